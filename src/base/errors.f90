@@ -1,0 +1,49 @@
+!> Errors as values: every procedure that can fail has a last argument
+!> `type(error_type), allocatable, intent(out) :: error`, left unallocated on success.
+module errors
+   implicit none
+   private
+
+   public :: error_type, fail, add_fault
+
+   !> What went wrong; the values are the exit statuses of the program.
+   integer, parameter, public :: error_input = 2          !! the user's input is wrong
+   integer, parameter, public :: error_file = 3           !! a file cannot be read or written
+   integer, parameter, public :: error_convergence = 4    !! a solver did not converge
+
+   !> An error: a message that says what, where, the value found and what is allowed.
+   type :: error_type
+      integer :: status = error_input          !! one of the parameters above
+      character(:), allocatable :: message     !! one line a fault, separated by new_line('a')
+   end type error_type
+
+contains
+
+   !> Set an error.
+   pure subroutine fail(error, status, message)
+      type(error_type), allocatable, intent(out) :: error
+      integer, intent(in) :: status              !! error_input, error_file or error_convergence
+      character(*), intent(in) :: message
+
+      allocate (error)
+      error%status = status
+      error%message = message
+   end subroutine fail
+
+   !> Add a fault to an error that may hold others already: all are reported at once.
+   !> The status is that of the first fault.
+   pure subroutine add_fault(error, status, message)
+      type(error_type), allocatable, intent(inout) :: error
+      integer, intent(in) :: status
+      character(*), intent(in) :: message
+
+      if (allocated(error)) then
+         error%message = error%message//new_line('a')//message
+      else
+         allocate (error)
+         error%status = status
+         error%message = message
+      end if
+   end subroutine add_fault
+
+end module errors

@@ -1,0 +1,45 @@
+!> The regular grid of cells on which everything lives.
+module regular_grid
+   use parallel, only : local_rows
+   use precision, only : dp
+   implicit none
+   private
+
+   public :: grid_type, new_grid
+
+   integer, parameter, public :: boundary_periodic = 1   !! the surface repeats for ever
+   integer, parameter, public :: boundary_free = 2       !! a patch on an unbounded half-space
+
+   !> Cell (i, j), from 0, has its centre at x = i dx, y = j dy.
+   type :: grid_type
+      integer :: nx = 0                         !! cells along x
+      integer :: ny = 0                         !! cells along y; 1 for a plane-strain line contact
+      real(dp) :: lx = 0.0_dp                   !! length along x, m
+      real(dp) :: ly = 0.0_dp                   !! length along y, m
+      real(dp) :: dx = 0.0_dp                   !! lx/nx
+      real(dp) :: dy = 0.0_dp                   !! ly/ny
+      integer :: boundary = boundary_periodic
+      integer :: first_row = 1                  !! this process's rows
+      integer :: last_row = 0
+   end type grid_type
+
+contains
+
+   !> Make a grid; the caller has checked that all numbers are positive.
+   pure function new_grid(nx, ny, lx, ly, boundary) result(self)
+      integer, intent(in) :: nx, ny
+      real(dp), intent(in) :: lx, ly
+      integer, intent(in) :: boundary
+      type(grid_type) :: self
+
+      self%nx = nx
+      self%ny = ny
+      self%lx = lx
+      self%ly = ly
+      self%dx = lx/nx
+      self%dy = ly/ny
+      self%boundary = boundary
+      call local_rows(ny, self%first_row, self%last_row)
+   end function new_grid
+
+end module regular_grid

@@ -1,0 +1,119 @@
+!> The checked settings of a case: one type for each namelist group, everything SI.
+!>
+!> `case_input` fills them from a file; `simulation` reads them. Choices are kept as the words of the
+!> input file, already checked, in lower case. The defaults stand in `case_input`.
+module case_settings
+   use precision, only : dp
+   use regular_grid, only : grid_type
+   implicit none
+   private
+
+   public :: adhesion_settings_type, case_type, friction_settings_type, material_settings_type, &
+      output_settings_type, phase_settings_type, solver_settings_type, surface_settings_type
+
+   integer, parameter, public :: word_length = 32       !! of a choice
+   integer, parameter, public :: path_length = 1024     !! of a file's path
+
+   !> `&surface`: one term of the sum of heights.
+   type :: surface_settings_type
+      character(word_length) :: shape               !! 'flat' | 'sphere' | 'paraboloid' | ...
+      real(dp) :: radius                            !! m
+      real(dp) :: amplitude                         !! m
+      real(dp) :: wavelength                        !! m
+      real(dp) :: hurst                             !! 0 < H <= 1
+      real(dp) :: wavelength_long                   !! largest wavelength, m
+      real(dp) :: wavelength_rolloff                !! m; equals wavelength_long without roll-off
+      real(dp) :: wavelength_short                  !! smallest wavelength, m
+      real(dp) :: rms_height                        !! m; 0 where rms_slope is given
+      real(dp) :: rms_slope                         !! 0 where rms_height is given
+      integer :: seed
+      character(word_length) :: generator           !! 'random_phase' | 'filtered_noise'
+      character(path_length) :: file
+      character(path_length) :: dataset             !! '' tries 'surface/height', then 'surface'
+      real(dp) :: scale
+      real(dp) :: centre_x, centre_y                !! m
+   end type surface_settings_type
+
+   !> `&material`, with Zener branches already turned into Prony arms.
+   type :: material_settings_type
+      real(dp) :: poisson
+      real(dp) :: shear_modulus                     !! long-term modulus G_e, Pa
+      real(dp), allocatable :: prony_g(:)           !! Pa; size 0 for an elastic material
+      real(dp), allocatable :: prony_tau(:)         !! relaxation times at the case's temperature, s
+      real(dp) :: thickness                         !! m; 0: half-space
+      real(dp) :: density                           !! kg/m3; 0: no inertia
+      real(dp) :: temperature                       !! C
+      real(dp) :: reference_temperature             !! C
+      real(dp) :: wlf_c1, wlf_c2                    !! both 0: no shift
+   end type material_settings_type
+
+   !> `&adhesion`
+   type :: adhesion_settings_type
+      character(word_length) :: potential           !! 'none' | 'exponential' | 'gauss' | 'maugis_dugdale'
+      real(dp) :: energy                            !! J/m2
+      real(dp) :: range                             !! m
+      character(word_length) :: start               !! 'non_adhesive' | 'full_contact'
+   end type adhesion_settings_type
+
+   !> `&friction`
+   type :: friction_settings_type
+      character(word_length) :: law                 !! 'none' | 'coulomb' | 'constant_shear' | 'coulomb_orowan'
+      real(dp) :: coefficient
+      real(dp) :: shear_strength                    !! Pa
+      logical :: slope_effect
+   end type friction_settings_type
+
+   !> `&phase`, resolved: nothing is left to be inherited or derived.
+   type :: phase_settings_type
+      character(64) :: name
+      logical :: static                             !! no duration: one solve
+      real(dp) :: duration                          !! s; 0 where static
+      integer :: steps                              !! at least 1; 1 where static
+      real(dp) :: dt                                !! s; 0 where static
+      character(word_length) :: control             !! 'pressure' | 'force' | 'displacement'
+      real(dp) :: target                            !! Pa, N or m, reached at the end
+      logical :: given                              !! the phase names its load itself
+      logical :: linear                             !! ramp = 'linear'
+      logical :: relaxed
+      real(dp) :: velocity_x, velocity_y            !! of the road, m/s
+   end type phase_settings_type
+
+   !> `&solver`
+   type :: solver_settings_type
+      real(dp) :: tolerance
+      integer :: max_iterations
+      character(word_length) :: method              !! 'fast' | 'thesis'
+      character(word_length) :: time_scheme         !! 'exponential2' | 'exponential' | 'backward_euler'
+      integer :: passes
+      character(word_length) :: slip_law            !! 'physical' | 'thesis'
+      character(word_length) :: interpolation       !! 'linear' | 'cubic'
+      character(word_length) :: precision           !! 'double' | 'mixed'
+      integer :: threads                            !! 0: all processors
+   end type solver_settings_type
+
+   !> `&output`
+   type :: output_settings_type
+      character(path_length) :: file                !! the case's name with .h5 by default
+      integer :: snapshot_every                     !! steps; 0: only the last
+      real(dp), allocatable :: snapshot_times(:)    !! s
+      character(word_length), allocatable :: snapshot_fields(:)
+      integer :: checkpoint_every                   !! steps; 0: only when stopped by a signal
+      integer :: compression                        !! deflate level, 0 to 9
+   end type output_settings_type
+
+   !> A whole case.
+   type :: case_type
+      character(:), allocatable :: path             !! of the input file
+      character(:), allocatable :: input            !! its text, verbatim
+      character(256) :: title
+      type(grid_type) :: grid
+      type(surface_settings_type), allocatable :: surfaces(:)
+      type(material_settings_type) :: material
+      type(adhesion_settings_type) :: adhesion
+      type(friction_settings_type) :: friction
+      type(phase_settings_type), allocatable :: phases(:)
+      type(solver_settings_type) :: solver
+      type(output_settings_type) :: output
+   end type case_type
+
+end module case_settings

@@ -1,0 +1,31 @@
+!> Tests of the ground floor.
+module test_base
+   use check, only : begin_suite, check_close, check_error, check_that
+   use errors, only : add_fault, error_file, error_input, error_type, fail
+   use precision, only : dp
+   use regular_grid, only : boundary_free, grid_type, new_grid
+   use version, only : asperity_version
+   implicit none
+   private
+
+   public :: run_base
+
+contains
+
+   subroutine run_base()
+      type(error_type), allocatable :: error
+      type(grid_type) :: grid
+
+      call begin_suite('base')
+      call fail(error, error_file, 'first')
+      call add_fault(error, error_input, 'second')
+      call check_error(error, 'first'//new_line('a')//'second', 'faults are gathered')
+      call check_that(error%status == error_file, 'the first fault gives the status')
+      grid = new_grid(6, 4, 3.0_dp, 1.0_dp, boundary_free)
+      call check_close(grid%dx, 0.5_dp, 0.0_dp, 'dx')
+      call check_close(grid%dy, 0.25_dp, 0.0_dp, 'dy')
+      call check_that(grid%first_row == 1 .and. grid%last_row == 4, 'all rows are here')
+      call check_that(verify(asperity_version, '0123456789.abcrdev') == 0, 'the version is a number')
+   end subroutine run_base
+
+end module test_base

@@ -1,0 +1,50 @@
+# Sourced by run.sh and test.sh from the project's root: installs what is missing, once, and leaves
+# fpm, python and the other tools on PATH. Afterwards it does nothing.
+set -eu
+
+packages="gcc gfortran libc6-dev pkg-config libfftw3-dev libhdf5-dev python3 python3-dev python3-venv"
+if command -v apt-get >/dev/null 2>&1; then
+  if ! dpkg -s $packages >/dev/null 2>&1; then
+    sudo=
+    [ "$(id -u)" = 0 ] || sudo=sudo
+    echo "asperity: installing Debian packages: $packages" >&2
+    $sudo apt-get update -qq
+    $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends \
+      $packages >/dev/null
+  fi
+else
+  missing=
+  for tool in gcc gfortran pkg-config python3; do
+    command -v $tool >/dev/null 2>&1 || missing="$missing $tool"
+  done
+  if command -v pkg-config >/dev/null 2>&1; then
+    for library in fftw3 fftw3f hdf5; do
+      pkg-config --exists $library || missing="$missing $library"
+    done
+  fi
+  if [ -n "$missing" ]; then
+    echo "asperity: not found:$missing" >&2
+    echo "asperity: install gcc, gfortran, pkg-config, FFTW 3 (double and single, with OpenMP)," >&2
+    echo "asperity: HDF5 with its Fortran interface, and Python 3.10 or newer; docs/install.md" >&2
+    echo "asperity: lists the packages of conda-forge and Homebrew." >&2
+    exit 1
+  fi
+fi
+
+if ! [ .venv/ready -nt pyproject.toml ] || ! [ .venv/ready -nt tools/requirements.txt ]; then
+  echo "asperity: installing the Python tools into .venv" >&2
+  python3 -m venv .venv
+  .venv/bin/python -m pip install -q --disable-pip-version-check -r tools/requirements.txt
+  touch .venv/ready
+fi
+PATH=$PWD/.venv/bin:$PATH
+export PATH
+
+# Where libhdf5-openmpi-dev is installed, hdf5.pc names the parallel library: ask for the serial one.
+if pkg-config --exists hdf5-serial 2>/dev/null; then
+  mkdir -p .venv/pkgconfig
+  printf 'Name: hdf5\nDescription: serial HDF5\nVersion: 1.10\nRequires: hdf5-serial\n' \
+    >.venv/pkgconfig/hdf5.pc
+  PKG_CONFIG_PATH=$PWD/.venv/pkgconfig${PKG_CONFIG_PATH:+:$PKG_CONFIG_PATH}
+  export PKG_CONFIG_PATH
+fi
