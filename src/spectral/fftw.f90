@@ -1,0 +1,179 @@
+!> Interfaces to the part of FFTW 3 that is used here, in double and single precision.
+!>
+!> Written from the FFTW manual. Plans are executed only by the new-array routines, on buffers of
+!> `fftw_alloc_*`, so that their alignment is that of the planning.
+module fftw
+   use, intrinsic :: iso_c_binding, only : c_char, c_double, c_float, c_int, c_ptr, c_size_t
+   implicit none
+   public
+
+   integer(c_int), parameter :: fftw_measure = 0
+   integer(c_int), parameter :: fftw_estimate = 64
+
+   interface
+
+      type(c_ptr) function fftw_alloc_real(n) bind(c, name='fftw_alloc_real')
+         import :: c_ptr, c_size_t
+         integer(c_size_t), value :: n
+      end function fftw_alloc_real
+
+      type(c_ptr) function fftwf_alloc_real(n) bind(c, name='fftwf_alloc_real')
+         import :: c_ptr, c_size_t
+         integer(c_size_t), value :: n
+      end function fftwf_alloc_real
+
+      subroutine fftw_free(p) bind(c, name='fftw_free')
+         import :: c_ptr
+         type(c_ptr), value :: p
+      end subroutine fftw_free
+
+      subroutine fftwf_free(p) bind(c, name='fftwf_free')
+         import :: c_ptr
+         type(c_ptr), value :: p
+      end subroutine fftwf_free
+
+      integer(c_int) function fftw_init_threads() bind(c, name='fftw_init_threads')
+         import :: c_int
+      end function fftw_init_threads
+
+      integer(c_int) function fftwf_init_threads() bind(c, name='fftwf_init_threads')
+         import :: c_int
+      end function fftwf_init_threads
+
+      subroutine fftw_plan_with_nthreads(n) bind(c, name='fftw_plan_with_nthreads')
+         import :: c_int
+         integer(c_int), value :: n
+      end subroutine fftw_plan_with_nthreads
+
+      subroutine fftwf_plan_with_nthreads(n) bind(c, name='fftwf_plan_with_nthreads')
+         import :: c_int
+         integer(c_int), value :: n
+      end subroutine fftwf_plan_with_nthreads
+
+      type(c_ptr) function fftw_plan_many_dft_r2c(rank, n, howmany, in, inembed, istride, idist, &
+         out, onembed, ostride, odist, flags) bind(c, name='fftw_plan_many_dft_r2c')
+         import :: c_int, c_ptr
+         integer(c_int), value :: rank, howmany, istride, idist, ostride, odist, flags
+         integer(c_int), intent(in) :: n(*), inembed(*), onembed(*)
+         type(c_ptr), value :: in, out
+      end function fftw_plan_many_dft_r2c
+
+      type(c_ptr) function fftw_plan_many_dft_c2r(rank, n, howmany, in, inembed, istride, idist, &
+         out, onembed, ostride, odist, flags) bind(c, name='fftw_plan_many_dft_c2r')
+         import :: c_int, c_ptr
+         integer(c_int), value :: rank, howmany, istride, idist, ostride, odist, flags
+         integer(c_int), intent(in) :: n(*), inembed(*), onembed(*)
+         type(c_ptr), value :: in, out
+      end function fftw_plan_many_dft_c2r
+
+      type(c_ptr) function fftw_plan_many_dft(rank, n, howmany, in, inembed, istride, idist, &
+         out, onembed, ostride, odist, direction, flags) bind(c, name='fftw_plan_many_dft')
+         import :: c_int, c_ptr
+         integer(c_int), value :: rank, howmany, istride, idist, ostride, odist, direction, flags
+         integer(c_int), intent(in) :: n(*), inembed(*), onembed(*)
+         type(c_ptr), value :: in, out
+      end function fftw_plan_many_dft
+
+      type(c_ptr) function fftwf_plan_many_dft_r2c(rank, n, howmany, in, inembed, istride, idist, &
+         out, onembed, ostride, odist, flags) bind(c, name='fftwf_plan_many_dft_r2c')
+         import :: c_int, c_ptr
+         integer(c_int), value :: rank, howmany, istride, idist, ostride, odist, flags
+         integer(c_int), intent(in) :: n(*), inembed(*), onembed(*)
+         type(c_ptr), value :: in, out
+      end function fftwf_plan_many_dft_r2c
+
+      type(c_ptr) function fftwf_plan_many_dft_c2r(rank, n, howmany, in, inembed, istride, idist, &
+         out, onembed, ostride, odist, flags) bind(c, name='fftwf_plan_many_dft_c2r')
+         import :: c_int, c_ptr
+         integer(c_int), value :: rank, howmany, istride, idist, ostride, odist, flags
+         integer(c_int), intent(in) :: n(*), inembed(*), onembed(*)
+         type(c_ptr), value :: in, out
+      end function fftwf_plan_many_dft_c2r
+
+      type(c_ptr) function fftwf_plan_many_dft(rank, n, howmany, in, inembed, istride, idist, &
+         out, onembed, ostride, odist, direction, flags) bind(c, name='fftwf_plan_many_dft')
+         import :: c_int, c_ptr
+         integer(c_int), value :: rank, howmany, istride, idist, ostride, odist, direction, flags
+         integer(c_int), intent(in) :: n(*), inembed(*), onembed(*)
+         type(c_ptr), value :: in, out
+      end function fftwf_plan_many_dft
+
+      subroutine fftw_execute_dft_r2c(plan, in, out) bind(c, name='fftw_execute_dft_r2c')
+         import :: c_double, c_ptr
+         type(c_ptr), value :: plan
+         real(c_double), intent(inout) :: in(*)
+         real(c_double), intent(inout) :: out(*)
+      end subroutine fftw_execute_dft_r2c
+
+      subroutine fftw_execute_dft_c2r(plan, in, out) bind(c, name='fftw_execute_dft_c2r')
+         import :: c_double, c_ptr
+         type(c_ptr), value :: plan
+         real(c_double), intent(inout) :: in(*)
+         real(c_double), intent(inout) :: out(*)
+      end subroutine fftw_execute_dft_c2r
+
+      subroutine fftw_execute_dft(plan, in, out) bind(c, name='fftw_execute_dft')
+         import :: c_double, c_ptr
+         type(c_ptr), value :: plan
+         real(c_double), intent(inout) :: in(*)
+         real(c_double), intent(inout) :: out(*)
+      end subroutine fftw_execute_dft
+
+      subroutine fftwf_execute_dft_r2c(plan, in, out) bind(c, name='fftwf_execute_dft_r2c')
+         import :: c_float, c_ptr
+         type(c_ptr), value :: plan
+         real(c_float), intent(inout) :: in(*)
+         real(c_float), intent(inout) :: out(*)
+      end subroutine fftwf_execute_dft_r2c
+
+      subroutine fftwf_execute_dft_c2r(plan, in, out) bind(c, name='fftwf_execute_dft_c2r')
+         import :: c_float, c_ptr
+         type(c_ptr), value :: plan
+         real(c_float), intent(inout) :: in(*)
+         real(c_float), intent(inout) :: out(*)
+      end subroutine fftwf_execute_dft_c2r
+
+      subroutine fftwf_execute_dft(plan, in, out) bind(c, name='fftwf_execute_dft')
+         import :: c_float, c_ptr
+         type(c_ptr), value :: plan
+         real(c_float), intent(inout) :: in(*)
+         real(c_float), intent(inout) :: out(*)
+      end subroutine fftwf_execute_dft
+
+      subroutine fftw_destroy_plan(plan) bind(c, name='fftw_destroy_plan')
+         import :: c_ptr
+         type(c_ptr), value :: plan
+      end subroutine fftw_destroy_plan
+
+      subroutine fftwf_destroy_plan(plan) bind(c, name='fftwf_destroy_plan')
+         import :: c_ptr
+         type(c_ptr), value :: plan
+      end subroutine fftwf_destroy_plan
+
+      integer(c_int) function fftw_import_wisdom_from_filename(file) &
+         bind(c, name='fftw_import_wisdom_from_filename')
+         import :: c_char, c_int
+         character(kind=c_char), intent(in) :: file(*)
+      end function fftw_import_wisdom_from_filename
+
+      integer(c_int) function fftw_export_wisdom_to_filename(file) &
+         bind(c, name='fftw_export_wisdom_to_filename')
+         import :: c_char, c_int
+         character(kind=c_char), intent(in) :: file(*)
+      end function fftw_export_wisdom_to_filename
+
+      integer(c_int) function fftwf_import_wisdom_from_filename(file) &
+         bind(c, name='fftwf_import_wisdom_from_filename')
+         import :: c_char, c_int
+         character(kind=c_char), intent(in) :: file(*)
+      end function fftwf_import_wisdom_from_filename
+
+      integer(c_int) function fftwf_export_wisdom_to_filename(file) &
+         bind(c, name='fftwf_export_wisdom_to_filename')
+         import :: c_char, c_int
+         character(kind=c_char), intent(in) :: file(*)
+      end function fftwf_export_wisdom_to_filename
+
+   end interface
+
+end module fftw
