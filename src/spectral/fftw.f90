@@ -3,7 +3,7 @@
 !> Written from the FFTW manual. Plans are executed only by the new-array routines, on buffers of
 !> `fftw_alloc_*`, so that their alignment is that of the planning.
 module fftw
-   use, intrinsic :: iso_c_binding, only : c_char, c_double, c_float, c_int, c_ptr, c_size_t
+   use, intrinsic :: iso_c_binding, only : c_char, c_int, c_ptr, c_size_t
    implicit none
    public
 
@@ -99,45 +99,33 @@ module fftw
       end function fftwf_plan_many_dft
 
       subroutine fftw_execute_dft_r2c(plan, in, out) bind(c, name='fftw_execute_dft_r2c')
-         import :: c_double, c_ptr
-         type(c_ptr), value :: plan
-         real(c_double), intent(inout) :: in(*)
-         real(c_double), intent(inout) :: out(*)
+         import :: c_ptr
+         type(c_ptr), value :: plan, in, out
       end subroutine fftw_execute_dft_r2c
 
       subroutine fftw_execute_dft_c2r(plan, in, out) bind(c, name='fftw_execute_dft_c2r')
-         import :: c_double, c_ptr
-         type(c_ptr), value :: plan
-         real(c_double), intent(inout) :: in(*)
-         real(c_double), intent(inout) :: out(*)
+         import :: c_ptr
+         type(c_ptr), value :: plan, in, out
       end subroutine fftw_execute_dft_c2r
 
       subroutine fftw_execute_dft(plan, in, out) bind(c, name='fftw_execute_dft')
-         import :: c_double, c_ptr
-         type(c_ptr), value :: plan
-         real(c_double), intent(inout) :: in(*)
-         real(c_double), intent(inout) :: out(*)
+         import :: c_ptr
+         type(c_ptr), value :: plan, in, out
       end subroutine fftw_execute_dft
 
       subroutine fftwf_execute_dft_r2c(plan, in, out) bind(c, name='fftwf_execute_dft_r2c')
-         import :: c_float, c_ptr
-         type(c_ptr), value :: plan
-         real(c_float), intent(inout) :: in(*)
-         real(c_float), intent(inout) :: out(*)
+         import :: c_ptr
+         type(c_ptr), value :: plan, in, out
       end subroutine fftwf_execute_dft_r2c
 
       subroutine fftwf_execute_dft_c2r(plan, in, out) bind(c, name='fftwf_execute_dft_c2r')
-         import :: c_float, c_ptr
-         type(c_ptr), value :: plan
-         real(c_float), intent(inout) :: in(*)
-         real(c_float), intent(inout) :: out(*)
+         import :: c_ptr
+         type(c_ptr), value :: plan, in, out
       end subroutine fftwf_execute_dft_c2r
 
       subroutine fftwf_execute_dft(plan, in, out) bind(c, name='fftwf_execute_dft')
-         import :: c_float, c_ptr
-         type(c_ptr), value :: plan
-         real(c_float), intent(inout) :: in(*)
-         real(c_float), intent(inout) :: out(*)
+         import :: c_ptr
+         type(c_ptr), value :: plan, in, out
       end subroutine fftwf_execute_dft
 
       subroutine fftw_destroy_plan(plan) bind(c, name='fftw_destroy_plan')
