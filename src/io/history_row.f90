@@ -76,9 +76,9 @@ contains
             'mean tangential traction on the rubber along y', .false.), &
          column_type('stick_area', '1', 'fraction of the grid that sticks', .false.), &
          column_type('friction_viscous', '1', &
-            '-mean(P dH/ds)/mean(P) along the road's velocity', .false.), &
+            "-mean(P dH/ds)/mean(P) along the road's velocity", .false.), &
          column_type('friction', '1', &
-            'apparent friction coefficient along the road's velocity', .false.), &
+            "apparent friction coefficient along the road's velocity", .false.), &
          column_type('work_normal', 'J', &
             'work of the normal traction, with the change of the adhesive energy', .false.), &
          column_type('work_tangential', 'J', &
@@ -91,9 +91,9 @@ contains
          column_type('energy_adhesive', 'J', 'energy of adhesion', .false.), &
          column_type('energy_kinetic', 'J', 'kinetic energy of the interface', .false.), &
          column_type('dissipated_viscous', 'J', &
-            'energy lost in the rubber, the scheme's own loss included', .false.), &
+            "energy lost in the rubber, the scheme's own loss included", .false.), &
          column_type('dissipated_numerical', 'J', &
-            'the part of the lost energy that is the scheme's own', .false.), &
+            "the part of the lost energy that is the scheme's own", .false.), &
          column_type('dissipated_friction', 'J', &
             'energy lost by friction in the interface', .false.), &
          column_type('iterations_normal', '1', 'iterations of the normal solver', .true.), &
