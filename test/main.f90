@@ -2,9 +2,11 @@
 program main
    use check, only : finish
    use test_base, only : run_base
+   use test_fft_conv, only : run_fft_conv
    implicit none
 
    if (wanted('base')) call run_base()
+   if (wanted('fft_conv')) call run_fft_conv()
    call finish()
 
 contains

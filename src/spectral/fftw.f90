@@ -9,6 +9,10 @@ module fftw
 
    integer(c_int), parameter :: fftw_measure = 0
    integer(c_int), parameter :: fftw_estimate = 64
+   integer(c_int), parameter :: fftw_forward = -1
+   integer(c_int), parameter :: fftw_backward = 1
+   integer(c_int), parameter :: fftw_redft00 = 3
+   integer(c_int), parameter :: fftw_rodft00 = 7
 
    interface
 
@@ -127,6 +131,18 @@ module fftw
          import :: c_ptr
          type(c_ptr), value :: plan, in, out
       end subroutine fftwf_execute_dft
+
+      type(c_ptr) function fftw_plan_r2r_2d(n0, n1, in, out, kind0, kind1, flags) &
+         bind(c, name='fftw_plan_r2r_2d')
+         import :: c_int, c_ptr
+         integer(c_int), value :: n0, n1, kind0, kind1, flags
+         type(c_ptr), value :: in, out
+      end function fftw_plan_r2r_2d
+
+      subroutine fftw_execute_r2r(plan, in, out) bind(c, name='fftw_execute_r2r')
+         import :: c_ptr
+         type(c_ptr), value :: plan, in, out
+      end subroutine fftw_execute_r2r
 
       subroutine fftw_destroy_plan(plan) bind(c, name='fftw_destroy_plan')
          import :: c_ptr

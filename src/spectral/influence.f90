@@ -1,0 +1,221 @@
+!> Influence coefficients: the displacement of a half-space of unit shear modulus under a traction.
+!>
+!> Periodic: the symbol of the operator for a wave vector q. Free: the displacement of cell centres
+!> under a uniform traction on one cell (Love 1929; Kalker 1990), and the discrete transform of these
+!> coefficients on a doubled, wrapped grid. Both for any Poisson ratio.
+!>
+!> All symbols are even in q_x and q_y, but that of the coupling xy, which is odd in both: a quarter of
+!> the plane is stored, tables (0:mx/2, 0:my/2).
+module influence
+   use, intrinsic :: iso_c_binding, only : c_f_pointer, c_int, c_loc, c_ptr, c_size_t
+   use fftw, only : fftw_alloc_real, fftw_destroy_plan, fftw_estimate, fftw_execute_r2r, &
+      fftw_free, fftw_plan_r2r_2d, fftw_redft00, fftw_rodft00
+   use precision, only : dp, pi
+   use regular_grid, only : boundary_periodic, grid_type
+   implicit none
+   private
+
+   public :: love_normal, love_tangential, normal_symbol, tangential_symbol, transform_length
+
+contains
+
+   !> Displacement u_z at (x, y) under unit pressure on the cell dx by dy at the origin, G = 1.
+   elemental function love_normal(x, y, dx, dy, poisson) result(a_zz)
+      real(dp), intent(in) :: x, y        !! m
+      real(dp), intent(in) :: dx, dy      !! m
+      real(dp), intent(in) :: poisson
+      real(dp) :: a_zz                    !! m for 1 Pa over 1 Pa of modulus
+      real(dp) :: i_x2, i_y2, i_xy
+
+      call corner_sums(x, y, dx, dy, i_x2, i_y2, i_xy)
+      a_zz = (1.0_dp - poisson)*(i_x2 + i_y2)/(2.0_dp*pi)
+   end function love_normal
+
+   !> Displacements in the plane at (x, y) under unit tangential traction on the cell at the origin.
+   elemental subroutine love_tangential(x, y, dx, dy, poisson, a_xx, a_xy, a_yy)
+      real(dp), intent(in) :: x, y
+      real(dp), intent(in) :: dx, dy
+      real(dp), intent(in) :: poisson
+      real(dp), intent(out) :: a_xx, a_xy, a_yy
+      real(dp) :: i_x2, i_y2, i_xy
+
+      call corner_sums(x, y, dx, dy, i_x2, i_y2, i_xy)
+      a_xx = ((1.0_dp - poisson)*i_y2 + i_x2)/(2.0_dp*pi)
+      a_yy = (i_y2 + (1.0_dp - poisson)*i_x2)/(2.0_dp*pi)
+      a_xy = poisson*i_xy/(2.0_dp*pi)
+   end subroutine love_tangential
+
+   !> The integrals of y^2/r^3, x^2/r^3 and x y/r^3 over a cell, by their values at its corners.
+   elemental subroutine corner_sums(x, y, dx, dy, i_x2, i_y2, i_xy)
+      real(dp), intent(in) :: x, y, dx, dy
+      real(dp), intent(out) :: i_x2, i_y2, i_xy
+      real(dp) :: a, b, sign
+      integer :: k, l
+
+      i_x2 = 0.0_dp
+      i_y2 = 0.0_dp
+      i_xy = 0.0_dp
+      do l = -1, 1, 2
+         do k = -1, 1, 2
+            a = x + 0.5_dp*k*dx
+            b = y + 0.5_dp*l*dy
+            sign = real(k*l, dp)
+            if (a /= 0.0_dp) i_y2 = i_y2 + sign*a*asinh(b/abs(a))
+            if (b /= 0.0_dp) i_x2 = i_x2 + sign*b*asinh(a/abs(b))
+            i_xy = i_xy - sign*hypot(a, b)
+         end do
+      end do
+   end subroutine corner_sums
+
+   !> Length of the transforms along a direction of n cells: n itself where periodic; in free mode at
+   !> least 2n, even, with small prime factors.
+   pure function transform_length(n, boundary) result(m)
+      integer, intent(in) :: n
+      integer, intent(in) :: boundary
+      integer :: m
+      integer :: rest
+
+      if (boundary == boundary_periodic) then
+         m = n
+         return
+      end if
+      m = 2*n
+      do
+         rest = m
+         do while (mod(rest, 2) == 0)
+            rest = rest/2
+         end do
+         do while (mod(rest, 3) == 0)
+            rest = rest/3
+         end do
+         do while (mod(rest, 5) == 0)
+            rest = rest/5
+         end do
+         if (rest == 1) return
+         m = m + 2
+      end do
+   end function transform_length
+
+   !> Symbol of A_zz for G = 1: (1-nu)/q, or the transform of Love's coefficients in free mode.
+   subroutine normal_symbol(grid, poisson, mx, my, symbol)
+      type(grid_type), intent(in) :: grid
+      real(dp), intent(in) :: poisson
+      integer, intent(in) :: mx, my                     !! lengths of the transforms
+      real(dp), intent(out) :: symbol(0:mx/2, 0:my/2)   !! m/Pa for G = 1 Pa
+      integer :: i, j
+      real(dp) :: q
+
+      if (grid%boundary == boundary_periodic) then
+         !$omp parallel do default(none) shared(grid, poisson, mx, my, symbol) private(i, j, q)
+         do j = 0, my/2
+            do i = 0, mx/2
+               q = 2.0_dp*pi*hypot(i/grid%lx, j/grid%ly)
+               if (q > 0.0_dp) then
+                  symbol(i, j) = (1.0_dp - poisson)/q
+               else
+                  symbol(i, j) = 0.0_dp
+               end if
+            end do
+         end do
+      else
+         !$omp parallel do default(none) shared(grid, poisson, mx, my, symbol) private(i, j)
+         do j = 0, my/2
+            do i = 0, mx/2
+               symbol(i, j) = love_normal(i*grid%dx, j*grid%dy, grid%dx, grid%dy, poisson)
+            end do
+         end do
+         call transform_even(mx, my, symbol)
+      end if
+   end subroutine normal_symbol
+
+   !> Symbols of A_xx, A_yy and A_xy for G = 1. The zero mode of a periodic block is its thickness:
+   !> a block sheared over the height h gives by h/G (0 for a half-space).
+   subroutine tangential_symbol(grid, poisson, thickness, mx, my, a_xx, a_yy, a_xy)
+      type(grid_type), intent(in) :: grid
+      real(dp), intent(in) :: poisson
+      real(dp), intent(in) :: thickness                 !! m; used in periodic mode only
+      integer, intent(in) :: mx, my
+      real(dp), intent(out) :: a_xx(0:mx/2, 0:my/2)
+      real(dp), intent(out) :: a_yy(0:mx/2, 0:my/2)
+      real(dp), intent(out) :: a_xy(0:mx/2, 0:my/2)     !! for q_x, q_y >= 0; odd in both
+      integer :: i, j
+      real(dp) :: qx, qy, q
+
+      if (grid%boundary == boundary_periodic) then
+         do j = 0, my/2
+            do i = 0, mx/2
+               qx = 2.0_dp*pi*i/grid%lx
+               qy = 2.0_dp*pi*j/grid%ly
+               q = hypot(qx, qy)
+               if (q > 0.0_dp) then
+                  a_xx(i, j) = (1.0_dp - poisson*(qx/q)**2)/q
+                  a_yy(i, j) = (1.0_dp - poisson*(qy/q)**2)/q
+                  a_xy(i, j) = -poisson*(qx/q)*(qy/q)/q
+               else
+                  a_xx(i, j) = thickness
+                  a_yy(i, j) = thickness
+                  a_xy(i, j) = 0.0_dp
+               end if
+               ! An odd symbol has no value on the Nyquist lines.
+               if (2*i == mx .or. 2*j == my) a_xy(i, j) = 0.0_dp
+            end do
+         end do
+      else
+         do j = 0, my/2
+            do i = 0, mx/2
+               call love_tangential(i*grid%dx, j*grid%dy, grid%dx, grid%dy, poisson, &
+                  a_xx(i, j), a_xy(i, j), a_yy(i, j))
+            end do
+         end do
+         call transform_even(mx, my, a_xx)
+         call transform_even(mx, my, a_yy)
+         call transform_odd(mx, my, a_xy)
+      end if
+   end subroutine tangential_symbol
+
+   !> Transform of coefficients that are even in both directions, in place; mx and my even.
+   subroutine transform_even(mx, my, table)
+      integer, intent(in) :: mx, my
+      real(dp), intent(inout) :: table(0:mx/2, 0:my/2)
+
+      call transform_real(mx/2 + 1, my/2 + 1, fftw_redft00, table)
+   end subroutine transform_even
+
+   !> Transform of coefficients that are odd in both directions, in place; mx and my even.
+   !> Two sine transforms, each with the factor -i, make it real and negative.
+   subroutine transform_odd(mx, my, table)
+      integer, intent(in) :: mx, my
+      real(dp), intent(inout) :: table(0:mx/2, 0:my/2)
+      real(dp), allocatable :: inner(:, :)
+
+      inner = -table(1:mx/2 - 1, 1:my/2 - 1)
+      table = 0.0_dp
+      if (size(inner) == 0) return
+      call transform_real(mx/2 - 1, my/2 - 1, fftw_rodft00, inner)
+      table(1:mx/2 - 1, 1:my/2 - 1) = inner
+   end subroutine transform_odd
+
+   !> A real transform of one kind in both directions, in place.
+   subroutine transform_real(nx, ny, kind, table)
+      integer, intent(in) :: nx, ny
+      integer(c_int), intent(in) :: kind
+      real(dp), intent(inout) :: table(nx, ny)
+      type(c_ptr) :: memory, plan
+      real(dp), pointer :: work(:, :)
+
+      memory = fftw_alloc_real(int(nx, c_size_t)*ny)
+      call c_f_pointer(memory, work, [nx, ny])
+      !$omp critical (fftw_planner)
+      plan = fftw_plan_r2r_2d(int(ny, c_int), int(nx, c_int), memory, memory, kind, kind, &
+         fftw_estimate)
+      !$omp end critical (fftw_planner)
+      work(:, :) = table
+      call fftw_execute_r2r(plan, memory, memory)
+      table(:, :) = work
+      !$omp critical (fftw_planner)
+      call fftw_destroy_plan(plan)
+      !$omp end critical (fftw_planner)
+      call fftw_free(memory)
+   end subroutine transform_real
+
+end module influence

@@ -1,0 +1,114 @@
+!> What FFTW learnt by measuring, kept in the user's cache folder between runs.
+!>
+!> Measured plans are faster, but two measurements may choose differently and then differ in the last
+!> bits. So plans are measured only where their wisdom can be kept: a run, its restart and its
+!> repetition use the same plans. Elsewhere the planner's estimate is used, which never varies.
+!> The folder is $XDG_CACHE_HOME/asperity or $HOME/.cache/asperity.
+module wisdom
+   use, intrinsic :: iso_c_binding, only : c_char, c_int, c_null_char
+   use fftw, only : fftw_estimate, fftw_export_wisdom_to_filename, &
+      fftw_import_wisdom_from_filename, fftw_measure, fftwf_export_wisdom_to_filename, &
+      fftwf_import_wisdom_from_filename
+   implicit none
+   private
+
+   public :: planning_flag, save_wisdom
+
+   logical :: started = .false.
+   logical :: kept = .false.
+   character(:), allocatable :: folder
+
+   interface
+      integer(c_int) function c_mkdir(path, mode) bind(c, name='mkdir')
+         import :: c_char, c_int
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int), value :: mode
+      end function c_mkdir
+
+      integer(c_int) function c_rename(from, to) bind(c, name='rename')
+         import :: c_char, c_int
+         character(kind=c_char), intent(in) :: from(*), to(*)
+      end function c_rename
+
+      integer(c_int) function c_access(path, mode) bind(c, name='access')
+         import :: c_char, c_int
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int), value :: mode
+      end function c_access
+
+      integer(c_int) function c_getpid() bind(c, name='getpid')
+         import :: c_int
+      end function c_getpid
+   end interface
+
+contains
+
+   !> The flag for FFTW's planner; reads the kept wisdom at the first call.
+   !> To be called inside the critical section `fftw_planner`.
+   integer(c_int) function planning_flag() result(flag)
+      integer(c_int), parameter :: writable = 2
+      integer(c_int) :: status
+
+      if (.not. started) then
+         started = .true.
+         call find_folder()
+         kept = len(folder) > 0
+         if (kept) kept = c_access(folder//c_null_char, writable) == 0
+         if (kept) then
+            status = fftw_import_wisdom_from_filename(folder//'/fftw'//c_null_char)
+            status = fftwf_import_wisdom_from_filename(folder//'/fftwf'//c_null_char)
+         end if
+      end if
+      flag = merge(fftw_measure, fftw_estimate, kept)
+   end function planning_flag
+
+   !> Keep what the planner has learnt; failing to do so harms nobody.
+   !> To be called inside the critical section `fftw_planner`.
+   subroutine save_wisdom()
+      integer(c_int) :: status
+      character(16) :: process
+      character(:), allocatable :: temporary
+
+      if (.not. kept) return
+      write (process, '(i0)') c_getpid()
+      temporary = folder//'/new'//trim(process)//c_null_char
+      if (fftw_export_wisdom_to_filename(temporary) /= 0) then
+         status = c_rename(temporary, folder//'/fftw'//c_null_char)
+      end if
+      if (fftwf_export_wisdom_to_filename(temporary) /= 0) then
+         status = c_rename(temporary, folder//'/fftwf'//c_null_char)
+      end if
+   end subroutine save_wisdom
+
+   !> Name the cache folder and make it where it is missing.
+   subroutine find_folder()
+      integer(c_int) :: status
+      character(:), allocatable :: parent
+
+      parent = environment('XDG_CACHE_HOME')
+      if (len(parent) == 0) then
+         parent = environment('HOME')
+         if (len(parent) > 0) parent = parent//'/.cache'
+      end if
+      if (len(parent) == 0) then
+         folder = ''
+         return
+      end if
+      folder = parent//'/asperity'
+      status = c_mkdir(parent//c_null_char, int(o'755', c_int))
+      status = c_mkdir(folder//c_null_char, int(o'755', c_int))
+   end subroutine find_folder
+
+   !> The value of an environment variable, '' where it is not set.
+   function environment(name) result(value)
+      character(*), intent(in) :: name
+      character(:), allocatable :: value
+      integer :: length, status
+
+      call get_environment_variable(name, length=length, status=status)
+      if (status /= 0) length = 0
+      allocate (character(length) :: value)
+      if (length > 0) call get_environment_variable(name, value)
+   end function environment
+
+end module wisdom

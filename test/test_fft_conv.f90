@@ -1,0 +1,243 @@
+!> Tests of the influence coefficients and of the convolution operator.
+module test_fft_conv
+   use check, only : begin_suite, check_close, check_no_error, check_that
+   use errors, only : error_type
+   use fft_conv, only : convolution_type, new_normal_operator, new_symbol_operator, &
+      new_tangential_operator
+   use influence, only : love_normal, love_tangential, transform_length
+   use precision, only : dp, pi
+   use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
+   implicit none
+   private
+
+   public :: run_fft_conv
+
+contains
+
+   subroutine run_fft_conv()
+      call begin_suite('fft_conv')
+      call test_quadrature()
+      call test_waves(8, 6, 3.0_dp, 2.0_dp)
+      call test_waves(9, 5, 1.0_dp, 2.0_dp)
+      call test_waves(16, 1, 1.0_dp, 2.0_dp)
+      call test_waves(160, 131, 1.0_dp, 0.7_dp)
+      call test_free_sums(7, 5)
+      call test_free_sums(6, 8)
+      call test_free_sums(1, 3)
+      call test_inverse()
+      call test_periodic_against_free()
+      call check_that(transform_length(7, boundary_periodic) == 7, 'no padding where periodic')
+      call check_that(transform_length(509, boundary_free) == 1024, 'padding to small factors')
+   end subroutine run_fft_conv
+
+   !> Love's coefficients against midpoint quadrature of the point solutions.
+   subroutine test_quadrature()
+      integer, parameter :: m = 400
+      real(dp), parameter :: dx = 0.7_dp, dy = 1.3_dp, nu = 0.3_dp
+      real(dp) :: x, y, a, b, r, zz, xx, xy, yy, l_xx, l_xy, l_yy
+      integer :: i, j
+
+      x = 2.0_dp
+      y = -1.5_dp
+      zz = 0.0_dp
+      xx = 0.0_dp
+      xy = 0.0_dp
+      yy = 0.0_dp
+      do j = 1, m
+         do i = 1, m
+            a = x - dx*((i - 0.5_dp)/m - 0.5_dp)
+            b = y - dy*((j - 0.5_dp)/m - 0.5_dp)
+            r = hypot(a, b)
+            zz = zz + (1.0_dp - nu)/r
+            xx = xx + (1.0_dp - nu)/r + nu*a**2/r**3
+            yy = yy + (1.0_dp - nu)/r + nu*b**2/r**3
+            xy = xy + nu*a*b/r**3
+         end do
+      end do
+      r = dx*dy/(2.0_dp*pi*real(m, dp)**2)
+      call love_tangential(x, y, dx, dy, nu, l_xx, l_xy, l_yy)
+      ! The midpoint rule with 400 x 400 points is good to about (dx/m)^2/24 = 1e-7 of the value.
+      call check_close(love_normal(x, y, dx, dy, nu), zz*r, 1e-7_dp*zz*r, 'a_zz by quadrature')
+      call check_close(l_xx, xx*r, 1e-7_dp*xx*r, 'a_xx by quadrature')
+      call check_close(l_yy, yy*r, 1e-7_dp*yy*r, 'a_yy by quadrature')
+      call check_close(l_xy, xy*r, 1e-6_dp*abs(xy*r), 'a_xy by quadrature')
+      ! At the centre of a square cell: 4 asinh(1) dx (1-nu)/(2 pi).
+      call check_close(love_normal(0.0_dp, 0.0_dp, 2.0_dp, 2.0_dp, 0.5_dp), &
+         4.0_dp*asinh(1.0_dp)*2.0_dp*0.5_dp/(2.0_dp*pi), 1e-15_dp, 'a_zz of a cell on itself')
+   end subroutine test_quadrature
+
+   !> Oblique waves are eigenfunctions of the periodic operators.
+   subroutine test_waves(nx, ny, lx, ly)
+      integer, intent(in) :: nx, ny
+      real(dp), intent(in) :: lx, ly
+      real(dp), parameter :: nu = 0.3_dp, h = 0.25_dp
+      type(grid_type) :: grid
+      type(convolution_type) :: normal, tangential
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: p(:, :), py(:, :), u(:, :), uy(:, :), w(:, :)
+      real(dp) :: qx, qy, q, form
+      integer :: i, j, kx, ky
+
+      grid = new_grid(nx, ny, lx, ly, boundary_periodic)
+      call new_normal_operator(normal, grid, nu, error)
+      call check_no_error(error, 'normal operator')
+      call new_tangential_operator(tangential, grid, nu, h, error)
+      call check_no_error(error, 'tangential operator')
+      allocate (p(nx, ny), py(nx, ny), u(nx, ny), uy(nx, ny), w(nx, ny))
+      do ky = -min(2, (ny - 1)/2), min(2, (ny - 1)/2)
+         do kx = 0, 2
+            qx = 2.0_dp*pi*kx/lx
+            qy = 2.0_dp*pi*ky/ly
+            q = hypot(qx, qy)
+            do j = 1, ny
+               do i = 1, nx
+                  w(i, j) = cos(qx*lx*(i - 1)/nx + qy*ly*(j - 1)/ny + 0.4_dp)
+               end do
+            end do
+            call normal%apply(w, u, form)
+            if (q > 0.0_dp) then
+               call check_close(maxval(abs(u - w*(1.0_dp - nu)/q)), 0.0_dp, 1e-14_dp, 'normal wave')
+            else
+               call check_close(maxval(abs(u)), 0.0_dp, 1e-15_dp, 'no mean displacement')
+            end if
+            call check_close(form, sum(w*u), 1e-13_dp*nx*ny, 'Parseval')
+            call normal%quadratic_form(w, form)
+            call check_close(form, sum(w*u), 1e-13_dp*nx*ny, 'quadratic form')
+            p = 2.0_dp*w
+            py = -3.0_dp*w
+            call tangential%apply_vector(p, py, u, uy, form)
+            ! A plain sum of n equal terms errs by up to n epsilon.
+            call check_close(form, sum(p*u + py*uy), 3e-16_dp*nx*ny*sum(abs(p*u + py*uy)) + 1e-12_dp, &
+               'Parseval of a vector')
+            if (q > 0.0_dp) then
+               u = u - (p - nu*qx*(qx*p + qy*py)/q**2)/q
+               uy = uy - (py - nu*qy*(qx*p + qy*py)/q**2)/q
+            else
+               u = u - h*p
+               uy = uy - h*py
+            end if
+            call check_close(maxval(abs(u)), 0.0_dp, 2e-14_dp, 'tangential wave, x')
+            call check_close(maxval(abs(uy)), 0.0_dp, 2e-14_dp, 'tangential wave, y')
+         end do
+      end do
+      call normal%destroy()
+      call tangential%destroy()
+   end subroutine test_waves
+
+   !> The free operators against the double sum.
+   subroutine test_free_sums(nx, ny)
+      integer, intent(in) :: nx, ny
+      real(dp), parameter :: nu = 0.4_dp
+      type(grid_type) :: grid
+      type(convolution_type) :: normal, tangential
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: p(:, :), py(:, :), u(:, :), ux(:, :), uy(:, :)
+      real(dp) :: zz, xx, xy, yy, a_xx, a_xy, a_yy, form
+      integer :: i, j, k, l
+
+      grid = new_grid(nx, ny, 1.0_dp, 1.7_dp, boundary_free)
+      call new_normal_operator(normal, grid, nu, error)
+      call new_tangential_operator(tangential, grid, nu, 0.0_dp, error)
+      allocate (p(nx, ny), py(nx, ny), u(nx, ny), ux(nx, ny), uy(nx, ny))
+      do j = 1, ny
+         do i = 1, nx
+            p(i, j) = sin(1.3_dp*i*j + i)
+            py(i, j) = cos(2.1_dp*j - 0.3_dp*i)
+         end do
+      end do
+      call normal%apply(p, u, form)
+      call check_close(form, sum(p*u), 1e-13_dp, 'free Parseval')
+      call tangential%apply_vector(p, py, ux, uy, form)
+      call check_close(form, sum(p*ux + py*uy), 1e-13_dp, 'free Parseval of a vector')
+      do j = 1, ny
+         do i = 1, nx
+            zz = 0.0_dp
+            xx = 0.0_dp
+            yy = 0.0_dp
+            do l = 1, ny
+               do k = 1, nx
+                  zz = zz + p(k, l)*love_normal((i - k)*grid%dx, (j - l)*grid%dy, grid%dx, grid%dy, nu)
+                  call love_tangential((i - k)*grid%dx, (j - l)*grid%dy, grid%dx, grid%dy, nu, &
+                     a_xx, a_xy, a_yy)
+                  xx = xx + a_xx*p(k, l) + a_xy*py(k, l)
+                  yy = yy + a_xy*p(k, l) + a_yy*py(k, l)
+               end do
+            end do
+            xy = abs(ux(i, j) - xx) + abs(uy(i, j) - yy)
+            call check_close(u(i, j), zz, 1e-14_dp, 'free normal')
+            call check_close(xy, 0.0_dp, 2e-14_dp, 'free tangential')
+         end do
+      end do
+      call normal%destroy()
+      call tangential%destroy()
+   end subroutine test_free_sums
+
+   !> The inverse undoes the periodic operator on what has no mean, and a symbol of one is the identity.
+   subroutine test_inverse()
+      type(grid_type) :: grid
+      type(convolution_type) :: normal, identity
+      type(error_type), allocatable :: error
+      real(dp) :: p(12, 7), u(12, 7), back(12, 7), ones(0:6, 0:3)
+      integer :: i, j
+
+      grid = new_grid(12, 7, 2.0_dp, 1.0_dp, boundary_periodic)
+      call new_normal_operator(normal, grid, 0.5_dp, error)
+      do j = 1, 7
+         do i = 1, 12
+            p(i, j) = sin(0.7_dp*i*j)
+         end do
+      end do
+      call normal%apply(p, u)
+      call normal%apply_inverse(u, back)
+      call check_close(maxval(abs(back - p + sum(p)/84.0_dp)), 0.0_dp, 1e-13_dp, 'inverse')
+      ones = 1.0_dp
+      call new_symbol_operator(identity, 12, 7, ones, error)
+      call identity%apply(p, back)
+      call check_close(maxval(abs(back - p)), 0.0_dp, 1e-15_dp, 'identity')
+      call check_that(identity%ffts == 2, 'an application is two transforms')
+      call normal%destroy()
+      call identity%destroy()
+   end subroutine test_inverse
+
+   !> In a large cell the periodic operator gives the free one's displacement differences.
+   subroutine test_periodic_against_free()
+      integer, parameter :: n = 512, m = 9
+      type(grid_type) :: large, small
+      type(convolution_type) :: periodic, free
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: p(:, :), u(:, :)
+      real(dp) :: q(m, m), w(m, m)
+      integer :: i, j
+
+      large = new_grid(n, n, real(n, dp), real(n, dp), boundary_periodic)
+      small = new_grid(m, m, real(m, dp), real(m, dp), boundary_free)
+      call new_normal_operator(periodic, large, 0.2_dp, error)
+      call new_normal_operator(free, small, 0.2_dp, error)
+      allocate (p(n, n), u(n, n), source=0.0_dp)
+      ! Smooth, so that the discretisation matters little, and small beside the period.
+      do j = 1, m
+         do i = 1, m
+            q(i, j) = cos(2.0_dp*pi*(i - 5)/8.0_dp)*bump(i)*bump(j)
+         end do
+      end do
+      p(1:m, 1:m) = q
+      call periodic%apply(p, u)
+      call free%apply(q, w)
+      w = w - w(1, 1) - (u(1:m, 1:m) - u(1, 1))
+      ! The cell average of the free kernel against the symbol cut at Nyquist: 1 % of the displacement.
+      call check_close(maxval(abs(w)), 0.0_dp, 0.02_dp, 'periodic against free')
+      call periodic%destroy()
+      call free%destroy()
+
+   contains
+
+      pure function bump(k) result(value)
+         integer, intent(in) :: k
+         real(dp) :: value
+
+         value = cos(pi*(k - 5)/10.0_dp)**2
+      end function bump
+
+   end subroutine test_periodic_against_free
+
+end module test_fft_conv
