@@ -7,6 +7,11 @@ program main
 
    if (wanted('base')) call run_base()
    if (wanted('fft_conv')) call run_fft_conv()
+   use test_prony, only : run_prony
+   implicit none
+
+   if (wanted('base')) call run_base()
+   if (wanted('prony')) call run_prony()
    call finish()
 
 contains
