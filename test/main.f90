@@ -3,14 +3,11 @@ program main
    use check, only : finish
    use test_base, only : run_base
    use test_fft_conv, only : run_fft_conv
-   implicit none
-
-   if (wanted('base')) call run_base()
-   if (wanted('fft_conv')) call run_fft_conv()
    use test_prony, only : run_prony
    implicit none
 
    if (wanted('base')) call run_base()
+   if (wanted('fft_conv')) call run_fft_conv()
    if (wanted('prony')) call run_prony()
    call finish()
 
