@@ -1,0 +1,1 @@
+"""Contact of a viscoelastic solid with a rough, rigid surface."""

@@ -1,0 +1,133 @@
+"""Checks of arguments: one message says the name, the value found and what is allowed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["array_of", "choice", "exactly_one", "number", "poisson_ratio", "positive"]
+
+
+def number(
+    name: str,
+    value: float,
+    low: float = -math.inf,
+    high: float = math.inf,
+    *,
+    low_open: bool = False,
+    high_open: bool = False,
+) -> float:
+    """Return `value` as a finite float within an interval.
+
+    Parameters
+    ----------
+    name : str
+        Name shown in the message.
+    value : float
+        Value to check.
+    low, high : float
+        Bounds of the interval; closed unless `low_open` or `high_open`.
+
+    Raises
+    ------
+    ValueError
+        If the value is not a finite real number within the bounds.
+
+    Examples
+    --------
+    >>> number("radius", 2, 0.0, low_open=True)
+    2.0
+    >>> number("radius", -1, 0.0, low_open=True)
+    Traceback (most recent call last):
+    ...
+    ValueError: radius = -1: must be a finite number > 0
+    """
+    allowed = "a finite number"
+    if math.isfinite(low):
+        allowed += f" {'>' if low_open else '>='} {low:g}"
+    if math.isfinite(high):
+        allowed += f"{' and' if math.isfinite(low) else ''} {'<' if high_open else '<='} {high:g}"
+    try:
+        result = float(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} = {value!r}: must be {allowed}") from None
+    bad = not math.isfinite(result) or result < low or result > high
+    if bad or (low_open and result == low) or (high_open and result == high):
+        raise ValueError(f"{name} = {value!r}: must be {allowed}")
+    return result
+
+
+def positive(name: str, value: float) -> float:
+    """Return `value` as a finite float above zero."""
+    return number(name, value, 0.0, low_open=True)
+
+
+def poisson_ratio(value: float) -> float:
+    """Return a Poisson ratio, -1 < nu <= 0.5."""
+    return number("poisson", value, -1.0, 0.5, low_open=True)
+
+
+def array_of(
+    name: str,
+    values: ArrayLike,
+    *,
+    low: float = -math.inf,
+    low_open: bool = False,
+    ndim: int | None = None,
+    increasing: bool = False,
+) -> NDArray[np.float64]:
+    """Return `values` as a float array, each finite and at least (or above) `low`.
+
+    Raises
+    ------
+    ValueError
+        With the first offending value and its index.
+
+    Examples
+    --------
+    >>> array_of("tau", [1.0, 0.0], low=0.0, low_open=True)
+    Traceback (most recent call last):
+    ...
+    ValueError: tau[1] = 0.0: must be finite and > 0
+    """
+    try:
+        result = np.array(values, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} = {values!r}: must be real numbers") from None
+    if ndim is not None and result.ndim != ndim:
+        raise ValueError(f"{name}: has {result.ndim} dimensions, must have {ndim}")
+    bad = ~np.isfinite(result) | (result < low)
+    if low_open:
+        bad |= result == low
+    if np.any(bad):
+        where = tuple(int(i) for i in np.argwhere(bad)[0])
+        index = f"[{', '.join(map(str, where))}]" if where else ""
+        bound = f" and {'>' if low_open else '>='} {low:g}" if math.isfinite(low) else ""
+        raise ValueError(f"{name}{index} = {float(result[where])!r}: must be finite{bound}")
+    if increasing and np.any(np.diff(result) <= 0):
+        i = int(np.argmax(np.diff(result) <= 0)) + 1
+        raise ValueError(
+            f"{name}[{i}] = {float(result[i])!r}: must be larger than the value before,"
+            f" {float(result[i - 1])!r}"
+        )
+    return result
+
+
+def choice(name: str, value: str, allowed: Sequence[str]) -> str:
+    """Return `value` if it is one of `allowed`."""
+    if value not in allowed:
+        raise ValueError(f"{name} = {value!r}: must be one of {', '.join(map(repr, allowed))}")
+    return value
+
+
+def exactly_one(**values: object) -> str:
+    """Return the name of the only argument that is not None."""
+    given = [name for name, value in values.items() if value is not None]
+    if len(given) != 1:
+        raise ValueError(
+            f"{', '.join(given) or 'none'} given: must be exactly one of {', '.join(values)}"
+        )
+    return given[0]
