@@ -27,6 +27,10 @@ __all__ = ["WLF", "FitErrors", "MasterCurve", "Prony", "master_curve"]
 
 FloatArray = NDArray[np.float64]
 
+_LEGEND_ABOVE = {
+    "loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": 4, "frameon": False,
+}
+
 
 class WLF(NamedTuple):
     """Constants of the Williams-Landel-Ferry shift, log10 a_T = -c1 (T - T_ref)/(c2 + T - T_ref).
@@ -383,7 +387,8 @@ class Prony:
             Shortest and longest relaxation time, s. Default: the reciprocals of the largest and
             smallest frequency and a decade beyond, where spectra have their tails.
         slack : float
-            Allowed relative increase of the rms misfit, plus 1e-4, in exchange for smoothness, >= 0.
+            Allowed relative increase of the rms misfit, plus 1e-4, in exchange for smoothness;
+            >= 0, and 0 asks for the smallest misfit alone.
 
         Returns
         -------
@@ -564,7 +569,7 @@ class Prony:
         ax.set_xlim(frequency[0], frequency[-1])
         ax.set_xlabel(r"angular frequency $\omega$ (rad/s)")
         ax.set_ylabel("shear modulus (Pa)")
-        ax.legend(lines, [str(line.get_label()) for line in lines], loc="best", frameon=False)
+        ax.legend(lines, [str(line.get_label()) for line in lines], **_LEGEND_ABOVE)
         return ax
 
 
@@ -745,7 +750,7 @@ def master_curve(
 def _overlay(
     fixed: tuple[FloatArray, FloatArray], moving: tuple[FloatArray, FloatArray]
 ) -> tuple[float, float]:
-    """Return the shift in log10 frequency that lays `moving` on `fixed`, and the mean square left."""
+    """Return the shift in log10 frequency from `moving` to `fixed`, and the mean square left."""
     x_fixed, y_fixed = fixed
     x_moving, y_moving = moving
 
@@ -755,7 +760,8 @@ def _overlay(
         x = np.linspace(low, high, 200)
         total = 0.0
         for a, b in zip(y_fixed, y_moving, strict=True):
-            total += float(np.mean((np.interp(x, x_fixed, a) - np.interp(x - shift, x_moving, b)) ** 2))
+            apart = np.interp(x, x_fixed, a) - np.interp(x - shift, x_moving, b)
+            total += float(np.mean(apart**2))
         return 0.5 * total
 
     # at least a tenth of the shorter sweep overlaps
