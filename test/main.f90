@@ -4,11 +4,15 @@ program main
    use test_base, only : run_base
    use test_fft_conv, only : run_fft_conv
    use test_prony, only : run_prony
+   use test_roughness, only : run_roughness
+   use test_surface, only : run_surface
    implicit none
 
    if (wanted('base')) call run_base()
    if (wanted('fft_conv')) call run_fft_conv()
    if (wanted('prony')) call run_prony()
+   if (wanted('surface')) call run_surface()
+   if (wanted('roughness')) call run_roughness()
    call finish()
 
 contains

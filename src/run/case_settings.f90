@@ -5,34 +5,13 @@
 module case_settings
    use precision, only : dp
    use regular_grid, only : grid_type
+   use surface_settings, only : path_length, surface_settings_type, word_length
    implicit none
    private
 
    public :: adhesion_settings_type, case_type, friction_settings_type, material_settings_type, &
-      output_settings_type, phase_settings_type, solver_settings_type, surface_settings_type
-
-   integer, parameter, public :: word_length = 32       !! of a choice
-   integer, parameter, public :: path_length = 1024     !! of a file's path
-
-   !> `&surface`: one term of the sum of heights.
-   type :: surface_settings_type
-      character(word_length) :: shape               !! 'flat' | 'sphere' | 'paraboloid' | ...
-      real(dp) :: radius                            !! m
-      real(dp) :: amplitude                         !! m
-      real(dp) :: wavelength                        !! m
-      real(dp) :: hurst                             !! 0 < H <= 1
-      real(dp) :: wavelength_long                   !! largest wavelength, m
-      real(dp) :: wavelength_rolloff                !! m; equals wavelength_long without roll-off
-      real(dp) :: wavelength_short                  !! smallest wavelength, m
-      real(dp) :: rms_height                        !! m; 0 where rms_slope is given
-      real(dp) :: rms_slope                         !! 0 where rms_height is given
-      integer :: seed
-      character(word_length) :: generator           !! 'random_phase' | 'filtered_noise'
-      character(path_length) :: file
-      character(path_length) :: dataset             !! '' tries 'surface/height', then 'surface'
-      real(dp) :: scale
-      real(dp) :: centre_x, centre_y                !! m
-   end type surface_settings_type
+      output_settings_type, path_length, phase_settings_type, solver_settings_type, &
+      surface_settings_type, word_length
 
    !> `&material`, with Zener branches already turned into Prony arms.
    type :: material_settings_type

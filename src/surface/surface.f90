@@ -1,0 +1,236 @@
+!> The height map H(x, y) of the road: a sum of analytic shapes, random surfaces and files.
+!>
+!> z points up into the rubber, so that summits are the largest values; lengths in m. The sphere, the
+!> paraboloid and the cylinder have their summit at height 0. In periodic mode they and their
+!> distances repeat with the cell, so that a shape off the middle is the same shape moved.
+module surface
+   use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
+   use errors, only : add_fault, error_input, error_type
+   use precision, only : dp, pi
+   use regular_grid, only : boundary_periodic, grid_type
+   use surface_self_affine, only : add_self_affine
+   use surface_settings, only : surface_settings_type
+   implicit none
+   private
+
+   public :: check_terms, new_height, rim_height
+
+   !> Shapes that are a function of the position alone.
+   character(*), parameter :: analytic_shapes(*) = [character(16) :: 'flat', 'sphere', &
+      'paraboloid', 'cylinder', 'sine', 'hexagonal_wave']
+
+contains
+
+   !> The height of the road on every cell: the sum of all terms.
+   subroutine new_height(grid, terms, height, error)
+      type(grid_type), intent(in) :: grid
+      type(surface_settings_type), intent(in) :: terms(:)          !! none: flat
+      real(dp), allocatable, intent(out) :: height(:, :)           !! m, shape [nx, ny]
+      type(error_type), allocatable, intent(out) :: error
+      integer :: i, j, n
+
+      call check_terms(terms, error)
+      if (allocated(error)) return
+      allocate (height(grid%nx, grid%ny))
+      !$omp parallel do default(none) shared(grid, height) private(i)
+      do j = 1, grid%ny
+         do i = 1, grid%nx
+            height(i, j) = 0.0_dp
+         end do
+      end do
+      do n = 1, size(terms)
+         select case (terms(n)%shape)
+         case ('flat')
+            cycle
+         case ('self_affine')
+            call add_self_affine(grid, terms(n), height, error)
+         case default
+            call add_analytic(grid, terms(n), height)
+         end select
+         if (allocated(error)) return
+      end do
+   end subroutine new_height
+
+   !> Highest value on the outermost cells: what a free surface lets leave or enter when it slides.
+   pure function rim_height(height) result(rim)
+      real(dp), intent(in) :: height(:, :)      !! m, shape [nx, ny]
+      real(dp) :: rim
+      integer :: nx, ny
+
+      nx = size(height, 1)
+      ny = size(height, 2)
+      rim = max(maxval(height(1, :)), maxval(height(nx, :)), maxval(height(:, 1)), &
+         maxval(height(:, ny)))
+   end function rim_height
+
+   !> Check that every term has what its shape needs; all faults are reported at once.
+   subroutine check_terms(terms, error)
+      type(surface_settings_type), intent(in) :: terms(:)
+      type(error_type), allocatable, intent(out) :: error
+      integer :: n
+
+      do n = 1, size(terms)
+         associate (term => terms(n))
+            if (.not. (ieee_is_finite(term%centre_x) .and. ieee_is_finite(term%centre_y))) &
+               call add_fault(error, error_input, '&surface: centre_x, centre_y must be finite')
+            select case (term%shape)
+            case ('flat')
+               continue
+            case ('sphere', 'paraboloid', 'cylinder')
+               call must_be_positive('radius', term%radius, error)
+            case ('sine', 'hexagonal_wave')
+               call must_be_positive('wavelength', term%wavelength, error)
+               if (.not. ieee_is_finite(term%amplitude)) call add_fault(error, error_input, &
+                  '&surface: amplitude = '//number(term%amplitude)//': must be finite')
+            case ('self_affine')
+               call check_self_affine(term, error)
+            case default
+               call add_fault(error, error_input, '&surface: shape = '''//trim(term%shape) &
+                  //''': must be one of '//known_shapes())
+            end select
+         end associate
+      end do
+   end subroutine check_terms
+
+   !> Faults of a self-affine term.
+   subroutine check_self_affine(term, error)
+      type(surface_settings_type), intent(in) :: term
+      type(error_type), allocatable, intent(inout) :: error
+
+      call must_be_positive('wavelength_short', term%wavelength_short, error)
+      if (.not. (term%wavelength_rolloff >= term%wavelength_short)) call add_fault(error, &
+         error_input, '&surface: wavelength_rolloff = '//number(term%wavelength_rolloff) &
+         //': must be at least wavelength_short = '//number(term%wavelength_short))
+      if (.not. (term%wavelength_long >= term%wavelength_rolloff)) call add_fault(error, &
+         error_input, '&surface: wavelength_long = '//number(term%wavelength_long) &
+         //': must be at least wavelength_rolloff = '//number(term%wavelength_rolloff))
+      if (.not. ieee_is_finite(term%wavelength_long)) call add_fault(error, error_input, &
+         '&surface: wavelength_long must be finite')
+      if (.not. (term%hurst > 0.0_dp .and. term%hurst <= 1.0_dp)) call add_fault(error, &
+         error_input, '&surface: hurst = '//number(term%hurst)//': must be above 0, at most 1')
+      if (abs(term%rms_slope) > 0.0_dp .and. abs(term%rms_height) > 0.0_dp) then
+         call add_fault(error, error_input, '&surface: rms_height = '//number(term%rms_height) &
+            //' and rms_slope = '//number(term%rms_slope)//': give one of them')
+      else if (abs(term%rms_slope) > 0.0_dp) then
+         call must_be_positive('rms_slope', term%rms_slope, error)
+      else
+         call must_be_positive('rms_height', term%rms_height, error)
+      end if
+      if (term%generator /= 'random_phase' .and. term%generator /= 'filtered_noise') &
+         call add_fault(error, error_input, '&surface: generator = '''//trim(term%generator) &
+         //''': must be ''random_phase'' or ''filtered_noise''')
+   end subroutine check_self_affine
+
+   !> Add a fault unless 0 < value < infinity.
+   subroutine must_be_positive(name, value, error)
+      character(*), intent(in) :: name
+      real(dp), intent(in) :: value
+      type(error_type), allocatable, intent(inout) :: error
+
+      if (value > 0.0_dp .and. ieee_is_finite(value)) return
+      call add_fault(error, error_input, '&surface: '//name//' = '//number(value) &
+         //': must be a positive number')
+   end subroutine must_be_positive
+
+   !> A number as a short word.
+   pure function number(value) result(word)
+      real(dp), intent(in) :: value
+      character(:), allocatable :: word
+      character(16) :: text
+
+      write (text, '(es12.5)') value
+      word = trim(adjustl(text))
+   end function number
+
+   !> The shapes, quoted.
+   pure function known_shapes() result(list)
+      character(:), allocatable :: list
+      integer :: n
+
+      list = ''
+      do n = 1, size(analytic_shapes)
+         list = list//''''//trim(analytic_shapes(n))//''', '
+      end do
+      list = list//'''self_affine'', ''file'''
+   end function known_shapes
+
+   !> Add an analytic shape.
+   subroutine add_analytic(grid, term, height)
+      type(grid_type), intent(in) :: grid
+      type(surface_settings_type), intent(in) :: term         !! checked
+      real(dp), intent(inout) :: height(:, :)
+      integer :: i, j
+
+      !$omp parallel do default(none) shared(grid, term, height) private(i)
+      do j = 1, grid%ny
+         do i = 1, grid%nx
+            height(i, j) = height(i, j) + analytic_height(grid, term, i, j)
+         end do
+      end do
+   end subroutine add_analytic
+
+   !> Height of an analytic shape at the centre of cell (i, j), from 1.
+   pure function analytic_height(grid, term, i, j) result(h)
+      type(grid_type), intent(in) :: grid
+      type(surface_settings_type), intent(in) :: term
+      integer, intent(in) :: i, j
+      real(dp) :: h
+      real(dp) :: k, x, y
+
+      x = (i - 1)*grid%dx - term%centre_x
+      y = (j - 1)*grid%dy - term%centre_y
+      k = 0.0_dp
+      if (term%wavelength > 0.0_dp) k = 2.0_dp*pi/term%wavelength
+      select case (term%shape)
+      case ('sphere')
+         h = circular_cap(nearest_image(grid, x, grid%lx)**2 + distance_y(grid, y)**2, term%radius)
+      case ('cylinder')
+         h = circular_cap(nearest_image(grid, x, grid%lx)**2, term%radius)
+      case ('paraboloid')
+         h = -(nearest_image(grid, x, grid%lx)**2 + distance_y(grid, y)**2)/(2.0_dp*term%radius)
+      case ('sine')
+         h = term%amplitude*cos(k*x)
+      case ('hexagonal_wave')                                 ! (thesis, eq. 4.6)
+         if (grid%ny == 1) y = 0.0_dp
+         h = term%amplitude*sin(k*(0.5_dp*x + sqrt(0.75_dp)*y)) &
+            *sin(k*(-0.5_dp*x + sqrt(0.75_dp)*y))*sin(k*x)
+      case default
+         h = 0.0_dp
+      end select
+   end function analytic_height
+
+   !> Distance to the nearest image in periodic mode; as it is in free mode.
+   elemental function nearest_image(grid, x, length) result(d)
+      type(grid_type), intent(in) :: grid
+      real(dp), intent(in) :: x
+      real(dp), intent(in) :: length
+      real(dp) :: d
+
+      d = x
+      if (grid%boundary == boundary_periodic) d = x - length*anint(x/length)
+   end function nearest_image
+
+   !> The distance along y, which a line contact (ny = 1) does not know.
+   elemental function distance_y(grid, y) result(d)
+      type(grid_type), intent(in) :: grid
+      real(dp), intent(in) :: y
+      real(dp) :: d
+
+      d = 0.0_dp
+      if (grid%ny > 1) d = nearest_image(grid, y, grid%ly)
+   end function distance_y
+
+   !> sqrt(R^2 - r^2) - R without cancellation; -R beyond the radius.
+   elemental function circular_cap(r_squared, radius) result(h)
+      real(dp), intent(in) :: r_squared      !! m2
+      real(dp), intent(in) :: radius         !! m
+      real(dp) :: h
+
+      if (r_squared < radius**2) then
+         h = -r_squared/(radius + sqrt(radius**2 - r_squared))
+      else
+         h = -radius
+      end if
+   end function circular_cap
+
+end module surface

@@ -1,0 +1,60 @@
+!> The checked settings of one `&surface` group: one term of the sum of heights.
+module surface_settings
+   use precision, only : dp
+   use regular_grid, only : grid_type
+   implicit none
+   private
+
+   public :: default_surface, surface_settings_type
+
+   integer, parameter, public :: word_length = 32       !! of a choice
+   integer, parameter, public :: path_length = 1024     !! of a file's path
+
+   !> `&surface`: one term of the sum of heights.
+   type :: surface_settings_type
+      character(word_length) :: shape               !! 'flat' | 'sphere' | 'paraboloid' | ...
+      real(dp) :: radius                            !! m
+      real(dp) :: amplitude                         !! m
+      real(dp) :: wavelength                        !! m
+      real(dp) :: hurst                             !! 0 < H <= 1
+      real(dp) :: wavelength_long                   !! largest wavelength, m
+      real(dp) :: wavelength_rolloff                !! m; equals wavelength_long without roll-off
+      real(dp) :: wavelength_short                  !! smallest wavelength, m
+      real(dp) :: rms_height                        !! m; 0 where rms_slope is given
+      real(dp) :: rms_slope                         !! 0 where rms_height is given
+      integer :: seed
+      character(word_length) :: generator           !! 'random_phase' | 'filtered_noise'
+      character(path_length) :: file
+      character(path_length) :: dataset             !! '' tries 'surface/height', then 'surface'
+      real(dp) :: scale
+      real(dp) :: centre_x, centre_y                !! m
+   end type surface_settings_type
+
+contains
+
+   !> A flat term whose numbers are unset (0), centred on the grid: a start for callers that name
+   !> only what their shape needs.
+   pure function default_surface(grid) result(term)
+      type(grid_type), intent(in) :: grid
+      type(surface_settings_type) :: term
+
+      term%shape = 'flat'
+      term%radius = 0.0_dp
+      term%amplitude = 0.0_dp
+      term%wavelength = 0.0_dp
+      term%hurst = 0.8_dp
+      term%wavelength_long = 0.0_dp
+      term%wavelength_rolloff = 0.0_dp
+      term%wavelength_short = 0.0_dp
+      term%rms_height = 0.0_dp
+      term%rms_slope = 0.0_dp
+      term%seed = 1
+      term%generator = 'random_phase'
+      term%file = ''
+      term%dataset = ''
+      term%scale = 1.0_dp
+      term%centre_x = (grid%nx/2)*grid%dx
+      term%centre_y = (grid%ny/2)*grid%dy
+   end function default_surface
+
+end module surface_settings

@@ -1,0 +1,367 @@
+!> Tests of the surfaces.
+module test_surface
+   use check, only : begin_suite, check_close, check_error, check_no_error, check_that
+   use counter_random, only : mix, normal_number, row_key, uniform_number
+   use errors, only : error_type
+   use omp_lib, only : omp_get_max_threads, omp_set_num_threads
+   use precision, only : dp, int64, pi
+   use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
+   use roughness, only : height_psd, height_statistics, roughness_type
+   use surface, only : check_terms, new_height, rim_height
+   use surface_settings, only : default_surface, surface_settings_type
+   implicit none
+   private
+
+   public :: run_surface
+
+contains
+
+   subroutine run_surface()
+      call begin_suite('surface')
+      call test_counter_random()
+      call test_caps()
+      call test_waves()
+      call test_sum_and_rim()
+      call test_spectrum()
+      call test_rms()
+      call test_same_modes()
+      call test_threads()
+      call test_noise_is_gaussian()
+      call test_faults()
+   end subroutine run_surface
+
+   !> The generator is SplitMix64: the first outputs from state 0 and 1234567 are known.
+   subroutine test_counter_random()
+      real(dp) :: mean, variance, x
+      integer :: i, n
+
+      call check_that(mix(0_int64) == ior(shiftl(int(z'E220A839', int64), 32), &
+         int(z'7B1DCDAF', int64)), 'SplitMix64 from 0')
+      call check_that(mix(1234567_int64) == 6457827717110365317_int64, 'SplitMix64 from 1234567')
+      n = 100000
+      mean = 0.0_dp
+      variance = 0.0_dp
+      do i = 1, n
+         x = normal_number(row_key(3, -7), i)
+         mean = mean + x/n
+         variance = variance + x**2/n
+      end do
+      call check_close(mean, 0.0_dp, 5.0_dp/sqrt(real(n, dp)), 'normal numbers: mean')
+      call check_close(variance, 1.0_dp, 5.0_dp*sqrt(2.0_dp/n), 'normal numbers: variance')
+      mean = 0.0_dp
+      do i = 1, n
+         mean = mean + uniform_number(row_key(i, 5), 2)/n
+      end do
+      call check_close(mean, 0.5_dp, 5.0_dp/sqrt(12.0_dp*n), 'uniform numbers over seeds: mean')
+   end subroutine test_counter_random
+
+   !> Sphere, paraboloid, cylinder: values, summit on a cell, beyond the radius, images.
+   subroutine test_caps()
+      type(grid_type) :: grid
+      type(surface_settings_type) :: term
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: h(:, :), moved(:, :)
+
+      grid = new_grid(9, 6, 9.0_dp, 3.0_dp, boundary_free)
+      term = default_surface(grid)
+      term%shape = 'sphere'
+      term%radius = 2.0_dp
+      call new_height(grid, [term], h, error)
+      call check_no_error(error, 'sphere')
+      call check_close(h(5, 4), 0.0_dp, 0.0_dp, 'summit of the sphere')
+      call check_close(h(6, 2), sqrt(4.0_dp - 2.0_dp) - 2.0_dp, 1.0e-15_dp, 'sphere at (1, -1)')
+      call check_close(h(1, 1), -2.0_dp, 0.0_dp, 'beyond the radius')
+      term%shape = 'cylinder'
+      call new_height(grid, [term], h, error)
+      call check_close(h(6, 1), sqrt(3.0_dp) - 2.0_dp, 1.0e-15_dp, 'cylinder at x = 1')
+      call check_close(h(3, 6), -2.0_dp, 0.0_dp, 'cylinder at its radius')
+      term%shape = 'paraboloid'
+      call new_height(grid, [term], h, error)
+      call check_close(h(9, 1), -(16.0_dp + 2.25_dp)/4.0_dp, 1.0e-15_dp, 'paraboloid')
+      call check_close(rim_height(h), -1.0_dp/4.0_dp, 1.0e-15_dp, 'highest on the rim: (0, 1)')
+      ! a shallow cap keeps its digits
+      term%shape = 'sphere'
+      term%radius = 1.0e9_dp
+      call new_height(grid, [term], h, error)
+      call check_close(h(6, 4), -0.5e-9_dp, 1.0e-24_dp, 'a shallow cap')
+      ! moving the centre by whole cells moves the periodic map
+      grid%boundary = boundary_periodic
+      term%radius = 3.0_dp
+      call new_height(grid, [term], h, error)
+      term%centre_x = term%centre_x + 3*grid%dx
+      term%centre_y = term%centre_y - 2*grid%dy
+      call new_height(grid, [term], moved, error)
+      call check_close(maxval(abs(moved - cshift(cshift(h, -3, 1), 2, 2))), 0.0_dp, 1.0e-14_dp, &
+         'a periodic sphere off the middle is the sphere moved')
+      ! a line contact knows no y
+      grid = new_grid(8, 1, 8.0_dp, 5.0_dp, boundary_periodic)
+      term = default_surface(grid)
+      term%shape = 'sphere'
+      term%radius = 10.0_dp
+      term%centre_y = 3.0_dp
+      call new_height(grid, [term], h, error)
+      call check_close(h(5, 1), 0.0_dp, 0.0_dp, 'summit of a line contact')
+   end subroutine test_caps
+
+   !> The sine, and the period of the hexagonal wave: lambda by lambda/sqrt(3).
+   subroutine test_waves()
+      type(grid_type) :: grid, larger
+      type(surface_settings_type) :: term
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: h(:, :), more(:, :)
+      real(dp) :: k, x, y
+      integer :: i, j
+
+      grid = new_grid(10, 3, 5.0_dp, 1.0_dp, boundary_periodic)
+      term = default_surface(grid)
+      term%shape = 'sine'
+      term%amplitude = 0.2_dp
+      term%wavelength = 2.5_dp
+      call new_height(grid, [term], h, error)
+      call check_no_error(error, 'sine')
+      call check_close(h(6, 2), 0.2_dp, 0.0_dp, 'summit of the sine')
+      call check_close(h(7, 3), 0.2_dp*cos(2.0_dp*pi*0.2_dp), 1.0e-15_dp, 'sine')
+
+      term%shape = 'hexagonal_wave'
+      term%amplitude = 0.3_dp
+      term%wavelength = 2.0_dp
+      grid = new_grid(24, 14, 2.0_dp, 2.0_dp/sqrt(3.0_dp), boundary_periodic)
+      larger = new_grid(48, 42, 4.0_dp, 6.0_dp/sqrt(3.0_dp), boundary_periodic)
+      term%centre_x = 0.0_dp
+      term%centre_y = 0.0_dp
+      call new_height(grid, [term], h, error)
+      call new_height(larger, [term], more, error)
+      call check_close(maxval(abs(more(25:, 15:28) - h)), 0.0_dp, 1.0e-14_dp, &
+         'the hexagonal wave repeats after lambda by lambda/sqrt(3)')
+      call check_close(maxval(abs(more(25:, 29:) - h)), 0.0_dp, 1.0e-14_dp, &
+         'the hexagonal wave repeats after lambda by 2 lambda/sqrt(3)')
+      ! the product of sines is a sum of three waves of the wave number sqrt(3) k, at 120 degrees
+      k = 2.0_dp*pi/term%wavelength
+      i = 5
+      j = 4
+      x = 4*grid%dx
+      y = 3*grid%dy
+      call check_close(h(i, j), 0.075_dp*(sin(2.0_dp*k*x) &
+         - sin(k*(x + sqrt(3.0_dp)*y)) - sin(k*(x - sqrt(3.0_dp)*y))), 1.0e-15_dp, 'hexagonal wave')
+      call check_close(maxval(more), 0.3_dp*0.75_dp**1.5_dp, 1.0e-3_dp, 'its highest value')
+   end subroutine test_waves
+
+   !> Terms add up.
+   subroutine test_sum_and_rim()
+      type(grid_type) :: grid
+      type(surface_settings_type) :: terms(3)
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: both(:, :), h(:, :), one(:, :)
+
+      grid = new_grid(12, 15, 1.0_dp, 2.0_dp, boundary_periodic)
+      terms = default_surface(grid)
+      terms(1)%shape = 'paraboloid'
+      terms(1)%radius = 4.0_dp
+      terms(3)%shape = 'self_affine'
+      terms(3)%wavelength_long = 1.0_dp
+      terms(3)%wavelength_rolloff = 0.5_dp
+      terms(3)%wavelength_short = 0.3_dp
+      terms(3)%rms_height = 0.1_dp
+      call new_height(grid, terms, both, error)
+      call check_no_error(error, 'three terms')
+      call new_height(grid, terms(1:1), one, error)
+      call new_height(grid, terms(3:3), h, error)
+      call check_close(maxval(abs(both - one - h)), 0.0_dp, 1.0e-15_dp, 'heights add up')
+      call new_height(grid, terms(2:2), h, error)
+      call check_close(maxval(abs(h)), 0.0_dp, 0.0_dp, 'flat')
+      call new_height(grid, terms(1:0), h, error)
+      call check_that(size(h, 1) == 12 .and. size(h, 2) == 15, 'no term: a flat map')
+   end subroutine test_sum_and_rim
+
+   !> The spectrum of a random_phase surface is eq. 1.6, mode by mode, for a surface and a profile.
+   subroutine test_spectrum()
+      type(grid_type) :: grid
+      type(surface_settings_type) :: term
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: h(:, :), psd(:, :)
+      real(dp) :: k, plateau
+
+      grid = new_grid(60, 45, 3.0_dp, 2.0_dp, boundary_periodic)
+      term = default_surface(grid)
+      term%shape = 'self_affine'
+      term%hurst = 0.7_dp
+      term%wavelength_long = 1.0_dp
+      term%wavelength_rolloff = 0.5_dp
+      term%wavelength_short = 0.15_dp
+      term%rms_height = 1.0e-3_dp
+      call new_height(grid, [term], h, error)
+      call check_no_error(error, 'self-affine')
+      allocate (psd(60, 45))
+      call height_psd(grid, h, psd, error)
+      plateau = psd(4, 1)                       ! mode (3, 0): wavelength 1
+      call check_that(plateau > 0.0_dp, 'the end of the band belongs to it')
+      call check_close(psd(1, 4)/plateau, 1.0_dp, 1.0e-12_dp, 'constant up to the roll-off')
+      k = 2.0_dp*pi*hypot(10.0_dp/3.0_dp, 4.0_dp/2.0_dp)
+      call check_close(psd(11, 42)/plateau, (k*0.25_dp/pi)**(-3.4_dp), 1.0e-12_dp, &
+         'power law above the roll-off, mode (10, -4)')
+      call check_close(psd(51, 5)/plateau, (k*0.25_dp/pi)**(-3.4_dp), 1.0e-12_dp, &
+         'power law above the roll-off, mode (-10, 4)')
+      call check_that(psd(3, 1) < 1.0e-25_dp*plateau, 'nothing below k_l')
+      call check_that(psd(22, 1) < 1.0e-25_dp*plateau, 'nothing above k_s')
+      call check_that(psd(21, 1) > 1.0e-3_dp*plateau, 'k_s itself belongs to the band')
+      call check_that(psd(1, 1) < 1.0e-25_dp*plateau, 'no mean')
+
+      grid = new_grid(135, 1, 3.0_dp, 2.0_dp, boundary_periodic)
+      call new_height(grid, [term], h, error)
+      deallocate (psd)
+      allocate (psd(135, 1))
+      call height_psd(grid, h, psd, error)
+      call check_close(psd(4, 1)/psd(7, 1), 1.0_dp, 1.0e-12_dp, 'plateau of a profile')
+      call check_close(psd(13, 1)/psd(7, 1), 2.0_dp**(-2.4_dp), 1.0e-12_dp, 'a profile: -(1 + 2 H)')
+   end subroutine test_spectrum
+
+   !> rms height and rms slope are exact: both generators, odd and even, not square, profiles.
+   subroutine test_rms()
+      integer, parameter :: sizes(2, 4) = reshape([64, 48, 45, 33, 50, 1, 31, 32], [2, 4])
+      character(16), parameter :: generators(2) = [character(16) :: 'random_phase', 'filtered_noise']
+      type(grid_type) :: grid
+      type(surface_settings_type) :: term
+      type(roughness_type) :: statistics
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: h(:, :)
+      integer :: g, n
+
+      do n = 1, size(sizes, 2)
+         grid = new_grid(sizes(1, n), sizes(2, n), 1.5e-3_dp, 1.0e-3_dp, boundary_periodic)
+         do g = 1, 2
+            term = default_surface(grid)
+            term%shape = 'self_affine'
+            term%generator = generators(g)
+            term%seed = n
+            term%wavelength_long = 0.8e-3_dp
+            term%wavelength_rolloff = 0.8e-3_dp
+            term%wavelength_short = 1.0e-6_dp        ! far below a cell: all modes below Nyquist
+            term%rms_height = 2.0e-6_dp
+            call new_height(grid, [term], h, error)
+            call check_no_error(error, generators(g))
+            call height_statistics(grid, h, statistics, error)
+            call check_close(statistics%rms_height, 2.0e-6_dp, 1.0e-18_dp, 'rms height')
+            term%rms_height = 0.0_dp
+            term%rms_slope = 0.3_dp
+            call new_height(grid, [term], h, error)
+            call height_statistics(grid, h, statistics, error)
+            call check_close(statistics%rms_slope, 0.3_dp, 1.0e-13_dp, 'rms slope')
+         end do
+      end do
+   end subroutine test_rms
+
+   !> A finer grid holds the same surface; another seed does not.
+   subroutine test_same_modes()
+      type(grid_type) :: fine, grid
+      type(surface_settings_type) :: term
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: h(:, :), refined(:, :)
+
+      grid = new_grid(30, 21, 3.0_dp, 1.0_dp, boundary_periodic)
+      fine = new_grid(90, 63, 3.0_dp, 1.0_dp, boundary_periodic)
+      term = default_surface(grid)
+      term%shape = 'self_affine'
+      term%wavelength_long = 1.5_dp
+      term%wavelength_rolloff = 1.0_dp
+      term%wavelength_short = 0.21_dp
+      term%rms_height = 1.0_dp
+      call new_height(grid, [term], h, error)
+      call new_height(fine, [term], refined, error)
+      call check_close(maxval(abs(refined(::3, ::3) - h)), 0.0_dp, 1.0e-13_dp, &
+         'a finer grid holds the same surface')
+      term%seed = 2
+      call new_height(grid, [term], refined, error)
+      call check_that(maxval(abs(refined - h)) > 0.5_dp, 'another seed, another surface')
+   end subroutine test_same_modes
+
+   !> The same surface bit for bit on any number of threads.
+   subroutine test_threads()
+      character(16), parameter :: generators(2) = [character(16) :: 'random_phase', 'filtered_noise']
+      type(grid_type) :: grid
+      type(surface_settings_type) :: term
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: h(:, :), other(:, :)
+      integer :: g, threads
+
+      threads = omp_get_max_threads()
+      grid = new_grid(77, 50, 1.0_dp, 1.0_dp, boundary_periodic)
+      term = default_surface(grid)
+      term%shape = 'self_affine'
+      term%wavelength_long = 0.5_dp
+      term%wavelength_rolloff = 0.5_dp
+      term%wavelength_short = 0.05_dp
+      term%rms_slope = 0.1_dp
+      do g = 1, 2
+         term%generator = generators(g)
+         call omp_set_num_threads(1)
+         call new_height(grid, [term], h, error)
+         call omp_set_num_threads(2)
+         call new_height(grid, [term], other, error)
+         call check_close(maxval(abs(h - other)), 0.0_dp, 0.0_dp, &
+            trim(generators(g))//' on one and two threads')
+      end do
+      call omp_set_num_threads(threads)
+   end subroutine test_threads
+
+   !> Filtered noise is Gaussian: skewness 0, kurtosis 3, within the scatter of its number of modes.
+   subroutine test_noise_is_gaussian()
+      type(grid_type) :: grid
+      type(surface_settings_type) :: term
+      type(roughness_type) :: statistics
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: h(:, :)
+
+      grid = new_grid(256, 200, 1.0_dp, 1.0_dp, boundary_periodic)
+      term = default_surface(grid)
+      term%shape = 'self_affine'
+      term%generator = 'filtered_noise'
+      term%wavelength_long = 1.0_dp/16.0_dp
+      term%wavelength_rolloff = 1.0_dp/32.0_dp
+      term%wavelength_short = 1.0_dp/64.0_dp
+      term%rms_height = 1.0_dp
+      call new_height(grid, [term], h, error)
+      call height_statistics(grid, h, statistics, error)
+      call check_close(statistics%skewness, 0.0_dp, 0.15_dp, 'skewness')
+      call check_close(statistics%kurtosis, 3.0_dp, 0.3_dp, 'kurtosis')
+   end subroutine test_noise_is_gaussian
+
+   !> Wrong numbers are named, all at once.
+   subroutine test_faults()
+      type(grid_type) :: grid
+      type(surface_settings_type) :: terms(2)
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: h(:, :)
+
+      grid = new_grid(16, 16, 1.0_dp, 1.0_dp, boundary_periodic)
+      terms = default_surface(grid)
+      terms(1)%shape = 'sphere'
+      terms(2)%shape = 'pyramid'
+      call check_terms(terms, error)
+      call check_error(error, 'radius', 'no radius')
+      call check_error(error, '''hexagonal_wave''', 'unknown shape')
+      terms(2) = default_surface(grid)
+      terms(2)%shape = 'self_affine'
+      terms(2)%hurst = 1.5_dp
+      terms(2)%wavelength_short = 0.2_dp
+      terms(2)%wavelength_rolloff = 0.1_dp
+      terms(2)%wavelength_long = 0.05_dp
+      terms(2)%rms_height = 1.0_dp
+      terms(2)%rms_slope = 1.0_dp
+      terms(2)%generator = 'dice'
+      call check_terms(terms(2:2), error)
+      call check_error(error, 'hurst', 'hurst')
+      call check_error(error, 'wavelength_long', 'order of the wavelengths')
+      call check_error(error, 'at least wavelength_short', 'order of the short wavelengths')
+      call check_error(error, 'give one of them', 'two rms')
+      call check_error(error, 'dice', 'generator')
+      terms(2)%rms_slope = 0.0_dp
+      terms(2)%hurst = 0.5_dp
+      terms(2)%generator = 'random_phase'
+      terms(2)%wavelength_short = 0.001_dp
+      terms(2)%wavelength_rolloff = 0.01_dp
+      terms(2)%wavelength_long = 0.01_dp
+      call new_height(grid, terms(2:2), h, error)
+      call check_error(error, 'no mode', 'an empty band')
+   end subroutine test_faults
+
+end module test_surface
