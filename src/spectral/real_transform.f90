@@ -1,14 +1,13 @@
 !> A two-dimensional real FFT in place, for work done once a run: surfaces, spectra, derivatives.
 !>
-!> It runs on one thread, so that its result is the same bit for bit on any number of threads.
+!> It runs on one thread (FFTW's default), so that its result is the same bit for bit on any number of threads.
 !> Memory: one field of doubles (nx padded by one or two).
 module real_transform
    use, intrinsic :: iso_c_binding, only : c_associated, c_f_pointer, c_int, c_null_ptr, c_ptr, &
       c_size_t
    use errors, only : error_input, error_type, fail
    use fftw, only : fftw_alloc_real, fftw_destroy_plan, fftw_estimate, fftw_execute_dft_c2r, &
-      fftw_execute_dft_r2c, fftw_free, fftw_init_threads, fftw_plan_many_dft_c2r, &
-      fftw_plan_many_dft_r2c, fftw_plan_with_nthreads
+      fftw_execute_dft_r2c, fftw_free, fftw_plan_many_dft_c2r, fftw_plan_many_dft_r2c
    use precision, only : dp
    implicit none
    private
@@ -33,7 +32,7 @@ contains
       type(real_transform_type), intent(inout) :: self
       integer, intent(in) :: nx, ny                              !! size of the field
       type(error_type), allocatable, intent(out) :: error
-      integer(c_int) :: n(2), field_shape(2), spectrum_shape(2), status
+      integer(c_int) :: n(2), field_shape(2), spectrum_shape(2)
       character(80) :: text
 
       call destroy_real_transform(self)
@@ -45,8 +44,6 @@ contains
       self%buffer = fftw_alloc_real(2*int(nx/2 + 1, c_size_t)*int(ny, c_size_t))
       if (c_associated(self%buffer)) then
          !$omp critical (fftw_planner)
-         status = fftw_init_threads()
-         if (status /= 0) call fftw_plan_with_nthreads(1_c_int)
          self%forward = fftw_plan_many_dft_r2c(2_c_int, n, 1_c_int, self%buffer, field_shape, &
             1_c_int, 0_c_int, self%buffer, spectrum_shape, 1_c_int, 0_c_int, fftw_estimate)
          self%backward = fftw_plan_many_dft_c2r(2_c_int, n, 1_c_int, self%buffer, spectrum_shape, &
