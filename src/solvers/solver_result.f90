@@ -1,0 +1,20 @@
+!> What a solver tells its caller: an outcome, not an error.
+module solver_result
+   use precision, only : dp, int64
+   implicit none
+   private
+
+   public :: solver_result_type
+
+   !> The record of one solve.
+   type :: solver_result_type
+      integer :: iterations = 0                 !! iterations done
+      integer(int64) :: ffts = 0                !! real n x n transforms done
+      real(dp) :: residual = 0.0_dp             !! relative residual, recomputed at the end
+      real(dp) :: load_error = 0.0_dp           !! relative error of the prescribed load
+      logical :: converged = .false.            !! the residual met the tolerance
+      character(64) :: reason = ''              !! why the solver came back
+      real(dp) :: seconds = 0.0_dp              !! wall time of the solve
+   end type solver_result_type
+
+end module solver_result
