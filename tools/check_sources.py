@@ -1,25 +1,46 @@
-"""Check that meson.build names every source that fpm finds, and every file of the package."""
+"""Check that meson.build names every source that fpm finds, and every file of the package.
+
+With --update, write the lists of meson.build anew.
+"""
 
 import re
 import sys
 from pathlib import Path
 
 root = Path(__file__).resolve().parent.parent
-named = set(re.findall(r"'((?:src|app|python)/[^']+\.(?:f90|F90|py|typed))'",
-                       (root / "meson.build").read_text()))
-present = {
-    path.relative_to(root).as_posix()
-    for pattern in ("src/**/*.f90", "src/**/*.F90", "app/*.f90", "python/src/*.f90",
-                    "python/asperity/**/*.py", "python/asperity/py.typed")
-    for path in root.glob(pattern)
+build = root / "meson.build"
+
+
+def present(*patterns: str) -> list[str]:
+    """Return the files that match, as paths from the root, sorted."""
+    files = {path for pattern in patterns for path in root.glob(pattern)}
+    return sorted(path.relative_to(root).as_posix() for path in files)
+
+
+lists = {
+    "sources = files": present("src/**/*.f90", "src/**/*.F90"),
+    "program = files": present("app/*.f90"),
+    "flat = files": present("python/src/*.f90"),
+    "package = files": present("python/asperity/*.py", "python/asperity/py.typed"),
 }
-faults = [f"meson.build lacks {name}" for name in sorted(present - named)]
-faults += [f"meson.build names {name}, which does not exist" for name in sorted(named - present)]
+text = build.read_text()
+faults = []
+for head, names in lists.items():
+    found = re.search(rf"( *){head}\((.*?)\)", text, flags=re.DOTALL)
+    named = re.findall(r"'([^']+)'", found[2])
+    faults += [f"meson.build lacks {name}" for name in names if name not in named]
+    faults += [f"meson.build names {name}, which does not exist" for name in named
+               if name not in names]
+    lines = "".join(f"{found[1]}  '{name}',\n" for name in names)
+    text = text.replace(found[0], f"{found[1]}{head}(\n{lines}{found[1]})")
+if "--update" in sys.argv[1:]:
+    build.write_text(text)
+    faults = []
+
 # One module a file, of the same name: that is how readers find it.
-for name in sorted(present):
-    if name.startswith("src/"):
-        modules = re.findall(r"(?mi)^ *module +(?!procedure\b)(\w+) *$", (root / name).read_text())
-        if modules != [Path(name).stem]:
-            faults.append(f"{name} must hold one module of its own name, not {modules}")
+for name in lists["sources = files"]:
+    modules = re.findall(r"(?mi)^ *module +(?!procedure\b)(\w+) *$", (root / name).read_text())
+    if modules != [Path(name).stem]:
+        faults.append(f"{name} must hold one module of its own name, not {modules}")
 if faults:
-    sys.exit("\n".join(faults))
+    sys.exit("\n".join([*faults, "python tools/check_sources.py --update mends the lists"]))
