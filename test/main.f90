@@ -3,6 +3,7 @@ program main
    use check, only : finish
    use test_base, only : run_base
    use test_fft_conv, only : run_fft_conv
+   use test_hdf5_file, only : run_hdf5_file
    use test_prony, only : run_prony
    use test_roughness, only : run_roughness
    use test_surface, only : run_surface
@@ -10,6 +11,7 @@ program main
 
    if (wanted('base')) call run_base()
    if (wanted('fft_conv')) call run_fft_conv()
+   if (wanted('hdf5_file')) call run_hdf5_file()
    if (wanted('prony')) call run_prony()
    if (wanted('surface')) call run_surface()
    if (wanted('roughness')) call run_roughness()

@@ -1,0 +1,134 @@
+!> What Fortran lacks to handle files: rename, remove, write through to the disk, look at folders.
+module file_system
+   use, intrinsic :: iso_c_binding, only : c_char, c_int, c_null_char
+   use errors, only : error_file, error_type, fail
+   implicit none
+   private
+
+   public :: rename_file, remove_file, sync_file, file_exists, is_folder, folder_of, name_of, &
+      is_terminal
+
+   integer(c_int), parameter :: open_read_write = 2     !! O_RDWR of every Unix
+
+   interface
+      function c_rename(old, new) bind(c, name='rename') result(status)
+         import :: c_char, c_int
+         character(kind=c_char), intent(in) :: old(*), new(*)
+         integer(c_int) :: status
+      end function c_rename
+
+      function c_unlink(path) bind(c, name='unlink') result(status)
+         import :: c_char, c_int
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int) :: status
+      end function c_unlink
+
+      function c_open(path, flags) bind(c, name='open') result(descriptor)
+         import :: c_char, c_int
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int), value :: flags
+         integer(c_int) :: descriptor
+      end function c_open
+
+      function c_fsync(descriptor) bind(c, name='fsync') result(status)
+         import :: c_int
+         integer(c_int), value :: descriptor
+         integer(c_int) :: status
+      end function c_fsync
+
+      function c_close(descriptor) bind(c, name='close') result(status)
+         import :: c_int
+         integer(c_int), value :: descriptor
+         integer(c_int) :: status
+      end function c_close
+
+      function c_isatty(descriptor) bind(c, name='isatty') result(status)
+         import :: c_int
+         integer(c_int), value :: descriptor
+         integer(c_int) :: status
+      end function c_isatty
+   end interface
+
+contains
+
+   !> Give a file another name in the same file system; a file of that name is replaced at once.
+   subroutine rename_file(old, new, error)
+      character(*), intent(in) :: old
+      character(*), intent(in) :: new
+      type(error_type), allocatable, intent(out) :: error
+
+      if (c_rename(old//c_null_char, new//c_null_char) /= 0) then
+         call fail(error, error_file, new//': cannot be written: renaming '//old//' failed')
+      end if
+   end subroutine rename_file
+
+   !> Remove a file; it is no error if there is none.
+   subroutine remove_file(path)
+      character(*), intent(in) :: path
+      integer(c_int) :: status
+
+      status = c_unlink(path//c_null_char)
+   end subroutine remove_file
+
+   !> Wait until what was written to a file is on the disk.
+   subroutine sync_file(path, error)
+      character(*), intent(in) :: path
+      type(error_type), allocatable, intent(out) :: error
+      integer(c_int) :: descriptor, status, closed
+
+      descriptor = c_open(path//c_null_char, open_read_write)
+      status = -1
+      if (descriptor >= 0) then
+         status = c_fsync(descriptor)
+         closed = c_close(descriptor)
+         if (closed /= 0) status = closed
+      end if
+      if (status /= 0) call fail(error, error_file, path//': cannot be written through to the disk')
+   end subroutine sync_file
+
+   !> Is there a file or folder of this name?
+   logical function file_exists(path)
+      character(*), intent(in) :: path
+
+      inquire (file=path, exist=file_exists)
+   end function file_exists
+
+   !> Is this a folder?
+   logical function is_folder(path)
+      character(*), intent(in) :: path
+
+      inquire (file=path//'/.', exist=is_folder)
+   end function is_folder
+
+   !> The folder part of a path, '.' if it has none.
+   pure function folder_of(path) result(folder)
+      character(*), intent(in) :: path
+      character(:), allocatable :: folder
+      integer :: slash
+
+      slash = index(path, '/', back=.true.)
+      if (slash == 0) then
+         folder = '.'
+      else if (slash == 1) then
+         folder = '/'
+      else
+         folder = path(:slash - 1)
+      end if
+   end function folder_of
+
+   !> A path without its folder.
+   pure function name_of(path) result(name)
+      character(*), intent(in) :: path
+      character(:), allocatable :: name
+
+      name = path(index(path, '/', back=.true.) + 1:)
+   end function name_of
+
+   !> Is this descriptor (1 standard output, 2 standard error) a terminal?
+   logical function is_terminal(descriptor)
+      integer, intent(in) :: descriptor
+
+      is_terminal = c_isatty(int(descriptor, c_int)) /= 0
+   end function is_terminal
+
+end module file_system
