@@ -1,0 +1,185 @@
+!> Small helpers for words and numbers in messages.
+module text_tools
+   use precision, only : dp, int64
+   implicit none
+   private
+
+   public :: lower, nearest, ordinary, to_text
+
+   !> A number as short text.
+   interface to_text
+      module procedure :: text_of_integer, text_of_long, text_of_real
+   end interface to_text
+
+contains
+
+   !> ASCII letters in lower case.
+   pure function lower(word) result(lowered)
+      character(*), intent(in) :: word
+      character(len(word)) :: lowered
+      integer :: i
+
+      do i = 1, len(word)
+         select case (word(i:i))
+         case ('A':'Z')
+            lowered(i:i) = achar(iachar(word(i:i)) + 32)
+         case default
+            lowered(i:i) = word(i:i)
+         end select
+      end do
+   end function lower
+
+   !> The candidate that is nearest to a word; empty if none is near.
+   pure function nearest(word, candidates) result(name)
+      character(*), intent(in) :: word             !! as typed
+      character(*), intent(in) :: candidates(:)    !! lower case, padded with blanks
+      character(:), allocatable :: name
+      integer :: best, distance, i
+
+      name = ''
+      best = max(1, len_trim(word)/2)
+      do i = 1, size(candidates)
+         if (abs(len_trim(candidates(i)) - len_trim(word)) > best) cycle
+         distance = edit_distance(lower(trim(word)), trim(candidates(i)))
+         if (distance < best .or. (distance == best .and. name == '')) then
+            best = distance
+            name = trim(candidates(i))
+         end if
+      end do
+      if (name /= '') return
+
+      ! A word that is cut short or goes on, as 'tol' for 'tolerance'
+      if (len_trim(word) < 2) return
+      do i = 1, size(candidates)
+         if (index(trim(candidates(i)), lower(trim(word))) == 1) then
+            name = trim(candidates(i))
+            return
+         end if
+      end do
+   end function nearest
+
+   !> Number of single-letter insertions, deletions, replacements and swaps of neighbours between
+   !> two words.
+   pure function edit_distance(a, b) result(distance)
+      character(*), intent(in) :: a, b
+      integer :: distance
+      integer :: row(0:len(b)), previous(0:len(b)), before(0:len(b))
+      integer :: cost, i, j
+
+      before = 0
+      previous = [(j, j = 0, len(b))]
+      row = previous
+      do i = 1, len(a)
+         row(0) = i
+         do j = 1, len(b)
+            cost = merge(0, 1, a(i:i) == b(j:j))
+            row(j) = min(previous(j) + 1, row(j - 1) + 1, previous(j - 1) + cost)
+            if (i > 1 .and. j > 1) then
+               if (a(i:i) == b(j - 1:j - 1) .and. a(i - 1:i - 1) == b(j:j)) then
+                  row(j) = min(row(j), before(j - 2) + 1)
+               end if
+            end if
+         end do
+         before = previous
+         previous = row
+      end do
+      distance = row(len(b))
+   end function edit_distance
+
+   !> A text fit for a message: control characters and runs of blanks become one blank, and what is
+   !> longer than `longest` is cut.
+   pure function ordinary(text, longest) result(shown)
+      character(*), intent(in) :: text
+      integer, intent(in) :: longest      !! characters, at least 4
+      character(:), allocatable :: shown
+      character(longest + 1) :: buffer
+      integer :: i, n
+      logical :: blank
+
+      n = 0
+      blank = .true.
+      do i = 1, len(text)
+         if (iachar(text(i:i)) <= 32 .or. iachar(text(i:i)) == 127) then
+            if (blank) cycle
+            n = n + 1
+            buffer(n:n) = ' '
+            blank = .true.
+         else
+            n = n + 1
+            buffer(n:n) = text(i:i)
+            blank = .false.
+         end if
+         if (n > longest) exit
+      end do
+      if (n > longest) then
+         shown = buffer(:longest - 3)//'...'
+      else
+         shown = trim(buffer(:n))
+      end if
+   end function ordinary
+
+   !> An integer as text.
+   pure function text_of_integer(number) result(text)
+      integer, intent(in) :: number
+      character(:), allocatable :: text
+      character(24) :: buffer
+
+      write (buffer, '(i0)') number
+      text = trim(buffer)
+   end function text_of_integer
+
+   !> A long integer as text.
+   pure function text_of_long(number) result(text)
+      integer(int64), intent(in) :: number
+      character(:), allocatable :: text
+      character(24) :: buffer
+
+      write (buffer, '(i0)') number
+      text = trim(buffer)
+   end function text_of_long
+
+   !> A real number with up to six significant digits, as 0.25, 120000 or 2.5e-7.
+   pure function text_of_real(number) result(text)
+      real(dp), intent(in) :: number
+      character(:), allocatable :: text
+      character(40) :: buffer
+      integer :: exponent, point
+
+      if (number == 0.0_dp) then
+         text = '0'
+         return
+      end if
+      write (buffer, '(es14.5e3)') number
+      buffer = adjustl(buffer)
+      point = index(buffer, 'E')
+      if (point == 0) then                          ! NaN, Infinity
+         text = trim(buffer)
+         return
+      end if
+      read (buffer(point + 1:), *) exponent
+      if (exponent >= -3 .and. exponent <= 6) then
+         write (buffer, '(f20.'//achar(iachar('0') + max(0, 5 - exponent))//')') number
+         buffer = adjustl(buffer)
+         text = without_zeros(trim(buffer))
+      else
+         text = without_zeros(buffer(:point - 1))//'e'//text_of_integer(exponent)
+      end if
+   end function text_of_real
+
+   !> Decimals without zeros at their end, and without a point at the end.
+   pure function without_zeros(decimals) result(short)
+      character(*), intent(in) :: decimals
+      character(:), allocatable :: short
+      integer :: n
+
+      n = len(decimals)
+      if (index(decimals, '.') > 0) then
+         do while (decimals(n:n) == '0')
+            n = n - 1
+         end do
+         if (decimals(n:n) == '.') n = n - 1
+      end if
+      short = decimals(:n)
+   end function without_zeros
+
+end module text_tools

@@ -1,0 +1,37 @@
+!> The faults of an input file: all are gathered, each as `file: &group: what is wrong`.
+module input_faults
+   use errors, only : add_fault, error_input, error_type
+   implicit none
+   private
+
+   public :: faults_type
+
+   integer, parameter :: most_faults = 100     !! reported; a file with more is hopeless
+
+   !> What is wrong so far.
+   type :: faults_type
+      character(:), allocatable :: path              !! of the file, as the user names it
+      type(error_type), allocatable :: error         !! unallocated: nothing is wrong
+      integer :: count = 0
+   contains
+      procedure :: add
+   end type faults_type
+
+contains
+
+   !> Add a fault.
+   pure subroutine add(self, place, message)
+      class(faults_type), intent(inout) :: self
+      character(*), intent(in) :: place       !! '&group: name = value', '&group' or 'line 3'
+      character(*), intent(in) :: message     !! what is allowed, or what is wrong
+
+      self%count = self%count + 1
+      if (self%count > most_faults) return
+      if (self%count == most_faults) then
+         call add_fault(self%error, error_input, self%path//': too many faults; the rest is not shown')
+      else
+         call add_fault(self%error, error_input, self%path//': '//place//': '//message)
+      end if
+   end subroutine add
+
+end module input_faults

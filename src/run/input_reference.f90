@@ -1,0 +1,413 @@
+!> The one description of the input: every group and variable with its type, default, units, allowed
+!> values and meaning. The reader checks against it, templates take their comments from it, and the
+!> documentation prints it.
+module input_reference
+   use precision, only : dp
+   use text_tools, only : to_text
+   implicit none
+   private
+
+   public :: allowed_phrase, group_entries, group_entry_type, is_array, is_required, reference_markdown, &
+      value_range, variable_entries, variable_entry_type, word_is_allowed
+
+   integer, parameter, public :: kind_integer = 1
+   integer, parameter, public :: kind_real = 2
+   integer, parameter, public :: kind_logical = 3
+   integer, parameter, public :: kind_text = 4        !! any string
+   integer, parameter, public :: kind_word = 5        !! one of several strings
+   integer, parameter, public :: kind_reals = 6       !! list of reals
+   integer, parameter, public :: kind_words = 7       !! list of such strings
+
+   !> A group.
+   type :: group_entry_type
+      character(12) :: name
+      logical :: required
+      logical :: repeatable
+      character(200) :: meaning
+   end type group_entry_type
+
+   !> A variable.
+   type :: variable_entry_type
+      character(12) :: group
+      character(24) :: name
+      integer :: kind
+      character(40) :: default      !! as in an input; in parentheses where it is none or derived
+      character(8) :: units
+      character(160) :: allowed     !! 'positive', 'not negative', 'any', an interval, or words
+      character(320) :: meaning
+   end type variable_entry_type
+
+contains
+
+   !> All groups, in the order of a usual input.
+   pure function group_entries() result(entries)
+      type(group_entry_type), allocatable :: entries(:)
+
+      entries = [ &
+         group_entry_type('case', .false., .false., 'What the case is called.'), &
+         group_entry_type('grid', .true., .false., 'The regular grid of cells, the same for all fields.'), &
+         group_entry_type('surface', .true., .true., &
+            'The height of the rigid road; the heights of several groups add up.'), &
+         group_entry_type('material', .true., .false., &
+            'The viscoelastic solid: a spring in parallel with Prony arms or Zener branches.'), &
+         group_entry_type('adhesion', .false., .false., 'Attraction across the gap.'), &
+         group_entry_type('friction', .false., .false., 'Friction in the interface.'), &
+         group_entry_type('phase', .true., .true., &
+            'A stretch of time with its load and the velocity of the road; without a duration one '// &
+            'static solve.'), &
+         group_entry_type('solver', .false., .false., 'How it is solved.'), &
+         group_entry_type('output', .false., .false., 'What is kept.')]
+   end function group_entries
+
+   !> All variables, group by group.
+   pure function variable_entries() result(entries)
+      type(variable_entry_type), allocatable :: entries(:)
+
+      entries = [case_and_grid(), surface(), material(), interface_laws(), phase(), solver_and_output()]
+   end function variable_entries
+
+   !> One row of the table, with blanks filled in.
+   pure function row(group, name, kind, default, units, allowed, meaning) result(entry)
+      character(*), intent(in) :: group, name
+      integer, intent(in) :: kind
+      character(*), intent(in) :: default, units, allowed, meaning
+      type(variable_entry_type) :: entry
+
+      entry%group = group
+      entry%name = name
+      entry%kind = kind
+      entry%default = default
+      entry%units = units
+      entry%allowed = allowed
+      entry%meaning = meaning
+   end function row
+
+   pure function case_and_grid() result(rows)
+      type(variable_entry_type), allocatable :: rows(:)
+
+      rows = [ &
+         row('case', 'title', kind_text, '''''', '', 'any', 'A title, kept in the result.'), &
+         row('grid', 'nx', kind_integer, '(required)', '', 'positive', 'Cells along x, at least 2.'), &
+         row('grid', 'ny', kind_integer, '(required)', '', 'positive', &
+            'Cells along y; 1 is a plane-strain line contact.'), &
+         row('grid', 'lx', kind_real, '(required)', 'm', 'positive', 'Length along x.'), &
+         row('grid', 'ly', kind_real, '(lx ny/nx)', 'm', 'positive', &
+            'Length along y; square cells by default.'), &
+         row('grid', 'boundary', kind_word, '''periodic''', '', '''periodic'' | ''free''', &
+            'Repeated for ever, or one patch on an unbounded half-space.')]
+   end function case_and_grid
+
+   pure function surface() result(rows)
+      type(variable_entry_type), allocatable :: rows(:)
+
+      rows = [ &
+         row('surface', 'shape', kind_word, '(required)', '', &
+            '''flat'' | ''sphere'' | ''paraboloid'' | ''cylinder'' | ''sine'' | ''hexagonal_wave'' | '// &
+            '''self_affine'' | ''file''', &
+            'The shape: exact cap, -r^2/(2R), exact arc with its axis along y, one wave along x, '// &
+            'three crossed waves, rough, or a height map.'), &
+         row('surface', 'radius', kind_real, '(required)', 'm', 'positive', &
+            'Radius of sphere, paraboloid or cylinder.'), &
+         row('surface', 'amplitude', kind_real, '(required)', 'm', 'any', 'Amplitude of a wave.'), &
+         row('surface', 'wavelength', kind_real, '(required)', 'm', 'positive', 'Wavelength of a wave.'), &
+         row('surface', 'hurst', kind_real, '(required)', '', '(0, 1]', 'Hurst exponent of a rough surface.'), &
+         row('surface', 'wavelength_long', kind_real, '(shorter side)', 'm', 'positive', &
+            'Longest wavelength of a rough surface; lx where ny = 1.'), &
+         row('surface', 'wavelength_rolloff', kind_real, '(wavelength_long)', 'm', 'positive', &
+            'The spectrum is flat from here to wavelength_long.'), &
+         row('surface', 'wavelength_short', kind_real, '(8 cells)', 'm', 'positive', &
+            'Shortest wavelength of a rough surface.'), &
+         row('surface', 'rms_height', kind_real, '(none)', 'm', 'positive', &
+            'Root mean square height; give this or rms_slope.'), &
+         row('surface', 'rms_slope', kind_real, '(none)', '', 'positive', &
+            'Root mean square of the gradient; give this or rms_height.'), &
+         row('surface', 'seed', kind_integer, '1', '', 'any', &
+            'Number of the random surface; the same seed gives the same surface.'), &
+         row('surface', 'generator', kind_word, '''random_phase''', '', &
+            '''random_phase'' | ''filtered_noise''', 'How a rough surface is drawn.'), &
+         row('surface', 'file', kind_text, '(required)', '', 'any', &
+            'HDF5 file with a height map in metres, shape (ny, nx); a path from the input''s folder.'), &
+         row('surface', 'dataset', kind_text, '''''', '', 'any', &
+            'Its dataset; ''surface/height'' and then ''surface'' are tried where none is given.'), &
+         row('surface', 'scale', kind_real, '1.0', '', 'any', 'Factor on the heights of the file.'), &
+         row('surface', 'centre_x', kind_real, '((nx/2) lx/nx)', 'm', 'any', &
+            'Where the summit lies; the default falls on a cell.'), &
+         row('surface', 'centre_y', kind_real, '((ny/2) ly/ny)', 'm', 'any', 'The same along y.')]
+   end function surface
+
+   pure function material() result(rows)
+      type(variable_entry_type), allocatable :: rows(:)
+
+      rows = [ &
+         row('material', 'poisson', kind_real, '0.5', '', '(-1, 0.5]', 'Poisson ratio, at all times.'), &
+         row('material', 'shear_modulus', kind_real, '(required; 0 with arms)', 'Pa', 'not negative', &
+            'Spring in parallel with the arms; 0 only where there are arms or branches.'), &
+         row('material', 'prony_g', kind_reals, '(none)', 'Pa', 'positive', 'Moduli of the Prony arms.'), &
+         row('material', 'prony_tau', kind_reals, '(none)', 's', 'positive', &
+            'Their relaxation times, at the reference temperature.'), &
+         row('material', 'zener_g0', kind_reals, '(none)', 'Pa', 'positive', &
+            'Zener branches: spring in series with (zener_g1 parallel to zener_eta).'), &
+         row('material', 'zener_g1', kind_reals, '(none)', 'Pa', 'not negative', &
+            'The spring beside the damper.'), &
+         row('material', 'zener_eta', kind_reals, '(none)', 'Pa s', 'positive', &
+            'The damper; the branch relaxes with zener_eta/(zener_g0 + zener_g1).'), &
+         row('material', 'thickness', kind_real, '0.0', 'm', 'not negative', &
+            'Height of the block, for its mean shear; 0 is a half-space.'), &
+         row('material', 'density', kind_real, '0.0', 'kg/m3', 'not negative', &
+            'For inertia of the mean shear, with thickness; 0 is none.'), &
+         row('material', 'temperature', kind_real, '(reference_temperature)', 'C', '[-273.15, inf)', &
+            'Temperature of the case.'), &
+         row('material', 'reference_temperature', kind_real, '20.0', 'C', '[-273.15, inf)', &
+            'Temperature of the given relaxation times.'), &
+         row('material', 'wlf_c1', kind_real, '(none)', '', 'positive', &
+            'WLF shift: log10 a_T = -c1 (T - T_ref)/(c2 + T - T_ref).'), &
+         row('material', 'wlf_c2', kind_real, '(none)', 'K', 'positive', 'The other constant of WLF.')]
+   end function material
+
+   pure function interface_laws() result(rows)
+      type(variable_entry_type), allocatable :: rows(:)
+
+      rows = [ &
+         row('adhesion', 'potential', kind_word, '''none''', '', &
+            '''none'' | ''exponential'' | ''gauss'' | ''maugis_dugdale''', &
+            'Energy against gap: -w exp(-g/r), -w exp(-g^2/r^2), or -w (1 - g/r) up to g = r.'), &
+         row('adhesion', 'energy', kind_real, '(required)', 'J/m2', 'positive', 'Work of adhesion w.'), &
+         row('adhesion', 'range', kind_real, '(required)', 'm', 'positive', 'Range r.'), &
+         row('adhesion', 'start', kind_word, '''non_adhesive''', '', '''non_adhesive'' | ''full_contact''', &
+            'State from which the first one is sought; hysteresis is real.'), &
+         row('friction', 'law', kind_word, '''none''', '', &
+            '''none'' | ''coulomb'' | ''constant_shear'' | ''coulomb_orowan''', &
+            'Bound of the traction: coefficient times pressure, shear_strength, or the lower of both.'), &
+         row('friction', 'coefficient', kind_real, '(required)', '', 'not negative', &
+            'Coulomb coefficient of the interface.'), &
+         row('friction', 'shear_strength', kind_real, '(required)', 'Pa', 'positive', &
+            'Shear strength of the interface.'), &
+         row('friction', 'slope_effect', kind_logical, '.true.', '', 'any', &
+            'Apply the law on the true local slope of the road.')]
+   end function interface_laws
+
+   pure function phase() result(rows)
+      type(variable_entry_type), allocatable :: rows(:)
+
+      rows = [ &
+         row('phase', 'name', kind_text, '(phase N)', '', 'any', 'A name, kept in the result.'), &
+         row('phase', 'duration', kind_real, '0.0', 's', 'not negative', &
+            '0 or none: one static solve.'), &
+         row('phase', 'steps', kind_integer, '(derived)', '', 'positive', &
+            'Time steps; give this or dt. By default from dt.'), &
+         row('phase', 'dt', kind_real, '(derived)', 's', 'positive', &
+            'Time step, adjusted to a whole number of steps. By default one cell a step where the road '// &
+            'slides, else an eighth of the shortest active relaxation time and 20 steps at least.'), &
+         row('phase', 'control', kind_word, '(from the load given)', '', &
+            '''pressure'' | ''force'' | ''displacement''', 'What is prescribed.'), &
+         row('phase', 'pressure', kind_real, '(as before)', 'Pa', 'any', &
+            'Mean pressure at the end; 0 or less with adhesion only.'), &
+         row('phase', 'force', kind_real, '(as before)', 'N', 'any', &
+            'Force on the cell at the end, pressure lx ly; 0 or less with adhesion only.'), &
+         row('phase', 'displacement', kind_real, '(as before)', 'm', 'any', &
+            'Approach of the far rubber at the end, from first touch of the undeformed surfaces.'), &
+         row('phase', 'ramp', kind_word, '''step''', '', '''step'' | ''linear''', &
+            'The load jumps at the start, or grows through the phase.'), &
+         row('phase', 'relaxed', kind_logical, '.false.', '', 'any', &
+            'Start as if the load had rested there for ever.'), &
+         row('phase', 'velocity_x', kind_real, '0.0', 'm/s', 'any', &
+            'Velocity of the road relative to the top of the block, along x.'), &
+         row('phase', 'velocity_y', kind_real, '0.0', 'm/s', 'any', 'The same along y.')]
+   end function phase
+
+   pure function solver_and_output() result(rows)
+      type(variable_entry_type), allocatable :: rows(:)
+      character(*), parameter :: fields = '''pressure'' | ''gap'' | ''displacement_z'' | ''contact'' | '// &
+         '''traction_x'' | ''traction_y'' | ''displacement_x'' | ''displacement_y'' | ''slip_x'' | ''slip_y'''
+
+      rows = [ &
+         row('solver', 'tolerance', kind_real, '1e-6', '', '(0, 1)', 'Residual of every solve.'), &
+         row('solver', 'max_iterations', kind_integer, '1000', '', 'positive', 'Of one solve.'), &
+         row('solver', 'method', kind_word, '''fast''', '', '''fast'' | ''thesis''', &
+            'The default algorithms, or those of the thesis.'), &
+         row('solver', 'time_scheme', kind_word, '''exponential2''', '', &
+            '''exponential2'' | ''exponential'' | ''backward_euler''', 'Time integration of the arms.'), &
+         row('solver', 'passes', kind_integer, '2', '', 'positive', &
+            'Most outer passes of a step with friction.'), &
+         row('solver', 'slip_law', kind_word, '''physical''', '', '''physical'' | ''thesis''', &
+            'Direction of slip on slopes.'), &
+         row('solver', 'interpolation', kind_word, '''linear''', '', '''linear'' | ''cubic''', &
+            'Of the road between cells.'), &
+         row('solver', 'precision', kind_word, '''double''', '', '''double'' | ''mixed''', &
+            'Single precision inside the transforms where it is safe, or double throughout.'), &
+         row('solver', 'threads', kind_integer, '0', '', 'not negative', '0 takes all processors.'), &
+         row('output', 'file', kind_text, '(the input''s name with .h5)', '', 'any', &
+            'The result, an HDF5 file; a path from the input''s folder.'), &
+         row('output', 'snapshot_every', kind_integer, '0', 'steps', 'not negative', &
+            'Keep the fields every so many steps; 0 keeps the last only. Or give snapshot_times.'), &
+         row('output', 'snapshot_times', kind_reals, '(none)', 's', 'not negative', &
+            'Times at which the fields are kept, increasing.'), &
+         row('output', 'snapshot_fields', kind_words, '(all that the case has)', '', fields, &
+            'Fields that are kept.'), &
+         row('output', 'checkpoint_every', kind_integer, '0', 'steps', 'not negative', &
+            'Steps between checkpoints; 0 writes one only when the run is stopped by a signal.'), &
+         row('output', 'compression', kind_integer, '1', '', '[0, 9]', &
+            'Deflate level of the fields; 0 is none.')]
+   end function solver_and_output
+
+   !> Must the user give it wherever it applies?
+   pure logical function is_required(entry)
+      type(variable_entry_type), intent(in) :: entry
+
+      is_required = index(entry%default, '(required') == 1
+   end function is_required
+
+   !> Does it take a list?
+   pure logical function is_array(entry)
+      type(variable_entry_type), intent(in) :: entry
+
+      is_array = entry%kind == kind_reals .or. entry%kind == kind_words
+   end function is_array
+
+   !> The range of a number.
+   pure subroutine value_range(entry, low, high, low_open, high_open)
+      type(variable_entry_type), intent(in) :: entry
+      real(dp), intent(out) :: low, high
+      logical, intent(out) :: low_open, high_open     !! the end itself is not allowed
+      integer :: comma, last
+
+      low = -huge(1.0_dp)
+      high = huge(1.0_dp)
+      low_open = .false.
+      high_open = .false.
+      select case (entry%allowed)
+      case ('any')
+      case ('positive')
+         low = 0.0_dp
+         low_open = .true.
+      case ('not negative')
+         low = 0.0_dp
+      case default
+         comma = index(entry%allowed, ',')
+         last = len_trim(entry%allowed)
+         read (entry%allowed(2:comma - 1), *) low
+         if (index(entry%allowed, 'inf') == 0) read (entry%allowed(comma + 1:last - 1), *) high
+         low_open = entry%allowed(1:1) == '('
+         high_open = entry%allowed(last:last) == ')'
+      end select
+   end subroutine value_range
+
+   !> What must be, for a message: 'must be a positive integer'.
+   pure function allowed_phrase(entry) result(phrase)
+      type(variable_entry_type), intent(in) :: entry
+      character(:), allocatable :: phrase
+      character(:), allocatable :: noun
+      real(dp) :: high, low
+      logical :: high_open, low_open
+
+      select case (entry%kind)
+      case (kind_logical)
+         phrase = 'must be .true. or .false.'
+         return
+      case (kind_text)
+         phrase = 'must be a string in quotes'
+         return
+      case (kind_word)
+         phrase = 'must be one of '//trim(entry%allowed)
+         return
+      case (kind_words)
+         phrase = 'every value must be one of '//trim(entry%allowed)
+         return
+      case (kind_integer)
+         noun = 'integer'
+      case default
+         noun = 'number'
+      end select
+
+      select case (entry%allowed)
+      case ('any')
+         phrase = 'a finite '//noun
+         if (noun == 'integer') phrase = 'an integer'
+      case ('positive')
+         phrase = 'a positive '//noun
+      case ('not negative')
+         phrase = '0 or a positive '//noun
+      case default
+         call value_range(entry, low, high, low_open, high_open)
+         phrase = 'a '//noun
+         if (noun == 'integer') phrase = 'an '//noun
+         if (low_open) then
+            phrase = phrase//' above'
+         else
+            phrase = phrase//' of at least'
+         end if
+         phrase = phrase//' '//to_text(low)
+         if (high < huge(1.0_dp)) then
+            if (high_open) then
+               phrase = phrase//' and below '//to_text(high)
+            else
+               phrase = phrase//' and at most '//to_text(high)
+            end if
+         end if
+      end select
+      if (is_array(entry)) then
+         phrase = 'every value must be '//phrase
+      else
+         phrase = 'must be '//phrase
+      end if
+   end function allowed_phrase
+
+   !> Is this word among the allowed ones?
+   pure logical function word_is_allowed(entry, word)
+      type(variable_entry_type), intent(in) :: entry
+      character(*), intent(in) :: word
+
+      word_is_allowed = index(entry%allowed, ''''//trim(word)//'''') > 0 .and. scan(trim(word), '|''') == 0
+   end function word_is_allowed
+
+   !> The whole table in Markdown.
+   function reference_markdown() result(text)
+      character(:), allocatable :: text
+      type(group_entry_type), allocatable :: groups(:)
+      type(variable_entry_type), allocatable :: variables(:)
+      character(*), parameter :: nl = new_line('a')
+      character(8), parameter :: kinds(7) = [character(8) :: 'integer', 'real', 'logical', 'string', &
+         'string', 'reals', 'strings']
+      integer :: i, j
+
+      groups = group_entries()
+      variables = variable_entries()
+      text = ''
+      do i = 1, size(groups)
+         text = text//'## `&'//trim(groups(i)%name)//'`'//nl//nl//trim(groups(i)%meaning)
+         if (groups(i)%required) text = text//' Required.'
+         if (groups(i)%repeatable) text = text//' May be repeated.'
+         text = text//nl//nl//'| variable | type | default | units | allowed | meaning |'//nl// &
+            '| --- | --- | --- | --- | --- | --- |'//nl
+         do j = 1, size(variables)
+            associate (entry => variables(j))
+               if (entry%group /= groups(i)%name) cycle
+               text = text//'| `'//trim(entry%name)//'` | '//trim(kinds(entry%kind))//' | '// &
+                  trim(entry%default)//' | '//trim(entry%units)//' | '//bars(trim(entry%allowed))// &
+                  ' | '//trim(entry%meaning)//' |'//nl
+            end associate
+         end do
+         if (i < size(groups)) text = text//nl
+      end do
+   end function reference_markdown
+
+   !> Bars as commas, for a cell of a table.
+   pure function bars(text) result(cell)
+      character(*), intent(in) :: text
+      character(:), allocatable :: cell
+      integer :: i
+
+      cell = ''
+      i = 1
+      do while (i <= len(text))
+         if (text(i:min(i + 2, len(text))) == ' | ') then
+            cell = cell//', '
+            i = i + 3
+         else
+            cell = cell//text(i:i)
+            i = i + 1
+         end if
+      end do
+   end function bars
+
+end module input_reference

@@ -1,0 +1,622 @@
+!> From scanned namelists to values: names are checked, each value is read by Fortran's own rules and
+!> held against the table of the input reference; defaults come from that table too.
+module input_values
+   use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
+   use case_settings, only : path_length
+   use input_faults, only : faults_type
+   use input_reference, only : allowed_phrase, group_entries, group_entry_type, is_array, &
+      kind_integer, kind_logical, kind_real, kind_reals, kind_text, kind_word, kind_words, value_range, &
+      variable_entries, variable_entry_type, word_is_allowed
+   use namelist_file, only : assignment_type, namelists_type, scan_namelists, shown_tokens, &
+      token_broken, token_comma, token_equals, token_string, token_type, token_word, tokenise
+   use precision, only : dp
+   use text_tools, only : lower, nearest, to_text
+   implicit none
+   private
+
+   public :: default_group, group_values_type, read_groups
+
+   integer, parameter :: longest_list = 10000      !! values of a variable
+
+   !> One value, as it came out of the text.
+   type :: item_type
+      real(dp) :: real = 0.0_dp
+      integer :: integer = 0
+      logical :: logical = .false.
+      character(path_length) :: text = ''
+   end type item_type
+
+   !> A variable of a group.
+   type :: value_type
+      type(variable_entry_type) :: entry
+      logical :: given = .false.                 !! the input names it
+      logical :: good = .true.                   !! and its value can be used
+      integer :: line = 0
+      character(:), allocatable :: shown         !! as written, for messages
+      type(item_type), allocatable :: items(:)   !! not allocated: no value, no default
+      logical, allocatable :: filled(:)          !! elements that were assigned
+   end type value_type
+
+   !> The values of one group, given or by default.
+   type :: group_values_type
+      character(12) :: name = ''
+      integer :: line = 0                        !! where it starts; 0 for a group of defaults
+      logical :: repeatable = .false.
+      type(value_type), allocatable :: values(:)
+   contains
+      procedure :: given                         !! does the input name the variable?
+      procedure :: usable                        !! is it given, and good?
+      procedure :: bad                           !! is it given, and wrong?
+      procedure :: integer_value
+      procedure :: real_value
+      procedure :: logical_value
+      procedure :: text_value
+      procedure :: reals_value
+      procedure :: texts_value
+      procedure :: fault                         !! report a variable
+      procedure :: group_fault                   !! report the group
+   end type group_values_type
+
+contains
+
+   !> Read a text into groups of values; all that is wrong is added to the faults.
+   subroutine read_groups(text, groups, faults)
+      character(*), intent(in) :: text
+      type(group_values_type), allocatable, intent(out) :: groups(:)   !! known groups, in file order
+      type(faults_type), intent(inout) :: faults
+      type(namelists_type) :: file
+      type(group_entry_type), allocatable :: known(:)
+      integer, allocatable :: entry_of(:)
+      integer :: count, i, j
+
+      known = group_entries()
+      call scan_namelists(text, file, faults)
+      allocate (entry_of(size(file%groups)))
+      do i = 1, size(file%groups)
+         entry_of(i) = findloc(known%name == file%groups(i)%name, .true., dim=1)
+         if (entry_of(i) == 0) then
+            call faults%add('&'//trim(file%groups(i)%name), 'there is no such group'// &
+               hint('&', nearest(file%groups(i)%name, known%name))//in_line(file%groups(i)%line))
+            cycle
+         end if
+         if (known(entry_of(i))%repeatable) cycle
+         do j = 1, i - 1
+            if (entry_of(j) == entry_of(i)) then
+               call faults%add('&'//trim(file%groups(i)%name), 'the group stands twice, in line '// &
+                  to_text(file%groups(j)%line)//' and in line '//to_text(file%groups(i)%line)// &
+                  ': only &surface and &phase may be repeated')
+               exit
+            end if
+         end do
+      end do
+
+      allocate (groups(count_nonzero(entry_of)))
+      count = 0
+      do i = 1, size(file%groups)
+         if (entry_of(i) == 0) cycle
+         count = count + 1
+         call default_group(known(entry_of(i))%name, groups(count))
+         groups(count)%line = file%groups(i)%line
+         do j = 1, size(file%assignments)
+            if (file%assignments(j)%group == i) call assign(file, file%assignments(j), groups(count), faults)
+         end do
+         call finish_group(groups(count), faults)
+      end do
+   end subroutine read_groups
+
+   pure integer function count_nonzero(numbers) result(n)
+      integer, intent(in) :: numbers(:)
+
+      n = count(numbers /= 0)
+   end function count_nonzero
+
+   !> A group in which nothing is given.
+   subroutine default_group(name, group)
+      character(*), intent(in) :: name
+      type(group_values_type), intent(out) :: group
+      type(variable_entry_type), allocatable :: entries(:)
+      type(group_entry_type), allocatable :: known(:)
+      type(token_type), allocatable :: tokens(:)
+      integer :: count, i
+      logical :: good
+
+      known = group_entries()
+      entries = variable_entries()
+      group%name = name
+      group%repeatable = any(known%name == name .and. known%repeatable)
+      allocate (group%values(count_of(entries, name)))
+      count = 0
+      do i = 1, size(entries)
+         if (entries(i)%group /= name) cycle
+         count = count + 1
+         group%values(count)%entry = entries(i)
+         group%values(count)%shown = trim(entries(i)%default)
+         if (entries(i)%default(1:1) == '(') cycle
+         call tokenise(trim(entries(i)%default), tokens)
+         allocate (group%values(count)%items(1))
+         call convert(trim(entries(i)%default), tokens(1), entries(i), group%values(count)%items(1), good)
+      end do
+   end subroutine default_group
+
+   !> Number of variables of a group.
+   pure integer function count_of(entries, group) result(n)
+      type(variable_entry_type), intent(in) :: entries(:)
+      character(*), intent(in) :: group
+
+      n = count(entries%group == group)
+   end function count_of
+
+   !> Take one assignment into its group.
+   subroutine assign(file, assignment, group, faults)
+      type(namelists_type), intent(in) :: file
+      type(assignment_type), intent(in) :: assignment
+      type(group_values_type), intent(inout) :: group
+      type(faults_type), intent(inout) :: faults
+      integer :: at
+
+      at = position(group, assignment%name)
+      if (at == 0) then
+         call faults%add('&'//trim(group%name)//': '//trim(assignment%name), 'there is no such variable'// &
+            hint('', nearest(assignment%name, group%values%entry%name))//in_line(assignment%line))
+         return
+      end if
+
+      associate (value => group%values(at))
+         if (value%given .and. .not. (assignment%subscripted .and. is_array(value%entry))) then
+            call group%group_fault(trim(assignment%name)//' is given twice, in line '// &
+               to_text(value%line)//' and in line '//to_text(assignment%line), faults)
+            return
+         end if
+         if (.not. value%given) then
+            value%shown = shown_tokens(file, assignment%first, assignment%last)
+            value%line = assignment%line
+            if (allocated(value%items)) deallocate (value%items)
+            allocate (value%items(0), value%filled(0))
+         else
+            value%shown = value%shown//' ... '//shown_tokens(file, assignment%first, assignment%last)
+         end if
+         value%given = .true.
+         call take_values(file, assignment, group, value, faults)
+      end associate
+   end subroutine assign
+
+   !> Read the values of an assignment, with repeat counts.
+   subroutine take_values(file, assignment, group, value, faults)
+      type(namelists_type), intent(in) :: file
+      type(assignment_type), intent(in) :: assignment
+      type(group_values_type), intent(in) :: group
+      type(value_type), intent(inout) :: value
+      type(faults_type), intent(inout) :: faults
+      type(token_type) :: token
+      type(item_type) :: item
+      integer :: at, element, first_element, repeats, star, token_number
+      logical :: comma_before, good
+
+      first_element = assignment%subscript
+      if (assignment%subscripted) then
+         if (.not. is_array(value%entry)) then
+            call reject('is a single value: it takes no subscript')
+            return
+         else if (first_element == 0) then
+            call reject('has a subscript that is not understood: it must be (n) or (n:m), n from 1')
+            return
+         else if (first_element > longest_list) then
+            call reject('has a subscript above '//to_text(longest_list))
+            return
+         end if
+      end if
+
+      element = first_element - 1
+      comma_before = .true.
+      token_number = assignment%first
+      do while (token_number <= assignment%last)
+         token = file%tokens(token_number)
+         token_number = token_number + 1
+         if (token%kind == token_comma) then
+            if (comma_before) then
+               call reject('has an empty value before a comma')
+               return
+            end if
+            comma_before = .true.
+            cycle
+         end if
+         comma_before = .false.
+         if (token%kind == token_broken) then
+            call reject('has a string that is not closed on its line')
+            return
+         end if
+
+         repeats = 1
+         if (token%kind == token_word) then
+            star = index(file%text(token%first:token%last), '*')
+            if (star > 1) then
+               call repeat_count(file%text(token%first:token%first + star - 2), repeats)
+               token%first = token%first + star
+               if (token%first > token%last .and. token_number <= assignment%last) then
+                  ! n*'string': the string is a token of its own
+                  if (file%tokens(token_number)%kind == token_string .and. &
+                     file%tokens(token_number)%first == token%first) then
+                     token = file%tokens(token_number)
+                     token_number = token_number + 1
+                  end if
+               end if
+               if (repeats < 1 .or. token%first > token%last) then
+                  call reject(allowed_phrase(value%entry)//'; a repetition is written n*value')
+                  return
+               end if
+            end if
+         end if
+         call convert(file%text, token, value%entry, item, good)
+         if (.not. good) then
+            call reject(allowed_phrase(value%entry)//too_long(token))
+            return
+         end if
+         if (element + repeats > merge(longest_list, 1, is_array(value%entry))) then
+            if (is_array(value%entry)) then
+               call reject('has more than '//to_text(longest_list)//' values')
+            else
+               call reject('takes one value only: it '//allowed_phrase(value%entry))
+            end if
+            return
+         end if
+         if (assignment%upper > 0 .and. element + repeats > assignment%upper) then
+            call reject('has more values than its subscript has elements')
+            return
+         end if
+         do at = 1, repeats
+            element = element + 1
+            call put(value, element, item, good)
+            if (.not. good) then
+               call reject('has its element '//to_text(element)//' given twice')
+               return
+            end if
+         end do
+      end do
+      if (element == first_element - 1) call reject('has no value: it '//allowed_phrase(value%entry))
+
+   contains
+
+      !> Report the variable, as found, and drop its value.
+      subroutine reject(message)
+         character(*), intent(in) :: message
+
+         if (value%good) call faults%add(place(group, value), message//line_note(group, value))
+         value%good = .false.
+      end subroutine reject
+
+      !> A note where a string is too long.
+      function too_long(token) result(note)
+         type(token_type), intent(in) :: token
+         character(:), allocatable :: note
+
+         note = ''
+         if (token%kind == token_string .and. token%last - token%first - 1 > path_length) &
+            note = ' of at most '//to_text(path_length)//' characters'
+      end function too_long
+
+   end subroutine take_values
+
+   !> Set an element of a list that grows as needed.
+   pure subroutine put(value, element, item, good)
+      type(value_type), intent(inout) :: value
+      integer, intent(in) :: element
+      type(item_type), intent(in) :: item
+      logical, intent(out) :: good                  !! false: it was set before
+      type(item_type), allocatable :: items(:)
+      logical, allocatable :: filled(:)
+      integer :: n
+
+      n = size(value%items)
+      if (element > n) then
+         allocate (items(max(element, min(2*n, 2*element))), filled(max(element, min(2*n, 2*element))))
+         filled = .false.
+         items(:n) = value%items
+         filled(:n) = value%filled
+         call move_alloc(items, value%items)
+         call move_alloc(filled, value%filled)
+      end if
+      good = .not. value%filled(element)
+      value%items(element) = item
+      value%filled(element) = .true.
+   end subroutine put
+
+   !> Look for gaps in the lists of a group.
+   subroutine finish_group(group, faults)
+      type(group_values_type), intent(inout) :: group
+      type(faults_type), intent(inout) :: faults
+      integer :: i, last, missing
+
+      do i = 1, size(group%values)
+         associate (value => group%values(i))
+            if (.not. (value%given .and. value%good)) cycle
+            last = findloc(value%filled, .true., dim=1, back=.true.)
+            missing = findloc(value%filled(:last), .false., dim=1)
+            value%items = value%items(:last)
+            if (missing > 0) then
+               value%good = .false.
+               call faults%add(place(group, value), 'has no element '//to_text(missing)// &
+                  ': all elements from 1 on must be given'//line_note(group, value))
+            end if
+         end associate
+      end do
+   end subroutine finish_group
+
+   !> Read a repeat count; 0 where it is none.
+   subroutine repeat_count(word, repeats)
+      character(*), intent(in) :: word
+      integer, intent(out) :: repeats
+      integer :: status
+
+      repeats = 0
+      if (verify(word, '0123456789') > 0 .or. len(word) > 30) return
+      read (word, *, iostat=status) repeats
+      if (status /= 0) repeats = 0
+      if (repeats > longest_list) repeats = longest_list + 1
+   end subroutine repeat_count
+
+   !> Read one value by Fortran's rules, and hold it against the table.
+   subroutine convert(text, token, entry, item, good)
+      character(*), intent(in) :: text
+      type(token_type), intent(in) :: token
+      type(variable_entry_type), intent(in) :: entry
+      type(item_type), intent(out) :: item
+      logical, intent(out) :: good
+      integer, parameter :: longest_word = 400      !! of a number
+      integer :: status
+      logical :: wants_string
+
+      good = .false.
+      wants_string = any(entry%kind == [kind_text, kind_word, kind_words])
+      if (wants_string .neqv. token%kind == token_string) return
+      if (wants_string) then
+         call unquote(text(token%first:token%last), item%text, good)
+         if (good .and. entry%kind /= kind_text) then
+            item%text = lower(item%text)
+            good = word_is_allowed(entry, item%text) .and. len_trim(item%text) > 0
+         end if
+         return
+      end if
+
+      if (token%kind /= token_word .or. token%last - token%first >= longest_word) return
+      associate (word => lower(text(token%first:token%last)))
+         select case (entry%kind)
+         case (kind_integer)
+            if (verify(word, '+-0123456789') > 0) return
+            read (word, *, iostat=status) item%integer
+            item%real = real(item%integer, dp)
+         case (kind_real, kind_reals)
+            if (verify(word, '+-.0123456789ed') > 0) return
+            read (word, *, iostat=status) item%real
+         case (kind_logical)
+            if (verify(word, '.abcdefghijklmnopqrstuvwxyz') > 0) return
+            read (word, *, iostat=status) item%logical
+         case default
+            return
+         end select
+      end associate
+      if (status /= 0) return
+      good = entry%kind == kind_logical
+      if (.not. good) good = in_range(entry, item%real)
+   end subroutine convert
+
+   !> Is the number finite and within the range of the table?
+   logical function in_range(entry, number)
+      type(variable_entry_type), intent(in) :: entry
+      real(dp), intent(in) :: number
+      real(dp) :: high, low
+      logical :: high_open, low_open
+
+      in_range = .false.
+      if (.not. ieee_is_finite(number)) return
+      call value_range(entry, low, high, low_open, high_open)
+      if (number < low .or. number > high) return
+      if (low_open .and. number <= low) return
+      if (high_open .and. number >= high) return
+      in_range = .true.
+   end function in_range
+
+   !> The content of a string in quotes; a doubled quote stands for one.
+   subroutine unquote(quoted, content, good)
+      character(*), intent(in) :: quoted
+      character(*), intent(out) :: content
+      logical, intent(out) :: good               !! false: too long
+      integer :: i, n
+
+      content = ''
+      n = 0
+      i = 2
+      do while (i < len(quoted))
+         n = n + 1
+         if (n <= len(content)) content(n:n) = quoted(i:i)
+         if (quoted(i:i) == quoted(1:1)) i = i + 1
+         i = i + 1
+      end do
+      good = n <= len(content)
+   end subroutine unquote
+
+   !> Number of a variable in its group; 0 if there is none.
+   pure integer function position(group, name)
+      class(group_values_type), intent(in) :: group
+      character(*), intent(in) :: name
+
+      do position = size(group%values), 1, -1
+         if (group%values(position)%entry%name == name) return
+      end do
+   end function position
+
+   !> Does the input name the variable?
+   pure logical function given(self, name)
+      class(group_values_type), intent(in) :: self
+      character(*), intent(in) :: name
+
+      given = self%values(position(self, name))%given
+   end function given
+
+   !> Is the variable given, and good?
+   pure logical function usable(self, name)
+      class(group_values_type), intent(in) :: self
+      character(*), intent(in) :: name
+
+      usable = self%given(name) .and. self%values(position(self, name))%good
+   end function usable
+
+   !> Is the variable given, and wrong?
+   pure logical function bad(self, name)
+      class(group_values_type), intent(in) :: self
+      character(*), intent(in) :: name
+
+      bad = .not. self%values(position(self, name))%good
+   end function bad
+
+   !> The integer of a variable; `otherwise`, or 0, where it has none.
+   pure integer function integer_value(self, name, otherwise) result(number)
+      class(group_values_type), intent(in) :: self
+      character(*), intent(in) :: name
+      integer, intent(in), optional :: otherwise
+
+      number = 0
+      if (present(otherwise)) number = otherwise
+      associate (value => self%values(position(self, name)))
+         if (has_value(value)) number = value%items(1)%integer
+      end associate
+   end function integer_value
+
+   !> The number of a variable; `otherwise`, or 0, where it has none.
+   pure real(dp) function real_value(self, name, otherwise) result(number)
+      class(group_values_type), intent(in) :: self
+      character(*), intent(in) :: name
+      real(dp), intent(in), optional :: otherwise
+
+      number = 0.0_dp
+      if (present(otherwise)) number = otherwise
+      associate (value => self%values(position(self, name)))
+         if (has_value(value)) number = value%items(1)%real
+      end associate
+   end function real_value
+
+   !> The logical of a variable; false where it has none.
+   pure logical function logical_value(self, name) result(truth)
+      class(group_values_type), intent(in) :: self
+      character(*), intent(in) :: name
+
+      truth = .false.
+      associate (value => self%values(position(self, name)))
+         if (has_value(value)) truth = value%items(1)%logical
+      end associate
+   end function logical_value
+
+   !> The string of a variable; empty where it has none.
+   pure function text_value(self, name) result(text)
+      class(group_values_type), intent(in) :: self
+      character(*), intent(in) :: name
+      character(:), allocatable :: text
+
+      text = ''
+      associate (value => self%values(position(self, name)))
+         if (has_value(value)) text = trim(value%items(1)%text)
+      end associate
+   end function text_value
+
+   !> The list of a variable; of size 0 where it has none.
+   pure function reals_value(self, name) result(numbers)
+      class(group_values_type), intent(in) :: self
+      character(*), intent(in) :: name
+      real(dp), allocatable :: numbers(:)
+
+      associate (value => self%values(position(self, name)))
+         if (has_value(value)) then
+            numbers = value%items%real
+         else
+            allocate (numbers(0))
+         end if
+      end associate
+   end function reals_value
+
+   !> The strings of a variable; of size 0 where it has none.
+   pure function texts_value(self, name) result(texts)
+      class(group_values_type), intent(in) :: self
+      character(*), intent(in) :: name
+      character(path_length), allocatable :: texts(:)
+
+      associate (value => self%values(position(self, name)))
+         if (has_value(value)) then
+            texts = value%items%text
+         else
+            allocate (texts(0))
+         end if
+      end associate
+   end function texts_value
+
+   !> Is there a value, given and good or by default?
+   pure logical function has_value(value)
+      type(value_type), intent(in) :: value
+
+      has_value = .false.
+      if (.not. value%good .or. .not. allocated(value%items)) return
+      has_value = size(value%items) > 0
+   end function has_value
+
+   !> Report a variable: `&group: name = value: message`, or `&group: name: message` if not given.
+   subroutine fault(self, name, message, faults)
+      class(group_values_type), intent(in) :: self
+      character(*), intent(in) :: name
+      character(*), intent(in) :: message
+      type(faults_type), intent(inout) :: faults
+
+      associate (value => self%values(position(self, name)))
+         call faults%add(place(self, value), message//line_note(self, value))
+      end associate
+   end subroutine fault
+
+   !> Report the group: `&group: message`.
+   subroutine group_fault(self, message, faults)
+      class(group_values_type), intent(in) :: self
+      character(*), intent(in) :: message
+      type(faults_type), intent(inout) :: faults
+
+      if (self%repeatable .and. self%line > 0) then
+         call faults%add('&'//trim(self%name), message//in_line(self%line))
+      else
+         call faults%add('&'//trim(self%name), message)
+      end if
+   end subroutine group_fault
+
+   !> Group, variable and what was found.
+   function place(group, value)
+      class(group_values_type), intent(in) :: group
+      type(value_type), intent(in) :: value
+      character(:), allocatable :: place
+
+      place = '&'//trim(group%name)//': '//trim(value%entry%name)
+      if (value%given) place = place//' = '//value%shown
+   end function place
+
+   !> Where a variable of a repeatable group stands.
+   function line_note(group, value) result(note)
+      class(group_values_type), intent(in) :: group
+      type(value_type), intent(in) :: value
+      character(:), allocatable :: note
+
+      note = ''
+      if (.not. group%repeatable) return
+      note = in_line(merge(value%line, group%line, value%given))
+   end function line_note
+
+   !> A line number in parentheses.
+   pure function in_line(line) result(note)
+      integer, intent(in) :: line
+      character(:), allocatable :: note
+
+      note = ' (line '//to_text(line)//')'
+   end function in_line
+
+   !> A proposal, if there is one.
+   pure function hint(prefix, name) result(text)
+      character(*), intent(in) :: prefix, name
+      character(:), allocatable :: text
+
+      text = ''
+      if (name /= '') text = '; did you mean '//prefix//name//'?'
+   end function hint
+
+end module input_values

@@ -1,0 +1,417 @@
+!> Takes a text of namelists apart into groups and assignments, without reading the values.
+!>
+!> Fortran's own `read (unit, nml=...)` stops at the first fault and says little about it. This scanner
+!> goes on to the end, so that all faults are reported at once. The form is Fortran's: `&name ... /`,
+!> or `&end`, `$name ... $end`; `!` starts a comment; blanks, tabs, line ends and commas separate.
+module namelist_file
+   use input_faults, only : faults_type
+   use text_tools, only : lower, ordinary, to_text
+   implicit none
+   private
+
+   public :: assignment_type, group_type, namelists_type, scan_namelists, shown_tokens, token_type, &
+      tokenise
+
+   integer, parameter, public :: name_length = 32      !! a name's characters; longer ones are cut
+   integer, parameter, public :: token_word = 1        !! a run of other characters
+   integer, parameter, public :: token_string = 2      !! a string with its quotes
+   integer, parameter, public :: token_comma = 3
+   integer, parameter, public :: token_equals = 4
+   integer, parameter, public :: token_parenthesis = 5 !! (...)
+   integer, parameter, public :: token_open = 6        !! &name
+   integer, parameter, public :: token_close = 7       !! / or &end
+   integer, parameter, public :: token_broken = 8      !! a string that is not closed on its line
+
+   integer, parameter :: from_start = 1                !! subscript where none is written
+
+   !> A piece of the text.
+   type :: token_type
+      integer :: kind = 0
+      integer :: first = 0         !! first character
+      integer :: last = 0          !! last character
+      integer :: line = 0          !! from 1
+   end type token_type
+
+   !> `name = values` or `name(subscript) = values`.
+   type :: assignment_type
+      character(name_length) :: name = ''     !! lower case
+      integer :: group = 0                    !! number of its group
+      integer :: first = 0                    !! first token of the values
+      integer :: last = -1                    !! last token; before the first where there is none
+      integer :: line = 0
+      logical :: subscripted = .false.
+      integer :: subscript = from_start       !! element that takes the first value; 0: not understood
+      integer :: upper = 0                    !! last element of (n:m), or 0
+   end type assignment_type
+
+   !> A group.
+   type :: group_type
+      character(name_length) :: name = ''     !! lower case
+      integer :: line = 0
+   end type group_type
+
+   !> A scanned text.
+   type :: namelists_type
+      character(:), allocatable :: text
+      type(token_type), allocatable :: tokens(:)
+      type(group_type), allocatable :: groups(:)
+      type(assignment_type), allocatable :: assignments(:)
+   end type namelists_type
+
+contains
+
+   !> Scan a text; what is wrong with its form is added to the faults.
+   subroutine scan_namelists(text, file, faults)
+      character(*), intent(in) :: text
+      type(namelists_type), intent(out) :: file
+      type(faults_type), intent(inout) :: faults
+      integer :: bad, i
+
+      file%text = text
+      allocate (file%groups(0), file%assignments(0))
+      bad = 0
+      do i = 1, len(text)
+         select case (iachar(text(i:i)))
+         case (0:8, 11, 14:31, 127)
+            bad = i
+            exit
+         end select
+      end do
+      if (bad > 0) then
+         allocate (file%tokens(0))
+         call faults%add('line '//to_text(line_of(text, bad)), 'a character that is no text (code '// &
+            to_text(iachar(text(bad:bad)))//'): this must be a text file of Fortran namelists')
+         return
+      end if
+
+      call tokenise(text, file%tokens)
+      call parse(file, faults)
+   end subroutine scan_namelists
+
+   !> Number of the line that holds a character.
+   pure integer function line_of(text, position) result(line)
+      character(*), intent(in) :: text
+      integer, intent(in) :: position
+      integer :: i
+
+      line = 1
+      do i = 1, position - 1
+         if (text(i:i) == new_line('a')) line = line + 1
+      end do
+   end function line_of
+
+   !> Split a text in tokens.
+   pure subroutine tokenise(text, tokens)
+      character(*), intent(in) :: text
+      type(token_type), allocatable, intent(out) :: tokens(:)
+      type(token_type), allocatable :: larger(:)
+      type(token_type) :: token
+      integer :: at, count, line, next
+
+      allocate (tokens(256))
+      count = 0
+      line = 1
+      at = 1
+      if (len(text) >= 3) then                        ! the mark that some editors put before UTF-8
+         if (text(:3) == achar(239)//achar(187)//achar(191)) at = 4
+      end if
+      do while (at <= len(text))
+         select case (text(at:at))
+         case (new_line('a'))
+            line = line + 1
+            at = at + 1
+         case (' ', achar(9), achar(12), achar(13))
+            at = at + 1
+         case ('!')
+            next = index(text(at:), new_line('a'))
+            if (next == 0) exit
+            at = at + next - 1
+         case default
+            call next_token(text, at, token)
+            token%line = line
+            if (count == size(tokens)) then
+               allocate (larger(2*count))
+               larger(:count) = tokens
+               call move_alloc(larger, tokens)
+            end if
+            count = count + 1
+            tokens(count) = token
+            at = token%last + 1
+         end select
+      end do
+      tokens = tokens(:count)
+   end subroutine tokenise
+
+   !> The token that starts at a character that is neither blank nor a comment.
+   pure subroutine next_token(text, at, token)
+      character(*), intent(in) :: text
+      integer, intent(in) :: at
+      type(token_type), intent(out) :: token
+      character(*), parameter :: ends = ' ,=/!''"()'//achar(9)//achar(10)//achar(12)//achar(13)
+      integer :: n
+
+      token%first = at
+      token%last = at
+      select case (text(at:at))
+      case (',')
+         token%kind = token_comma
+      case ('=')
+         token%kind = token_equals
+      case ('/')
+         token%kind = token_close
+      case ('''', '"')
+         call string_end(text, at, token%last, token%kind)
+      case ('(')
+         token%kind = token_parenthesis
+         n = scan(text(at:), ')'//new_line('a'))
+         if (n == 0) n = len(text) - at + 2
+         token%last = at + n - 1
+         if (token%last > len(text)) then
+            token%last = len(text)
+         else if (text(token%last:token%last) /= ')') then
+            token%last = token%last - 1
+         end if
+      case ('&', '$')
+         n = scan(text(at:)//' ', ends)
+         token%last = max(at, at + n - 2)
+         if (token%last == at) then
+            token%kind = token_word
+         else if (lower(text(at + 1:token%last)) == 'end') then
+            token%kind = token_close
+         else
+            token%kind = token_open
+         end if
+      case default
+         token%kind = token_word
+         n = word_length_at(text, at)
+         token%last = at + n - 1
+      end select
+
+   contains
+
+      !> Characters of the word that starts here, at least 1.
+      pure integer function word_length_at(text, at) result(n)
+         character(*), intent(in) :: text
+         integer, intent(in) :: at
+
+         n = 1
+         do while (at + n <= len(text))
+            if (index(ends, text(at + n:at + n)) > 0) exit
+            n = n + 1
+         end do
+      end function word_length_at
+
+   end subroutine next_token
+
+   !> Where the string that starts here ends: at its quote, or unclosed at the end of its line.
+   pure subroutine string_end(text, at, last, kind)
+      character(*), intent(in) :: text
+      integer, intent(in) :: at
+      integer, intent(out) :: last
+      integer, intent(out) :: kind           !! token_string or token_broken
+      integer :: i
+
+      i = at + 1
+      do while (i <= len(text))
+         if (text(i:i) == new_line('a')) exit
+         if (text(i:i) == text(at:at)) then
+            if (i < len(text)) then
+               if (text(i + 1:i + 1) == text(at:at)) then    ! a doubled quote stands for one
+                  i = i + 2
+                  cycle
+               end if
+            end if
+            last = i
+            kind = token_string
+            return
+         end if
+         i = i + 1
+      end do
+      last = i - 1
+      if (last > at .and. text(last:last) == achar(13)) last = last - 1
+      kind = token_broken
+   end subroutine string_end
+
+   !> Collect tokens into groups and assignments.
+   subroutine parse(file, faults)
+      type(namelists_type), intent(inout) :: file
+      type(faults_type), intent(inout) :: faults
+      type(group_type), allocatable :: groups(:)
+      type(assignment_type), allocatable :: assignments(:)
+      integer :: at, first, group_count, count
+      logical :: inside
+
+      allocate (groups(number_of(file%tokens, token_open)))
+      allocate (assignments(number_of(file%tokens, token_equals)))
+      group_count = 0
+      count = 0
+      inside = .false.
+      at = 1
+      do while (at <= size(file%tokens))
+         associate (token => file%tokens(at))
+            if (token%kind == token_open) then
+               if (inside) call unclosed(token%line)
+               group_count = group_count + 1
+               groups(group_count)%name = lower(file%text(token%first + 1:token%last))
+               groups(group_count)%line = token%line
+               inside = .true.
+               at = at + 1
+            else if (.not. inside) then
+               first = at
+               do while (at < size(file%tokens))
+                  if (file%tokens(at + 1)%kind == token_open) exit
+                  at = at + 1
+               end do
+               call faults%add('line '//to_text(token%line), 'text outside of a group: '// &
+                  shown_tokens(file, first, at)//': a group is &name ... /')
+               at = at + 1
+            else if (token%kind == token_close) then
+               inside = .false.
+               at = at + 1
+            else
+               call parse_assignment(file, groups(group_count), group_count, at, assignments, count, &
+                  faults)
+            end if
+         end associate
+      end do
+      if (inside) call unclosed(0)
+      file%groups = groups(:group_count)
+      file%assignments = assignments(:count)
+
+   contains
+
+      !> The group in hand has no end.
+      subroutine unclosed(line)
+         integer, intent(in) :: line       !! of the next group; 0 at the end of the file
+         character(:), allocatable :: where_
+
+         where_ = 'the end of the file'
+         if (line > 0) where_ = 'the next group in line '//to_text(line)
+         call faults%add('&'//trim(groups(group_count)%name), 'the group that starts in line '// &
+            to_text(groups(group_count)%line)//' is not closed: a ''/'' is missing before '//where_)
+      end subroutine unclosed
+
+   end subroutine parse
+
+   !> Number of tokens of a kind.
+   pure integer function number_of(tokens, kind) result(n)
+      type(token_type), intent(in) :: tokens(:)
+      integer, intent(in) :: kind
+      integer :: i
+
+      n = 0
+      do i = 1, size(tokens)
+         if (tokens(i)%kind == kind) n = n + 1
+      end do
+   end function number_of
+
+   !> Take one assignment, or skip what is none.
+   subroutine parse_assignment(file, group, number, at, assignments, count, faults)
+      type(namelists_type), intent(in) :: file
+      type(group_type), intent(in) :: group
+      integer, intent(in) :: number                          !! of the group
+      integer, intent(inout) :: at                           !! token
+      type(assignment_type), intent(inout) :: assignments(:)
+      integer, intent(inout) :: count                        !! of assignments so far
+      type(faults_type), intent(inout) :: faults
+      type(assignment_type) :: new
+      integer :: first
+
+      first = at
+      if (.not. starts_assignment(file%tokens, at)) then
+         do while (at < size(file%tokens))
+            if (starts_assignment(file%tokens, at + 1)) exit
+            if (any(file%tokens(at + 1)%kind == [token_open, token_close])) exit
+            at = at + 1
+         end do
+         call faults%add('&'//trim(group%name), shown_tokens(file, first, at)//' in line '// &
+            to_text(file%tokens(first)%line)//' is no assignment: it must be ''variable = value''')
+         at = at + 1
+         return
+      end if
+
+      new%name = lower(file%text(file%tokens(at)%first:file%tokens(at)%last))
+      new%group = number
+      new%line = file%tokens(at)%line
+      at = at + 1
+      if (file%tokens(at)%kind == token_parenthesis) then
+         call read_subscript(file%text(file%tokens(at)%first:file%tokens(at)%last), new)
+         at = at + 1
+      end if
+      at = at + 1                                             ! '='
+      new%first = at
+      do while (at <= size(file%tokens))
+         if (any(file%tokens(at)%kind == [token_open, token_close, token_equals])) exit
+         if (starts_assignment(file%tokens, at)) exit
+         at = at + 1
+      end do
+      new%last = at - 1
+      count = count + 1
+      assignments(count) = new
+   end subroutine parse_assignment
+
+   !> Does `name =` or `name(...) =` start at this token?
+   pure logical function starts_assignment(tokens, at) result(starts)
+      type(token_type), intent(in) :: tokens(:)
+      integer, intent(in) :: at
+      integer :: next
+
+      starts = .false.
+      if (tokens(at)%kind /= token_word) return
+      next = at + 1
+      if (next > size(tokens)) return
+      if (tokens(next)%kind == token_parenthesis) next = next + 1
+      if (next > size(tokens)) return
+      starts = tokens(next)%kind == token_equals
+   end function starts_assignment
+
+   !> Understand (n), (n:), (n:m), (:m) or (:).
+   pure subroutine read_subscript(text, assignment)
+      character(*), intent(in) :: text                        !! with its parentheses
+      type(assignment_type), intent(inout) :: assignment
+      integer :: colon, n
+
+      assignment%subscripted = .true.
+      n = len(text)
+      if (n < 3 .or. text(n:n) /= ')') then
+         assignment%subscript = 0
+         return
+      end if
+      colon = index(text, ':')
+      if (colon == 0) then
+         assignment%subscript = whole(text(2:n - 1), 0)
+         assignment%upper = assignment%subscript
+      else
+         assignment%subscript = whole(text(2:colon - 1), from_start)
+         assignment%upper = whole(text(colon + 1:n - 1), huge(1))
+         if (assignment%upper < assignment%subscript) assignment%subscript = 0
+      end if
+   end subroutine read_subscript
+
+   !> A positive integer, 0 where there is none, `default` where nothing is written.
+   pure integer function whole(text, default)
+      character(*), intent(in) :: text
+      integer, intent(in) :: default
+      integer :: status
+
+      whole = default
+      if (len_trim(text) == 0) return
+      whole = 0
+      if (verify(trim(adjustl(text)), '0123456789') > 0 .or. len_trim(text) > 30) return
+      read (text, *, iostat=status) whole
+      if (status /= 0) whole = 0
+   end function whole
+
+   !> The text of some tokens, for a message.
+   function shown_tokens(file, first, last) result(shown)
+      type(namelists_type), intent(in) :: file
+      integer, intent(in) :: first, last        !! tokens
+      character(:), allocatable :: shown
+      integer, parameter :: longest = 60
+
+      shown = ''
+      if (last < first) return
+      shown = ordinary(file%text(file%tokens(first)%first:file%tokens(last)%last), longest)
+   end function shown_tokens
+
+end module namelist_file
