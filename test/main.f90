@@ -2,6 +2,7 @@
 program main
    use check, only : finish
    use test_base, only : run_base
+   use test_case_input, only : run_case_input
    use test_fft_conv, only : run_fft_conv
    use test_hdf5_file, only : run_hdf5_file
    use test_prony, only : run_prony
@@ -15,6 +16,7 @@ program main
    if (wanted('prony')) call run_prony()
    if (wanted('surface')) call run_surface()
    if (wanted('roughness')) call run_roughness()
+   if (wanted('case_input')) call run_case_input()
    call finish()
 
 contains

@@ -49,6 +49,7 @@ module case_settings
       real(dp) :: duration                          !! s; 0 where static
       integer :: steps                              !! at least 1; 1 where static
       real(dp) :: dt                                !! s; 0 where static
+      character(64) :: dt_reason                    !! how dt was chosen, in words
       character(word_length) :: control             !! 'pressure' | 'force' | 'displacement'
       real(dp) :: target                            !! Pa, N or m, reached at the end
       logical :: given                              !! the phase names its load itself
@@ -93,6 +94,7 @@ module case_settings
       type(phase_settings_type), allocatable :: phases(:)
       type(solver_settings_type) :: solver
       type(output_settings_type) :: output
+      character(:), allocatable :: warnings         !! one line each; empty if there are none
    end type case_type
 
 end module case_settings

@@ -13,6 +13,7 @@ module input_faults
       character(:), allocatable :: path              !! of the file, as the user names it
       type(error_type), allocatable :: error         !! unallocated: nothing is wrong
       integer :: count = 0
+      logical :: hopeless = .false.                  !! the file is no text: nothing else is looked at
    contains
       procedure :: add
    end type faults_type

@@ -159,9 +159,9 @@ contains
             'Temperature of the case.'), &
          row('material', 'reference_temperature', kind_real, '20.0', 'C', '[-273.15, inf)', &
             'Temperature of the given relaxation times.'), &
-         row('material', 'wlf_c1', kind_real, '(none)', '', 'positive', &
+         row('material', 'wlf_c1', kind_real, '0.0', '', 'not negative', &
             'WLF shift: log10 a_T = -c1 (T - T_ref)/(c2 + T - T_ref).'), &
-         row('material', 'wlf_c2', kind_real, '(none)', 'K', 'positive', 'The other constant of WLF.')]
+         row('material', 'wlf_c2', kind_real, '0.0', 'K', 'not negative', 'The other constant of WLF.')]
    end function material
 
    pure function interface_laws() result(rows)
@@ -222,7 +222,7 @@ contains
 
       rows = [ &
          row('solver', 'tolerance', kind_real, '1e-6', '', '(0, 1)', 'Residual of every solve.'), &
-         row('solver', 'max_iterations', kind_integer, '1000', '', 'positive', 'Of one solve.'), &
+         row('solver', 'max_iterations', kind_integer, '1000', '', 'positive', 'Most iterations of a solve.'), &
          row('solver', 'method', kind_word, '''fast''', '', '''fast'' | ''thesis''', &
             'The default algorithms, or those of the thesis.'), &
          row('solver', 'time_scheme', kind_word, '''exponential2''', '', &
@@ -235,7 +235,7 @@ contains
             'Of the road between cells.'), &
          row('solver', 'precision', kind_word, '''double''', '', '''double'' | ''mixed''', &
             'Single precision inside the transforms where it is safe, or double throughout.'), &
-         row('solver', 'threads', kind_integer, '0', '', 'not negative', '0 takes all processors.'), &
+         row('solver', 'threads', kind_integer, '0', '', '[0, 1024]', '0 takes all processors.'), &
          row('output', 'file', kind_text, '(the input''s name with .h5)', '', 'any', &
             'The result, an HDF5 file; a path from the input''s folder.'), &
          row('output', 'snapshot_every', kind_integer, '0', 'steps', 'not negative', &

@@ -66,17 +66,19 @@ contains
       type(faults_type), intent(inout) :: faults
       type(namelists_type) :: file
       type(group_entry_type), allocatable :: known(:)
+      character(12), allocatable :: names(:)
       integer, allocatable :: entry_of(:)
       integer :: count, i, j
 
       known = group_entries()
+      names = known%name
       call scan_namelists(text, file, faults)
       allocate (entry_of(size(file%groups)))
       do i = 1, size(file%groups)
-         entry_of(i) = findloc(known%name == file%groups(i)%name, .true., dim=1)
+         entry_of(i) = findloc(names == file%groups(i)%name, .true., dim=1)
          if (entry_of(i) == 0) then
             call faults%add('&'//trim(file%groups(i)%name), 'there is no such group'// &
-               hint('&', nearest(file%groups(i)%name, known%name))//in_line(file%groups(i)%line))
+               hint('&', nearest(file%groups(i)%name, names))//in_line(file%groups(i)%line))
             cycle
          end if
          if (known(entry_of(i))%repeatable) cycle
@@ -152,12 +154,14 @@ contains
       type(assignment_type), intent(in) :: assignment
       type(group_values_type), intent(inout) :: group
       type(faults_type), intent(inout) :: faults
+      character(24), allocatable :: names(:)
       integer :: at
 
       at = position(group, assignment%name)
       if (at == 0) then
+         names = group%values%entry%name
          call faults%add('&'//trim(group%name)//': '//trim(assignment%name), 'there is no such variable'// &
-            hint('', nearest(assignment%name, group%values%entry%name))//in_line(assignment%line))
+            hint('', nearest(assignment%name, names))//in_line(assignment%line))
          return
       end if
 
@@ -364,6 +368,7 @@ contains
       integer, parameter :: longest_word = 400      !! of a number
       integer :: status
       logical :: wants_string
+      character(:), allocatable :: word
 
       good = .false.
       wants_string = any(entry%kind == [kind_text, kind_word, kind_words])
@@ -378,22 +383,21 @@ contains
       end if
 
       if (token%kind /= token_word .or. token%last - token%first >= longest_word) return
-      associate (word => lower(text(token%first:token%last)))
-         select case (entry%kind)
-         case (kind_integer)
-            if (verify(word, '+-0123456789') > 0) return
-            read (word, *, iostat=status) item%integer
-            item%real = real(item%integer, dp)
-         case (kind_real, kind_reals)
-            if (verify(word, '+-.0123456789ed') > 0) return
-            read (word, *, iostat=status) item%real
-         case (kind_logical)
-            if (verify(word, '.abcdefghijklmnopqrstuvwxyz') > 0) return
-            read (word, *, iostat=status) item%logical
-         case default
-            return
-         end select
-      end associate
+      word = lower(text(token%first:token%last))
+      select case (entry%kind)
+      case (kind_integer)
+         if (verify(word, '+-0123456789') > 0) return
+         read (word, *, iostat=status) item%integer
+         item%real = real(item%integer, dp)
+      case (kind_real, kind_reals)
+         if (verify(word, '+-.0123456789ed') > 0) return
+         read (word, *, iostat=status) item%real
+      case (kind_logical)
+         if (verify(word, '.abcdefghijklmnopqrstuvwxyz') > 0) return
+         read (word, *, iostat=status) item%logical
+      case default
+         return
+      end select
       if (status /= 0) return
       good = entry%kind == kind_logical
       if (.not. good) good = in_range(entry, item%real)

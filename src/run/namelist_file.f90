@@ -79,6 +79,7 @@ contains
       end do
       if (bad > 0) then
          allocate (file%tokens(0))
+         faults%hopeless = .true.
          call faults%add('line '//to_text(line_of(text, bad)), 'a character that is no text (code '// &
             to_text(iachar(text(bad:bad)))//'): this must be a text file of Fortran namelists')
          return
@@ -283,12 +284,13 @@ contains
       !> The group in hand has no end.
       subroutine unclosed(line)
          integer, intent(in) :: line       !! of the next group; 0 at the end of the file
-         character(:), allocatable :: where_
+         character(:), allocatable :: next
 
-         where_ = 'the end of the file'
-         if (line > 0) where_ = 'the next group in line '//to_text(line)
+         if (file%tokens(at - 1)%kind == token_broken) return       ! that is the fault
+         next = 'the end of the file'
+         if (line > 0) next = 'the next group in line '//to_text(line)
          call faults%add('&'//trim(groups(group_count)%name), 'the group that starts in line '// &
-            to_text(groups(group_count)%line)//' is not closed: a ''/'' is missing before '//where_)
+            to_text(groups(group_count)%line)//' is not closed: a ''/'' is missing before '//next)
       end subroutine unclosed
 
    end subroutine parse
@@ -408,10 +410,16 @@ contains
       integer, intent(in) :: first, last        !! tokens
       character(:), allocatable :: shown
       integer, parameter :: longest = 60
+      integer :: end
 
+      end = last
+      do while (end > first)
+         if (file%tokens(end)%kind /= token_comma) exit
+         end = end - 1
+      end do
       shown = ''
-      if (last < first) return
-      shown = ordinary(file%text(file%tokens(first)%first:file%tokens(last)%last), longest)
+      if (end < first) return
+      shown = ordinary(file%text(file%tokens(first)%first:file%tokens(end)%last), longest)
    end function shown_tokens
 
 end module namelist_file

@@ -1,0 +1,271 @@
+!> The phases of a case: load and control that are inherited, time steps that are derived.
+!>
+!> Default time step: where the road slides, one cell a step, so that the height map is shifted by
+!> whole cells (thesis, 2.2.2); elsewhere an eighth of the shortest active relaxation time, and at
+!> least 20 steps. An arm is active in a phase if its relaxation time is above a thousandth of it:
+!> faster ones have relaxed at once.
+module case_phases
+   use case_settings, only : material_settings_type, phase_settings_type
+   use input_faults, only : faults_type
+   use input_values, only : group_values_type
+   use precision, only : dp
+   use regular_grid, only : grid_type
+   use text_tools, only : to_text
+   implicit none
+   private
+
+   public :: resolve_phases
+
+   real(dp), parameter :: most_steps = 1.0e9_dp
+   character(*), parameter :: loads(3) = [character(12) :: 'pressure', 'force', 'displacement']
+
+contains
+
+   !> Resolve all phases, in the order of the input.
+   subroutine resolve_phases(groups, grid, material, adhesive, phases, faults, warnings)
+      type(group_values_type), intent(in) :: groups(:)        !! only the phases
+      type(grid_type), intent(in) :: grid                     !! nx = 0: not known
+      type(material_settings_type), intent(in) :: material
+      logical, intent(in) :: adhesive                         !! loads of 0 or less are allowed
+      type(phase_settings_type), allocatable, intent(out) :: phases(:)
+      type(faults_type), intent(inout) :: faults
+      character(:), allocatable, intent(inout) :: warnings    !! a line each
+      integer :: i
+
+      allocate (phases(size(groups)))
+      do i = 1, size(groups)
+         associate (group => groups(i), phase => phases(i))
+            phase%name = 'phase '//to_text(i)
+            if (group%given('name')) phase%name = group%text_value('name')
+            if (len(group%text_value('name')) > len(phase%name)) &
+               call group%fault('name', 'must have at most '//to_text(len(phase%name))//' characters', faults)
+            phase%duration = group%real_value('duration')
+            phase%static = .not. phase%duration > 0.0_dp .and. .not. group%bad('duration')
+            phase%linear = group%text_value('ramp') == 'linear'
+            phase%relaxed = group%logical_value('relaxed')
+            phase%velocity_x = group%real_value('velocity_x')
+            phase%velocity_y = group%real_value('velocity_y')
+            if (i == 1) then
+               call resolve_load(group, phase, faults)
+            else
+               call resolve_load(group, phase, faults, phases(i - 1))
+            end if
+            call check_load(group, phase, adhesive, faults)
+            call check_combination(group, phase, material, faults)
+            call resolve_steps(group, phase, grid, material, faults)
+            call warn_of_steps(i, phase, grid, material, warnings)
+         end associate
+      end do
+   end subroutine resolve_phases
+
+   !> Control and target: given, derived from the load that is given, or those of the phase before.
+   subroutine resolve_load(group, phase, faults, before)
+      type(group_values_type), intent(in) :: group
+      type(phase_settings_type), intent(inout) :: phase
+      type(faults_type), intent(inout) :: faults
+      type(phase_settings_type), intent(in), optional :: before
+      integer :: i
+      logical :: named(3)
+      character(:), allocatable :: list
+
+      phase%control = ''
+      phase%target = 0.0_dp
+      phase%given = .false.
+      named = [(group%given(trim(loads(i))), i = 1, 3)]
+      if (group%bad('control')) return
+
+      if (group%given('control')) then
+         phase%control = group%text_value('control')
+         if (group%given(trim(phase%control))) then
+            phase%target = group%real_value(trim(phase%control))
+            phase%given = .true.
+            return
+         end if
+         if (present(before)) then
+            if (before%control == phase%control .and. .not. any(named)) then
+               phase%target = before%target
+               return
+            end if
+         end if
+         call group%fault('control', 'needs '//trim(phase%control)//' in the same phase', faults)
+      else if (count(named) > 1) then
+         list = ''
+         do i = 1, 3
+            if (.not. named(i)) cycle
+            if (list /= '') list = list//' and '
+            list = list//trim(loads(i))
+         end do
+         call group%group_fault(list//' are given together: give one of them, or say by control '// &
+            'which of them is prescribed', faults)
+      else if (count(named) == 1) then
+         i = findloc(named, .true., dim=1)
+         phase%control = loads(i)
+         phase%target = group%real_value(trim(loads(i)))
+         phase%given = .true.
+      else if (present(before)) then
+         phase%control = before%control
+         phase%target = before%target
+      else
+         call group%group_fault('pressure, force or displacement is missing: the first phase must give '// &
+            'one of them', faults)
+      end if
+   end subroutine resolve_load
+
+   !> Without adhesion a load must press.
+   subroutine check_load(group, phase, adhesive, faults)
+      type(group_values_type), intent(in) :: group
+      type(phase_settings_type), intent(in) :: phase
+      logical, intent(in) :: adhesive
+      type(faults_type), intent(inout) :: faults
+
+      if (adhesive .or. .not. phase%given .or. phase%control == 'displacement') return
+      if (group%bad(trim(phase%control)) .or. phase%target > 0.0_dp) return
+      call group%fault(trim(phase%control), 'must be a positive number; 0 or less is allowed with '// &
+         '&adhesion only', faults)
+   end subroutine check_load
+
+   !> Settings that exclude or need one another.
+   subroutine check_combination(group, phase, material, faults)
+      type(group_values_type), intent(in) :: group
+      type(phase_settings_type), intent(in) :: phase
+      type(material_settings_type), intent(in) :: material
+      type(faults_type), intent(inout) :: faults
+      character(*), parameter :: timed(4) = [character(10) :: 'steps', 'dt', 'velocity_x', 'velocity_y']
+      integer :: i
+
+      if (phase%relaxed .and. phase%linear) call group%fault('relaxed', &
+         'excludes ramp = ''linear'': a load that grows has not rested', faults)
+      if (phase%relaxed .and. size(material%prony_g) > 0 .and. .not. material%shear_modulus > 0.0_dp) &
+         call group%fault('relaxed', 'needs a long-term shear modulus above 0: this material flows', faults)
+      if (.not. phase%static) return
+      do i = 1, size(timed)
+         if (.not. group%usable(trim(timed(i)))) cycle
+         if (i > 2 .and. abs(group%real_value(trim(timed(i)))) <= 0.0_dp) cycle
+         call group%fault(trim(timed(i)), 'needs a duration: a phase without one is one static solve', &
+            faults)
+      end do
+      if (phase%linear) call group%fault('ramp', &
+         'needs a duration: a phase without one is one static solve', faults)
+   end subroutine check_combination
+
+   !> Number of steps and time step.
+   subroutine resolve_steps(group, phase, grid, material, faults)
+      type(group_values_type), intent(in) :: group
+      type(phase_settings_type), intent(inout) :: phase
+      type(grid_type), intent(in) :: grid
+      type(material_settings_type), intent(in) :: material
+      type(faults_type), intent(inout) :: faults
+      real(dp) :: dt
+      real(dp), parameter :: same = 1.0e-6_dp       !! relative difference of times that are one
+
+      phase%steps = 1
+      phase%dt = 0.0_dp
+      phase%dt_reason = 'static'
+      if (phase%static .or. .not. phase%duration > 0.0_dp) return
+      if (group%bad('steps') .or. group%bad('dt')) return
+
+      if (group%given('steps')) then
+         phase%steps = group%integer_value('steps')
+         phase%dt_reason = 'steps given'
+         dt = phase%duration/phase%steps
+         if (group%given('dt')) then
+            if (abs(group%real_value('dt') - dt) > same*dt) call group%fault('dt', &
+               'does not agree with steps = '//to_text(phase%steps)//' in a duration of '// &
+               to_text(phase%duration)//' s, which make '//to_text(dt)//' s: give one of them', faults)
+         end if
+      else if (group%given('dt')) then
+         dt = group%real_value('dt')
+         phase%dt_reason = 'dt given'
+         if (dt > phase%duration*(1.0_dp + same)) call group%fault('dt', &
+            'must be at most the duration, '//to_text(phase%duration)//' s', faults)
+      else
+         if (group%bad('velocity_x') .or. group%bad('velocity_y')) return
+         call default_step(phase, grid, material, dt)
+      end if
+
+      if (phase%duration/dt > most_steps) then
+         call group%group_fault('a time step of '//to_text(dt)//' s in a duration of '// &
+            to_text(phase%duration)//' s makes more than 1e9 steps: give steps or a longer dt', faults)
+         return
+      end if
+      if (.not. group%given('steps')) phase%steps = max(1, nint(phase%duration/dt))
+      phase%dt = phase%duration/phase%steps
+   end subroutine resolve_steps
+
+   !> The time step where the input gives none.
+   subroutine default_step(phase, grid, material, dt)
+      type(phase_settings_type), intent(inout) :: phase
+      type(grid_type), intent(in) :: grid
+      type(material_settings_type), intent(in) :: material
+      real(dp), intent(out) :: dt
+      integer, parameter :: fewest = 20           !! steps of a phase at rest
+      real(dp), parameter :: fraction = 8.0_dp    !! steps in a relaxation time
+      real(dp) :: tau
+
+      dt = phase%duration
+      if (abs(phase%velocity_x) + abs(phase%velocity_y) > 0.0_dp) then
+         if (grid%nx == 0) return
+         if (abs(phase%velocity_x) > 0.0_dp) dt = grid%dx/abs(phase%velocity_x)
+         if (abs(phase%velocity_y) > 0.0_dp .and. grid%ny > 1) then
+            if (abs(phase%velocity_x) > 0.0_dp) then
+               dt = min(dt, grid%dy/abs(phase%velocity_y))
+            else
+               dt = grid%dy/abs(phase%velocity_y)
+            end if
+         end if
+         phase%dt_reason = 'one cell a step'
+         return
+      end if
+
+      dt = phase%duration/fewest
+      phase%dt_reason = to_text(fewest)//' steps'
+      tau = shortest_active(phase, material)
+      if (tau > 0.0_dp .and. tau/fraction < dt) then
+         dt = tau/fraction
+         phase%dt_reason = 'an eighth of the relaxation time '//to_text(tau)//' s'
+      end if
+   end subroutine default_step
+
+   !> The shortest relaxation time above a thousandth of the phase, s; 0 if there is none.
+   pure real(dp) function shortest_active(phase, material) result(tau)
+      type(phase_settings_type), intent(in) :: phase
+      type(material_settings_type), intent(in) :: material
+      real(dp), parameter :: relaxed_at_once = 1.0e-3_dp
+
+      tau = 0.0_dp
+      if (any(material%prony_tau > relaxed_at_once*phase%duration)) &
+         tau = minval(material%prony_tau, mask=material%prony_tau > relaxed_at_once*phase%duration)
+   end function shortest_active
+
+   !> Warn where a step is too coarse.
+   subroutine warn_of_steps(number, phase, grid, material, warnings)
+      integer, intent(in) :: number                            !! of the phase
+      type(phase_settings_type), intent(in) :: phase
+      type(grid_type), intent(in) :: grid
+      type(material_settings_type), intent(in) :: material
+      character(:), allocatable, intent(inout) :: warnings
+      real(dp) :: cells, tau
+
+      if (phase%static .or. grid%nx == 0) return
+      cells = hypot(phase%velocity_x/grid%dx, phase%velocity_y/grid%dy)*phase%dt
+      if (cells > 1.5_dp) call warn('a step moves the road by '//to_text(cells)// &
+         ' cells; the contact is well followed up to one cell a step, dt = '//to_text(phase%dt/cells)//' s')
+      tau = shortest_active(phase, material)
+      if (tau > 0.0_dp .and. .not. cells > 0.0_dp) then
+         if (phase%dt > tau) call warn('dt = '//to_text(phase%dt)// &
+            ' s is longer than the shortest active relaxation time, '//to_text(tau)//' s')
+      end if
+
+   contains
+
+      !> Add a line.
+      subroutine warn(message)
+         character(*), intent(in) :: message
+
+         if (warnings /= '') warnings = warnings//new_line('a')
+         warnings = warnings//'&phase '//to_text(number)//': '//message
+      end subroutine warn
+
+   end subroutine warn_of_steps
+
+end module case_phases

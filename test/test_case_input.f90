@@ -1,0 +1,353 @@
+!> Tests of `case_input`: resolved values of good inputs, and every fault of bad ones.
+module test_case_input
+   use case_input, only : parse_case, read_case
+   use case_settings, only : case_type
+   use check, only : begin_suite, check_close, check_error, check_no_error, check_that
+   use errors, only : error_file, error_input, error_type
+   use precision, only : dp
+   use regular_grid, only : boundary_free
+   implicit none
+   private
+
+   public :: run_case_input
+
+   character(*), parameter :: nl = new_line('a')
+   character(*), parameter :: grid = '&grid nx = 64, ny = 32, lx = 2e-3 /'//nl
+   character(*), parameter :: sphere = '&surface shape = ''sphere'', radius = 0.01 /'//nl
+   character(*), parameter :: steel = '&material shear_modulus = 1e6 /'//nl
+   character(*), parameter :: press = '&phase pressure = 1e5 /'//nl
+   character(*), parameter :: body = grid//sphere//steel//press
+
+contains
+
+   subroutine run_case_input()
+      call begin_suite('case_input')
+      call test_defaults()
+      call test_given_values()
+      call test_phases()
+      call test_materials()
+      call test_bad_inputs()
+      call test_many_faults()
+      call test_files()
+   end subroutine run_case_input
+
+   !> What is not given.
+   subroutine test_defaults()
+      type(case_type) :: case
+      type(error_type), allocatable :: error
+
+      call parse_case(body, 'folder/road.nml', case, error)
+      call check_no_error(error, 'a small case')
+      if (allocated(error)) return
+      call check_close(case%grid%ly, 1.0e-3_dp, 1.0e-18_dp, 'ly makes square cells')
+      call check_close(case%surfaces(1)%centre_x, 1.0e-3_dp, 1.0e-18_dp, 'centre_x')
+      call check_close(case%surfaces(1)%centre_y, 0.5e-3_dp, 1.0e-18_dp, 'centre_y')
+      call check_close(case%material%poisson, 0.5_dp, 0.0_dp, 'poisson')
+      call check_that(size(case%material%prony_g) == 0, 'no arms')
+      call check_that(case%adhesion%potential == 'none', 'no adhesion')
+      call check_that(case%friction%law == 'none' .and. case%friction%slope_effect, 'no friction')
+      call check_that(case%phases(1)%static .and. case%phases(1)%steps == 1, 'one static solve')
+      call check_that(case%phases(1)%control == 'pressure' .and. case%phases(1)%given, 'control follows')
+      call check_close(case%phases(1)%target, 1.0e5_dp, 0.0_dp, 'its target')
+      call check_that(.not. case%phases(1)%linear .and. .not. case%phases(1)%relaxed, 'a step')
+      call check_that(case%phases(1)%name == 'phase 1', 'its name')
+      call check_close(case%solver%tolerance, 1.0e-6_dp, 1.0e-20_dp, 'tolerance')
+      call check_that(case%solver%method == 'fast', 'method')
+      call check_that(case%solver%time_scheme == 'exponential2', 'time_scheme')
+      call check_that(case%solver%passes == 2 .and. case%solver%threads == 0, 'passes, threads')
+      call check_that(case%solver%slip_law == 'physical' .and. case%solver%interpolation == 'linear', &
+         'slip_law, interpolation')
+      call check_that(case%output%file == 'folder/road.h5', 'the result lies beside the input')
+      call check_that(size(case%output%snapshot_fields) == 4, 'snapshot_fields')
+      call check_that(case%input == body, 'the text is kept')
+
+      ! an odd number of cells, and an input without an ending
+      call parse_case('&grid nx=5 ny=3 lx=5.0 ly=6.0/'//sphere//steel//press, 'road', case, error)
+      call check_no_error(error, 'odd numbers')
+      if (allocated(error)) return
+      call check_close(case%surfaces(1)%centre_x, 2.0_dp, 1.0e-15_dp, 'centre_x on a cell')
+      call check_close(case%surfaces(1)%centre_y, 2.0_dp, 1.0e-15_dp, 'centre_y on a cell')
+      call check_that(case%output%file == 'road.h5', 'result of an input without an ending')
+   end subroutine test_defaults
+
+   !> Values in all the forms that Fortran allows.
+   subroutine test_given_values()
+      type(case_type) :: case
+      type(error_type), allocatable :: error
+      character(*), parameter :: cr = achar(13)//nl, tab = achar(9)
+
+      call parse_case('! a comment / with a slash'//cr//'$CASE Title = ''it''''s "1/2" ! here'' $END'//cr// &
+         '&GRID NX=64'//tab//'NY = 1*32, lx=2D-3 BOUNDARY="FREE"'//cr//'&end &solver tolerance=1.e-8'// &
+         ' threads = +2 method = ''Thesis''/'//sphere//'&surface shape=''file'' file=''maps/a.h5'' scale=-2/'// &
+         steel//press//'&output file = ''/tmp/x.h5'', snapshot_fields = ''gap'' ''pressure'','//cr// &
+         ' compression = 0 snapshot_every = 3 / ! end', 'in/road.nml', case, error)
+      call check_no_error(error, 'all forms')
+      if (allocated(error)) return
+      call check_that(case%title == 'it''s "1/2" ! here', 'title: '//trim(case%title))
+      call check_that(case%grid%nx == 64 .and. case%grid%ny == 32, 'nx, ny')
+      call check_close(case%grid%lx, 2.0e-3_dp, 0.0_dp, 'lx with D')
+      call check_that(case%grid%boundary == boundary_free, 'boundary in capitals')
+      call check_close(case%solver%tolerance, 1.0e-8_dp, 1.0e-22_dp, 'tolerance')
+      call check_that(case%solver%threads == 2 .and. case%solver%method == 'thesis', 'solver')
+      call check_that(size(case%surfaces) == 2, 'two surfaces')
+      call check_that(case%surfaces(2)%file == 'in/maps/a.h5', 'a path counts from the input')
+      call check_close(case%surfaces(2)%scale, -2.0_dp, 0.0_dp, 'scale')
+      call check_that(case%output%file == '/tmp/x.h5', 'an absolute path stays')
+      call check_that(all(case%output%snapshot_fields == ['gap     ', 'pressure']), 'snapshot_fields')
+      call check_that(case%output%compression == 0 .and. case%output%snapshot_every == 3, 'output')
+
+      call parse_case(grid//steel//press//'&surface shape=''self_affine'' hurst=0.8 rms_slope=0.1 '// &
+         'wavelength_long=5e-4 seed = -7/', 'a', case, error)
+      call check_no_error(error, 'rough')
+      if (allocated(error)) return
+      call check_close(case%surfaces(1)%wavelength_rolloff, 5.0e-4_dp, 0.0_dp, 'rolloff is long by default')
+      call check_close(case%surfaces(1)%wavelength_short, 8*2.0e-3_dp/64, 1.0e-18_dp, 'short is 8 cells')
+      call check_that(case%surfaces(1)%seed == -7, 'seed')
+      call check_close(case%surfaces(1)%rms_slope, 0.1_dp, 0.0_dp, 'rms_slope')
+      call check_close(case%surfaces(1)%rms_height, 0.0_dp, 0.0_dp, 'no rms_height')
+   end subroutine test_given_values
+
+   !> Phases that inherit and derive.
+   subroutine test_phases()
+      type(case_type) :: case
+      type(error_type), allocatable :: error
+
+      call parse_case(body//'&phase control = ''force'', force = 2.0, pressure = 3.0, name = ''second'' /'// &
+         '&phase relaxed = T / &phase displacement = -1e-6 /', 'a', case, error)
+      call check_no_error(error, 'four phases')
+      if (allocated(error)) return
+      call check_that(size(case%phases) == 4, 'four phases')
+      call check_that(case%phases(2)%control == 'force' .and. case%phases(2)%name == 'second', 'by control')
+      call check_close(case%phases(2)%target, 2.0_dp, 0.0_dp, 'the force')
+      call check_that(case%phases(3)%control == 'force' .and. case%phases(3)%relaxed .and. &
+         .not. case%phases(3)%given, 'inherits')
+      call check_close(case%phases(3)%target, 2.0_dp, 0.0_dp, 'inherits the force')
+      call check_close(case%phases(4)%target, -1.0e-6_dp, 0.0_dp, 'a negative displacement')
+   end subroutine test_phases
+
+   !> Arms are parsed and checked, and then refused as long as they are not available.
+   subroutine test_materials()
+      type(case_type) :: case
+      type(error_type), allocatable :: error
+
+      call parse_case(grid//sphere//press//'&material shear_modulus = 1e6, prony_g = 2*1e6, 3e6, '// &
+         'prony_tau(3) = 1.0, prony_tau(1:2) = 1e-3, 1e-2, wlf_c1 = 2.0, wlf_c2 = 50.0, temperature = 70.0/', &
+         'a', case, error)
+      call check_that(size(case%material%prony_g) == 3, 'three arms')
+      if (size(case%material%prony_g) == 3) then
+         call check_close(case%material%prony_g(2), 1.0e6_dp, 0.0_dp, 'a repeated modulus')
+         call check_close(case%material%prony_tau(3), 0.1_dp, 1.0e-15_dp, 'times shifted by 1/10')
+      end if
+
+      call parse_case(grid//sphere//press//'&material zener_g0 = 2.75e6, zener_g1 = 0.25e6, '// &
+         'zener_eta = 3e3 /', 'a', case, error)
+      call check_that(size(case%material%prony_g) == 1, 'a branch is an arm')
+      if (size(case%material%prony_g) == 1) then
+         call check_close(case%material%prony_g(1), 2.75e6_dp**2/3.0e6_dp, 1.0e-8_dp, 'its modulus')
+         call check_close(case%material%prony_tau(1), 1.0e-3_dp, 1.0e-17_dp, 'its relaxation time')
+         call check_close(case%material%shear_modulus, 2.75e6_dp*0.25e6_dp/3.0e6_dp, 1.0e-8_dp, 'long term')
+      end if
+   end subroutine test_materials
+
+   !> Each of these is one fault with a known message.
+   subroutine test_bad_inputs()
+      character(*), parameter :: no_grid = sphere//steel//press
+      character(*), parameter :: no_surface = grid//steel//press
+      character(*), parameter :: no_material = grid//sphere//press
+      character(*), parameter :: no_phase = grid//sphere//steel
+
+      ! values
+      call refuse(no_grid//'&grid nx = -4, ny = 4, lx = 1.0 /', &
+         'road.nml: &grid: nx = -4: must be a positive integer')
+      call refuse(no_grid//'&grid nx = 1.5, ny = 4, lx = 1.0 /', 'nx = 1.5: must be a positive integer')
+      call refuse(no_grid//'&grid nx = ''a'', ny = 4, lx = 1.0 /', 'nx = ''a'': must be a positive integer')
+      call refuse(no_grid//'&grid nx = 99999999999, ny = 4, lx = 1.0 /', 'nx = 99999999999: must be a positive')
+      call refuse(no_grid//'&grid nx = 4 5, ny = 4, lx = 1.0 /', 'nx = 4 5: takes one value only')
+      call refuse(no_grid//'&grid nx = , ny = 4, lx = 1.0 /', '&grid: nx')
+      call refuse(no_grid//'&grid nx = 2*4, ny = 4, lx = 1.0 /', 'nx = 2*4: takes one value only')
+      call refuse(no_grid//'&grid nx(1) = 4, ny = 4, lx = 1.0 /', 'is a single value: it takes no subscript')
+      call refuse(no_grid//'&grid nx = 1, ny = 4, lx = 1.0 /', 'nx = 1: must be at least 2')
+      call refuse(no_grid//'&grid nx = 4, ny = 4, lx = NaN /', 'lx = NaN: must be a positive number')
+      call refuse(no_grid//'&grid nx = 4, ny = 4, lx = Infinity /', 'lx = Infinity: must be a positive number')
+      call refuse(no_grid//'&grid nx = 4, ny = 4, lx = 1e999 /', 'lx = 1e999: must be a positive number')
+      call refuse(no_grid//'&grid nx = 4, ny = 4, lx = 1.0.0 /', 'lx = 1.0.0: must be a positive number')
+      call refuse(no_grid//'&grid nx = 60000, ny = 60000, lx = 1.0 /', 'must be at most 2147483647')
+      call refuse(no_grid//'&grid nx = 4, ny = 4, lx = 1.0, boundary = ''peridic'' /', &
+         'boundary = ''peridic'': must be one of ''periodic'' | ''free''')
+      call refuse(no_grid//'&grid nx = 4, ny = 4, lx = 1.0, boundary = free /', 'boundary = free: must be one of')
+      call refuse(no_grid//'&grid nx = 4, ny = 1, lx = 1.0, boundary = ''free'' /', &
+         'a free line contact has no finite displacement')
+      call refuse(no_grid//'&grid ny = 4, lx = 1.0 /', '&grid: nx: is missing')
+      call refuse(no_material//'&material shear_modulus = 0 /', 'shear_modulus = 0: must be a positive number')
+      call refuse(no_material//'&material /', '&material: shear_modulus: is missing')
+      call refuse(no_material//'&material shear_modulus = 1e6, poisson = 0.6 /', &
+         'poisson = 0.6: must be a number above -1 and at most 0.5')
+      call refuse(no_material//'&material shear_modulus = 1e6, poisson = -1 /', 'poisson = -1: must be a number')
+      call refuse(no_material//'&material shear_modulus = 1e6, density = 1.0 /', &
+         'density = 1.0: needs a thickness')
+      call refuse(no_phase//'&phase pressure = 1e5, relaxed = 1 /', &
+         'relaxed = 1: must be .true. or .false. (line 4)')
+      call refuse(body//'&solver tolerance = 1.0 /', 'tolerance = 1.0: must be a number above 0 and below 1')
+      call refuse(body//'&output compression = 10 /', 'must be an integer of at least 0 and at most 9')
+      call refuse(body//'&output file = '''' /', 'must name a file')
+      call refuse(body//'&case title = '''//repeat('x', 300)//''' /', 'must have at most 256 characters')
+      call refuse(body//'&output file = '''//repeat('x', 3000)//''' /', 'of at most 1024 characters')
+      call refuse(body//'&output snapshot_fields = ''slip_x'' /', 'need &friction')
+      call refuse(body//'&output snapshot_times = 1.0 /', 'must lie within the run, which ends at 0 s')
+      call refuse(body//'&output snapshot_times = 1.0, snapshot_every = 2 /', 'are given together')
+
+      ! names
+      call refuse(no_grid//'&grd nx = 4, ny = 4, lx = 1.0 /', '&grd: there is no such group; did you mean &grid?')
+      call refuse(no_material//'&material shear_modulos = 1e6 /', &
+         'shear_modulos: there is no such variable; did you mean shear_modulus?')
+      call refuse(body//'&solver tol = 1e-6 /', 'did you mean tolerance?')
+      call refuse(body//grid, '&grid: the group stands twice, in line 1 and in line 5')
+      call refuse(no_phase//'&phase pressure = 1.0, pressure = 2.0 /', 'pressure is given twice')
+
+      ! form
+      call refuse('', '&grid: the group is missing')
+      call refuse('', '&surface: the group is missing')
+      call refuse(body//'&solver tolerance = 1e-6', 'is not closed: a ''/'' is missing before the end')
+      call refuse('&solver tolerance = 1e-6'//nl//body, 'missing before the next group in line 2')
+      call refuse('nx = 4'//nl//body, 'line 1: text outside of a group: nx = 4')
+      call refuse(body//'&case title = ''open /'//nl, 'has a string that is not closed on its line')
+      call refuse(body//'&solver 1e-6 /', '1e-6 in line 5 is no assignment')
+      call refuse(body//achar(0), 'line 5: a character that is no text (code 0)')
+
+      ! lists
+      call refuse(no_material//'&material shear_modulus=1, prony_g(2)=1.0, prony_tau=1.0,2.0/', &
+         'prony_g = 1.0: has no element 1')
+      call refuse(no_material//'&material shear_modulus=1, prony_g=1.0, prony_g(1)=2.0, prony_tau=1.0/', &
+         'has its element 1 given twice')
+      call refuse(no_material//'&material shear_modulus=1, prony_g(0)=1.0, prony_tau=1.0/', &
+         'has a subscript that is not understood')
+      call refuse(no_material//'&material shear_modulus=1, prony_g(999999999)=1.0, prony_tau=1.0/', &
+         'has a subscript above')
+      call refuse(no_material//'&material shear_modulus=1, prony_g=999999999*1.0, prony_tau=1.0/', &
+         'has more than')
+      call refuse(no_material//'&material shear_modulus=1, prony_g=1.0,,2.0, prony_tau=1.0/', &
+         'has an empty value')
+      call refuse(no_material//'&material shear_modulus=1, prony_g=1.0,2.0, prony_tau=1.0/', &
+         'prony_tau = 1.0: has 1 values, but prony_g has 2')
+      call refuse(no_material//'&material shear_modulus=1, prony_g=1.0 /', 'prony_tau: is missing')
+      call refuse(no_material//'&material shear_modulus=1, prony_g=1.0, prony_tau=0.0/', &
+         'prony_tau = 0.0: every value must be a positive number')
+      call refuse(no_material//'&material shear_modulus=1, prony_g=1.0, prony_tau=1.0, zener_g0=1.0, '// &
+         'zener_g1=1.0, zener_eta=1.0/', 'prony_... and zener_... are given together')
+      call refuse(no_material//'&material shear_modulus=1, prony_g=1.0, prony_tau=1.0, temperature=30/', &
+         'needs wlf_c1 and wlf_c2')
+      call refuse(no_material//'&material shear_modulus=1, wlf_c1=17.0/', 'must be given together')
+      call refuse(no_material//'&material shear_modulus=1, wlf_c1=17.0, wlf_c2=50, temperature=-40/', &
+         'is below the range of the WLF shift')
+
+      ! surfaces
+      call refuse(no_surface//'&surface shape = ''sphere'' /', 'radius: is missing: sphere needs it (line 4)')
+      call refuse(no_surface//'&surface shape = ''ball'' /', 'shape = ''ball'': must be one of ''flat''')
+      call refuse(no_surface//'&surface shape = ''sine'', amplitude=1e-6, wavelength=1e-3, radius=1.0 /', &
+         'radius = 1.0: does not belong to shape = ''sine''')
+      call refuse(no_surface//'&surface shape = ''self_affine'', hurst = 1.2, rms_slope = 0.1 /', &
+         'hurst = 1.2: must be a number above 0 and at most 1')
+      call refuse(no_surface//'&surface shape = ''self_affine'', hurst = 0.8 /', &
+         'rms_height or rms_slope is missing')
+      call refuse(no_surface//'&surface shape = ''self_affine'', hurst=0.8, rms_slope=0.1, rms_height=1e-6 /', &
+         'rms_height and rms_slope are given together')
+      call refuse(no_surface//'&surface shape = ''self_affine'', hurst=0.8, rms_slope=0.1, '// &
+         'wavelength_short=1e-3, wavelength_rolloff=1e-4 /', 'must be below wavelength_rolloff')
+      call refuse(no_surface//'&surface shape = ''file'' /', 'file: is missing')
+      call refuse(no_surface, '&surface: the group is missing')
+
+      ! phases
+      call refuse(no_phase//'&phase /', 'the first phase must give one of them')
+      call refuse(no_phase//'&phase pressure = 1.0, force = 1.0 /', 'pressure and force are given together')
+      call refuse(no_phase//'&phase pressure = -1.0 /', 'with &adhesion only')
+      call refuse(no_phase//'&phase force = 0.0 /', 'force = 0.0: must be a positive number')
+      call refuse(no_phase//'&phase control = ''force'', pressure = 1.0 /', 'needs force in the same phase')
+      call refuse(no_phase//'&phase pressure=1.0, duration=1.0, ramp=''linear'', relaxed=.true. /', &
+         'relaxed = .true.: excludes ramp')
+      call refuse(no_phase//'&phase pressure=1.0, ramp=''linear'' /', 'ramp = ''linear'': needs a duration')
+      call refuse(no_phase//'&phase pressure=1.0, steps=4 /', 'steps = 4: needs a duration')
+      call refuse(no_phase//'&phase pressure=1.0, velocity_x=4 /', 'velocity_x = 4: needs a duration')
+      call refuse(no_phase//'&phase pressure=1.0, duration=-1 /', 'duration = -1: must be 0 or a positive number')
+      call refuse(no_phase//'&phase pressure=1.0, duration=1, dt=2 /', 'dt = 2: must be at most the duration')
+      call refuse(no_phase//'&phase pressure=1.0, duration=1, dt=1e-12 /', 'makes more than 1e9 steps')
+      call refuse(no_phase//'&phase pressure=1.0, duration=1, dt=0.3, steps=4 /', 'dt = 0.3: does not agree')
+
+      ! laws
+      call refuse(body//'&friction law = ''coulomb'' /', 'coefficient: is missing: coulomb needs it')
+      call refuse(body//'&friction coefficient = 0.3 /', '&friction: law: is missing')
+      call refuse(body//'&adhesion potential = ''gauss'', energy = 0.05 /', 'range: is missing')
+   end subroutine test_bad_inputs
+
+   !> An input must give exactly one fault, which holds the fragment.
+   subroutine refuse(text, fragment)
+      character(*), intent(in) :: text
+      character(*), intent(in) :: fragment
+      type(case_type) :: case
+      type(error_type), allocatable :: error
+
+      call parse_case(text, 'road.nml', case, error)
+      call check_error(error, fragment, fragment)
+      if (.not. allocated(error)) return
+      call check_that(error%status == error_input, fragment//': status')
+      call check_that(index(error%message, 'road.nml: ') == 1, fragment//': names the file')
+      if (text /= '') call check_that(lines(error%message) <= 1 .or. index(fragment, 'there is no such') > 0 &
+         .or. index(fragment, 'did you mean') > 0, fragment//': alone, not'//nl//error%message)
+   end subroutine refuse
+
+   !> Number of lines.
+   pure integer function lines(text)
+      character(*), intent(in) :: text
+      integer :: i
+
+      lines = 1
+      do i = 1, len(text)
+         if (text(i:i) == nl) lines = lines + 1
+      end do
+   end function lines
+
+   !> Faults of one input, all reported.
+   subroutine test_many_faults()
+      type(case_type) :: case
+      type(error_type), allocatable :: error
+      character(*), parameter :: expected(7) = [character(60) :: &
+         'r: &grid: nx = 0: must be a positive integer', 'r: &grid: ly = ''x'': must be a positive number', &
+         'r: &material: poisson = 2: must be', 'r: &solvr: there is no such group; did you mean &solver?', &
+         'r: &surface: radius: is missing', 'r: &phase: pressure = -5: must be a positive number', &
+         'r: &phase: rmp: there is no such variable; did you mean ramp']
+      integer :: i
+
+      call parse_case('&grid nx = 0 ny = 4 lx = 1.0 ly = ''x'' /'//nl//'&material poisson = 2, '// &
+         'shear_modulus = 1e6 /'//nl//'&solvr /'//nl//'&surface shape = ''cylinder'' /'//nl// &
+         '&phase pressure = -5, rmp = ''step'' /', 'r', case, error)
+      do i = 1, size(expected)
+         call check_error(error, trim(expected(i)), 'fault '//achar(48 + i))
+      end do
+      if (allocated(error)) call check_that(lines(error%message) == size(expected), &
+         'no fault is invented: '//error%message)
+   end subroutine test_many_faults
+
+   !> Files that are there or not.
+   subroutine test_files()
+      type(case_type) :: case
+      type(error_type), allocatable :: error
+      integer :: unit
+      character(*), parameter :: path = 'build/test_case_input.nml'
+
+      call read_case('build/no/such/file.nml', case, error)
+      call check_error(error, 'build/no/such/file.nml: there is no such file', 'a missing file')
+      if (allocated(error)) call check_that(error%status == error_file, 'a missing file: status')
+      call read_case('build', case, error)
+      call check_error(error, 'build: cannot be read', 'a folder')
+      if (allocated(error)) call check_that(error%status == error_file, 'a folder: status')
+
+      open (newunit=unit, file=path, access='stream', form='unformatted', status='replace')
+      write (unit) body
+      close (unit)
+      call read_case(path, case, error)
+      call check_no_error(error, 'a file')
+      if (.not. allocated(error)) call check_that(case%input == body, 'its text')
+      open (newunit=unit, file=path)
+      close (unit, status='delete')
+   end subroutine test_files
+
+end module test_case_input
