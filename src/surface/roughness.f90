@@ -50,6 +50,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(dp) :: moments(0:2)
 
+      call check_shape(grid, height, error)
+      if (allocated(error)) return
       call height_moments(grid, height, statistics)
       statistics%rms_slope_differences = difference_slope(grid, height)
       call spectral_moments(grid, height, statistics%mean, moments, error)
@@ -135,6 +137,16 @@ contains
       psd = psd_factor(grid)*pack(power_sum, counted > 0)/modes
    end subroutine radial_psd
 
+   !> Refuse a map of another shape than its grid.
+   subroutine check_shape(grid, height, error)
+      type(grid_type), intent(in) :: grid
+      real(dp), intent(in) :: height(:, :)
+      type(error_type), allocatable, intent(out) :: error
+
+      if (size(height, 1) /= grid%nx .or. size(height, 2) /= grid%ny) &
+         call fail(error, error_input, 'roughness: the map does not have the shape of its grid')
+   end subroutine check_shape
+
    !> Transform a map less its mean.
    subroutine transformed(grid, height, mean, transform, error)
       type(grid_type), intent(in) :: grid
@@ -144,10 +156,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
       integer :: i, j
 
-      if (size(height, 1) /= grid%nx .or. size(height, 2) /= grid%ny) then
-         call fail(error, error_input, 'roughness: the map does not have the shape of its grid')
-         return
-      end if
+      call check_shape(grid, height, error)
+      if (allocated(error)) return
       call new_real_transform(transform, grid%nx, grid%ny, error)
       if (allocated(error)) return
       !$omp parallel do default(none) shared(grid, height, mean, transform) private(i)
