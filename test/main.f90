@@ -5,6 +5,7 @@ program main
    use test_case_input, only : run_case_input
    use test_fft_conv, only : run_fft_conv
    use test_hdf5_file, only : run_hdf5_file
+   use test_interpolation, only : run_interpolation
    use test_prony, only : run_prony
    use test_roughness, only : run_roughness
    use test_surface, only : run_surface
@@ -17,6 +18,7 @@ program main
    if (wanted('surface')) call run_surface()
    if (wanted('roughness')) call run_roughness()
    if (wanted('case_input')) call run_case_input()
+   if (wanted('interpolation')) call run_interpolation()
    call finish()
 
 contains
