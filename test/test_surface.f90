@@ -1,13 +1,16 @@
 !> Tests of the surfaces.
 module test_surface
+   use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use check, only : begin_suite, check_close, check_error, check_no_error, check_that
    use counter_random, only : mix, normal_number, row_key, uniform_number
-   use errors, only : error_type
+   use errors, only : error_file, error_input, error_type
+   use hdf5_file, only : hdf5_file_type
    use omp_lib, only : omp_get_max_threads, omp_set_num_threads
    use precision, only : dp, int64, pi
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use roughness, only : height_psd, height_statistics, roughness_type
    use surface, only : check_terms, new_height, rim_height
+   use surface_warnings, only : find_warnings, warning_length
    use surface_settings, only : default_surface, surface_settings_type
    implicit none
    private
@@ -28,6 +31,8 @@ contains
       call test_threads()
       call test_noise_is_gaussian()
       call test_faults()
+      call test_file()
+      call test_warnings()
    end subroutine run_surface
 
    !> The generator is SplitMix64: the first outputs from state 0 and 1234567 are known.
@@ -135,7 +140,7 @@ contains
          'the hexagonal wave repeats after lambda by lambda/sqrt(3)')
       call check_close(maxval(abs(more(25:, 29:) - h)), 0.0_dp, 1.0e-14_dp, &
          'the hexagonal wave repeats after lambda by 2 lambda/sqrt(3)')
-      ! the product of sines is a sum of three waves of the wave number sqrt(3) k, at 120 degrees
+      ! the product of sines is a sum of three waves of the wave number 2 k, at 120 degrees
       k = 2.0_dp*pi/term%wavelength
       i = 5
       j = 4
@@ -363,5 +368,130 @@ contains
       call new_height(grid, terms(2:2), h, error)
       call check_error(error, 'no mode', 'an empty band')
    end subroutine test_faults
+
+   !> Height maps from files: values, scale, orientation, names of datasets, everything that is wrong.
+   subroutine test_file()
+      character(*), parameter :: path = 'build/test_surface.h5'
+      type(grid_type) :: grid
+      type(surface_settings_type) :: term
+      type(hdf5_file_type) :: file
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: h(:, :), map(:, :)
+      integer :: i, j, unit
+
+      grid = new_grid(5, 3, 1.0_dp, 1.0_dp, boundary_periodic)
+      allocate (map(5, 3))
+      do j = 1, 3
+         do i = 1, 5
+            map(i, j) = 10*i + j
+         end do
+      end do
+      call file%open(path, 'create', error)
+      call check_no_error(error, 'a file')
+      call file%write('surface', map, 'm', 'height', error)
+      call file%write('other', 2.0_dp*map(:4, :), 'm', 'height', error)
+      map(2, 3) = ieee_value(0.0_dp, ieee_quiet_nan)
+      call file%write('holes', map, 'm', 'height', error)
+      call file%close(error)
+      call check_no_error(error, 'a file with three maps')
+      term = default_surface(grid)
+      term%shape = 'file'
+      term%file = path
+      term%scale = -0.5_dp
+      call new_height(grid, [term, term], h, error)
+      call check_no_error(error, 'a map from ''surface''')
+      call check_close(h(4, 2), -42.0_dp, 0.0_dp, 'x runs fastest; scale; the sum of two')
+      call check_close(h(5, 1), -51.0_dp, 0.0_dp, 'the last cell along x')
+      term%dataset = 'other'
+      call new_height(grid, [term], h, error)
+      call check_error(error, '(3, 4): must be (ny, nx) = (3, 5)', 'wrong shape')
+      call check_that(error%status == error_input, 'a wrong shape is wrong input')
+      term%dataset = 'holes'
+      call new_height(grid, [term], h, error)
+      call check_error(error, '1 values that are not finite', 'NaN in a map')
+      call check_that(error%status == error_input, 'NaN is wrong input')
+      term%dataset = 'nothing'
+      call new_height(grid, [term], h, error)
+      call check_error(error, 'nothing', 'a missing dataset')
+      call check_that(error%status == error_file, 'a missing dataset is a file that cannot be read')
+      ! 'surface/height' comes before 'surface'
+      call file%open(path, 'create', error)
+      call file%create_group('surface', error)
+      call check_no_error(error, 'a group')
+      map(2, 3) = 0.0_dp
+      call file%write('surface/height', map, 'm', 'height', error)
+      call check_no_error(error, 'a map in it')
+      call file%close(error)
+      term%dataset = ''
+      term%scale = 1.0_dp
+      call new_height(grid, [term], h, error)
+      call check_no_error(error, 'a map from ''surface/height''')
+      call check_close(maxval(abs(h - map)), 0.0_dp, 0.0_dp, 'the map from ''surface/height''')
+      term%file = 'build/no_such_file.h5'
+      call new_height(grid, [term], h, error)
+      call check_error(error, 'no_such_file.h5', 'a missing file')
+      call check_that(error%status == error_file, 'a missing file: status')
+      open (newunit=unit, file=path, status='replace', action='write')
+      write (unit, '(a)') 'not HDF5'
+      close (unit)
+      term%file = path
+      call new_height(grid, [term], h, error)
+      call check_error(error, path, 'not HDF5')
+      call check_that(error%status == error_file, 'not HDF5: status')
+      term%file = ''
+      call new_height(grid, [term], h, error)
+      call check_error(error, 'file is missing', 'no file named')
+      open (newunit=unit, file=path, status='old')
+      close (unit, status='delete')
+   end subroutine test_file
+
+   !> Warnings name what is doubtful, and are silent otherwise.
+   subroutine test_warnings()
+      type(grid_type) :: grid
+      type(surface_settings_type) :: term
+      character(warning_length), allocatable :: warnings(:)
+
+      grid = new_grid(128, 64, 2.0_dp, 2.0_dp, boundary_periodic)
+      term = default_surface(grid)
+      term%shape = 'self_affine'
+      term%wavelength_long = 0.5_dp
+      term%wavelength_rolloff = 0.5_dp
+      term%wavelength_short = 0.25_dp
+      call find_warnings(grid, [term], warnings)
+      call check_that(size(warnings) == 0, 'eight cells a wave, four waves a side: no warning')
+      term%wavelength_short = 0.2_dp
+      term%wavelength_long = 2.0_dp
+      call find_warnings(grid, [term], warnings)
+      call check_that(size(warnings) == 2, 'two warnings')
+      call check_that(index(warnings(1), 'wavelength_long = 2.000E+00') > 0, 'waves as long as the side')
+      call check_that(index(warnings(2), '6.4 cells') > 0, 'few cells a wave')
+      term%wavelength_long = 0.5_dp
+      term%wavelength_short = 0.05_dp
+      call find_warnings(grid, [term], warnings)
+      call check_that(size(warnings) == 1, 'one warning')
+      call check_that(index(warnings(1), 'Nyquist') > 0, 'below the Nyquist wavelength')
+
+      term = default_surface(grid)
+      term%shape = 'sine'
+      term%wavelength = 0.5_dp
+      call find_warnings(grid, [term], warnings)
+      call check_that(size(warnings) == 0, 'four waves: no warning')
+      term%wavelength = 0.6_dp
+      call find_warnings(grid, [term], warnings)
+      call check_that(size(warnings) == 1 .and. index(warnings(1), '3.3333') > 0, 'a broken wave')
+      grid%boundary = boundary_free
+      call find_warnings(grid, [term], warnings)
+      call check_that(size(warnings) == 0, 'a free map may break a wave')
+
+      grid = new_grid(128, 74, 2.0_dp, 2.0_dp/sqrt(3.0_dp), boundary_periodic)
+      term%shape = 'hexagonal_wave'
+      term%wavelength = 1.0_dp
+      call find_warnings(grid, [term], warnings)
+      call check_that(size(warnings) == 0, 'a hexagonal wave in its cell: no warning')
+      grid = new_grid(128, 128, 2.0_dp, 2.0_dp, boundary_periodic)
+      call find_warnings(grid, [term], warnings)
+      call check_that(size(warnings) == 1 .and. index(warnings(1), 'ly') > 0, &
+         'a hexagonal wave on a square')
+   end subroutine test_warnings
 
 end module test_surface

@@ -1,11 +1,16 @@
 !> The height map H(x, y) of the road: a sum of analytic shapes, random surfaces and files.
 !>
-!> z points up into the rubber, so that summits are the largest values; lengths in m. The sphere, the
-!> paraboloid and the cylinder have their summit at height 0. In periodic mode they and their
+!> z points up into the rubber, so that summits are the largest values; lengths in m. The sphere,
+!> the paraboloid and the cylinder have their summit at height 0. In periodic mode they and their
 !> distances repeat with the cell, so that a shape off the middle is the same shape moved.
+!> The hexagonal wave (thesis, eq. 4.6) repeats after a wavelength along x and wavelength/sqrt(3)
+!> along y.
+!>
+!> Memory: the height, and one field more while a file is read or a random surface made.
 module surface
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
-   use errors, only : add_fault, error_input, error_type
+   use errors, only : add_fault, error_input, error_type, fail
+   use hdf5_file, only : read_field
    use precision, only : dp, pi
    use regular_grid, only : boundary_periodic, grid_type
    use surface_self_affine, only : add_self_affine
@@ -44,6 +49,8 @@ contains
             cycle
          case ('self_affine')
             call add_self_affine(grid, terms(n), height, error)
+         case ('file')
+            call add_file(grid, terms(n), height, error)
          case default
             call add_analytic(grid, terms(n), height)
          end select
@@ -71,19 +78,24 @@ contains
 
       do n = 1, size(terms)
          associate (term => terms(n))
-            if (.not. (ieee_is_finite(term%centre_x) .and. ieee_is_finite(term%centre_y))) &
-               call add_fault(error, error_input, '&surface: centre_x, centre_y must be finite')
             select case (term%shape)
             case ('flat')
                continue
             case ('sphere', 'paraboloid', 'cylinder')
                call must_be_positive('radius', term%radius, error)
+               call must_be_finite('centre_x', term%centre_x, error)
+               call must_be_finite('centre_y', term%centre_y, error)
             case ('sine', 'hexagonal_wave')
                call must_be_positive('wavelength', term%wavelength, error)
-               if (.not. ieee_is_finite(term%amplitude)) call add_fault(error, error_input, &
-                  '&surface: amplitude = '//number(term%amplitude)//': must be finite')
+               call must_be_finite('amplitude', term%amplitude, error)
+               call must_be_finite('centre_x', term%centre_x, error)
+               call must_be_finite('centre_y', term%centre_y, error)
             case ('self_affine')
                call check_self_affine(term, error)
+            case ('file')
+               call must_be_finite('scale', term%scale, error)
+               if (term%file == '') call add_fault(error, error_input, &
+                  '&surface: file is missing: shape = ''file'' needs the name of an HDF5 file')
             case default
                call add_fault(error, error_input, '&surface: shape = '''//trim(term%shape) &
                   //''': must be one of '//known_shapes())
@@ -132,6 +144,17 @@ contains
          //': must be a positive number')
    end subroutine must_be_positive
 
+   !> Add a fault unless the value is finite.
+   subroutine must_be_finite(name, value, error)
+      character(*), intent(in) :: name
+      real(dp), intent(in) :: value
+      type(error_type), allocatable, intent(inout) :: error
+
+      if (ieee_is_finite(value)) return
+      call add_fault(error, error_input, '&surface: '//name//' = '//number(value) &
+         //': must be finite')
+   end subroutine must_be_finite
+
    !> A number as a short word.
    pure function number(value) result(word)
       real(dp), intent(in) :: value
@@ -153,6 +176,39 @@ contains
       end do
       list = list//'''self_affine'', ''file'''
    end function known_shapes
+
+   !> Add a height map from a file, times its scale.
+   subroutine add_file(grid, term, height, error)
+      type(grid_type), intent(in) :: grid
+      type(surface_settings_type), intent(in) :: term         !! checked
+      real(dp), intent(inout) :: height(:, :)
+      type(error_type), allocatable, intent(out) :: error
+      real(dp), allocatable :: map(:, :)
+      character(160) :: text
+      integer :: faulty, i, j
+
+      call read_field(trim(term%file), trim(term%dataset), map, error)
+      if (allocated(error)) return
+      if (size(map, 1) /= grid%nx .or. size(map, 2) /= grid%ny) then
+         write (text, '(4(a, i0), a)') ': the height map has the shape (', size(map, 2), ', ', &
+            size(map, 1), '): must be (ny, nx) = (', grid%ny, ', ', grid%nx, ')'
+         call fail(error, error_input, '&surface: file = '''//trim(term%file)//''''//trim(text))
+         return
+      end if
+      faulty = 0
+      !$omp parallel do default(none) shared(grid, height, map, term) private(i) reduction(+:faulty)
+      do j = 1, grid%ny
+         do i = 1, grid%nx
+            height(i, j) = height(i, j) + term%scale*map(i, j)
+            if (.not. ieee_is_finite(height(i, j))) faulty = faulty + 1
+         end do
+      end do
+      if (faulty > 0) then
+         write (text, '(a, i0, a)') ': the height map has ', faulty, &
+            ' values that are not finite (NaN or infinite): all must be numbers, in m'
+         call fail(error, error_input, '&surface: file = '''//trim(term%file)//''''//trim(text))
+      end if
+   end subroutine add_file
 
    !> Add an analytic shape.
    subroutine add_analytic(grid, term, height)
@@ -179,8 +235,6 @@ contains
 
       x = (i - 1)*grid%dx - term%centre_x
       y = (j - 1)*grid%dy - term%centre_y
-      k = 0.0_dp
-      if (term%wavelength > 0.0_dp) k = 2.0_dp*pi/term%wavelength
       select case (term%shape)
       case ('sphere')
          h = circular_cap(nearest_image(grid, x, grid%lx)**2 + distance_y(grid, y)**2, term%radius)
@@ -189,9 +243,10 @@ contains
       case ('paraboloid')
          h = -(nearest_image(grid, x, grid%lx)**2 + distance_y(grid, y)**2)/(2.0_dp*term%radius)
       case ('sine')
-         h = term%amplitude*cos(k*x)
+         h = term%amplitude*cos(2.0_dp*pi*x/term%wavelength)
       case ('hexagonal_wave')                                 ! (thesis, eq. 4.6)
          if (grid%ny == 1) y = 0.0_dp
+         k = 2.0_dp*pi/term%wavelength
          h = term%amplitude*sin(k*(0.5_dp*x + sqrt(0.75_dp)*y)) &
             *sin(k*(-0.5_dp*x + sqrt(0.75_dp)*y))*sin(k*x)
       case default
