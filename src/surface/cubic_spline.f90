@@ -1,10 +1,11 @@
 !> The cubic B-spline surface through a height map: twice continuously differentiable, exact at the
 !> cells, fourth order in the height and third in the slope (fourth at the cells).
 !>
-!> H(x, y) = sum of c_ij B(x - i) B(y - j). The coefficients c follow from the map once, by lines along
-!> x and along y: on a period by the recursive filter with the pole z = sqrt(3) - 2 (Unser, Aldroubi
-!> and Eden, IEEE Trans. Signal Process. 41, 1993), on a bounded map from the tridiagonal system with
-!> the second derivative at its ends from one-sided differences, which keeps cubics exact up to the rim.
+!> H(x, y) = sum of c_ij B(x - i) B(y - j). The coefficients c follow from the map once, by lines
+!> along x and along y: on a period by the recursive filter with the pole z = sqrt(3) - 2 (Unser,
+!> Aldroubi and Eden, IEEE Trans. Signal Process. 41, 1993), on a bounded map from the tridiagonal
+!> system with the second derivative at its ends from one-sided differences, which keeps cubics
+!> exact up to the rim.
 !>
 !> Cells count from 0 here; coefficients reach from -1 to n + 1.
 module cubic_spline

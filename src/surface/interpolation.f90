@@ -214,8 +214,8 @@ contains
       end if
    end subroutine split
 
-   !> Find the place `start + q` along a direction of `n` cells: cell, fraction, and the weight of the
-   !> map against its lowest value (1 but outside a free map).
+   !> Find the place `start + q` along a direction of `n` cells: cell, fraction, and the weight of
+   !> the map against its lowest value (1 but outside a free map).
    elemental subroutine locate(periodic, n, start, q, cell, u, weight)
       logical, intent(in) :: periodic
       integer, intent(in) :: n

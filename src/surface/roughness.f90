@@ -7,7 +7,8 @@
 !>     sum of Phi dk_x dk_y/(2 pi)^2 = mean(h^2),   with weight |k|^2: the mean of |grad h|^2.
 !>
 !> For a profile (ny = 1) Phi(k) = |h_hat(k)|^2/lx, in m3, and sum of Phi dk_x/(2 pi) = mean(h^2).
-!> Spectral measures take the map as periodic; on a map that is not, they hold the step at its edges.
+!> Spectral measures take the map as periodic; on a map that is not, they hold the step at its
+!> edges.
 !>
 !> Sums are gathered by rows, so that the number of threads changes no bit.
 module roughness
@@ -29,11 +30,11 @@ module roughness
       real(dp) :: highest                 !! m
       real(dp) :: rms_height              !! m
       real(dp) :: skewness                !! mean (h/rms)^3; 0 of a flat map
-      real(dp) :: kurtosis                !! mean (h/rms)^4, 3 of a Gaussian surface; 0 of a flat map
+      real(dp) :: kurtosis                !! mean (h/rms)^4; 3: Gaussian; 0 of a flat map
       real(dp) :: rms_slope               !! sqrt(mean |grad h|^2), spectral
       real(dp) :: rms_slope_differences   !! the same from forward differences, wrapped if periodic
-      real(dp) :: rms_curvature           !! 1/m: rms of (h_xx + h_yy)/2, of h_xx for a profile; spectral
-      real(dp) :: nayak                   !! m0 m4/m2^2 of the isotropic surface, see height_statistics
+      real(dp) :: rms_curvature           !! 1/m: rms of (h_xx + h_yy)/2 (profile: h_xx)
+      real(dp) :: nayak                   !! m0 m4/m2^2, see height_statistics
    end type roughness_type
 
 contains
@@ -64,8 +65,8 @@ contains
       if (grid%ny > 1) statistics%nayak = 1.5_dp*statistics%nayak
    end subroutine height_statistics
 
-   !> The two-dimensional power spectral density of all modes, in the order of an FFT: modes 0, 1, ...,
-   !> then the negative ones; the mean is mode 0. The field `psd` may have been allocated before.
+   !> The two-dimensional power spectral density of all modes, in the order of an FFT: modes 0, 1,
+   !> ..., then the negative ones; the mean is mode 0.
    subroutine height_psd(grid, height, psd, error)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: height(:, :)                    !! m, shape [nx, ny]
@@ -102,7 +103,7 @@ contains
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: height(:, :)                    !! m, shape [nx, ny]
       real(dp), allocatable, intent(out) :: wave_numbers(:)   !! mean |k| of a ring, rad/m, rising
-      real(dp), allocatable, intent(out) :: psd(:)            !! mean Phi of a ring, m4 (m3 for ny = 1)
+      real(dp), allocatable, intent(out) :: psd(:)            !! mean Phi, m4 (m3 for ny = 1)
       integer, allocatable, intent(out) :: modes(:)           !! number of modes of a ring
       type(error_type), allocatable, intent(out) :: error
       type(real_transform_type) :: transform

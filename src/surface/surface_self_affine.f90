@@ -1,7 +1,7 @@
 !> Self-affine random surfaces with a roll-off (thesis, eq. 1.6).
 !>
-!> The power spectral density is constant for k_l <= |k| <= k_r, falls as (|k|/k_r)^(-2 (1 + H)) up to
-!> k_s, and is 0 elsewhere, with k_l, k_r, k_s = 2 pi over the long, roll-off and short wavelengths.
+!> The power spectral density is constant for k_l <= |k| <= k_r, falls as (|k|/k_r)^(-2 (1 + H)) up
+!> to k_s, and is 0 elsewhere, with k_l, k_r, k_s = 2 pi over the long, roll-off and short wavelengths.
 !> A profile (ny = 1) has the exponent -(1 + 2 H), that of a line cut through such a surface.
 !> The ends of the band belong to it. The mean mode and the Nyquist modes are left out.
 !>
@@ -11,9 +11,9 @@
 !> of the spectrum (after Hu and Tonder, Int. J. Mach. Tools Manufact. 32, 1992): the amplitudes
 !> scatter, too, as those of a measured surface do.
 !>
-!> Either way the surface is scaled to have exactly the rms height asked for (over the cells), or the
-!> rms slope: the sum of |k|^2 |c_k|^2 over its modes c_k, the mean of |grad h|^2 of the surface that
-!> they describe. It does not depend on the number of threads, in no bit.
+!> Either way the surface is scaled to have exactly the rms height asked for (over the cells), or
+!> the rms slope: the sum of |k|^2 |c_k|^2 over its modes c_k, the mean of |grad h|^2 of the surface
+!> that they describe. It does not depend on the number of threads, in no bit.
 !>
 !> Memory: one field beside the height.
 module surface_self_affine

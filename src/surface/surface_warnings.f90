@@ -31,12 +31,16 @@ contains
                .false., warnings)
          case ('sine')
             call check_period('lx', grid%lx, 'wavelength', terms(n)%wavelength, grid, warnings)
-            call check_short_waves(grid, 'wavelength', terms(n)%wavelength, 1.0_dp, .true., warnings)
+            call check_short_waves(grid, 'wavelength', terms(n)%wavelength, 1.0_dp, .true., &
+               warnings)
          case ('hexagonal_wave')
             call check_period('lx', grid%lx, 'wavelength', terms(n)%wavelength, grid, warnings)
             if (grid%ny > 1) call check_period('ly', grid%ly, 'wavelength/sqrt(3)', &
                terms(n)%wavelength/sqrt(3.0_dp), grid, warnings)
-            call check_short_waves(grid, 'wavelength', terms(n)%wavelength, 2.0_dp, .false., warnings)
+            call check_short_waves(grid, 'wavelength', terms(n)%wavelength, 2.0_dp, .false., &
+               warnings)
+         case default
+            continue                     ! the other shapes leave nothing to doubt
          end select
       end do
    end subroutine find_warnings
@@ -96,8 +100,8 @@ contains
       if (grid%boundary /= boundary_periodic) return
       waves = side/wavelength
       if (abs(waves - anint(waves)) <= 1.0e-6_dp*max(1.0_dp, waves)) return
-      write (text, '(a, es11.5, a, f0.4, a)') '&surface: '//side_name//' = ', side, ' m is ', waves, &
-         ' times '//name//': the periodic surface has a step at its edge'
+      write (text, '(a, es11.5, a, f0.4, a)') '&surface: '//side_name//' = ', side, ' m is ', &
+         waves, ' times '//name//': the periodic surface has a step at its edge'
       call append(warnings, text)
    end subroutine check_period
 
