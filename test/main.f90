@@ -9,6 +9,8 @@ program main
    use test_prony, only : run_prony
    use test_roughness, only : run_roughness
    use test_surface, only : run_surface
+   use test_viscoelastic_energy, only : run_viscoelastic_energy
+   use test_zener, only : run_zener
    implicit none
 
    if (wanted('base')) call run_base()
@@ -19,6 +21,8 @@ program main
    if (wanted('roughness')) call run_roughness()
    if (wanted('case_input')) call run_case_input()
    if (wanted('interpolation')) call run_interpolation()
+   if (wanted('zener')) call run_zener()
+   if (wanted('viscoelastic_energy')) call run_viscoelastic_energy()
    call finish()
 
 contains

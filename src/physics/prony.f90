@@ -18,7 +18,7 @@ contains
    !>
    !> g = G_0^2/(G_0 + G_1), tau = eta/(G_0 + G_1), G_e = G_inf + sum G_0 G_1/(G_0 + G_1).
    pure subroutine zener_to_prony(g_inf, g0, g1, eta, g_e, g, tau)
-      real(dp), intent(in) :: g_inf         !! modulus of the spring parallel to all branches, Pa, >= 0
+      real(dp), intent(in) :: g_inf         !! spring parallel to all branches, Pa, >= 0
       real(dp), intent(in) :: g0(:)         !! springs in series, Pa, > 0
       real(dp), intent(in) :: g1(size(g0))  !! springs parallel to the dashpots, Pa, >= 0
       real(dp), intent(in) :: eta(size(g0)) !! dashpots, Pa s, > 0

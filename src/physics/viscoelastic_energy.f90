@@ -1,0 +1,193 @@
+!> The discrete energy books of a viscoelastic body: work = change of stored energy + loss, exactly.
+!>
+!> With the scalar product a.b = sum over the cells times the cell area, and the notation of `zener`
+!> (m_k = A p_k), the stored energy is W = 1/2 G_e U.S + sum E_k/(2 g_k), E_k = m_k.p_k (thesis,
+!> eq. 4.1 to 4.3), and E_k follows its own scalar recurrence: products of tractions and
+!> displacements are enough, A is never inverted. What work and loss are depends on the scheme:
+!>
+!> * exponential, exponential2 and jumps: the exact integrals of P dU and of the dashpots' power
+!>   along the path that the scheme assumes within the step, U(t) linear or parabolic; the loss is
+!>   never negative.
+!> * backward Euler: work P'.dU with the traction of the end of the step; the loss is that of the
+!>   dashpots at their mean speed, plus what the scheme itself loses, booked apart as numerical.
+!> * an elastic body, a body relaxed for ever: work = change of the stored energy.
+!>
+!> The work holds the product P'.dU of the fields, the stored energy the product U.S, the loss
+!> the products with the arms: that the three agree is a check of the fields, not an identity.
+module viscoelastic_energy
+   use precision, only : dp
+   use relaxation_functions, only : mean_decay, mean_rise, parabola_work, slope_response, &
+      steady_loss
+   use zener, only : is_elastic, products_type, scheme_backward_euler, step_regular, &
+      step_relaxed, zener_type
+   implicit none
+   private
+
+   public :: energy_books_type, new_books, book_step, books_values, books_from_values
+
+   !> Cumulative books, in J, of one set of products.
+   type :: energy_books_type
+      real(dp) :: cell_area = 0.0_dp        !! m2
+      real(dp) :: stored = 0.0_dp           !! elastic energy W now, J
+      real(dp) :: work = 0.0_dp             !! done by the traction on the rubber, J
+      real(dp) :: dissipated = 0.0_dp       !! lost in the rubber, the scheme's own loss included, J
+      real(dp) :: numerical = 0.0_dp        !! the part of it that is the scheme's own, J
+      real(dp) :: du_ds = 0.0_dp            !! dU.dS of the last step, m3
+      real(dp), allocatable :: arm(:)       !! E_k, Pa2 m3
+      real(dp), allocatable :: arm_du(:)    !! p_k.dU of the last step with p_k from its end, J
+   end type energy_books_type
+
+   integer, parameter :: fixed_values = 6   !! numbers of the books beside those of the arms
+
+contains
+
+   !> Books of a body at rest.
+   pure subroutine new_books(self, material, cell_area)
+      type(energy_books_type), intent(out) :: self
+      type(zener_type), intent(in) :: material
+      real(dp), intent(in) :: cell_area     !! dx dy, m2
+
+      self%cell_area = cell_area
+      allocate (self%arm(size(material%g)), self%arm_du(size(material%g)), source=0.0_dp)
+   end subroutine new_books
+
+   !> Book a step: after all fields are committed and before `finish_step`.
+   pure subroutine book_step(self, material, products)
+      type(energy_books_type), intent(inout) :: self
+      type(zener_type), intent(in) :: material
+      type(products_type), intent(in) :: products   !! of all fields that share the books
+      real(dp) :: work, loss, numerical, stored
+
+      if (is_elastic(material) .or. material%kind == step_relaxed) then
+         self%arm = 0.0_dp
+         stored = 0.5_dp*material%g_e*products%u_s*self%cell_area
+         work = stored - self%stored
+         loss = 0.0_dp
+         numerical = 0.0_dp
+      else
+         if (material%scheme == scheme_backward_euler .and. material%kind == step_regular) then
+            call implicit_step(self, material, products, work, loss, numerical)
+         else
+            call path_step(self, material, products, work, loss)
+            numerical = 0.0_dp
+         end if
+         call advance_arms(self, material, products)
+         stored = 0.5_dp*material%g_e*products%u_s*self%cell_area &
+            + sum(self%arm/(2.0_dp*material%g))
+      end if
+      self%stored = stored
+      self%work = self%work + work
+      self%dissipated = self%dissipated + loss
+      self%numerical = self%numerical + numerical
+   end subroutine book_step
+
+   !> Work and loss of a backward Euler step.
+   pure subroutine implicit_step(self, material, products, work, loss, numerical)
+      type(energy_books_type), intent(in) :: self
+      type(zener_type), intent(in) :: material
+      type(products_type), intent(in) :: products
+      real(dp), intent(out) :: work         !! J
+      real(dp), intent(out) :: loss         !! all of it, J
+      real(dp), intent(out) :: numerical    !! the scheme's own part, J
+      real(dp) :: a, d, e, g, r, x
+      integer :: k
+
+      d = products%du_ds*self%cell_area
+      work = products%p_du*self%cell_area
+      loss = 0.0_dp
+      numerical = 0.5_dp*material%g_e*d
+      do k = 1, size(material%g)
+         a = material%alpha(k)
+         x = material%x(k)
+         g = material%g(k)
+         e = self%arm(k)
+         r = products%arm_du(k)*self%cell_area
+         loss = loss + x*a**2*(g*d + 2.0_dp*r + e/g)                  ! eta/dt dV.dV/A
+         numerical = numerical + (a**2*g*d - 2.0_dp*a*(a*x)*r + (a*x)**2*e/g)/2.0_dp  ! dm.dm/2gA
+      end do
+      loss = loss + numerical
+   end subroutine implicit_step
+
+   !> Work and loss along the path U' = dU + K (s - 1/2), with K = w (dU - dU_old dt/dt_old).
+   pure subroutine path_step(self, material, products, work, loss)
+      type(energy_books_type), intent(in) :: self
+      type(zener_type), intent(in) :: material
+      type(products_type), intent(in) :: products
+      real(dp), intent(out) :: work         !! J
+      real(dp), intent(out) :: loss         !! J
+      real(dp) :: c, chi, d, g, k_du, k_k, omega, phi, r, r_k, w, x
+      integer :: k
+
+      w = material%weight
+      d = products%du_ds*self%cell_area
+      c = products%du_ds_old*self%cell_area
+      k_du = w*(d - material%ratio*c)
+      k_k = w**2*(d - 2.0_dp*material%ratio*c + material%ratio**2*self%du_ds)
+      work = products%p_du*self%cell_area - 0.5_dp*material%g_e*d
+      loss = 0.0_dp
+      do k = 1, size(material%g)
+         g = material%g(k)
+         x = material%x(k)
+         phi = mean_decay(x)
+         chi = slope_response(x)
+         omega = parabola_work(x)
+         r = products%arm_du(k)*self%cell_area
+         r_k = w*(r - material%ratio*self%arm_du(k))
+         ! the mean traction along the path instead of the one at its end
+         work = work + (phi - material%alpha(k))*r - chi*r_k &
+            + (g*mean_rise(x) - material%b1(k))*d - material%b2(k)*c + g*omega*k_k
+         loss = loss + x*mean_decay(2.0_dp*x)/g*self%arm(k) + x*phi**2*r &
+            - chi*(1.0_dp + material%alpha(k))*r_k &
+            + g*(steady_loss(x)*d - phi*chi*k_du + (omega - 0.5_dp*chi**2)*k_k)
+      end do
+   end subroutine path_step
+
+   !> E_k and p_k.dU at the end of the step.
+   pure subroutine advance_arms(self, material, products)
+      type(energy_books_type), intent(inout) :: self
+      type(zener_type), intent(in) :: material
+      type(products_type), intent(in) :: products
+      real(dp) :: a, b1, b2, c, d, r
+      integer :: k
+
+      d = products%du_ds*self%cell_area
+      c = products%du_ds_old*self%cell_area
+      do k = 1, size(material%g)
+         a = material%alpha(k)
+         b1 = material%b1(k)
+         b2 = material%b2(k)
+         r = products%arm_du(k)*self%cell_area
+         self%arm(k) = a**2*self%arm(k) + 2.0_dp*a*(b1*r + b2*self%arm_du(k)) &
+            + b1**2*d + 2.0_dp*b1*b2*c + b2**2*self%du_ds
+         self%arm_du(k) = a*r + b1*d + b2*c
+      end do
+      self%du_ds = d
+   end subroutine advance_arms
+
+   !> The books as an array, for a checkpoint.
+   pure function books_values(self) result(values)
+      type(energy_books_type), intent(in) :: self
+      real(dp) :: values(fixed_values + 2*size(self%arm))
+
+      values = [self%cell_area, self%stored, self%work, self%dissipated, self%numerical, &
+         self%du_ds, self%arm, self%arm_du]
+   end function books_values
+
+   !> The books that `books_values` made into an array.
+   pure function books_from_values(values) result(self)
+      real(dp), intent(in) :: values(:)
+      type(energy_books_type) :: self
+      integer :: arms
+
+      arms = (size(values) - fixed_values)/2
+      self%cell_area = values(1)
+      self%stored = values(2)
+      self%work = values(3)
+      self%dissipated = values(4)
+      self%numerical = values(5)
+      self%du_ds = values(6)
+      allocate (self%arm(arms), source=values(fixed_values + 1:fixed_values + arms))
+      allocate (self%arm_du(arms), source=values(fixed_values + arms + 1:fixed_values + 2*arms))
+   end function books_from_values
+
+end module viscoelastic_energy

@@ -1,0 +1,457 @@
+!> A viscoelastic half-space or layer in time: schemes and history fields.
+!>
+!> U = A S, with A the elastic operator for a unit shear modulus and S the traction that would hold
+!> the displacement U elastically. Each Maxwell arm k carries the traction p_k; the whole is
+!>
+!>    P = G_e S + sum p_k                                            (thesis, section 2.1.3)
+!>    p_k' = alpha p_k + b1 (S' - S) + b2 (S - S_old)                one step; a prime: its end
+!>    P'   = Q S' - hist,   Q = G_e + sum b1,   hist = sum(b1 S - alpha p_k - b2 (S - S_old))
+!>
+!> so S' = (P' + hist)/Q point by point, and a contact solver meets an elastic body with the
+!> displacement U' = A (P' + hist)/Q.
+!> This is thesis eq. 2.13/2.14 with all displacement-like terms written as tractions. x = dt/tau:
+!>
+!>    backward_euler   alpha = 1/(1+x)   b1 = g/(1+x)           b2 = 0
+!>    exponential      alpha = exp(-x)   b1 = g phi             b2 = 0, exact for a linear U(t)
+!>    exponential2     alpha = exp(-x)   b1 = g (phi + w chi)   b2 = -g w chi dt/dt_old, a parabola
+!>
+!> with phi, chi from `relaxation_functions` and w = 2 dt/(dt + dt_old), damped by (2 dt_old/dt)^2
+!> where a step is more than twice the last: plain extrapolation would overshoot there. w = 0 in the
+!> first step and after a jump. A jump is a step of no duration: alpha = 1, b1 = g.
+!>
+!> Memory: S and one field an arm; one more (S - S_old) for exponential2; none for an elastic body.
+!> Results do not depend on the number of threads: sums are formed block by block.
+module zener
+   use errors, only : add_fault, error_input, error_type, fail
+   use parallel, only : global_sum
+   use precision, only : dp
+   use relaxation_functions, only : mean_decay, slope_response
+   implicit none
+   private
+
+   public :: history_type, products_type, zener_type
+   public :: new_zener, start_step, start_jump, start_relaxed, finish_step, restart_order
+   public :: is_elastic
+   public :: new_history, history_field, commit_history, destroy_history
+   public :: new_products
+
+   integer, parameter, public :: scheme_backward_euler = 1
+   integer, parameter, public :: scheme_exponential = 2
+   integer, parameter, public :: scheme_exponential2 = 3
+
+   integer, parameter, public :: step_regular = 1   !! a step of some duration
+   integer, parameter, public :: step_jump = 2      !! instantaneous
+   integer, parameter, public :: step_relaxed = 3   !! the load has rested for ever
+
+   integer, parameter :: block = 1024               !! cells of a block of the passes
+   integer, parameter :: fixed_sums = 4             !! sums of a pass beside those of the arms
+
+   !> The material, its time scheme and the coefficients of the step in hand. No fields.
+   type :: zener_type
+      real(dp) :: g_e = 0.0_dp               !! long-term modulus, Pa
+      real(dp), allocatable :: g(:)          !! moduli of the arms, Pa
+      real(dp), allocatable :: tau(:)        !! relaxation times, s
+      integer :: scheme = scheme_exponential2
+      integer :: kind = step_jump            !! of the step in hand
+      real(dp) :: dt = 0.0_dp                !! its duration, s
+      real(dp) :: dt_old = 0.0_dp           !! of the step before, s; 0: b2 = 0 (for checkpoints)
+      real(dp) :: q = 0.0_dp                 !! modulus of the step, Pa
+      real(dp) :: weight = 0.0_dp            !! w
+      real(dp) :: ratio = 0.0_dp             !! dt/dt_old; 0 without a step before
+      real(dp), allocatable :: x(:)          !! dt/tau
+      real(dp), allocatable :: alpha(:)      !! what is left of an arm's traction
+      real(dp), allocatable :: b1(:)         !! Pa
+      real(dp), allocatable :: b2(:)         !! Pa
+   end type zener_type
+
+   !> The history of a field of tractions with one or more components.
+   type :: history_type
+      integer :: cells = 0                   !! values of a component on this process
+      integer :: components = 0
+      real(dp), allocatable :: s(:, :)       !! S = P over a modulus [cells, components]
+      real(dp), allocatable :: ds(:, :)      !! S - S_old, exponential2 only
+      real(dp), allocatable :: arm(:, :, :)  !! p_k, Pa [cells, arms, components]
+   end type history_type
+
+   !> Sums over the cells that the energy books need (not yet times the cell area).
+   type :: products_type
+      real(dp) :: u_s = 0.0_dp               !! U'.S', m
+      real(dp) :: p_du = 0.0_dp              !! P'.dU, Pa m, with dU = U' - U
+      real(dp) :: du_ds = 0.0_dp             !! dU.dS, m
+      real(dp) :: du_ds_old = 0.0_dp         !! dU.dS of the step before, m
+      real(dp), allocatable :: arm_du(:)     !! p_k.dU with p_k from before the step, Pa m
+   end type products_type
+
+contains
+
+   !> Check and set a material and its scheme.
+   subroutine new_zener(self, g_e, g, tau, scheme, error)
+      type(zener_type), intent(out) :: self
+      real(dp), intent(in) :: g_e            !! long-term modulus, Pa, >= 0; > 0 without arms
+      real(dp), intent(in) :: g(:)           !! moduli of the arms, Pa, > 0; size 0: elastic
+      real(dp), intent(in) :: tau(:)         !! relaxation times, s, > 0
+      character(*), intent(in) :: scheme     !! 'backward_euler' | 'exponential' | 'exponential2'
+      type(error_type), allocatable, intent(out) :: error
+
+      select case (scheme)
+      case ('backward_euler')
+         self%scheme = scheme_backward_euler
+      case ('exponential')
+         self%scheme = scheme_exponential
+      case ('exponential2')
+         self%scheme = scheme_exponential2
+      case default
+         call add_fault(error, error_input, 'time_scheme = '''//trim(scheme)// &
+            ''': must be ''backward_euler'', ''exponential'' or ''exponential2''')
+      end select
+      if (size(g) /= size(tau)) then
+         call add_fault(error, error_input, 'as many moduli as relaxation times are needed')
+      else if (.not. all(g > 0.0_dp .and. g <= huge(g)) .or. &
+         .not. all(tau > 0.0_dp .and. tau <= huge(tau))) then
+         call add_fault(error, error_input, 'moduli and relaxation times must be positive')
+      end if
+      if (.not. (g_e >= 0.0_dp .and. g_e <= huge(g_e))) then
+         call add_fault(error, error_input, 'the long-term modulus must not be negative')
+      else if (size(g) == 0 .and. g_e <= 0.0_dp) then
+         call add_fault(error, error_input, &
+            'the shear modulus of an elastic material must be positive')
+      end if
+      if (allocated(error)) return
+      self%g_e = g_e
+      allocate (self%g, source=g)
+      allocate (self%tau, source=tau)
+      allocate (self%x(size(g)), self%alpha(size(g)), self%b1(size(g)), self%b2(size(g)))
+      call start_jump(self)
+   end subroutine new_zener
+
+   !> No arms: the response has no history.
+   pure function is_elastic(self) result(elastic)
+      type(zener_type), intent(in) :: self
+      logical :: elastic
+
+      elastic = size(self%g) == 0
+   end function is_elastic
+
+   !> Coefficients of a step of duration dt. May be called again before `finish_step`.
+   pure subroutine start_step(self, dt)
+      type(zener_type), intent(inout) :: self
+      real(dp), intent(in) :: dt             !! s, > 0
+      real(dp) :: chi
+      integer :: k
+
+      self%kind = step_regular
+      self%dt = dt
+      self%weight = 0.0_dp
+      self%ratio = 0.0_dp
+      if (self%scheme == scheme_exponential2 .and. self%dt_old > 0.0_dp) then
+         self%ratio = dt/self%dt_old
+         self%weight = 2.0_dp*self%ratio/(1.0_dp + self%ratio)*min(1.0_dp, (2.0_dp/self%ratio)**2)
+      end if
+      do k = 1, size(self%g)
+         self%x(k) = dt/self%tau(k)
+         if (self%scheme == scheme_backward_euler) then
+            self%alpha(k) = 1.0_dp/(1.0_dp + self%x(k))
+            self%b1(k) = self%g(k)*self%alpha(k)
+            self%b2(k) = 0.0_dp
+         else
+            chi = slope_response(self%x(k))*self%weight
+            self%alpha(k) = exp(-self%x(k))
+            self%b1(k) = self%g(k)*(mean_decay(self%x(k)) + chi)
+            self%b2(k) = -self%g(k)*chi*self%ratio
+         end if
+      end do
+      self%q = self%g_e + sum(self%b1)
+   end subroutine start_step
+
+   !> Coefficients of a jump: the material answers with G(0).
+   pure subroutine start_jump(self)
+      type(zener_type), intent(inout) :: self
+
+      self%kind = step_jump
+      self%dt = 0.0_dp
+      self%weight = 0.0_dp
+      self%ratio = 0.0_dp
+      self%x = 0.0_dp
+      self%alpha = 1.0_dp
+      self%b1 = self%g
+      self%b2 = 0.0_dp
+      self%q = self%g_e + sum(self%b1)
+   end subroutine start_jump
+
+   !> Coefficients of a state that has rested for ever: the material answers with G_e.
+   subroutine start_relaxed(self, error)
+      type(zener_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+
+      if (self%g_e <= 0.0_dp) then
+         call fail(error, error_input, 'relaxed = .true.: a material without long-term modulus '// &
+            'flows for ever under load: shear_modulus (or a Zener branch''s g1) must be positive')
+         return
+      end if
+      call start_jump(self)
+      self%kind = step_relaxed
+      self%alpha = 0.0_dp
+      self%b1 = 0.0_dp
+      self%q = self%g_e
+   end subroutine start_relaxed
+
+   !> The step in hand is over: all histories are committed and the energies booked.
+   pure subroutine finish_step(self)
+      type(zener_type), intent(inout) :: self
+
+      self%dt_old = 0.0_dp
+      if (self%kind == step_regular) self%dt_old = self%dt
+   end subroutine finish_step
+
+   !> The load or the speed changes abruptly: the next step does not look back beyond the last.
+   pure subroutine restart_order(self)
+      type(zener_type), intent(inout) :: self
+
+      self%dt_old = 0.0_dp
+   end subroutine restart_order
+
+   !> A history at rest.
+   subroutine new_history(self, material, cells, components, error)
+      type(history_type), intent(out) :: self
+      type(zener_type), intent(in) :: material
+      integer, intent(in) :: cells           !! values of a component on this process, nx ny
+      integer, intent(in) :: components      !! 1: normal, 2: tangential
+      type(error_type), allocatable, intent(out) :: error
+      integer :: arms, i, status
+
+      self%cells = cells
+      self%components = components
+      arms = size(material%g)
+      i = 0
+      if (arms > 0) i = cells
+      allocate (self%s(i, components), self%arm(i, arms, components), stat=status)
+      if (status == 0) then
+         if (material%scheme /= scheme_exponential2) i = 0
+         allocate (self%ds(i, components), stat=status)
+      end if
+      if (status /= 0) then
+         call fail(error, error_input, 'not enough memory for the history of the arms')
+         return
+      end if
+      self%s = 0.0_dp
+      self%ds = 0.0_dp
+      self%arm = 0.0_dp
+   end subroutine new_history
+
+   !> Free the fields.
+   subroutine destroy_history(self)
+      type(history_type), intent(inout) :: self
+
+      self%cells = 0
+      self%components = 0
+      if (allocated(self%s)) deallocate (self%s, self%ds, self%arm)
+   end subroutine destroy_history
+
+   !> Sums of zero.
+   pure function new_products(material) result(products)
+      type(zener_type), intent(in) :: material
+      type(products_type) :: products
+
+      allocate (products%arm_du(size(material%g)), source=0.0_dp)
+   end function new_products
+
+   !> What the past adds to the traction of the step in hand: S' = (P' + hist)/Q.
+   subroutine history_field(self, material, hist)
+      type(history_type), intent(in) :: self
+      type(zener_type), intent(in) :: material        !! after start_step, _jump or _relaxed
+      real(dp), intent(out) :: hist(self%cells, self%components)   !! Pa; of any rank, x first
+      integer :: c, first, n
+      real(dp) :: b1, b2
+
+      n = self%cells
+      b1 = sum(material%b1)
+      b2 = sum(material%b2)
+      do c = 1, self%components
+         !$omp parallel do schedule(static) default(none) shared(self, material, hist, c, n, b1, b2)
+         do first = 1, n, block
+            if (is_elastic(material)) then
+               hist(first:min(first + block - 1, n), c) = 0.0_dp
+            else
+               call history_block(first, min(first + block - 1, n), b1, b2, material%alpha, &
+                  self%s(:, c), self%ds(:, c), self%arm(:, :, c), hist(first:, c))
+            end if
+         end do
+         !$omp end parallel do
+      end do
+   end subroutine history_field
+
+   !> The history of the cells first to last.
+   pure subroutine history_block(first, last, b1, b2, alpha, s, ds, arm, hist)
+      integer, intent(in) :: first
+      integer, intent(in) :: last
+      real(dp), intent(in) :: b1             !! sum of the arms' b1, Pa
+      real(dp), intent(in) :: b2             !! sum of the arms' b2, Pa
+      real(dp), intent(in) :: alpha(:)
+      real(dp), intent(in), contiguous :: s(:)
+      real(dp), intent(in), contiguous :: ds(:)
+      real(dp), intent(in), contiguous :: arm(:, :)
+      real(dp), intent(inout), contiguous :: hist(:)     !! element 1 is that of cell `first`
+      integer :: i, k
+
+      do i = first, last
+         hist(i - first + 1) = b1*s(i)
+      end do
+      if (abs(b2) > 0.0_dp) then
+         do i = first, last
+            hist(i - first + 1) = hist(i - first + 1) - b2*ds(i)
+         end do
+      end if
+      do k = 1, size(alpha)
+         do i = first, last
+            hist(i - first + 1) = hist(i - first + 1) - alpha(k)*arm(i, k)
+         end do
+      end do
+   end subroutine history_block
+
+   !> End the step in hand for one field: new S and p_k, and the sums of the books, in one pass.
+   !>
+   !> Sums are added to `products`, so that the fields of several calls share one set of books.
+   subroutine commit_history(self, material, p, u_old, u_new, products, carried)
+      type(history_type), intent(inout) :: self
+      type(zener_type), intent(in) :: material        !! after start_step, _jump or _relaxed
+      real(dp), intent(in) :: p(self%cells, self%components)       !! P' at the end, Pa; any rank
+      real(dp), intent(in) :: u_old(self%cells, self%components)   !! at the start, m
+      real(dp), intent(in) :: u_new(self%cells, self%components)   !! at the end, m
+      type(products_type), intent(inout) :: products               !! of `new_products`
+      real(dp), intent(in), optional :: carried(self%components)   !! uniform part of P' that moves
+                                                !! a mass and does not strain the rubber, Pa
+      real(dp), allocatable :: sums(:, :), total(:)
+      real(dp) :: b1, b2, off
+      integer :: arms, c, first, n
+
+      n = self%cells
+      arms = size(material%g)
+      b1 = sum(material%b1)
+      b2 = sum(material%b2)
+      allocate (sums(fixed_sums + arms, (n + block - 1)/block), total(fixed_sums + arms))
+      total = 0.0_dp
+      do c = 1, self%components
+         off = 0.0_dp
+         if (present(carried)) off = carried(c)
+         !$omp parallel do schedule(static) default(none) &
+         !$omp shared(self, material, p, u_old, u_new, sums, c, n, b1, b2, off)
+         do first = 1, n, block
+            if (is_elastic(material)) then
+               call elastic_block(first, min(first + block - 1, n), material%g_e, off, p(:, c), &
+                  u_old(:, c), u_new(:, c), sums(:, (first - 1)/block + 1))
+            else
+               call commit_block(first, min(first + block - 1, n), b1, b2, material, off, p(:, c), &
+                  u_old(:, c), u_new(:, c), self%s(:, c), self%ds(:, c), self%arm(:, :, c), &
+                  sums(:, (first - 1)/block + 1))
+            end if
+         end do
+         !$omp end parallel do
+         total = total + sum(sums, dim=2)
+      end do
+      total = global_sum(total)
+      products%u_s = products%u_s + total(1)
+      products%p_du = products%p_du + total(2)
+      products%du_ds = products%du_ds + total(3)
+      products%du_ds_old = products%du_ds_old + total(4)
+      products%arm_du = products%arm_du + total(fixed_sums + 1:)
+   end subroutine commit_history
+
+   !> The cells first to last of a body with arms.
+   pure subroutine commit_block(first, last, b1, b2, material, off, p, u_old, u_new, s, ds, arm, &
+      sums)
+      integer, intent(in) :: first
+      integer, intent(in) :: last
+      real(dp), intent(in) :: b1             !! sum of the arms' b1, Pa
+      real(dp), intent(in) :: b2             !! sum of the arms' b2, Pa
+      type(zener_type), intent(in) :: material
+      real(dp), intent(in) :: off            !! part of p that does not strain the rubber, Pa
+      real(dp), intent(in), contiguous :: p(:)
+      real(dp), intent(in), contiguous :: u_old(:)
+      real(dp), intent(in), contiguous :: u_new(:)
+      real(dp), intent(inout), contiguous :: s(:)
+      real(dp), intent(inout), contiguous :: ds(:)
+      real(dp), intent(inout), contiguous :: arm(:, :)
+      real(dp), intent(out) :: sums(:)       !! u_s, p_du, du_ds, du_ds_old, arm_du(:)
+      real(dp) :: du(block), step(block), old(block)
+      real(dp) :: a, first_b, second_b, u_s, p_du, du_ds, du_ds_old, arm_du, s_new
+      integer :: i, k, m, n
+      logical :: parabola
+
+      n = last - first + 1
+      parabola = size(ds) > 0
+      call history_block(first, last, b1, b2, material%alpha, s, ds, arm, step)
+      u_s = 0.0_dp
+      p_du = 0.0_dp
+      du_ds = 0.0_dp
+      !$omp simd private(m, s_new) reduction(+:u_s, p_du, du_ds)
+      do i = 1, n
+         m = first + i - 1
+         du(i) = u_new(m) - u_old(m)
+         s_new = (p(m) - off + step(i))/material%q
+         step(i) = s_new - s(m)
+         s(m) = s_new
+         u_s = u_s + u_new(m)*s_new
+         p_du = p_du + (p(m) - off)*du(i)
+         du_ds = du_ds + du(i)*step(i)
+      end do
+      du_ds_old = 0.0_dp
+      if (parabola) then
+         !$omp simd private(m) reduction(+:du_ds_old)
+         do i = 1, n
+            m = first + i - 1
+            old(i) = ds(m)
+            ds(m) = step(i)
+            du_ds_old = du_ds_old + du(i)*old(i)
+         end do
+      end if
+      do k = 1, size(material%alpha)
+         a = material%alpha(k)
+         first_b = material%b1(k)
+         second_b = material%b2(k)
+         arm_du = 0.0_dp
+         if (abs(second_b) > 0.0_dp) then
+            !$omp simd private(m) reduction(+:arm_du)
+            do i = 1, n
+               m = first + i - 1
+               arm_du = arm_du + arm(m, k)*du(i)
+               arm(m, k) = a*arm(m, k) + first_b*step(i) + second_b*old(i)
+            end do
+         else
+            !$omp simd private(m) reduction(+:arm_du)
+            do i = 1, n
+               m = first + i - 1
+               arm_du = arm_du + arm(m, k)*du(i)
+               arm(m, k) = a*arm(m, k) + first_b*step(i)
+            end do
+         end if
+         sums(fixed_sums + k) = arm_du
+      end do
+      sums(1:fixed_sums) = [u_s, p_du, du_ds, du_ds_old]
+   end subroutine commit_block
+
+   !> The cells first to last of an elastic body: only the products.
+   pure subroutine elastic_block(first, last, modulus, off, p, u_old, u_new, sums)
+      integer, intent(in) :: first
+      integer, intent(in) :: last
+      real(dp), intent(in) :: modulus        !! Pa
+      real(dp), intent(in) :: off            !! part of p that does not strain the rubber, Pa
+      real(dp), intent(in), contiguous :: p(:)
+      real(dp), intent(in), contiguous :: u_old(:)
+      real(dp), intent(in), contiguous :: u_new(:)
+      real(dp), intent(out) :: sums(:)       !! u_s, p_du, 0, 0
+      real(dp) :: u_s, p_du
+      integer :: i
+
+      u_s = 0.0_dp
+      p_du = 0.0_dp
+      !$omp simd reduction(+:u_s, p_du)
+      do i = first, last
+         u_s = u_s + u_new(i)*(p(i) - off)
+         p_du = p_du + (p(i) - off)*(u_new(i) - u_old(i))
+      end do
+      sums = 0.0_dp
+      sums(1) = u_s/modulus
+      sums(2) = p_du
+   end subroutine elastic_block
+
+end module zener
