@@ -46,7 +46,8 @@ contains
       integer, intent(inout) :: state
       real(dp) :: number
 
-      state = mod(16807*mod(state, 127773) + 2147483647 - 2836*(state/127773), 2147483647)
+      state = 16807*mod(state, 127773) - 2836*(state/127773)
+      if (state <= 0) state = state + 2147483647
       number = 2.0_dp*real(state, dp)/2147483647.0_dp - 1.0_dp
    end function random
 

@@ -224,11 +224,10 @@ contains
       arms = size(material%g)
       i = 0
       if (arms > 0) i = cells
-      allocate (self%s(i, components), self%arm(i, arms, components), stat=status)
-      if (status == 0) then
-         if (material%scheme /= scheme_exponential2) i = 0
-         allocate (self%ds(i, components), stat=status)
-      end if
+      allocate (self%s(i, components), stat=status)
+      if (status == 0) allocate (self%arm(i, arms, components), stat=status)
+      if (material%scheme /= scheme_exponential2) i = 0
+      if (status == 0) allocate (self%ds(i, components), stat=status)
       if (status /= 0) then
          call fail(error, error_input, 'not enough memory for the history of the arms')
          return
