@@ -5,7 +5,12 @@ import shutil
 import sys
 from pathlib import Path
 
+import h5py
+import matplotlib
+import numpy as np
 import pytest
+
+matplotlib.use("Agg")
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -33,3 +38,57 @@ def program() -> str:
         if candidate and Path(candidate).is_file():
             return str(candidate)
     pytest.fail("the program is not built: run ./test.sh")
+
+
+def write_result(path, *, nx=24, ny=16, lx=2.4e-3, ly=1.6e-3, rows=6, moving=False,
+                 finished=1, boundary="periodic"):
+    """Write a file laid out as results are, with fields that a formula gives."""
+    x = np.arange(nx) * lx / nx
+    y = np.arange(ny) * ly / ny
+    height = 2e-6 * np.cos(2 * np.pi * x / lx) * np.cos(2 * np.pi * y / ly)[:, None]
+    with h5py.File(path, "w") as file:
+        file.attrs.update(
+            title="Sample", program="asperity", version="0.1.0", finished=np.int32(finished),
+            created="2026-01-01T00:00:00Z", input="&surface shape = 'self_affine' /\n")
+        grid = file.create_group("grid")
+        grid.attrs.update(nx=np.int32(nx), ny=np.int32(ny), lx=lx, ly=ly, boundary=boundary)
+        grid["x"], grid["y"] = x, y
+        file["surface/height"] = height
+        file["material/shear_modulus"] = 1e6
+        file["material/poisson"] = 0.5
+        file["material/prony_g"] = np.zeros(0)
+        history = file.create_group("history")
+        load = np.linspace(1e3, 5e4, rows)
+        columns = {
+            "contact_area": (np.sqrt(load / 1e5), "1", "fraction of the grid in contact"),
+            "friction": (0.3 * moving * np.linspace(0, 1, rows), "1", "friction coefficient"),
+            "phase": (np.ones(rows, np.int32), "1", "number of the phase"),
+            "pressure": (load, "Pa", "mean normal pressure"),
+            "step": (np.arange(rows, dtype=np.int32), "1", "number of the row"),
+            "time": (1e-3 * moving * np.arange(rows), "s", "time"),
+            "work_normal": (1e-9 * np.arange(rows), "J", "work of the normal traction"),
+        }
+        for name, (values, units, long_name) in columns.items():
+            # The last column lags a row behind: the run is caught in the middle of a step.
+            kept = values[:-1] if name == "work_normal" and not finished else values
+            item = history.create_dataset(name, data=kept, maxshape=(None,), chunks=(64,))
+            item.attrs.update(units=units, long_name=long_name)
+        for step in (0, rows - 1):
+            group = file.create_group(f"snapshots/{step:06d}")
+            group.attrs.update(step=np.int32(step), time=columns["time"][0][step],
+                               phase=np.int32(1))
+            pressure = np.maximum(height, 0.0) * 1e11 + np.zeros((ny, nx))
+            contact = (pressure > 0).astype(np.int8) * (1 + (x > lx / 2))
+            fields = {"pressure": (pressure, "Pa"), "gap": (np.maximum(-height, 0.0), "m"),
+                      "traction_x": (0.3 * pressure * np.sign(x - lx / 2), "Pa"),
+                      "contact": (contact.astype(np.int8), "1")}
+            for name, (values, units) in fields.items():
+                item = group.create_dataset(name, data=values)
+                item.attrs.update(units=units, long_name=f"the {name}")
+    return path
+
+
+@pytest.fixture
+def result(tmp_path):
+    """Return the path of a result of an elastic contact at growing load."""
+    return write_result(tmp_path / "rough.h5")

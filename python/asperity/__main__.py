@@ -1,0 +1,95 @@
+"""``python -m asperity plot RESULT.h5``: pictures of results from the command line."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+__all__ = ["main"]
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command; return its exit status: 0 done, 2 wrong arguments, 3 a file.
+
+    Parameters
+    ----------
+    arguments : list of str, optional
+        The words after ``python -m asperity``; those of the process if left out.
+    """
+    parser = argparse.ArgumentParser(
+        prog="python -m asperity",
+        description="Pictures of results. Runs are made by the command `asperity`.")
+    verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
+    plot = verbs.add_parser(
+        "plot", help="draw a result",
+        description="Draw a result: by default an overview of the last pressure and gap and of the"
+                    " contact area, into RESULT.png.")
+    plot.add_argument("result", metavar="RESULT.h5", help="result of `asperity run`")
+    plot.add_argument("-o", "--output", metavar="PNG", type=Path,
+                      help="picture to write (.png, .pdf, .svg); default: RESULT.png beside the"
+                           " result")
+    plot.add_argument("--show", action="store_true", help="open a window instead of writing")
+    what = plot.add_mutually_exclusive_group()
+    what.add_argument("--field", metavar="NAME", help="draw a field of a snapshot, as pressure")
+    what.add_argument("--history", metavar="NAME",
+                      help="draw a column of the history, as friction")
+    plot.add_argument("--step", type=int, help="the snapshot's step; default: the last one")
+    plot.add_argument("--x", metavar="NAME", help="column to draw --history against")
+    plot.set_defaults(call=_plot)
+    chosen = parser.parse_args(arguments)
+    if chosen.step is not None and not chosen.field:
+        plot.error("--step goes with --field")
+    if chosen.x is not None and not chosen.history:
+        plot.error("--x goes with --history")
+    try:
+        return chosen.call(chosen)
+    except OSError as error:
+        return _fail(error, 3)
+    except (KeyError, IndexError, ValueError) as error:
+        return _fail(error, 2)
+
+
+def _plot(chosen: argparse.Namespace) -> int:
+    """Draw what was chosen."""
+    import matplotlib
+
+    if not chosen.show:
+        matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    from .result import open_result
+
+    run = open_result(chosen.result)
+    if chosen.field:
+        if not len(run.snapshots):
+            raise ValueError(f"{run.path}: holds no snapshots yet")
+        snapshots = run.snapshots
+        snapshot = snapshots[-1] if chosen.step is None else snapshots.at_step(chosen.step)
+        figure = snapshot.plot(chosen.field).figure
+    elif chosen.history:
+        figure = run.plot(chosen.history, chosen.x).figure
+    else:
+        figure = run.overview()
+    if chosen.show:
+        plt.show()
+        return 0
+    output = chosen.output or run.path.with_suffix(".png")
+    figure.savefig(output, dpi=150)
+    plt.close(figure)
+    print(f"wrote {output}")
+    return 0
+
+
+def _fail(error: Exception, status: int) -> int:
+    """Print a message and return the exit status."""
+    if isinstance(error, OSError) and error.strerror and error.filename:
+        text = f"{error.filename}: {error.strerror}"
+    else:
+        text = str(error)
+    print(f"asperity: {text}", file=sys.stderr)
+    return status
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,39 @@
+"""Exceptions of the package, and how a status of the Fortran library becomes one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+__all__ = ["NotConverged", "raise_for_status"]
+
+
+class NotConverged(RuntimeError):  # noqa: N818 - an outcome that callers look for by this name
+    """A solver has not reached its tolerance.
+
+    Attributes
+    ----------
+    result : object
+        The best result so far; of `asperity.run` the opened result file.
+    """
+
+    def __init__(self, message: str, result: Any = None) -> None:
+        super().__init__(message)
+        self.result = result
+
+
+def raise_for_status(status: int, message: bytes | str) -> None:
+    """Raise the exception that belongs to a status of the library; 0 raises none.
+
+    Examples
+    --------
+    >>> raise_for_status(0, b"")
+    >>> raise_for_status(2, b"tolerance = 0: must be positive  ")
+    Traceback (most recent call last):
+    ...
+    ValueError: tolerance = 0: must be positive
+    """
+    if status == 0:
+        return
+    text = (message.decode(errors="replace") if isinstance(message, bytes) else message).strip()
+    kinds: dict[int, type[Exception]] = {2: ValueError, 3: OSError, 4: NotConverged}
+    raise kinds.get(status, RuntimeError)(text)

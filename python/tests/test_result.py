@@ -1,0 +1,129 @@
+"""Reading results."""
+
+import h5py
+import numpy as np
+import pytest
+from conftest import write_result
+
+import asperity
+
+
+def test_reads_what_was_written(result):
+    run = asperity.open(result)
+    assert (run.title, run.program, run.version) == ("Sample", "asperity", "0.1.0")
+    assert run.finished
+    assert "&surface" in run.input
+    assert (run.grid.nx, run.grid.ny, run.grid.boundary) == (24, 16, "periodic")
+    assert run.grid.dx == pytest.approx(1e-4, rel=1e-12)
+    assert run.grid.x.shape == (24,)
+    assert run.height.shape == (16, 24)
+    assert run.material.shear_modulus == run.material["shear_modulus"] == 1e6
+    assert run.material["prony_g"].shape == (0,)
+    assert list(run.history)[:3] == ["step", "phase", "time"]
+    np.testing.assert_array_equal(run.history["pressure"], np.linspace(1e3, 5e4, 6))
+    assert run.history.units("pressure") == "Pa"
+    assert run.history.long_name("pressure") == "mean normal pressure"
+
+
+def test_snapshots(result):
+    run = asperity.open(result)
+    assert len(run.snapshots) == 2
+    assert run.snapshots.steps == (0, 5)
+    last = run.snapshots[-1]
+    assert (last.step, last.time, last.phase) == (5, 0.0, 1)
+    assert last.pressure.shape == (16, 24)
+    with h5py.File(result) as file:
+        np.testing.assert_array_equal(last.pressure, file["snapshots/000005/pressure"])
+    assert last["contact"].dtype == np.int8
+    assert set(last.fields) == {"pressure", "gap", "traction_x", "contact"}
+    assert [snapshot.step for snapshot in run.snapshots] == [0, 5]
+    assert [snapshot.step for snapshot in run.snapshots[1:]] == [5]
+    assert run.snapshots.at_step(0).step == 0
+    with pytest.raises(IndexError, match="there are 2"):
+        run.snapshots[2]
+    with pytest.raises(KeyError, match="0, 5"):
+        run.snapshots.at_step(3)
+
+
+def test_names_are_completed_and_suggested(result):
+    run = asperity.open(result)
+    assert "friction" in run.history._ipython_key_completions_()
+    assert "friction" in dir(run.history)
+    assert "pressure" in dir(run.snapshots[0])
+    with pytest.raises(KeyError, match="did you mean 'friction'"):
+        run.history["fricton"]
+    with pytest.raises(AttributeError, match="did you mean 'friction'"):
+        _ = run.history.fricton
+    with pytest.raises(KeyError, match="did you mean 'pressure'"):
+        run.snapshots[0]["presure"]
+    with pytest.raises(AttributeError, match="did you mean 'pressure'"):
+        _ = run.snapshots[0].presure
+
+
+def test_a_run_that_is_still_going(tmp_path):
+    path = write_result(tmp_path / "going.h5", finished=0)
+    run = asperity.open(path)
+    assert not run.finished
+    assert {len(column) for column in run.history.values()} == {5}
+    with h5py.File(path, "a", locking=False) as writer:
+        assert len(asperity.open(path).snapshots) == 2
+        for column in writer["history"].values():
+            column.resize((7,))
+        writer["history/pressure"][-1] = 6e4
+        writer.flush()
+        assert run.refresh().history.rows == 7
+        assert run.history["pressure"][-1] == 6e4
+
+
+def test_reprs_say_what_is_there(result):
+    run = asperity.open(result)
+    assert "Sample" in repr(run)
+    assert "24 x 16" in repr(run)
+    assert "finished, 6 rows, 2 snapshots (steps 0, 5)" in repr(run)
+    assert "pressure" in repr(run.history)
+    assert "step 5" in repr(run.snapshots[-1])
+    assert "poisson: 0.5" in repr(run.material)
+
+
+def test_missing_file(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"none\.h5: no such file: `asperity run"):
+        asperity.open(tmp_path / "none.h5")
+
+
+def test_folder(tmp_path):
+    with pytest.raises(IsADirectoryError, match="is a folder"):
+        asperity.open(tmp_path)
+
+
+@pytest.mark.parametrize(("content", "message"), [
+    (b"", "is empty"),
+    (b"&grid nx = 4 /\n", "is not an HDF5 file"),
+    (b"\x89HDF\r\n\x1a\n then nothing", "cannot be read"),
+])
+def test_bad_files(tmp_path, content, message):
+    path = tmp_path / "bad.h5"
+    path.write_bytes(content)
+    with pytest.raises(OSError, match=message) as caught:
+        asperity.open(path)
+    assert "bad.h5" in str(caught.value)
+
+
+def test_truncated_file(result):
+    result.write_bytes(result.read_bytes()[: result.stat().st_size // 2])
+    with pytest.raises(OSError, match=r"rough\.h5: cannot be read.*--restart"):
+        asperity.open(result)
+
+
+def test_another_hdf5_file(tmp_path):
+    path = tmp_path / "other.h5"
+    with h5py.File(path, "w") as file:
+        file["numbers"] = [1, 2, 3]
+    with pytest.raises(OSError, match=r"other\.h5: holds no /grid: it is not a result"):
+        asperity.open(path)
+
+
+def test_to_pandas(result):
+    pandas = pytest.importorskip("pandas")
+    table = asperity.open(result).history.to_pandas()
+    assert isinstance(table, pandas.DataFrame)
+    assert table["pressure"].iloc[-1] == 5e4
