@@ -202,12 +202,13 @@ def _load_panel(run: Run, axes: Axes) -> None:
     factor, unit = si_scale(pressure, "Pa")
     rough = re.search(r"(?i)shape *= *['\"](self_affine|file)['\"]", run.input)
     if rough and run.grid.boundary == "periodic" and run.grid.ny > 1 and _is_elastic(run):
-        modulus = 2.0 * float(run.material["shear_modulus"]) / (1.0 - float(run.material["poisson"]))
+        modulus = 2.0 * float(run.material.shear_modulus) / (1.0 - float(run.material.poisson))
         slope = _rms_slope(run.grid, run.height)
         if slope > 0.0 and pressure.max(initial=0.0) > 0.0:
             loads = np.linspace(0.0, 1.05 * pressure.max(), 200)
-            axes.plot(loads * factor, erf(np.sqrt(2.0) * loads / (modulus * slope)), color=COLOURS[1],
-                      linestyle="--", label="Persson (2001)")
+            areas = erf(np.sqrt(2.0) * loads / (modulus * slope))
+            axes.plot(loads * factor, areas, color=COLOURS[1], linestyle="--",
+                      label="Persson (2001)")
     axes.plot(pressure * factor, history["contact_area"], color=COLOURS[0], marker="o",
               markersize=4.0, linestyle="-" if history.rows > 1 else "", label="this run")
     axes.set_xlabel(_axis(LABELS["pressure"], unit))

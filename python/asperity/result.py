@@ -446,14 +446,17 @@ def _read(path: Path, read: Callable[[h5py.File], T]) -> T:
     """Open the file, read, close it; a file caught in the middle of a write is tried again."""
     _check_file(path)
     reason: OSError
+    options: dict[str, Any] = {"locking": False}  # the program may be writing
     for attempt in range(5):
         try:
-            with h5py.File(path, "r", locking=False) as file:
+            with h5py.File(path, "r", **options) as file:
                 return read(file)
         except _NotAResultError as error:
             reason = error
         except (OSError, RuntimeError, KeyError) as error:
             detail = str(error.args[0] if error.args else error)
+            if "locking flag" in detail:  # the caller has it open through h5py's defaults
+                options = {}
             reason = OSError(f"{path}: cannot be read: {detail}; if its run was killed,"
                              " `asperity run CASE.nml --restart` goes on from the last checkpoint;"
                              " otherwise run the case again")
