@@ -4,11 +4,14 @@ set -eu
 cd "$(dirname "$0")"
 . tools/setup.sh
 
-python tools/check_sources.py
-fortitude check --quiet
-ruff check --quiet
+# A fault of style is reported first and fails the whole, but only after the tests.
+status=0
+python tools/check_sources.py || status=1
+fortitude check --quiet || status=1
+ruff check --quiet || status=1
 
 fpm test --profile release
 
 . tools/install_editable.sh
-python -m pytest -q
+python -m pytest -q || status=1
+exit $status
