@@ -72,8 +72,10 @@ module fft_conv
       procedure :: quadratic_form
       procedure :: quadratic_form_vector
       procedure :: forward_row
+      procedure :: forward_zero_row
       procedure :: columns
       procedure :: backward_row
+      procedure :: add_backward_row
       procedure :: destroy
    end type convolution_type
 
@@ -304,6 +306,15 @@ contains
       end associate
    end subroutine forward_row
 
+   !> The same as `forward_row` for a row of zeros.
+   subroutine forward_zero_row(self, component, j)
+      class(convolution_type), intent(inout) :: self
+      integer, intent(in) :: component
+      integer, intent(in) :: j
+
+      self%spectrum(:, j, component) = (0.0_dp, 0.0_dp)
+   end subroutine forward_zero_row
+
    !> Row j of the result of a component.
    subroutine backward_row(self, component, j, row)
       class(convolution_type), intent(inout) :: self
@@ -317,6 +328,21 @@ contains
          row = buffer%row(1:self%nx)
       end associate
    end subroutine backward_row
+
+   !> Add `factor` times row j of the result of a component.
+   subroutine add_backward_row(self, component, j, factor, row)
+      class(convolution_type), intent(inout) :: self
+      integer, intent(in) :: component
+      integer, intent(in) :: j
+      real(dp), intent(in) :: factor
+      real(dp), intent(inout) :: row(self%nx)
+
+      associate (buffer => self%buffers(omp_get_thread_num()))
+         buffer%spectral_row(:) = self%spectrum(:, j, component)
+         call fftw_execute_dft_c2r(self%row_backward, buffer%row_memory, buffer%row_memory)
+         row = row + factor*buffer%row(1:self%nx)
+      end associate
+   end subroutine add_backward_row
 
    !> Between the rows' two passes: transform the columns, multiply by the symbol, transform back.
    subroutine columns(self, action, form)

@@ -1,0 +1,642 @@
+!> Normal contact without adhesion: P >= 0, gap >= 0, P gap = 0.
+!>
+!> Bound-constrained, projected conjugate gradients for the pressure P under a rigid rough surface H,
+!>     minimise  c/2 (P + P_h).A(P + P_h) - P.H,   P >= 0,   mean(P) given or the approach given,
+!> where A is the operator for unit shear modulus, c = 1/modulus, and P_h a given traction (the memory
+!> of a viscoelastic material; nothing else changes with it). After Polonsky and Keer (1999), with
+!> * the exact projection on {P >= 0, sum P = load} instead of a rescaling;
+!> * the direction kept through changes of the contact set (Fletcher-Reeves);
+!> * a preconditioner ~ |q| of a local stencil and block means (module coarse_level);
+!> * the step length predicted on the block means, so that the clipped step s is known before the
+!>   transform: two transforms an iteration, always;
+!> * passes over active blocks of 16 cells only, but the one that updates the gap.
+!> The thesis's own algorithm (2.1.2) is in module normal_cg_thesis.
+!>
+!> Converged means that the duality gap e1 = (mean gap under the pressure - least gap)/h_rms and the
+!> error of the load, both of a fresh U = A P, are below the tolerance.
+!>
+!> Fields of doubles: H, P, gap, and the work fields residual, direction, step; the operator's spectrum.
+module normal_cg
+   use coarse_level, only : coarse_level_type, new_coarse_level, stencil_c0
+   use errors, only : error_type
+   use fft_conv, only : columns_apply, convolution_type, new_normal_operator
+   use normal_state, only : combine_measures, control_pressure, evaluate_gap, first_pressure, &
+      gap_measure_type, normal_problem_type, row_measure
+   use parallel, only : global_min, global_sum
+   use precision, only : dp, int64
+   use regular_grid, only : grid_type
+   use solver_result, only : solver_result_type
+   implicit none
+   private
+
+   public :: new_normal_solver, normal_solver_type
+
+   integer, parameter :: width = 16            !! cells of an active block
+   integer, parameter :: refresh = 40          !! iterations between fresh products A P
+
+   !> The solver with its operators and work fields, kept from step to step. Not to be copied.
+   type :: normal_solver_type
+      type(grid_type) :: grid
+      type(convolution_type) :: operator              !! A for G = 1
+      type(coarse_level_type), private :: coarse
+      real(dp), allocatable, private :: residual(:, :)    !! with a rim: (0:nx+1, 0:ny+1)
+      real(dp), allocatable, private :: direction(:, :)
+      real(dp), allocatable, private :: step(:, :)
+      real(dp), allocatable, private :: least(:, :)       !! least gap of each block
+      logical, allocatable, private :: loaded(:, :)       !! blocks that hold P > 0
+      logical, allocatable, private :: live(:, :)         !! active blocks
+      integer, allocatable, private :: blocks(:, :)       !! first cells of a row's active blocks
+      integer, allocatable, private :: counts(:)          !! number of a row's active blocks
+      real(dp), allocatable, private :: rows(:, :)        !! partial sums of each row
+   contains
+      procedure :: solve
+      procedure :: destroy
+   end type normal_solver_type
+
+contains
+
+   !> Make a solver for a grid.
+   subroutine new_normal_solver(self, grid, poisson, error)
+      type(normal_solver_type), intent(out) :: self
+      type(grid_type), intent(in) :: grid
+      real(dp), intent(in) :: poisson
+      type(error_type), allocatable, intent(out) :: error
+      integer :: nb
+
+      self%grid = grid
+      call new_normal_operator(self%operator, grid, poisson, error)
+      if (allocated(error)) return
+      call new_coarse_level(self%coarse, grid, poisson, error)
+      if (allocated(error)) return
+      nb = (grid%nx + width - 1)/width
+      allocate (self%residual(0:grid%nx + 1, 0:grid%ny + 1), source=0.0_dp)
+      allocate (self%direction(grid%nx, grid%ny), self%step(grid%nx, grid%ny), source=0.0_dp)
+      allocate (self%least(nb, grid%ny), self%loaded(nb, grid%ny))
+      allocate (self%live(nb, grid%ny), source=.false.)
+      allocate (self%blocks(nb, grid%ny), self%counts(grid%ny))
+      allocate (self%rows(6, grid%ny))
+   end subroutine new_normal_solver
+
+   !> Solve a contact problem by the fast method.
+   !>
+   !> Not converging is an outcome: the state reached, the best so far, is handed out.
+   subroutine solve(self, problem, height, pressure, gap, level, outcome, history)
+      class(normal_solver_type), intent(inout) :: self
+      type(normal_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: height(:, :)             !! H, [nx, ny], m
+      real(dp), intent(inout) :: pressure(:, :)        !! P, Pa; a start where problem%warm
+      real(dp), intent(inout) :: gap(:, :)             !! U - H - level, m
+      real(dp), intent(out) :: level                   !! U - H where the gap is zero, m
+      type(solver_result_type), intent(out) :: outcome
+      real(dp), intent(in), optional :: history(:, :)  !! P_h, Pa
+      type(gap_measure_type) :: measure
+      real(dp) :: scale, old, rz, rd, kappa, squares, alpha, form, trial
+      real(dp) :: best, limit, cells
+      logical :: fresh, restart, clipped
+      integer :: age
+      integer(int64) :: before
+      real(dp) :: coarse_before
+
+      before = self%operator%ffts
+      coarse_before = self%coarse%transforms()
+      cells = global_sum(real(size(gap), dp))
+      scale = 1.0_dp/problem%modulus
+      kappa = 1.0_dp
+      old = 0.0_dp
+      restart = .true.
+      age = 0
+      fresh = .true.
+      self%direction = 0.0_dp
+      self%residual = 0.0_dp
+      call first_pressure(problem, self%grid, self%operator, height, pressure, history)
+      call evaluate_gap(problem, self%operator, height, pressure, gap, history)
+      call survey(self, problem, pressure, gap)
+      outcome%iterations = 0
+      outcome%reason = 'the limit of iterations was reached'
+      do
+         measure = combine_measures(problem, cells, self%rows)
+         call activate(self, measure%level)
+         if (measure%error <= problem%tolerance) then
+            if (fresh) then
+               outcome%converged = .true.
+               outcome%reason = 'converged'
+               exit
+            end if
+            call evaluate_gap(problem, self%operator, height, pressure, gap, history)
+            call survey(self, problem, pressure, gap)
+            fresh = .true.
+            age = 0
+            cycle
+         end if
+         if (outcome%iterations == problem%max_iterations) exit
+         outcome%iterations = outcome%iterations + 1
+
+         call form_residual(self, problem, measure%level, pressure, gap)
+         call precondition(self, problem, measure%level, pressure, gap, rz)
+         if (restart .or. old <= 0.0_dp) then
+            call new_direction(self, problem, 0.0_dp, rd, squares)
+         else
+            call new_direction(self, problem, rz/old, rd, squares)
+            if (rd <= 0.0_dp) call new_direction(self, problem, 0.0_dp, rd, squares)
+         end if
+         old = rz
+         restart = .false.
+         if (rd <= 0.0_dp) then
+            outcome%reason = 'no direction of descent is left'
+            exit
+         end if
+         trial = scale*self%coarse%predict_form(squares)
+         alpha = rd/max(kappa*trial, tiny(1.0_dp))
+         call clipped_step(self, problem, alpha, pressure, gap, measure%level, clipped, rd, squares, limit)
+         if (rd <= 0.0_dp) then
+            ! The projection bent the step too far: once more from the steepest descent.
+            if (kappa > 1e6_dp) then
+               outcome%reason = 'no step lowers the energy'
+               exit
+            end if
+            kappa = 4.0_dp*kappa
+            restart = .true.
+            cycle
+         end if
+         call transform_step(self, form)
+         form = scale*form
+         trial = scale*self%coarse%predict_form(squares)
+         kappa = min(max(form/max(trial, tiny(1.0_dp)), 0.1_dp), 10.0_dp)
+         best = rd/form
+         if (clipped .and. best > 0.55_dp) then
+            alpha = 1.0_dp
+         else
+            alpha = min(best, limit)
+         end if
+         age = age + 1
+         call update(self, problem, scale*alpha, alpha, pressure, gap)
+         fresh = .false.
+         if (age == refresh) then
+            call evaluate_gap(problem, self%operator, height, pressure, gap, history)
+            call survey(self, problem, pressure, gap)
+            fresh = .true.
+            age = 0
+         end if
+      end do
+
+      level = measure%weighted_level
+      outcome%residual = measure%error
+      outcome%load_error = measure%load_error
+      outcome%ffts = self%operator%ffts - before &
+         + nint(self%coarse%transforms() - coarse_before, int64)
+      call shift_gap(self, level, gap)
+   end subroutine solve
+
+   !> Which blocks hold pressure, the least gap of each, and the measures of the rows.
+   subroutine survey(self, problem, pressure, gap)
+      type(normal_solver_type), intent(inout) :: self
+      type(normal_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: pressure(:, :), gap(:, :)
+      integer :: j
+
+      !$omp parallel do default(none) shared(self, problem, pressure, gap) private(j) &
+      !$omp num_threads(self%operator%threads)
+      do j = 1, self%grid%ny
+         call survey_row(self, problem, j, pressure(:, j), gap(:, j))
+      end do
+   end subroutine survey
+
+   !> The survey of a row.
+   subroutine survey_row(self, problem, j, pressure, gap)
+      type(normal_solver_type), intent(inout) :: self
+      type(normal_problem_type), intent(in) :: problem
+      integer, intent(in) :: j
+      real(dp), intent(in) :: pressure(:), gap(:)
+      integer :: b, first, last
+
+      do b = 1, size(self%least, 1)
+         first = (b - 1)*width + 1
+         last = min(b*width, self%grid%nx)
+         self%least(b, j) = minval(gap(first:last))
+         self%loaded(b, j) = maxval(pressure(first:last)) > 0.0_dp
+      end do
+      self%rows(:, j) = row_measure(pressure, gap, problem%target)
+   end subroutine survey_row
+
+   !> List the blocks that hold a cell with P > 0 or a gap below the level; clear those that left.
+   subroutine activate(self, level)
+      type(normal_solver_type), intent(inout) :: self
+      real(dp), intent(in) :: level
+      integer :: b, j, first, last
+      logical :: now
+
+      !$omp parallel do default(none) shared(self, level) private(b, j, first, last, now) &
+      !$omp num_threads(self%operator%threads)
+      do j = 1, self%grid%ny
+         self%counts(j) = 0
+         do b = 1, size(self%least, 1)
+            now = self%loaded(b, j) .or. self%least(b, j) < level
+            first = (b - 1)*width + 1
+            if (now) then
+               self%counts(j) = self%counts(j) + 1
+               self%blocks(self%counts(j), j) = first
+            else if (self%live(b, j)) then
+               last = min(b*width, self%grid%nx)
+               self%residual(first:last, j) = 0.0_dp
+               self%direction(first:last, j) = 0.0_dp
+               self%step(first:last, j) = 0.0_dp
+            end if
+            self%live(b, j) = now
+         end do
+      end do
+   end subroutine activate
+
+   !> The residual -(gap - mean) on S = {P > 0 or gap < level}, its rim, and its block means.
+   subroutine form_residual(self, problem, level, pressure, gap)
+      type(normal_solver_type), intent(inout) :: self
+      type(normal_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: level
+      real(dp), intent(in) :: pressure(:, :), gap(:, :)
+      real(dp) :: mean, total, cells
+      integer :: i, j, k, last, nx, ny
+
+      nx = self%grid%nx
+      ny = self%grid%ny
+      mean = level
+      if (problem%control == control_pressure) then
+         !$omp parallel do default(none) shared(self, pressure, gap, level, nx, ny) &
+         !$omp private(i, j, k, last, total, cells) num_threads(self%operator%threads)
+         do j = 1, ny
+            total = 0.0_dp
+            cells = 0.0_dp
+            do k = 1, self%counts(j)
+               last = min(self%blocks(k, j) + width - 1, nx)
+               do i = self%blocks(k, j), last
+                  if (pressure(i, j) > 0.0_dp .or. gap(i, j) < level) then
+                     total = total + gap(i, j)
+                     cells = cells + 1.0_dp
+                  end if
+               end do
+            end do
+            self%rows(1, j) = total
+            self%rows(2, j) = cells
+         end do
+         mean = row_sum(self, 1)/max(row_sum(self, 2), 1.0_dp)
+      end if
+      !$omp parallel do default(none) shared(self, pressure, gap, level, mean, nx, ny) &
+      !$omp private(i, j, k, last) num_threads(self%operator%threads)
+      do j = 1, ny
+         do k = 1, self%counts(j)
+            last = min(self%blocks(k, j) + width - 1, nx)
+            do i = self%blocks(k, j), last
+               self%residual(i, j) = merge(mean - gap(i, j), 0.0_dp, &
+                  pressure(i, j) > 0.0_dp .or. gap(i, j) < level)
+            end do
+         end do
+      end do
+      call fill_rim(self)
+      call restrict(self, self%residual(1:nx, 1:ny))
+   end subroutine form_residual
+
+   !> The rim of the residual: the other side's values where periodic, zero where free.
+   subroutine fill_rim(self)
+      use regular_grid, only : boundary_periodic
+      type(normal_solver_type), intent(inout) :: self
+      integer :: nx, ny
+
+      if (self%grid%boundary /= boundary_periodic) return
+      nx = self%grid%nx
+      ny = self%grid%ny
+      self%residual(0, 1:ny) = self%residual(nx, 1:ny)
+      self%residual(nx + 1, 1:ny) = self%residual(1, 1:ny)
+      self%residual(1:nx, 0) = self%residual(1:nx, ny)
+      self%residual(1:nx, ny + 1) = self%residual(1:nx, 1)
+   end subroutine fill_rim
+
+   !> Block means of a field that is zero off the active blocks.
+   subroutine restrict(self, field)
+      type(normal_solver_type), intent(inout) :: self
+      real(dp), intent(in) :: field(:, :)
+      integer :: i, j, k, last, jb
+
+      !$omp parallel do default(none) shared(self, field) private(i, j, k, last, jb) &
+      !$omp num_threads(self%operator%threads)
+      do jb = 1, self%coarse%ny
+         self%coarse%mean(:, jb) = 0.0_dp
+         do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
+            do k = 1, self%counts(j)
+               last = min(self%blocks(k, j) + width - 1, self%grid%nx)
+               do i = self%blocks(k, j), last
+                  associate (ib => self%coarse%block_x(i))
+                     self%coarse%mean(ib, jb) = self%coarse%mean(ib, jb) + field(i, j)
+                  end associate
+               end do
+            end do
+         end do
+         self%coarse%mean(:, jb) = self%coarse%mean(:, jb)/self%coarse%cells
+      end do
+   end subroutine restrict
+
+   !> step = M residual on S, without its mean, without empty cells that it would empty further;
+   !> the product with the residual.
+   subroutine precondition(self, problem, level, pressure, gap, rz)
+      type(normal_solver_type), intent(inout) :: self
+      type(normal_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: level
+      real(dp), intent(in) :: pressure(:, :), gap(:, :)
+      real(dp), intent(out) :: rz
+      real(dp) :: mean, total, cells, wx, wy, centre
+      integer :: i, j, k, last, jb, nx
+
+      nx = self%grid%nx
+      wx = self%coarse%wx
+      wy = self%coarse%wy
+      centre = stencil_c0 + 2.0_dp*(wx + wy)
+      call self%coarse%precondition()
+      !$omp parallel do default(none) shared(self, pressure, gap, level, nx, wx, wy, centre) &
+      !$omp private(i, j, k, last, jb, total, cells) num_threads(self%operator%threads)
+      do jb = 1, self%coarse%ny
+         do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
+            total = 0.0_dp
+            cells = 0.0_dp
+            do k = 1, self%counts(j)
+               last = min(self%blocks(k, j) + width - 1, nx)
+               do i = self%blocks(k, j), last
+                  if (pressure(i, j) > 0.0_dp .or. gap(i, j) < level) then
+                     self%step(i, j) = centre*self%residual(i, j) &
+                        - wx*(self%residual(i - 1, j) + self%residual(i + 1, j)) &
+                        - wy*(self%residual(i, j - 1) + self%residual(i, j + 1)) &
+                        + self%coarse%correction(self%coarse%block_x(i), jb)
+                     total = total + self%step(i, j)
+                     cells = cells + 1.0_dp
+                  else
+                     self%step(i, j) = 0.0_dp
+                  end if
+               end do
+            end do
+            self%rows(1, j) = total
+            self%rows(2, j) = cells
+         end do
+      end do
+      mean = 0.0_dp
+      if (problem%control == control_pressure) &
+         mean = row_sum(self, 1)/max(row_sum(self, 2), 1.0_dp)
+
+      ! Off S the residual is made to flag a dropped cell: huge is never a residual.
+      !$omp parallel do default(none) shared(self, pressure, gap, level, nx, mean) &
+      !$omp private(i, j, k, last, total, cells) num_threads(self%operator%threads)
+      do j = 1, self%grid%ny
+         total = 0.0_dp
+         cells = 0.0_dp
+         do k = 1, self%counts(j)
+            last = min(self%blocks(k, j) + width - 1, nx)
+            do i = self%blocks(k, j), last
+               if (pressure(i, j) > 0.0_dp .or. (gap(i, j) < level .and. self%step(i, j) > mean)) then
+                  self%step(i, j) = self%step(i, j) - mean
+                  total = total + self%step(i, j)
+                  cells = cells + 1.0_dp
+               else
+                  self%step(i, j) = huge(1.0_dp)
+               end if
+            end do
+         end do
+         self%rows(1, j) = total
+         self%rows(2, j) = cells
+      end do
+      mean = 0.0_dp
+      if (problem%control == control_pressure) &
+         mean = row_sum(self, 1)/max(row_sum(self, 2), 1.0_dp)
+
+      !$omp parallel do default(none) shared(self, nx, mean) private(i, j, k, last, total) &
+      !$omp num_threads(self%operator%threads)
+      do j = 1, self%grid%ny
+         total = 0.0_dp
+         do k = 1, self%counts(j)
+            last = min(self%blocks(k, j) + width - 1, nx)
+            do i = self%blocks(k, j), last
+               if (self%step(i, j) < huge(1.0_dp)) then
+                  self%step(i, j) = self%step(i, j) - mean
+                  total = total + self%residual(i, j)*self%step(i, j)
+               end if
+            end do
+         end do
+         self%rows(1, j) = total
+      end do
+      rz = row_sum(self, 1)
+   end subroutine precondition
+
+   !> direction = step + beta direction on S, zero elsewhere, without its mean; its product with the
+   !> residual, its square and its block means.
+   subroutine new_direction(self, problem, beta, rd, squares)
+      type(normal_solver_type), intent(inout) :: self
+      type(normal_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: beta
+      real(dp), intent(out) :: rd, squares
+      real(dp) :: mean, total, cells, product
+      integer :: i, j, k, last, nx
+
+      nx = self%grid%nx
+      !$omp parallel do default(none) shared(self, beta, nx) &
+      !$omp private(i, j, k, last, total, cells) num_threads(self%operator%threads)
+      do j = 1, self%grid%ny
+         total = 0.0_dp
+         cells = 0.0_dp
+         do k = 1, self%counts(j)
+            last = min(self%blocks(k, j) + width - 1, nx)
+            do i = self%blocks(k, j), last
+               if (self%step(i, j) < huge(1.0_dp)) then
+                  self%direction(i, j) = self%step(i, j) + beta*self%direction(i, j)
+                  total = total + self%direction(i, j)
+                  cells = cells + 1.0_dp
+               else
+                  self%direction(i, j) = 0.0_dp
+               end if
+            end do
+         end do
+         self%rows(1, j) = total
+         self%rows(2, j) = cells
+      end do
+      mean = 0.0_dp
+      if (problem%control == control_pressure) &
+         mean = row_sum(self, 1)/max(row_sum(self, 2), 1.0_dp)
+
+      !$omp parallel do default(none) shared(self, nx, mean) &
+      !$omp private(i, j, k, last, total, product) num_threads(self%operator%threads)
+      do j = 1, self%grid%ny
+         total = 0.0_dp
+         product = 0.0_dp
+         do k = 1, self%counts(j)
+            last = min(self%blocks(k, j) + width - 1, nx)
+            do i = self%blocks(k, j), last
+               if (self%step(i, j) < huge(1.0_dp)) &
+                  self%direction(i, j) = self%direction(i, j) - mean
+               product = product + self%residual(i, j)*self%direction(i, j)
+               total = total + self%direction(i, j)**2
+            end do
+         end do
+         self%rows(1, j) = product
+         self%rows(2, j) = total
+      end do
+      rd = row_sum(self, 1)
+      squares = row_sum(self, 2)
+      call restrict(self, self%direction)
+   end subroutine new_direction
+
+   !> step = (P + alpha direction, put back on what is allowed) - P; whether anything was clipped, the
+   !> slope of the energy along it, its square and block means, and the longest multiple allowed.
+   subroutine clipped_step(self, problem, alpha, pressure, gap, level, clipped, slope, squares, limit)
+      type(normal_solver_type), intent(inout) :: self
+      type(normal_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: alpha
+      real(dp), intent(in) :: pressure(:, :), gap(:, :)
+      real(dp), intent(in) :: level
+      logical, intent(out) :: clipped
+      real(dp), intent(out) :: slope, squares, limit
+      real(dp) :: shift, next, total, cells, trial, longest, product
+      integer :: i, j, k, last, nx
+
+      nx = self%grid%nx
+      shift = 0.0_dp
+      if (problem%control == control_pressure) then
+         do
+            !$omp parallel do default(none) shared(self, pressure, alpha, shift, nx) &
+            !$omp private(i, j, k, last, total, cells, trial, product) &
+            !$omp num_threads(self%operator%threads)
+            do j = 1, self%grid%ny
+               total = 0.0_dp
+               cells = 0.0_dp
+               product = 0.0_dp
+               do k = 1, self%counts(j)
+                  last = min(self%blocks(k, j) + width - 1, nx)
+                  do i = self%blocks(k, j), last
+                     trial = pressure(i, j) + alpha*self%direction(i, j)
+                     if (trial > shift) then
+                        total = total + trial
+                        cells = cells + 1.0_dp
+                     end if
+                     product = min(product, trial)
+                  end do
+               end do
+               self%rows(1, j) = total
+               self%rows(2, j) = cells
+               self%rows(3, j) = product
+            end do
+            if (shift == 0.0_dp) then
+               if (global_min(minval(self%rows(3, :))) == 0.0_dp) exit
+            end if
+            cells = row_sum(self, 2)
+            if (cells == 0.0_dp) exit
+            next = (row_sum(self, 1) - problem%target*nx*self%grid%ny)/cells
+            if (next <= shift) exit
+            shift = next
+         end do
+      end if
+
+      !$omp parallel do default(none) shared(self, pressure, gap, level, alpha, shift, nx) &
+      !$omp private(i, j, k, last, total, cells, trial, product, longest) &
+      !$omp num_threads(self%operator%threads)
+      do j = 1, self%grid%ny
+         product = 0.0_dp
+         total = 0.0_dp
+         cells = 0.0_dp
+         longest = huge(1.0_dp)
+         do k = 1, self%counts(j)
+            last = min(self%blocks(k, j) + width - 1, nx)
+            do i = self%blocks(k, j), last
+               trial = pressure(i, j) + alpha*self%direction(i, j) - shift
+               if (trial <= 0.0_dp) then
+                  if (trial < 0.0_dp .and. pressure(i, j) > 0.0_dp) cells = cells + 1.0_dp
+                  trial = 0.0_dp
+               end if
+               self%step(i, j) = trial - pressure(i, j)
+               product = product - (gap(i, j) - level)*self%step(i, j)
+               total = total + self%step(i, j)**2
+               if (self%step(i, j) < 0.0_dp) &
+                  longest = min(longest, -pressure(i, j)/self%step(i, j))
+            end do
+         end do
+         self%rows(1, j) = product
+         self%rows(2, j) = total
+         self%rows(3, j) = cells
+         self%rows(4, j) = longest
+      end do
+      slope = row_sum(self, 1)
+      squares = row_sum(self, 2)
+      clipped = row_sum(self, 3) > 0.0_dp
+      limit = global_min(minval(self%rows(4, :)))
+      call restrict(self, self%step)
+   end subroutine clipped_step
+
+   !> Transform the step and multiply by the operator; step.A step.
+   subroutine transform_step(self, form)
+      type(normal_solver_type), intent(inout) :: self
+      real(dp), intent(out) :: form
+      integer :: j
+
+      !$omp parallel do default(none) shared(self) private(j) num_threads(self%operator%threads) &
+      !$omp schedule(dynamic, 8)
+      do j = 1, self%grid%ny
+         if (self%counts(j) == 0) then
+            call self%operator%forward_zero_row(1, j)
+         else
+            call self%operator%forward_row(1, j, self%step(:, j))
+         end if
+      end do
+      call self%operator%columns(columns_apply, form)
+   end subroutine transform_step
+
+   !> P = P + alpha step, gap = gap + factor A step, and the survey of the new state.
+   subroutine update(self, problem, factor, alpha, pressure, gap)
+      type(normal_solver_type), intent(inout) :: self
+      type(normal_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: factor, alpha
+      real(dp), intent(inout) :: pressure(:, :), gap(:, :)
+      integer :: i, j, k, last
+
+      !$omp parallel do default(none) shared(self, problem, factor, alpha, pressure, gap) &
+      !$omp private(i, j, k, last) num_threads(self%operator%threads)
+      do j = 1, self%grid%ny
+         call self%operator%add_backward_row(1, j, factor, gap(:, j))
+         do k = 1, self%counts(j)
+            last = min(self%blocks(k, j) + width - 1, self%grid%nx)
+            do i = self%blocks(k, j), last
+               ! Round-off may not leave a trace where the step empties a cell.
+               pressure(i, j) = max(pressure(i, j) + alpha*self%step(i, j), 0.0_dp)
+            end do
+         end do
+         call survey_row(self, problem, j, pressure(:, j), gap(:, j))
+      end do
+   end subroutine update
+
+   !> Subtract the level.
+   subroutine shift_gap(self, level, gap)
+      type(normal_solver_type), intent(in) :: self
+      real(dp), intent(in) :: level
+      real(dp), intent(inout) :: gap(:, :)
+      integer :: j
+
+      !$omp parallel do default(none) shared(self, gap, level) private(j) &
+      !$omp num_threads(self%operator%threads)
+      do j = 1, self%grid%ny
+         gap(:, j) = gap(:, j) - level
+      end do
+   end subroutine shift_gap
+
+   !> Sum of the rows' partial sums, in order, so that the threads do not matter.
+   function row_sum(self, which) result(total)
+      type(normal_solver_type), intent(in) :: self
+      integer, intent(in) :: which
+      real(dp) :: total
+      integer :: j
+
+      total = 0.0_dp
+      do j = 1, self%grid%ny
+         total = total + self%rows(which, j)
+      end do
+      total = global_sum(total)
+   end function row_sum
+
+   !> Free plans and memory.
+   subroutine destroy(self)
+      class(normal_solver_type), intent(inout) :: self
+
+      call self%operator%destroy()
+      call self%coarse%destroy()
+   end subroutine destroy
+
+end module normal_cg

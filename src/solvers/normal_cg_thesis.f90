@@ -1,0 +1,161 @@
+!> Normal contact by the thesis's conjugate gradients (thesis, 2.1.2), so that its counts can be
+!> repeated: three transforms an iteration.
+!>
+!> The direction's quadratic form by Parseval (eq. 2.8) is the first, U = A P the other two. The
+!> pressure is clipped and rescaled to the load; the contact is where P > 0 or the surfaces overlap.
+!> The stopping criterion is that of module normal_cg.
+module normal_cg_thesis
+   use fft_conv, only : convolution_type
+   use normal_state, only : control_pressure, evaluate_gap, first_pressure, gap_measure_type, &
+      measure_gap, normal_problem_type
+   use parallel, only : global_sum
+   use precision, only : dp, int64
+   use regular_grid, only : grid_type
+   use solver_result, only : solver_result_type
+   implicit none
+   private
+
+   public :: solve_normal_thesis
+
+contains
+
+   !> Solve a contact problem; arguments as those of `normal_solver_type%solve`.
+   subroutine solve_normal_thesis(grid, operator, problem, height, pressure, gap, level, outcome, &
+      history)
+      type(grid_type), intent(in) :: grid
+      type(convolution_type), intent(inout) :: operator
+      type(normal_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: height(:, :)             !! H, [nx, ny], m
+      real(dp), intent(inout) :: pressure(:, :)        !! P, Pa
+      real(dp), intent(inout) :: gap(:, :)             !! U - H - level, m
+      real(dp), intent(out) :: level                   !! m
+      type(solver_result_type), intent(out) :: outcome
+      real(dp), intent(in), optional :: history(:, :)  !! P_h, Pa
+      type(gap_measure_type) :: measure
+      real(dp), allocatable :: residual(:, :), previous(:, :), direction(:, :)
+      real(dp) :: alpha, beta, form, slope, change
+      integer(int64) :: before
+
+      allocate (residual(grid%nx, grid%ny), previous(grid%nx, grid%ny), source=0.0_dp)
+      allocate (direction(grid%nx, grid%ny), source=0.0_dp)
+      before = operator%ffts
+      alpha = 0.0_dp
+      form = 0.0_dp
+      call first_pressure(problem, grid, operator, height, pressure, history)
+      outcome%reason = 'the limit of iterations was reached'
+      do
+         call evaluate_gap(problem, operator, height, pressure, gap, history)
+         measure = measure_gap(problem, pressure, gap, operator%threads)
+         if (measure%error <= problem%tolerance) then
+            outcome%converged = .true.
+            outcome%reason = 'converged'
+            exit
+         end if
+         if (outcome%iterations == problem%max_iterations) exit
+         outcome%iterations = outcome%iterations + 1
+
+         call new_residual(problem, measure%level, pressure, gap, residual, previous, slope, change)
+         beta = 0.0_dp
+         if (form > 0.0_dp) beta = max(change/(alpha*form), 0.0_dp)     ! eq. 2.7
+         call turn(beta, residual, direction, slope)
+         if (slope <= 0.0_dp) call turn(0.0_dp, residual, direction, slope)
+         call operator%quadratic_form(direction, form)
+         form = form/problem%modulus
+         if (slope <= 0.0_dp .or. form <= 0.0_dp) then
+            outcome%reason = 'no direction of descent is left'
+            exit
+         end if
+         alpha = slope/form                                              ! eq. 2.6
+         call move(problem, alpha, direction, pressure)
+      end do
+      level = measure%weighted_level
+      outcome%residual = measure%error
+      outcome%load_error = measure%load_error
+      outcome%ffts = operator%ffts - before
+      gap(:, :) = gap - level
+   end subroutine solve_normal_thesis
+
+   !> residual = H - U less its mean, on the contact; residual.(residual - previous).
+   subroutine new_residual(problem, level, pressure, gap, residual, previous, slope, change)
+      type(normal_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: level
+      real(dp), intent(in) :: pressure(:, :), gap(:, :)
+      real(dp), intent(inout) :: residual(:, :), previous(:, :)
+      real(dp), intent(out) :: slope, change
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: mean
+      integer :: i, j
+
+      allocate (rows(2, size(gap, 2)))
+      mean = level
+      if (problem%control == control_pressure) then
+         !$omp parallel do default(none) shared(pressure, gap, level, rows) private(j)
+         do j = 1, size(gap, 2)
+            rows(1, j) = sum(gap(:, j), pressure(:, j) > 0.0_dp .or. gap(:, j) < level)
+            rows(2, j) = count(pressure(:, j) > 0.0_dp .or. gap(:, j) < level)
+         end do
+         mean = global_sum(sum(rows(1, :)))/global_sum(sum(rows(2, :)))
+      end if
+      !$omp parallel do default(none) shared(pressure, gap, level, mean, residual, previous, rows) &
+      !$omp private(i, j)
+      do j = 1, size(gap, 2)
+         rows(:, j) = 0.0_dp
+         do i = 1, size(gap, 1)
+            previous(i, j) = residual(i, j)
+            residual(i, j) = merge(mean - gap(i, j), 0.0_dp, &
+               pressure(i, j) > 0.0_dp .or. gap(i, j) < level)
+            rows(1, j) = rows(1, j) + residual(i, j)**2
+            rows(2, j) = rows(2, j) + residual(i, j)*(residual(i, j) - previous(i, j))
+         end do
+      end do
+      slope = global_sum(sum(rows(1, :)))
+      change = global_sum(sum(rows(2, :)))
+   end subroutine new_residual
+
+   !> direction = residual + beta direction on the contact; its product with the residual.
+   subroutine turn(beta, residual, direction, slope)
+      real(dp), intent(in) :: beta
+      real(dp), intent(in) :: residual(:, :)
+      real(dp), intent(inout) :: direction(:, :)
+      real(dp), intent(out) :: slope
+      real(dp), allocatable :: rows(:)
+      integer :: i, j
+
+      allocate (rows(size(residual, 2)))
+      !$omp parallel do default(none) shared(beta, residual, direction, rows) private(i, j)
+      do j = 1, size(residual, 2)
+         rows(j) = 0.0_dp
+         do i = 1, size(residual, 1)
+            direction(i, j) = merge(residual(i, j) + beta*direction(i, j), 0.0_dp, &
+               abs(residual(i, j)) > 0.0_dp)
+            rows(j) = rows(j) + residual(i, j)*direction(i, j)
+         end do
+      end do
+      slope = global_sum(sum(rows))
+   end subroutine turn
+
+   !> P = P + alpha direction, clipped, and rescaled where the load is prescribed.
+   subroutine move(problem, alpha, direction, pressure)
+      type(normal_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: alpha
+      real(dp), intent(in) :: direction(:, :)
+      real(dp), intent(inout) :: pressure(:, :)
+      real(dp), allocatable :: rows(:)
+      real(dp) :: factor
+      integer :: j
+
+      allocate (rows(size(pressure, 2)))
+      !$omp parallel do default(none) shared(alpha, direction, pressure, rows) private(j)
+      do j = 1, size(pressure, 2)
+         pressure(:, j) = max(pressure(:, j) + alpha*direction(:, j), 0.0_dp)
+         rows(j) = sum(pressure(:, j))
+      end do
+      if (problem%control /= control_pressure) return
+      factor = problem%target*size(pressure)/global_sum(sum(rows))
+      !$omp parallel do default(none) shared(pressure, factor) private(j)
+      do j = 1, size(pressure, 2)
+         pressure(:, j) = factor*pressure(:, j)
+      end do
+   end subroutine move
+
+end module normal_cg_thesis

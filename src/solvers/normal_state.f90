@@ -1,0 +1,212 @@
+!> What the methods for normal contact share: the problem, the start, the gap, the measure of error.
+module normal_state
+   use fft_conv, only : columns_apply, convolution_type
+   use parallel, only : global_max, global_min, global_sum
+   use precision, only : dp, pi
+   use projection, only : project_simplex
+   use regular_grid, only : boundary_periodic, grid_type
+   implicit none
+   private
+
+   public :: combine_measures, evaluate_gap, first_pressure, gap_measure_type, measure_gap, &
+      normal_problem_type, row_measure, rms_about_mean
+
+   integer, parameter, public :: control_pressure = 1   !! the mean pressure is prescribed
+   integer, parameter, public :: control_approach = 2   !! U - H where the gap is zero is prescribed
+
+   !> A normal contact problem but for its fields.
+   type :: normal_problem_type
+      real(dp) :: modulus = 1.0_dp          !! shear modulus of the step (Q of module zener), Pa
+      integer :: control = control_pressure
+      real(dp) :: target = 0.0_dp           !! mean pressure, Pa, or the level U - H, m
+      real(dp) :: tolerance = 1e-6_dp       !! of the duality gap and of the load
+      integer :: max_iterations = 1000
+      logical :: warm = .false.             !! the pressure handed in is a start
+      real(dp) :: rms_height = 0.0_dp       !! of H about its mean, m
+   end type normal_problem_type
+
+   !> How far a state is from the solution.
+   type :: gap_measure_type
+      real(dp) :: level = 0.0_dp            !! mean of U - H over P > 0, or the prescribed one, m
+      real(dp) :: weighted_level = 0.0_dp   !! mean of U - H weighted by P, or the prescribed one, m
+      real(dp) :: load = 0.0_dp             !! sum of P over the cells, Pa
+      real(dp) :: load_error = 0.0_dp       !! relative
+      real(dp) :: error = 0.0_dp            !! the larger of the duality gap and the load error
+   end type gap_measure_type
+
+contains
+
+   !> Sums over a row: P, P g, g where P > 0, the number of those, P |g - level|, and the least g.
+   pure function row_measure(pressure, gap, level) result(sums)
+      real(dp), intent(in) :: pressure(:), gap(:)
+      real(dp), intent(in) :: level
+      real(dp) :: sums(6)
+      real(dp) :: load, work, touched, cells, distance, least
+      integer :: i
+
+      load = 0.0_dp
+      work = 0.0_dp
+      touched = 0.0_dp
+      cells = 0.0_dp
+      distance = 0.0_dp
+      least = huge(1.0_dp)
+      do i = 1, size(pressure)
+         least = min(least, gap(i))
+         load = load + pressure(i)
+         work = work + pressure(i)*gap(i)
+         distance = distance + pressure(i)*abs(gap(i) - level)
+         touched = touched + merge(gap(i), 0.0_dp, pressure(i) > 0.0_dp)
+         cells = cells + merge(1.0_dp, 0.0_dp, pressure(i) > 0.0_dp)
+      end do
+      sums = [load, work, touched, cells, distance, least]
+   end function row_measure
+
+   !> The measure of a state from the sums of its rows.
+   function combine_measures(problem, cells, rows) result(measure)
+      type(normal_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: cells                !! number of cells of the whole grid
+      real(dp), intent(in) :: rows(:, :)           !! [6, ny], from `row_measure`
+      type(gap_measure_type) :: measure
+      real(dp) :: sums(5), least, height
+      integer :: j
+
+      sums = 0.0_dp
+      do j = 1, size(rows, 2)
+         sums = sums + rows(1:5, j)
+      end do
+      sums = global_sum(sums)
+      least = global_min(minval(rows(6, :)))
+      height = max(problem%rms_height, tiny(1.0_dp))
+      measure%load = sums(1)
+      if (problem%control == control_approach) then
+         measure%level = problem%target
+         measure%weighted_level = problem%target
+         measure%error = max(measure%level - least, 0.0_dp)/height
+         if (sums(1) > 0.0_dp) measure%error = max(measure%error, sums(5)/sums(1)/height)
+      else if (sums(1) > 0.0_dp) then
+         measure%level = sums(3)/sums(4)
+         measure%weighted_level = sums(2)/sums(1)
+         measure%load_error = abs(sums(1)/(cells*problem%target) - 1.0_dp)
+         measure%error = max((measure%weighted_level - least)/height, measure%load_error)
+      else
+         measure%level = least
+         measure%weighted_level = least
+      end if
+   end function combine_measures
+
+   !> The measure of a state.
+   function measure_gap(problem, pressure, gap, threads) result(measure)
+      type(normal_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: pressure(:, :), gap(:, :)
+      integer, intent(in) :: threads
+      type(gap_measure_type) :: measure
+      real(dp), allocatable :: rows(:, :)
+      integer :: j
+
+      allocate (rows(6, size(gap, 2)))
+      !$omp parallel do default(none) shared(problem, pressure, gap, rows) private(j) &
+      !$omp num_threads(threads)
+      do j = 1, size(gap, 2)
+         rows(:, j) = row_measure(pressure(:, j), gap(:, j), problem%target)
+      end do
+      measure = combine_measures(problem, real(size(gap), dp), rows)
+   end function measure_gap
+
+   !> gap = A(P + P_h)/modulus - H.
+   subroutine evaluate_gap(problem, operator, height, pressure, gap, history)
+      type(normal_problem_type), intent(in) :: problem
+      type(convolution_type), intent(inout) :: operator
+      real(dp), intent(in) :: height(:, :), pressure(:, :)
+      real(dp), intent(inout) :: gap(:, :)
+      real(dp), intent(in), optional :: history(:, :)
+      real(dp) :: form
+      logical :: remembers
+      integer :: j
+
+      remembers = present(history)
+      !$omp parallel do default(none) shared(operator, pressure, history, remembers) private(j) &
+      !$omp num_threads(operator%threads)
+      do j = 1, operator%ny
+         if (remembers) then
+            call operator%forward_row(1, j, pressure(:, j) + history(:, j))
+         else
+            call operator%forward_row(1, j, pressure(:, j))
+         end if
+      end do
+      call operator%columns(columns_apply, form)
+      !$omp parallel do default(none) shared(operator, height, gap, problem) private(j) &
+      !$omp num_threads(operator%threads)
+      do j = 1, operator%ny
+         gap(:, j) = -height(:, j)
+         call operator%add_backward_row(1, j, 1.0_dp/problem%modulus, gap(:, j))
+      end do
+   end subroutine evaluate_gap
+
+   !> The start: the pressure handed in, or that of full contact (Westergaard) in periodic mode and a
+   !> cap of the height in free mode, put on what is allowed.
+   subroutine first_pressure(problem, grid, operator, height, pressure, history)
+      type(normal_problem_type), intent(in) :: problem
+      type(grid_type), intent(in) :: grid
+      type(convolution_type), intent(inout) :: operator
+      real(dp), intent(in) :: height(:, :)
+      real(dp), intent(inout) :: pressure(:, :)
+      real(dp), intent(in), optional :: history(:, :)
+      real(dp) :: factor, base
+      logical :: warm
+      integer :: j
+
+      warm = problem%warm
+      if (warm) warm = global_max(maxval(pressure)) > 0.0_dp
+      base = 0.0_dp
+      if (.not. warm) then
+         if (grid%boundary == boundary_periodic) then
+            call operator%apply_inverse(height, pressure)
+            factor = problem%modulus
+            if (problem%control == control_pressure) base = problem%target
+         else
+            factor = 2.0_dp*pi*problem%modulus/max(grid%lx, grid%ly)
+            pressure(:, :) = height
+            if (problem%control == control_approach) base = factor*problem%target
+         end if
+         !$omp parallel do default(none) shared(pressure, factor, base, operator) private(j) &
+         !$omp num_threads(operator%threads)
+         do j = 1, operator%ny
+            pressure(:, j) = base + factor*pressure(:, j)
+         end do
+         if (present(history)) pressure(:, :) = pressure - history
+      end if
+      if (problem%control == control_pressure) then
+         call project_simplex(pressure, problem%target*grid%nx*grid%ny)
+      else
+         !$omp parallel do default(none) shared(pressure, operator) private(j) &
+         !$omp num_threads(operator%threads)
+         do j = 1, operator%ny
+            pressure(:, j) = max(pressure(:, j), 0.0_dp)
+         end do
+      end if
+   end subroutine first_pressure
+
+   !> Root mean square of a field about its mean.
+   function rms_about_mean(field, threads) result(rms)
+      real(dp), intent(in) :: field(:, :)
+      integer, intent(in) :: threads
+      real(dp) :: rms
+      real(dp), allocatable :: rows(:)
+      real(dp) :: mean, cells
+      integer :: j
+
+      cells = global_sum(real(size(field), dp))
+      allocate (rows(size(field, 2)))
+      !$omp parallel do default(none) shared(field, rows) private(j) num_threads(threads)
+      do j = 1, size(field, 2)
+         rows(j) = sum(field(:, j))
+      end do
+      mean = global_sum(sum(rows))/cells
+      !$omp parallel do default(none) shared(field, rows, mean) private(j) num_threads(threads)
+      do j = 1, size(field, 2)
+         rows(j) = sum((field(:, j) - mean)**2)
+      end do
+      rms = sqrt(global_sum(sum(rows))/cells)
+   end function rms_about_mean
+
+end module normal_state
