@@ -11,6 +11,7 @@ program main
    use test_surface, only : run_surface
    use test_viscoelastic_energy, only : run_viscoelastic_energy
    use test_zener, only : run_zener
+   use test_normal_cg, only : run_normal_cg
    implicit none
 
    if (wanted('base')) call run_base()
@@ -23,6 +24,7 @@ program main
    if (wanted('interpolation')) call run_interpolation()
    if (wanted('zener')) call run_zener()
    if (wanted('viscoelastic_energy')) call run_viscoelastic_energy()
+   if (wanted('normal_cg')) call run_normal_cg()
    call finish()
 
 contains

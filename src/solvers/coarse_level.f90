@@ -28,13 +28,17 @@ module coarse_level
       real(dp) :: cells = 1.0_dp                   !! cells of a block, on average
       real(dp) :: wx = 0.0_dp, wy = 0.0_dp         !! weights of the stencil along x and y
       integer, allocatable :: block_x(:)           !! block of a cell along x, [nx of the grid]
+      integer, allocatable :: last_x(:)            !! last cell of a block along x, [nx]
       integer, allocatable :: first_y(:)           !! first row of a block, [ny + 1]
       real(dp), allocatable :: mean(:, :)          !! block means, [nx, ny]
+      real(dp), allocatable :: share(:, :)         !! part of a block that takes part, [nx, ny]
       real(dp), allocatable :: correction(:, :)    !! of the preconditioner, [nx, ny]
       real(dp), private :: fine_symbol = 0.0_dp    !! of A at the size of a block
       type(convolution_type), private :: normal
       type(convolution_type), private :: missing
    contains
+      procedure :: add_means
+      procedure :: add_shares
       procedure :: precondition
       procedure :: predict_form
       procedure :: transforms
@@ -62,14 +66,16 @@ contains
       self%wy = merge(0.0_dp, stencil_c1*(h/grid%dy)**2, grid%ny == 1)
       self%fine_symbol = (1.0_dp - poisson)*ratio*h/(2.0_dp*pi)
 
-      allocate (self%block_x(grid%nx), self%first_y(self%ny + 1))
+      allocate (self%block_x(grid%nx), self%last_x(self%nx), self%first_y(self%ny + 1))
       do i = 1, grid%nx
          self%block_x(i) = int(int(i - 1, kind=8)*self%nx/grid%nx) + 1
+         self%last_x(self%block_x(i)) = i
       end do
       do j = 1, self%ny + 1
          self%first_y(j) = int((int(j - 1, kind=8)*grid%ny + self%ny - 1)/self%ny) + 1
       end do
-      allocate (self%mean(self%nx, self%ny), self%correction(self%nx, self%ny))
+      allocate (self%mean(self%nx, self%ny), self%share(self%nx, self%ny))
+      allocate (self%correction(self%nx, self%ny))
 
       blocks = new_grid(self%nx, self%ny, grid%lx, grid%ly, grid%boundary)
       call new_normal_operator(self%normal, blocks, poisson, error)
@@ -99,6 +105,47 @@ contains
       end function stencil
 
    end subroutine new_coarse_level
+
+   !> Add cells of a row to the block means.
+   pure subroutine add_means(self, block_y, first, cells)
+      class(coarse_level_type), intent(inout) :: self
+      integer, intent(in) :: block_y           !! block of the row along y
+      integer, intent(in) :: first             !! first of the cells
+      real(dp), intent(in) :: cells(:)
+
+      call add_blocks(self, first, cells, self%mean(:, block_y))
+   end subroutine add_means
+
+   !> Add cells of a row, 1 where they take part, to the shares.
+   pure subroutine add_shares(self, block_y, first, cells)
+      class(coarse_level_type), intent(inout) :: self
+      integer, intent(in) :: block_y
+      integer, intent(in) :: first
+      real(dp), intent(in) :: cells(:)
+
+      call add_blocks(self, first, cells, self%share(:, block_y))
+   end subroutine add_shares
+
+   !> Add cells of a row to the blocks that hold them, divided by the mean number of cells.
+   pure subroutine add_blocks(self, first, cells, blocks)
+      type(coarse_level_type), intent(in) :: self
+      integer, intent(in) :: first
+      real(dp), intent(in) :: cells(:)
+      real(dp), intent(inout) :: blocks(:)
+      integer :: i, k, last, b
+      real(dp) :: total
+
+      i = 1
+      do b = self%block_x(first), self%block_x(first + size(cells) - 1)
+         last = min(self%last_x(b) - first + 1, size(cells))
+         total = 0.0_dp
+         do k = i, last
+            total = total + cells(k)
+         end do
+         blocks(b) = blocks(b) + total/self%cells
+         i = last + 1
+      end do
+   end subroutine add_blocks
 
    !> From the block means of a residual: `correction`, to be added to the stencil's result.
    subroutine precondition(self)

@@ -24,7 +24,7 @@ module normal_cg
       gap_measure_type, normal_problem_type, row_measure
    use parallel, only : global_min, global_sum
    use precision, only : dp, int64
-   use regular_grid, only : grid_type
+   use regular_grid, only : boundary_periodic, grid_type
    use solver_result, only : solver_result_type
    implicit none
    private
@@ -45,8 +45,9 @@ module normal_cg
       real(dp), allocatable, private :: least(:, :)       !! least gap of each block
       logical, allocatable, private :: loaded(:, :)       !! blocks that hold P > 0
       logical, allocatable, private :: live(:, :)         !! active blocks
-      integer, allocatable, private :: blocks(:, :)       !! first cells of a row's active blocks
-      integer, allocatable, private :: counts(:)          !! number of a row's active blocks
+      integer, allocatable, private :: first(:, :)        !! first cells of a row's active runs
+      integer, allocatable, private :: last(:, :)         !! their last cells
+      integer, allocatable, private :: runs(:)            !! number of a row's active runs
       real(dp), allocatable, private :: rows(:, :)        !! partial sums of each row
    contains
       procedure :: solve
@@ -73,7 +74,7 @@ contains
       allocate (self%direction(grid%nx, grid%ny), self%step(grid%nx, grid%ny), source=0.0_dp)
       allocate (self%least(nb, grid%ny), self%loaded(nb, grid%ny))
       allocate (self%live(nb, grid%ny), source=.false.)
-      allocate (self%blocks(nb, grid%ny), self%counts(grid%ny))
+      allocate (self%first(nb, grid%ny), self%last(nb, grid%ny), self%runs(grid%ny))
       allocate (self%rows(6, grid%ny))
    end subroutine new_normal_solver
 
@@ -91,7 +92,7 @@ contains
       real(dp), intent(in), optional :: history(:, :)  !! P_h, Pa
       type(gap_measure_type) :: measure
       real(dp) :: scale, old, rz, rd, kappa, squares, alpha, form, trial
-      real(dp) :: best, limit, cells
+      real(dp) :: best, limit, cells, mean, offset, beta
       logical :: fresh, restart, clipped
       integer :: age
       integer(int64) :: before
@@ -132,13 +133,11 @@ contains
          outcome%iterations = outcome%iterations + 1
 
          call form_residual(self, problem, measure%level, pressure, gap)
-         call precondition(self, problem, measure%level, pressure, gap, rz)
-         if (restart .or. old <= 0.0_dp) then
-            call new_direction(self, problem, 0.0_dp, rd, squares)
-         else
-            call new_direction(self, problem, rz/old, rd, squares)
-            if (rd <= 0.0_dp) call new_direction(self, problem, 0.0_dp, rd, squares)
-         end if
+         call precondition(self, problem, pressure, mean, rz)
+         beta = 0.0_dp
+         if (.not. restart .and. old > 0.0_dp) beta = rz/old
+         call new_direction(self, problem, mean, beta, offset, rd, squares)
+         if (rd <= 0.0_dp) call new_direction(self, problem, mean, 0.0_dp, offset, rd, squares)
          old = rz
          restart = .false.
          if (rd <= 0.0_dp) then
@@ -147,7 +146,8 @@ contains
          end if
          trial = scale*self%coarse%predict_form(squares)
          alpha = rd/max(kappa*trial, tiny(1.0_dp))
-         call clipped_step(self, problem, alpha, pressure, gap, measure%level, clipped, rd, squares, limit)
+         call clipped_step(self, problem, alpha, offset, pressure, gap, measure%level, clipped, rd, &
+            squares, limit)
          if (rd <= 0.0_dp) then
             ! The projection bent the step too far: once more from the steepest descent.
             if (kappa > 1e6_dp) then
@@ -218,31 +218,38 @@ contains
       self%rows(:, j) = row_measure(pressure, gap, problem%target)
    end subroutine survey_row
 
-   !> List the blocks that hold a cell with P > 0 or a gap below the level; clear those that left.
+   !> List the runs of blocks that hold a cell with P > 0 or a gap below the level; clear those that
+   !> left.
    subroutine activate(self, level)
       type(normal_solver_type), intent(inout) :: self
       real(dp), intent(in) :: level
-      integer :: b, j, first, last
-      logical :: now
+      integer :: b, j, first, last, n
+      logical :: now, before
 
-      !$omp parallel do default(none) shared(self, level) private(b, j, first, last, now) &
+      !$omp parallel do default(none) shared(self, level) private(b, j, first, last, n, now, before) &
       !$omp num_threads(self%operator%threads)
       do j = 1, self%grid%ny
-         self%counts(j) = 0
+         n = 0
+         before = .false.
          do b = 1, size(self%least, 1)
             now = self%loaded(b, j) .or. self%least(b, j) < level
             first = (b - 1)*width + 1
+            last = min(b*width, self%grid%nx)
             if (now) then
-               self%counts(j) = self%counts(j) + 1
-               self%blocks(self%counts(j), j) = first
+               if (.not. before) then
+                  n = n + 1
+                  self%first(n, j) = first
+               end if
+               self%last(n, j) = last
             else if (self%live(b, j)) then
-               last = min(b*width, self%grid%nx)
                self%residual(first:last, j) = 0.0_dp
                self%direction(first:last, j) = 0.0_dp
                self%step(first:last, j) = 0.0_dp
             end if
             self%live(b, j) = now
+            before = now
          end do
+         self%runs(j) = n
       end do
    end subroutine activate
 
@@ -253,24 +260,22 @@ contains
       real(dp), intent(in) :: level
       real(dp), intent(in) :: pressure(:, :), gap(:, :)
       real(dp) :: mean, total, cells
-      integer :: i, j, k, last, nx, ny
+      integer :: i, j, k, jb
 
-      nx = self%grid%nx
-      ny = self%grid%ny
       mean = level
       if (problem%control == control_pressure) then
-         !$omp parallel do default(none) shared(self, pressure, gap, level, nx, ny) &
-         !$omp private(i, j, k, last, total, cells) num_threads(self%operator%threads)
-         do j = 1, ny
+         !$omp parallel do default(none) shared(self, pressure, gap, level) &
+         !$omp private(i, j, k, total, cells) num_threads(self%operator%threads)
+         do j = 1, self%grid%ny
             total = 0.0_dp
             cells = 0.0_dp
-            do k = 1, self%counts(j)
-               last = min(self%blocks(k, j) + width - 1, nx)
-               do i = self%blocks(k, j), last
-                  if (pressure(i, j) > 0.0_dp .or. gap(i, j) < level) then
-                     total = total + gap(i, j)
-                     cells = cells + 1.0_dp
-                  end if
+            do k = 1, self%runs(j)
+               !$omp simd reduction(+:total, cells)
+               do i = self%first(k, j), self%last(k, j)
+                  total = total + merge(gap(i, j), 0.0_dp, &
+                     pressure(i, j) > 0.0_dp .or. gap(i, j) < level)
+                  cells = cells + merge(1.0_dp, 0.0_dp, &
+                     pressure(i, j) > 0.0_dp .or. gap(i, j) < level)
                end do
             end do
             self%rows(1, j) = total
@@ -278,24 +283,27 @@ contains
          end do
          mean = row_sum(self, 1)/max(row_sum(self, 2), 1.0_dp)
       end if
-      !$omp parallel do default(none) shared(self, pressure, gap, level, mean, nx, ny) &
-      !$omp private(i, j, k, last) num_threads(self%operator%threads)
-      do j = 1, ny
-         do k = 1, self%counts(j)
-            last = min(self%blocks(k, j) + width - 1, nx)
-            do i = self%blocks(k, j), last
-               self%residual(i, j) = merge(mean - gap(i, j), 0.0_dp, &
-                  pressure(i, j) > 0.0_dp .or. gap(i, j) < level)
+      !$omp parallel do default(none) shared(self, pressure, gap, level, mean) &
+      !$omp private(i, j, k, jb) num_threads(self%operator%threads)
+      do jb = 1, self%coarse%ny
+         self%coarse%mean(:, jb) = 0.0_dp
+         do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
+            do k = 1, self%runs(j)
+               !$omp simd
+               do i = self%first(k, j), self%last(k, j)
+                  self%residual(i, j) = merge(mean - gap(i, j), 0.0_dp, &
+                     pressure(i, j) > 0.0_dp .or. gap(i, j) < level)
+               end do
+               call self%coarse%add_means(jb, self%first(k, j), &
+                  self%residual(self%first(k, j):self%last(k, j), j))
             end do
          end do
       end do
       call fill_rim(self)
-      call restrict(self, self%residual(1:nx, 1:ny))
    end subroutine form_residual
 
    !> The rim of the residual: the other side's values where periodic, zero where free.
    subroutine fill_rim(self)
-      use regular_grid, only : boundary_periodic
       type(normal_solver_type), intent(inout) :: self
       integer :: nx, ny
 
@@ -308,258 +316,224 @@ contains
       self%residual(1:nx, ny + 1) = self%residual(1:nx, 1)
    end subroutine fill_rim
 
-   !> Block means of a field that is zero off the active blocks.
-   subroutine restrict(self, field)
-      type(normal_solver_type), intent(inout) :: self
-      real(dp), intent(in) :: field(:, :)
-      integer :: i, j, k, last, jb
-
-      !$omp parallel do default(none) shared(self, field) private(i, j, k, last, jb) &
-      !$omp num_threads(self%operator%threads)
-      do jb = 1, self%coarse%ny
-         self%coarse%mean(:, jb) = 0.0_dp
-         do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
-            do k = 1, self%counts(j)
-               last = min(self%blocks(k, j) + width - 1, self%grid%nx)
-               do i = self%blocks(k, j), last
-                  associate (ib => self%coarse%block_x(i))
-                     self%coarse%mean(ib, jb) = self%coarse%mean(ib, jb) + field(i, j)
-                  end associate
-               end do
-            end do
-         end do
-         self%coarse%mean(:, jb) = self%coarse%mean(:, jb)/self%coarse%cells
-      end do
-   end subroutine restrict
-
-   !> step = M residual on S, without its mean, without empty cells that it would empty further;
-   !> the product with the residual.
-   subroutine precondition(self, problem, level, pressure, gap, rz)
+   !> step = M residual on S, without its mean, without empty cells that it would empty further
+   !> (they hold `huge`); the mean still to be taken off, and the product with the residual.
+   subroutine precondition(self, problem, pressure, mean, rz)
       type(normal_solver_type), intent(inout) :: self
       type(normal_problem_type), intent(in) :: problem
-      real(dp), intent(in) :: level
-      real(dp), intent(in) :: pressure(:, :), gap(:, :)
-      real(dp), intent(out) :: rz
-      real(dp) :: mean, total, cells, wx, wy, centre
-      integer :: i, j, k, last, jb, nx
+      real(dp), intent(in) :: pressure(:, :)
+      real(dp), intent(out) :: mean, rz
+      real(dp), allocatable :: correction(:)
+      real(dp) :: total, cells, product, residuals, wx, wy, centre
+      integer :: i, j, k, jb
 
-      nx = self%grid%nx
       wx = self%coarse%wx
       wy = self%coarse%wy
       centre = stencil_c0 + 2.0_dp*(wx + wy)
       call self%coarse%precondition()
-      !$omp parallel do default(none) shared(self, pressure, gap, level, nx, wx, wy, centre) &
-      !$omp private(i, j, k, last, jb, total, cells) num_threads(self%operator%threads)
+      !$omp parallel default(none) shared(self, wx, wy, centre) &
+      !$omp private(i, j, k, jb, total, cells, correction) num_threads(self%operator%threads)
+      allocate (correction(self%grid%nx))
+      !$omp do
       do jb = 1, self%coarse%ny
+         correction(:) = self%coarse%correction(self%coarse%block_x, jb)
          do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
             total = 0.0_dp
             cells = 0.0_dp
-            do k = 1, self%counts(j)
-               last = min(self%blocks(k, j) + width - 1, nx)
-               do i = self%blocks(k, j), last
-                  if (pressure(i, j) > 0.0_dp .or. gap(i, j) < level) then
-                     self%step(i, j) = centre*self%residual(i, j) &
-                        - wx*(self%residual(i - 1, j) + self%residual(i + 1, j)) &
-                        - wy*(self%residual(i, j - 1) + self%residual(i, j + 1)) &
-                        + self%coarse%correction(self%coarse%block_x(i), jb)
-                     total = total + self%step(i, j)
-                     cells = cells + 1.0_dp
-                  else
-                     self%step(i, j) = 0.0_dp
-                  end if
+            do k = 1, self%runs(j)
+               !$omp simd reduction(+:total, cells)
+               do i = self%first(k, j), self%last(k, j)
+                  self%step(i, j) = merge(centre*self%residual(i, j) &
+                     - wx*(self%residual(i - 1, j) + self%residual(i + 1, j)) &
+                     - wy*(self%residual(i, j - 1) + self%residual(i, j + 1)) &
+                     + correction(i), 0.0_dp, abs(self%residual(i, j)) > 0.0_dp)
+                  total = total + self%step(i, j)
+                  cells = cells + merge(1.0_dp, 0.0_dp, abs(self%residual(i, j)) > 0.0_dp)
                end do
             end do
             self%rows(1, j) = total
             self%rows(2, j) = cells
          end do
       end do
+      !$omp end parallel
       mean = 0.0_dp
       if (problem%control == control_pressure) &
          mean = row_sum(self, 1)/max(row_sum(self, 2), 1.0_dp)
 
-      ! Off S the residual is made to flag a dropped cell: huge is never a residual.
-      !$omp parallel do default(none) shared(self, pressure, gap, level, nx, mean) &
-      !$omp private(i, j, k, last, total, cells) num_threads(self%operator%threads)
+      !$omp parallel do default(none) shared(self, pressure, mean) &
+      !$omp private(i, j, k, total, cells, product, residuals) num_threads(self%operator%threads)
       do j = 1, self%grid%ny
          total = 0.0_dp
          cells = 0.0_dp
-         do k = 1, self%counts(j)
-            last = min(self%blocks(k, j) + width - 1, nx)
-            do i = self%blocks(k, j), last
-               if (pressure(i, j) > 0.0_dp .or. (gap(i, j) < level .and. self%step(i, j) > mean)) then
-                  self%step(i, j) = self%step(i, j) - mean
+         product = 0.0_dp
+         residuals = 0.0_dp
+         do k = 1, self%runs(j)
+            !$omp simd reduction(+:total, cells, product, residuals)
+            do i = self%first(k, j), self%last(k, j)
+               if (abs(self%residual(i, j)) > 0.0_dp .and. &
+                  (pressure(i, j) > 0.0_dp .or. self%step(i, j) > mean)) then
                   total = total + self%step(i, j)
                   cells = cells + 1.0_dp
+                  product = product + self%residual(i, j)*self%step(i, j)
+                  residuals = residuals + self%residual(i, j)
                else
                   self%step(i, j) = huge(1.0_dp)
                end if
             end do
          end do
-         self%rows(1, j) = total
-         self%rows(2, j) = cells
+         self%rows(1:4, j) = [total, cells, product, residuals]
       end do
       mean = 0.0_dp
       if (problem%control == control_pressure) &
          mean = row_sum(self, 1)/max(row_sum(self, 2), 1.0_dp)
-
-      !$omp parallel do default(none) shared(self, nx, mean) private(i, j, k, last, total) &
-      !$omp num_threads(self%operator%threads)
-      do j = 1, self%grid%ny
-         total = 0.0_dp
-         do k = 1, self%counts(j)
-            last = min(self%blocks(k, j) + width - 1, nx)
-            do i = self%blocks(k, j), last
-               if (self%step(i, j) < huge(1.0_dp)) then
-                  self%step(i, j) = self%step(i, j) - mean
-                  total = total + self%residual(i, j)*self%step(i, j)
-               end if
-            end do
-         end do
-         self%rows(1, j) = total
-      end do
-      rz = row_sum(self, 1)
+      rz = row_sum(self, 3) - mean*row_sum(self, 4)
    end subroutine precondition
 
-   !> direction = step + beta direction on S, zero elsewhere, without its mean; its product with the
-   !> residual, its square and its block means.
-   subroutine new_direction(self, problem, beta, rd, squares)
+   !> direction = step - mean + beta direction on S, zero elsewhere; `offset` is the mean that the next
+   !> pass takes off it. Without that mean: its product with the residual, its square, its block means.
+   subroutine new_direction(self, problem, mean, beta, offset, rd, squares)
       type(normal_solver_type), intent(inout) :: self
       type(normal_problem_type), intent(in) :: problem
-      real(dp), intent(in) :: beta
-      real(dp), intent(out) :: rd, squares
-      real(dp) :: mean, total, cells, product
-      integer :: i, j, k, last, nx
+      real(dp), intent(in) :: mean, beta
+      real(dp), intent(out) :: offset, rd, squares
+      real(dp), allocatable :: inside(:)
+      real(dp) :: total, cells, product, residuals, square
+      integer :: i, j, k, jb
 
-      nx = self%grid%nx
-      !$omp parallel do default(none) shared(self, beta, nx) &
-      !$omp private(i, j, k, last, total, cells) num_threads(self%operator%threads)
-      do j = 1, self%grid%ny
-         total = 0.0_dp
-         cells = 0.0_dp
-         do k = 1, self%counts(j)
-            last = min(self%blocks(k, j) + width - 1, nx)
-            do i = self%blocks(k, j), last
-               if (self%step(i, j) < huge(1.0_dp)) then
-                  self%direction(i, j) = self%step(i, j) + beta*self%direction(i, j)
+      !$omp parallel default(none) shared(self, mean, beta) &
+      !$omp private(i, j, k, jb, total, cells, product, residuals, square, inside) &
+      !$omp num_threads(self%operator%threads)
+      allocate (inside(self%grid%nx))
+      !$omp do
+      do jb = 1, self%coarse%ny
+         self%coarse%mean(:, jb) = 0.0_dp
+         self%coarse%share(:, jb) = 0.0_dp
+         do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
+            total = 0.0_dp
+            cells = 0.0_dp
+            product = 0.0_dp
+            residuals = 0.0_dp
+            square = 0.0_dp
+            do k = 1, self%runs(j)
+               !$omp simd reduction(+:total, cells, product, residuals, square)
+               do i = self%first(k, j), self%last(k, j)
+                  inside(i) = merge(1.0_dp, 0.0_dp, self%step(i, j) < huge(1.0_dp))
+                  self%direction(i, j) = merge(self%step(i, j) - mean + beta*self%direction(i, j), &
+                     0.0_dp, self%step(i, j) < huge(1.0_dp))
                   total = total + self%direction(i, j)
-                  cells = cells + 1.0_dp
-               else
-                  self%direction(i, j) = 0.0_dp
-               end if
+                  cells = cells + inside(i)
+                  product = product + self%residual(i, j)*self%direction(i, j)
+                  residuals = residuals + self%residual(i, j)*inside(i)
+                  square = square + self%direction(i, j)**2
+               end do
+               call self%coarse%add_means(jb, self%first(k, j), &
+                  self%direction(self%first(k, j):self%last(k, j), j))
+               call self%coarse%add_shares(jb, self%first(k, j), &
+                  inside(self%first(k, j):self%last(k, j)))
             end do
+            self%rows(1:5, j) = [total, cells, product, residuals, square]
          end do
-         self%rows(1, j) = total
-         self%rows(2, j) = cells
       end do
-      mean = 0.0_dp
-      if (problem%control == control_pressure) &
-         mean = row_sum(self, 1)/max(row_sum(self, 2), 1.0_dp)
-
-      !$omp parallel do default(none) shared(self, nx, mean) &
-      !$omp private(i, j, k, last, total, product) num_threads(self%operator%threads)
-      do j = 1, self%grid%ny
-         total = 0.0_dp
-         product = 0.0_dp
-         do k = 1, self%counts(j)
-            last = min(self%blocks(k, j) + width - 1, nx)
-            do i = self%blocks(k, j), last
-               if (self%step(i, j) < huge(1.0_dp)) &
-                  self%direction(i, j) = self%direction(i, j) - mean
-               product = product + self%residual(i, j)*self%direction(i, j)
-               total = total + self%direction(i, j)**2
-            end do
-         end do
-         self%rows(1, j) = product
-         self%rows(2, j) = total
-      end do
-      rd = row_sum(self, 1)
-      squares = row_sum(self, 2)
-      call restrict(self, self%direction)
+      !$omp end parallel
+      offset = 0.0_dp
+      rd = row_sum(self, 3)
+      squares = row_sum(self, 5)
+      if (problem%control /= control_pressure) return
+      total = row_sum(self, 1)
+      cells = max(row_sum(self, 2), 1.0_dp)
+      offset = total/cells
+      rd = rd - offset*row_sum(self, 4)
+      squares = squares - offset*total
+      self%coarse%mean(:, :) = self%coarse%mean - offset*self%coarse%share
    end subroutine new_direction
 
    !> step = (P + alpha direction, put back on what is allowed) - P; whether anything was clipped, the
    !> slope of the energy along it, its square and block means, and the longest multiple allowed.
-   subroutine clipped_step(self, problem, alpha, pressure, gap, level, clipped, slope, squares, limit)
+   subroutine clipped_step(self, problem, alpha, offset, pressure, gap, level, clipped, slope, &
+      squares, limit)
       type(normal_solver_type), intent(inout) :: self
       type(normal_problem_type), intent(in) :: problem
       real(dp), intent(in) :: alpha
+      real(dp), intent(in) :: offset                 !! to be taken off the direction
       real(dp), intent(in) :: pressure(:, :), gap(:, :)
       real(dp), intent(in) :: level
       logical, intent(out) :: clipped
       real(dp), intent(out) :: slope, squares, limit
-      real(dp) :: shift, next, total, cells, trial, longest, product
-      integer :: i, j, k, last, nx
+      real(dp) :: shift, next, total, cells, trial, longest, product, lowest
+      integer :: i, j, k, jb
 
-      nx = self%grid%nx
+      !$omp parallel do default(none) shared(self, pressure, alpha, offset) &
+      !$omp private(i, j, k, total, cells, trial, lowest) num_threads(self%operator%threads)
+      do j = 1, self%grid%ny
+         total = 0.0_dp
+         cells = 0.0_dp
+         lowest = 0.0_dp
+         do k = 1, self%runs(j)
+            !$omp simd reduction(+:total, cells) reduction(min:lowest)
+            do i = self%first(k, j), self%last(k, j)
+               self%direction(i, j) = merge(self%direction(i, j) - offset, 0.0_dp, &
+                  self%step(i, j) < huge(1.0_dp))
+               trial = pressure(i, j) + alpha*self%direction(i, j)
+               self%step(i, j) = trial
+               total = total + max(trial, 0.0_dp)
+               cells = cells + merge(1.0_dp, 0.0_dp, trial > 0.0_dp)
+               lowest = min(lowest, trial)
+            end do
+         end do
+         self%rows(1:3, j) = [total, cells, lowest]
+      end do
+      clipped = global_min(minval(self%rows(3, :))) < 0.0_dp
       shift = 0.0_dp
-      if (problem%control == control_pressure) then
+      if (problem%control == control_pressure .and. clipped) then
          do
-            !$omp parallel do default(none) shared(self, pressure, alpha, shift, nx) &
-            !$omp private(i, j, k, last, total, cells, trial, product) &
+            cells = row_sum(self, 2)
+            if (cells == 0.0_dp) exit
+            next = (row_sum(self, 1) - problem%target*self%grid%nx*self%grid%ny)/cells
+            if (next <= shift) exit
+            shift = next
+            !$omp parallel do default(none) shared(self, shift) private(i, j, k, total, cells) &
             !$omp num_threads(self%operator%threads)
             do j = 1, self%grid%ny
                total = 0.0_dp
                cells = 0.0_dp
-               product = 0.0_dp
-               do k = 1, self%counts(j)
-                  last = min(self%blocks(k, j) + width - 1, nx)
-                  do i = self%blocks(k, j), last
-                     trial = pressure(i, j) + alpha*self%direction(i, j)
-                     if (trial > shift) then
-                        total = total + trial
-                        cells = cells + 1.0_dp
-                     end if
-                     product = min(product, trial)
+               do k = 1, self%runs(j)
+                  !$omp simd reduction(+:total, cells)
+                  do i = self%first(k, j), self%last(k, j)
+                     total = total + merge(self%step(i, j), 0.0_dp, self%step(i, j) > shift)
+                     cells = cells + merge(1.0_dp, 0.0_dp, self%step(i, j) > shift)
                   end do
                end do
-               self%rows(1, j) = total
-               self%rows(2, j) = cells
-               self%rows(3, j) = product
+               self%rows(1:2, j) = [total, cells]
             end do
-            if (shift == 0.0_dp) then
-               if (global_min(minval(self%rows(3, :))) == 0.0_dp) exit
-            end if
-            cells = row_sum(self, 2)
-            if (cells == 0.0_dp) exit
-            next = (row_sum(self, 1) - problem%target*nx*self%grid%ny)/cells
-            if (next <= shift) exit
-            shift = next
          end do
       end if
 
-      !$omp parallel do default(none) shared(self, pressure, gap, level, alpha, shift, nx) &
-      !$omp private(i, j, k, last, total, cells, trial, product, longest) &
-      !$omp num_threads(self%operator%threads)
-      do j = 1, self%grid%ny
-         product = 0.0_dp
-         total = 0.0_dp
-         cells = 0.0_dp
-         longest = huge(1.0_dp)
-         do k = 1, self%counts(j)
-            last = min(self%blocks(k, j) + width - 1, nx)
-            do i = self%blocks(k, j), last
-               trial = pressure(i, j) + alpha*self%direction(i, j) - shift
-               if (trial <= 0.0_dp) then
-                  if (trial < 0.0_dp .and. pressure(i, j) > 0.0_dp) cells = cells + 1.0_dp
-                  trial = 0.0_dp
-               end if
-               self%step(i, j) = trial - pressure(i, j)
-               product = product - (gap(i, j) - level)*self%step(i, j)
-               total = total + self%step(i, j)**2
-               if (self%step(i, j) < 0.0_dp) &
-                  longest = min(longest, -pressure(i, j)/self%step(i, j))
+      !$omp parallel do default(none) shared(self, pressure, gap, level, shift) &
+      !$omp private(i, j, k, jb, total, product, longest) num_threads(self%operator%threads)
+      do jb = 1, self%coarse%ny
+         self%coarse%mean(:, jb) = 0.0_dp
+         do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
+            product = 0.0_dp
+            total = 0.0_dp
+            longest = huge(1.0_dp)
+            do k = 1, self%runs(j)
+               !$omp simd reduction(+:product, total) reduction(min:longest)
+               do i = self%first(k, j), self%last(k, j)
+                  self%step(i, j) = max(self%step(i, j) - shift, 0.0_dp) - pressure(i, j)
+                  product = product - (gap(i, j) - level)*self%step(i, j)
+                  total = total + self%step(i, j)**2
+                  longest = min(longest, merge(-pressure(i, j)/min(self%step(i, j), -tiny(1.0_dp)), &
+                     huge(1.0_dp), self%step(i, j) < 0.0_dp))
+               end do
+               call self%coarse%add_means(jb, self%first(k, j), &
+                  self%step(self%first(k, j):self%last(k, j), j))
             end do
+            self%rows(1:3, j) = [product, total, longest]
          end do
-         self%rows(1, j) = product
-         self%rows(2, j) = total
-         self%rows(3, j) = cells
-         self%rows(4, j) = longest
       end do
       slope = row_sum(self, 1)
       squares = row_sum(self, 2)
-      clipped = row_sum(self, 3) > 0.0_dp
-      limit = global_min(minval(self%rows(4, :)))
-      call restrict(self, self%step)
+      limit = global_min(minval(self%rows(3, :)))
    end subroutine clipped_step
 
    !> Transform the step and multiply by the operator; step.A step.
@@ -571,7 +545,7 @@ contains
       !$omp parallel do default(none) shared(self) private(j) num_threads(self%operator%threads) &
       !$omp schedule(dynamic, 8)
       do j = 1, self%grid%ny
-         if (self%counts(j) == 0) then
+         if (self%runs(j) == 0) then
             call self%operator%forward_zero_row(1, j)
          else
             call self%operator%forward_row(1, j, self%step(:, j))
@@ -586,15 +560,15 @@ contains
       type(normal_problem_type), intent(in) :: problem
       real(dp), intent(in) :: factor, alpha
       real(dp), intent(inout) :: pressure(:, :), gap(:, :)
-      integer :: i, j, k, last
+      integer :: i, j, k
 
       !$omp parallel do default(none) shared(self, problem, factor, alpha, pressure, gap) &
-      !$omp private(i, j, k, last) num_threads(self%operator%threads)
+      !$omp private(i, j, k) num_threads(self%operator%threads)
       do j = 1, self%grid%ny
          call self%operator%add_backward_row(1, j, factor, gap(:, j))
-         do k = 1, self%counts(j)
-            last = min(self%blocks(k, j) + width - 1, self%grid%nx)
-            do i = self%blocks(k, j), last
+         do k = 1, self%runs(j)
+            !$omp simd
+            do i = self%first(k, j), self%last(k, j)
                ! Round-off may not leave a trace where the step empties a cell.
                pressure(i, j) = max(pressure(i, j) + alpha*self%step(i, j), 0.0_dp)
             end do

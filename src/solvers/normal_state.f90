@@ -37,7 +37,7 @@ module normal_state
 contains
 
    !> Sums over a row: P, P g, g where P > 0, the number of those, P |g - level|, and the least g.
-   pure function row_measure(pressure, gap, level) result(sums)
+   function row_measure(pressure, gap, level) result(sums)
       real(dp), intent(in) :: pressure(:), gap(:)
       real(dp), intent(in) :: level
       real(dp) :: sums(6)
@@ -50,6 +50,7 @@ contains
       cells = 0.0_dp
       distance = 0.0_dp
       least = huge(1.0_dp)
+      !$omp simd reduction(+:load, work, touched, cells, distance) reduction(min:least)
       do i = 1, size(pressure)
          least = min(least, gap(i))
          load = load + pressure(i)
