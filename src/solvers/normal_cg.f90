@@ -197,25 +197,42 @@ contains
       !$omp parallel do default(none) shared(self, problem, pressure, gap) private(j) &
       !$omp num_threads(self%operator%threads)
       do j = 1, self%grid%ny
-         call survey_row(self, problem, j, pressure(:, j), gap(:, j))
+         call survey_row(self, problem, .true., j, pressure(:, j), gap(:, j))
       end do
    end subroutine survey
 
    !> The survey of a row.
-   subroutine survey_row(self, problem, j, pressure, gap)
+   subroutine survey_row(self, problem, all_blocks, j, pressure, gap)
       type(normal_solver_type), intent(inout) :: self
       type(normal_problem_type), intent(in) :: problem
+      logical, intent(in) :: all_blocks        !! look for pressure off the active blocks, too
       integer, intent(in) :: j
       real(dp), intent(in) :: pressure(:), gap(:)
       integer :: b, first, last
+      real(dp) :: sums(6), least
+      integer :: i
 
+      sums = [0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, huge(1.0_dp)]
       do b = 1, size(self%least, 1)
          first = (b - 1)*width + 1
          last = min(b*width, self%grid%nx)
-         self%least(b, j) = minval(gap(first:last))
-         self%loaded(b, j) = maxval(pressure(first:last)) > 0.0_dp
+         least = gap(first)
+         !$omp simd reduction(min:least)
+         do i = first + 1, last
+            least = min(least, gap(i))
+         end do
+         self%least(b, j) = least
+         sums(6) = min(sums(6), least)
+         ! Where the solver did not act, there is no pressure.
+         if (all_blocks .or. self%live(b, j)) then
+            self%loaded(b, j) = maxval(pressure(first:last)) > 0.0_dp
+            if (self%loaded(b, j)) sums(1:5) = sums(1:5) &
+               + row_measure(pressure(first:last), gap(first:last), problem%target)
+         else
+            self%loaded(b, j) = .false.
+         end if
       end do
-      self%rows(:, j) = row_measure(pressure, gap, problem%target)
+      self%rows(:, j) = sums
    end subroutine survey_row
 
    !> List the runs of blocks that hold a cell with P > 0 or a gap below the level; clear those that
@@ -573,7 +590,7 @@ contains
                pressure(i, j) = max(pressure(i, j) + alpha*self%step(i, j), 0.0_dp)
             end do
          end do
-         call survey_row(self, problem, j, pressure(:, j), gap(:, j))
+         call survey_row(self, problem, .false., j, pressure(:, j), gap(:, j))
       end do
    end subroutine update
 

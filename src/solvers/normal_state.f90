@@ -36,12 +36,12 @@ module normal_state
 
 contains
 
-   !> Sums over a row: P, P g, g where P > 0, the number of those, P |g - level|, and the least g.
+   !> Sums over cells of a row: P, P g, g where P > 0, the number of those, P |g - level|.
    function row_measure(pressure, gap, level) result(sums)
       real(dp), intent(in) :: pressure(:), gap(:)
       real(dp), intent(in) :: level
-      real(dp) :: sums(6)
-      real(dp) :: load, work, touched, cells, distance, least
+      real(dp) :: sums(5)
+      real(dp) :: load, work, touched, cells, distance
       integer :: i
 
       load = 0.0_dp
@@ -49,24 +49,22 @@ contains
       touched = 0.0_dp
       cells = 0.0_dp
       distance = 0.0_dp
-      least = huge(1.0_dp)
-      !$omp simd reduction(+:load, work, touched, cells, distance) reduction(min:least)
+      !$omp simd reduction(+:load, work, touched, cells, distance)
       do i = 1, size(pressure)
-         least = min(least, gap(i))
          load = load + pressure(i)
          work = work + pressure(i)*gap(i)
          distance = distance + pressure(i)*abs(gap(i) - level)
          touched = touched + merge(gap(i), 0.0_dp, pressure(i) > 0.0_dp)
          cells = cells + merge(1.0_dp, 0.0_dp, pressure(i) > 0.0_dp)
       end do
-      sums = [load, work, touched, cells, distance, least]
+      sums = [load, work, touched, cells, distance]
    end function row_measure
 
    !> The measure of a state from the sums of its rows.
    function combine_measures(problem, cells, rows) result(measure)
       type(normal_problem_type), intent(in) :: problem
       real(dp), intent(in) :: cells                !! number of cells of the whole grid
-      real(dp), intent(in) :: rows(:, :)           !! [6, ny], from `row_measure`
+      real(dp), intent(in) :: rows(:, :)           !! [6, ny]: `row_measure` and the least gap
       type(gap_measure_type) :: measure
       real(dp) :: sums(5), least, height
       integer :: j
@@ -108,7 +106,8 @@ contains
       !$omp parallel do default(none) shared(problem, pressure, gap, rows) private(j) &
       !$omp num_threads(threads)
       do j = 1, size(gap, 2)
-         rows(:, j) = row_measure(pressure(:, j), gap(:, j), problem%target)
+         rows(1:5, j) = row_measure(pressure(:, j), gap(:, j), problem%target)
+         rows(6, j) = minval(gap(:, j))
       end do
       measure = combine_measures(problem, real(size(gap), dp), rows)
    end function measure_gap

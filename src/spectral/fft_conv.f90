@@ -15,7 +15,7 @@
 !> field (a whole one in free mode) for each symbol.
 module fft_conv
    use, intrinsic :: iso_c_binding, only : c_associated, c_double_complex, c_f_pointer, c_int, &
-      c_null_ptr, c_ptr, c_size_t
+      c_loc, c_null_ptr, c_ptr, c_size_t
    use errors, only : error_input, error_type, fail
    use fftw, only : fftw_alloc_real, fftw_backward, fftw_destroy_plan, fftw_execute_dft, &
       fftw_execute_dft_c2r, fftw_execute_dft_r2c, fftw_forward, fftw_free, fftw_plan_many_dft, &
@@ -44,7 +44,6 @@ module fft_conv
       type(c_ptr) :: row_memory = c_null_ptr
       type(c_ptr) :: column_memory = c_null_ptr
       real(dp), pointer, contiguous :: row(:) => null()
-      complex(c_double_complex), pointer, contiguous :: spectral_row(:) => null()   !! the same memory
       complex(c_double_complex), pointer, contiguous :: column(:, :, :) => null()
    end type buffer_type
 
@@ -57,9 +56,10 @@ module fft_conv
       integer :: components = 0             !! 1 scalar, 2 vector
       integer :: threads = 1                !! for parallel loops around forward_row, backward_row
       integer(int64) :: ffts = 0            !! real transforms done so far
-      !> Symbols over (mx my): (0:mx/2, 0:my/2, 1) or xx, yy, xy.
+      !> Symbols over (mx my): (0:, 0:my/2, 1) or xx, yy, xy; zero beyond mx/2.
       real(dp), allocatable :: symbol(:, :, :)
-      complex(dp), allocatable, private :: spectrum(:, :, :)
+      type(c_ptr), private :: spectrum_memory = c_null_ptr
+      complex(dp), pointer, contiguous, private :: spectrum(:, :, :) => null()   !! whole blocks
       type(buffer_type), allocatable, private :: buffers(:)
       type(c_ptr), private :: row_forward = c_null_ptr
       type(c_ptr), private :: row_backward = c_null_ptr
@@ -90,7 +90,7 @@ contains
 
       call plan(self, grid%nx, grid%ny, grid%boundary, 1, error)
       if (allocated(error)) return
-      call normal_symbol(grid, poisson, self%mx, self%my, self%symbol(:, :, 1))
+      call normal_symbol(grid, poisson, self%mx, self%my, self%symbol(0:self%mx/2, :, 1))
       call scale_symbol(self)
    end subroutine new_normal_operator
 
@@ -105,7 +105,8 @@ contains
       call plan(self, grid%nx, grid%ny, grid%boundary, 2, error)
       if (allocated(error)) return
       call tangential_symbol(grid, poisson, thickness, self%mx, self%my, &
-         self%symbol(:, :, 1), self%symbol(:, :, 2), self%symbol(:, :, 3))
+         self%symbol(0:self%mx/2, :, 1), self%symbol(0:self%mx/2, :, 2), &
+         self%symbol(0:self%mx/2, :, 3))
       call scale_symbol(self)
    end subroutine new_tangential_operator
 
@@ -118,7 +119,7 @@ contains
 
       call plan(self, nx, ny, boundary_periodic, 1, error)
       if (allocated(error)) return
-      self%symbol(:, :, 1) = symbol
+      self%symbol(0:nx/2, :, 1) = symbol
       call scale_symbol(self)
    end subroutine new_symbol_operator
 
@@ -133,9 +134,9 @@ contains
 
       call plan(self, nx, ny, boundary_periodic, 2, error)
       if (allocated(error)) return
-      self%symbol(:, :, 1) = xx
-      self%symbol(:, :, 2) = yy
-      self%symbol(:, :, 3) = xy
+      self%symbol(0:nx/2, :, 1) = xx
+      self%symbol(0:nx/2, :, 2) = yy
+      self%symbol(0:nx/2, :, 3) = xy
       call scale_symbol(self)
    end subroutine new_tensor_symbol_operator
 
@@ -151,7 +152,7 @@ contains
       type(convolution_type), intent(inout) :: self
       integer, intent(in) :: nx, ny, boundary, components
       type(error_type), allocatable, intent(out) :: error
-      integer :: mc, k
+      integer :: mc, j, k
       integer(c_int) :: flag, lx(1), ly(1), batch
       character(80) :: text
 
@@ -161,16 +162,24 @@ contains
       self%my = transform_length(ny, boundary)
       self%components = components
       self%threads = merge(1, thread_count(), nx*ny < small)
-      mc = self%mx/2 + 1
-      allocate (self%symbol(0:self%mx/2, 0:self%my/2, merge(1, 3, components == 1)))
-      allocate (self%spectrum(mc, ny, components))
+      mc = (self%mx/2 + block)/block*block
+      allocate (self%symbol(0:mc - 1, 0:self%my/2, merge(1, 3, components == 1)), source=0.0_dp)
+      self%spectrum_memory = fftw_alloc_real(2_c_size_t*mc*ny*components)
+      call c_f_pointer(self%spectrum_memory, self%spectrum, [mc, ny, components])
+      !$omp parallel do default(none) shared(self, ny, components) private(j, k) &
+      !$omp num_threads(self%threads)
+      do j = 1, ny
+         do k = 1, components
+            self%spectrum(:, j, k) = (0.0_dp, 0.0_dp)
+         end do
+      end do
       allocate (self%buffers(0:self%threads - 1))
       do k = 0, self%threads - 1
          associate (buffer => self%buffers(k))
-            buffer%row_memory = fftw_alloc_real(int(2*mc, c_size_t))
+            buffer%row_memory = fftw_alloc_real(int(self%mx, c_size_t))
             buffer%column_memory = fftw_alloc_real(2_c_size_t*block*self%my*components)
-            call c_f_pointer(buffer%row_memory, buffer%row, [2*mc])
-            call c_f_pointer(buffer%row_memory, buffer%spectral_row, [mc])
+            call c_f_pointer(buffer%row_memory, buffer%row, [self%mx])
+            buffer%row = 0.0_dp
             call c_f_pointer(buffer%column_memory, buffer%column, [block, components, self%my])
          end associate
       end do
@@ -180,9 +189,12 @@ contains
       batch = int(block*components, c_int)
       !$omp critical (fftw_planner)
       flag = planning_flag()
-      associate (row => self%buffers(0)%row_memory, column => self%buffers(0)%column_memory)
-         self%row_forward = fftw_plan_many_dft_r2c(1, lx, 1, row, lx, 1, 0, row, lx, 1, 0, flag)
-         self%row_backward = fftw_plan_many_dft_c2r(1, lx, 1, row, lx, 1, 0, row, lx, 1, 0, flag)
+      associate (row => self%buffers(0)%row_memory, column => self%buffers(0)%column_memory, &
+         spectrum => self%spectrum_memory)
+         self%row_forward = fftw_plan_many_dft_r2c(1, lx, 1, row, lx, 1, 0, &
+            spectrum, lx, 1, 0, flag)
+         self%row_backward = fftw_plan_many_dft_c2r(1, lx, 1, spectrum, lx, 1, 0, &
+            row, lx, 1, 0, flag)
          self%column_forward = fftw_plan_many_dft(1, ly, batch, column, ly, batch, 1, &
             column, ly, batch, 1, fftw_forward, flag)
          self%column_backward = fftw_plan_many_dft(1, ly, batch, column, ly, batch, 1, &
@@ -300,9 +312,9 @@ contains
 
       associate (buffer => self%buffers(omp_get_thread_num()))
          buffer%row(1:self%nx) = row
-         buffer%row(self%nx + 1:) = 0.0_dp
-         call fftw_execute_dft_r2c(self%row_forward, buffer%row_memory, buffer%row_memory)
-         self%spectrum(:, j, component) = buffer%spectral_row
+         if (self%mx > self%nx) buffer%row(self%nx + 1:) = 0.0_dp
+         call fftw_execute_dft_r2c(self%row_forward, buffer%row_memory, &
+            spectral_row(self, component, j))
       end associate
    end subroutine forward_row
 
@@ -323,8 +335,8 @@ contains
       real(dp), intent(out) :: row(self%nx)
 
       associate (buffer => self%buffers(omp_get_thread_num()))
-         buffer%spectral_row(:) = self%spectrum(:, j, component)
-         call fftw_execute_dft_c2r(self%row_backward, buffer%row_memory, buffer%row_memory)
+         call fftw_execute_dft_c2r(self%row_backward, spectral_row(self, component, j), &
+            buffer%row_memory)
          row = buffer%row(1:self%nx)
       end associate
    end subroutine backward_row
@@ -338,11 +350,21 @@ contains
       real(dp), intent(inout) :: row(self%nx)
 
       associate (buffer => self%buffers(omp_get_thread_num()))
-         buffer%spectral_row(:) = self%spectrum(:, j, component)
-         call fftw_execute_dft_c2r(self%row_backward, buffer%row_memory, buffer%row_memory)
+         call fftw_execute_dft_c2r(self%row_backward, spectral_row(self, component, j), &
+            buffer%row_memory)
          row = row + factor*buffer%row(1:self%nx)
       end associate
    end subroutine add_backward_row
+
+   !> Address of row j of the spectrum of a component.
+   function spectral_row(self, component, j) result(address)
+      class(convolution_type), intent(in) :: self
+      integer, intent(in) :: component
+      integer, intent(in) :: j
+      type(c_ptr) :: address
+
+      address = c_loc(self%spectrum(1, j, component))
+   end function spectral_row
 
    !> Between the rows' two passes: transform the columns, multiply by the symbol, transform back.
    subroutine columns(self, action, form)
@@ -350,35 +372,37 @@ contains
       integer, intent(in) :: action                !! columns_apply, columns_inverse or columns_form
       real(dp), intent(out) :: form                !! p.(symbol p) over the cells
       real(dp), allocatable :: partial(:)
-      integer :: blocks, b, c, j, first, width
+      integer :: blocks, b, c, j, first
 
       blocks = (self%mx/2 + block)/block
       allocate (partial(blocks))
       !$omp parallel do default(none) shared(self, action, partial, blocks) &
-      !$omp private(b, c, j, first, width) num_threads(self%threads)
+      !$omp private(b, c, j, first) num_threads(self%threads)
       do b = 1, blocks
          first = (b - 1)*block
-         width = min(block, self%mx/2 + 1 - first)
          associate (column => self%buffers(omp_get_thread_num())%column, &
             memory => self%buffers(omp_get_thread_num())%column_memory)
-            do j = 1, self%ny
-               do c = 1, self%components
-                  column(1:width, c, j) = self%spectrum(first + 1:first + width, j, c)
-                  column(width + 1:, c, j) = 0.0_dp
+            do c = 1, self%components
+               do j = 1, self%ny
+                  column(:, c, j) = self%spectrum(first + 1:first + block, j, c)
+               end do
+               do j = self%ny + 1, self%my
+                  column(:, c, j) = (0.0_dp, 0.0_dp)
                end do
             end do
-            column(:, :, self%ny + 1:) = 0.0_dp
             if (self%my > 1) call fftw_execute_dft(self%column_forward, memory, memory)
-            if (self%components == 1) then
-               call multiply_scalar(self, action, first, width, column, partial(b))
+            if (self%components == 2) then
+               call multiply_tensor(self, first, column, partial(b))
+            else if (action == columns_inverse) then
+               call divide_scalar(self, first, column, partial(b))
             else
-               call multiply_tensor(self, first, width, column, partial(b))
+               call multiply_scalar(self, first, column, partial(b))
             end if
             if (action /= columns_form) then
                if (self%my > 1) call fftw_execute_dft(self%column_backward, memory, memory)
-               do j = 1, self%ny
-                  do c = 1, self%components
-                     self%spectrum(first + 1:first + width, j, c) = column(1:width, c, j)
+               do c = 1, self%components
+                  do j = 1, self%ny
+                     self%spectrum(first + 1:first + block, j, c) = column(:, c, j)
                   end do
                end do
             end if
@@ -393,76 +417,88 @@ contains
    end subroutine columns
 
    !> Multiply a block of columns by the scalar symbol and sum the quadratic form.
-   subroutine multiply_scalar(self, action, first, width, column, form)
+   subroutine multiply_scalar(self, first, column, form)
       class(convolution_type), intent(in) :: self
-      integer, intent(in) :: action
       integer, intent(in) :: first                 !! wave number of the first column
-      integer, intent(in) :: width                 !! columns of this block
       complex(dp), intent(inout) :: column(block, self%my)
       real(dp), intent(out) :: form
-      real(dp) :: factor(block), weight(block), cells
-      integer :: i, j
+      real(dp) :: sums(block)
+      integer :: i, j, k
 
-      weight = 0.0_dp
-      weight(1:width) = column_weights(self, first, width)
-      factor = 0.0_dp
-      cells = (real(self%mx, dp)*self%my)**2
-      form = 0.0_dp
+      sums = 0.0_dp
       do j = 1, self%my
-         factor(1:width) = self%symbol(first:first + width - 1, min(j - 1, self%my - j + 1), 1)
-         if (action == columns_inverse) then
-            do i = 1, width
-               if (factor(i) /= 0.0_dp) factor(i) = 1.0_dp/(factor(i)*cells)
-            end do
-         end if
+         k = min(j - 1, self%my - j + 1)
          do i = 1, block
-            form = form + weight(i)*factor(i)*(real(column(i, j))**2 + aimag(column(i, j))**2)
-            column(i, j) = factor(i)*column(i, j)
+            associate (factor => self%symbol(first + i - 1, k, 1))
+               sums(i) = sums(i) + factor*(real(column(i, j))**2 + aimag(column(i, j))**2)
+               column(i, j) = factor*column(i, j)
+            end associate
          end do
       end do
+      form = sum(column_weights(self, first)*sums)
    end subroutine multiply_scalar
 
-   !> Multiply a block of columns by the 2 x 2 symbol and sum the quadratic form.
-   subroutine multiply_tensor(self, first, width, column, form)
+   !> Multiply a block of columns by the inverse of the scalar symbol, 0 where that is 0.
+   subroutine divide_scalar(self, first, column, form)
       class(convolution_type), intent(in) :: self
       integer, intent(in) :: first
-      integer, intent(in) :: width
+      complex(dp), intent(inout) :: column(block, self%my)
+      real(dp), intent(out) :: form                !! with the inverse symbol
+      real(dp) :: sums(block), factor, cells
+      integer :: i, j, k
+
+      sums = 0.0_dp
+      cells = (real(self%mx, dp)*self%my)**2
+      do j = 1, self%my
+         k = min(j - 1, self%my - j + 1)
+         do i = 1, block
+            factor = self%symbol(first + i - 1, k, 1)
+            if (abs(factor) > 0.0_dp) factor = 1.0_dp/(factor*cells)
+            sums(i) = sums(i) + factor*(real(column(i, j))**2 + aimag(column(i, j))**2)
+            column(i, j) = factor*column(i, j)
+         end do
+      end do
+      form = sum(column_weights(self, first)*sums)
+   end subroutine divide_scalar
+
+   !> Multiply a block of columns by the 2 x 2 symbol and sum the quadratic form.
+   subroutine multiply_tensor(self, first, column, form)
+      class(convolution_type), intent(in) :: self
+      integer, intent(in) :: first
       complex(dp), intent(inout) :: column(block, 2, self%my)
       real(dp), intent(out) :: form
-      real(dp) :: weight(block), xy
+      real(dp) :: sums(block), xy, sign
       complex(dp) :: x, y, ux, uy
-      integer :: i, j, k, jj
+      integer :: i, j, jj
 
-      weight = 0.0_dp
-      weight(1:width) = column_weights(self, first, width)
-      form = 0.0_dp
+      sums = 0.0_dp
       do j = 1, self%my
          jj = min(j - 1, self%my - j + 1)
-         do i = 1, width
-            k = first + i - 1
+         sign = merge(1.0_dp, -1.0_dp, j - 1 <= self%my/2)
+         do i = 1, block
             x = column(i, 1, j)
             y = column(i, 2, j)
-            xy = self%symbol(k, jj, 3)
-            if (j - 1 > self%my/2) xy = -xy
-            ux = self%symbol(k, jj, 1)*x + xy*y
-            uy = xy*x + self%symbol(k, jj, 2)*y
-            form = form + weight(i)*(real(conjg(x)*ux) + real(conjg(y)*uy))
+            xy = sign*self%symbol(first + i - 1, jj, 3)
+            ux = self%symbol(first + i - 1, jj, 1)*x + xy*y
+            uy = xy*x + self%symbol(first + i - 1, jj, 2)*y
+            sums(i) = sums(i) + real(x)*real(ux) + aimag(x)*aimag(ux) &
+               + real(y)*real(uy) + aimag(y)*aimag(uy)
             column(i, 1, j) = ux
             column(i, 2, j) = uy
          end do
       end do
+      form = sum(column_weights(self, first)*sums)
    end subroutine multiply_tensor
 
    !> How often a column of the half spectrum counts in a sum over the whole one.
-   pure function column_weights(self, first, width) result(weight)
+   pure function column_weights(self, first) result(weight)
       class(convolution_type), intent(in) :: self
-      integer, intent(in) :: first
-      integer, intent(in) :: width
-      real(dp) :: weight(width)
+      integer, intent(in) :: first                 !! wave number of the first column
+      real(dp) :: weight(block)
       integer :: i
 
       weight = 2.0_dp
-      do i = 1, width
+      do i = 1, block
          if (first + i - 1 == 0 .or. 2*(first + i - 1) == self%mx) weight(i) = 1.0_dp
       end do
    end function column_weights
@@ -489,7 +525,9 @@ contains
          end do
          deallocate (self%buffers)
       end if
-      if (allocated(self%spectrum)) deallocate (self%spectrum)
+      if (c_associated(self%spectrum_memory)) call fftw_free(self%spectrum_memory)
+      self%spectrum_memory = c_null_ptr
+      nullify (self%spectrum)
       if (allocated(self%symbol)) deallocate (self%symbol)
    end subroutine destroy
 
