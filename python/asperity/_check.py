@@ -50,6 +50,8 @@ def number(
         allowed += f" {'>' if low_open else '>='} {low:g}"
     if math.isfinite(high):
         allowed += f"{' and' if math.isfinite(low) else ''} {'<' if high_open else '<='} {high:g}"
+    if isinstance(value, np.generic):
+        value = value.item()
     try:
         result = float(value)
     except (TypeError, ValueError):

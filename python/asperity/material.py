@@ -29,6 +29,7 @@ FloatArray = NDArray[np.float64]
 
 _LEGEND_ABOVE = {
     "loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": 4, "frameon": False,
+    "columnspacing": 1.2, "handlelength": 1.6,
 }
 
 

@@ -1,0 +1,218 @@
+"""Elastic contact of smooth bodies: Hertz's sphere and line contact.
+
+The rigid body is pressed on an elastic half-space of modulus E* = E/(1 - nu^2) = 2 G/(1 - nu).
+Displacements are positive into the half-space. Frictionless, small slopes (parabolic bodies).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._check import array_of, exactly_one, number, positive
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class HertzContact:
+    """Contact of a rigid sphere with an elastic half-space.
+
+    Attributes
+    ----------
+    radius : float
+        Radius of the sphere, m.
+    modulus : float
+        E*, Pa.
+    force : float
+        Normal force, N.
+    contact_radius : float
+        m.
+    approach : float
+        Distance the sphere has come down from first touch, m.
+    peak_pressure : float
+        Pressure at the centre, Pa.
+    """
+
+    radius: float
+    modulus: float
+    force: float
+    contact_radius: float
+    approach: float
+    peak_pressure: float
+
+    def pressure(self, r: ArrayLike) -> FloatArray:
+        """Return p(r), Pa, at distances r >= 0 (m) from the axis; 0 outside the contact."""
+        return self.peak_pressure * _dome(array_of("r", r, low=0.0), self.contact_radius)
+
+    def displacement(self, r: ArrayLike) -> FloatArray:
+        """Return the normal displacement u_z(r), m, inside and outside the contact.
+
+        Johnson (1985), eq. 3.41a and 3.42a.
+        """
+        return hertz_displacement(array_of("r", r, low=0.0), self.contact_radius, self.radius)
+
+
+def _dome(r: FloatArray, a: float) -> FloatArray:
+    """Return sqrt(1 - r^2/a^2), 0 where r >= a."""
+    if a == 0.0:
+        return np.zeros_like(r)
+    return np.sqrt(np.clip((1.0 - r / a) * (1.0 + r / a), 0.0, None))
+
+
+def hertz_displacement(r: FloatArray, a: float, radius: float) -> FloatArray:
+    """Return u_z of a Hertzian pressure on a circle of radius `a`: a^2/R - r^2/(2R) inside."""
+    outer = np.maximum(r, a)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        t = np.where(outer > 0.0, a / np.where(outer > 0.0, outer, 1.0), 1.0)
+    outside = (2.0 * a * a - outer**2) * np.arcsin(t) + outer * a * np.sqrt((1 - t) * (1 + t))
+    # far away the two terms cancel: this is what is left of them
+    far = a * a * t * (4.0 / 3.0 + t * t * (2.0 / 15.0 + t * t * (3.0 / 70.0)))
+    outside = np.where(t < 1e-2, far, outside)
+    return np.where(r <= a, a * a - 0.5 * r * r, outside / math.pi) / radius
+
+
+def hertz(
+    radius: float,
+    modulus: float,
+    *,
+    force: float | None = None,
+    contact_radius: float | None = None,
+    approach: float | None = None,
+) -> HertzContact:
+    """Return Hertz's contact of a rigid sphere with an elastic half-space.
+
+    a^3 = 3 F R/(4 E*), approach = a^2/R, p0 = 2 E* a/(pi R) (thesis, eq. 1.1).
+
+    Parameters
+    ----------
+    radius : float
+        Radius of the sphere, m, > 0.
+    modulus : float
+        E*, Pa, > 0.
+    force, contact_radius, approach : float
+        Exactly one of them: normal force (N), contact radius (m) or approach (m), >= 0.
+
+    Returns
+    -------
+    HertzContact
+
+    Raises
+    ------
+    ValueError
+        If a value is out of range, or not exactly one of the three is given.
+
+    References
+    ----------
+    K. L. Johnson, Contact Mechanics, Cambridge, 1985, chapter 3.
+
+    Examples
+    --------
+    >>> contact = hertz(50e-3, 344.828e6, contact_radius=1e-3)
+    >>> round(contact.force, 5), round(contact.peak_pressure / 1e6, 5)
+    (9.19541, 4.39049)
+    >>> float(contact.displacement(0.0)) == contact.approach
+    True
+    """
+    r, e = positive("radius", radius), positive("modulus", modulus)
+    name = exactly_one(force=force, contact_radius=contact_radius, approach=approach)
+    if name == "force":
+        load = number("force", force, 0.0)  # type: ignore[arg-type]
+        a = (0.75 * load * r / e) ** (1.0 / 3.0)
+    elif name == "contact_radius":
+        a = number("contact_radius", contact_radius, 0.0)  # type: ignore[arg-type]
+    else:
+        a = math.sqrt(r * number("approach", approach, 0.0))  # type: ignore[arg-type]
+    load = load if name == "force" else 4.0 * e * a**3 / (3.0 * r)
+    return HertzContact(r, e, load, a, a * a / r, 2.0 * e * a / (math.pi * r))
+
+
+@dataclass(frozen=True)
+class HertzLine:
+    """Contact of a rigid cylinder with an elastic half-space, per length along the axis.
+
+    Attributes
+    ----------
+    radius : float
+        Radius of the cylinder, m.
+    modulus : float
+        E*, Pa.
+    load : float
+        Normal force per length, N/m.
+    half_width : float
+        Half the width of the contact, m.
+    peak_pressure : float
+        Pa.
+    """
+
+    radius: float
+    modulus: float
+    load: float
+    half_width: float
+    peak_pressure: float
+
+    def pressure(self, x: ArrayLike) -> FloatArray:
+        """Return p(x), Pa, at positions x (m) across the line; 0 outside the contact."""
+        return self.peak_pressure * _dome(np.abs(array_of("x", x)), self.half_width)
+
+    def displacement(self, x: ArrayLike) -> FloatArray:
+        """Return u_z(x) - u_z(0), m (a line load has no absolute displacement)."""
+        return self.gap(x) - 0.5 * array_of("x", x) ** 2 / self.radius
+
+    def gap(self, x: ArrayLike) -> FloatArray:
+        """Return the gap between cylinder and half-space, m; 0 within the contact."""
+        t = np.maximum(np.abs(array_of("x", x)) / self.half_width, 1.0)
+        root = np.sqrt((t - 1.0) * (t + 1.0))
+        return self.half_width**2 / (2.0 * self.radius) * (t * root - np.arccosh(t))
+
+
+def hertz_line(
+    radius: float,
+    modulus: float,
+    *,
+    load: float | None = None,
+    half_width: float | None = None,
+) -> HertzLine:
+    """Return Hertz's contact of a rigid cylinder with an elastic half-space.
+
+    a^2 = 4 W R/(pi E*), p0 = 2 W/(pi a).
+
+    Parameters
+    ----------
+    radius : float
+        Radius of the cylinder, m, > 0.
+    modulus : float
+        E*, Pa, > 0.
+    load, half_width : float
+        Exactly one: the normal force per length (N/m) or half the contact width (m), > 0.
+
+    Returns
+    -------
+    HertzLine
+
+    Raises
+    ------
+    ValueError
+        If a value is out of range, or not exactly one of the two is given.
+
+    References
+    ----------
+    K. L. Johnson, Contact Mechanics, Cambridge, 1985, chapter 4.
+
+    Examples
+    --------
+    >>> line = hertz_line(0.01, 1e6, load=100.0)
+    >>> round(line.half_width * 1e3, 6), round(line.peak_pressure)
+    (1.128379, 56419)
+    """
+    r, e = positive("radius", radius), positive("modulus", modulus)
+    if exactly_one(load=load, half_width=half_width) == "load":
+        w = positive("load", load)  # type: ignore[arg-type]
+        a = math.sqrt(4.0 * w * r / (math.pi * e))
+    else:
+        a = positive("half_width", half_width)  # type: ignore[arg-type]
+        w = math.pi * e * a * a / (4.0 * r)
+    return HertzLine(r, e, w, a, 2.0 * w / (math.pi * a))
