@@ -1,14 +1,18 @@
 !> What Fortran lacks to handle files: rename, remove, write through to the disk, look at folders.
 module file_system
-   use, intrinsic :: iso_c_binding, only : c_char, c_int, c_null_char
+   use, intrinsic :: iso_c_binding, only : c_char, c_int, c_int64_t, c_intptr_t, c_null_char
    use errors, only : error_file, error_type, fail
+   use precision, only : int64
    implicit none
    private
 
-   public :: rename_file, remove_file, sync_file, file_exists, is_folder, folder_of, name_of, &
-      is_terminal
+   public :: rename_file, remove_file, sync_file, lengthen_file, file_exists, is_folder, &
+      folder_of, name_of, is_terminal, let_size_limit_be_an_error
 
    integer(c_int), parameter :: open_read_write = 2     !! O_RDWR of every Unix
+
+   integer(c_int), parameter :: size_limit_signal = 25  !! SIGXFSZ of Linux and macOS
+   integer(c_intptr_t), parameter :: ignore = 1         !! SIG_IGN
 
    interface
       function c_rename(old, new) bind(c, name='rename') result(status)
@@ -47,6 +51,20 @@ module file_system
          integer(c_int), value :: descriptor
          integer(c_int) :: status
       end function c_isatty
+
+      function c_signal(number, action) bind(c, name='signal') result(old)
+         import :: c_int, c_intptr_t
+         integer(c_int), value :: number
+         integer(c_intptr_t), value :: action
+         integer(c_intptr_t) :: old
+      end function c_signal
+
+      function c_truncate(path, length) bind(c, name='truncate') result(status)
+         import :: c_char, c_int, c_int64_t
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int64_t), value :: length
+         integer(c_int) :: status
+      end function c_truncate
    end interface
 
 contains
@@ -85,6 +103,27 @@ contains
       end if
       if (status /= 0) call fail(error, error_file, path//': cannot be written through to the disk')
    end subroutine sync_file
+
+   !> Make a file at least as long as this; what is added reads as zeros and takes no space yet.
+   subroutine lengthen_file(path, length, error)
+      character(*), intent(in) :: path
+      integer(int64), intent(in) :: length      !! bytes
+      type(error_type), allocatable, intent(out) :: error
+      integer(int64) :: now
+
+      inquire (file=path, size=now)
+      if (now >= length) return
+      if (c_truncate(path//c_null_char, int(length, c_int64_t)) /= 0) then
+         call fail(error, error_file, path//': cannot be written: the file cannot grow')
+      end if
+   end subroutine lengthen_file
+
+   !> Let a write beyond the limit on the size of files fail, where it would end the program.
+   subroutine let_size_limit_be_an_error()
+      integer(c_intptr_t) :: old
+
+      old = c_signal(size_limit_signal, ignore)
+   end subroutine let_size_limit_be_an_error
 
    !> Is there a file or folder of this name?
    logical function file_exists(path)

@@ -24,22 +24,25 @@ module hdf5_file
       h5dcreate_f, h5dget_space_f, h5dont_atexit_f, h5dopen_f, h5dread_f, h5dset_extent_f, &
       h5dvlen_reclaim_f, h5dwrite_f, h5eset_auto_f, H5F_ACC_RDONLY_F, H5F_ACC_RDWR_F, &
       H5F_ACC_TRUNC_F, H5F_CLOSE_STRONG_F, H5F_LIBVER_V18_F, H5F_SCOPE_LOCAL_F, h5fclose_f, &
-      h5fcreate_f, h5fflush_f, h5fis_hdf5_f, h5fopen_f, h5gclose_f, h5gcreate_anon_f, &
-      h5gcreate_f, h5gget_obj_info_idx_f, h5gn_members_f, H5I_DATASET_F, h5iget_type_f, &
-      h5kind_to_type, h5lcreate_external_f, h5ldelete_f, h5lexists_f, h5oclose_f, h5olink_f, &
-      h5oopen_f, h5open_f, H5P_DATASET_ACCESS_F, H5P_DATASET_CREATE_F, H5P_DEFAULT_F, &
-      H5P_FILE_ACCESS_F, H5P_GROUP_CREATE_F, H5P_LINK_CREATE_F, h5pclose_f, h5pcreate_f, &
-      h5pset_chunk_cache_f, h5pset_chunk_f, h5pset_create_inter_group_f, h5pset_deflate_f, &
-      h5pset_est_link_info_f, h5pset_fclose_degree_f, h5pset_fill_time_f, &
-      h5pset_libver_bounds_f, h5pset_link_phase_change_f, h5pset_shuffle_f, H5S_SCALAR_F, &
-      H5S_SELECT_SET_F, H5S_UNLIMITED_F, h5sclose_f, h5screate_f, h5screate_simple_f, &
-      h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, &
-      H5T_CSET_UTF8_F, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, H5T_NATIVE_INTEGER, H5T_STD_I32LE, &
-      H5T_STD_I8LE, H5T_STR_NULLTERM_F, H5T_STRING, h5tclose_f, h5tcopy_f, h5tget_size_f, &
-      h5tis_variable_str_f, h5tset_cset_f, h5tset_strpad_f, hid_t, hsize_t, size_t
+      h5fcreate_f, h5fflush_f, h5fget_filesize_f, h5fis_hdf5_f, h5fopen_f, h5gclose_f, &
+      h5gcreate_anon_f, h5gcreate_f, h5gget_obj_info_idx_f, h5gn_members_f, H5I_DATASET_F, &
+      h5iget_type_f, h5kind_to_type, h5lcreate_external_f, h5ldelete_f, h5lexists_f, h5oclose_f, &
+      h5olink_f, h5oopen_f, h5open_f, H5P_DATASET_ACCESS_F, H5P_DATASET_CREATE_F, H5P_DEFAULT_F, &
+      H5P_FILE_ACCESS_F, H5P_FILE_CREATE_F, H5P_GROUP_CREATE_F, H5P_LINK_CREATE_F, h5pclose_f, &
+      h5pcreate_f, h5pset_attr_phase_change_f, h5pset_chunk_cache_f, h5pset_chunk_f, &
+      h5pset_create_inter_group_f, h5pset_deflate_f, h5pset_est_link_info_f, &
+      h5pset_fclose_degree_f, h5pset_fill_time_f, h5pset_libver_bounds_f, &
+      h5pset_link_phase_change_f, h5pset_meta_block_size_f, h5pset_shuffle_f, &
+      h5pset_small_data_block_size_f, H5S_SCALAR_F, H5S_SELECT_SET_F, H5S_UNLIMITED_F, &
+      h5sclose_f, h5screate_f, h5screate_simple_f, h5sget_simple_extent_dims_f, &
+      h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, H5T_CSET_UTF8_F, H5T_IEEE_F64LE, &
+      H5T_NATIVE_DOUBLE, H5T_NATIVE_INTEGER, H5T_STD_I32LE, H5T_STD_I8LE, H5T_STR_NULLTERM_F, &
+      H5T_STRING, h5tclose_f, h5tcopy_f, h5tget_size_f, h5tis_variable_str_f, h5tset_cset_f, &
+      h5tset_strpad_f, hid_t, hsize_t, size_t
    use errors, only : error_file, error_input, error_type, fail
-   use file_system, only : file_exists, folder_of, is_folder
-   use precision, only : dp, int8
+   use file_system, only : file_exists, folder_of, is_folder, lengthen_file, &
+      let_size_limit_be_an_error
+   use precision, only : dp, int64, int8
    implicit none
    private
 
@@ -73,22 +76,23 @@ module hdf5_file
       procedure :: publish_group
       procedure :: has
       procedure :: has_dataset
+      procedure :: has_link
       procedure :: has_attribute
       procedure :: members
       procedure :: remove => remove_object
       procedure :: link_external
       procedure :: create_column
       procedure :: append_value
-      procedure :: truncate_column
+      procedure :: append_values
       procedure :: dataset_shape
-      procedure, private :: write_real_1, write_real_2, write_real_3, write_integer_1, &
-         write_integer_2, write_int8_2, read_real_1, read_real_2, read_real_3, read_integer_1, &
-         read_integer_2, read_int8_2, write_text, write_integer, write_real, write_reals, &
-         read_text, read_integer, read_real, resolve, checked, not_broken, open_object, store, &
-         load, put_attribute, get_attribute
+      procedure, private :: write_real_0, write_real_1, write_real_2, write_real_3, &
+         write_integer_1, write_integer_2, write_int8_2, read_real_1, read_real_2, read_real_3, &
+         read_integer_1, read_integer_2, read_int8_2, write_text, write_integer, write_real, &
+         write_reals, read_text, read_integer, read_real, resolve, checked, not_broken, &
+         open_object, store, load, put_attribute, get_attribute
       !> Write a new dataset.
-      generic :: write => write_real_1, write_real_2, write_real_3, write_integer_1, &
-         write_integer_2, write_int8_2
+      generic :: write => write_real_0, write_real_1, write_real_2, write_real_3, &
+         write_integer_1, write_integer_2, write_int8_2
       !> Read a whole dataset.
       generic :: read => read_real_1, read_real_2, read_real_3, read_integer_1, read_integer_2, &
          read_int8_2
@@ -148,7 +152,7 @@ contains
       character(*), intent(in) :: path
       character(*), intent(in) :: mode      !! 'read', 'create' (replaces a file) or 'append'
       type(error_type), allocatable, intent(out) :: error
-      integer(hid_t) :: access_list
+      integer(hid_t) :: access_list, creation
       integer :: status, ignored
       logical :: right_kind
 
@@ -180,11 +184,19 @@ contains
       if (status >= 0) call h5pset_libver_bounds_f(access_list, H5F_LIBVER_V18_F, &
          H5F_LIBVER_V18_F, status)
       if (status >= 0) call h5pset_fclose_degree_f(access_list, H5F_CLOSE_STRONG_F, status)
+      ! Space is taken as it is needed: space set aside would be given back by cutting the file,
+      ! which HDF5 does before it notes the new length.
+      if (status >= 0) call h5pset_meta_block_size_f(access_list, 0_hsize_t, status)
+      if (status >= 0) call h5pset_small_data_block_size_f(access_list, 0_hsize_t, status)
       if (status >= 0) status = c_set_file_locking(access_list, .false._c_bool, .true._c_bool)
       if (status >= 0) then
          select case (mode)
          case ('create')
-            call h5fcreate_f(self%path, H5F_ACC_TRUNC_F, self%id, status, access_prp=access_list)
+            call h5pcreate_f(H5P_FILE_CREATE_F, creation, status)
+            if (status >= 0) call set_one_block(creation, 24, 24, status)
+            if (status >= 0) call h5fcreate_f(self%path, H5F_ACC_TRUNC_F, self%id, status, &
+               creation_prp=creation, access_prp=access_list)
+            call h5pclose_f(creation, ignored)
          case ('append')
             call h5fopen_f(self%path, H5F_ACC_RDWR_F, self%id, status, access_list)
          case default
@@ -218,6 +230,8 @@ contains
 
       if (self%id >= 0 .and. .not. self%broken) then
          if (self%staged >= 0) call h5gclose_f(self%staged, status)
+         if (self%writable) call self%flush(error)
+         if (allocated(error)) return
          call h5fclose_f(self%id, status)
          call self%checked(status, 'closing the file failed', '', error)
       end if
@@ -236,10 +250,21 @@ contains
    subroutine flush_file(self, error)
       class(hdf5_file_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
+      integer(hsize_t) :: length
       integer :: status
 
       call self%not_broken('', error)
       if (allocated(error)) return
+      ! HDF5 notes the new length before it has made the file so long: a reader in between would
+      ! find the file too short. So the file gets its length first.
+      call h5fget_filesize_f(self%id, length, status)
+      call self%checked(status, 'writing failed', '', error)
+      if (allocated(error)) return
+      call lengthen_file(self%path, int(length, int64), error)
+      if (allocated(error)) then
+         self%broken = .true.
+         return
+      end if
       call h5fflush_f(self%id, H5F_SCOPE_LOCAL_F, status)
       call self%checked(status, 'writing failed', '', error)
    end subroutine flush_file
@@ -250,6 +275,7 @@ contains
       integer :: status
 
       if (started) return
+      call let_size_limit_be_an_error()
       call h5dont_atexit_f(status)
       call h5open_f(status)
       if (status >= 0) call h5eset_auto_f(0, status)
@@ -380,8 +406,7 @@ contains
       call h5pcreate_f(H5P_LINK_CREATE_F, links, status)
       if (status >= 0) call h5pset_create_inter_group_f(links, 1, status)
       if (status >= 0) call h5pcreate_f(H5P_GROUP_CREATE_F, creation, status)
-      if (status >= 0) call h5pset_link_phase_change_f(creation, 65535, 0, status)
-      if (status >= 0) call h5pset_est_link_info_f(creation, count, 12, status)
+      if (status >= 0) call set_one_block(creation, count, 12, status)
       if (status >= 0) call h5gcreate_f(location, name, group, status, lcpl_id=links, &
          gcpl_id=creation)
       call self%checked(status, 'the group cannot be made', path, error)
@@ -390,6 +415,18 @@ contains
       call h5pclose_f(links, ignored)
       call h5pclose_f(creation, ignored)
    end subroutine create_group
+
+   !> Let a group keep its names and attributes in one block, made large enough at once.
+   subroutine set_one_block(creation, count, length, status)
+      integer(hid_t), intent(in) :: creation  !! property list of the group
+      integer, intent(in) :: count            !! number of names expected
+      integer, intent(in) :: length           !! letters of a name
+      integer, intent(out) :: status
+
+      call h5pset_link_phase_change_f(creation, 65535, 0, status)
+      if (status >= 0) call h5pset_est_link_info_f(creation, count, length, status)
+      if (status >= 0) call h5pset_attr_phase_change_f(creation, 65535, 0, status)
+   end subroutine set_one_block
 
    !> Start a group that readers do not see before `publish_group`; the group above it exists.
    !> Everything written below its path goes into it.
@@ -461,6 +498,17 @@ contains
          call h5oclose_f(object, ignored)
       end do
    end function has
+
+   !> Is there a link of this name in the file's root, wherever it leads?
+   function has_link(self, path) result(exists)
+      class(hdf5_file_type), intent(in) :: self
+      character(*), intent(in) :: path      !! '/name'
+      logical :: exists
+      integer :: status
+
+      call h5lexists_f(self%id, path, exists, status)
+      exists = exists .and. status >= 0
+   end function has_link
 
    !> Is there a dataset of this name?
    function has_dataset(self, path) result(exists)
@@ -856,7 +904,11 @@ contains
          if (status >= 0) call h5pset_shuffle_f(creation, status)
          if (status >= 0) call h5pset_deflate_f(creation, level, status)
       end if
-      if (status >= 0) call h5screate_simple_f(size(extent), dims, space, status)
+      if (size(extent) == 0) then
+         if (status >= 0) call h5screate_f(H5S_SCALAR_F, space, status)
+      else
+         if (status >= 0) call h5screate_simple_f(size(extent), dims, space, status)
+      end if
       if (status >= 0) call h5dcreate_f(location, name, file_type, space, dataset, status, &
          dcpl_id=creation, lcpl_id=links)
       if (status >= 0 .and. all(extent > 0)) call h5dwrite_f(dataset, memory_type, buffer, status)
@@ -871,6 +923,21 @@ contains
       if (allocated(error)) return
       call self%write_attribute(path, 'long_name', long_name, error)
    end subroutine store
+
+   !> Write a single real.
+   subroutine write_real_0(self, path, value, units, long_name, error)
+      class(hdf5_file_type), intent(inout) :: self
+      character(*), intent(in) :: path
+      real(dp), intent(in) :: value
+      character(*), intent(in) :: units
+      character(*), intent(in) :: long_name
+      type(error_type), allocatable, intent(out) :: error
+      integer :: extent(0)
+      real(dp), target :: buffer(1)
+
+      buffer(1) = value
+      call self%store(path, extent, kind_real, c_loc(buffer), units, long_name, error=error)
+   end subroutine write_real_0
 
    !> Write a vector of reals.
    subroutine write_real_1(self, path, values, units, long_name, error)
@@ -1242,43 +1309,37 @@ contains
       integer, intent(in) :: row            !! from 0; the column has at least this many rows
       real(dp), intent(in) :: value         !! stored as a whole number if that is the column's kind
       type(error_type), allocatable, intent(out) :: error
+
+      call self%append_values(path, row, [value], error)
+   end subroutine append_value
+
+   !> Write values into the rows of a column from a row on.
+   subroutine append_values(self, path, row, values, error)
+      class(hdf5_file_type), intent(inout) :: self
+      character(*), intent(in) :: path
+      integer, intent(in) :: row            !! from 0; the column has at least this many rows
+      real(dp), intent(in), contiguous, target :: values(:)  !! at least one
+      type(error_type), allocatable, intent(out) :: error
       integer(hid_t) :: dataset, memory, file_space
+      integer(hsize_t) :: count
       integer :: status, ignored
-      real(dp), target :: buffer(1)
 
       call self%not_broken(path, error)
       if (allocated(error)) return
-      buffer(1) = value
+      count = size(values)
       call open_column(self, path, dataset, status)
-      if (status >= 0) call h5dset_extent_f(dataset, [int(row + 1, hsize_t)], status)
+      if (status >= 0) call h5dset_extent_f(dataset, [row + count], status)
       if (status >= 0) call h5dget_space_f(dataset, file_space, status)
       if (status >= 0) call h5sselect_hyperslab_f(file_space, H5S_SELECT_SET_F, &
-         [int(row, hsize_t)], [1_hsize_t], status)
-      if (status >= 0) call h5screate_simple_f(1, [1_hsize_t], memory, status)
-      if (status >= 0) call h5dwrite_f(dataset, H5T_NATIVE_DOUBLE, c_loc(buffer), status, &
+         [int(row, hsize_t)], [count], status)
+      if (status >= 0) call h5screate_simple_f(1, [count], memory, status)
+      if (status >= 0) call h5dwrite_f(dataset, H5T_NATIVE_DOUBLE, c_loc(values), status, &
          mem_space_id=memory, file_space_id=file_space)
       if (status >= 0) call h5dclose_f(dataset, status)
       call self%checked(status, 'the row cannot be written', path, error)
       if (allocated(error)) return
       call h5sclose_f(memory, ignored)
       call h5sclose_f(file_space, ignored)
-   end subroutine append_value
-
-   !> Cut a column off after a number of rows.
-   subroutine truncate_column(self, path, rows, error)
-      class(hdf5_file_type), intent(inout) :: self
-      character(*), intent(in) :: path
-      integer, intent(in) :: rows           !! at least 1, and no more than there are
-      type(error_type), allocatable, intent(out) :: error
-      integer(hid_t) :: dataset
-      integer :: status
-
-      call self%not_broken(path, error)
-      if (allocated(error)) return
-      call open_column(self, path, dataset, status)
-      if (status >= 0) call h5dset_extent_f(dataset, [int(rows, hsize_t)], status)
-      if (status >= 0) call h5dclose_f(dataset, status)
-      call self%checked(status, 'the column cannot be cut', path, error)
-   end subroutine truncate_column
+   end subroutine append_values
 
 end module hdf5_file

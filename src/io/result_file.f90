@@ -1,0 +1,587 @@
+!> The result of a run: one HDF5 file, written step by step, readable at any moment.
+!>
+!> A file is built under the name FILE.new and takes its place with everything but the history's
+!> rows in it. A row counts when all columns have it: readers take the shortest column.
+!> A snapshot appears whole (see `hdf5_file`), and then in the XDMF file beside the result.
+module result_file
+   use errors, only : error_file, error_input, error_type, fail
+   use file_system, only : is_folder, name_of, remove_file, rename_file
+   use hdf5_file, only : hdf5_file_type
+   use history_row, only : column_count, column_type, history_columns, history_row_type, row_values
+   use precision, only : dp, int8
+   use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
+   use version, only : asperity_version
+   use xdmf, only : snapshot_name, snapshot_type, write_xdmf
+   implicit none
+   private
+
+   public :: result_file_type, sibling_path
+
+   !> What a snapshot may hold.
+   type :: field_type
+      character(24) :: name
+      character(4) :: units
+      character(80) :: long_name
+   end type field_type
+
+   type(field_type), parameter :: known_fields(*) = [ &
+      field_type('pressure', 'Pa', 'normal traction on the rubber, pressure positive'), &
+      field_type('gap', 'm', 'gap between rubber and road'), &
+      field_type('displacement_z', 'm', 'displacement of the rubber along z'), &
+      field_type('traction_x', 'Pa', 'tangential traction on the rubber along x'), &
+      field_type('traction_y', 'Pa', 'tangential traction on the rubber along y'), &
+      field_type('displacement_x', 'm', 'displacement of the rubber along x'), &
+      field_type('displacement_y', 'm', 'displacement of the rubber along y'), &
+      field_type('slip_x', 'm', 'slip of the step along x'), &
+      field_type('slip_y', 'm', 'slip of the step along y'), &
+      field_type('contact', '1', 'state of contact: 0 open, 1 stick, 2 slip')]
+
+   !> An open result.
+   type :: result_file_type
+      private
+      type(hdf5_file_type) :: file
+      type(grid_type) :: grid
+      integer :: expected_rows = 0
+      integer :: compression = 0
+      character(:), allocatable :: xdmf_path
+      type(snapshot_type), allocatable :: snapshots(:)
+      type(snapshot_type) :: current                 !! the snapshot under construction
+      character(:), allocatable :: current_path
+      character(:), allocatable, public :: path      !! name of the file
+      integer, public :: rows = 0                    !! rows of the history
+   contains
+      procedure :: create => create_result
+      procedure :: reopen => reopen_result
+      procedure :: write_text
+      procedure :: append_row
+      procedure :: begin_snapshot
+      procedure, private :: write_real_field, write_state_field, write_material_value, &
+         write_material_values, start_field
+      !> Write a field into the snapshot under construction.
+      generic :: write_field => write_real_field, write_state_field
+      !> Write a number or numbers into /material.
+      generic :: write_material => write_material_value, write_material_values
+      procedure :: end_snapshot
+      procedure :: link_checkpoint
+      procedure :: unlink_checkpoint
+      procedure :: finish => finish_result
+      procedure :: close => close_result
+   end type result_file_type
+
+contains
+
+   !> Name of a file that belongs to a result: FILE without '.h5', with another ending.
+   pure function sibling_path(path, ending) result(sibling)
+      character(*), intent(in) :: path      !! name of the result
+      character(*), intent(in) :: ending    !! such as '.xdmf'
+      character(:), allocatable :: sibling
+      integer :: length
+
+      length = len_trim(path)
+      if (length > 3) then
+         if (path(length - 2:length) == '.h5') length = length - 3
+      end if
+      sibling = path(:length)//ending
+   end function sibling_path
+
+   !> Start a result; one of the same name is replaced, and its checkpoint removed.
+   subroutine create_result(self, path, title, input, settings, grid, height, expected_rows, &
+      expected_snapshots, compression, error)
+      class(result_file_type), intent(inout) :: self
+      character(*), intent(in) :: path               !! name of the file
+      character(*), intent(in) :: title
+      character(*), intent(in) :: input              !! the namelists, verbatim
+      character(*), intent(in) :: settings           !! every resolved setting, one a line
+      type(grid_type), intent(in) :: grid
+      real(dp), intent(in), contiguous :: height(:, :) !! height map before any sliding, m [nx, ny]
+      integer, intent(in) :: expected_rows           !! rows of the history when it is complete
+      integer, intent(in) :: expected_snapshots      !! snapshots when it is complete
+      integer, intent(in) :: compression             !! of fields, 0 none to 9 smallest
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: temporary
+      type(error_type), allocatable :: closing
+
+      self%grid = grid
+      self%expected_rows = expected_rows
+      self%compression = compression
+      self%rows = 0
+      self%path = trim(path)
+      self%xdmf_path = sibling_path(path, '.xdmf')
+      if (allocated(self%snapshots)) deallocate (self%snapshots)
+      allocate (self%snapshots(0))
+
+      if (is_folder(self%path)) then
+         call fail(error, error_file, self%path//': is a folder, not a file')
+         return
+      end if
+      temporary = self%path//'.new'
+      call self%file%open(temporary, 'create', error)
+      if (.not. allocated(error)) call write_frame()
+      if (allocated(error)) then
+         call self%file%close(closing)
+         call remove_file(temporary)
+         return
+      end if
+      call remove_file(sibling_path(path, '.checkpoint.h5'))
+      call remove_file(self%xdmf_path)
+      call rename_file(temporary, self%path, error)
+      if (allocated(error)) return
+      self%file%path = self%path
+
+   contains
+
+      !> Everything that is known before the first row.
+      subroutine write_frame()
+         integer :: i
+
+         call self%file%write_attribute('/', 'title', title, error)
+         if (allocated(error)) return
+         call self%file%write_attribute('/', 'program', 'asperity', error)
+         if (allocated(error)) return
+         call self%file%write_attribute('/', 'version', asperity_version, error)
+         if (allocated(error)) return
+         call self%file%write_attribute('/', 'created', utc_time(), error)
+         if (allocated(error)) return
+         call self%file%write_attribute('/', 'input', input, error)
+         if (allocated(error)) return
+         call self%file%write_attribute('/', 'settings', settings, error)
+         if (allocated(error)) return
+         call self%file%write_attribute('/', 'finished', 0, error)
+         if (allocated(error)) return
+         call self%file%write_attribute('/', 'expected_rows', expected_rows, error)
+         if (allocated(error)) return
+         call self%file%write('/grid/x', [(i*grid%dx, i=0, grid%nx - 1)], 'm', &
+            'centres of the cells along x', error)
+         if (allocated(error)) return
+         call self%file%write('/grid/y', [(i*grid%dy, i=0, grid%ny - 1)], 'm', &
+            'centres of the cells along y', error)
+         if (allocated(error)) return
+         call self%file%write_attribute('/grid', 'nx', grid%nx, error)
+         if (allocated(error)) return
+         call self%file%write_attribute('/grid', 'ny', grid%ny, error)
+         if (allocated(error)) return
+         call self%file%write_attribute('/grid', 'lx', grid%lx, error)
+         if (allocated(error)) return
+         call self%file%write_attribute('/grid', 'ly', grid%ly, error)
+         if (allocated(error)) return
+         call self%file%write_attribute('/grid', 'boundary', &
+            trim(merge('periodic', 'free    ', grid%boundary == boundary_periodic)), error)
+         if (allocated(error)) return
+         call self%file%write('/surface/height', height, 'm', 'height of the road', error, &
+            self%compression)
+         if (allocated(error)) return
+         call self%file%create_group('/material', error)
+         if (allocated(error)) return
+         call self%file%create_group('/snapshots', error, expected_snapshots)
+         if (allocated(error)) return
+         call self%file%create_group('/history', error, column_count)
+         if (allocated(error)) return
+         call create_columns(self, error)
+         if (allocated(error)) return
+         ! Made and removed: the root group keeps the room for this name.
+         call self%link_checkpoint(error)
+         if (allocated(error)) return
+         call self%unlink_checkpoint(error)
+      end subroutine write_frame
+
+   end subroutine create_result
+
+   !> Make the columns of the history. `step` is the last in the file, so that it grows last.
+   subroutine create_columns(self, error)
+      class(result_file_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      type(column_type) :: columns(column_count)
+      integer :: i, j
+
+      columns = history_columns()
+      do i = 1, column_count
+         j = mod(i, column_count) + 1
+         call self%file%create_column('/history/'//trim(columns(j)%name), columns(j)%whole, &
+            self%expected_rows, trim(columns(j)%units), trim(columns(j)%long_name), error)
+         if (allocated(error)) return
+      end do
+   end subroutine create_columns
+
+   !> Write a text as an attribute of the file, such as the name of a case.
+   subroutine write_text(self, name, value, error)
+      class(result_file_type), intent(inout) :: self
+      character(*), intent(in) :: name
+      character(*), intent(in) :: value
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%file%write_attribute('/', name, value, error)
+   end subroutine write_text
+
+   !> Write a number of the material; before the first row.
+   subroutine write_material_value(self, name, value, units, long_name, error)
+      class(result_file_type), intent(inout) :: self
+      character(*), intent(in) :: name      !! such as 'poisson'
+      real(dp), intent(in) :: value
+      character(*), intent(in) :: units
+      character(*), intent(in) :: long_name
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%file%write('/material/'//name, value, units, long_name, error)
+   end subroutine write_material_value
+
+   !> Write numbers of the material, such as the moduli of its arms; before the first row.
+   subroutine write_material_values(self, name, values, units, long_name, error)
+      class(result_file_type), intent(inout) :: self
+      character(*), intent(in) :: name      !! such as 'prony_g'
+      real(dp), intent(in), contiguous :: values(:)
+      character(*), intent(in) :: units
+      character(*), intent(in) :: long_name
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%file%write('/material/'//name, values, units, long_name, error)
+   end subroutine write_material_values
+
+   !> Add a row to the history; afterwards a kill cannot take it away.
+   subroutine append_row(self, row, error)
+      class(result_file_type), intent(inout) :: self
+      type(history_row_type), intent(in) :: row
+      type(error_type), allocatable, intent(out) :: error
+      type(column_type) :: columns(column_count)
+      real(dp) :: values(column_count)
+      integer :: i
+
+      columns = history_columns()
+      values = row_values(row)
+      if (self%rows == 0) then
+         ! The first row sets the columns' space aside, which takes several blocks of the file:
+         ! it is written into a new group that takes the empty one's place.
+         call self%file%flush(error)
+         if (allocated(error)) return
+         call self%file%stage_group('/history', error)
+         if (allocated(error)) return
+         call create_columns(self, error)
+         if (allocated(error)) return
+      end if
+      do i = 1, column_count
+         call self%file%append_value('/history/'//trim(columns(i)%name), self%rows, values(i), &
+            error)
+         if (allocated(error)) return
+      end do
+      if (self%rows == 0) then
+         call self%file%publish_group(error)
+      else
+         call self%file%flush(error)
+      end if
+      if (allocated(error)) return
+      self%rows = self%rows + 1
+   end subroutine append_row
+
+   !> Start a snapshot.
+   subroutine begin_snapshot(self, step, time, phase, error)
+      class(result_file_type), intent(inout) :: self
+      integer, intent(in) :: step           !! row of the history
+      real(dp), intent(in) :: time          !! s
+      integer, intent(in) :: phase          !! number of the phase, from 1
+      type(error_type), allocatable, intent(out) :: error
+
+      self%current_path = '/snapshots/'//snapshot_name(step)
+      self%current%step = step
+      self%current%time = time
+      if (allocated(self%current%fields)) deallocate (self%current%fields)
+      allocate (self%current%fields(0))
+      call self%file%stage_group(self%current_path, error)
+      if (allocated(error)) return
+      call self%file%write_attribute(self%current_path, 'step', step, error)
+      if (allocated(error)) return
+      call self%file%write_attribute(self%current_path, 'time', time, error)
+      if (allocated(error)) return
+      call self%file%write_attribute(self%current_path, 'phase', phase, error)
+   end subroutine begin_snapshot
+
+   !> Look a field's name up, and note it.
+   subroutine start_field(self, name, known, error)
+      class(result_file_type), intent(inout) :: self
+      character(*), intent(in) :: name
+      type(field_type), intent(out) :: known
+      type(error_type), allocatable, intent(out) :: error
+      integer :: i
+
+      do i = 1, size(known_fields)
+         if (known_fields(i)%name == name) then
+            known = known_fields(i)
+            self%current%fields = [character(24) :: self%current%fields, name]
+            return
+         end if
+      end do
+      call fail(error, error_input, 'snapshots have no field "'//trim(name)//'"')
+   end subroutine start_field
+
+   !> Write a field of reals.
+   subroutine write_real_field(self, name, field, error)
+      class(result_file_type), intent(inout) :: self
+      character(*), intent(in) :: name      !! as in the interface, such as 'pressure'
+      real(dp), intent(in), contiguous :: field(:, :) !! [nx, ny]
+      type(error_type), allocatable, intent(out) :: error
+      type(field_type) :: known
+
+      call self%start_field(name, known, error)
+      if (allocated(error)) return
+      call self%file%write(self%current_path//'/'//trim(name), field, trim(known%units), &
+         trim(known%long_name), error, self%compression)
+   end subroutine write_real_field
+
+   !> Write a field of states.
+   subroutine write_state_field(self, name, field, error)
+      class(result_file_type), intent(inout) :: self
+      character(*), intent(in) :: name      !! 'contact'
+      integer(int8), intent(in), contiguous :: field(:, :) !! [nx, ny]
+      type(error_type), allocatable, intent(out) :: error
+      type(field_type) :: known
+
+      call self%start_field(name, known, error)
+      if (allocated(error)) return
+      call self%file%write(self%current_path//'/'//trim(name), field, trim(known%units), &
+         trim(known%long_name), error, self%compression)
+   end subroutine write_state_field
+
+   !> Let the snapshot appear, in the result and in the XDMF file.
+   subroutine end_snapshot(self, error)
+      class(result_file_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%file%publish_group(error)
+      if (allocated(error)) return
+      self%snapshots = [self%snapshots, self%current]
+      call write_xdmf(self%xdmf_path, self%path, self%grid, self%snapshots, error)
+   end subroutine end_snapshot
+
+   !> Let /checkpoint of the result stand for the checkpoint, a file of its own.
+   subroutine link_checkpoint(self, error)
+      class(result_file_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+
+      if (self%file%has_link('/checkpoint')) return
+      call self%file%link_external('/checkpoint', name_of(sibling_path(self%path, &
+         '.checkpoint.h5')), '/', error)
+      if (allocated(error)) return
+      call self%file%flush(error)
+   end subroutine link_checkpoint
+
+   !> Take /checkpoint away.
+   subroutine unlink_checkpoint(self, error)
+      class(result_file_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. self%file%has_link('/checkpoint')) return
+      call self%file%remove('/checkpoint', error)
+      if (allocated(error)) return
+      call self%file%flush(error)
+   end subroutine unlink_checkpoint
+
+   !> Say whether the run came to its end.
+   subroutine finish_result(self, finished, error)
+      class(result_file_type), intent(inout) :: self
+      logical, intent(in) :: finished
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%file%write_attribute('/', 'finished', merge(1, 0, finished), error)
+      if (allocated(error)) return
+      call self%file%flush(error)
+   end subroutine finish_result
+
+   !> Close the file.
+   subroutine close_result(self, error)
+      class(result_file_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%file%close(error)
+   end subroutine close_result
+
+   !> Open a result to go on with it after a given row: later rows and snapshots are dropped.
+   subroutine reopen_result(self, path, last_step, compression, error)
+      class(result_file_type), intent(inout) :: self
+      character(*), intent(in) :: path
+      integer, intent(in) :: last_step      !! the last row to keep, from 0
+      integer, intent(in) :: compression    !! of fields, 0 none to 9 smallest
+      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable :: closing
+
+      self%path = trim(path)
+      self%compression = compression
+      self%xdmf_path = sibling_path(path, '.xdmf')
+      call self%file%open(self%path, 'append', error)
+      if (allocated(error)) return
+      call go_back(self, last_step, error)
+      if (allocated(error)) call self%file%close(closing)
+   end subroutine reopen_result
+
+   !> Drop what lies behind a row.
+   subroutine go_back(self, last_step, error)
+      class(result_file_type), intent(inout) :: self
+      integer, intent(in) :: last_step
+      type(error_type), allocatable, intent(out) :: error
+      type(column_type) :: columns(column_count)
+      integer, allocatable :: extent(:)
+      character(120) :: text
+      integer :: i
+
+      columns = history_columns()
+      self%rows = huge(1)
+      do i = 1, column_count
+         call self%file%dataset_shape('/history/'//trim(columns(i)%name), extent, error)
+         if (allocated(error)) return
+         self%rows = min(self%rows, extent(1))
+      end do
+      if (last_step < 0 .or. last_step >= self%rows) then
+         write (text, '(": the history has ", i0, " rows, the run would go on after row ", i0)') &
+            self%rows, last_step
+         call fail(error, error_file, self%path//trim(text))
+         return
+      end if
+      call read_grid(self, error)
+      if (allocated(error)) return
+      call self%file%read_attribute('/', 'expected_rows', self%expected_rows, error)
+      if (allocated(error)) return
+      if (self%rows > last_step + 1) call shorten_history(self, last_step + 1, error)
+      if (allocated(error)) return
+      call keep_snapshots(self, last_step, error)
+      if (allocated(error)) return
+      call self%file%flush(error)
+      if (allocated(error)) return
+      if (self%rows > last_step + 1) call self%file%publish_group(error)
+      if (allocated(error)) return
+      self%rows = last_step + 1
+      call self%finish(.false., error)
+      if (allocated(error)) return
+      call write_xdmf(self%xdmf_path, self%path, self%grid, self%snapshots, error)
+   end subroutine go_back
+
+   !> Write the first rows of the history into a new group, to take the old one's place. It lies at
+   !> the end of the file, so that removing snapshots does not shorten the file.
+   subroutine shorten_history(self, rows, error)
+      class(result_file_type), intent(inout) :: self
+      integer, intent(in) :: rows
+      type(error_type), allocatable, intent(out) :: error
+      type(column_type) :: columns(column_count)
+      real(dp), allocatable :: values(:, :), column(:)
+      integer :: i
+
+      columns = history_columns()
+      allocate (values(rows, column_count))
+      do i = 1, column_count
+         call self%file%read('/history/'//trim(columns(i)%name), column, error)
+         if (allocated(error)) return
+         values(:, i) = column(:rows)
+      end do
+      call self%file%stage_group('/history', error)
+      if (allocated(error)) return
+      call create_columns(self, error)
+      do i = 1, column_count
+         if (allocated(error)) return
+         call self%file%append_values('/history/'//trim(columns(i)%name), 0, values(:, i), error)
+      end do
+      if (allocated(error)) return
+      call self%file%flush(error)
+   end subroutine shorten_history
+
+   !> Read the grid of a result.
+   subroutine read_grid(self, error)
+      class(result_file_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      integer :: nx, ny
+      real(dp) :: lx, ly
+      character(:), allocatable :: boundary
+
+      call self%file%read_attribute('/grid', 'nx', nx, error)
+      if (allocated(error)) return
+      call self%file%read_attribute('/grid', 'ny', ny, error)
+      if (allocated(error)) return
+      call self%file%read_attribute('/grid', 'lx', lx, error)
+      if (allocated(error)) return
+      call self%file%read_attribute('/grid', 'ly', ly, error)
+      if (allocated(error)) return
+      call self%file%read_attribute('/grid', 'boundary', boundary, error)
+      if (allocated(error)) return
+      self%grid = new_grid(nx, ny, lx, ly, &
+         merge(boundary_periodic, boundary_free, boundary == 'periodic'))
+   end subroutine read_grid
+
+   !> Note the snapshots up to a row and remove the later ones.
+   subroutine keep_snapshots(self, last_step, error)
+      class(result_file_type), intent(inout) :: self
+      integer, intent(in) :: last_step
+      type(error_type), allocatable, intent(out) :: error
+      character(256), allocatable :: names(:), fields(:)
+      type(snapshot_type) :: snapshot
+      integer :: i, j
+      character(:), allocatable :: path
+
+      if (allocated(self%snapshots)) deallocate (self%snapshots)
+      allocate (self%snapshots(0))
+      call self%file%members('/snapshots', names, error)
+      if (allocated(error)) return
+      do i = 1, size(names)
+         path = '/snapshots/'//trim(names(i))
+         call self%file%read_attribute(path, 'step', snapshot%step, error)
+         if (allocated(error)) return
+         if (snapshot%step > last_step) then
+            call self%file%remove(path, error)
+            if (allocated(error)) return
+            cycle
+         end if
+         call self%file%read_attribute(path, 'time', snapshot%time, error)
+         if (allocated(error)) return
+         call self%file%members(path, fields, error)
+         if (allocated(error)) return
+         if (allocated(snapshot%fields)) deallocate (snapshot%fields)
+         allocate (snapshot%fields(size(fields)))
+         do j = 1, size(fields)
+            snapshot%fields(j) = fields(j) (:24)
+         end do
+         self%snapshots = [self%snapshots, snapshot]
+      end do
+   end subroutine keep_snapshots
+
+   !> Now, as ISO 8601 in UTC.
+   function utc_time() result(text)
+      character(20) :: text
+      integer :: values(8), days, minutes, year, month, day, length
+      integer, parameter :: month_days(12) = [31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31]
+
+      call date_and_time(values=values)
+      year = values(1)
+      month = values(2)
+      day = values(3)
+      minutes = 60*values(5) + values(6) - values(4)
+      days = 0
+      if (minutes < 0) days = -1
+      if (minutes >= 1440) days = 1
+      minutes = minutes - 1440*days
+      day = day + days
+      if (day < 1) then
+         month = month - 1
+         if (month < 1) then
+            month = 12
+            year = year - 1
+         end if
+         day = last_day()
+      end if
+      length = last_day()
+      if (day > length) then
+         day = 1
+         month = month + 1
+         if (month > 12) then
+            month = 1
+            year = year + 1
+         end if
+      end if
+      write (text, '(i4.4, "-", i2.2, "-", i2.2, "T", i2.2, ":", i2.2, ":", i2.2, "Z")') &
+         year, month, day, minutes/60, mod(minutes, 60), values(7)
+
+   contains
+
+      !> Number of days of the month.
+      integer function last_day()
+         last_day = month_days(month)
+         if (month /= 2) return
+         if (mod(year, 4) == 0 .and. (mod(year, 100) /= 0 .or. mod(year, 400) == 0)) last_day = 29
+      end function last_day
+
+   end function utc_time
+
+end module result_file

@@ -1,0 +1,126 @@
+!> A small run that writes a result and nothing else: tests kill it, fill its disk, read it.
+module result_writer
+   use checkpoint, only : checkpoint_reader_type, checkpoint_writer_type, pair_type
+   use errors, only : error_type
+   use history_row, only : history_row_type
+   use precision, only : dp, int8
+   use regular_grid, only : boundary_periodic, grid_type, new_grid
+   use result_file, only : result_file_type
+   implicit none
+   private
+
+   public :: write_result, row_of, pressure_of
+
+   integer, parameter, public :: nx = 7, ny = 4
+
+contains
+
+   !> Row of a step; all its numbers follow from the step.
+   pure function row_of(step) result(row)
+      integer, intent(in) :: step
+      type(history_row_type) :: row
+
+      row%step = step
+      row%phase = 1 + step/10
+      row%time = 0.25_dp*step
+      row%friction = 1.0_dp + step
+      row%seconds = 2.0_dp*step
+   end function row_of
+
+   !> Pressure of a step, larger along y than along x.
+   pure function pressure_of(step) result(pressure)
+      integer, intent(in) :: step
+      real(dp) :: pressure(nx, ny)
+      integer :: i, j
+
+      do j = 1, ny
+         do i = 1, nx
+            pressure(i, j) = 1000.0_dp*step + 10.0_dp*(j - 1) + (i - 1)
+         end do
+      end do
+   end function pressure_of
+
+   !> Write `rows` rows, a snapshot every third, a checkpoint every fourth step.
+   subroutine write_result(path, rows, compression, restart, error)
+      character(*), intent(in) :: path
+      integer, intent(in) :: rows
+      integer, intent(in) :: compression
+      logical, intent(in) :: restart        !! go on from the checkpoint
+      type(error_type), allocatable, intent(out) :: error
+      type(result_file_type) :: output
+      type(checkpoint_writer_type) :: state
+      type(checkpoint_reader_type) :: old
+      type(error_type), allocatable :: closing
+      type(grid_type) :: grid
+      type(pair_type) :: settings(1)
+      integer :: step, first
+
+      settings(1)%name = 'grid: nx'
+      settings(1)%value = '7'
+      grid = new_grid(nx, ny, 14.0_dp, 4.0_dp, boundary_periodic)
+      first = 0
+      if (restart) then
+         call old%open(path, error)
+         if (allocated(error)) return
+         call old%get('step', first, error)
+         if (allocated(error)) return
+         call old%close()
+         call output%reopen(path, first, compression, error)
+         first = first + 1
+      else
+         call output%create(path, 'a small run', '&case title = ''a small run'' /', 'nx = 7', &
+            grid, pressure_of(0), rows, rows/3 + 1, compression, error)
+         if (.not. allocated(error)) call output%write_material('prony_g', [1.0_dp, 2.0_dp], &
+            'Pa', 'moduli of the arms', error)
+         if (.not. allocated(error)) call output%write_material('poisson', 0.5_dp, '1', &
+            'Poisson''s ratio', error)
+      end if
+      do step = first, rows - 1
+         if (allocated(error)) exit
+         call output%append_row(row_of(step), error)
+         if (.not. allocated(error) .and. mod(step, 3) == 0) call write_snapshot(step)
+         if (.not. allocated(error) .and. mod(step, 4) == 3) call write_state(step)
+      end do
+      if (.not. allocated(error)) call output%finish(.true., error)
+      if (allocated(error)) then
+         call output%close(closing)
+      else
+         call output%close(error)
+      end if
+
+   contains
+
+      subroutine write_snapshot(step)
+         integer, intent(in) :: step
+         integer(int8) :: contact(nx, ny)
+
+         contact = int(mod(step, 3), int8)
+         contact(2, 1) = 1_int8
+         call output%begin_snapshot(step, 0.25_dp*step, 1, error)
+         if (allocated(error)) return
+         call output%write_field('pressure', pressure_of(step), error)
+         if (allocated(error)) return
+         call output%write_field('gap', -pressure_of(step), error)
+         if (allocated(error)) return
+         call output%write_field('contact', contact, error)
+         if (allocated(error)) return
+         call output%end_snapshot(error)
+      end subroutine write_snapshot
+
+      subroutine write_state(step)
+         integer, intent(in) :: step
+
+         call state%start(path, settings, error)
+         if (allocated(error)) return
+         call state%put('step', step, error)
+         if (allocated(error)) return
+         call state%put('pressure', pressure_of(step), 'Pa', error)
+         if (allocated(error)) return
+         call state%commit(error)
+         if (allocated(error)) return
+         call output%link_checkpoint(error)
+      end subroutine write_state
+
+   end subroutine write_result
+
+end module result_writer

@@ -1,0 +1,167 @@
+!> Tests of the result: the layout, rows and snapshots, going on after a given row, a full disk.
+module test_result_file
+   use check, only : begin_suite, check_close, check_error, check_no_error, check_that
+   use checkpoint, only : checkpoint_path
+   use errors, only : error_file, error_type
+   use file_system, only : file_exists, remove_file
+   use hdf5_file, only : hdf5_file_type
+   use history_row, only : column_count, column_type, history_columns
+   use precision, only : dp, int8
+   use regular_grid, only : boundary_free, new_grid
+   use result_file, only : result_file_type, sibling_path
+   use result_writer, only : nx, ny, pressure_of, write_result
+   implicit none
+   private
+
+   public :: run_result_file
+
+   character(*), parameter :: path = 'test_result_file.h5'
+
+contains
+
+   subroutine run_result_file()
+      call begin_suite('result_file')
+      call layout_is_kept()
+      call run_goes_on()
+      call wrong_use_is_refused()
+      call remove_file(path)
+      call remove_file(checkpoint_path(path))
+      call remove_file(sibling_path(path, '.xdmf'))
+   end subroutine run_result_file
+
+   !> What is in a whole result.
+   subroutine layout_is_kept()
+      type(hdf5_file_type) :: file
+      type(error_type), allocatable :: error
+      type(column_type) :: columns(column_count)
+      character(:), allocatable :: text
+      character(256), allocatable :: names(:)
+      character(24), parameter :: root_texts(*) = [character(24) :: &
+         'title', 'program', 'version', 'created', 'input', 'settings']
+      real(dp), allocatable :: x(:), field(:, :)
+      integer, allocatable :: n(:)
+      integer(int8), allocatable :: contact(:, :)
+      real(dp) :: time
+      integer :: i, finished
+
+      call write_result(path, 13, 3, .false., error)
+      call check_no_error(error, 'written')
+      call check_that(.not. file_exists(path//'.new'), 'no temporary file left')
+      call file%open(path, 'read', error)
+      call check_no_error(error, 'open')
+      do i = 1, size(root_texts)
+         call file%read_attribute('/', trim(root_texts(i)), text, error)
+         call check_no_error(error, trim(root_texts(i)))
+         call check_that(len(text) > 0, trim(root_texts(i)))
+      end do
+      call file%read_attribute('/', 'input', text, error)
+      call check_that(text == '&case title = ''a small run'' /', 'input verbatim')
+      call file%read_attribute('/', 'created', text, error)
+      call check_that(len(text) == 20 .and. text(11:11) == 'T' .and. text(20:20) == 'Z', 'created')
+      call file%read_attribute('/', 'finished', finished, error)
+      call check_that(finished == 1, 'finished')
+      call file%read('/grid/x', x, error)
+      call check_that(size(x) == nx .and. all(abs(x - [(2.0_dp*i, i=0, nx - 1)]) <= 0.0_dp), 'x')
+      call file%read('/grid/y', x, error)
+      call check_that(size(x) == ny, 'y')
+      call file%read_attribute('/grid', 'boundary', text, error)
+      call check_that(text == 'periodic', 'boundary')
+      call file%read('/surface/height', field, error)
+      call check_that(all(abs(field - pressure_of(0)) <= 0.0_dp), 'height')
+      call file%read('/material/prony_g', x, error)
+      call check_that(size(x) == 2, 'material')
+      call check_that(file%has_dataset('/material/poisson'), 'poisson')
+
+      columns = history_columns()
+      do i = 1, column_count
+         call file%read('/history/'//trim(columns(i)%name), x, error)
+         call check_no_error(error, 'column '//trim(columns(i)%name))
+         call check_that(size(x) == 13, 'length of '//trim(columns(i)%name))
+         call file%read_attribute('/history/'//trim(columns(i)%name), 'units', text, error)
+         call check_that(text == trim(columns(i)%units), 'units of '//trim(columns(i)%name))
+      end do
+      call file%read('/history/step', n, error)
+      call check_that(all(n == [(i, i=0, 12)]), 'steps')
+      call file%read('/history/friction', x, error)
+      call check_that(all(abs(x - [(1.0_dp + i, i=0, 12)]) <= 0.0_dp), 'friction')
+
+      call file%members('/snapshots', names, error)
+      call check_that(size(names) == 5 .and. names(5) == '000012', 'snapshots')
+      call file%read_attribute('/snapshots/000012', 'time', time, error)
+      call check_close(time, 3.0_dp, 0.0_dp, 'time of a snapshot')
+      call file%read('/snapshots/000012/pressure', field, error)
+      call check_that(all(abs(field - pressure_of(12)) <= 0.0_dp), 'field of a snapshot')
+      call file%read('/snapshots/000012/contact', contact, error)
+      call check_that(contact(2, 1) == 1_int8 .and. contact(1, 2) == 0_int8, 'contact map')
+      call check_that(file%has('/checkpoint'), 'checkpoint seen through the result')
+      call file%read('/checkpoint/pressure', field, error)
+      call check_that(all(abs(field - pressure_of(11)) <= 0.0_dp), 'field of the checkpoint')
+      call file%close(error)
+   end subroutine layout_is_kept
+
+   !> A run that goes on from its checkpoint drops what came after it, and ends the same.
+   subroutine run_goes_on()
+      type(hdf5_file_type) :: file
+      type(error_type), allocatable :: error
+      type(result_file_type) :: output
+      character(256), allocatable :: names(:)
+      real(dp), allocatable :: x(:), field(:, :)
+      integer :: i, finished
+
+      call write_result(path, 14, 0, .false., error)
+      call check_no_error(error, 'written')
+      call output%reopen(path, 7, 0, error)
+      call check_no_error(error, 'opened again')
+      call check_that(output%rows == 8, 'rows kept')
+      call output%close(error)
+      call check_no_error(error, 'closed')
+      call file%open(path, 'read', error)
+      call file%read('/history/time', x, error)
+      call check_that(size(x) == 8 .and. all(abs(x - [(0.25_dp*i, i=0, 7)]) <= 0.0_dp), 'history')
+      call file%members('/snapshots', names, error)
+      call check_that(size(names) == 3 .and. names(3) == '000006', 'snapshots kept')
+      call file%read('/snapshots/000006/pressure', field, error)
+      call check_that(all(abs(field - pressure_of(6)) <= 0.0_dp), 'field kept')
+      call file%read_attribute('/', 'finished', finished, error)
+      call check_that(finished == 0, 'no longer finished')
+      call file%close(error)
+
+      call write_result(path, 14, 0, .false., error)
+      call write_result(path, 14, 0, .true., error)
+      call check_no_error(error, 'gone on')
+      call file%open(path, 'read', error)
+      call file%read('/history/time', x, error)
+      call check_that(size(x) == 14 .and. all(abs(x - [(0.25_dp*i, i=0, 13)]) <= 0.0_dp), 'rows')
+      call file%members('/snapshots', names, error)
+      call check_that(size(names) == 5, 'snapshots')
+      call file%close(error)
+
+      call output%reopen(path, 14, 0, error)
+      call check_error(error, 'the history has 14 rows, the run would go on after row 14', 'too far')
+      call check_that(error%status == error_file, 'status')
+   end subroutine run_goes_on
+
+   !> What cannot be done is said; a file that cannot be made leaves nothing.
+   subroutine wrong_use_is_refused()
+      type(result_file_type) :: output
+      type(error_type), allocatable :: error
+
+      call output%create('no_such_folder/x.h5', 't', 'i', 's', &
+         new_grid(nx, ny, 1.0_dp, 1.0_dp, boundary_free), pressure_of(0), 1, 1, 0, error)
+      call check_error(error, 'there is no folder "no_such_folder"', 'no folder')
+      call output%create('.', 't', 'i', 's', &
+         new_grid(nx, ny, 1.0_dp, 1.0_dp, boundary_free), pressure_of(0), 1, 1, 0, error)
+      call check_error(error, 'is a folder', 'folder')
+      call output%create(path, 't', 'i', 's', &
+         new_grid(nx, ny, 1.0_dp, 1.0_dp, boundary_free), pressure_of(0), 1, 1, 0, error)
+      call check_no_error(error, 'a free grid')
+      call check_that(.not. file_exists(checkpoint_path(path)), 'old checkpoint removed')
+      call output%begin_snapshot(0, 0.0_dp, 1, error)
+      call output%write_field('pessure', pressure_of(0), error)
+      call check_error(error, 'snapshots have no field "pessure"', 'unknown field')
+      call output%begin_snapshot(1, 0.0_dp, 1, error)
+      call check_error(error, '/snapshots/000000 is not finished yet', 'two at once')
+      call output%close(error)
+   end subroutine wrong_use_is_refused
+
+end module test_result_file
