@@ -1,12 +1,15 @@
 !> The one driver of the Fortran tests: all suites, or those named on the command line.
 program main
    use check, only : finish
+   use result_writer, only : run_writer
    use test_base, only : run_base
    use test_case_input, only : run_case_input
+   use test_checkpoint, only : run_checkpoint
    use test_fft_conv, only : run_fft_conv
    use test_hdf5_file, only : run_hdf5_file
    use test_interpolation, only : run_interpolation
    use test_prony, only : run_prony
+   use test_result_file, only : run_result_file
    use test_roughness, only : run_roughness
    use test_surface, only : run_surface
    use test_viscoelastic_energy, only : run_viscoelastic_energy
@@ -14,6 +17,11 @@ program main
    use test_normal_cg, only : run_normal_cg
    implicit none
 
+   ! check writer FILE ROWS COMPRESSION [restart]: a run for tests that kill it, and no test.
+   if (called('writer')) then
+      call run_writer()
+      stop
+   end if
    if (wanted('base')) call run_base()
    if (wanted('fft_conv')) call run_fft_conv()
    if (wanted('hdf5_file')) call run_hdf5_file()
@@ -25,9 +33,20 @@ program main
    if (wanted('zener')) call run_zener()
    if (wanted('viscoelastic_energy')) call run_viscoelastic_energy()
    if (wanted('normal_cg')) call run_normal_cg()
+   if (wanted('result_file')) call run_result_file()
+   if (wanted('checkpoint')) call run_checkpoint()
    call finish()
 
 contains
+
+   !> Is this the first argument?
+   logical function called(verb)
+      character(*), intent(in) :: verb
+      character(64) :: argument
+
+      call get_command_argument(1, argument)
+      called = argument == verb
+   end function called
 
    !> Is this suite asked for?
    logical function wanted(suite)

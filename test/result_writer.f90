@@ -1,5 +1,6 @@
 !> A small run that writes a result and nothing else: tests kill it, fill its disk, read it.
 module result_writer
+   use, intrinsic :: iso_fortran_env, only : error_unit
    use checkpoint, only : checkpoint_reader_type, checkpoint_writer_type, pair_type
    use errors, only : error_type
    use history_row, only : history_row_type
@@ -9,7 +10,7 @@ module result_writer
    implicit none
    private
 
-   public :: write_result, row_of, pressure_of
+   public :: run_writer, write_result, row_of, pressure_of
 
    integer, parameter, public :: nx = 7, ny = 4
 
@@ -39,6 +40,23 @@ contains
          end do
       end do
    end function pressure_of
+
+   !> Write what the command line asks for: writer FILE ROWS COMPRESSION [restart].
+   subroutine run_writer()
+      type(error_type), allocatable :: error
+      character(1024) :: path, number
+      integer :: rows, compression
+
+      call get_command_argument(2, path)
+      call get_command_argument(3, number)
+      read (number, *) rows
+      call get_command_argument(4, number)
+      read (number, *) compression
+      call write_result(trim(path), rows, compression, command_argument_count() > 4, error)
+      if (.not. allocated(error)) return
+      write (error_unit, '(a)') error%message
+      error stop 3
+   end subroutine run_writer
 
    !> Write `rows` rows, a snapshot every third, a checkpoint every fourth step.
    subroutine write_result(path, rows, compression, restart, error)
