@@ -4,7 +4,7 @@ module text_tools
    implicit none
    private
 
-   public :: lower, nearest, ordinary, to_text
+   public :: exact_text, lower, nearest, ordinary, to_text
 
    !> A number as short text.
    interface to_text
@@ -142,14 +142,39 @@ contains
    pure function text_of_real(number) result(text)
       real(dp), intent(in) :: number
       character(:), allocatable :: text
-      character(40) :: buffer
-      integer :: exponent, point
 
-      if (number == 0.0_dp) then
+      text = with_digits(number, 6)
+   end function text_of_real
+
+   !> A real number with as few digits as give the same number when read again.
+   pure function exact_text(number) result(text)
+      real(dp), intent(in) :: number
+      character(:), allocatable :: text
+      integer :: digits, status
+      real(dp) :: again
+
+      do digits = 1, 17
+         text = with_digits(number, digits)
+         read (text, *, iostat=status) again
+         if (status /= 0) cycle
+         if (abs(again - number) <= 0.0_dp) return
+      end do
+   end function exact_text
+
+   !> A real number rounded to so many significant digits, without zeros at its end.
+   pure function with_digits(number, digits) result(text)
+      real(dp), intent(in) :: number
+      integer, intent(in) :: digits             !! 1 to 17
+      character(:), allocatable :: text
+      character(40) :: buffer
+      character(40) :: figures
+      integer :: exponent, n, point
+
+      if (abs(number) <= 0.0_dp) then
          text = '0'
          return
       end if
-      write (buffer, '(es14.5e3)') number
+      write (buffer, '(es40.'//text_of_integer(digits - 1)//'e3)') abs(number)
       buffer = adjustl(buffer)
       point = index(buffer, 'E')
       if (point == 0) then                          ! NaN, Infinity
@@ -157,29 +182,21 @@ contains
          return
       end if
       read (buffer(point + 1:), *) exponent
-      if (exponent >= -3 .and. exponent <= 6) then
-         write (buffer, '(f20.'//achar(iachar('0') + max(0, 5 - exponent))//')') number
-         buffer = adjustl(buffer)
-         text = without_zeros(trim(buffer))
+      figures = buffer(1:1)//buffer(3:point - 1)
+      n = max(1, verify(trim(figures), '0', back=.true.))
+
+      if (exponent >= 0 .and. exponent <= 6) then
+         if (n < exponent + 1) figures(n + 1:exponent + 1) = repeat('0', exponent + 1 - n)
+         text = figures(:exponent + 1)
+         if (n > exponent + 1) text = text//'.'//figures(exponent + 2:n)
+      else if (exponent < 0 .and. exponent >= -3) then
+         text = '0.'//repeat('0', -exponent - 1)//figures(:n)
       else
-         text = without_zeros(buffer(:point - 1))//'e'//text_of_integer(exponent)
+         text = figures(1:1)
+         if (n > 1) text = text//'.'//figures(2:n)
+         text = text//'e'//text_of_integer(exponent)
       end if
-   end function text_of_real
-
-   !> Decimals without zeros at their end, and without a point at the end.
-   pure function without_zeros(decimals) result(short)
-      character(*), intent(in) :: decimals
-      character(:), allocatable :: short
-      integer :: n
-
-      n = len(decimals)
-      if (index(decimals, '.') > 0) then
-         do while (decimals(n:n) == '0')
-            n = n - 1
-         end do
-         if (decimals(n:n) == '.') n = n - 1
-      end if
-      short = decimals(:n)
-   end function without_zeros
+      if (number < 0.0_dp) text = '-'//text
+   end function with_digits
 
 end module text_tools

@@ -1,0 +1,243 @@
+!> What the user typed, as a type; and the help texts.
+module command_line
+   use errors, only : add_fault, error_input, error_type
+   use text_tools, only : nearest, ordinary
+   implicit none
+   private
+
+   public :: command_type, help_text, read_command_line
+
+   !> A command.
+   type :: command_type
+      character(:), allocatable :: verb        !! 'run', 'check', 'template', 'info', 'version', 'help'
+      character(:), allocatable :: path        !! of the input or the result; the name of a template
+      character(:), allocatable :: output      !! --output; not allocated if not given
+      integer :: threads = -1                  !! --threads; -1 if not given
+      logical :: restart = .false.             !! --restart
+      logical :: quiet = .false.               !! --quiet
+      logical :: reference = .false.           !! --reference
+      character(:), allocatable :: help_of     !! verb that help is asked for; '' for the program's
+   end type command_type
+
+   character(*), parameter :: nl = new_line('a')
+   character(*), parameter :: verbs(4) = [character(8) :: 'run', 'check', 'template', 'info']
+   character(*), parameter :: options(8) = [character(11) :: '--output', '--threads', '--restart', &
+      '--quiet', '--help', '--version', '--reference', '-h']
+
+contains
+
+   !> Read the command line; all its faults are reported.
+   subroutine read_command_line(command, error)
+      type(command_type), intent(out) :: command
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: argument, name
+      logical :: help, options_end
+      integer :: i
+
+      command%verb = ''
+      help = .false.
+      options_end = .false.
+      i = 0
+      do while (i < command_argument_count())
+         i = i + 1
+         argument = argument_text(i)
+         if (argument == '--' .and. .not. options_end) then
+            options_end = .true.
+         else if (len(argument) > 1 .and. index(argument, '-') == 1 .and. .not. options_end) then
+            name = argument
+            if (index(argument, '--') == 1 .and. index(argument, '=') > 0) &
+               name = argument(:index(argument, '=') - 1)
+            if (name /= argument .and. name /= '--output' .and. name /= '--threads') then
+               if (any(options == name)) then
+                  call refuse(name//' takes no value')
+                  cycle
+               end if
+            end if
+            select case (name)
+            case ('--help', '-h')
+               help = .true.
+            case ('--version')
+               command%verb = 'version'
+            case ('--restart')
+               command%restart = .true.
+            case ('--quiet')
+               command%quiet = .true.
+            case ('--reference')
+               command%reference = .true.
+            case ('--output')
+               if (allocated(command%output)) call refuse('--output is given twice')
+               call take_value(command%output)
+            case ('--threads')
+               call take_threads()
+            case default
+               call refuse(ordinary(name, 60)//': there is no such option'//hint(nearest(name, options)))
+            end select
+         else if (command%verb == '') then
+            command%verb = argument
+            if (argument == 'help') then
+               help = .true.
+            else if (.not. any(verbs == argument)) then
+               call refuse(''''//ordinary(argument, 60)//''': there is no such command'// &
+                  hint(nearest(argument, verbs))//'; run, check, template and info are there')
+               return
+            end if
+         else if (.not. allocated(command%path)) then
+            command%path = argument
+         else
+            call refuse(''''//ordinary(argument, 60)//''' is one argument too many')
+         end if
+      end do
+
+      if (help) then
+         command%help_of = ''
+         if (any(verbs == command%verb)) command%help_of = command%verb
+         if (command%verb == 'help' .and. allocated(command%path)) then
+            if (any(verbs == command%path)) command%help_of = command%path
+         end if
+         command%verb = 'help'
+      else if (command%verb == '') then
+         if (.not. allocated(error)) call refuse('no command is given: run, check, template and info '// &
+            'are there; asperity --help says more')
+      else
+         call check_fit(command, error)
+      end if
+
+   contains
+
+      !> Add a fault.
+      subroutine refuse(message)
+         character(*), intent(in) :: message
+
+         call add_fault(error, error_input, 'asperity: '//message)
+      end subroutine refuse
+
+      !> The value of the option in hand: behind its '=', or the next argument.
+      subroutine take_value(value)
+         character(:), allocatable, intent(inout) :: value
+
+         if (name /= argument) then
+            value = argument(len(name) + 2:)
+         else if (i < command_argument_count()) then
+            i = i + 1
+            value = argument_text(i)
+         else
+            call refuse(name//' needs a value')
+            return
+         end if
+         if (value == '') call refuse(name//' needs a value')
+      end subroutine take_value
+
+      !> --threads N
+      subroutine take_threads()
+         character(:), allocatable :: value
+         integer :: status
+
+         call take_value(value)
+         if (.not. allocated(value)) return
+         if (value == '') return
+         status = 1
+         if (verify(value, '0123456789') == 0 .and. len(value) < 10) &
+            read (value, *, iostat=status) command%threads
+         if (status /= 0 .or. command%threads < 1 .or. command%threads > 1024) call refuse('--threads '// &
+            ordinary(value, 60)//': must be an integer from 1 to 1024')
+      end subroutine take_threads
+
+   end subroutine read_command_line
+
+   !> Do options and arguments fit the verb?
+   subroutine check_fit(command, error)
+      type(command_type), intent(in) :: command
+      type(error_type), allocatable, intent(inout) :: error
+
+      if (command%verb == 'version') return
+      if (command%verb /= 'run') then
+         if (allocated(command%output)) call alien('--output')
+         if (command%threads > 0) call alien('--threads')
+         if (command%restart) call alien('--restart')
+         if (command%quiet) call alien('--quiet')
+      end if
+      if (command%reference .and. command%verb /= 'template') call alien('--reference')
+      select case (command%verb)
+      case ('run', 'check')
+         if (.not. allocated(command%path)) call add_fault(error, error_input, 'asperity: '// &
+            command%verb//' needs an input: asperity '//command%verb//' CASE.nml')
+      case ('info')
+         if (.not. allocated(command%path)) call add_fault(error, error_input, &
+            'asperity: info needs a result: asperity info RESULT.h5')
+      end select
+
+   contains
+
+      !> An option of another verb.
+      subroutine alien(option)
+         character(*), intent(in) :: option
+
+         call add_fault(error, error_input, 'asperity: '//option//' does not belong to '//command%verb)
+      end subroutine alien
+
+   end subroutine check_fit
+
+   !> An argument, at its full length.
+   function argument_text(i) result(text)
+      integer, intent(in) :: i
+      character(:), allocatable :: text
+      integer :: n
+
+      call get_command_argument(i, length=n)
+      allocate (character(n) :: text)
+      if (n > 0) call get_command_argument(i, text)
+   end function argument_text
+
+   !> A proposal, if there is one.
+   pure function hint(name) result(text)
+      character(*), intent(in) :: name
+      character(:), allocatable :: text
+
+      text = ''
+      if (name /= '') text = '; did you mean '//name//'?'
+   end function hint
+
+   !> The help of a verb, or of the program.
+   function help_text(verb) result(text)
+      character(*), intent(in) :: verb             !! '' for the program
+      character(:), allocatable :: text
+
+      select case (verb)
+      case ('run')
+         text = 'asperity run CASE.nml [--output FILE.h5] [--threads N] [--restart] [--quiet]'//nl//nl// &
+            'Run a case. The result is an HDF5 file, beside the input by default.'//nl//nl// &
+            '  --output FILE.h5  write the result there'//nl// &
+            '  --threads N       use N threads; all processors by default'//nl// &
+            '  --restart         go on from the last checkpoint in the result'//nl// &
+            '  --quiet           show no progress'//nl//nl//statuses()
+      case ('check')
+         text = 'asperity check CASE.nml'//nl//nl// &
+            'Check an input without running it, and print every setting as it is understood, with'//nl// &
+            'defaults, time steps and the memory needed. The print is an input itself.'//nl
+      case ('template')
+         text = 'asperity template [NAME]'//nl//'asperity template --reference'//nl//nl// &
+            'Print an input to start from, as in: asperity template hertz > hertz.nml'//nl// &
+            'Without a name: list the templates.'//nl//nl// &
+            '  --reference  print all groups and variables as Markdown'//nl
+      case ('info')
+         text = 'asperity info RESULT.h5'//nl//nl// &
+            'Say what a result holds: case, grid, phases, last step, finished or not.'//nl
+      case default
+         text = 'Asperity: contact of a viscoelastic solid with a rough surface'//nl//nl// &
+            'asperity run CASE.nml [--output FILE.h5] [--threads N] [--restart] [--quiet]'//nl// &
+            'asperity check CASE.nml      validate only: settings, time steps, memory'//nl// &
+            'asperity template [NAME]     print an input to start from; without a name, list them'//nl// &
+            'asperity info RESULT.h5      what a result holds'//nl// &
+            'asperity --version | --help  each command also has --help'//nl//nl//statuses()
+      end select
+   end function help_text
+
+   !> The exit statuses.
+   pure function statuses() result(text)
+      character(:), allocatable :: text
+
+      text = 'Exit status: 0 done; 2 input or command line wrong; 3 a file cannot be read or written;'//nl// &
+         '4 a solver did not converge; 130 or 143 stopped by SIGINT or SIGTERM.'//nl
+   end function statuses
+
+end module command_line

@@ -1,0 +1,298 @@
+!> A case in words: every resolved setting as an input of its own, time steps and memory.
+module case_report
+   use case_settings, only : case_type, phase_settings_type
+   use precision, only : dp
+   use regular_grid, only : boundary_free
+   use text_tools, only : exact_text, to_text
+   implicit none
+   private
+
+   public :: case_summary, memory_needed, resolved_input
+
+   character(*), parameter :: nl = new_line('a')
+
+contains
+
+   !> Every setting, given or default, as a namelist input that makes the same case. Paths are those
+   !> seen from where the program runs; relaxation times are those at the case's temperature.
+   function resolved_input(case) result(text)
+      type(case_type), intent(in) :: case
+      character(:), allocatable :: text
+      integer :: i
+
+      text = '&case'//nl//string('title', case%title)//'/'//nl
+      text = text//'&grid'//nl//whole('nx', case%grid%nx)//whole('ny', case%grid%ny)// &
+         number('lx', case%grid%lx, 'm')//number('ly', case%grid%ly, 'm')// &
+         string('boundary', boundary_name(case))//'/'//nl
+      do i = 1, size(case%surfaces)
+         text = text//surface_text(case, i)
+      end do
+      associate (m => case%material)
+         text = text//'&material'//nl//number('poisson', m%poisson, '')// &
+            number('shear_modulus', m%shear_modulus, 'Pa')
+         if (size(m%prony_g) > 0) text = text//list('prony_g', m%prony_g, 'Pa')// &
+            list('prony_tau', m%prony_tau, 's, at '//to_text(m%temperature)//' C')
+         text = text//number('thickness', m%thickness, 'm')//number('density', m%density, 'kg/m3')// &
+            number('temperature', m%temperature, 'C')// &
+            number('reference_temperature', m%temperature, 'C')//'/'//nl
+      end associate
+      text = text//laws_text(case)
+      do i = 1, size(case%phases)
+         text = text//phase_text(case%phases(i))
+      end do
+      text = text//solver_text(case)
+   end function resolved_input
+
+   !> Steps, memory and warnings, as comment lines.
+   function case_summary(case) result(text)
+      type(case_type), intent(in) :: case
+      character(:), allocatable :: text
+      character(:), allocatable :: unit
+      real(dp) :: memory
+      integer :: at, next
+
+      memory = memory_needed(case)/1.0e6_dp
+      unit = ' MB'
+      if (memory >= 1.0e3_dp) then
+         memory = memory/1.0e3_dp
+         unit = ' GB'
+      end if
+      text = '! cells of '//to_text(case%grid%dx)//' m by '//to_text(case%grid%dy)//' m'//nl
+      text = text//'! '//counted(size(case%phases), 'phase')//', '// &
+         counted(count(case%phases%static), 'static solve')//', '// &
+         counted(sum(case%phases%steps, mask=.not. case%phases%static), 'time step')//' in '// &
+         to_text(sum(case%phases%duration))//' s'//nl
+      text = text//'! memory: about '//to_text(real(nint(memory*10.0_dp), dp)/10.0_dp)//unit//nl
+      at = 1
+      do while (at <= len(case%warnings))
+         next = index(case%warnings(at:)//nl, nl)
+         text = text//'! warning: '//case%warnings(at:at + next - 2)//nl
+         at = at + next
+      end do
+   end function case_summary
+
+   !> Memory of a run, bytes: fields of doubles, transform buffers, and what the program itself takes.
+   !>
+   !> Normal solver: 9 fields and one padded buffer (one field in periodic mode, four in free mode);
+   !> adhesion adds 6 fields, and its buffer doubles; each arm one field, and two for the surface of
+   !> the steps before; friction adds 14 fields, two buffers, and two fields an arm. The rest: 20 MB.
+   pure function memory_needed(case) result(bytes)
+      type(case_type), intent(in) :: case
+      real(dp) :: bytes
+      real(dp) :: buffers, fields, padding
+      real(dp), parameter :: program_itself = 20.0e6_dp
+      integer :: arms
+
+      arms = size(case%material%prony_g)
+      padding = merge(4.0_dp, 1.0_dp, case%grid%boundary == boundary_free)
+      fields = 9.0_dp + arms
+      buffers = 1.0_dp
+      if (arms > 0) fields = fields + 2.0_dp
+      if (case%adhesion%potential /= 'none') then
+         fields = fields + 6.0_dp
+         buffers = buffers + 1.0_dp
+      end if
+      if (case%friction%law /= 'none') then
+         fields = fields + 14.0_dp + 2.0_dp*arms
+         buffers = buffers + 2.0_dp
+      end if
+      bytes = 8.0_dp*(real(case%grid%nx, dp)*real(case%grid%ny, dp)*fields + &
+         padding*buffers*real(case%grid%nx + 2, dp)*real(case%grid%ny, dp)) + program_itself
+   end function memory_needed
+
+   !> One `&surface`, with the variables that its shape uses.
+   function surface_text(case, i) result(text)
+      type(case_type), intent(in) :: case
+      integer, intent(in) :: i
+      character(:), allocatable :: text
+
+      associate (term => case%surfaces(i))
+         text = '&surface'//nl//string('shape', term%shape)
+         select case (term%shape)
+         case ('sphere', 'paraboloid', 'cylinder')
+            text = text//number('radius', term%radius, 'm')
+         case ('sine', 'hexagonal_wave')
+            text = text//number('amplitude', term%amplitude, 'm')//number('wavelength', term%wavelength, 'm')
+         case ('self_affine')
+            text = text//number('hurst', term%hurst, '')// &
+               number('wavelength_long', term%wavelength_long, 'm')// &
+               number('wavelength_rolloff', term%wavelength_rolloff, 'm')// &
+               number('wavelength_short', term%wavelength_short, 'm')
+            if (term%rms_height > 0.0_dp) text = text//number('rms_height', term%rms_height, 'm')
+            if (term%rms_slope > 0.0_dp) text = text//number('rms_slope', term%rms_slope, '')
+            text = text//whole('seed', term%seed)//string('generator', term%generator)
+         case ('file')
+            text = text//string('file', term%file)//string('dataset', term%dataset)// &
+               number('scale', term%scale, '')
+         end select
+         if (term%shape /= 'self_affine' .and. term%shape /= 'file') &
+            text = text//number('centre_x', term%centre_x, 'm')//number('centre_y', term%centre_y, 'm')
+         text = text//'/'//nl
+      end associate
+   end function surface_text
+
+   !> `&adhesion` and `&friction`
+   function laws_text(case) result(text)
+      type(case_type), intent(in) :: case
+      character(:), allocatable :: text
+
+      text = '&adhesion'//nl//string('potential', case%adhesion%potential)
+      if (case%adhesion%potential /= 'none') text = text//number('energy', case%adhesion%energy, 'J/m2')// &
+         number('range', case%adhesion%range, 'm')//string('start', case%adhesion%start)
+      text = text//'/'//nl//'&friction'//nl//string('law', case%friction%law)
+      if (index(case%friction%law, 'coulomb') > 0) &
+         text = text//number('coefficient', case%friction%coefficient, '')
+      if (any(case%friction%law == [character(14) :: 'constant_shear', 'coulomb_orowan'])) &
+         text = text//number('shear_strength', case%friction%shear_strength, 'Pa')
+      if (case%friction%law /= 'none') text = text//truth('slope_effect', case%friction%slope_effect)
+      text = text//'/'//nl
+   end function laws_text
+
+   !> One `&phase`
+   function phase_text(phase) result(text)
+      type(phase_settings_type), intent(in) :: phase
+      character(:), allocatable :: text
+
+      text = '&phase'//nl//string('name', phase%name)//number('duration', phase%duration, 's')
+      if (.not. phase%static) text = text//line('steps', to_text(phase%steps), 'dt = '// &
+         to_text(phase%dt)//' s: '//trim(phase%dt_reason))
+      text = text//string('control', phase%control)
+      if (phase%given) then
+         text = text//number(trim(phase%control), phase%target, control_units(phase%control))
+      else
+         text = text//'  ! '//trim(phase%control)//' as before: '//to_text(phase%target)//' '// &
+            control_units(phase%control)//nl
+      end if
+      text = text//string('ramp', merge('linear', 'step  ', phase%linear))//truth('relaxed', phase%relaxed)// &
+         number('velocity_x', phase%velocity_x, 'm/s')//number('velocity_y', phase%velocity_y, 'm/s')// &
+         '/'//nl
+   end function phase_text
+
+   !> `&solver` and `&output`
+   function solver_text(case) result(text)
+      type(case_type), intent(in) :: case
+      character(:), allocatable :: text
+      character(:), allocatable :: fields
+      integer :: i
+
+      associate (s => case%solver, o => case%output)
+         text = '&solver'//nl//number('tolerance', s%tolerance, '')// &
+            whole('max_iterations', s%max_iterations)//string('method', s%method)// &
+            string('time_scheme', s%time_scheme)//whole('passes', s%passes)//string('slip_law', s%slip_law)// &
+            string('interpolation', s%interpolation)//string('precision', s%precision)// &
+            whole('threads', s%threads)//'/'//nl
+         text = text//'&output'//nl//string('file', o%file)
+         if (size(o%snapshot_times) > 0) then
+            text = text//list('snapshot_times', o%snapshot_times, 's')
+         else
+            text = text//whole('snapshot_every', o%snapshot_every)
+         end if
+         fields = ''
+         do i = 1, size(o%snapshot_fields)
+            if (i > 1) fields = fields//', '
+            fields = fields//''''//trim(o%snapshot_fields(i))//''''
+         end do
+         text = text//line('snapshot_fields', fields, '')//whole('checkpoint_every', o%checkpoint_every)// &
+            whole('compression', o%compression)//'/'//nl
+      end associate
+   end function solver_text
+
+   pure function boundary_name(case) result(name)
+      type(case_type), intent(in) :: case
+      character(:), allocatable :: name
+
+      name = 'periodic'
+      if (case%grid%boundary == boundary_free) name = 'free'
+   end function boundary_name
+
+   pure function control_units(control) result(units)
+      character(*), intent(in) :: control
+      character(:), allocatable :: units
+
+      select case (control)
+      case ('pressure')
+         units = 'Pa'
+      case ('force')
+         units = 'N'
+      case default
+         units = 'm'
+      end select
+   end function control_units
+
+   !> `1 phase`, `2 phases`
+   pure function counted(n, what) result(text)
+      integer, intent(in) :: n
+      character(*), intent(in) :: what
+      character(:), allocatable :: text
+
+      text = to_text(n)//' '//what
+      if (n /= 1) text = text//'s'
+   end function counted
+
+   !> `  name = value  ! comment`
+   pure function line(name, value, comment) result(text)
+      character(*), intent(in) :: name, value, comment
+      character(:), allocatable :: text
+
+      text = '  '//name//' = '//value
+      if (comment /= '') text = text//'  ! '//comment
+      text = text//nl
+   end function line
+
+   pure function whole(name, value) result(text)
+      character(*), intent(in) :: name
+      integer, intent(in) :: value
+      character(:), allocatable :: text
+
+      text = line(name, to_text(value), '')
+   end function whole
+
+   pure function number(name, value, units) result(text)
+      character(*), intent(in) :: name
+      real(dp), intent(in) :: value
+      character(*), intent(in) :: units
+      character(:), allocatable :: text
+
+      text = line(name, exact_text(value), units)
+   end function number
+
+   pure function list(name, values, units) result(text)
+      character(*), intent(in) :: name
+      real(dp), intent(in) :: values(:)
+      character(*), intent(in) :: units
+      character(:), allocatable :: text
+      character(:), allocatable :: all_values
+      integer :: i
+
+      all_values = ''
+      do i = 1, size(values)
+         if (i > 1) all_values = all_values//', '
+         all_values = all_values//exact_text(values(i))
+      end do
+      text = line(name, all_values, units)
+   end function list
+
+   pure function truth(name, value) result(text)
+      character(*), intent(in) :: name
+      logical, intent(in) :: value
+      character(:), allocatable :: text
+
+      text = line(name, trim(merge('.true. ', '.false.', value)), '')
+   end function truth
+
+   !> A string in quotes; a quote inside is doubled.
+   pure function string(name, value) result(text)
+      character(*), intent(in) :: name, value
+      character(:), allocatable :: text
+      character(:), allocatable :: quoted
+      integer :: i
+
+      quoted = ''
+      do i = 1, len_trim(value)
+         quoted = quoted//value(i:i)
+         if (value(i:i) == '''') quoted = quoted//''''
+      end do
+      text = line(name, ''''//quoted//'''', '')
+   end function string
+
+end module case_report
