@@ -1,7 +1,7 @@
 !> What the user typed, as a type; and the help texts.
 module command_line
    use errors, only : add_fault, error_input, error_type
-   use text_tools, only : nearest, ordinary
+   use text_tools, only : nearest_name, ordinary
    implicit none
    private
 
@@ -70,7 +70,7 @@ contains
             case ('--threads')
                call take_threads()
             case default
-               call refuse(ordinary(name, 60)//': there is no such option'//hint(nearest(name, options)))
+               call refuse(ordinary(name, 60)//': there is no such option'//hint(nearest_name(name, options)))
             end select
          else if (command%verb == '') then
             command%verb = argument
@@ -78,7 +78,7 @@ contains
                help = .true.
             else if (.not. any(verbs == argument)) then
                call refuse(''''//ordinary(argument, 60)//''': there is no such command'// &
-                  hint(nearest(argument, verbs))//'; run, check, template and info are there')
+                  hint(nearest_name(argument, verbs))//'; run, check, template and info are there')
                return
             end if
          else if (.not. allocated(command%path)) then

@@ -1,7 +1,130 @@
-!> The program `asperity`.
+!> The program `asperity`: from the command line to an exit status. The only place that stops.
 program main
+   use, intrinsic :: iso_fortran_env, only : error_unit
+   use, intrinsic :: iso_c_binding, only : c_char, c_int, c_size_t
+   use case_input, only : read_case
+   use case_report, only : case_summary, resolved_input
+   use case_settings, only : case_type
+   use case_templates, only : all_template_names, find_template, template_is_available, template_list, &
+      template_text
+   use command_line, only : command_type, help_text, read_command_line
+   use errors, only : error_file, error_input, error_type, fail
+   use input_reference, only : reference_markdown
+   use result_summary, only : summarise_result
+   use text_tools, only : nearest_name, ordinary
    use version, only : asperity_version
    implicit none
 
-   print '(a)', 'asperity '//asperity_version
+   type(command_type) :: command
+   type(error_type), allocatable :: error
+   integer :: status
+
+   call read_command_line(command, error)
+   if (.not. allocated(error)) then
+      select case (command%verb)
+      case ('help')
+         call say(help_text(command%help_of), error)
+      case ('version')
+         call say('asperity '//asperity_version//new_line('a'), error)
+      case ('template')
+         call template(error)
+      case ('check')
+         call check(error)
+      case ('info')
+         call info(error)
+      case ('run')
+         call run(error)
+      end select
+   end if
+   status = 0
+   if (allocated(error)) then
+      write (error_unit, '(a)', iostat=status) error%message
+      status = error%status
+   end if
+   stop status, quiet=.true.
+
+contains
+
+   !> Write a text to standard output; by the system's own call, which tells when it fails.
+   subroutine say(text, error)
+      character(*), intent(in) :: text
+      type(error_type), allocatable, intent(out) :: error
+      integer(c_size_t) :: done
+      integer(c_size_t) :: count
+      interface
+         function c_write(descriptor, buffer, count) bind(c, name='write') result(written)
+            import :: c_char, c_int, c_size_t
+            implicit none
+            integer(c_int), value :: descriptor
+            character(kind=c_char), intent(in) :: buffer(*)
+            integer(c_size_t), value :: count
+            integer(c_size_t) :: written       !! as large as the signed type of C
+         end function c_write
+      end interface
+
+      done = 0
+      do while (done < len(text))
+         count = c_write(1_c_int, text(done + 1:), len(text) - done)
+         if (count < 1) then
+            call fail(error, error_file, 'asperity: standard output cannot be written')
+            return
+         end if
+         done = done + count
+      end do
+   end subroutine say
+
+   !> asperity template [NAME]
+   subroutine template(error)
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: message, near
+
+      if (command%reference) then
+         call say(reference_markdown(), error)
+      else if (.not. allocated(command%path)) then
+         call say(template_list(), error)
+      else if (find_template(command%path) == 0) then
+         message = 'asperity: there is no template '''//ordinary(command%path, 60)//''''
+         near = nearest_name(command%path, all_template_names())
+         if (near /= '') message = message//'; did you mean '//near//'?'
+         call fail(error, error_input, message)
+      else if (.not. template_is_available(command%path)) then
+         call fail(error, error_input, 'asperity: the template '//command%path//' is not available yet')
+      else
+         call say(template_text(command%path), error)
+      end if
+   end subroutine template
+
+   !> asperity check CASE.nml
+   subroutine check(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_type) :: case
+
+      call read_case(command%path, case, error)
+      if (allocated(error)) return
+      call say(resolved_input(case)//case_summary(case), error)
+   end subroutine check
+
+   !> asperity info RESULT.h5
+   subroutine info(error)
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: text
+
+      call summarise_result(command%path, text, error)
+      if (allocated(error)) return
+      call say(text, error)
+   end subroutine info
+
+   !> asperity run CASE.nml
+   subroutine run(error)
+      type(error_type), allocatable, intent(out) :: error
+      type(case_type) :: case
+
+      call read_case(command%path, case, error)
+      if (allocated(error)) return
+      if (allocated(command%output)) case%output%file = command%output
+      if (command%threads > 0) case%solver%threads = command%threads
+      if (case%warnings /= '') write (error_unit, '(a)', iostat=status) case%warnings
+      call fail(error, error_input, 'asperity: run is not available yet')
+   end subroutine run
+
 end program main

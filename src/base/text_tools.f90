@@ -4,7 +4,7 @@ module text_tools
    implicit none
    private
 
-   public :: exact_text, lower, nearest, ordinary, to_text
+   public :: exact_text, lower, nearest_name, ordinary, to_text
 
    !> A number as short text.
    interface to_text
@@ -30,7 +30,7 @@ contains
    end function lower
 
    !> The candidate that is nearest to a word; empty if none is near.
-   pure function nearest(word, candidates) result(name)
+   pure function nearest_name(word, candidates) result(name)
       character(*), intent(in) :: word             !! as typed
       character(*), intent(in) :: candidates(:)    !! lower case, padded with blanks
       character(:), allocatable :: name
@@ -56,14 +56,14 @@ contains
             return
          end if
       end do
-   end function nearest
+   end function nearest_name
 
    !> Number of single-letter insertions, deletions, replacements and swaps of neighbours between
    !> two words.
    pure function edit_distance(a, b) result(distance)
       character(*), intent(in) :: a, b
       integer :: distance
-      integer :: row(0:len(b)), previous(0:len(b)), before(0:len(b))
+      integer :: row(0:len(b)), previous(0:len(b)), before(-1:len(b))
       integer :: cost, i, j
 
       before = 0
@@ -80,7 +80,7 @@ contains
                end if
             end if
          end do
-         before = previous
+         before(0:) = previous
          previous = row
       end do
       distance = row(len(b))

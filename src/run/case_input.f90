@@ -1,15 +1,16 @@
 !> Reads a case: a file of namelists becomes checked settings, or one error with all its faults.
 module case_input
    use case_features, only : check_features
+   use case_material, only : resolve_material
    use case_phases, only : resolve_phases
-   use case_settings, only : case_type, material_settings_type, output_settings_type, path_length, &
-      surface_settings_type, word_length
+   use case_settings, only : case_type, output_settings_type, path_length, word_length
+   use case_surfaces, only : resolve_path, resolve_surfaces
    use errors, only : error_file, error_type, fail
    use input_faults, only : faults_type
-   use input_reference, only : group_entries, group_entry_type, is_required
-   use input_values, only : default_group, group_values_type, read_groups
+   use input_group, only : group_values_type
+   use input_reference, only : group_entries, group_entry_type
+   use input_values, only : default_group, read_groups
    use precision, only : dp
-   use prony, only : wlf_shift, zener_to_prony
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use text_tools, only : to_text
    implicit none
@@ -134,7 +135,7 @@ contains
       type(group_entry_type), allocatable :: known(:)
       integer :: i
 
-      known = group_entries()
+      allocate (known, source=group_entries())
       do i = 1, size(known)
          if (.not. known(i)%required .or. any(groups%name == known(i)%name)) cycle
          call faults%add('&'//trim(known(i)%name), 'the group is missing')
@@ -172,21 +173,6 @@ contains
       end do
    end function pack_phases
 
-   !> Report a variable that must be given and is not.
-   subroutine demand(group, name, faults, why)
-      type(group_values_type), intent(in) :: group
-      character(*), intent(in) :: name
-      type(faults_type), intent(inout) :: faults
-      character(*), intent(in), optional :: why       !! what asks for it
-
-      if (group%given(name) .or. group%line == 0) return
-      if (present(why)) then
-         call group%fault(name, 'is missing: '//why//' needs it', faults)
-      else
-         call group%fault(name, 'is missing', faults)
-      end if
-   end subroutine demand
-
    !> `&grid`
    subroutine resolve_grid(group, grid, known, faults)
       type(group_values_type), intent(in) :: group
@@ -196,9 +182,9 @@ contains
       integer :: boundary, nx, ny
       real(dp) :: lx, ly
 
-      call demand(group, 'nx', faults)
-      call demand(group, 'ny', faults)
-      call demand(group, 'lx', faults)
+      call group%demand('nx', faults)
+      call group%demand('ny', faults)
+      call group%demand('lx', faults)
       nx = group%integer_value('nx')
       ny = group%integer_value('ny')
       lx = group%real_value('lx')
@@ -222,294 +208,6 @@ contains
       if (.not. known) grid = grid_type()
    end subroutine resolve_grid
 
-   !> `&surface`, all of them
-   subroutine resolve_surfaces(groups, path, grid, grid_known, surfaces, faults)
-      type(group_values_type), intent(in) :: groups(:)
-      character(*), intent(in) :: path
-      type(grid_type), intent(in) :: grid
-      logical, intent(in) :: grid_known
-      type(surface_settings_type), allocatable, intent(out) :: surfaces(:)
-      type(faults_type), intent(inout) :: faults
-      integer :: i, n
-
-      allocate (surfaces(count(groups%name == 'surface')))
-      n = 0
-      do i = 1, size(groups)
-         if (groups(i)%name /= 'surface') cycle
-         n = n + 1
-         call resolve_surface(groups(i), path, grid, grid_known, surfaces(n), faults)
-      end do
-   end subroutine resolve_surfaces
-
-   !> One `&surface`
-   subroutine resolve_surface(group, path, grid, grid_known, term, faults)
-      type(group_values_type), intent(in) :: group
-      character(*), intent(in) :: path
-      type(grid_type), intent(in) :: grid
-      logical, intent(in) :: grid_known
-      type(surface_settings_type), intent(out) :: term
-      type(faults_type), intent(inout) :: faults
-      character(:), allocatable :: belongs, name
-      real(dp) :: side
-      integer :: i
-
-      term%shape = group%text_value('shape')
-      side = merge(grid%lx, min(grid%lx, grid%ly), grid%ny == 1)
-      term%radius = group%real_value('radius')
-      term%amplitude = group%real_value('amplitude')
-      term%wavelength = group%real_value('wavelength')
-      term%hurst = group%real_value('hurst')
-      term%wavelength_long = group%real_value('wavelength_long', side)
-      term%wavelength_rolloff = group%real_value('wavelength_rolloff', term%wavelength_long)
-      term%wavelength_short = group%real_value('wavelength_short', &
-         8.0_dp*merge(grid%dx, max(grid%dx, grid%dy), grid%ny == 1))
-      term%rms_height = group%real_value('rms_height')
-      term%rms_slope = group%real_value('rms_slope')
-      term%seed = group%integer_value('seed')
-      term%generator = group%text_value('generator')
-      term%dataset = group%text_value('dataset')
-      term%scale = group%real_value('scale')
-      term%centre_x = group%real_value('centre_x', (grid%nx/2)*grid%dx)
-      term%centre_y = group%real_value('centre_y', (grid%ny/2)*grid%dy)
-      term%file = ''
-
-      call demand(group, 'shape', faults)
-      belongs = ' shape '
-      select case (term%shape)
-      case ('sphere', 'paraboloid', 'cylinder')
-         belongs = belongs//'radius centre_x centre_y '
-         call demand(group, 'radius', faults, trim(term%shape))
-      case ('sine', 'hexagonal_wave')
-         belongs = belongs//'amplitude wavelength centre_x centre_y '
-         call demand(group, 'amplitude', faults, trim(term%shape))
-         call demand(group, 'wavelength', faults, trim(term%shape))
-      case ('self_affine')
-         belongs = belongs//'hurst wavelength_long wavelength_rolloff wavelength_short rms_height '// &
-            'rms_slope seed generator '
-         call demand(group, 'hurst', faults, 'self_affine')
-         call check_rough(group, term, grid_known, faults)
-      case ('file')
-         belongs = belongs//'file dataset scale '
-         call demand(group, 'file', faults, 'shape = ''file''')
-         call resolve_path(group, path, term%file, faults)
-      case ('flat')
-         belongs = belongs//'centre_x centre_y '
-      case default
-         return
-      end select
-      do i = 1, size(group%values)
-         name = trim(group%values(i)%entry%name)
-         if (.not. group%given(name) .or. index(belongs, ' '//name//' ') > 0) cycle
-         call group%fault(name, 'does not belong to shape = '''//trim(term%shape)//'''', faults)
-      end do
-   end subroutine resolve_surface
-
-   !> The parameters of a rough surface among each other.
-   subroutine check_rough(group, term, grid_known, faults)
-      type(group_values_type), intent(in) :: group
-      type(surface_settings_type), intent(in) :: term
-      logical, intent(in) :: grid_known                !! defaults are known
-      type(faults_type), intent(inout) :: faults
-      logical :: long_known, rolloff_known, short_known
-
-      if (group%given('rms_height') .and. group%given('rms_slope')) then
-         call group%group_fault('rms_height and rms_slope are given together: give one of them', faults)
-      else if (.not. (group%given('rms_height') .or. group%given('rms_slope'))) then
-         call group%group_fault('rms_height or rms_slope is missing: self_affine needs one of them', faults)
-      end if
-      long_known = known('wavelength_long')
-      rolloff_known = known('wavelength_rolloff') .and. (long_known .or. group%given('wavelength_rolloff'))
-      short_known = known('wavelength_short')
-      if (rolloff_known .and. short_known) then
-         if (.not. term%wavelength_short < term%wavelength_rolloff) call group%fault('wavelength_short', &
-            'must be below wavelength_rolloff = '//to_text(term%wavelength_rolloff)// &
-            default_note('wavelength_short', term%wavelength_short), faults)
-      end if
-      if (rolloff_known .and. long_known) then
-         if (term%wavelength_rolloff > term%wavelength_long) call group%fault('wavelength_rolloff', &
-            'must be at most wavelength_long = '//to_text(term%wavelength_long), faults)
-      end if
-
-   contains
-
-      !> Is the wavelength known, given or by default?
-      logical function known(name)
-         character(*), intent(in) :: name
-
-         known = group%usable(name) .or. (grid_known .and. .not. group%given(name))
-      end function known
-
-      !> The value where it is the default.
-      function default_note(name, value) result(note)
-         character(*), intent(in) :: name
-         real(dp), intent(in) :: value
-         character(:), allocatable :: note
-
-         note = ''
-         if (.not. group%given(name)) note = '; by default it is '//to_text(value)//', 8 cells'
-      end function default_note
-
-   end subroutine check_rough
-
-   !> A path in the input counts from the input's folder.
-   subroutine resolve_path(group, path, file, faults)
-      type(group_values_type), intent(in) :: group
-      character(*), intent(in) :: path                  !! of the input
-      character(*), intent(out) :: file
-      type(faults_type), intent(inout) :: faults
-      character(:), allocatable :: name
-
-      file = ''
-      if (.not. group%usable('file')) return
-      name = group%text_value('file')
-      if (name == '') then
-         call group%fault('file', 'must name a file', faults)
-         return
-      end if
-      if (name(1:1) /= '/') name = path(:index(path, '/', back=.true.))//name
-      if (len(name) > len(file)) then
-         call group%fault('file', 'with the input''s folder it must have at most '//to_text(path_length)// &
-            ' characters', faults)
-         return
-      end if
-      file = name
-   end subroutine resolve_path
-
-   !> `&material`
-   subroutine resolve_material(group, grid, grid_known, material, faults)
-      type(group_values_type), intent(in) :: group
-      type(grid_type), intent(in) :: grid
-      logical, intent(in) :: grid_known
-      type(material_settings_type), intent(out) :: material
-      type(faults_type), intent(inout) :: faults
-      logical :: arms
-
-      material%poisson = group%real_value('poisson')
-      material%shear_modulus = group%real_value('shear_modulus')
-      material%thickness = group%real_value('thickness')
-      material%density = group%real_value('density')
-      material%reference_temperature = group%real_value('reference_temperature')
-      material%temperature = group%real_value('temperature', material%reference_temperature)
-      material%wlf_c1 = group%real_value('wlf_c1')
-      material%wlf_c2 = group%real_value('wlf_c2')
-
-      call resolve_arms(group, material, arms, faults)
-      if (.not. arms) then
-         call demand(group, 'shear_modulus', faults)
-         if (group%usable('shear_modulus') .and. .not. material%shear_modulus > 0.0_dp) &
-            call group%fault('shear_modulus', 'must be a positive number; 0 is allowed only where '// &
-            'there are Prony arms or Zener branches', faults)
-      end if
-      if (material%density > 0.0_dp .and. .not. group%bad('thickness') .and. &
-         .not. material%thickness > 0.0_dp) call group%fault('density', &
-         'needs a thickness above 0: inertia is that of the block', faults)
-      if (grid_known .and. grid%boundary == boundary_free .and. material%thickness > 0.0_dp) &
-         call group%fault('thickness', 'needs boundary = ''periodic'': a free patch lies on a half-space', &
-         faults)
-      call shift_times(group, material, faults)
-   end subroutine resolve_material
-
-   !> Prony arms, or Zener branches turned into arms.
-   subroutine resolve_arms(group, material, arms, faults)
-      type(group_values_type), intent(in) :: group
-      type(material_settings_type), intent(inout) :: material
-      logical, intent(out) :: arms                     !! arms or branches are given, perhaps wrongly
-      type(faults_type), intent(inout) :: faults
-      logical :: prony_given, zener_given
-      real(dp), allocatable :: eta(:), g0(:), g1(:)
-      real(dp) :: spring
-
-      prony_given = group%given('prony_g') .or. group%given('prony_tau')
-      zener_given = group%given('zener_g0') .or. group%given('zener_g1') .or. group%given('zener_eta')
-      arms = prony_given .or. zener_given
-      allocate (material%prony_g(0), material%prony_tau(0))
-      if (prony_given .and. zener_given) then
-         call group%group_fault('prony_... and zener_... are given together: give Prony arms or Zener '// &
-            'branches', faults)
-      end if
-      if (prony_given) then
-         call demand(group, 'prony_g', faults, 'prony_tau')
-         call demand(group, 'prony_tau', faults, 'prony_g')
-         call same_size('prony_tau', 'prony_g')
-         if (.not. both_good('prony_g', 'prony_tau')) return
-         material%prony_g = group%reals_value('prony_g')
-         material%prony_tau = group%reals_value('prony_tau')
-      else if (zener_given) then
-         call demand(group, 'zener_g0', faults, 'a Zener branch')
-         call demand(group, 'zener_g1', faults, 'a Zener branch')
-         call demand(group, 'zener_eta', faults, 'a Zener branch')
-         call same_size('zener_g1', 'zener_g0')
-         call same_size('zener_eta', 'zener_g0')
-         if (.not. (both_good('zener_g0', 'zener_g1') .and. both_good('zener_g0', 'zener_eta'))) return
-         g0 = group%reals_value('zener_g0')
-         g1 = group%reals_value('zener_g1')
-         eta = group%reals_value('zener_eta')
-         deallocate (material%prony_g, material%prony_tau)
-         allocate (material%prony_g(size(g0)), material%prony_tau(size(g0)))
-         spring = material%shear_modulus
-         call zener_to_prony(spring, g0, g1, eta, material%shear_modulus, material%prony_g, &
-            material%prony_tau)
-      end if
-
-   contains
-
-      !> Report lists of different sizes.
-      subroutine same_size(name, other)
-         character(*), intent(in) :: name, other
-
-         if (.not. (group%usable(name) .and. group%usable(other))) return
-         if (size(group%reals_value(name)) == size(group%reals_value(other))) return
-         call group%fault(name, 'has '//to_text(size(group%reals_value(name)))//' values, but '// &
-            other//' has '//to_text(size(group%reals_value(other))), faults)
-      end subroutine same_size
-
-      !> Are two lists there, and of one size?
-      logical function both_good(name, other)
-         character(*), intent(in) :: name, other
-
-         both_good = group%usable(name) .and. group%usable(other)
-         if (both_good) both_good = size(group%reals_value(name)) == size(group%reals_value(other))
-      end function both_good
-
-   end subroutine resolve_arms
-
-   !> Bring the relaxation times to the case's temperature.
-   subroutine shift_times(group, material, faults)
-      type(group_values_type), intent(in) :: group
-      type(material_settings_type), intent(inout) :: material
-      type(faults_type), intent(inout) :: faults
-      real(dp) :: difference, factor
-
-      if (group%bad('wlf_c1') .or. group%bad('wlf_c2') .or. group%bad('temperature') .or. &
-         group%bad('reference_temperature')) return
-      if (group%given('wlf_c1') .neqv. group%given('wlf_c2')) then
-         call group%group_fault('wlf_c1 and wlf_c2 must be given together', faults)
-         return
-      end if
-      difference = material%temperature - material%reference_temperature
-      if (.not. abs(difference) > 0.0_dp) return
-      if (.not. group%given('wlf_c1')) then
-         if (size(material%prony_tau) > 0) call group%group_fault('temperature = '// &
-            to_text(material%temperature)//' is not reference_temperature = '// &
-            to_text(material%reference_temperature)//': a shift needs wlf_c1 and wlf_c2', faults)
-         return
-      end if
-      if (.not. material%wlf_c2 + difference > 0.0_dp) then
-         call group%fault('temperature', 'is below the range of the WLF shift: it must be above '// &
-            'reference_temperature - wlf_c2 = '// &
-            to_text(material%reference_temperature - material%wlf_c2), faults)
-         return
-      end if
-      factor = wlf_shift(material%temperature, material%reference_temperature, material%wlf_c1, &
-         material%wlf_c2)
-      if (.not. (factor > 1.0e-100_dp .and. factor < 1.0e100_dp)) then
-         call group%fault('temperature', 'shifts the relaxation times by a factor of '//to_text(factor)// &
-            ': it is too far from reference_temperature', faults)
-         return
-      end if
-      material%prony_tau = factor*material%prony_tau
-   end subroutine shift_times
-
    !> `&adhesion`
    subroutine resolve_adhesion(group, case, faults)
       type(group_values_type), intent(in) :: group
@@ -523,8 +221,8 @@ contains
       if (case%adhesion%potential == '') case%adhesion%potential = 'none'
       if (group%bad('potential')) return
       if (case%adhesion%potential /= 'none') then
-         call demand(group, 'energy', faults, trim(case%adhesion%potential))
-         call demand(group, 'range', faults, trim(case%adhesion%potential))
+         call group%demand('energy', faults, trim(case%adhesion%potential))
+         call group%demand('range', faults, trim(case%adhesion%potential))
       else if (.not. group%given('potential') .and. &
          (group%given('energy') .or. group%given('range') .or. group%given('start'))) then
          call group%fault('potential', 'is missing', faults)
@@ -545,12 +243,12 @@ contains
       if (group%bad('law')) return
       select case (case%friction%law)
       case ('coulomb')
-         call demand(group, 'coefficient', faults, 'coulomb')
+         call group%demand('coefficient', faults, 'coulomb')
       case ('constant_shear')
-         call demand(group, 'shear_strength', faults, 'constant_shear')
+         call group%demand('shear_strength', faults, 'constant_shear')
       case ('coulomb_orowan')
-         call demand(group, 'coefficient', faults, 'coulomb_orowan')
-         call demand(group, 'shear_strength', faults, 'coulomb_orowan')
+         call group%demand('coefficient', faults, 'coulomb_orowan')
+         call group%demand('shear_strength', faults, 'coulomb_orowan')
       case default
          if (.not. group%given('law') .and. (group%given('coefficient') .or. &
             group%given('shear_strength') .or. group%given('slope_effect'))) &
@@ -605,9 +303,9 @@ contains
       end if
 
       if (group%given('snapshot_fields')) then
-         fields = group%texts_value('snapshot_fields')
+         allocate (fields, source=group%texts_value('snapshot_fields'))
          allocate (output%snapshot_fields(size(fields)))
-         output%snapshot_fields = fields
+         output%snapshot_fields = fields(:)(:word_length)
          if (case%friction%law == 'none' .and. any(is_tangential(output%snapshot_fields))) &
             call group%fault('snapshot_fields', 'traction, slip and displacement_x, displacement_y need '// &
             '&friction', faults)

@@ -7,7 +7,7 @@
 module case_phases
    use case_settings, only : material_settings_type, phase_settings_type
    use input_faults, only : faults_type
-   use input_values, only : group_values_type
+   use input_group, only : group_values_type
    use precision, only : dp
    use regular_grid, only : grid_type
    use text_tools, only : to_text

@@ -124,6 +124,8 @@ contains
          case ('file')
             text = text//string('file', term%file)//string('dataset', term%dataset)// &
                number('scale', term%scale, '')
+         case default                                  ! flat
+            continue
          end select
          if (term%shape /= 'self_affine' .and. term%shape /= 'file') &
             text = text//number('centre_x', term%centre_x, 'm')//number('centre_y', term%centre_y, 'm')

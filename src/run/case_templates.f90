@@ -86,7 +86,7 @@ contains
       character(16), allocatable :: names(:)
       type(template_type), allocatable :: list(:)
 
-      list = templates()
+      allocate (list, source=templates())
       allocate (names(size(list)))
       names = list%name
    end function all_template_names
@@ -97,7 +97,7 @@ contains
       type(template_type), allocatable :: list(:)
       integer :: i
 
-      list = templates()
+      allocate (list, source=templates())
       text = ''
       do i = 1, size(list)
          if (template_is_available(trim(list(i)%name))) text = text//list(i)%name//trim(list(i)%meaning)//nl
@@ -121,7 +121,7 @@ contains
       character(*), intent(in) :: name
       character(16), allocatable :: names(:)
 
-      names = all_template_names()
+      allocate (names, source=all_template_names())
       number = findloc(names == name, .true., dim=1)
    end function find_template
 
@@ -138,8 +138,8 @@ contains
       text = ''
       at = find_template(name)
       if (at == 0) return
-      list = templates()
-      entries = variable_entries()
+      allocate (list, source=templates())
+      allocate (entries, source=variable_entries())
       text = '! '//trim(list(at)%meaning)//nl//'! All units are SI. Run it with: asperity run '//name//'.nml'//nl
       associate (source => list(at)%text)
          at = 1

@@ -370,8 +370,8 @@ contains
          'string', 'reals', 'strings']
       integer :: i, j
 
-      groups = group_entries()
-      variables = variable_entries()
+      allocate (groups, source=group_entries())
+      allocate (variables, source=variable_entries())
       text = ''
       do i = 1, size(groups)
          text = text//'## `&'//trim(groups(i)%name)//'`'//nl//nl//trim(groups(i)%meaning)

@@ -4,58 +4,20 @@ module input_values
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use case_settings, only : path_length
    use input_faults, only : faults_type
+   use input_group, only : group_values_type, in_line, item_type, line_note, place, position, value_type
    use input_reference, only : allowed_phrase, group_entries, group_entry_type, is_array, &
       kind_integer, kind_logical, kind_real, kind_reals, kind_text, kind_word, kind_words, value_range, &
       variable_entries, variable_entry_type, word_is_allowed
    use namelist_file, only : assignment_type, namelists_type, scan_namelists, shown_tokens, &
       token_broken, token_comma, token_equals, token_string, token_type, token_word, tokenise
    use precision, only : dp
-   use text_tools, only : lower, nearest, to_text
+   use text_tools, only : lower, nearest_name, to_text
    implicit none
    private
 
-   public :: default_group, group_values_type, read_groups
+   public :: default_group, read_groups
 
    integer, parameter :: longest_list = 10000      !! values of a variable
-
-   !> One value, as it came out of the text.
-   type :: item_type
-      real(dp) :: real = 0.0_dp
-      integer :: integer = 0
-      logical :: logical = .false.
-      character(path_length) :: text = ''
-   end type item_type
-
-   !> A variable of a group.
-   type :: value_type
-      type(variable_entry_type) :: entry
-      logical :: given = .false.                 !! the input names it
-      logical :: good = .true.                   !! and its value can be used
-      integer :: line = 0
-      character(:), allocatable :: shown         !! as written, for messages
-      type(item_type), allocatable :: items(:)   !! not allocated: no value, no default
-      logical, allocatable :: filled(:)          !! elements that were assigned
-   end type value_type
-
-   !> The values of one group, given or by default.
-   type :: group_values_type
-      character(12) :: name = ''
-      integer :: line = 0                        !! where it starts; 0 for a group of defaults
-      logical :: repeatable = .false.
-      type(value_type), allocatable :: values(:)
-   contains
-      procedure :: given                         !! does the input name the variable?
-      procedure :: usable                        !! is it given, and good?
-      procedure :: bad                           !! is it given, and wrong?
-      procedure :: integer_value
-      procedure :: real_value
-      procedure :: logical_value
-      procedure :: text_value
-      procedure :: reals_value
-      procedure :: texts_value
-      procedure :: fault                         !! report a variable
-      procedure :: group_fault                   !! report the group
-   end type group_values_type
 
 contains
 
@@ -70,15 +32,18 @@ contains
       integer, allocatable :: entry_of(:)
       integer :: count, i, j
 
-      known = group_entries()
-      names = known%name
+      allocate (known, source=group_entries())
+      allocate (names(size(known)))
+      do i = 1, size(known)
+         names(i) = known(i)%name
+      end do
       call scan_namelists(text, file, faults)
       allocate (entry_of(size(file%groups)))
       do i = 1, size(file%groups)
          entry_of(i) = findloc(names == file%groups(i)%name, .true., dim=1)
          if (entry_of(i) == 0) then
             call faults%add('&'//trim(file%groups(i)%name), 'there is no such group'// &
-               hint('&', nearest(file%groups(i)%name, names))//in_line(file%groups(i)%line))
+               hint('&', nearest_name(file%groups(i)%name, names))//in_line(file%groups(i)%line))
             cycle
          end if
          if (known(entry_of(i))%repeatable) cycle
@@ -122,8 +87,8 @@ contains
       integer :: count, i
       logical :: good
 
-      known = group_entries()
-      entries = variable_entries()
+      allocate (known, source=group_entries())
+      allocate (entries, source=variable_entries())
       group%name = name
       group%repeatable = any(known%name == name .and. known%repeatable)
       allocate (group%values(count_of(entries, name)))
@@ -155,13 +120,16 @@ contains
       type(group_values_type), intent(inout) :: group
       type(faults_type), intent(inout) :: faults
       character(24), allocatable :: names(:)
-      integer :: at
+      integer :: at, i
 
       at = position(group, assignment%name)
       if (at == 0) then
-         names = group%values%entry%name
+         allocate (names(size(group%values)))
+         do i = 1, size(names)
+            names(i) = group%values(i)%entry%name
+         end do
          call faults%add('&'//trim(group%name)//': '//trim(assignment%name), 'there is no such variable'// &
-            hint('', nearest(assignment%name, names))//in_line(assignment%line))
+            hint('', nearest_name(assignment%name, names))//in_line(assignment%line))
          return
       end if
 
@@ -422,7 +390,7 @@ contains
    !> The content of a string in quotes; a doubled quote stands for one.
    subroutine unquote(quoted, content, good)
       character(*), intent(in) :: quoted
-      character(*), intent(out) :: content
+      character(path_length), intent(out) :: content
       logical, intent(out) :: good               !! false: too long
       integer :: i, n
 
@@ -437,182 +405,6 @@ contains
       end do
       good = n <= len(content)
    end subroutine unquote
-
-   !> Number of a variable in its group; 0 if there is none.
-   pure integer function position(group, name)
-      class(group_values_type), intent(in) :: group
-      character(*), intent(in) :: name
-
-      do position = size(group%values), 1, -1
-         if (group%values(position)%entry%name == name) return
-      end do
-   end function position
-
-   !> Does the input name the variable?
-   pure logical function given(self, name)
-      class(group_values_type), intent(in) :: self
-      character(*), intent(in) :: name
-
-      given = self%values(position(self, name))%given
-   end function given
-
-   !> Is the variable given, and good?
-   pure logical function usable(self, name)
-      class(group_values_type), intent(in) :: self
-      character(*), intent(in) :: name
-
-      usable = self%given(name) .and. self%values(position(self, name))%good
-   end function usable
-
-   !> Is the variable given, and wrong?
-   pure logical function bad(self, name)
-      class(group_values_type), intent(in) :: self
-      character(*), intent(in) :: name
-
-      bad = .not. self%values(position(self, name))%good
-   end function bad
-
-   !> The integer of a variable; `otherwise`, or 0, where it has none.
-   pure integer function integer_value(self, name, otherwise) result(number)
-      class(group_values_type), intent(in) :: self
-      character(*), intent(in) :: name
-      integer, intent(in), optional :: otherwise
-
-      number = 0
-      if (present(otherwise)) number = otherwise
-      associate (value => self%values(position(self, name)))
-         if (has_value(value)) number = value%items(1)%integer
-      end associate
-   end function integer_value
-
-   !> The number of a variable; `otherwise`, or 0, where it has none.
-   pure real(dp) function real_value(self, name, otherwise) result(number)
-      class(group_values_type), intent(in) :: self
-      character(*), intent(in) :: name
-      real(dp), intent(in), optional :: otherwise
-
-      number = 0.0_dp
-      if (present(otherwise)) number = otherwise
-      associate (value => self%values(position(self, name)))
-         if (has_value(value)) number = value%items(1)%real
-      end associate
-   end function real_value
-
-   !> The logical of a variable; false where it has none.
-   pure logical function logical_value(self, name) result(truth)
-      class(group_values_type), intent(in) :: self
-      character(*), intent(in) :: name
-
-      truth = .false.
-      associate (value => self%values(position(self, name)))
-         if (has_value(value)) truth = value%items(1)%logical
-      end associate
-   end function logical_value
-
-   !> The string of a variable; empty where it has none.
-   pure function text_value(self, name) result(text)
-      class(group_values_type), intent(in) :: self
-      character(*), intent(in) :: name
-      character(:), allocatable :: text
-
-      text = ''
-      associate (value => self%values(position(self, name)))
-         if (has_value(value)) text = trim(value%items(1)%text)
-      end associate
-   end function text_value
-
-   !> The list of a variable; of size 0 where it has none.
-   pure function reals_value(self, name) result(numbers)
-      class(group_values_type), intent(in) :: self
-      character(*), intent(in) :: name
-      real(dp), allocatable :: numbers(:)
-
-      associate (value => self%values(position(self, name)))
-         if (has_value(value)) then
-            numbers = value%items%real
-         else
-            allocate (numbers(0))
-         end if
-      end associate
-   end function reals_value
-
-   !> The strings of a variable; of size 0 where it has none.
-   pure function texts_value(self, name) result(texts)
-      class(group_values_type), intent(in) :: self
-      character(*), intent(in) :: name
-      character(path_length), allocatable :: texts(:)
-
-      associate (value => self%values(position(self, name)))
-         if (has_value(value)) then
-            texts = value%items%text
-         else
-            allocate (texts(0))
-         end if
-      end associate
-   end function texts_value
-
-   !> Is there a value, given and good or by default?
-   pure logical function has_value(value)
-      type(value_type), intent(in) :: value
-
-      has_value = .false.
-      if (.not. value%good .or. .not. allocated(value%items)) return
-      has_value = size(value%items) > 0
-   end function has_value
-
-   !> Report a variable: `&group: name = value: message`, or `&group: name: message` if not given.
-   subroutine fault(self, name, message, faults)
-      class(group_values_type), intent(in) :: self
-      character(*), intent(in) :: name
-      character(*), intent(in) :: message
-      type(faults_type), intent(inout) :: faults
-
-      associate (value => self%values(position(self, name)))
-         call faults%add(place(self, value), message//line_note(self, value))
-      end associate
-   end subroutine fault
-
-   !> Report the group: `&group: message`.
-   subroutine group_fault(self, message, faults)
-      class(group_values_type), intent(in) :: self
-      character(*), intent(in) :: message
-      type(faults_type), intent(inout) :: faults
-
-      if (self%repeatable .and. self%line > 0) then
-         call faults%add('&'//trim(self%name), message//in_line(self%line))
-      else
-         call faults%add('&'//trim(self%name), message)
-      end if
-   end subroutine group_fault
-
-   !> Group, variable and what was found.
-   function place(group, value)
-      class(group_values_type), intent(in) :: group
-      type(value_type), intent(in) :: value
-      character(:), allocatable :: place
-
-      place = '&'//trim(group%name)//': '//trim(value%entry%name)
-      if (value%given) place = place//' = '//value%shown
-   end function place
-
-   !> Where a variable of a repeatable group stands.
-   function line_note(group, value) result(note)
-      class(group_values_type), intent(in) :: group
-      type(value_type), intent(in) :: value
-      character(:), allocatable :: note
-
-      note = ''
-      if (.not. group%repeatable) return
-      note = in_line(merge(value%line, group%line, value%given))
-   end function line_note
-
-   !> A line number in parentheses.
-   pure function in_line(line) result(note)
-      integer, intent(in) :: line
-      character(:), allocatable :: note
-
-      note = ' (line '//to_text(line)//')'
-   end function in_line
 
    !> A proposal, if there is one.
    pure function hint(prefix, name) result(text)

@@ -75,6 +75,8 @@ contains
          case (0:8, 11, 14:31, 127)
             bad = i
             exit
+         case default
+            cycle
          end select
       end do
       if (bad > 0) then
@@ -114,7 +116,7 @@ contains
       line = 1
       at = 1
       if (len(text) >= 3) then                        ! the mark that some editors put before UTF-8
-         if (text(:3) == achar(239)//achar(187)//achar(191)) at = 4
+         if (text(:3) == char(239)//char(187)//char(191)) at = 4
       end if
       do while (at <= len(text))
          select case (text(at:at))

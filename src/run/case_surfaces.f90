@@ -1,0 +1,169 @@
+!> The `&surface` groups of a case: defaults from the grid, and what belongs to each shape.
+module case_surfaces
+   use case_settings, only : path_length, surface_settings_type
+   use input_faults, only : faults_type
+   use input_group, only : group_values_type
+   use precision, only : dp
+   use regular_grid, only : grid_type
+   use text_tools, only : to_text
+   implicit none
+   private
+
+   public :: resolve_path, resolve_surfaces
+
+contains
+
+   !> `&surface`, all of them
+   subroutine resolve_surfaces(groups, path, grid, grid_known, surfaces, faults)
+      type(group_values_type), intent(in) :: groups(:)
+      character(*), intent(in) :: path
+      type(grid_type), intent(in) :: grid
+      logical, intent(in) :: grid_known
+      type(surface_settings_type), allocatable, intent(out) :: surfaces(:)
+      type(faults_type), intent(inout) :: faults
+      integer :: i, n
+
+      allocate (surfaces(count(groups%name == 'surface')))
+      n = 0
+      do i = 1, size(groups)
+         if (groups(i)%name /= 'surface') cycle
+         n = n + 1
+         call resolve_surface(groups(i), path, grid, grid_known, surfaces(n), faults)
+      end do
+   end subroutine resolve_surfaces
+
+   !> One `&surface`
+   subroutine resolve_surface(group, path, grid, grid_known, term, faults)
+      type(group_values_type), intent(in) :: group
+      character(*), intent(in) :: path
+      type(grid_type), intent(in) :: grid
+      logical, intent(in) :: grid_known
+      type(surface_settings_type), intent(out) :: term
+      type(faults_type), intent(inout) :: faults
+      character(:), allocatable :: belongs, name
+      real(dp) :: side
+      integer :: i
+
+      term%shape = group%text_value('shape')
+      side = merge(grid%lx, min(grid%lx, grid%ly), grid%ny == 1)
+      term%radius = group%real_value('radius')
+      term%amplitude = group%real_value('amplitude')
+      term%wavelength = group%real_value('wavelength')
+      term%hurst = group%real_value('hurst')
+      term%wavelength_long = group%real_value('wavelength_long', side)
+      term%wavelength_rolloff = group%real_value('wavelength_rolloff', term%wavelength_long)
+      term%wavelength_short = group%real_value('wavelength_short', &
+         8.0_dp*merge(grid%dx, max(grid%dx, grid%dy), grid%ny == 1))
+      term%rms_height = group%real_value('rms_height')
+      term%rms_slope = group%real_value('rms_slope')
+      term%seed = group%integer_value('seed')
+      term%generator = group%text_value('generator')
+      term%dataset = group%text_value('dataset')
+      term%scale = group%real_value('scale')
+      term%centre_x = group%real_value('centre_x', (grid%nx/2)*grid%dx)
+      term%centre_y = group%real_value('centre_y', (grid%ny/2)*grid%dy)
+      term%file = ''
+
+      call group%demand('shape', faults)
+      belongs = ' shape '
+      select case (term%shape)
+      case ('sphere', 'paraboloid', 'cylinder')
+         belongs = belongs//'radius centre_x centre_y '
+         call group%demand('radius', faults, trim(term%shape))
+      case ('sine', 'hexagonal_wave')
+         belongs = belongs//'amplitude wavelength centre_x centre_y '
+         call group%demand('amplitude', faults, trim(term%shape))
+         call group%demand('wavelength', faults, trim(term%shape))
+      case ('self_affine')
+         belongs = belongs//'hurst wavelength_long wavelength_rolloff wavelength_short rms_height '// &
+            'rms_slope seed generator '
+         call group%demand('hurst', faults, 'self_affine')
+         call check_rough(group, term, grid_known, faults)
+      case ('file')
+         belongs = belongs//'file dataset scale '
+         call group%demand('file', faults, 'shape = ''file''')
+         call resolve_path(group, path, term%file, faults)
+      case ('flat')
+         belongs = belongs//'centre_x centre_y '
+      case default
+         return
+      end select
+      do i = 1, size(group%values)
+         name = trim(group%values(i)%entry%name)
+         if (.not. group%given(name) .or. index(belongs, ' '//name//' ') > 0) cycle
+         call group%fault(name, 'does not belong to shape = '''//trim(term%shape)//'''', faults)
+      end do
+   end subroutine resolve_surface
+
+   !> The parameters of a rough surface among each other.
+   subroutine check_rough(group, term, grid_known, faults)
+      type(group_values_type), intent(in) :: group
+      type(surface_settings_type), intent(in) :: term
+      logical, intent(in) :: grid_known                !! defaults are known
+      type(faults_type), intent(inout) :: faults
+      logical :: long_known, rolloff_known, short_known
+
+      if (group%given('rms_height') .and. group%given('rms_slope')) then
+         call group%group_fault('rms_height and rms_slope are given together: give one of them', faults)
+      else if (.not. (group%given('rms_height') .or. group%given('rms_slope'))) then
+         call group%group_fault('rms_height or rms_slope is missing: self_affine needs one of them', faults)
+      end if
+      long_known = known('wavelength_long')
+      rolloff_known = known('wavelength_rolloff') .and. (long_known .or. group%given('wavelength_rolloff'))
+      short_known = known('wavelength_short')
+      if (rolloff_known .and. short_known) then
+         if (.not. term%wavelength_short < term%wavelength_rolloff) call group%fault('wavelength_short', &
+            'must be below wavelength_rolloff = '//to_text(term%wavelength_rolloff)// &
+            default_note('wavelength_short', term%wavelength_short), faults)
+      end if
+      if (rolloff_known .and. long_known) then
+         if (term%wavelength_rolloff > term%wavelength_long) call group%fault('wavelength_rolloff', &
+            'must be at most wavelength_long = '//to_text(term%wavelength_long), faults)
+      end if
+
+   contains
+
+      !> Is the wavelength known, given or by default?
+      logical function known(name)
+         character(*), intent(in) :: name
+
+         known = group%usable(name) .or. (grid_known .and. .not. group%given(name))
+      end function known
+
+      !> The value where it is the default.
+      function default_note(name, value) result(note)
+         character(*), intent(in) :: name
+         real(dp), intent(in) :: value
+         character(:), allocatable :: note
+
+         note = ''
+         if (.not. group%given(name)) note = '; by default it is '//to_text(value)//', 8 cells'
+      end function default_note
+
+   end subroutine check_rough
+
+   !> A path in the input counts from the input's folder.
+   subroutine resolve_path(group, path, file, faults)
+      type(group_values_type), intent(in) :: group
+      character(*), intent(in) :: path                  !! of the input
+      character(path_length), intent(out) :: file
+      type(faults_type), intent(inout) :: faults
+      character(:), allocatable :: name
+
+      file = ''
+      if (.not. group%usable('file')) return
+      name = group%text_value('file')
+      if (name == '') then
+         call group%fault('file', 'must name a file', faults)
+         return
+      end if
+      if (name(1:1) /= '/') name = path(:index(path, '/', back=.true.))//name
+      if (len(name) > len(file)) then
+         call group%fault('file', 'with the input''s folder it must have at most '//to_text(path_length)// &
+            ' characters', faults)
+         return
+      end if
+      file = name
+   end subroutine resolve_path
+
+end module case_surfaces

@@ -1,0 +1,132 @@
+!> What a result holds, in words.
+module result_summary
+   use case_input, only : parse_case
+   use case_settings, only : case_type
+   use errors, only : error_type
+   use hdf5_file, only : hdf5_file_type
+   use precision, only : dp
+   use text_tools, only : ordinary, to_text
+   implicit none
+   private
+
+   public :: summarise_result
+
+   character(*), parameter :: nl = new_line('a')
+
+contains
+
+   !> Read a result and say what it holds; it may belong to a run that is still going.
+   subroutine summarise_result(path, text, error)
+      character(*), intent(in) :: path
+      character(:), allocatable, intent(out) :: text
+      type(error_type), allocatable, intent(out) :: error
+      type(hdf5_file_type) :: file
+      type(error_type), allocatable :: ignored
+
+      text = ''
+      call file%open(path, 'read', error)
+      if (allocated(error)) return
+      call describe(file, path, text, error)
+      call file%close(ignored)
+   end subroutine summarise_result
+
+   !> The summary of an open file.
+   subroutine describe(file, path, text, error)
+      type(hdf5_file_type), intent(inout) :: file
+      character(*), intent(in) :: path
+      character(:), allocatable, intent(inout) :: text
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: boundary, input, maker, title, written
+      integer :: finished, nx, ny
+      real(dp) :: lx, ly
+
+      call file%read_attribute('/', 'title', title, error)
+      if (.not. allocated(error)) call file%read_attribute('/', 'version', maker, error)
+      if (.not. allocated(error)) call file%read_attribute('/', 'created', written, error)
+      if (.not. allocated(error)) call file%read_attribute('/', 'input', input, error)
+      if (.not. allocated(error)) call file%read_attribute('/', 'finished', finished, error)
+      if (.not. allocated(error)) call file%read_attribute('/grid', 'nx', nx, error)
+      if (.not. allocated(error)) call file%read_attribute('/grid', 'ny', ny, error)
+      if (.not. allocated(error)) call file%read_attribute('/grid', 'lx', lx, error)
+      if (.not. allocated(error)) call file%read_attribute('/grid', 'ly', ly, error)
+      if (.not. allocated(error)) call file%read_attribute('/grid', 'boundary', boundary, error)
+      if (allocated(error)) return
+
+      text = 'file        '//path//nl
+      text = text//'case        '//ordinary(title, 200)//nl
+      text = text//'written     '//written//' by asperity '//maker//nl
+      text = text//'grid        '//to_text(nx)//' x '//to_text(ny)//' cells, '//to_text(lx)//' m x '// &
+         to_text(ly)//' m, '//boundary//nl
+      text = text//phases_text(input, path)
+      call history_text(file, text, error)
+      if (allocated(error)) return
+      if (finished == 1) then
+         text = text//'finished    yes'//nl
+      else
+         text = text//'finished    no'//nl
+      end if
+   end subroutine describe
+
+   !> The phases of the input that the result keeps.
+   function phases_text(input, path) result(text)
+      character(*), intent(in) :: input
+      character(*), intent(in) :: path
+      character(:), allocatable :: text
+      type(case_type) :: case
+      type(error_type), allocatable :: error
+      integer :: i
+
+      text = ''
+      call parse_case(input, path, case, error)
+      if (allocated(error)) return                   ! of another version, say
+      text = 'phases      '//to_text(size(case%phases))//nl
+      do i = 1, size(case%phases)
+         associate (phase => case%phases(i))
+            text = text//'  '//to_text(i)//'         '//trim(phase%name)//': '//trim(phase%control)//' '// &
+               to_text(phase%target)//trim(merge(' Pa', ' N ', phase%control == 'pressure'))
+            if (phase%control == 'displacement') text = text(:len(text) - 1)//'m'
+            if (.not. phase%static) text = text//', '//to_text(phase%duration)//' s in '// &
+               to_text(phase%steps)//' steps'
+            text = text//nl
+         end associate
+      end do
+   end function phases_text
+
+   !> The last row of the history, and how well it converged.
+   subroutine history_text(file, text, error)
+      type(hdf5_file_type), intent(inout) :: file
+      character(:), allocatable, intent(inout) :: text
+      type(error_type), allocatable, intent(out) :: error
+      character(*), parameter :: names(7) = [character(20) :: 'step', 'phase', 'time', 'pressure', &
+         'displacement', 'contact_area', 'residual_normal']
+      character(*), parameter :: units(7) = [character(3) :: '', '', ' s', ' Pa', ' m', '', '']
+      real(dp), allocatable :: column(:)
+      real(dp) :: last(size(names)), worst
+      integer :: i, rows
+
+      rows = huge(1)
+      worst = 0.0_dp
+      do i = 1, size(names)
+         call file%read('/history/'//trim(names(i)), column, error)
+         if (allocated(error)) return
+         rows = min(rows, size(column))
+      end do
+      if (rows == 0) then
+         text = text//'rows        0'//nl
+         return
+      end if
+      do i = 1, size(names)
+         call file%read('/history/'//trim(names(i)), column, error)
+         if (allocated(error)) return
+         rows = min(rows, size(column))
+         last(i) = column(rows)
+         if (names(i) == 'residual_normal') worst = maxval(column(:rows))
+      end do
+      text = text//'rows        '//to_text(rows)//nl//'last row'//nl
+      do i = 1, size(names)
+         text = text//'  '//names(i)//to_text(last(i))//trim(units(i))//nl
+      end do
+      text = text//'largest residual_normal of all rows: '//to_text(worst)//nl
+   end subroutine history_text
+
+end module result_summary
