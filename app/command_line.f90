@@ -164,6 +164,8 @@ contains
       case ('info')
          if (.not. allocated(command%path)) call add_fault(error, error_input, &
             'asperity: info needs a result: asperity info RESULT.h5')
+      case default                                   ! template: a name is optional
+         continue
       end select
 
    contains

@@ -1,17 +1,16 @@
 !> The program `asperity`: from the command line to an exit status. The only place that stops.
 program main
-   use, intrinsic :: iso_fortran_env, only : error_unit
-   use, intrinsic :: iso_c_binding, only : c_char, c_int, c_size_t
    use case_input, only : read_case
    use case_report, only : case_summary, resolved_input
-   use case_settings, only : case_type
+   use case_settings, only : case_type, path_length
    use case_templates, only : all_template_names, find_template, template_is_available, template_list, &
       template_text
    use command_line, only : command_type, help_text, read_command_line
-   use errors, only : error_file, error_input, error_type, fail
+   use errors, only : error_input, error_type, fail
    use input_reference, only : reference_markdown
    use result_summary, only : summarise_result
-   use text_tools, only : nearest_name, ordinary
+   use standard_streams, only : say, say_error
+   use text_tools, only : nearest_name, ordinary, to_text
    use version, only : asperity_version
    implicit none
 
@@ -32,46 +31,18 @@ program main
          call check(error)
       case ('info')
          call info(error)
-      case ('run')
+      case default
          call run(error)
       end select
    end if
    status = 0
    if (allocated(error)) then
-      write (error_unit, '(a)', iostat=status) error%message
+      call say_error(error%message)
       status = error%status
    end if
    stop status, quiet=.true.
 
 contains
-
-   !> Write a text to standard output; by the system's own call, which tells when it fails.
-   subroutine say(text, error)
-      character(*), intent(in) :: text
-      type(error_type), allocatable, intent(out) :: error
-      integer(c_size_t) :: done
-      integer(c_size_t) :: count
-      interface
-         function c_write(descriptor, buffer, count) bind(c, name='write') result(written)
-            import :: c_char, c_int, c_size_t
-            implicit none
-            integer(c_int), value :: descriptor
-            character(kind=c_char), intent(in) :: buffer(*)
-            integer(c_size_t), value :: count
-            integer(c_size_t) :: written       !! as large as the signed type of C
-         end function c_write
-      end interface
-
-      done = 0
-      do while (done < len(text))
-         count = c_write(1_c_int, text(done + 1:), len(text) - done)
-         if (count < 1) then
-            call fail(error, error_file, 'asperity: standard output cannot be written')
-            return
-         end if
-         done = done + count
-      end do
-   end subroutine say
 
    !> asperity template [NAME]
    subroutine template(error)
@@ -121,9 +92,16 @@ contains
 
       call read_case(command%path, case, error)
       if (allocated(error)) return
-      if (allocated(command%output)) case%output%file = command%output
+      if (allocated(command%output)) then
+         if (len(command%output) > path_length) then
+            call fail(error, error_input, 'asperity: --output: the path has '//to_text(len(command%output))// &
+               ' characters: at most '//to_text(path_length)//' are allowed')
+            return
+         end if
+         case%output%file = command%output
+      end if
       if (command%threads > 0) case%solver%threads = command%threads
-      if (case%warnings /= '') write (error_unit, '(a)', iostat=status) case%warnings
+      if (case%warnings /= '') call say_error(case%warnings)
       call fail(error, error_input, 'asperity: run is not available yet')
    end subroutine run
 

@@ -8,6 +8,7 @@ program main
    use test_fft_conv, only : run_fft_conv
    use test_hdf5_file, only : run_hdf5_file
    use test_interpolation, only : run_interpolation
+   use test_namelist, only : run_namelist
    use test_prony, only : run_prony
    use test_result_file, only : run_result_file
    use test_roughness, only : run_roughness
@@ -28,6 +29,7 @@ program main
    if (wanted('prony')) call run_prony()
    if (wanted('surface')) call run_surface()
    if (wanted('roughness')) call run_roughness()
+   if (wanted('namelist')) call run_namelist()
    if (wanted('case_input')) call run_case_input()
    if (wanted('interpolation')) call run_interpolation()
    if (wanted('zener')) call run_zener()

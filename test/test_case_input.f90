@@ -1,7 +1,9 @@
 !> Tests of `case_input`: resolved values of good inputs, and every fault of bad ones.
 module test_case_input
    use case_input, only : parse_case, read_case
+   use case_report, only : case_summary, memory_needed, resolved_input
    use case_settings, only : case_type
+   use case_templates, only : all_template_names, template_is_available, template_list, template_text
    use check, only : begin_suite, check_close, check_error, check_no_error, check_that
    use errors, only : error_file, error_input, error_type
    use precision, only : dp
@@ -25,10 +27,14 @@ contains
       call test_defaults()
       call test_given_values()
       call test_phases()
+      call test_steps()
       call test_materials()
       call test_bad_inputs()
       call test_many_faults()
       call test_files()
+      call test_features()
+      call test_report()
+      call test_templates()
    end subroutine run_case_input
 
    !> What is not given.
@@ -124,6 +130,157 @@ contains
       call check_close(case%phases(3)%target, 2.0_dp, 0.0_dp, 'inherits the force')
       call check_close(case%phases(4)%target, -1.0e-6_dp, 0.0_dp, 'a negative displacement')
    end subroutine test_phases
+
+   !> Time steps, given and derived. Cells are 2e-3/64 m.
+   subroutine test_steps()
+      type(case_type) :: case
+      type(error_type), allocatable :: error
+      real(dp), parameter :: dx = 2.0e-3_dp/64
+      character(*), parameter :: arms = '&material shear_modulus=1e6, prony_g=3*1e6, prony_tau=1e-6, 0.4, 9.0 /'
+
+      ! 2 cells in 0.3 s are no whole number of 0.07 s: 4 steps of 0.075 s
+      call parse_case(body//'&phase duration = 0.3, dt = 0.07 /&phase duration = 0.3, steps = 7 /'// &
+         '&phase duration = 0.3, dt = 0.1, steps = 3, ramp = ''linear'', force = 1.0 /'// &
+         '&phase duration = 8.0 /', 'a', case, error)
+      call check_steps(2, 4, 0.075_dp, 'dt given')
+      call check_steps(3, 7, 0.3_dp/7, 'steps given')
+      call check_steps(4, 3, 0.1_dp, 'both given')
+      call check_steps(5, 20, 0.4_dp, 'elastic at rest')
+      call check_that(case%phases(4)%linear .and. .not. case%phases(4)%static, 'a ramp')
+
+      ! an arm of 1e-6 s relaxes at once in a second: 0.4 s counts; 8 s take at least 20 steps
+      call parse_case(grid//sphere//arms//press//'&phase duration = 1.0 /&phase duration = 8.0 /'// &
+         '&phase duration = 0.5e-6 /', 'a', case, error)
+      call check_steps(2, 20, 0.05_dp, 'an eighth of the shortest active time')
+      call check_steps(3, 160, 0.05_dp, 'the same in a longer phase')
+      call check_steps(4, 20, 0.025e-6_dp, 'a phase shorter than every time')
+
+      ! one cell a step, along x, along y with other cells, and obliquely
+      call parse_case('&grid nx=64, ny=32, lx=2e-3, ly=3e-3 /'//sphere//arms//press// &
+         '&phase duration = 1.0, velocity_x = -1e-3 /&phase duration = 1.0, velocity_y = 3e-3 /'// &
+         '&phase duration = 1.0, velocity_x = 1e-3, velocity_y = 3e-3 /'// &
+         '&phase duration = 1.0, velocity_x = 1e-3, steps = 4 /', 'a', case, error)
+      call check_steps(2, 32, dx/1.0e-3_dp, 'one cell along x')
+      call check_steps(3, 32, 3.0e-3_dp/32/3.0e-3_dp, 'one cell along y')
+      call check_steps(4, 32, dx/1.0e-3_dp, 'one cell obliquely')
+      call check_that(index(case%warnings, '&phase 5: a step moves the road by 8 cells') > 0, &
+         'a coarse step is warned of: '//case%warnings)
+
+   contains
+
+      subroutine check_steps(i, steps, dt, what)
+         integer, intent(in) :: i, steps
+         real(dp), intent(in) :: dt
+         character(*), intent(in) :: what
+
+         if (size(case%phases) < i) then
+            call check_that(.false., what//': the phase is not there')
+            return
+         end if
+         call check_that(case%phases(i)%steps == steps, what//': steps')
+         call check_close(case%phases(i)%dt, dt, 1.0e-14_dp*dt, what//': dt')
+      end subroutine check_steps
+
+   end subroutine test_steps
+
+   !> What is not available yet is refused, once it is otherwise right; each case here has one thing
+   !> that the program lacks, or none any more.
+   subroutine test_features()
+      character(*), parameter :: asks(2) = [character(70) :: &
+         '&adhesion potential = ''exponential'', energy = 0.05, range = 1e-6 /', &
+         '&friction law = ''coulomb'', coefficient = 0.5 /']
+      type(case_type) :: case
+      type(error_type), allocatable :: error
+      integer :: i
+
+      do i = 1, size(asks)
+         call parse_case(body//trim(asks(i)), 'a', case, error)
+         if (.not. allocated(error)) cycle
+         call check_that(error%status == error_input, 'a missing feature: status')
+         call check_error(error, 'is not available yet', trim(asks(i)))
+         call check_that(lines(error%message) == 1, 'a missing feature is one fault: '//error%message)
+      end do
+      call parse_case(body//asks(1)//'&phase pressure = -1.0 /&phase force = 0 /', 'a', case, error)
+      if (allocated(error)) then
+         call check_error(error, 'is not available yet', 'adhesion allows pulling')
+         call check_that(lines(error%message) == 1, 'adhesion allows pulling: '//error%message)
+      end if
+      call check_close(case%phases(2)%target, -1.0_dp, 0.0_dp, 'a pulling pressure')
+   end subroutine test_features
+
+   !> The resolved settings are an input of the same case.
+   subroutine test_report()
+      type(case_type) :: again, case
+      type(error_type), allocatable :: error
+      character(:), allocatable :: text
+
+      call parse_case('&case title = ''it''''s'' /'//grid//sphere//steel//press// &
+         '&phase displacement = 3.3333333333333333e-6, name=''deep'' /&phase /'// &
+         '&surface shape=''self_affine'' hurst=0.7 rms_height=1.1e-7 wavelength_short=1.7e-4/'// &
+         '&surface shape=''file'' file=''x.h5'' /&surface shape=''sine'' amplitude=-1e-6 wavelength=1e-3 /'// &
+         '&output snapshot_fields=''gap'' snapshot_every=2 file=''y.h5'' /', 'folder/a.nml', case, error)
+      call check_no_error(error, 'a case to report')
+      if (allocated(error)) return
+      text = resolved_input(case)
+      call parse_case(text, 'b.nml', again, error)
+      call check_no_error(error, 'resolved settings as an input')
+      if (allocated(error)) return
+      call check_that(resolved_input(again) == text, 'resolved settings stay the same')
+      call check_that(again%title == 'it''s' .and. again%output%file == 'folder/y.h5' .and. &
+         again%surfaces(3)%file == 'folder/x.h5', 'texts')
+      call check_close(again%phases(3)%target, case%phases(2)%target, 0.0_dp, 'numbers to the last bit')
+      call check_close(again%surfaces(2)%wavelength_long, 1.0e-3_dp, 0.0_dp, 'a derived default')
+      call check_that(again%phases(3)%control == 'displacement' .and. .not. again%phases(3)%given, &
+         'an inherited load stays inherited')
+      call check_that(index(text, 'tolerance = 1e-6') > 0, 'defaults are shown')
+
+      ! 64 x 32 cells: 9 fields and a buffer of 66 x 32
+      call check_close(memory_needed(case), 8.0_dp*(9*64*32 + 66*32) + 20.0e6_dp, 1.0e-6_dp, 'memory')
+      case%grid%boundary = boundary_free
+      call check_close(memory_needed(case), 8.0_dp*(9*64*32 + 4*66*32) + 20.0e6_dp, 1.0e-6_dp, 'memory, free')
+      call check_that(index(case_summary(case), '3 phases, 3 static solves, 0 time steps in 0 s') > 0, &
+         'summary: '//case_summary(case))
+      call check_that(index(case_summary(case), 'memory: about 20.2 MB') > 0, 'summary: '//case_summary(case))
+   end subroutine test_report
+
+   !> Every template is a good input, or waits for a feature; those of the elastic spine are there.
+   subroutine test_templates()
+      type(case_type) :: case
+      type(error_type), allocatable :: error
+      character(16), allocatable :: names(:)
+      integer :: i
+
+      allocate (names, source=all_template_names())
+      call check_that(size(names) >= 7, 'seven templates')
+      do i = 1, size(names)
+         call parse_case(template_text(trim(names(i))), trim(names(i)), case, error)
+         if (allocated(error)) then
+            call check_that(lines(error%message) == occurrences(error%message, 'is not available yet'), &
+               'template '//trim(names(i))//' lacks only features: '//error%message)
+            call check_that(.not. template_is_available(trim(names(i))), trim(names(i))//' is not offered')
+         else
+            call check_that(case%title /= '' .and. case%warnings == '', 'template '//trim(names(i))// &
+               ' is in order '//case%warnings)
+            call check_that(index(nl//template_list(), nl//trim(names(i))//' ') > 0, trim(names(i))// &
+               ' is listed, its name first')
+         end if
+      end do
+      do i = 1, 3
+         call check_that(template_is_available(trim(names(i))), trim(names(i))//' is available')
+      end do
+      call check_that(template_text('nothing') == '', 'no such template')
+   end subroutine test_templates
+
+   !> How often a piece occurs in a text.
+   pure integer function occurrences(text, piece)
+      character(*), intent(in) :: text, piece
+      integer :: i
+
+      occurrences = 0
+      do i = 1, len(text) - len(piece) + 1
+         if (text(i:i + len(piece) - 1) == piece) occurrences = occurrences + 1
+      end do
+   end function occurrences
 
    !> Arms are parsed and checked, and then refused as long as they are not available.
    subroutine test_materials()

@@ -12,6 +12,7 @@ module case_input
    use input_values, only : default_group, read_groups
    use precision, only : dp
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
+   use surface_warnings, only : find_warnings, warning_length
    use text_tools, only : to_text
    implicit none
    private
@@ -124,9 +125,25 @@ contains
       call pick(groups, 'output', group)
       call resolve_output(group, case, faults)
 
-      if (.not. allocated(faults%error)) call check_features(case, faults)
+      if (.not. allocated(faults%error)) then
+         call add_surface_warnings(case)
+         call check_features(case, faults)
+      end if
       if (allocated(faults%error)) call move_alloc(faults%error, error)
    end subroutine parse_case
+
+   !> Doubts about the surfaces, with numbers.
+   subroutine add_surface_warnings(case)
+      type(case_type), intent(inout) :: case
+      character(warning_length), allocatable :: found(:)
+      integer :: i
+
+      call find_warnings(case%grid, case%surfaces, found)
+      do i = 1, size(found)
+         if (case%warnings /= '') case%warnings = case%warnings//new_line('a')
+         case%warnings = case%warnings//trim(found(i))
+      end do
+   end subroutine add_surface_warnings
 
    !> Report groups that are missing.
    subroutine check_presence(groups, faults)

@@ -1,0 +1,59 @@
+!> Standard output and standard error, written by the system's own call, which tells when it fails.
+module standard_streams
+   use errors, only : error_file, error_type, fail
+   use, intrinsic :: iso_c_binding, only : c_char, c_int, c_size_t
+   implicit none
+   private
+
+   public :: say, say_error
+
+   interface
+      !> write(2): the number of bytes written, or -1.
+      function c_write(descriptor, buffer, count) bind(c, name='write') result(written)
+         import :: c_char, c_int, c_size_t
+         implicit none
+         integer(c_int), value :: descriptor
+         character(kind=c_char), intent(in) :: buffer(*)
+         integer(c_size_t), value :: count
+         integer(c_size_t) :: written
+      end function c_write
+   end interface
+
+contains
+
+   !> Write a text to standard output.
+   subroutine say(text, error)
+      character(*), intent(in) :: text                         !! with its line ends
+      type(error_type), allocatable, intent(out) :: error
+      logical :: written
+
+      call write_all(1_c_int, text, written)
+      if (.not. written) call fail(error, error_file, 'asperity: standard output cannot be written')
+   end subroutine say
+
+   !> Write lines to standard error; nobody can be told where that fails.
+   subroutine say_error(text)
+      character(*), intent(in) :: text                         !! without its last line end
+      logical :: written
+
+      call write_all(2_c_int, text//new_line('a'), written)
+   end subroutine say_error
+
+   !> Write all of a text, in as many calls as it takes.
+   subroutine write_all(descriptor, text, written)
+      integer(c_int), intent(in) :: descriptor
+      character(*), intent(in) :: text
+      logical, intent(out) :: written
+      integer(c_size_t) :: count, done
+
+      written = .false.
+      done = 0
+      do while (done < len(text))
+         count = c_write(descriptor, text(done + 1:), len(text) - done)
+         if (count < 1) return
+         done = done + count
+      end do
+      written = .true.
+   end subroutine write_all
+
+end module standard_streams
