@@ -1,0 +1,368 @@
+"""The program as a user meets it: commands, messages, exit statuses, and inputs that are broken."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+GOOD = """&grid nx = 16, ny = 8, lx = 1e-3 /
+&surface shape = 'sphere', radius = 0.01 /
+&material shear_modulus = 1e6 /
+&phase pressure = 1e5 /
+"""
+VERBS = ["run", "check", "template", "info"]
+
+
+def call(program, *arguments, cwd=None):
+    """Run the program; whatever happens, it must not crash."""
+    done = subprocess.run([program, *map(str, arguments)], capture_output=True, cwd=cwd, timeout=60)
+    done.out = done.stdout.decode(errors="replace")
+    done.err = done.stderr.decode(errors="replace")
+    assert done.returncode in (0, 2, 3, 4), (done.returncode, done.err)
+    for word in ("Backtrace", "Fortran runtime", "STOP", "Note:", "HDF5-DIAG"):
+        assert word not in done.err
+    assert (done.returncode == 0) or done.err.strip()
+    return done
+
+
+def check(program, folder, text):
+    """Check an input given as text or bytes."""
+    path = folder / "case.nml"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return call(program, "check", "case.nml", cwd=folder)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("case")
+
+
+def test_version(program, root):
+    done = call(program, "--version")
+    assert done.returncode == 0
+    assert done.out == f"asperity {(root / 'VERSION').read_text().strip()}\n"
+
+
+@pytest.mark.parametrize("verb", ["", *VERBS])
+def test_help(program, verb):
+    done = call(program, *([verb] if verb else []), "--help")
+    assert done.returncode == 0
+    assert done.out.count("asperity") >= 1
+    assert verb in done.out
+    assert done.err == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fragment"),
+    [
+        ([], "no command is given"),
+        (["chek", "a.nml"], "did you mean check?"),
+        (["run"], "run needs an input"),
+        (["check", "--outptu", "x", "a.nml"], "did you mean --output?"),
+        (["run", "a.nml", "b.nml"], "'b.nml' is one argument too many"),
+        (["run", "a.nml", "--output"], "--output needs a value"),
+        (["run", "a.nml", "--threads", "0"], "must be an integer from 1 to 1024"),
+        (["run", "a.nml", "--threads", "two"], "--threads two"),
+        (["run", "a.nml", "--threads=99999999999"], "--threads 99999999999"),
+        (["run", "a.nml", "--quiet=yes"], "--quiet takes no value"),
+        (["info", "a.h5", "--restart"], "--restart does not belong to info"),
+        (["check", "a.nml", "--output", "x.h5"], "--output does not belong to check"),
+        (["template", "herz"], "did you mean hertz?"),
+        (["info"], "info needs a result"),
+    ],
+)
+def test_wrong_command_line(program, folder, arguments, fragment):
+    done = call(program, *arguments, cwd=folder)
+    assert done.returncode == 2
+    assert fragment in done.err
+    assert all(line.startswith("asperity: ") for line in done.err.strip("\n").split("\n"))
+    assert done.out == ""
+
+
+def test_all_faults_of_a_command_line(program):
+    done = call(program, "run", "--quite", "--threads", "-1", "a", "b")
+    assert len(done.err.splitlines()) == 3
+
+
+def test_missing_files(program, folder):
+    for verb in ("run", "check", "info"):
+        done = call(program, verb, "not_there", cwd=folder)
+        assert done.returncode == 3
+        assert "not_there" in done.err
+    done = call(program, "check", folder)
+    assert done.returncode == 3
+    done = call(program, "check", "")
+    assert done.returncode in (2, 3)
+
+
+def test_full_device(program, folder):
+    if not Path("/dev/full").exists():
+        pytest.skip("there is no /dev/full")
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run([program, "--help"], stdout=full, stderr=subprocess.PIPE)
+    assert done.returncode == 3
+    assert b"standard output cannot be written" in done.stderr
+
+
+def test_check_prints_an_input(program, folder):
+    done = check(program, folder, GOOD)
+    assert done.returncode == 0
+    assert re.search(r"ly = 5e-4", done.out)
+    assert re.search(r"tolerance = 1e-6", done.out)
+    assert "memory: about" in done.out
+    again = check(program, folder, done.out)
+    assert again.returncode == 0
+    assert again.out == done.out
+
+
+def test_templates_are_good_inputs(program, folder):
+    listed = call(program, "template").out.splitlines()
+    names = [line.split()[0] for line in listed]
+    assert {"hertz", "westergaard", "rough"} <= set(names)
+    for name in names:
+        text = call(program, "template", name).out
+        assert text.count("! ") > 10
+        assert check(program, folder, text).returncode == 0
+
+
+def test_reference(program):
+    text = call(program, "template", "--reference").out
+    for group in [
+        "case",
+        "grid",
+        "surface",
+        "material",
+        "adhesion",
+        "friction",
+        "phase",
+        "solver",
+        "output",
+    ]:
+        assert f"## `&{group}`" in text
+    assert "| `nx` | integer |" in text
+
+
+def test_message_has_the_stated_form(program, folder):
+    done = check(program, folder, GOOD.replace("nx = 16", "nx = -4"))
+    assert done.returncode == 2
+    assert done.err == "case.nml: &grid: nx = -4: must be a positive integer\n"
+    done = call(program, "run", "case.nml", cwd=folder)
+    assert done.returncode == 2
+    assert not list(folder.glob("*.h5"))
+
+
+def test_info(program, folder):
+    path = folder / "result.h5"
+    with h5py.File(path, "w") as file:
+        file.attrs.update(
+            title="A title",
+            program="asperity",
+            version="0.1.0",
+            finished=1,
+            created="2020-01-01T00:00:00Z",
+            input=GOOD,
+        )
+        file.create_group("grid").attrs.update(nx=16, ny=8, lx=1e-3, ly=5e-4, boundary="periodic")
+        columns = {
+            "step": [0],
+            "phase": [1],
+            "time": [0.0],
+            "pressure": [1e5],
+            "displacement": [1e-6],
+            "contact_area": [0.125],
+            "residual_normal": [3e-7],
+        }
+        for name, values in columns.items():
+            file[f"history/{name}"] = np.array(values)
+    done = call(program, "info", path)
+    assert done.returncode == 0, done.err
+    for piece in (
+        "A title",
+        "16 x 8 cells",
+        "periodic",
+        "phase 1: pressure 100000 Pa",
+        "contact_area        0.125",
+        "3e-7",
+        "finished    yes",
+    ):
+        assert piece in done.out
+    with h5py.File(path, "a") as file:
+        del file.attrs["title"]
+    assert call(program, "info", path).returncode == 3
+    path.write_bytes(b"not HDF5 at all")
+    assert call(program, "info", path).returncode == 3
+
+
+# Inputs that hypothesis makes. The program may accept what is right; it must never crash.
+
+lines = settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+pieces = st.sampled_from(
+    [
+        "&grid",
+        "&",
+        "$phase",
+        "/",
+        "=",
+        ",",
+        "(",
+        ")",
+        "(3)",
+        "(2:1)",
+        "'",
+        '"',
+        "!",
+        "\n",
+        "\r\n",
+        "\t",
+        "nx",
+        "prony_g",
+        "shape",
+        "'sphere'",
+        "2*",
+        "*",
+        "3*0.1",
+        "1e999",
+        "-1e-999",
+        "NaN",
+        "-Infinity",
+        "99999999999999999999",
+        ".true.",
+        ".t",
+        "%",
+        "&end",
+        "x" * 300,
+        "'" + "y" * 3000 + "'",
+        "1.5",
+        "\x0c",
+        "\u00e9",
+        "0x10",
+        "1d",
+        "e5",
+        "+",
+        "-",
+        ".",
+        ";",
+        "@",
+        "shear_modulus",
+        "(1,2)",
+        "''",
+        "**",
+        "&&",
+    ]
+)
+
+
+def judge(done):
+    """Whatever the input was, the answer is orderly."""
+    assert done.returncode in (0, 2)
+    if done.returncode == 2:
+        assert all(line.startswith("case.nml: ") for line in done.err.strip("\n").split("\n")), done.err
+        assert done.err.count("\n") <= 101
+        assert done.out == ""
+
+
+@lines
+@given(data=st.binary(max_size=400))
+def test_any_bytes(program, folder, data):
+    done = check(program, folder, data)
+    assert done.returncode == 2
+    judge(done)
+
+
+@lines
+@given(data=st.lists(pieces, max_size=30))
+def test_any_pieces(program, folder, data):
+    judge(check(program, folder, " ".join(data)))
+
+
+@lines
+@given(data=st.lists(pieces, min_size=1, max_size=5), at=st.integers(0, len(GOOD)))
+def test_pieces_in_a_good_input(program, folder, data, at):
+    judge(check(program, folder, GOOD[:at] + " ".join(data) + GOOD[at:]))
+
+
+@lines
+@given(first=st.integers(0, len(GOOD)), last=st.integers(0, len(GOOD)))
+def test_holes_in_a_good_input(program, folder, first, last):
+    judge(check(program, folder, GOOD[: min(first, last)] + GOOD[max(first, last) :]))
+
+
+GROUPS = {
+    "grid": {"nx": 16, "ny": 8, "lx": 1e-3, "ly": 1e-3, "boundary": "'periodic'"},
+    "surface": {"shape": "'sphere'", "radius": 0.01, "centre_x": 0.0},
+    "material": {
+        "shear_modulus": 1e6,
+        "poisson": 0.4,
+        "thickness": 0.0,
+        "prony_g": "",
+        "wlf_c1": "",
+    },
+    "phase": {"pressure": 1e5, "duration": "", "dt": "", "steps": "", "relaxed": "", "name": ""},
+    "solver": {"tolerance": "", "threads": "", "method": "", "max_iterations": ""},
+    "output": {"file": "", "snapshot_times": "", "snapshot_fields": "", "compression": ""},
+    "case": {"title": ""},
+}
+VARIABLES = [(group, name) for group, names in GROUPS.items() for name in names]
+
+
+@settings(lines, max_examples=150)
+@given(
+    variable=st.sampled_from(VARIABLES),
+    value=st.one_of(st.integers(), st.floats(), st.text(max_size=20), st.booleans(), pieces),
+)
+def test_any_value(program, folder, variable, value):
+    text = ""
+    for group, names in GROUPS.items():
+        text += f"&{group}\n"
+        for name, usual in names.items():
+            if (group, name) == variable:
+                text += f"  {name} = {value}\n"
+            elif usual != "":
+                text += f"  {name} = {usual}\n"
+        text += "/\n"
+    done = check(program, folder, text)
+    judge(done)
+    if done.returncode == 0:
+        again = check(program, folder, done.out)
+        assert again.returncode == 0
+        assert again.out == done.out
+
+
+@lines
+@given(
+    arguments=st.lists(
+        st.one_of(
+            st.sampled_from(
+                [
+                    *VERBS,
+                    "--help",
+                    "--output",
+                    "--threads",
+                    "--quiet",
+                    "--restart",
+                    "--",
+                    "-",
+                    "=",
+                    "--version",
+                    "-h",
+                    "--threads=3",
+                    "--output=",
+                    "a.nml",
+                ]
+            ),
+            st.text(
+                st.characters(blacklist_characters="\0", blacklist_categories=["Cs"]), max_size=12
+            ),
+        ),
+        max_size=6,
+    )
+)
+def test_any_command_line(program, folder, arguments):
+    call(program, *arguments, cwd=folder)
