@@ -16,6 +16,7 @@ program main
    use test_viscoelastic_energy, only : run_viscoelastic_energy
    use test_zener, only : run_zener
    use test_normal_cg, only : run_normal_cg
+   use test_simulation, only : run_simulation
    implicit none
 
    ! check writer FILE ROWS COMPRESSION [restart]: a run for tests that kill it, and no test.
@@ -37,6 +38,7 @@ program main
    if (wanted('normal_cg')) call run_normal_cg()
    if (wanted('result_file')) call run_result_file()
    if (wanted('checkpoint')) call run_checkpoint()
+   if (wanted('simulation')) call run_simulation()
    call finish()
 
 contains

@@ -15,12 +15,9 @@ contains
       type(case_type), intent(in) :: case
       type(faults_type), intent(inout) :: faults
 
-      associate (m => case%material, a => case%adhesion, f => case%friction, p => case%phases)
-         call missing(size(m%prony_g) > 0, '&material', 'a viscoelastic material (Prony arms, Zener branches)')
+      associate (a => case%adhesion, f => case%friction)
          call missing(a%potential /= 'none', '&adhesion: potential = '//trim(a%potential), 'adhesion')
          call missing(f%law /= 'none', '&friction: law = '//trim(f%law), 'friction')
-         call missing(any(.not. p%static), '&phase: duration', 'a phase with a duration')
-         call missing(any(abs(p%velocity_x) + abs(p%velocity_y) > 0.0_dp), '&phase: velocity', 'sliding')
          call missing(case%solver%precision == 'mixed', '&solver: precision = ''mixed''', 'mixed precision')
       end associate
 

@@ -1,0 +1,156 @@
+!> The rows of a run: which solve comes next, at what time, under what load and speed.
+!>
+!> A phase with a duration begins with a jump where it is the first, where its load differs from the
+!> one held so far and is not ramped, or where it starts relaxed; then come its steps. A phase
+!> without a duration is static: one instantaneous solve, or a series of them up to its load.
+module schedule
+   use case_settings, only : phase_settings_type
+   use precision, only : dp
+   implicit none
+   private
+
+   public :: count_rows, next_row, planned_row_type, schedule_type
+
+   !> What a row asks for.
+   type :: planned_row_type
+      integer :: phase = 0                        !! number of the phase, from 1
+      logical :: instantaneous = .false.          !! a jump or a static solve
+      logical :: relaxed = .false.                !! the load has rested for ever
+      logical :: new_speed = .false.              !! the speed of the road changed just before
+      real(dp) :: time = 0.0_dp                   !! s
+      real(dp) :: dt = 0.0_dp                     !! s; 0 where instantaneous
+      character(12) :: control = 'pressure'
+      real(dp) :: load = 0.0_dp                   !! Pa, N or m
+      real(dp) :: road_x = 0.0_dp                 !! displacement of the road, m
+      real(dp) :: road_y = 0.0_dp
+      real(dp) :: velocity_x = 0.0_dp             !! of the road, m/s
+      real(dp) :: velocity_y = 0.0_dp
+   end type planned_row_type
+
+   !> Where a run stands. Plain numbers, so that a checkpoint can hold them.
+   type :: schedule_type
+      integer :: row = -1                         !! last row done; -1: none
+      integer :: phase = 1                        !! phase in hand
+      integer :: step = 0                         !! steps of it that are done
+      logical :: entered = .false.                !! its first row is done or not needed
+      real(dp) :: start_time = 0.0_dp             !! of the phase, s
+      real(dp) :: start_load = 0.0_dp             !! its load at the start, in its own control
+      real(dp) :: start_x = 0.0_dp                !! displacement of the road at the start, m
+      real(dp) :: start_y = 0.0_dp
+      character(12) :: held_control = ''          !! load held so far; '' before the first phase
+      real(dp) :: held_load = 0.0_dp
+      real(dp) :: velocity_x = 0.0_dp             !! of the road so far, m/s
+      real(dp) :: velocity_y = 0.0_dp
+   end type schedule_type
+
+contains
+
+   !> Number of rows of a run.
+   pure function count_rows(phases) result(rows)
+      type(phase_settings_type), intent(in) :: phases(:)
+      integer :: rows
+      integer :: k
+      character(12) :: control
+      real(dp) :: load
+
+      rows = 0
+      control = ''
+      load = 0.0_dp
+      do k = 1, size(phases)
+         rows = rows + phases(k)%steps
+         if (begins_with_row(phases(k), control, load)) rows = rows + 1
+         control = phases(k)%control(:12)
+         load = phases(k)%target
+      end do
+   end function count_rows
+
+   !> Does a phase begin with a row of its own, for a load that jumps?
+   pure function begins_with_row(phase, control, load) result(begins)
+      type(phase_settings_type), intent(in) :: phase
+      character(12), intent(in) :: control         !! of the load held so far
+      real(dp), intent(in) :: load
+      logical :: begins
+
+      begins = .false.
+      if (phase%static) return
+      begins = control == '' .or. phase%relaxed
+      if (.not. phase%linear) begins = begins .or. control /= phase%control(:12) .or. &
+         abs(load - phase%target) > 0.0_dp
+   end function begins_with_row
+
+   !> The next row, and the schedule behind it; `finished` where there is none.
+   subroutine next_row(self, phases, present_load, row, finished)
+      type(schedule_type), intent(inout) :: self
+      type(phase_settings_type), intent(in) :: phases(:)
+      real(dp), intent(in) :: present_load(3)      !! pressure, force and displacement now
+      type(planned_row_type), intent(out) :: row
+      logical, intent(out) :: finished
+      real(dp) :: part
+
+      finished = self%phase > size(phases)
+      if (finished) return
+      associate (phase => phases(self%phase))
+         if (self%step == 0 .and. .not. self%entered) then
+            row%new_speed = abs(phase%velocity_x - self%velocity_x) > 0.0_dp .or. &
+               abs(phase%velocity_y - self%velocity_y) > 0.0_dp
+            self%start_load = load_at_start(self, phase, present_load)
+            self%velocity_x = phase%velocity_x
+            self%velocity_y = phase%velocity_y
+         end if
+         row%phase = self%phase
+         row%control = phase%control(:12)
+         row%velocity_x = phase%velocity_x
+         row%velocity_y = phase%velocity_y
+
+         if (.not. self%entered .and. begins_with_row(phase, self%held_control, self%held_load)) then
+            part = 0.0_dp
+            row%instantaneous = .true.
+            row%load = self%start_load
+            if (.not. phase%linear) row%load = phase%target
+         else
+            self%step = self%step + 1
+            part = real(self%step, dp)/phase%steps
+            row%instantaneous = phase%static
+            row%dt = phase%dt
+            row%load = phase%target
+            if (phase%linear) row%load = self%start_load + part*(phase%target - self%start_load)
+            if (self%step == phase%steps) row%load = phase%target
+         end if
+         self%entered = .true.
+         row%relaxed = phase%relaxed .and. row%instantaneous
+         row%time = self%start_time + part*phase%duration
+         row%road_x = self%start_x + part*phase%duration*phase%velocity_x
+         row%road_y = self%start_y + part*phase%duration*phase%velocity_y
+         self%row = self%row + 1
+
+         if (self%step == phase%steps) then
+            self%start_time = row%time
+            self%start_x = row%road_x
+            self%start_y = row%road_y
+            self%held_control = row%control
+            self%held_load = phase%target
+            self%phase = self%phase + 1
+            self%step = 0
+            self%entered = .false.
+         end if
+      end associate
+   end subroutine next_row
+
+   !> The load from which a phase's ramp starts, in the phase's control.
+   pure function load_at_start(self, phase, present_load) result(load)
+      type(schedule_type), intent(in) :: self
+      type(phase_settings_type), intent(in) :: phase
+      real(dp), intent(in) :: present_load(3)
+      real(dp) :: load
+
+      if (self%held_control == phase%control(:12)) then
+         load = self%held_load
+      else if (self%held_control == '') then
+         load = 0.0_dp
+      else
+         load = present_load(findloc([character(12) :: 'pressure', 'force', 'displacement'], &
+            phase%control(:12), dim=1))
+      end if
+   end function load_at_start
+
+end module schedule

@@ -1,0 +1,341 @@
+!> The step loop: a rubber block pressed on a road and moved over it.
+!>
+!> A row of the history is one solve: `advance` takes the next from the schedule, moves the road,
+!> solves the contact, ends the step of the material and books the energies. Who calls it writes
+!> files or fills arrays. The state can be saved and taken up again (module simulation_state).
+!>
+!> Fields of doubles beside those of the normal solver: H, P, gap, U; with sliding the original map and
+!> the two slopes; with Prony arms the history (S, S - S_old and one field an arm) and its traction.
+module simulation
+   use case_settings, only : case_type
+   use errors, only : error_type
+   use history_row, only : history_row_type
+   use interpolation, only : interpolation_type, new_interpolation, shifted
+   use normal_cg, only : new_normal_solver, normal_solver_type
+   use normal_cg_thesis, only : solve_normal_thesis
+   use normal_state, only : control_approach, control_pressure, normal_problem_type, rms_about_mean
+   use parallel, only : global_max, global_sum
+   use precision, only : dp, int64
+   use regular_grid, only : boundary_free, grid_type
+   use schedule, only : next_row, planned_row_type, schedule_type
+   use solver_result, only : solver_result_type
+   use surface, only : new_height
+   use viscoelastic_energy, only : book_step, energy_books_type, new_books
+   use zener, only : commit_history, destroy_history, finish_step, history_field, history_type, &
+      is_elastic, new_history, new_products, new_zener, products_type, restart_order, start_jump, &
+      start_relaxed, start_step, zener_type
+   implicit none
+   private
+
+   public :: new_simulation, simulation_type
+
+   !> A run in hand. Not to be copied.
+   type :: simulation_type
+      type(case_type) :: case
+      type(grid_type) :: grid
+      type(schedule_type) :: schedule
+      type(planned_row_type) :: plan                !! of the last row
+      type(history_row_type) :: row                 !! the last row
+      logical :: converged = .true.                 !! the last row's solvers met the tolerance
+      logical :: finished = .false.                 !! no row is left
+      character(64) :: reason = ''                  !! why not converged
+      character(:), allocatable :: warnings         !! new ones, a line each; the caller clears them
+      real(dp), allocatable :: height(:, :)         !! H under the rubber now, m
+      real(dp), allocatable :: pressure(:, :)       !! P, Pa
+      real(dp), allocatable :: gap(:, :)            !! m
+      real(dp), allocatable :: displacement(:, :)   !! U_z, m
+      type(zener_type) :: material
+      type(history_type) :: history                 !! of the normal traction
+      type(energy_books_type) :: books              !! of the normal traction
+      real(dp) :: summit = 0.0_dp                   !! highest point of the original map, m
+      real(dp) :: direction(2) = 0.0_dp             !! of the road's last motion
+      real(dp) :: drive_force(2) = 0.0_dp           !! horizontal force on the rubber, N
+      type(interpolation_type), private :: road
+      logical, private :: slides = .false.          !! some phase moves the road
+      logical, private :: edge_reported = .false.
+      type(normal_solver_type), private :: normal
+      real(dp), allocatable, private :: slope_x(:, :), slope_y(:, :)
+      real(dp), allocatable, private :: past(:, :)  !! traction of the history, Pa
+      real(dp), private :: rms_height = 0.0_dp
+   contains
+      procedure :: advance
+      procedure :: place_road
+      procedure :: destroy
+   end type simulation_type
+
+contains
+
+   !> Prepare a run: surface, operators, fields.
+   subroutine new_simulation(self, case, error)
+      type(simulation_type), intent(out) :: self
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      integer :: nx, ny
+
+      self%case = case
+      self%grid = case%grid
+      self%warnings = ''
+      nx = self%grid%nx
+      ny = self%grid%ny
+      self%slides = any(abs(case%phases%velocity_x) > 0.0_dp .or. abs(case%phases%velocity_y) > 0.0_dp)
+      call new_height(self%grid, case%surfaces, self%height, error)
+      if (allocated(error)) return
+      self%summit = global_max(maxval(self%height))
+      call new_normal_solver(self%normal, self%grid, case%material%poisson, error)
+      if (allocated(error)) return
+      self%rms_height = rms_about_mean(self%height, self%normal%operator%threads)
+      call new_zener(self%material, case%material%shear_modulus, case%material%prony_g, &
+         case%material%prony_tau, trim(case%solver%time_scheme), error)
+      if (allocated(error)) return
+      call new_history(self%history, self%material, nx*ny, 1, error)
+      if (allocated(error)) return
+      call new_books(self%books, self%material, self%grid%dx*self%grid%dy)
+      allocate (self%pressure(nx, ny), self%gap(nx, ny), self%displacement(nx, ny), source=0.0_dp)
+      if (.not. is_elastic(self%material)) allocate (self%past(nx, ny), source=0.0_dp)
+      if (self%slides) then
+         call new_interpolation(self%road, self%grid, self%height, trim(case%solver%interpolation), &
+            error)
+         if (allocated(error)) return
+         allocate (self%slope_x(nx, ny), self%slope_y(nx, ny))
+         call self%place_road(0.0_dp, 0.0_dp)
+      end if
+   end subroutine new_simulation
+
+   !> Do the next row. Where the solvers did not converge, the state reached is kept.
+   subroutine advance(self, error)
+      class(simulation_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      type(planned_row_type) :: plan
+      type(solver_result_type) :: outcome
+      type(products_type) :: products
+      real(dp) :: level
+      integer(int64) :: start, now, rate
+
+      call next_row(self%schedule, self%case%phases, &
+         [self%row%pressure, self%row%force, self%row%displacement], plan, self%finished)
+      if (self%finished) return
+      call begin_step(self, plan, error)
+      if (allocated(error)) return
+      call move_road(self, plan)
+
+      call system_clock(start, rate)
+      if (.not. is_elastic(self%material)) then
+         call history_field(self%history, self%material, self%past)
+         call solve_normal(self, plan, outcome, level, self%past)
+      else
+         call solve_normal(self, plan, outcome, level)
+      end if
+      call system_clock(now)
+      outcome%seconds = real(now - start, dp)/real(rate, dp)
+      self%converged = outcome%converged
+      self%reason = outcome%reason
+
+      products = new_products(self%material)
+      call new_displacement(self, level)
+      call commit_history(self%history, self%material, self%pressure, self%displacement, &
+         self%normal%step, products)
+      self%displacement(:, :) = self%normal%step
+      call book_step(self%books, self%material, products)
+      call finish_step(self%material)
+
+      call fill_row(self, plan, outcome, level)
+      self%plan = plan
+      self%finished = self%schedule%phase > size(self%case%phases)
+   end subroutine advance
+
+   !> The material's coefficients for the step.
+   subroutine begin_step(self, plan, error)
+      type(simulation_type), intent(inout) :: self
+      type(planned_row_type), intent(in) :: plan
+      type(error_type), allocatable, intent(out) :: error
+
+      if (plan%new_speed) call restart_order(self%material)
+      if (plan%relaxed) then
+         call start_relaxed(self%material, error)
+      else if (plan%instantaneous) then
+         call start_jump(self%material)
+      else
+         call start_step(self%material, plan%dt)
+      end if
+   end subroutine begin_step
+
+   !> Move the road, and the pressure with it: the best start for the solver.
+   subroutine move_road(self, plan)
+      type(simulation_type), intent(inout) :: self
+      type(planned_row_type), intent(in) :: plan
+      integer :: cells_x, cells_y
+
+      if (abs(plan%velocity_x) > 0.0_dp .or. abs(plan%velocity_y) > 0.0_dp) &
+         self%direction = [plan%velocity_x, plan%velocity_y]/hypot(plan%velocity_x, plan%velocity_y)
+      if (.not. self%slides) return
+      cells_x = nint(plan%road_x/self%grid%dx) - nint(self%row%road_x/self%grid%dx)
+      cells_y = nint(plan%road_y/self%grid%dy) - nint(self%row%road_y/self%grid%dy)
+      if (cells_x /= 0 .or. cells_y /= 0) call shift_field(self, cells_x, cells_y, self%pressure)
+      call self%place_road(plan%road_x, plan%road_y)
+   end subroutine move_road
+
+   !> Heights and slopes of the road at a displacement.
+   subroutine place_road(self, road_x, road_y)
+      class(simulation_type), intent(inout) :: self
+      real(dp), intent(in) :: road_x, road_y        !! m
+
+      if (self%slides) call shifted(self%road, road_x, road_y, self%height, self%slope_x, self%slope_y)
+   end subroutine place_road
+
+   !> Shift a field by whole cells; what enters a free map is zero.
+   subroutine shift_field(self, cells_x, cells_y, field)
+      type(simulation_type), intent(inout) :: self
+      integer, intent(in) :: cells_x, cells_y
+      real(dp), intent(inout) :: field(:, :)
+      integer :: i, j, from_i, from_j
+      logical :: free
+
+      free = self%grid%boundary == boundary_free
+      !$omp parallel do default(none) shared(self, field, cells_x, cells_y, free) &
+      !$omp private(i, j, from_i, from_j)
+      do j = 1, self%grid%ny
+         from_j = j - cells_y
+         do i = 1, self%grid%nx
+            from_i = i - cells_x
+            if (.not. free) then
+               self%normal%step(i, j) = field(modulo(from_i - 1, self%grid%nx) + 1, &
+                  modulo(from_j - 1, self%grid%ny) + 1)
+            else if (from_i >= 1 .and. from_i <= self%grid%nx .and. &
+               from_j >= 1 .and. from_j <= self%grid%ny) then
+               self%normal%step(i, j) = field(from_i, from_j)
+            else
+               self%normal%step(i, j) = 0.0_dp
+            end if
+         end do
+      end do
+      field(:, :) = self%normal%step
+   end subroutine shift_field
+
+   !> Solve the normal contact under the row's load.
+   subroutine solve_normal(self, plan, outcome, level, past)
+      type(simulation_type), intent(inout) :: self
+      type(planned_row_type), intent(in) :: plan
+      type(solver_result_type), intent(out) :: outcome
+      real(dp), intent(out) :: level
+      real(dp), intent(in), optional :: past(:, :)
+      type(normal_problem_type) :: problem
+
+      problem%modulus = self%material%q
+      problem%tolerance = self%case%solver%tolerance
+      problem%max_iterations = self%case%solver%max_iterations
+      problem%rms_height = self%rms_height
+      problem%warm = self%schedule%row > 0
+      select case (plan%control)
+      case ('displacement')
+         problem%control = control_approach
+         problem%target = plan%load - self%summit
+      case ('force')
+         problem%control = control_pressure
+         problem%target = plan%load/(self%grid%lx*self%grid%ly)
+      case default
+         problem%control = control_pressure
+         problem%target = plan%load
+      end select
+      if (self%case%solver%method == 'thesis') then
+         call solve_normal_thesis(self%grid, self%normal%operator, problem, self%height, &
+            self%pressure, self%gap, level, outcome, past)
+      else
+         call self%normal%solve(problem, self%height, self%pressure, self%gap, level, outcome, past)
+      end if
+   end subroutine solve_normal
+
+   !> U = gap + H + level, into the solver's work field.
+   subroutine new_displacement(self, level)
+      type(simulation_type), intent(inout) :: self
+      real(dp), intent(in) :: level
+      integer :: j
+
+      !$omp parallel do default(none) shared(self, level) private(j)
+      do j = 1, self%grid%ny
+         self%normal%step(:, j) = self%gap(:, j) + self%height(:, j) + level
+      end do
+   end subroutine new_displacement
+
+   !> The row of the history.
+   subroutine fill_row(self, plan, outcome, level)
+      type(simulation_type), intent(inout) :: self
+      type(planned_row_type), intent(in) :: plan
+      type(solver_result_type), intent(in) :: outcome
+      real(dp), intent(in) :: level
+      type(history_row_type) :: row
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: sums(5), cells, area
+      integer :: j
+
+      allocate (rows(5, self%grid%ny), source=0.0_dp)
+      !$omp parallel do default(none) shared(self, rows) private(j)
+      do j = 1, self%grid%ny
+         rows(1, j) = sum(self%pressure(:, j))
+         rows(2, j) = count(self%pressure(:, j) > 0.0_dp)
+         rows(3, j) = sum(self%gap(:, j))
+         if (self%slides) then
+            rows(4, j) = sum(self%pressure(:, j)*self%slope_x(:, j))
+            rows(5, j) = sum(self%pressure(:, j)*self%slope_y(:, j))
+         end if
+      end do
+      sums = global_sum([(sum(rows(j, :)), j = 1, 5)])
+      cells = real(self%grid%nx, dp)*self%grid%ny
+      area = self%grid%lx*self%grid%ly
+
+      row = self%row
+      row%step = self%schedule%row
+      row%phase = plan%phase
+      row%time = plan%time
+      row%pressure = sums(1)/cells
+      row%force = row%pressure*area
+      row%displacement = level + self%summit
+      row%contact_area = sums(2)/cells
+      row%mean_gap = sums(3)/cells
+      row%road_x = plan%road_x
+      row%road_y = plan%road_y
+      row%friction_viscous = 0.0_dp
+      if (sums(1) > 0.0_dp) &
+         row%friction_viscous = -dot_product(sums(4:5), self%direction)/sums(1)
+      row%friction = row%friction_viscous
+      row%work_normal = self%books%work
+      row%energy_elastic = self%books%stored
+      row%dissipated_viscous = self%books%dissipated
+      row%dissipated_numerical = self%books%numerical
+      if (plan%instantaneous) then
+         ! The path of a jump is not known: its work is what it stores.
+         row%work_load = self%row%work_load + row%work_normal - self%row%work_normal
+      else
+         row%work_load = self%row%work_load + 0.5_dp*(row%force + self%row%force) &
+            *(row%displacement - self%row%displacement)
+      end if
+      row%iterations_normal = outcome%iterations
+      row%residual_normal = outcome%residual
+      row%ffts = real(outcome%ffts, dp)
+      row%seconds = outcome%seconds
+      call book_drive(self, sums(4:5)*self%grid%dx*self%grid%dy, row)
+      self%row = row
+   end subroutine fill_row
+
+   !> Work of the road's motion: the horizontal force on the rubber times the displacement.
+   subroutine book_drive(self, slope_force, row)
+      type(simulation_type), intent(inout) :: self
+      real(dp), intent(in) :: slope_force(2)        !! sum of P grad H over the cells, N
+      type(history_row_type), intent(inout) :: row
+      real(dp) :: force(2)
+
+      force = -slope_force
+      row%work_drive = self%row%work_drive + 0.5_dp*( &
+         (force(1) + self%drive_force(1))*(row%road_x - self%row%road_x) &
+         + (force(2) + self%drive_force(2))*(row%road_y - self%row%road_y))
+      self%drive_force = force
+   end subroutine book_drive
+
+   !> Free plans and fields.
+   subroutine destroy(self)
+      class(simulation_type), intent(inout) :: self
+
+      call self%normal%destroy()
+      call destroy_history(self%history)
+   end subroutine destroy
+
+end module simulation
