@@ -1,6 +1,7 @@
 !> The program `asperity`: from the command line to an exit status. The only place that stops.
 program main
    use case_input, only : read_case
+   use case_run, only : run_type
    use case_report, only : case_summary, resolved_input
    use case_settings, only : case_type, path_length
    use case_templates, only : all_template_names, find_template, template_is_available, template_list, &
@@ -9,6 +10,7 @@ program main
    use errors, only : error_input, error_type, fail
    use input_reference, only : reference_markdown
    use result_summary, only : summarise_result
+   use signals, only : catch_signals, checkpoint_asked, forget_checkpoint, signal_interrupt, stop_signal
    use standard_streams, only : say, say_error
    use text_tools, only : nearest_name, ordinary, to_text
    use version, only : asperity_version
@@ -102,7 +104,40 @@ contains
       end if
       if (command%threads > 0) case%solver%threads = command%threads
       if (case%warnings /= '') call say_error(case%warnings)
-      call fail(error, error_input, 'asperity: run is not available yet')
+      call catch_signals()
+      call run_steps(case, error)
    end subroutine run
+
+   !> The steps of a run. A signal stops it after the step in hand, with a checkpoint.
+   subroutine run_steps(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      type(run_type) :: run
+      type(error_type), allocatable :: closing
+
+      call run%open(case, command%restart, error)
+      if (.not. allocated(error)) then
+         do while (.not. run%finished)
+            if (len(run%warnings) > 0) call say_error(run%warnings)
+            run%warnings = ''
+            if (stop_signal() /= 0) then
+               call run%interrupt(error)
+               if (.not. allocated(error)) call fail(error, 128 + stop_signal(), 'asperity: stopped by '// &
+                  trim(merge('SIGINT ', 'SIGTERM', stop_signal() == signal_interrupt))// &
+                  ' after step '//to_text(run%sim%row%step)//'; --restart goes on from there')
+               exit
+            end if
+            if (checkpoint_asked()) then
+               call forget_checkpoint()
+               call run%save(error)
+               if (allocated(error)) exit
+            end if
+            call run%step(error)
+            if (allocated(error)) exit
+         end do
+      end if
+      call run%close(closing)
+      if (.not. allocated(error) .and. allocated(closing)) call move_alloc(closing, error)
+   end subroutine run_steps
 
 end program main

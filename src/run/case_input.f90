@@ -304,6 +304,7 @@ contains
       output%snapshot_every = group%integer_value('snapshot_every')
       output%snapshot_times = group%reals_value('snapshot_times')
       output%checkpoint_every = group%integer_value('checkpoint_every')
+      output%checkpoint_minutes = group%real_value('checkpoint_minutes')
       output%compression = group%integer_value('compression')
 
       if (group%given('snapshot_every') .and. group%given('snapshot_times')) call group%group_fault( &

@@ -195,6 +195,7 @@ contains
             fields = fields//''''//trim(o%snapshot_fields(i))//''''
          end do
          text = text//line('snapshot_fields', fields, '')//whole('checkpoint_every', o%checkpoint_every)// &
+            number('checkpoint_minutes', o%checkpoint_minutes, 'min')// &
             whole('compression', o%compression)//'/'//nl
       end associate
    end function solver_text

@@ -78,6 +78,7 @@ module case_settings
       real(dp), allocatable :: snapshot_times(:)    !! s
       character(word_length), allocatable :: snapshot_fields(:)
       integer :: checkpoint_every                   !! steps; 0: only when stopped by a signal
+      real(dp) :: checkpoint_minutes                !! minutes between checkpoints; 0: none by time
       integer :: compression                        !! deflate level, 0 to 9
    end type output_settings_type
 

@@ -245,7 +245,9 @@ contains
          row('output', 'snapshot_fields', kind_words, '(all that the case has)', '', fields, &
             'Fields that are kept.'), &
          row('output', 'checkpoint_every', kind_integer, '0', 'steps', 'not negative', &
-            'Steps between checkpoints; 0 writes one only when the run is stopped by a signal.'), &
+            'Steps between checkpoints; 0: only by time and when the run is stopped by a signal.'), &
+         row('output', 'checkpoint_minutes', kind_real, '10', 'min', 'not negative', &
+            'Minutes between checkpoints; 0: none by time.'), &
          row('output', 'compression', kind_integer, '1', '', '[0, 9]', &
             'Deflate level of the fields; 0 is none.')]
    end function solver_and_output

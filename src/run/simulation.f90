@@ -15,7 +15,7 @@ module simulation
    use normal_cg_thesis, only : solve_normal_thesis
    use normal_state, only : control_approach, control_pressure, normal_problem_type, rms_about_mean
    use parallel, only : global_max, global_sum
-   use precision, only : dp, int64
+   use precision, only : dp, int64, int8
    use regular_grid, only : boundary_free, grid_type
    use schedule, only : next_row, planned_row_type, schedule_type
    use solver_result, only : solver_result_type
@@ -56,10 +56,12 @@ module simulation
       type(normal_solver_type), private :: normal
       real(dp), allocatable, private :: slope_x(:, :), slope_y(:, :)
       real(dp), allocatable, private :: past(:, :)  !! traction of the history, Pa
-      real(dp), private :: rms_height = 0.0_dp
+      real(dp) :: rms_height = 0.0_dp               !! of the original map about its mean, m
    contains
       procedure :: advance
       procedure :: place_road
+      procedure :: field
+      procedure :: contact_states
       procedure :: destroy
    end type simulation_type
 
@@ -329,6 +331,34 @@ contains
          + (force(2) + self%drive_force(2))*(row%road_y - self%row%road_y))
       self%drive_force = force
    end subroutine book_drive
+
+   !> A field of the state by its name in the result.
+   subroutine field(self, name, values)
+      class(simulation_type), intent(in) :: self
+      character(*), intent(in) :: name              !! 'pressure', 'gap' or 'displacement_z'
+      real(dp), allocatable, intent(out) :: values(:, :)
+
+      select case (name)
+      case ('pressure')
+         values = self%pressure
+      case ('gap')
+         values = self%gap
+      case ('displacement_z')
+         values = self%displacement
+      end select
+   end subroutine field
+
+   !> The state of each cell: 0 open, 1 stick, 2 slip. Without friction all contact slips.
+   subroutine contact_states(self, states)
+      class(simulation_type), intent(in) :: self
+      integer(int8), allocatable, intent(out) :: states(:, :)
+      integer :: j
+
+      allocate (states(self%grid%nx, self%grid%ny))
+      do j = 1, self%grid%ny
+         states(:, j) = merge(2_int8, 0_int8, self%pressure(:, j) > 0.0_dp)
+      end do
+   end subroutine contact_states
 
    !> Free plans and fields.
    subroutine destroy(self)

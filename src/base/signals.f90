@@ -1,0 +1,74 @@
+!> Signals as flags that a run looks at between its steps.
+!>
+!> SIGINT and SIGTERM ask a run to stop after the step in hand, SIGUSR1 for a checkpoint; SIGXFSZ (a
+!> file larger than allowed) is ignored, so that the write that met it fails and says so.
+module signals
+   use, intrinsic :: iso_c_binding, only : c_funloc, c_funptr, c_int, c_intptr_t
+   implicit none
+   private
+
+   public :: catch_signals, checkpoint_asked, forget_checkpoint, stop_signal
+
+   integer(c_int), parameter, public :: signal_interrupt = 2     !! SIGINT
+   integer(c_int), parameter, public :: signal_terminate = 15    !! SIGTERM
+   integer(c_int), parameter :: signal_file_size = 25            !! SIGXFSZ
+   integer(c_int), parameter :: signal_user = 10                 !! SIGUSR1
+
+   integer(c_int), volatile :: caught = 0
+   logical, volatile :: asked = .false.
+
+   interface
+      type(c_funptr) function c_signal(number, handler) bind(c, name='signal')
+         import :: c_funptr, c_int
+         integer(c_int), value :: number
+         type(c_funptr), value :: handler
+      end function c_signal
+   end interface
+
+contains
+
+   !> Catch the signals from here on.
+   subroutine catch_signals()
+      type(c_funptr) :: before, ignore
+
+      before = c_signal(signal_interrupt, c_funloc(note_stop))
+      before = c_signal(signal_terminate, c_funloc(note_stop))
+      before = c_signal(signal_user, c_funloc(note_checkpoint))
+      ignore = transfer(1_c_intptr_t, ignore)
+      before = c_signal(signal_file_size, ignore)
+   end subroutine catch_signals
+
+   !> The signal that asks to stop, 0 if none came.
+   function stop_signal() result(number)
+      integer :: number
+
+      number = caught
+   end function stop_signal
+
+   !> Has a checkpoint been asked for?
+   function checkpoint_asked() result(yes)
+      logical :: yes
+
+      yes = asked
+   end function checkpoint_asked
+
+   !> The checkpoint that was asked for is written.
+   subroutine forget_checkpoint()
+      asked = .false.
+   end subroutine forget_checkpoint
+
+   !> Handler of SIGINT and SIGTERM.
+   subroutine note_stop(number) bind(c)
+      integer(c_int), value :: number
+
+      caught = number
+   end subroutine note_stop
+
+   !> Handler of SIGUSR1.
+   subroutine note_checkpoint(number) bind(c)
+      integer(c_int), value :: number
+
+      asked = number == signal_user
+   end subroutine note_checkpoint
+
+end module signals

@@ -1,0 +1,312 @@
+!> A run of a case with its result file: rows, snapshots, checkpoints, the restart.
+!>
+!> The program and the Python package drive it alike: `open`, `step` until `finished`, `close`. A stop
+!> between two steps writes a checkpoint; a failing solver keeps all there is in the result.
+module case_run
+   use case_report, only : resolved_input
+   use case_settings, only : case_type
+   use checkpoint, only : checkpoint_reader_type, checkpoint_writer_type, pair_type, &
+      remove_checkpoint
+   use errors, only : error_convergence, error_type, fail
+   use parallel, only : set_threads
+   use precision, only : dp, int64, int8
+   use result_file, only : result_file_type
+   use schedule, only : count_rows
+   use simulation, only : new_simulation, simulation_type
+   use simulation_state, only : load_state, save_state
+   use text_tools, only : exact_text, to_text
+   implicit none
+   private
+
+   public :: run_type
+
+   !> A run in hand. Not to be copied.
+   type :: run_type
+      type(simulation_type) :: sim
+      integer :: rows = 0                          !! rows of the whole run
+      logical :: finished = .false.
+      character(:), allocatable :: warnings        !! new ones, a line each; the caller clears them
+      type(result_file_type), private :: result
+      character(:), allocatable, private :: path   !! of the result
+      integer, private :: next_time = 1            !! next of the times for snapshots
+      integer, private :: last_snapshot = -1       !! row of the last snapshot
+      integer(int64), private :: saved_at = 0      !! clock of the last checkpoint
+   contains
+      procedure :: open => open_run
+      procedure :: step => step_run
+      procedure :: interrupt => interrupt_run
+      procedure :: save => save_run
+      procedure :: close => close_run
+   end type run_type
+
+contains
+
+   !> Prepare a run and its result, or take an interrupted one up again.
+   subroutine open_run(self, case, restart, error)
+      class(run_type), intent(inout) :: self
+      type(case_type), intent(in) :: case
+      logical, intent(in) :: restart               !! go on from the checkpoint of the result
+      type(error_type), allocatable, intent(out) :: error
+
+      call set_threads(case%solver%threads)
+      self%path = trim(case%output%file)
+      self%warnings = ''
+      self%rows = count_rows(case%phases)
+      self%finished = .false.
+      self%next_time = 1
+      self%last_snapshot = -1
+      call system_clock(self%saved_at)
+      call new_simulation(self%sim, case, error)
+      if (allocated(error)) return
+      if (restart) then
+         call take_up(self, error)
+      else
+         call create_result(self, error)
+      end if
+      call collect_warnings(self)
+   end subroutine open_run
+
+   !> A new result with all that is known before the first row.
+   subroutine create_result(self, error)
+      type(run_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      integer :: snapshots
+
+      associate (case => self%sim%case)
+         snapshots = size(case%output%snapshot_times) + 1
+         if (case%output%snapshot_every > 0) &
+            snapshots = snapshots + self%rows/case%output%snapshot_every
+         call self%result%create(self%path, trim(case%title), case%input, resolved_input(case), &
+            self%sim%grid, self%sim%height, self%rows, snapshots, case%output%compression, error)
+         if (allocated(error)) return
+         call write_material(self, error)
+         if (allocated(error)) return
+         call self%result%write_text('warnings', case%warnings, error)
+      end associate
+   end subroutine create_result
+
+   !> The material, as it is at the case's temperature.
+   subroutine write_material(self, error)
+      type(run_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+
+      associate (m => self%sim%case%material, result => self%result)
+         call result%write_material('shear_modulus', m%shear_modulus, 'Pa', 'long-term shear modulus', &
+            error)
+         if (allocated(error)) return
+         call result%write_material('poisson', m%poisson, '1', 'Poisson ratio', error)
+         if (allocated(error)) return
+         call result%write_material('prony_g', m%prony_g, 'Pa', 'moduli of the arms', error)
+         if (allocated(error)) return
+         call result%write_material('prony_tau', m%prony_tau, 's', &
+            'relaxation times of the arms at the temperature of the case', error)
+         if (allocated(error)) return
+         call result%write_material('thickness', m%thickness, 'm', 'thickness of the block', error)
+         if (allocated(error)) return
+         call result%write_material('density', m%density, 'kg/m3', 'density', error)
+         if (allocated(error)) return
+         call result%write_material('temperature', m%temperature, 'C', 'temperature', error)
+      end associate
+   end subroutine write_material
+
+   !> Go on from the checkpoint: the state, and a result without what came later.
+   subroutine take_up(self, error)
+      type(run_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      type(checkpoint_reader_type) :: reader
+
+      call reader%open(self%path, error)
+      if (allocated(error)) return
+      call reader%compare(identity(self%sim), error)
+      if (.not. allocated(error)) call load_state(self%sim, reader, error)
+      call reader%close()
+      if (allocated(error)) return
+      call self%result%reopen(self%path, self%sim%row%step, self%sim%case%output%compression, error)
+      if (allocated(error)) return
+      self%finished = self%sim%finished
+      associate (times => self%sim%case%output%snapshot_times)
+         do while (self%next_time <= size(times))
+            if (times(self%next_time) > self%sim%row%time) exit
+            self%next_time = self%next_time + 1
+         end do
+      end associate
+   end subroutine take_up
+
+   !> Do a row, and write what is due. With status error_convergence the row is kept all the same.
+   subroutine step_run(self, error)
+      class(run_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%sim%advance(error)
+      if (allocated(error)) return
+      self%finished = self%sim%finished
+      call collect_warnings(self)
+      call self%result%append_row(self%sim%row, error)
+      if (allocated(error)) return
+      if (snapshot_due(self)) call write_snapshot(self, error)
+      if (allocated(error)) return
+      if (.not. self%sim%converged) then
+         call fail(error, error_convergence, self%path//': step '//to_text(self%sim%row%step)// &
+            ' of phase '//to_text(self%sim%row%phase)//', t = '//to_text(self%sim%row%time)// &
+            ' s: the solver did not converge: '//trim(self%sim%reason)//'; residual '// &
+            to_text(self%sim%row%residual_normal)//', allowed '// &
+            to_text(self%sim%case%solver%tolerance)//'; all steps up to this one are kept')
+         return
+      end if
+      if (self%finished) then
+         call self%result%unlink_checkpoint(error)
+         if (allocated(error)) return
+         call remove_checkpoint(self%path)
+         call self%result%finish(.true., error)
+      else if (checkpoint_due(self)) then
+         call self%save(error)
+      end if
+   end subroutine step_run
+
+   !> Is a snapshot of the last row due?
+   function snapshot_due(self) result(due)
+      type(run_type), intent(inout) :: self
+      logical :: due
+      real(dp) :: now
+
+      associate (output => self%sim%case%output)
+         due = self%finished .or. .not. self%sim%converged
+         if (output%snapshot_every > 0) &
+            due = due .or. mod(self%sim%row%step, output%snapshot_every) == 0
+         ! A time counts as reached within round-off.
+         now = self%sim%row%time*(1.0_dp + 1e-12_dp)
+         do while (self%next_time <= size(output%snapshot_times))
+            if (output%snapshot_times(self%next_time) > now) exit
+            due = .true.
+            self%next_time = self%next_time + 1
+         end do
+      end associate
+   end function snapshot_due
+
+   !> Write the fields that were asked for.
+   subroutine write_snapshot(self, error)
+      type(run_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      real(dp), allocatable :: field(:, :)
+      integer(int8), allocatable :: states(:, :)
+      integer :: k
+
+      associate (sim => self%sim, names => self%sim%case%output%snapshot_fields)
+         call self%result%begin_snapshot(sim%row%step, sim%row%time, sim%row%phase, error)
+         do k = 1, size(names)
+            if (allocated(error)) return
+            if (names(k) == 'contact') then
+               call sim%contact_states(states)
+               call self%result%write_field('contact', states, error)
+            else
+               call sim%field(trim(names(k)), field)
+               call self%result%write_field(trim(names(k)), field, error)
+            end if
+         end do
+         if (allocated(error)) return
+         call self%result%end_snapshot(error)
+         self%last_snapshot = sim%row%step
+      end associate
+   end subroutine write_snapshot
+
+   !> Is a checkpoint due after the last row?
+   function checkpoint_due(self) result(due)
+      type(run_type), intent(in) :: self
+      logical :: due
+      integer(int64) :: now, rate
+
+      associate (output => self%sim%case%output)
+         due = .false.
+         if (output%checkpoint_every > 0) &
+            due = mod(self%sim%row%step, output%checkpoint_every) == 0 .and. self%sim%row%step > 0
+         if (output%checkpoint_minutes > 0.0_dp) then
+            call system_clock(now, rate)
+            due = due .or. real(now - self%saved_at, dp) > 60.0_dp*output%checkpoint_minutes*rate
+         end if
+      end associate
+   end function checkpoint_due
+
+   !> Write a checkpoint of the state after the last row.
+   subroutine save_run(self, error)
+      class(run_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      type(checkpoint_writer_type) :: writer
+
+      call writer%start(self%path, identity(self%sim), error)
+      if (allocated(error)) return
+      call save_state(self%sim, writer, error)
+      if (allocated(error)) return
+      call writer%commit(error)
+      if (allocated(error)) return
+      call self%result%link_checkpoint(error)
+      call system_clock(self%saved_at)
+   end subroutine save_run
+
+   !> Stop between two steps: a snapshot of where the run stands, and a checkpoint.
+   subroutine interrupt_run(self, error)
+      class(run_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+
+      if (self%sim%row%step > self%last_snapshot .and. self%sim%schedule%row >= 0) &
+         call write_snapshot(self, error)
+      if (allocated(error)) return
+      if (self%sim%schedule%row >= 0) call self%save(error)
+   end subroutine interrupt_run
+
+   !> Close the result and free everything.
+   subroutine close_run(self, error)
+      class(run_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%result%close(error)
+      call self%sim%destroy()
+   end subroutine close_run
+
+   !> New warnings of the simulation, for the caller.
+   subroutine collect_warnings(self)
+      type(run_type), intent(inout) :: self
+
+      if (.not. allocated(self%sim%warnings)) return
+      if (len(self%sim%warnings) == 0) return
+      if (len(self%warnings) > 0) self%warnings = self%warnings//new_line('a')
+      self%warnings = self%warnings//self%sim%warnings
+      self%sim%warnings = ''
+   end subroutine collect_warnings
+
+   !> What must agree for a run to go on from a checkpoint: every setting of the case that the
+   !> numbers depend on, and the height map.
+   function identity(sim) result(pairs)
+      type(simulation_type), intent(in) :: sim
+      type(pair_type), allocatable :: pairs(:)
+      character(:), allocatable :: text, line, group
+      integer :: at, next, equals, note, groups
+
+      text = resolved_input(sim%case)
+      allocate (pairs(0))
+      group = ''
+      groups = 0
+      at = 1
+      do while (at <= len(text))
+         next = index(text(at:), new_line('a'))
+         if (next == 0) next = len(text) - at + 2
+         line = trim(adjustl(text(at:at + next - 2)))
+         at = at + next
+         if (len(line) == 0) cycle
+         if (line(1:1) == '&') then
+            groups = groups + 1
+            group = line
+         end if
+         equals = index(line, '=')
+         if (equals == 0) cycle
+         if (group == '&case' .or. group == '&output') cycle
+         if (group == '&solver' .and. index(line, 'threads') == 1) cycle
+         note = index(line, ' ! ')
+         if (note == 0) note = len(line) + 1
+         pairs = [pairs, pair_type(group//' ('//to_text(groups)//') '//trim(line(:equals - 1)), &
+            trim(adjustl(line(equals + 1:note - 1))))]
+      end do
+      pairs = [pairs, pair_type('height map: rms height', exact_text(sim%rms_height)), &
+         pair_type('height map: summit', exact_text(sim%summit))]
+   end function identity
+
+end module case_run
