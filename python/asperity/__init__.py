@@ -5,14 +5,17 @@
 2
 """
 
-from asperity._core import asperity_flat as _flat
-
-from . import material
+from . import material, surface
+from ._library import set_threads, version
+from .contact import NormalContact, solve_normal
 from .errors import NotConverged
 from .result import Run
 from .result import open_result as open
 
-__all__ = ["NotConverged", "Run", "__version__", "material", "open"]
+__all__ = ["NormalContact", "NotConverged", "Run", "__version__", "material", "open",
+           "set_threads", "solve_normal", "surface"]
 
-__version__ = _flat.library_version().decode().strip()
+__version__ = version()
 """The version of the Fortran library that is loaded, such as ``"0.1.0"``."""
+
+del version

@@ -1,13 +1,19 @@
 !> The library for Python, wrapped by f2py: plain arguments, a status and a message.
 !>
 !> Every argument is of a C kind that is written out, since f2py maps a renamed kind to a C float
-!> without a word. Arrays have explicit shapes and are passed without copies.
+!> without a word. Arrays have explicit shapes and are passed without copies: an array of Python of
+!> shape (ny, nx) is one of shape [nx, ny] here. The status is 0 or that of the error.
+!> One call at a time: the planner of the FFTs is not made for two.
 module asperity_flat
    use, intrinsic :: iso_c_binding, only : c_double, c_int
    implicit none
    private
 
-   public :: library_version
+   public :: library_version, set_thread_count
+   public :: surface_height, surface_psd, surface_radial_psd, surface_statistics
+   public :: contact_normal
+
+   integer, parameter :: message_length = 2000    !! written out below: f2py knows no parameters
 
 contains
 
@@ -18,5 +24,235 @@ contains
 
       text = asperity_version
    end subroutine library_version
+
+   !> Use `n` threads from here on, all processors for 0; tell how many that are.
+   subroutine set_thread_count(n, used)
+      use parallel, only : set_threads, thread_count
+      integer(c_int), intent(in) :: n
+      integer(c_int), intent(out) :: used
+
+      call set_threads(int(n))
+      used = thread_count()
+   end subroutine set_thread_count
+
+   !> Height of one term of a surface.
+   subroutine surface_height(nx, ny, lx, ly, is_free, shape_name, radius, amplitude, wavelength, &
+      hurst, wavelength_long, wavelength_rolloff, wavelength_short, rms_height, rms_slope, seed, &
+      generator, centre_x, centre_y, height, status, message)
+      use errors, only : error_type
+      use precision, only : dp
+      use regular_grid, only : grid_type
+      use surface, only : new_height
+      use surface_settings, only : default_surface, surface_settings_type
+      integer(c_int), intent(in) :: nx, ny
+      real(c_double), intent(in) :: lx, ly
+      integer(c_int), intent(in) :: is_free              !! 1: free boundary, 0: periodic
+      character(len=*), intent(in) :: shape_name
+      real(c_double), intent(in) :: radius, amplitude, wavelength
+      real(c_double), intent(in) :: hurst
+      real(c_double), intent(in) :: wavelength_long, wavelength_rolloff, wavelength_short
+      real(c_double), intent(in) :: rms_height, rms_slope
+      integer(c_int), intent(in) :: seed
+      character(len=*), intent(in) :: generator
+      real(c_double), intent(in) :: centre_x, centre_y
+      real(c_double), intent(inout) :: height(nx, ny)    !! m
+      integer(c_int), intent(out) :: status
+      character(len=2000), intent(out) :: message
+      type(error_type), allocatable :: error
+      type(grid_type) :: grid
+      type(surface_settings_type) :: term(1)
+      real(dp), allocatable :: made(:, :)
+      integer :: i, j
+
+      grid = grid_of(nx, ny, lx, ly, is_free)
+      term(1) = default_surface(grid)
+      term(1)%shape = shape_name
+      term(1)%radius = radius
+      term(1)%amplitude = amplitude
+      term(1)%wavelength = wavelength
+      term(1)%hurst = hurst
+      term(1)%wavelength_long = wavelength_long
+      term(1)%wavelength_rolloff = wavelength_rolloff
+      term(1)%wavelength_short = wavelength_short
+      term(1)%rms_height = rms_height
+      term(1)%rms_slope = rms_slope
+      term(1)%seed = seed
+      term(1)%generator = generator
+      term(1)%centre_x = centre_x
+      term(1)%centre_y = centre_y
+      call new_height(grid, term, made, error)
+      if (.not. allocated(error)) then
+         do j = 1, ny
+            do i = 1, nx
+               height(i, j) = made(i, j)
+            end do
+         end do
+      end if
+      call report(error, status, message)
+   end subroutine surface_height
+
+   !> Power spectral density of all modes, in the order of an FFT.
+   subroutine surface_psd(height, nx, ny, lx, ly, psd, status, message)
+      use errors, only : error_type
+      use roughness, only : height_psd
+      integer(c_int), intent(in) :: nx, ny
+      real(c_double), intent(in) :: height(nx, ny)
+      real(c_double), intent(in) :: lx, ly
+      real(c_double), intent(inout) :: psd(nx, ny)
+      integer(c_int), intent(out) :: status
+      character(len=2000), intent(out) :: message
+      type(error_type), allocatable :: error
+
+      call height_psd(grid_of(nx, ny, lx, ly, 0_c_int), height, psd, error)
+      call report(error, status, message)
+   end subroutine surface_psd
+
+   !> Radially averaged power spectral density; `most` rings have room, `rings` are found.
+   subroutine surface_radial_psd(height, nx, ny, lx, ly, most, wave_numbers, psd, modes, rings, &
+      status, message)
+      use errors, only : error_input, error_type, fail
+      use precision, only : dp
+      use roughness, only : radial_psd
+      integer(c_int), intent(in) :: nx, ny
+      real(c_double), intent(in) :: height(nx, ny)
+      real(c_double), intent(in) :: lx, ly
+      integer(c_int), intent(in) :: most
+      real(c_double), intent(inout) :: wave_numbers(most), psd(most)
+      integer(c_int), intent(inout) :: modes(most)
+      integer(c_int), intent(out) :: rings
+      integer(c_int), intent(out) :: status
+      character(len=2000), intent(out) :: message
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: ring_wave_numbers(:), ring_psd(:)
+      integer, allocatable :: ring_modes(:)
+
+      rings = 0
+      call radial_psd(grid_of(nx, ny, lx, ly, 0_c_int), height, ring_wave_numbers, ring_psd, &
+         ring_modes, error)
+      if (.not. allocated(error)) then
+         rings = size(ring_psd)
+         if (rings > most) then
+            call fail(error, error_input, 'no room for the rings of the spectrum')
+         else
+            wave_numbers(:rings) = ring_wave_numbers
+            psd(:rings) = ring_psd
+            modes(:rings) = ring_modes
+         end if
+      end if
+      call report(error, status, message)
+   end subroutine surface_radial_psd
+
+   !> Statistics in the order of `roughness_type`.
+   subroutine surface_statistics(height, nx, ny, lx, ly, is_free, values, status, message)
+      use errors, only : error_type
+      use roughness, only : height_statistics, roughness_type
+      integer(c_int), intent(in) :: nx, ny
+      real(c_double), intent(in) :: height(nx, ny)
+      real(c_double), intent(in) :: lx, ly
+      integer(c_int), intent(in) :: is_free              !! 1: free boundary, 0: periodic
+      real(c_double), intent(out) :: values(10)
+      integer(c_int), intent(out) :: status
+      character(len=2000), intent(out) :: message
+      type(error_type), allocatable :: error
+      type(roughness_type) :: found
+
+      call height_statistics(grid_of(nx, ny, lx, ly, is_free), height, found, error)
+      values = [found%mean, found%lowest, found%highest, found%rms_height, found%skewness, &
+         found%kurtosis, found%rms_slope, found%rms_slope_differences, found%rms_curvature, &
+         found%nayak]
+      call report(error, status, message)
+   end subroutine surface_statistics
+
+   !> Elastic normal contact without adhesion.
+   subroutine contact_normal(height, pressure, gap, nx, ny, lx, ly, is_free, modulus, approach, &
+      target, warm, thesis, tolerance, max_iterations, level, iterations, ffts, residual, seconds, &
+      converged, reason, status, message)
+      use errors, only : error_type
+      use normal_cg, only : new_normal_solver, normal_solver_type
+      use normal_cg_thesis, only : solve_normal_thesis
+      use normal_state, only : control_approach, control_pressure, normal_problem_type, &
+         rms_about_mean
+      use parallel, only : thread_count
+      use precision, only : dp
+      use regular_grid, only : grid_type
+      use solver_result, only : solver_result_type
+      integer(c_int), intent(in) :: nx, ny
+      real(c_double), intent(in) :: height(nx, ny)         !! m
+      real(c_double), intent(inout) :: pressure(nx, ny)    !! Pa; a start where warm
+      real(c_double), intent(inout) :: gap(nx, ny)         !! m
+      real(c_double), intent(in) :: lx, ly
+      integer(c_int), intent(in) :: is_free                !! 1: free boundary, 0: periodic
+      real(c_double), intent(in) :: modulus                !! E*, Pa
+      integer(c_int), intent(in) :: approach               !! 1: the target is U - H in contact, m
+      real(c_double), intent(in) :: target                 !! mean pressure, Pa, otherwise
+      integer(c_int), intent(in) :: warm, thesis           !! 1 or 0
+      real(c_double), intent(in) :: tolerance
+      integer(c_int), intent(in) :: max_iterations
+      real(c_double), intent(out) :: level                 !! U - H in contact, m
+      integer(c_int), intent(out) :: iterations
+      real(c_double), intent(out) :: ffts, residual, seconds
+      integer(c_int), intent(out) :: converged             !! 1 or 0
+      character(len=64), intent(out) :: reason
+      integer(c_int), intent(out) :: status
+      character(len=2000), intent(out) :: message
+      type(error_type), allocatable :: error
+      type(grid_type) :: grid
+      type(normal_problem_type) :: problem
+      type(normal_solver_type) :: solver
+      type(solver_result_type) :: outcome
+!f2py threadsafe
+
+      level = 0.0_dp
+      grid = grid_of(nx, ny, lx, ly, is_free)
+      ! E* = 2 G/(1 - nu) is all that the normal problem knows of the material: take nu = 0.
+      call new_normal_solver(solver, grid, 0.0_dp, error)
+      if (.not. allocated(error)) then
+         problem%modulus = 0.5_dp*modulus
+         problem%control = merge(control_approach, control_pressure, approach == 1)
+         problem%target = target
+         problem%tolerance = tolerance
+         problem%max_iterations = max_iterations
+         problem%warm = warm == 1
+         problem%rms_height = rms_about_mean(height, thread_count())
+         if (thesis == 1) then
+            call solve_normal_thesis(grid, solver%operator, problem, height, pressure, gap, level, &
+               outcome)
+         else
+            call solver%solve(problem, height, pressure, gap, level, outcome)
+         end if
+         call solver%destroy()
+      end if
+      iterations = outcome%iterations
+      ffts = real(outcome%ffts, dp)
+      residual = outcome%residual
+      seconds = outcome%seconds
+      converged = merge(1, 0, outcome%converged)
+      reason = outcome%reason
+      call report(error, status, message)
+   end subroutine contact_normal
+
+   !> The grid of plain numbers.
+   function grid_of(nx, ny, lx, ly, is_free) result(grid)
+      use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
+      integer(c_int), intent(in) :: nx, ny, is_free
+      real(c_double), intent(in) :: lx, ly
+      type(grid_type) :: grid
+
+      grid = new_grid(int(nx), int(ny), lx, ly, merge(boundary_free, boundary_periodic, is_free == 1))
+   end function grid_of
+
+   !> Turn an error into a status and a message.
+   subroutine report(error, status, message)
+      use errors, only : error_type
+      type(error_type), allocatable, intent(in) :: error
+      integer(c_int), intent(out) :: status
+      character(len=message_length), intent(out) :: message
+
+      status = 0
+      message = ''
+      if (.not. allocated(error)) return
+      status = error%status
+      message = error%message
+   end subroutine report
 
 end module asperity_flat

@@ -1,0 +1,94 @@
+"""Calls of the Fortran library: one at a time, a status becomes an exception."""
+
+from __future__ import annotations
+
+import functools
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from asperity._core import asperity_flat
+
+from ._check import choice, positive
+from .errors import raise_for_status
+
+__all__ = ["call", "flag_of_boundary", "height_map", "lengths", "set_threads", "version"]
+
+_lock = threading.Lock()
+
+
+def call(name: str) -> Callable[..., tuple[Any, ...]]:
+    """Return a routine of the library that raises instead of returning a status.
+
+    The routine's last two outputs are its status and message; the others are returned.
+    """
+    routine = getattr(asperity_flat, name)
+
+    @functools.wraps(routine)
+    def checked(*arguments: Any) -> tuple[Any, ...]:
+        with _lock:
+            *outputs, status, message = routine(*arguments)
+        raise_for_status(int(status), message)
+        return tuple(outputs)
+
+    return checked
+
+
+def version() -> str:
+    """Return the version of the library."""
+    return asperity_flat.library_version().decode().strip()
+
+
+def set_threads(number: int = 0) -> int:
+    """Let the library use a number of threads from here on.
+
+    Parameters
+    ----------
+    number : int
+        Number of threads; 0 takes all processors.
+
+    Returns
+    -------
+    int
+        The number in use.
+
+    Examples
+    --------
+    >>> import asperity
+    >>> asperity.set_threads(1)
+    1
+    """
+    if number < 0:
+        raise ValueError(f"number = {number}: must be 0 or more")
+    with _lock:
+        return int(asperity_flat.set_thread_count(number))
+
+
+def height_map(height: ArrayLike, name: str = "height") -> NDArray[np.float64]:
+    """Return a map as a C-ordered array of doubles of shape (ny, nx); a profile has ny = 1."""
+    try:
+        array = np.ascontiguousarray(height, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name}: must be an array of real numbers") from None
+    if array.ndim == 1 and np.ndim(height) == 1:
+        array = array[None, :]
+    if array.ndim != 2 or np.ndim(height) == 0 or array.size == 0:
+        raise ValueError(f"{name}: has shape {np.shape(height)}: must be (ny, nx)")
+    if not np.isfinite(array).all():
+        j, i = np.argwhere(~np.isfinite(array))[0]
+        raise ValueError(f"{name}[{j}, {i}] = {array[j, i]}: must be finite")
+    return array
+
+
+def lengths(shape: tuple[int, int], lx: float, ly: float | None) -> tuple[float, float]:
+    """Return the lengths of a map of shape (ny, nx); `ly` defaults to square cells."""
+    lx = positive("lx", lx)
+    return lx, lx * shape[0] / shape[1] if ly is None else positive("ly", ly)
+
+
+def flag_of_boundary(boundary: str) -> int:
+    """Return 1 for 'free', 0 for 'periodic'."""
+    return int(choice("boundary", boundary, ("periodic", "free")) == "free")

@@ -1,0 +1,172 @@
+"""Normal contact on numpy arrays."""
+
+import threading
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+import asperity
+
+MODULUS = 344.828e6
+
+
+def sphere(n=128, lx=4e-3, boundary="free"):
+    return asperity.surface.shape("paraboloid", n, lx=lx, radius=0.05, boundary=boundary)
+
+
+def rough(nx=96, ny=64):
+    return asperity.surface.self_affine(nx, ny, 1.5e-3, 1e-3, wavelength_long=0.5e-3,
+                                        wavelength_short=0.1e-3, rms_slope=0.2, seed=3)
+
+
+def test_hertz():
+    height = sphere()
+    contact = asperity.solve_normal(height, 4e-3, None, MODULUS, force=9.1954, boundary="free",
+                                    tolerance=1e-9)
+    radius = (3 * 9.1954 * 0.05 / (4 * MODULUS)) ** (1 / 3)
+    assert contact.force == pytest.approx(9.1954, rel=1e-8)
+    # 32 cells a radius: the displacement is good to some 1e-4, the peak likewise.
+    assert contact.displacement == pytest.approx(radius**2 / 0.05, rel=1e-3)
+    assert contact.pressure.max() == pytest.approx(2 * MODULUS * radius / (np.pi * 0.05), rel=2e-3)
+    assert contact.contact_area * 16e-6 == pytest.approx(np.pi * radius**2, rel=2e-2)
+    summit = np.unravel_index(contact.pressure.argmax(), contact.pressure.shape)
+    assert summit == (64, 64)
+    # Far gap: the displacement dies out, gap -> approach below the road, less the surface's drop.
+    np.testing.assert_allclose(
+        contact.gap, contact.displacement_z - height - contact.displacement, atol=1e-15)
+
+
+@pytest.mark.parametrize("area", [0.25, 0.6])
+def test_westergaard(area):
+    n, length, amplitude, modulus = 1024, 1e-3, 1e-6, 1e7
+    height = amplitude * np.cos(2 * np.pi * (np.arange(n) / n))
+    load = np.pi * modulus * amplitude / length * np.sin(np.pi * area / 2) ** 2
+    contact = asperity.solve_normal(height, length, None, modulus, pressure=load, tolerance=1e-9)
+    assert contact.pressure.shape == (n,)
+    # Exact within a cell at each edge.
+    assert contact.contact_area == pytest.approx(area, abs=3 / n)
+    psi = np.pi * np.arange(n) / n
+    sine = np.sin(np.pi * area / 2)
+    exact = 2 * load * np.abs(np.cos(psi + 0)) / sine**2 * np.sqrt(
+        np.maximum(sine**2 - np.sin(psi) ** 2, 0))
+    inside = np.abs(np.sin(psi)) < 0.9 * sine
+    np.testing.assert_allclose(contact.pressure[inside], exact[inside], rtol=2e-3)
+
+
+def test_rough_contact_is_complementary_and_balanced():
+    height = rough()
+    contact = asperity.solve_normal(height, 1.5e-3, 1e-3, 1e6, pressure=2e4, tolerance=1e-9)
+    assert contact.converged
+    assert contact.residual <= 1e-9
+    assert contact.pressure.min() >= 0
+    assert contact.mean_pressure == pytest.approx(2e4, rel=1e-9)
+    assert contact.gap.min() > -1e-6 * np.ptp(height)
+    duality = np.sum(contact.pressure * np.abs(contact.gap)) / np.sum(contact.pressure)
+    assert duality < 1e-6 * height.std()
+    # U is the response to P: per wave vector 2 P/(E* q).
+    qx = 2 * np.pi * np.fft.rfftfreq(96, 1.5e-3 / 96)
+    qy = 2 * np.pi * np.fft.fftfreq(64, 1e-3 / 64)
+    q = np.hypot(qx, qy[:, None])
+    q[0, 0] = np.inf
+    response = np.fft.irfft2(2 / (1e6 * q) * np.fft.rfft2(contact.pressure), s=(64, 96))
+    np.testing.assert_allclose(contact.displacement_z, response, atol=1e-9 * np.ptp(height))
+
+
+def test_displacement_gives_back_the_load():
+    height = rough()
+    loaded = asperity.solve_normal(height, 1.5e-3, 1e-3, 1e6, pressure=2e4, tolerance=1e-10)
+    pressed = asperity.solve_normal(height, 1.5e-3, 1e-3, 1e6, displacement=loaded.displacement,
+                                    tolerance=1e-10)
+    assert pressed.mean_pressure == pytest.approx(2e4, rel=1e-6)
+    assert pressed.displacement == pytest.approx(loaded.displacement, rel=1e-12)
+
+
+def test_methods_agree_and_a_start_helps():
+    height = rough()
+    fast = asperity.solve_normal(height, 1.5e-3, 1e-3, 1e6, pressure=2e4, tolerance=1e-9)
+    thesis = asperity.solve_normal(height, 1.5e-3, 1e-3, 1e6, pressure=2e4, tolerance=1e-9,
+                                   method="thesis", max_iterations=20000)
+    np.testing.assert_allclose(fast.pressure, thesis.pressure, atol=1e-4 * fast.pressure.max())
+    again = asperity.solve_normal(height, 1.5e-3, 1e-3, 1e6, pressure=2e4, tolerance=1e-8,
+                                  start=fast)
+    assert again.iterations < fast.iterations
+    np.testing.assert_allclose(again.pressure, fast.pressure, atol=1e-4 * fast.pressure.max())
+
+
+def test_any_memory_order_and_type():
+    height = rough()
+    single = height.astype(np.float32)
+    expected = asperity.solve_normal(single.astype(float), 1.5e-3, 1e-3, 1e6, pressure=2e4)
+    wide = np.zeros((128, 96), dtype=np.float32)
+    wide[::2] = single
+    for given in (np.asfortranarray(single), wide[::2], single.tolist()):
+        contact = asperity.solve_normal(given, 1.5e-3, 1e-3, 1e6, pressure=2e4)
+        np.testing.assert_allclose(contact.pressure, expected.pressure,
+                                   atol=1e-9 * expected.pressure.max())
+    # Mirrored and turned maps, too: strides may be negative.
+    mirrored = asperity.solve_normal(height[:, ::-1], 1.5e-3, 1e-3, 1e6, pressure=2e4,
+                                     tolerance=1e-9)
+    straight = asperity.solve_normal(height, 1.5e-3, 1e-3, 1e6, pressure=2e4, tolerance=1e-9)
+    np.testing.assert_allclose(mirrored.pressure[:, ::-1], straight.pressure,
+                               atol=1e-3 * straight.pressure.max())
+
+
+def test_the_height_is_left_as_it_is():
+    height = rough()
+    before = height.copy()
+    asperity.solve_normal(height, 1.5e-3, 1e-3, 1e6, pressure=2e4)
+    np.testing.assert_array_equal(height, before)
+
+
+def test_two_threads_of_python():
+    height = rough()
+    alone = asperity.solve_normal(height, 1.5e-3, 1e-3, 1e6, pressure=2e4)
+    found = [None, None]
+
+    def solve(place):
+        found[place] = asperity.solve_normal(height, 1.5e-3, 1e-3, 1e6, pressure=2e4)
+
+    threads = [threading.Thread(target=solve, args=(place,)) for place in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for contact in found:
+        np.testing.assert_allclose(contact.pressure, alone.pressure,
+                                   atol=1e-9 * alone.pressure.max())
+
+
+def test_no_convergence_carries_the_best_result():
+    with pytest.raises(asperity.NotConverged, match="did not converge: residual") as caught:
+        asperity.solve_normal(rough(), 1.5e-3, 1e-3, 1e6, pressure=2e4, tolerance=1e-12,
+                              max_iterations=3)
+    result = caught.value.result
+    assert not result.converged
+    assert result.iterations <= 3
+    assert result.pressure.shape == (64, 96)
+    assert {field.name for field in fields(result)} >= {"pressure", "gap", "residual"}
+
+
+@pytest.mark.parametrize(("changes", "message"), [
+    ({"height": np.zeros((2, 2, 2))}, r"height: has shape \(2, 2, 2\): must be \(ny, nx\)"),
+    ({"height": np.array([[0.0, np.nan]])}, r"height\[0, 1\] = nan: must be finite"),
+    ({"height": [["a"]]}, "height: must be an array of real numbers"),
+    ({"lx": 0.0}, "lx = 0.0: must be a finite number > 0"),
+    ({"ly": -1.0}, "ly = -1.0"),
+    ({"modulus": np.inf}, "modulus = inf"),
+    ({"pressure": -1.0}, "pressure = -1.0"),
+    ({"pressure": None}, "must be exactly one of pressure, force, displacement"),
+    ({"force": 1.0}, "pressure, force given: must be exactly one of"),
+    ({"pressure": None, "displacement": 1.0}, "displacement = 1.0: must be below"),
+    ({"boundary": "open"}, "boundary = 'open': must be one of 'periodic', 'free'"),
+    ({"method": "slow"}, "method = 'slow': must be one of 'fast', 'thesis'"),
+    ({"tolerance": 0.0}, "tolerance = 0.0"),
+    ({"max_iterations": 0}, "max_iterations = 0: must be a positive integer"),
+    ({"start": np.zeros((3, 3))}, r"start: has shape \(3, 3\): must be \(64, 96\)"),
+    ({"height": np.zeros((1, 8)), "boundary": "free"}, "must be 'periodic'"),
+])
+def test_wrong_values(changes, message):
+    arguments = {"height": rough(), "lx": 1e-3, "ly": None, "modulus": 1e6, "pressure": 1e4}
+    with pytest.raises(ValueError, match=message):
+        asperity.solve_normal(**(arguments | changes))
