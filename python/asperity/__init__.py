@@ -5,7 +5,7 @@
 2
 """
 
-from . import material, surface
+from . import material, surface, theory
 from ._library import set_threads, version
 from .contact import NormalContact, solve_normal
 from .errors import NotConverged
@@ -13,7 +13,7 @@ from .result import Run
 from .result import open_result as open
 
 __all__ = ["NormalContact", "NotConverged", "Run", "__version__", "material", "open",
-           "set_threads", "solve_normal", "surface"]
+           "set_threads", "solve_normal", "surface", "theory"]
 
 __version__ = version()
 """The version of the Fortran library that is loaded, such as ``"0.1.0"``."""

@@ -12,7 +12,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import erf
+
+from .theory import persson_area
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -206,7 +207,7 @@ def _load_panel(run: Run, axes: Axes) -> None:
         slope = _rms_slope(run.grid, run.height)
         if slope > 0.0 and pressure.max(initial=0.0) > 0.0:
             loads = np.linspace(0.0, 1.05 * pressure.max(), 200)
-            areas = erf(np.sqrt(2.0) * loads / (modulus * slope))
+            areas = persson_area(loads, modulus, slope)
             axes.plot(loads * factor, areas, color=COLOURS[1], linestyle="--",
                       label="Persson (2001)")
     axes.plot(pressure * factor, history["contact_area"], color=COLOURS[0], marker="o",
