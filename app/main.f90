@@ -14,12 +14,14 @@ program main
    use standard_streams, only : say, say_error
    use text_tools, only : nearest_name, ordinary, to_text
    use version, only : asperity_version
+   use wait_policy, only : wait_passively
    implicit none
 
    type(command_type) :: command
    type(error_type), allocatable :: error
    integer :: status
 
+   call wait_passively()
    call read_command_line(command, error)
    if (.not. allocated(error)) then
       select case (command%verb)
