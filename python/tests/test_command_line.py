@@ -263,8 +263,8 @@ def judge(done):
     """Whatever the input was, the answer is orderly."""
     assert done.returncode in (0, 2)
     if done.returncode == 2:
-        lines = done.err.strip("\n").split("\n")
-        assert all(line.startswith("case.nml: ") for line in lines), done.err
+        messages = done.err.strip("\n").split("\n")
+        assert all(line.startswith("case.nml: ") for line in messages), done.err
         assert done.err.count("\n") <= 101
         assert done.out == ""
 

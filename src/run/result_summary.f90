@@ -1,4 +1,7 @@
 !> What a result holds, in words.
+!>
+!> Besides what every result holds, the root's text attribute `outcome` is told where a run has left
+!> one: why it ended, if not at its end.
 module result_summary
    use case_input, only : parse_case
    use case_settings, only : case_type
@@ -36,7 +39,7 @@ contains
       character(*), intent(in) :: path
       character(:), allocatable, intent(inout) :: text
       type(error_type), allocatable, intent(out) :: error
-      character(:), allocatable :: boundary, input, maker, title, written
+      character(:), allocatable :: boundary, input, maker, outcome, title, written
       integer :: finished, nx, ny
       real(dp) :: lx, ly
 
@@ -65,6 +68,9 @@ contains
       else
          text = text//'finished    no'//nl
       end if
+      if (.not. file%has_attribute('/', 'outcome')) return
+      call file%read_attribute('/', 'outcome', outcome, error)
+      if (.not. allocated(error)) text = text//'outcome     '//ordinary(outcome, 400)//nl
    end subroutine describe
 
    !> The phases of the input that the result keeps.
