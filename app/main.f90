@@ -12,6 +12,7 @@ program main
    use result_summary, only : summarise_result
    use signals, only : catch_signals, checkpoint_asked, forget_checkpoint, signal_interrupt, stop_signal
    use standard_streams, only : say, say_error
+   use surface, only : check_files
    use text_tools, only : nearest_name, ordinary, to_text
    use version, only : asperity_version
    use wait_policy, only : wait_passively
@@ -75,6 +76,7 @@ contains
       type(case_type) :: case
 
       call read_case(command%path, case, error)
+      if (.not. allocated(error)) call check_files(case%grid, case%surfaces, error)
       if (allocated(error)) return
       call say(resolved_input(case)//case_summary(case), error)
    end subroutine check

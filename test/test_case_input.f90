@@ -163,6 +163,8 @@ contains
       call check_steps(2, 32, dx/1.0e-3_dp, 'one cell along x')
       call check_steps(3, 32, 3.0e-3_dp/32/3.0e-3_dp, 'one cell along y')
       call check_steps(4, 32, dx/1.0e-3_dp, 'one cell obliquely')
+      call check_that(case%phases(2)%dt_reason == 'for one cell a step, 1 cells a step', &
+         'why: '//case%phases(2)%dt_reason)
       call check_that(index(case%warnings, '&phase 5: a step moves the road by 8 cells') > 0, &
          'a coarse step is warned of: '//case%warnings)
 
@@ -409,7 +411,7 @@ contains
       call refuse(no_surface//'&surface shape = ''self_affine'', hurst=0.8, rms_slope=0.1, rms_height=1e-6 /', &
          'rms_height and rms_slope are given together')
       call refuse(no_surface//'&surface shape = ''self_affine'', hurst=0.8, rms_slope=0.1, '// &
-         'wavelength_short=1e-3, wavelength_rolloff=1e-4 /', 'must be below wavelength_rolloff')
+         'wavelength_short=1e-3, wavelength_rolloff=1e-4 /', 'must be at most wavelength_rolloff')
       call refuse(no_surface//'&surface shape = ''file'' /', 'file: is missing')
       call refuse(no_surface, '&surface: the group is missing')
 

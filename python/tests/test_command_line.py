@@ -156,6 +156,24 @@ def test_message_has_the_stated_form(program, folder):
     assert not list(folder.glob("*.h5"))
 
 
+def test_check_reads_height_maps(program, folder):
+    text = GOOD.replace("shape = 'sphere', radius = 0.01", "shape = 'file', file = 'map.h5'")
+    path = folder / "map.h5"
+    path.unlink(missing_ok=True)
+    assert check(program, folder, text).returncode == 3
+    for values, status in (
+        (np.zeros((8, 16)), 0),
+        (np.zeros((16, 8)), 2),
+        (np.full((8, 16), np.nan), 2),
+    ):
+        with h5py.File(path, "w") as file:
+            file["surface/height"] = values
+        done = check(program, folder, text)
+        assert done.returncode == status, done.err
+        assert status == 0 or "map.h5" in done.err
+    assert call(program, "check", folder / "case.nml").returncode == 2  # from another folder
+
+
 def test_info(program, folder):
     path = folder / "result.h5"
     with h5py.File(path, "w") as file:

@@ -190,7 +190,19 @@ contains
       end if
       if (.not. group%given('steps')) phase%steps = max(1, nint(phase%duration/dt))
       phase%dt = phase%duration/phase%steps
+      if (grid%nx == 0) return
+      if (cells_a_step(phase, grid) > 0.0_dp) phase%dt_reason = trim(phase%dt_reason)//', '// &
+         to_text(cells_a_step(phase, grid))//' cells a step'
    end subroutine resolve_steps
+
+   !> How far a step moves the road, in cells.
+   pure real(dp) function cells_a_step(phase, grid) result(cells)
+      type(phase_settings_type), intent(in) :: phase
+      type(grid_type), intent(in) :: grid
+
+      cells = abs(phase%velocity_x)/grid%dx*phase%dt
+      if (grid%ny > 1) cells = max(cells, abs(phase%velocity_y)/grid%dy*phase%dt)
+   end function cells_a_step
 
    !> The time step where the input gives none.
    subroutine default_step(phase, grid, material, dt)
@@ -200,24 +212,19 @@ contains
       real(dp), intent(out) :: dt
       integer, parameter :: fewest = 20           !! steps of a phase at rest
       real(dp), parameter :: fraction = 8.0_dp    !! steps in a relaxation time
-      real(dp) :: tau
-
-      dt = phase%duration
-      if (abs(phase%velocity_x) + abs(phase%velocity_y) > 0.0_dp) then
-         if (grid%nx == 0) return
-         if (abs(phase%velocity_x) > 0.0_dp) dt = grid%dx/abs(phase%velocity_x)
-         if (abs(phase%velocity_y) > 0.0_dp .and. grid%ny > 1) then
-            if (abs(phase%velocity_x) > 0.0_dp) then
-               dt = min(dt, grid%dy/abs(phase%velocity_y))
-            else
-               dt = grid%dy/abs(phase%velocity_y)
-            end if
-         end if
-         phase%dt_reason = 'one cell a step'
-         return
-      end if
+      real(dp) :: rate, tau
 
       dt = phase%duration/fewest
+      if (grid%nx > 0) then
+         rate = abs(phase%velocity_x)/grid%dx               ! cells in a second
+         if (grid%ny > 1) rate = max(rate, abs(phase%velocity_y)/grid%dy)
+         if (rate > 0.0_dp) then
+            dt = 1.0_dp/rate
+            phase%dt_reason = 'for one cell a step'
+            return
+         end if
+      end if
+
       phase%dt_reason = to_text(fewest)//' steps'
       tau = shortest_active(phase, material)
       if (tau > 0.0_dp .and. tau/fraction < dt) then
@@ -247,7 +254,7 @@ contains
       real(dp) :: cells, tau
 
       if (phase%static .or. grid%nx == 0) return
-      cells = hypot(phase%velocity_x/grid%dx, phase%velocity_y/grid%dy)*phase%dt
+      cells = cells_a_step(phase, grid)
       if (cells > 1.5_dp) call warn('a step moves the road by '//to_text(cells)// &
          ' cells; the contact is well followed up to one cell a step, dt = '//to_text(phase%dt/cells)//' s')
       tau = shortest_active(phase, material)

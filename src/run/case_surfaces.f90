@@ -112,8 +112,8 @@ contains
       rolloff_known = known('wavelength_rolloff') .and. (long_known .or. group%given('wavelength_rolloff'))
       short_known = known('wavelength_short')
       if (rolloff_known .and. short_known) then
-         if (.not. term%wavelength_short < term%wavelength_rolloff) call group%fault('wavelength_short', &
-            'must be below wavelength_rolloff = '//to_text(term%wavelength_rolloff)// &
+         if (term%wavelength_short > term%wavelength_rolloff) call group%fault('wavelength_short', &
+            'must be at most wavelength_rolloff = '//to_text(term%wavelength_rolloff)// &
             default_note('wavelength_short', term%wavelength_short), faults)
       end if
       if (rolloff_known .and. long_known) then

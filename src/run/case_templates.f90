@@ -4,7 +4,7 @@ module case_templates
    use case_input, only : parse_case
    use case_settings, only : case_type
    use errors, only : error_type
-   use input_reference, only : variable_entries, variable_entry_type
+   use input_reference, only : kind_word, variable_entries, variable_entry_type
    implicit none
    private
 
@@ -168,6 +168,7 @@ contains
       character(:), allocatable :: line
       character(:), allocatable :: name
       integer, parameter :: column = 36           !! of the comment
+      integer, parameter :: longest_choice = 80   !! longer lists of words are left out
       integer :: i
 
       name = assignment(:index(assignment, '=') - 2)
@@ -176,9 +177,26 @@ contains
          if (entries(i)%group /= group .or. entries(i)%name /= name) cycle
          line = line//repeat(' ', max(1, column - len(line)))//'! '
          if (entries(i)%units /= '') line = line//trim(entries(i)%units)//': '
-         line = line//trim(entries(i)%meaning)
+         if (entries(i)%kind == kind_word .and. len_trim(entries(i)%allowed) < longest_choice) then
+            line = line//trim(entries(i)%allowed)
+         else
+            line = line//first_clause(trim(entries(i)%meaning))
+         end if
          exit
       end do
    end function commented
+
+   !> A text up to its first colon, semicolon or full stop.
+   pure function first_clause(text) result(clause)
+      character(*), intent(in) :: text
+      character(:), allocatable :: clause
+      integer :: i
+
+      do i = 1, len(text) - 1
+         if (scan(text(i:i), ':;.') > 0 .and. text(i + 1:i + 1) == ' ') exit
+      end do
+      clause = text(:i - 1)
+      if (i == len(text) .and. scan(text(i:i), '.') == 0) clause = text
+   end function first_clause
 
 end module case_templates

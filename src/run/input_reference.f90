@@ -104,7 +104,7 @@ contains
          row('surface', 'shape', kind_word, '(required)', '', &
             '''flat'' | ''sphere'' | ''paraboloid'' | ''cylinder'' | ''sine'' | ''hexagonal_wave'' | '// &
             '''self_affine'' | ''file''', &
-            'The shape: exact cap, -r^2/(2R), exact arc with its axis along y, one wave along x, '// &
+            'Shape of the road: nothing, exact cap, -r^2/(2R), exact arc with its axis along y, one wave along x, '// &
             'three crossed waves, rough, or a height map.'), &
          row('surface', 'radius', kind_real, '(required)', 'm', 'positive', &
             'Radius of sphere, paraboloid or cylinder.'), &
@@ -146,11 +146,11 @@ contains
          row('material', 'prony_tau', kind_reals, '(none)', 's', 'positive', &
             'Their relaxation times, at the reference temperature.'), &
          row('material', 'zener_g0', kind_reals, '(none)', 'Pa', 'positive', &
-            'Zener branches: spring in series with (zener_g1 parallel to zener_eta).'), &
+            'Springs of the Zener branches, in series with (zener_g1 parallel to zener_eta).'), &
          row('material', 'zener_g1', kind_reals, '(none)', 'Pa', 'not negative', &
-            'The spring beside the damper.'), &
+            'Springs parallel to the dampers.'), &
          row('material', 'zener_eta', kind_reals, '(none)', 'Pa s', 'positive', &
-            'The damper; the branch relaxes with zener_eta/(zener_g0 + zener_g1).'), &
+            'Dampers; a branch relaxes with zener_eta/(zener_g0 + zener_g1).'), &
          row('material', 'thickness', kind_real, '0.0', 'm', 'not negative', &
             'Height of the block, for its mean shear; 0 is a half-space.'), &
          row('material', 'density', kind_real, '0.0', 'kg/m3', 'not negative', &
@@ -192,7 +192,7 @@ contains
       rows = [ &
          row('phase', 'name', kind_text, '(phase N)', '', 'any', 'A name, kept in the result.'), &
          row('phase', 'duration', kind_real, '0.0', 's', 'not negative', &
-            '0 or none: one static solve.'), &
+            'Time that the phase takes; 0 or none is one static solve.'), &
          row('phase', 'steps', kind_integer, '(derived)', '', 'positive', &
             'Time steps; give this or dt. By default from dt.'), &
          row('phase', 'dt', kind_real, '(derived)', 's', 'positive', &

@@ -18,7 +18,7 @@ module surface
    implicit none
    private
 
-   public :: check_terms, new_height, rim_height
+   public :: check_files, check_terms, new_height, rim_height
 
    !> Shapes that are a function of the position alone.
    character(*), parameter :: analytic_shapes(*) = [character(16) :: 'flat', 'sphere', &
@@ -184,6 +184,39 @@ contains
       real(dp), intent(inout) :: height(:, :)
       type(error_type), allocatable, intent(out) :: error
       real(dp), allocatable :: map(:, :)
+      integer :: i, j
+
+      call read_map(grid, term, map, error)
+      if (allocated(error)) return
+      !$omp parallel do default(none) shared(grid, height, map, term) private(i)
+      do j = 1, grid%ny
+         do i = 1, grid%nx
+            height(i, j) = height(i, j) + term%scale*map(i, j)
+         end do
+      end do
+   end subroutine add_file
+
+   !> Read the maps of all terms that are files, only to see that they can be used.
+   subroutine check_files(grid, terms, error)
+      type(grid_type), intent(in) :: grid
+      type(surface_settings_type), intent(in) :: terms(:)
+      type(error_type), allocatable, intent(out) :: error
+      real(dp), allocatable :: map(:, :)
+      integer :: n
+
+      do n = 1, size(terms)
+         if (terms(n)%shape /= 'file') cycle
+         call read_map(grid, terms(n), map, error)
+         if (allocated(error)) return
+      end do
+   end subroutine check_files
+
+   !> Read the map of a term and see that it has the grid's shape and holds numbers.
+   subroutine read_map(grid, term, map, error)
+      type(grid_type), intent(in) :: grid
+      type(surface_settings_type), intent(in) :: term         !! checked
+      real(dp), allocatable, intent(out) :: map(:, :)         !! as in the file, not scaled
+      type(error_type), allocatable, intent(out) :: error
       character(160) :: text
       integer :: faulty, i, j
 
@@ -196,11 +229,10 @@ contains
          return
       end if
       faulty = 0
-      !$omp parallel do default(none) shared(grid, height, map, term) private(i) reduction(+:faulty)
+      !$omp parallel do default(none) shared(grid, map, term) private(i) reduction(+:faulty)
       do j = 1, grid%ny
          do i = 1, grid%nx
-            height(i, j) = height(i, j) + term%scale*map(i, j)
-            if (.not. ieee_is_finite(height(i, j))) faulty = faulty + 1
+            if (.not. ieee_is_finite(term%scale*map(i, j))) faulty = faulty + 1
          end do
       end do
       if (faulty > 0) then
@@ -208,7 +240,7 @@ contains
             ' values that are not finite (NaN or infinite): all must be numbers, in m'
          call fail(error, error_input, '&surface: file = '''//trim(term%file)//''''//trim(text))
       end if
-   end subroutine add_file
+   end subroutine read_map
 
    !> Add an analytic shape.
    subroutine add_analytic(grid, term, height)
