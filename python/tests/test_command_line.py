@@ -117,7 +117,7 @@ def test_check_prints_an_input(program, folder):
     assert "memory: about" in done.out
     again = check(program, folder, done.out)
     assert again.returncode == 0
-    assert again.out == done.out
+    assert without_comments(again.out) == without_comments(done.out)
 
 
 def test_templates_are_good_inputs(program, folder):
@@ -277,6 +277,11 @@ pieces = st.sampled_from(
 )
 
 
+def without_comments(text):
+    """Drop the comments: they say where a value comes from, which changes once it is given."""
+    return re.sub(r" *!.*", "", text)
+
+
 def judge(done):
     """Whatever the input was, the answer is orderly."""
     assert done.returncode in (0, 2)
@@ -351,7 +356,7 @@ def test_any_value(program, folder, variable, value):
     if done.returncode == 0:
         again = check(program, folder, done.out)
         assert again.returncode == 0
-        assert again.out == done.out
+        assert without_comments(again.out) == without_comments(done.out)
 
 
 @lines
