@@ -1,0 +1,278 @@
+!> The friction laws: the bound of the tangential traction, at one point.
+!>
+!> Coulomb, constant shear stress and Coulomb-Orowan (thesis, section 3.1.2), on the true local slope of
+!> the road (thesis, section 3.1.3) and with the pressure that adhesion adds (thesis, appendix B).
+!>
+!> Rubber lies above, the road H pushes up into it. With the unit normal N = (-H_x, -H_y, 1) N_z and
+!> n = (N_x, N_y) a purely normal reaction has the tangential traction T* = P n/N_z = -P grad H.
+!> For D = T - T* the force normal to the slope is P/N_z + n.D, the force along it
+!> m = sqrt(|D|^2 - (n.D)^2). From T* along D the bound is met at T* + s D:
+!>
+!>     Coulomb          s = F/(m - mu n.D),  F = mu (P/N_z + p_a N_z); no bound if m <= mu n.D
+!>     constant shear   s = sigma_max/m
+!>     Coulomb-Orowan   the smaller of the two
+!>
+!> T is out of bounds where s < 1; T* + s D is then the returned traction. This is the admissible root of
+!> the quadratic equation of the thesis (eq. 3.10 and B.5), without its second nappe.
+!> Without slope n = 0 and T* = 0.
+!>
+!> Direction of slip. `r` is the slip of the road over the rubber. The slip along the slope is parallel to
+!> the force along it if r + n (n.r)/N_z^2 = r + grad H (grad H . r) is parallel to D: the physical law.
+!> The thesis (eq. 3.16) asks for r parallel to D.
+module friction_law
+   use precision, only : dp, int8
+   implicit none
+   private
+
+   public :: friction_law_type, new_friction_law, return_tractions, largest_excess
+
+   integer, parameter, public :: law_coulomb = 1            !! |T| <= mu P
+   integer, parameter, public :: law_constant_shear = 2     !! |T| <= sigma_max
+   integer, parameter, public :: law_coulomb_orowan = 3     !! the smaller of the two
+
+   integer(int8), parameter, public :: contact_open = 0_int8     !! no contact
+   integer(int8), parameter, public :: contact_stick = 1_int8
+   integer(int8), parameter, public :: contact_slip = 2_int8
+
+   real(dp), parameter, public :: unbounded = huge(1.0_dp)       !! s of a ray that meets no bound
+
+   !> A friction law with its constants.
+   type :: friction_law_type
+      integer :: law = law_coulomb
+      real(dp) :: coefficient = 0.0_dp           !! mu; not used by constant shear
+      real(dp) :: shear_strength = 0.0_dp        !! sigma_max, Pa; not used by Coulomb
+      real(dp) :: adhesive_pressure = 0.0_dp     !! p_a = gamma_0/z_0, Pa; 0 without adhesion
+      logical :: slope = .false.                 !! the slope of the road counts
+      logical :: physical_slip = .true.          !! direction of slip: physical, or the thesis's
+   contains
+      procedure :: normal_traction
+      procedure :: bound_ratio
+      procedure :: bound_variation
+      procedure :: return_to_bound
+      procedure :: slip_along_slope
+   end type friction_law_type
+
+contains
+
+   !> Make a law from its name and constants.
+   pure function new_friction_law(name, coefficient, shear_strength, adhesive_pressure, slope, &
+      physical_slip) result(self)
+      character(*), intent(in) :: name             !! 'coulomb', 'constant_shear' or 'coulomb_orowan'
+      real(dp), intent(in) :: coefficient          !! mu >= 0
+      real(dp), intent(in) :: shear_strength       !! sigma_max >= 0, Pa
+      real(dp), intent(in) :: adhesive_pressure    !! p_a >= 0, Pa; 0 without adhesion
+      logical, intent(in) :: slope                 !! count the slope of the road
+      logical, intent(in) :: physical_slip         !! .false.: the thesis's direction of slip
+      type(friction_law_type) :: self
+
+      select case (name)
+      case ('constant_shear')
+         self%law = law_constant_shear
+      case ('coulomb_orowan')
+         self%law = law_coulomb_orowan
+      case default
+         self%law = law_coulomb
+      end select
+      self%coefficient = coefficient
+      self%shear_strength = shear_strength
+      self%adhesive_pressure = adhesive_pressure
+      self%slope = slope
+      self%physical_slip = physical_slip
+   end function new_friction_law
+
+   !> T*, the tangential traction of a purely normal reaction.
+   pure function normal_traction(self, p, slope) result(t)
+      class(friction_law_type), intent(in) :: self
+      real(dp), intent(in) :: p             !! pressure, Pa
+      real(dp), intent(in) :: slope(2)      !! H_x, H_y; not looked at without slope
+      real(dp) :: t(2)                      !! Pa
+
+      if (self%slope) then
+         t = -p*slope
+      else
+         t = 0.0_dp
+      end if
+   end function normal_traction
+
+   !> s: T* + s D lies on the bound. Where nothing but T* is allowed, D = 0 has s = 1.
+   pure function bound_ratio(self, p, slope, d) result(s)
+      class(friction_law_type), intent(in) :: self
+      real(dp), intent(in) :: p             !! pressure, Pa
+      real(dp), intent(in) :: slope(2)      !! H_x, H_y; not looked at without slope
+      real(dp), intent(in) :: d(2)          !! D = T - T*, Pa
+      real(dp) :: s                         !! >= 0; `unbounded` where the ray meets no bound
+      real(dp) :: nz, nd, m
+
+      if (self%slope) then
+         nz = 1.0_dp/sqrt(1.0_dp + slope(1)**2 + slope(2)**2)
+         nd = -nz*(slope(1)*d(1) + slope(2)*d(2))
+         m = sqrt(max(d(1)**2 + d(2)**2 - nd**2, 0.0_dp))
+      else
+         nz = 1.0_dp
+         nd = 0.0_dp
+         m = sqrt(d(1)**2 + d(2)**2)
+      end if
+      s = unbounded
+      if (self%law /= law_constant_shear) then
+         s = ratio(self%coefficient*max(p/nz + self%adhesive_pressure*nz, 0.0_dp), &
+            m - self%coefficient*nd)
+      end if
+      if (self%law /= law_coulomb) s = min(s, ratio(self%shear_strength, m))
+   end function bound_ratio
+
+   !> force/reach; 1 where both vanish, unbounded where only the reach does or it is negative.
+   pure function ratio(force, reach) result(s)
+      real(dp), intent(in) :: force     !! >= 0, Pa
+      real(dp), intent(in) :: reach     !! Pa
+      real(dp) :: s
+
+      if (reach > 0.0_dp) then
+         if (force < reach*unbounded) then
+            s = force/reach
+         else
+            s = unbounded
+         end if
+      else if (reach < 0.0_dp .or. force > 0.0_dp) then
+         s = unbounded
+      else
+         s = 1.0_dp
+      end if
+   end function ratio
+
+   !> First and second derivative of s(D + a v) for a at a = 0, for a D on the bound (s = 1).
+   !> The traction on the bound then moves by a K_1 + a^2/2 K_2 besides a v, with K_1 = s' D and
+   !> K_2 = s'' D + 2 s' v: the terms of thesis eq. 3.12, in closed form for every law.
+   pure subroutine bound_variation(self, p, slope, d, v, first, second)
+      class(friction_law_type), intent(in) :: self
+      real(dp), intent(in) :: p
+      real(dp), intent(in) :: slope(2)
+      real(dp), intent(in) :: d(2)          !! D, Pa
+      real(dp), intent(in) :: v(2)          !! direction in which T moves, Pa
+      real(dp), intent(out) :: first        !! ds/da
+      real(dp), intent(out) :: second       !! d2s/da2
+      real(dp) :: n(2), nz, m, dm, ddm, mu, force, reach, change
+
+      n = 0.0_dp
+      nz = 1.0_dp
+      if (self%slope) then
+         nz = 1.0_dp/sqrt(1.0_dp + slope(1)**2 + slope(2)**2)
+         n = -nz*slope
+      end if
+      first = 0.0_dp
+      second = 0.0_dp
+      m = sqrt(max(dot_product(d, d) - dot_product(n, d)**2, 0.0_dp))
+      if (m <= 0.0_dp) return
+      dm = (dot_product(d, v) - dot_product(n, d)*dot_product(n, v))/m
+      ddm = (dot_product(v, v) - dot_product(n, v)**2 - dm**2)/m
+      mu = self%coefficient
+      force = mu*max(p/nz + self%adhesive_pressure*nz, 0.0_dp)
+      if (self%law == law_constant_shear) then
+         mu = 0.0_dp
+      else if (self%law == law_coulomb_orowan) then
+         if (ratio(self%shear_strength, m) < ratio(force, m - mu*dot_product(n, d))) mu = 0.0_dp
+      end if
+      reach = m - mu*dot_product(n, d)
+      change = dm - mu*dot_product(n, v)
+      if (reach <= 0.0_dp) return
+      first = -change/reach
+      second = 2.0_dp*(change/reach)**2 - ddm/reach
+   end subroutine bound_variation
+
+   !> Return a traction to the bound if it lies outside.
+   pure subroutine return_to_bound(self, p, slope, t, returned)
+      class(friction_law_type), intent(in) :: self
+      real(dp), intent(in) :: p
+      real(dp), intent(in) :: slope(2)
+      real(dp), intent(inout) :: t(2)       !! Pa
+      logical, intent(out) :: returned      !! it lay outside
+      real(dp) :: star(2), d(2), s
+
+      star = self%normal_traction(p, slope)
+      d = t - star
+      s = self%bound_ratio(p, slope, d)
+      returned = s < 1.0_dp
+      if (returned) t = star + s*d
+   end subroutine return_to_bound
+
+   !> The slip that must be parallel to D: r + grad H (grad H . r), or r itself in the thesis.
+   pure function slip_along_slope(self, slope, r) result(slip)
+      class(friction_law_type), intent(in) :: self
+      real(dp), intent(in) :: slope(2)
+      real(dp), intent(in) :: r(2)          !! slip in the plane, m
+      real(dp) :: slip(2)
+
+      slip = r
+      if (self%slope .and. self%physical_slip) then
+         slip = r + slope*(slope(1)*r(1) + slope(2)*r(2))
+      end if
+   end function slip_along_slope
+
+   !> Give tractions to a new pressure: return them to its bound, and clear them outside the contact.
+   !> Points that were returned become slip points.
+   subroutine return_tractions(law, p, slope_x, slope_y, contact, tx, ty)
+      type(friction_law_type), intent(in) :: law
+      real(dp), intent(in) :: p(:, :)                       !! [nx, ny], Pa
+      real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)  !! [nx, ny]; any size without slope
+      !> [nx, ny] In: 0 open, else in contact; out: 0 open, 1 stick, 2 slip. Without adhesion a point
+      !> with p <= 0 is taken as open.
+      integer(int8), intent(inout) :: contact(:, :)
+      real(dp), intent(inout) :: tx(:, :), ty(:, :)         !! [nx, ny], Pa
+      real(dp) :: slope(2), t(2)
+      logical :: returned
+      integer :: i, j
+
+      slope = 0.0_dp
+      !$omp parallel do default(none) shared(law, p, slope_x, slope_y, contact, tx, ty) &
+      !$omp private(i, j, t, returned) firstprivate(slope)
+      do j = 1, size(p, 2)
+         do i = 1, size(p, 1)
+            if (p(i, j) <= 0.0_dp .and. law%adhesive_pressure <= 0.0_dp) then
+               contact(i, j) = contact_open
+            end if
+            if (contact(i, j) == contact_open) then
+               tx(i, j) = 0.0_dp
+               ty(i, j) = 0.0_dp
+            else
+               if (law%slope) slope = [slope_x(i, j), slope_y(i, j)]
+               t = [tx(i, j), ty(i, j)]
+               call law%return_to_bound(p(i, j), slope, t, returned)
+               if (returned) then
+                  contact(i, j) = contact_slip
+                  tx(i, j) = t(1)
+                  ty(i, j) = t(2)
+               end if
+            end if
+         end do
+      end do
+   end subroutine return_tractions
+
+   !> By how much the tractions lie outside their bounds: the largest |T - returned T|, Pa.
+   function largest_excess(law, p, slope_x, slope_y, contact, tx, ty) result(excess)
+      type(friction_law_type), intent(in) :: law
+      real(dp), intent(in) :: p(:, :)                       !! [nx, ny], Pa
+      real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)  !! [nx, ny]; any size without slope
+      integer(int8), intent(in) :: contact(:, :)            !! [nx, ny] 0 open
+      real(dp), intent(in) :: tx(:, :), ty(:, :)            !! [nx, ny], Pa
+      real(dp) :: excess
+      real(dp) :: slope(2), t(2)
+      logical :: returned
+      integer :: i, j
+
+      excess = 0.0_dp
+      slope = 0.0_dp
+      !$omp parallel do default(none) shared(law, p, slope_x, slope_y, contact, tx, ty) &
+      !$omp private(i, j, t, returned) firstprivate(slope) reduction(max: excess)
+      do j = 1, size(p, 2)
+         do i = 1, size(p, 1)
+            t = 0.0_dp
+            if (contact(i, j) /= contact_open) then
+               if (law%slope) slope = [slope_x(i, j), slope_y(i, j)]
+               t = [tx(i, j), ty(i, j)]
+               call law%return_to_bound(p(i, j), slope, t, returned)
+            end if
+            excess = max(excess, hypot(tx(i, j) - t(1), ty(i, j) - t(2)))
+         end do
+      end do
+   end function largest_excess
+
+end module friction_law
