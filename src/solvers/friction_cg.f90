@@ -1,0 +1,257 @@
+!> The tangential problem of one step: stick, slip and tractions on a known contact.
+!>
+!> Given the displacement DX of the road against the rubber, find the traction T within the bound of the
+!> friction law such that the slip r = DX - A T is zero where T is inside its bound, and along D = T - T*
+!> where it is on it (thesis, eq. 3.1; modules `friction_law`, `friction_problem`).
+!>
+!> The operator A is that of G = 1. For a scheme of time (Q, Hist) pass DX' = Q DX - Hist: r is then
+!> Q times the slip, and the displacement is U = DX - r/Q, without another product. With inertia the
+!> mean mode of the operator differs from A(0): set it by `set_mean_compliance`.
+!>
+!> Methods: 'fast' (module `friction_cg_fast`, falling back on `friction_cg_gradient`), 'gradient' (the
+!> fallback alone) and 'thesis' (`friction_cg_thesis`). Converged means both the criterion of the thesis,
+!> |T' - T|/|T'| <= tolerance (eq. 3.15), and the residual of all points: the largest slip of a sticking
+!> point, part of the slip across its traction, or slip against it, over the RMS of DX or of A T in the
+!> contact, whichever is larger, or over `slip_scale`.
+!>
+!> Memory beside the caller's fields: four fields, the two of the operator's spectrum and the two of the
+!> preconditioner's with its symbols (3/4 of a field); 'thesis' takes two fields more.
+module friction_cg
+   use errors, only : error_type
+   use fft_conv, only : convolution_type, new_tensor_symbol_operator
+   use friction_cg_fast, only : iterate_fast
+   use friction_cg_gradient, only : iterate_gradient
+   use friction_cg_thesis, only : iterate_thesis
+   use friction_law, only : friction_law_type
+   use friction_problem, only : friction_problem_type
+   use influence, only : tangential_symbol
+   use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
+   use omp_lib, only : omp_get_wtime
+   use precision, only : dp, int8, pi
+   use regular_grid, only : boundary_periodic, grid_type
+   use solver_result, only : solver_result_type
+   implicit none
+   private
+
+   public :: friction_solver_type, new_friction_solver, set_mean_compliance
+
+   integer, parameter, public :: friction_fast = 1
+   integer, parameter, public :: friction_thesis = 2
+   integer, parameter, public :: friction_gradient = 3
+
+   integer, parameter :: gradient_steps = 100    !! at a time, when the fast method stalls
+
+   !> Work space and preconditioner for one operator.
+   type :: friction_solver_type
+      integer :: method = friction_fast
+      real(dp) :: tolerance = 1.0e-6_dp
+      integer :: max_iterations = 1000
+      !> A slip that counts (of r, so times Q), m: the residual is measured by it where it is smaller
+      !> than the displacements, as in a small step of a long slide. 0: by the displacements.
+      real(dp) :: slip_scale = 0.0_dp
+      type(convolution_type), private :: preconditioner
+      logical, private :: periodic = .true.
+      real(dp), private :: length = 0.0_dp       !! of the longer side, m
+      real(dp), private :: compliance = 0.0_dp   !! a_0
+      real(dp), allocatable, private :: zx(:, :), zy(:, :), dx(:, :), dy(:, :)
+   contains
+      procedure :: solve
+      procedure :: destroy
+   end type friction_solver_type
+
+contains
+
+   !> Make the solver for an operator of `new_tangential_operator`.
+   subroutine new_friction_solver(self, grid, poisson, operator, error)
+      type(friction_solver_type), intent(out) :: self
+      type(grid_type), intent(in) :: grid
+      real(dp), intent(in) :: poisson
+      type(convolution_type), intent(in) :: operator
+      type(error_type), allocatable, intent(out) :: error
+      real(dp), allocatable :: xx(:, :), yy(:, :), xy(:, :)
+      type(grid_type) :: periodic
+      real(dp) :: determinant, swap
+      integer :: i, j
+
+      self%periodic = grid%boundary == boundary_periodic
+      self%length = max(grid%lx, grid%ly)
+      periodic = grid
+      periodic%boundary = boundary_periodic
+      allocate (xx(0:grid%nx/2, 0:grid%ny/2))
+      allocate (yy, xy, mold=xx)
+      call tangential_symbol(periodic, poisson, self%length/pi, grid%nx, grid%ny, xx, yy, xy)
+      do j = 0, grid%ny/2
+         do i = 0, grid%nx/2
+            determinant = xx(i, j)*yy(i, j) - xy(i, j)**2
+            swap = xx(i, j)
+            xx(i, j) = yy(i, j)/determinant
+            yy(i, j) = swap/determinant
+            xy(i, j) = -xy(i, j)/determinant
+         end do
+      end do
+      call new_tensor_symbol_operator(self%preconditioner, grid%nx, grid%ny, xx, yy, xy, error)
+      if (allocated(error)) return
+      self%compliance = self_compliance(operator, self%periodic)
+      allocate (self%zx(grid%nx, grid%ny))
+      allocate (self%zy, self%dx, self%dy, mold=self%zx)
+      self%zx = 0.0_dp
+      self%zy = 0.0_dp
+      self%dx = 0.0_dp
+      self%dy = 0.0_dp
+   end subroutine new_friction_solver
+
+   !> a_0, the mean of the symbols over the whole spectrum; without the mean mode where periodic.
+   pure function self_compliance(operator, periodic) result(compliance)
+      type(convolution_type), intent(in) :: operator
+      logical, intent(in) :: periodic
+      real(dp) :: compliance
+      real(dp) :: weight
+      integer :: i, j
+
+      compliance = 0.0_dp
+      do j = 0, operator%my/2
+         do i = 0, operator%mx/2
+            if (periodic .and. i == 0 .and. j == 0) cycle
+            weight = merge(1.0_dp, 2.0_dp, i == 0 .or. 2*i == operator%mx) &
+               *merge(1.0_dp, 2.0_dp, j == 0 .or. 2*j == operator%my)
+            compliance = compliance &
+               + 0.5_dp*weight*(operator%symbol(i, j, 1) + operator%symbol(i, j, 2))
+         end do
+      end do
+   end function self_compliance
+
+   !> Set the mean mode of a periodic tangential operator: u = compliance t for a uniform traction.
+   subroutine set_mean_compliance(operator, compliance)
+      type(convolution_type), intent(inout) :: operator
+      real(dp), intent(in) :: compliance           !! m for G = 1 Pa; h for a block at rest
+
+      operator%symbol(0, 0, 1:2) = compliance/(real(operator%mx, dp)*operator%my)
+   end subroutine set_mean_compliance
+
+   !> Solve for T, starting from the T given.
+   subroutine solve(self, operator, law, p, slope_x, slope_y, drive_x, drive_y, contact, tx, ty, &
+      slip_x, slip_y, result)
+      class(friction_solver_type), intent(inout) :: self
+      type(convolution_type), intent(inout) :: operator
+      type(friction_law_type), intent(in) :: law
+      real(dp), intent(in), contiguous, target :: p(:, :)            !! [nx, ny] pressure, Pa
+      real(dp), intent(in), contiguous, target :: slope_x(:, :)      !! [nx, ny] H_x; any size without slope
+      real(dp), intent(in), contiguous, target :: slope_y(:, :)      !! [nx, ny] H_y
+      real(dp), intent(in), contiguous, target :: drive_x(:, :)      !! [nx, ny] DX', m
+      real(dp), intent(in), contiguous, target :: drive_y(:, :)      !! [nx, ny]
+      !> [nx, ny] In: 0 open, else in contact (without adhesion a point with p <= 0 is taken as open);
+      !> out: 0 open, 1 stick, 2 slip.
+      integer(int8), intent(inout), contiguous, target :: contact(:, :)
+      real(dp), intent(inout), contiguous, target :: tx(:, :)        !! [nx, ny] T_x, Pa; in: the start
+      real(dp), intent(inout), contiguous, target :: ty(:, :)        !! [nx, ny] T_y, Pa
+      real(dp), intent(inout), contiguous, target :: slip_x(:, :)    !! [nx, ny] out: r, everywhere, m
+      real(dp), intent(inout), contiguous, target :: slip_y(:, :)    !! [nx, ny]
+      type(solver_result_type), intent(out) :: result
+      type(friction_problem_type) :: problem
+      real(dp) :: start_time
+      logical :: moving, converged
+
+      start_time = omp_get_wtime()
+      result%ffts = -operator%ffts - self%preconditioner%ffts
+      problem%law = law
+      problem%nx = operator%nx
+      problem%ny = operator%ny
+      problem%threads = operator%threads
+      problem%compliance = self%compliance
+      problem%slip_scale = self%slip_scale
+      problem%p => p
+      problem%hx => slope_x
+      problem%hy => slope_y
+      problem%drive_x => drive_x
+      problem%drive_y => drive_y
+      problem%tx => tx
+      problem%ty => ty
+      problem%rx => slip_x
+      problem%ry => slip_y
+      problem%contact => contact
+      allocate (problem%row_sums(4, problem%ny))
+      call set_mean_stiffness(self, operator)
+
+      call problem%start(operator, moving)
+      if (moving) then
+         call problem%update_slip(operator)
+      else
+         call problem%start_from_rest()
+      end if
+      do
+         if (problem%residual > self%tolerance) call iterate(self, problem, operator, result%iterations)
+         converged = problem%residual <= self%tolerance .and. problem%change <= self%tolerance
+         if (problem%fresh .or. .not. converged) exit
+         call problem%forward_tractions(operator)       ! the residual of a recurrence proves nothing
+         call problem%update_slip(operator)
+         if (problem%residual <= self%tolerance) exit
+      end do
+
+      result%residual = problem%residual
+      result%converged = converged
+      result%ffts = result%ffts + operator%ffts + self%preconditioner%ffts
+      if (problem%cells == 0) then
+         result%reason = 'no contact'
+      else if (converged) then
+         result%reason = 'converged'
+      else if (.not. ieee_is_finite(problem%residual)) then
+         result%reason = 'not a number'
+      else if (result%iterations >= self%max_iterations) then
+         result%reason = 'iteration limit'
+      else
+         result%reason = 'no direction of descent'
+      end if
+      result%seconds = omp_get_wtime() - start_time
+   end subroutine solve
+
+   !> Run the method that was asked for, and its fallback.
+   subroutine iterate(self, problem, operator, iterations)
+      type(friction_solver_type), intent(inout) :: self
+      type(friction_problem_type), intent(inout) :: problem
+      type(convolution_type), intent(inout) :: operator
+      integer, intent(inout) :: iterations
+      integer :: limit
+
+      limit = self%max_iterations
+      select case (self%method)
+      case (friction_thesis)
+         call iterate_thesis(problem, operator, self%tolerance, limit, self%zx, self%zy, &
+            self%dx, self%dy, iterations)
+      case (friction_gradient)
+         call iterate_gradient(problem, operator, self%tolerance, 0.0_dp, limit, self%zx, self%zy, &
+            self%dx, self%dy, iterations)
+      case default
+         do while (iterations < limit)
+            call iterate_fast(problem, operator, self%preconditioner, self%tolerance, limit, &
+               self%zx, self%zy, self%dx, self%dy, iterations)
+            if (problem%residual <= self%tolerance .and. problem%change <= self%tolerance) return
+            if (.not. ieee_is_finite(problem%residual)) return
+            call iterate_gradient(problem, operator, self%tolerance, 0.1_dp, &
+               min(limit, iterations + gradient_steps), self%zx, self%zy, self%dx, self%dy, iterations)
+            if (problem%residual <= self%tolerance .and. problem%change <= self%tolerance) return
+         end do
+      end select
+   end subroutine iterate
+
+   !> Let the preconditioner's mean mode be the inverse of the operator's.
+   subroutine set_mean_stiffness(self, operator)
+      class(friction_solver_type), intent(inout) :: self
+      type(convolution_type), intent(in) :: operator
+      real(dp) :: cells, mean
+
+      if (.not. self%periodic) return
+      cells = real(operator%nx, dp)*operator%ny
+      mean = operator%symbol(0, 0, 1)*cells
+      if (mean <= 0.0_dp) mean = self%length/pi
+      self%preconditioner%symbol(0, 0, 1:2) = 1.0_dp/(mean*cells)
+   end subroutine set_mean_stiffness
+
+   !> Free the preconditioner and the work space.
+   subroutine destroy(self)
+      class(friction_solver_type), intent(inout) :: self
+
+      call self%preconditioner%destroy()
+      if (allocated(self%zx)) deallocate (self%zx, self%zy, self%dx, self%dy)
+   end subroutine destroy
+
+end module friction_cg

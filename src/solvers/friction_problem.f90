@@ -1,0 +1,368 @@
+!> What the methods of `friction_cg` share: the tangential problem of one step, with its passes.
+!>
+!> Unknown: the traction T on the contact. The slip is r = DX - A T. Wanted is T within the bound of
+!> module `friction_law`, with r = 0 where T is inside (stick) and, where T is on the bound (slip), the
+!> slip along the slope parallel to D = T - T* with r.D >= 0. The residual of a point is
+!>
+!>     g = slip along the slope                        inside, or on the bound with r.D < 0
+!>     g = the same less its part along D              on the bound with r.D >= 0
+!>
+!> so that g = 0 everywhere is the solution: stick, direction of slip and no reversed slip.
+!>
+!> Each pass over the fields is one loop over rows, fused with the transforms of its row. Sums are
+!> formed by row and added up in order: the results do not depend on the number of threads.
+module friction_problem
+   use fft_conv, only : columns_apply, convolution_type
+   use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type, unbounded
+   use parallel, only : global_max, global_sum
+   use precision, only : dp, int8
+   implicit none
+   private
+
+   public :: friction_problem_type
+
+   real(dp), parameter :: on_bound = 1.0_dp + 1.0e-9_dp   !! a point with s below it is on its bound
+   real(dp), parameter :: outermost = 4.0_dp              !! no point is moved out by more than this
+   real(dp), parameter :: stiffest = 1.0e15_dp            !! curvature of a bound, in units of a_0
+
+   !> The fields of one solve (the caller's, by pointers) and its measures.
+   type :: friction_problem_type
+      type(friction_law_type) :: law
+      integer :: nx = 0, ny = 0
+      integer :: threads = 1
+      real(dp) :: compliance = 0.0_dp        !! a_0: displacement of a cell under its own unit traction
+      real(dp) :: slip_scale = 0.0_dp        !! the slip that the residual is measured by; 0: by U
+      real(dp), pointer, contiguous :: p(:, :) => null()
+      real(dp), pointer, contiguous :: hx(:, :) => null(), hy(:, :) => null()
+      real(dp), pointer, contiguous :: drive_x(:, :) => null(), drive_y(:, :) => null()
+      real(dp), pointer, contiguous :: tx(:, :) => null(), ty(:, :) => null()
+      real(dp), pointer, contiguous :: rx(:, :) => null(), ry(:, :) => null()
+      integer(int8), pointer, contiguous :: contact(:, :) => null()
+      real(dp), allocatable :: row_sums(:, :)
+      integer :: cells = 0                   !! in contact
+      integer :: slipping = 0                !! on the bound
+      integer :: released = 0                !! left the bound since the last move
+      logical :: fresh = .false.             !! r comes from DX - A T, not from a recurrence
+      real(dp) :: residual = 0.0_dp          !! largest |g| over the scale of displacement
+      real(dp) :: change = 0.0_dp            !! |T' - T|/|T'| of the last move (thesis, eq. 3.15)
+   contains
+      procedure :: start
+      procedure :: slope_at
+      procedure :: friction_part
+      procedure :: point_residual
+      procedure :: put_back
+      procedure :: update_slip
+      procedure :: advance_slip
+      procedure :: start_from_rest
+      procedure :: move
+      procedure :: forward_tractions
+      procedure :: totals
+   end type friction_problem_type
+
+contains
+
+   !> Bring the first T within its bound, and transform its rows.
+   subroutine start(self, operator, moving)
+      class(friction_problem_type), intent(inout) :: self
+      type(convolution_type), intent(inout) :: operator
+      logical, intent(out) :: moving         !! T is not zero everywhere
+      real(dp) :: slope(2), star(2), d(2), s
+      integer :: i, j
+
+      !$omp parallel do default(none) shared(self, operator) private(i, j, slope, star, d, s) &
+      !$omp num_threads(self%threads)
+      do j = 1, self%ny
+         self%row_sums(:, j) = 0.0_dp
+         do i = 1, self%nx
+            if (self%p(i, j) <= 0.0_dp .and. self%law%adhesive_pressure <= 0.0_dp) then
+               self%contact(i, j) = contact_open
+            end if
+            if (self%contact(i, j) == contact_open) then
+               self%tx(i, j) = 0.0_dp
+               self%ty(i, j) = 0.0_dp
+            else
+               slope = self%slope_at(i, j)
+               star = self%law%normal_traction(self%p(i, j), slope)
+               d = [self%tx(i, j), self%ty(i, j)] - star
+               s = self%law%bound_ratio(self%p(i, j), slope, d)
+               self%contact(i, j) = merge(contact_slip, contact_stick, s <= on_bound)
+               if (s < 1.0_dp) then
+                  self%tx(i, j) = star(1) + s*d(1)
+                  self%ty(i, j) = star(2) + s*d(2)
+               end if
+               self%row_sums(1, j) = self%row_sums(1, j) + 1.0_dp
+               self%row_sums(2, j) = self%row_sums(2, j) + self%tx(i, j)**2 + self%ty(i, j)**2
+            end if
+         end do
+         call operator%forward_row(1, j, self%tx(:, j))
+         call operator%forward_row(2, j, self%ty(:, j))
+      end do
+      associate (sums => self%totals(2))
+         self%cells = nint(sums(1))
+         moving = sums(2) > 0.0_dp
+      end associate
+      self%change = 0.0_dp
+   end subroutine start
+
+   !> grad H at a point, 0 where the slope does not count.
+   pure function slope_at(self, i, j) result(slope)
+      class(friction_problem_type), intent(in) :: self
+      integer, intent(in) :: i, j
+      real(dp) :: slope(2)
+
+      if (self%law%slope) then
+         slope = [self%hx(i, j), self%hy(i, j)]
+      else
+         slope = 0.0_dp
+      end if
+   end function slope_at
+
+   !> D = T - T* at a point.
+   pure function friction_part(self, i, j, slope) result(d)
+      class(friction_problem_type), intent(in) :: self
+      integer, intent(in) :: i, j
+      real(dp), intent(in) :: slope(2)
+      real(dp) :: d(2)
+
+      d = [self%tx(i, j), self%ty(i, j)] - self%law%normal_traction(self%p(i, j), slope)
+   end function friction_part
+
+   !> D, slip along the slope, residual and curvature of a point in contact.
+   pure subroutine point_residual(self, i, j, d, r, g, curvature, reversed)
+      class(friction_problem_type), intent(in) :: self
+      integer, intent(in) :: i, j
+      real(dp), intent(out) :: d(2)          !! D, Pa
+      real(dp), intent(out) :: r(2)          !! slip along the slope, m
+      real(dp), intent(out) :: g(2)          !! m
+      real(dp), intent(out) :: curvature     !! of the bound: r.D/|D|^2, m/Pa; 0 inside
+      logical, intent(out) :: reversed       !! on the bound, but slips against the traction
+      real(dp) :: slope(2), rd, dd
+
+      slope = self%slope_at(i, j)
+      d = self%friction_part(i, j, slope)
+      r = self%law%slip_along_slope(slope, [self%rx(i, j), self%ry(i, j)])
+      g = r
+      curvature = 0.0_dp
+      reversed = .false.
+      if (self%contact(i, j) /= contact_slip) return
+      dd = d(1)**2 + d(2)**2
+      rd = r(1)*d(1) + r(2)*d(2)
+      if (dd <= 0.0_dp) then                 ! nothing but T* is allowed here
+         g = 0.0_dp
+      else if (rd < 0.0_dp) then
+         reversed = .true.
+      else
+         g = r - rd/dd*d
+         curvature = min(rd, stiffest*self%compliance*dd)/dd
+      end if
+   end subroutine point_residual
+
+   !> The traction and the state of a point that moved to T: slip points go back on their bound from
+   !> both sides, others only from outside.
+   pure subroutine put_back(self, i, j, t, state, returned)
+      class(friction_problem_type), intent(in) :: self
+      integer, intent(in) :: i, j
+      real(dp), intent(inout) :: t(2)              !! Pa
+      integer(int8), intent(inout) :: state
+      logical, intent(out) :: returned             !! it was moved
+      real(dp) :: slope(2), star(2), d(2), s
+
+      slope = self%slope_at(i, j)
+      star = self%law%normal_traction(self%p(i, j), slope)
+      d = t - star
+      s = self%law%bound_ratio(self%p(i, j), slope, d)
+      returned = s < 1.0_dp .or. (state == contact_slip .and. s <= outermost)
+      if (returned) then
+         t = star + s*d
+         state = contact_slip
+      else
+         state = merge(contact_slip, contact_stick, s <= on_bound)
+      end if
+   end subroutine put_back
+
+   !> r = DX - A T from the transformed rows of T; then measure.
+   subroutine update_slip(self, operator)
+      class(friction_problem_type), intent(inout) :: self
+      type(convolution_type), intent(inout) :: operator
+      real(dp) :: form
+
+      self%fresh = .true.
+      call operator%columns(columns_apply, form)
+      call slip_pass(self, operator, 1.0_dp)
+   end subroutine update_slip
+
+   !> r = r - step A d, after the operator's columns have been done for d; then measure.
+   subroutine advance_slip(self, operator, step)
+      class(friction_problem_type), intent(inout) :: self
+      type(convolution_type), intent(inout) :: operator
+      real(dp), intent(in) :: step
+
+      self%fresh = .false.
+      call slip_pass(self, operator, step)
+   end subroutine advance_slip
+
+   !> The rows of `update_slip` and `advance_slip`.
+   subroutine slip_pass(self, operator, factor)
+      class(friction_problem_type), intent(inout) :: self
+      type(convolution_type), intent(inout) :: operator
+      real(dp), intent(in) :: factor
+      real(dp) :: largest
+      integer :: j
+
+      largest = 0.0_dp
+      !$omp parallel do default(none) shared(self, operator, factor) private(j) &
+      !$omp reduction(max: largest) num_threads(self%threads)
+      do j = 1, self%ny
+         call slip_row(self, operator, factor, j)
+         call measure_row(self, j, largest)
+      end do
+      call finish_measure(self, largest)
+   end subroutine slip_pass
+
+   !> One row of r.
+   subroutine slip_row(self, operator, factor, j)
+      class(friction_problem_type), intent(inout) :: self
+      type(convolution_type), intent(inout) :: operator
+      real(dp), intent(in) :: factor
+      integer, intent(in) :: j
+      real(dp) :: u(self%nx)
+
+      call operator%backward_row(1, j, u)
+      if (self%fresh) then
+         self%rx(:, j) = self%drive_x(:, j) - u
+      else
+         self%rx(:, j) = self%rx(:, j) - factor*u
+      end if
+      call operator%backward_row(2, j, u)
+      if (self%fresh) then
+         self%ry(:, j) = self%drive_y(:, j) - u
+      else
+         self%ry(:, j) = self%ry(:, j) - factor*u
+      end if
+   end subroutine slip_row
+
+   !> r = DX where T is zero everywhere.
+   subroutine start_from_rest(self)
+      class(friction_problem_type), intent(inout) :: self
+      real(dp) :: largest
+      integer :: j
+
+      self%fresh = .true.
+      largest = 0.0_dp
+      !$omp parallel do default(none) shared(self) private(j) &
+      !$omp reduction(max: largest) num_threads(self%threads)
+      do j = 1, self%ny
+         self%rx(:, j) = self%drive_x(:, j)
+         self%ry(:, j) = self%drive_y(:, j)
+         call measure_row(self, j, largest)
+      end do
+      call finish_measure(self, largest)
+   end subroutine start_from_rest
+
+   !> Release the points of a row that slip against their traction, and sum its residuals.
+   subroutine measure_row(self, j, largest)
+      class(friction_problem_type), intent(inout) :: self
+      integer, intent(in) :: j
+      real(dp), intent(inout) :: largest           !! |g|^2
+      real(dp) :: d(2), r(2), g(2), curvature
+      logical :: reversed
+      integer :: i
+
+      self%row_sums(:, j) = 0.0_dp
+      associate (sums => self%row_sums(:, j))
+         do i = 1, self%nx
+            if (self%contact(i, j) == contact_open) cycle
+            call self%point_residual(i, j, d, r, g, curvature, reversed)
+            if (reversed) then
+               self%contact(i, j) = contact_stick
+               sums(1) = sums(1) + 1.0_dp
+            end if
+            if (self%contact(i, j) == contact_slip) sums(2) = sums(2) + 1.0_dp
+            sums(3) = sums(3) + self%drive_x(i, j)**2 + self%drive_y(i, j)**2
+            sums(4) = sums(4) + (self%drive_x(i, j) - self%rx(i, j))**2 &
+               + (self%drive_y(i, j) - self%ry(i, j))**2
+            largest = max(largest, g(1)**2 + g(2)**2)
+         end do
+      end associate
+   end subroutine measure_row
+
+   !> The residual from the sums of `measure_row`.
+   subroutine finish_measure(self, largest)
+      class(friction_problem_type), intent(inout) :: self
+      real(dp), intent(in) :: largest              !! |g|^2
+      real(dp) :: scale, sums(4)
+
+      sums = self%totals(4)
+      self%released = nint(sums(1))
+      self%slipping = nint(sums(2))
+      scale = sqrt(max(sums(3), sums(4))/max(self%cells, 1))
+      if (self%slip_scale > 0.0_dp) scale = min(scale, max(self%slip_scale, 1.0e-6_dp*scale))
+      self%residual = sqrt(global_max(largest))
+      if (scale > 0.0_dp) self%residual = self%residual/scale
+   end subroutine finish_measure
+
+   !> T' = T + step d, put back; the rows of T' are transformed if asked for.
+   subroutine move(self, operator, step, dx, dy, transform, returned)
+      class(friction_problem_type), intent(inout) :: self
+      type(convolution_type), intent(inout) :: operator
+      real(dp), intent(in) :: step
+      real(dp), intent(in) :: dx(:, :), dy(:, :)    !! [nx, ny] direction d, Pa
+      logical, intent(in) :: transform
+      integer, intent(out) :: returned              !! points that were put back
+      real(dp) :: t(2), sums(3)
+      logical :: moved
+      integer :: i, j
+
+      !$omp parallel do default(none) shared(self, operator, step, dx, dy, transform) &
+      !$omp private(i, j, t, moved) num_threads(self%threads)
+      do j = 1, self%ny
+         self%row_sums(:, j) = 0.0_dp
+         do i = 1, self%nx
+            if (self%contact(i, j) == contact_open) cycle
+            t = [self%tx(i, j) + step*dx(i, j), self%ty(i, j) + step*dy(i, j)]
+            call self%put_back(i, j, t, self%contact(i, j), moved)
+            if (moved) self%row_sums(1, j) = self%row_sums(1, j) + 1.0_dp
+            self%row_sums(2, j) = self%row_sums(2, j) + (t(1) - self%tx(i, j))**2 &
+               + (t(2) - self%ty(i, j))**2
+            self%row_sums(3, j) = self%row_sums(3, j) + t(1)**2 + t(2)**2
+            self%tx(i, j) = t(1)
+            self%ty(i, j) = t(2)
+         end do
+         if (transform) then
+            call operator%forward_row(1, j, self%tx(:, j))
+            call operator%forward_row(2, j, self%ty(:, j))
+         end if
+      end do
+      sums = self%totals(3)
+      returned = nint(sums(1))
+      self%change = sqrt(sums(2)/max(sums(3), tiny(1.0_dp)))
+   end subroutine move
+
+   !> Transform the rows of T.
+   subroutine forward_tractions(self, operator)
+      class(friction_problem_type), intent(inout) :: self
+      type(convolution_type), intent(inout) :: operator
+      integer :: j
+
+      !$omp parallel do default(none) shared(self, operator) private(j) num_threads(self%threads)
+      do j = 1, self%ny
+         call operator%forward_row(1, j, self%tx(:, j))
+         call operator%forward_row(2, j, self%ty(:, j))
+      end do
+   end subroutine forward_tractions
+
+   !> The first n sums over all rows, in order.
+   function totals(self, n) result(sums)
+      class(friction_problem_type), intent(in) :: self
+      integer, intent(in) :: n
+      real(dp) :: sums(n)
+      integer :: j
+
+      sums = 0.0_dp
+      do j = 1, self%ny
+         sums = sums + self%row_sums(1:n, j)
+      end do
+      sums = global_sum(sums)
+   end function totals
+
+end module friction_problem
