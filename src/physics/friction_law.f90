@@ -17,8 +17,8 @@
 !> Without slope n = 0 and T* = 0.
 !>
 !> Direction of slip. `r` is the slip of the road over the rubber. The slip along the slope is parallel to
-!> the force along it if r + n (n.r)/N_z^2 = r + grad H (grad H . r) is parallel to D: the physical law.
-!> The thesis (eq. 3.16) asks for r parallel to D.
+!> the force along it if r + n (n.r)/N_z^2 = r + grad H (grad H . r) is parallel to D, which is the same
+!> as r parallel to D - n (n.D): the physical law. The thesis (eq. 3.16) asks for r parallel to D.
 module friction_law
    use precision, only : dp, int8
    implicit none
@@ -49,6 +49,7 @@ module friction_law
       procedure :: bound_ratio
       procedure :: bound_variation
       procedure :: return_to_bound
+      procedure :: slip_direction
       procedure :: slip_along_slope
    end type friction_law_type
 
@@ -193,6 +194,19 @@ contains
       returned = s < 1.0_dp
       if (returned) t = star + s*d
    end subroutine return_to_bound
+
+   !> The direction of slip on the bound: D - n (n.D), or D itself in the thesis.
+   pure function slip_direction(self, slope, d) result(direction)
+      class(friction_law_type), intent(in) :: self
+      real(dp), intent(in) :: slope(2)
+      real(dp), intent(in) :: d(2)          !! D, Pa
+      real(dp) :: direction(2)              !! Pa
+
+      direction = d
+      if (self%slope .and. self%physical_slip) then
+         direction = d - slope*((slope(1)*d(1) + slope(2)*d(2))/(1.0_dp + slope(1)**2 + slope(2)**2))
+      end if
+   end function slip_direction
 
    !> The slip that must be parallel to D: r + grad H (grad H . r), or r itself in the thesis.
    pure function slip_along_slope(self, slope, r) result(slip)

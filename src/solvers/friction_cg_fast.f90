@@ -116,7 +116,7 @@ contains
       logical, intent(in) :: restart
       integer, intent(in) :: j
       real(dp), intent(in) :: zx(:), zy(:)         !! z_old
-      real(dp) :: d(2), r(2), g(2), curvature, w, gx(problem%nx), gy(problem%nx)
+      real(dp) :: normal(2), g(2), curvature, w, gx(problem%nx), gy(problem%nx)
       logical :: reversed
       integer :: i
 
@@ -126,7 +126,7 @@ contains
             gx(i) = 0.0_dp
             gy(i) = 0.0_dp
          else
-            call problem%point_residual(i, j, d, r, g, curvature, reversed)
+            call problem%point_residual(i, j, normal, g, curvature, reversed)
             if (.not. restart) then
                problem%row_sums(1, j) = problem%row_sums(1, j) + g(1)*zx(i) + g(2)*zy(i)
             end if
@@ -145,7 +145,7 @@ contains
       type(convolution_type), intent(inout) :: preconditioner
       integer, intent(in) :: j
       real(dp), intent(inout) :: zx(:), zy(:)
-      real(dp) :: d(2), r(2), g(2), z(2), curvature, w
+      real(dp) :: normal(2), g(2), z(2), curvature, w
       logical :: reversed
       integer :: i
 
@@ -155,10 +155,10 @@ contains
       do i = 1, problem%nx
          z = 0.0_dp
          if (problem%contact(i, j) /= contact_open) then
-            call problem%point_residual(i, j, d, r, g, curvature, reversed)
+            call problem%point_residual(i, j, normal, g, curvature, reversed)
             w = problem%compliance/(problem%compliance + curvature)
             z = w*([zx(i), zy(i)] + (1.0_dp - w)/problem%compliance*g)
-            if (problem%contact(i, j) == contact_slip) z = along_bound(d, z)
+            if (problem%contact(i, j) == contact_slip) z = along_bound(normal, z)
             problem%row_sums(1, j) = problem%row_sums(1, j) + g(1)*z(1) + g(2)*z(2)
          end if
          zx(i) = z(1)
@@ -197,7 +197,7 @@ contains
       integer, intent(in) :: j
       real(dp), intent(in) :: zx(:), zy(:)
       real(dp), intent(inout) :: dx(:), dy(:)
-      real(dp) :: d(2), r(2), g(2), v(2), curvature
+      real(dp) :: normal(2), g(2), v(2), curvature
       logical :: reversed
       integer :: i
 
@@ -205,10 +205,10 @@ contains
       do i = 1, problem%nx
          v = 0.0_dp
          if (problem%contact(i, j) /= contact_open) then
-            call problem%point_residual(i, j, d, r, g, curvature, reversed)
+            call problem%point_residual(i, j, normal, g, curvature, reversed)
             if (beta > 0.0_dp) then
                v = beta*[dx(i), dy(i)]
-               if (problem%contact(i, j) == contact_slip) v = along_bound(d, v)
+               if (problem%contact(i, j) == contact_slip) v = along_bound(normal, v)
             end if
             v = v + [zx(i), zy(i)]
             problem%row_sums(1, j) = problem%row_sums(1, j) + g(1)*v(1) + g(2)*v(2)
@@ -219,16 +219,16 @@ contains
       end do
    end subroutine direction_row
 
-   !> Z: v less its part along D.
-   pure function along_bound(d, v) result(projected)
-      real(dp), intent(in) :: d(2)
+   !> Z: v less its part across the bound.
+   pure function along_bound(normal, v) result(projected)
+      real(dp), intent(in) :: normal(2)      !! direction of slip
       real(dp), intent(in) :: v(2)
       real(dp) :: projected(2)
-      real(dp) :: dd
+      real(dp) :: nn
 
-      dd = d(1)**2 + d(2)**2
+      nn = normal(1)**2 + normal(2)**2
       projected = 0.0_dp
-      if (dd > 0.0_dp) projected = v - (d(1)*v(1) + d(2)*v(2))/dd*d
+      if (nn > 0.0_dp) projected = v - (normal(1)*v(1) + normal(2)*v(2))/nn*normal
    end function along_bound
 
 end module friction_cg_fast

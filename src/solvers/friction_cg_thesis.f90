@@ -71,12 +71,11 @@ contains
       real(dp), intent(inout) :: tx(:, :), ty(:, :)
       real(dp), intent(out) :: ascent              !! t.g
       real(dp), intent(out) :: bend                !! K_2.r
-      real(dp) :: d(2), r(2), g(2), v(2), t(2), curvature, first, second, sums(2)
-      logical :: reversed
+      real(dp) :: d(2), r(2), g(2), v(2), t(2), first, second, sums(2)
       integer :: i, j
 
       !$omp parallel do default(none) shared(problem, operator, beta, gx, gy, dx, dy, tx, ty) &
-      !$omp private(i, j, d, r, g, v, t, curvature, first, second, reversed) &
+      !$omp private(i, j, d, r, g, v, t, first, second) &
       !$omp num_threads(problem%threads)
       do j = 1, problem%ny
          problem%row_sums(1:2, j) = 0.0_dp
@@ -85,7 +84,7 @@ contains
             v = 0.0_dp
             t = 0.0_dp
             if (problem%contact(i, j) /= contact_open) then
-               call problem%point_residual(i, j, d, r, g, curvature, reversed)
+               call perpendicular(problem, i, j, d, r, g)
                v = g
                if (abs(beta) > 0.0_dp) v = g + beta*[dx(i, j), dy(i, j)]
                t = v
@@ -118,18 +117,17 @@ contains
       type(friction_problem_type), intent(inout) :: problem
       real(dp), intent(in) :: gx(:, :), gy(:, :)   !! the old g
       real(dp), intent(in) :: tx(:, :), ty(:, :)
-      real(dp) :: d(2), r(2), g(2), y(2), t(2), curvature
-      logical :: reversed
+      real(dp) :: d(2), r(2), g(2), y(2), t(2)
       integer :: i, j
 
       !$omp parallel do default(none) shared(problem, gx, gy, tx, ty) &
-      !$omp private(i, j, d, r, g, y, t, curvature, reversed) num_threads(problem%threads)
+      !$omp private(i, j, d, r, g, y, t) num_threads(problem%threads)
       do j = 1, problem%ny
          associate (sums => problem%row_sums(:, j))
             sums(:) = 0.0_dp
             do i = 1, problem%nx
                if (problem%contact(i, j) == contact_open) cycle
-               call problem%point_residual(i, j, d, r, g, curvature, reversed)
+               call perpendicular(problem, i, j, d, r, g)
                y = g - [gx(i, j), gy(i, j)]
                t = [tx(i, j), ty(i, j)]
                sums(1) = sums(1) + dot_product(t, y)
@@ -140,5 +138,23 @@ contains
          end associate
       end do
    end subroutine direction_products
+
+   !> D, the slip along the slope, and its part perpendicular to D where the point slips.
+   pure subroutine perpendicular(problem, i, j, d, r, g)
+      type(friction_problem_type), intent(in) :: problem
+      integer, intent(in) :: i, j
+      real(dp), intent(out) :: d(2)          !! Pa
+      real(dp), intent(out) :: r(2), g(2)    !! m
+      real(dp) :: slope(2), dd
+
+      slope = problem%slope_at(i, j)
+      d = problem%friction_part(i, j, slope)
+      r = problem%law%slip_along_slope(slope, [problem%rx(i, j), problem%ry(i, j)])
+      g = r
+      if (problem%contact(i, j) /= contact_slip) return
+      dd = d(1)**2 + d(2)**2
+      g = 0.0_dp
+      if (dd > 0.0_dp) g = r - (r(1)*d(1) + r(2)*d(2))/dd*d
+   end subroutine perpendicular
 
 end module friction_cg_thesis

@@ -1,11 +1,11 @@
 !> What the methods of `friction_cg` share: the tangential problem of one step, with its passes.
 !>
 !> Unknown: the traction T on the contact. The slip is r = DX - A T. Wanted is T within the bound of
-!> module `friction_law`, with r = 0 where T is inside (stick) and, where T is on the bound (slip), the
-!> slip along the slope parallel to D = T - T* with r.D >= 0. The residual of a point is
+!> module `friction_law`, with r = 0 where T is inside (stick) and, where T is on the bound (slip), r
+!> along the direction of slip v (D = T - T*, or D - n (n.D) by the physical law). The residual of a point
 !>
-!>     g = slip along the slope                        inside, or on the bound with r.D < 0
-!>     g = the same less its part along D              on the bound with r.D >= 0
+!>     g = r                      inside, or on the bound with r.v < 0
+!>     g = r - (r.v) v/|v|^2      on the bound with r.v >= 0
 !>
 !> so that g = 0 everywhere is the solution: stick, direction of slip and no reversed slip.
 !>
@@ -127,33 +127,40 @@ contains
       d = [self%tx(i, j), self%ty(i, j)] - self%law%normal_traction(self%p(i, j), slope)
    end function friction_part
 
-   !> D, slip along the slope, residual and curvature of a point in contact.
-   pure subroutine point_residual(self, i, j, d, r, g, curvature, reversed)
+   !> Residual and curvature of a point in contact. With the direction of slip v = S^-1 D the bound is
+   !> |S^-1/2 D| = const to first order (its change with n.D left out): a multiplier lam = r.v/|v|^2 and
+   !> the curvature lam e.(S^-1 e)/|e|^2 along its tangent e.
+   pure subroutine point_residual(self, i, j, v, g, curvature, reversed)
       class(friction_problem_type), intent(in) :: self
       integer, intent(in) :: i, j
-      real(dp), intent(out) :: d(2)          !! D, Pa
-      real(dp), intent(out) :: r(2)          !! slip along the slope, m
+      real(dp), intent(out) :: v(2)          !! direction of slip, Pa
       real(dp), intent(out) :: g(2)          !! m
-      real(dp), intent(out) :: curvature     !! of the bound: r.D/|D|^2, m/Pa; 0 inside
+      real(dp), intent(out) :: curvature     !! m/Pa; 0 inside the bound
       logical, intent(out) :: reversed       !! on the bound, but slips against the traction
-      real(dp) :: slope(2), rd, dd
+      real(dp) :: slope(2), d(2), r(2), rv, vv
 
-      slope = self%slope_at(i, j)
-      d = self%friction_part(i, j, slope)
-      r = self%law%slip_along_slope(slope, [self%rx(i, j), self%ry(i, j)])
+      r = [self%rx(i, j), self%ry(i, j)]
       g = r
+      v = 0.0_dp
       curvature = 0.0_dp
       reversed = .false.
       if (self%contact(i, j) /= contact_slip) return
-      dd = d(1)**2 + d(2)**2
-      rd = r(1)*d(1) + r(2)*d(2)
-      if (dd <= 0.0_dp) then                 ! nothing but T* is allowed here
+      slope = self%slope_at(i, j)
+      d = self%friction_part(i, j, slope)
+      v = self%law%slip_direction(slope, d)
+      vv = v(1)**2 + v(2)**2
+      rv = r(1)*v(1) + r(2)*v(2)
+      if (vv <= 0.0_dp) then                 ! nothing but T* is allowed here
          g = 0.0_dp
-      else if (rd < 0.0_dp) then
+      else if (rv < 0.0_dp) then
          reversed = .true.
       else
-         g = r - rd/dd*d
-         curvature = min(rd, stiffest*self%compliance*dd)/dd
+         g = r - rv/vv*v
+         curvature = min(rv, stiffest*self%compliance*vv)/vv
+         if (self%law%slope) then            ! e = v turned by 90 degrees; S^-1 e = D turned
+            d = [-v(2), v(1)]
+            curvature = curvature*dot_product(d, self%law%slip_direction(slope, d))/vv
+         end if
       end if
    end subroutine point_residual
 
@@ -264,7 +271,7 @@ contains
       class(friction_problem_type), intent(inout) :: self
       integer, intent(in) :: j
       real(dp), intent(inout) :: largest           !! |g|^2
-      real(dp) :: d(2), r(2), g(2), curvature
+      real(dp) :: v(2), g(2), curvature
       logical :: reversed
       integer :: i
 
@@ -272,7 +279,7 @@ contains
       associate (sums => self%row_sums(:, j))
          do i = 1, self%nx
             if (self%contact(i, j) == contact_open) cycle
-            call self%point_residual(i, j, d, r, g, curvature, reversed)
+            call self%point_residual(i, j, v, g, curvature, reversed)
             if (reversed) then
                self%contact(i, j) = contact_stick
                sums(1) = sums(1) + 1.0_dp
