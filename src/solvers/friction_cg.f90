@@ -169,7 +169,8 @@ contains
       problem%rx => slip_x
       problem%ry => slip_y
       problem%contact => contact
-      allocate (problem%row_sums(4, problem%ny))
+      allocate (problem%row_sums(12, problem%ny))
+      if (self%periodic) problem%mean_compliance = operator%symbol(0, 0, 1)
       call set_mean_stiffness(self, operator)
 
       call problem%start(operator, moving)

@@ -11,6 +11,13 @@
 !>     alpha = g.d/(d.A d + sum lam |d|^2)
 !>     T' = put back(T + alpha d)            r from A T' where points were put back, else by recurrence
 !>
+!> A thick block makes the mean mode h/G of a periodic operator its largest by far, which every masked
+!> field excites. It is taken out of g and z by the two fields e = w Z of uniform traction, with
+!> E = sum of e and A e = (h/N) E:
+!>
+!>     g - E^-1 sum(w g) goes through the preconditioner to z0
+!>     z = z0 + w Z c,  c = E^-1 (N/h E^-1 sum(w g) - sum(z0))
+!>
 !> An iteration costs two operator products, of which the first needs no inverse transform where points
 !> slip, and one preconditioner. beta is formed with z_old (M is symmetric), so that no old g is kept:
 !> four work fields z and d beside T, r and DX.
@@ -41,6 +48,7 @@ contains
       real(dp), intent(inout) :: zx(:, :), zy(:, :), dx(:, :), dy(:, :)    !! work [nx, ny]
       integer, intent(inout) :: iterations
       real(dp) :: rho, rho_old, cross, beta, slope, curvature, form, alpha, milestone
+      real(dp) :: shift(2)
       logical :: restart, slipping
       integer :: returned, first
 
@@ -50,12 +58,13 @@ contains
       first = iterations
       do while (iterations < limit)
          iterations = iterations + 1
-         call precondition(problem, preconditioner, restart, zx, zy, cross, rho)
+         call precondition(problem, preconditioner, restart, zx, zy, shift, cross, rho)
          beta = 0.0_dp
          if (.not. restart) beta = max(0.0_dp, (rho - cross)/rho_old)
-         call new_direction(problem, operator, beta, zx, zy, dx, dy, slope, curvature)
+         call new_direction(problem, operator, beta, shift, zx, zy, dx, dy, slope, curvature)
          if (slope <= 0.0_dp .and. beta > 0.0_dp) then
-            call new_direction(problem, operator, 0.0_dp, zx, zy, dx, dy, slope, curvature)
+            call new_direction(problem, operator, 0.0_dp, [0.0_dp, 0.0_dp], zx, zy, dx, dy, slope, &
+               curvature)
          end if
          slipping = problem%slipping > 0
          call operator%columns(merge(columns_form, columns_apply, slipping), form)
@@ -82,45 +91,71 @@ contains
    end subroutine iterate_fast
 
    !> z from the residual; g.z and, unless at a start, g.z_old.
-   subroutine precondition(problem, preconditioner, restart, zx, zy, cross, rho)
+   subroutine precondition(problem, preconditioner, restart, zx, zy, shift, cross, rho)
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: preconditioner
       logical, intent(in) :: restart
       real(dp), intent(inout) :: zx(:, :), zy(:, :)
+      real(dp), intent(out) :: shift(2)            !! c: w Z c is still to be added to z
       real(dp), intent(out) :: cross               !! g.z_old; 0 at a start
       real(dp), intent(out) :: rho                 !! g.z
-      real(dp) :: sums(1)
+      real(dp) :: sums(5), c(2), mean(2), inverse(2, 2), coupling(2, 2), form
       integer :: j
 
-      !$omp parallel do default(none) shared(problem, preconditioner, restart, zx, zy) private(j) &
-      !$omp num_threads(problem%threads)
+      call mean_mode(problem, inverse, coupling)
+      c = matmul(inverse, problem%weighted_residual)
+      mean = matmul(coupling, c)
+      !$omp parallel do default(none) shared(problem, preconditioner, restart, mean, c, zx, zy) &
+      !$omp private(j) num_threads(problem%threads)
       do j = 1, problem%ny
-         call scale_row(problem, preconditioner, restart, j, zx(:, j), zy(:, j))
+         call scale_row(problem, preconditioner, restart, mean, c, j, zx(:, j), zy(:, j))
       end do
-      sums = problem%totals(1)
+      sums = problem%totals(5)
       cross = sums(1)
-      call preconditioner%columns(columns_apply, sums(1))
-      !$omp parallel do default(none) shared(problem, preconditioner, zx, zy) private(j) &
-      !$omp num_threads(problem%threads)
+      call preconditioner%columns(columns_apply, form)
+      !$omp parallel do default(none) shared(problem, preconditioner, mean, c, zx, zy) &
+      !$omp private(j) num_threads(problem%threads)
       do j = 1, problem%ny
-         call unscale_row(problem, preconditioner, j, zx(:, j), zy(:, j))
+         call unscale_row(problem, preconditioner, mean, c, j, zx(:, j), zy(:, j))
       end do
-      sums = problem%totals(1)
-      rho = sums(1)
+      sums = problem%totals(5)
+      shift = c - matmul(inverse, matmul(coupling, sums(2:3)) + sums(4:5))
+      rho = sums(1) + dot_product(problem%weighted_residual, shift)
    end subroutine precondition
 
-   !> Transform a row of w g.
-   subroutine scale_row(problem, preconditioner, restart, j, zx, zy)
+   !> K^-1 and (h/N) E; 0 where the mean mode is left alone.
+   subroutine mean_mode(problem, inverse, coupling)
+      type(friction_problem_type), intent(in) :: problem
+      real(dp), intent(out) :: inverse(2, 2)
+      real(dp), intent(out) :: coupling(2, 2)
+      real(dp) :: k(2, 2), determinant
+
+      inverse = 0.0_dp
+      coupling = 0.0_dp
+      if (problem%mean_compliance <= 0.0_dp) return
+      coupling = problem%mean_compliance*problem%weighted_tangent
+      k = matmul(problem%weighted_tangent, coupling) + problem%curved_tangent
+      determinant = k(1, 1)*k(2, 2) - k(1, 2)**2
+      if (determinant <= 1.0e-6_dp*(k(1, 1) + k(2, 2))**2) then
+         coupling = 0.0_dp
+      else
+         inverse = reshape([k(2, 2), -k(1, 2), -k(1, 2), k(1, 1)], [2, 2])/determinant
+      end if
+   end subroutine mean_mode
+
+   !> Transform a row of w Z (g - mean).
+   subroutine scale_row(problem, preconditioner, restart, mean, c, j, zx, zy)
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: preconditioner
       logical, intent(in) :: restart
+      real(dp), intent(in) :: mean(2), c(2)
       integer, intent(in) :: j
       real(dp), intent(in) :: zx(:), zy(:)         !! z_old
       real(dp) :: normal(2), g(2), curvature, w, gx(problem%nx), gy(problem%nx)
       logical :: reversed
       integer :: i
 
-      problem%row_sums(1, j) = 0.0_dp
+      problem%row_sums(1:5, j) = 0.0_dp
       do i = 1, problem%nx
          if (problem%contact(i, j) == contact_open) then
             gx(i) = 0.0_dp
@@ -131,6 +166,8 @@ contains
                problem%row_sums(1, j) = problem%row_sums(1, j) + g(1)*zx(i) + g(2)*zy(i)
             end if
             w = problem%compliance/(problem%compliance + curvature)
+            g = g - mean - problem%compliance*(1.0_dp - w)*c
+            if (problem%contact(i, j) == contact_slip) g = along_bound(normal, g)
             gx(i) = w*g(1)
             gy(i) = w*g(2)
          end if
@@ -140,9 +177,10 @@ contains
    end subroutine scale_row
 
    !> A row of z.
-   subroutine unscale_row(problem, preconditioner, j, zx, zy)
+   subroutine unscale_row(problem, preconditioner, mean, c, j, zx, zy)
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: preconditioner
+      real(dp), intent(in) :: mean(2), c(2)
       integer, intent(in) :: j
       real(dp), intent(inout) :: zx(:), zy(:)
       real(dp) :: normal(2), g(2), z(2), curvature, w
@@ -151,15 +189,19 @@ contains
 
       call preconditioner%backward_row(1, j, zx)
       call preconditioner%backward_row(2, j, zy)
-      problem%row_sums(1, j) = 0.0_dp
+      problem%row_sums(1:5, j) = 0.0_dp
       do i = 1, problem%nx
          z = 0.0_dp
          if (problem%contact(i, j) /= contact_open) then
             call problem%point_residual(i, j, normal, g, curvature, reversed)
             w = problem%compliance/(problem%compliance + curvature)
-            z = w*([zx(i), zy(i)] + (1.0_dp - w)/problem%compliance*g)
+            z = g - mean - problem%compliance*(1.0_dp - w)*c
+            z = w*([zx(i), zy(i)] + (1.0_dp - w)/problem%compliance*z)
             if (problem%contact(i, j) == contact_slip) z = along_bound(normal, z)
             problem%row_sums(1, j) = problem%row_sums(1, j) + g(1)*z(1) + g(2)*z(2)
+            problem%row_sums(2:3, j) = problem%row_sums(2:3, j) + z
+            problem%row_sums(4:5, j) = problem%row_sums(4:5, j) &
+               + problem%compliance*(1.0_dp - w)*z
          end if
          zx(i) = z(1)
          zy(i) = z(2)
@@ -167,21 +209,22 @@ contains
    end subroutine unscale_row
 
    !> d = z + beta Z d with its transform, its slope g.d and the part of its curvature by the bounds.
-   subroutine new_direction(problem, operator, beta, zx, zy, dx, dy, slope, curvature)
+   subroutine new_direction(problem, operator, beta, shift, zx, zy, dx, dy, slope, curvature)
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
       real(dp), intent(in) :: beta
-      real(dp), intent(in) :: zx(:, :), zy(:, :)
+      real(dp), intent(in) :: shift(2)             !! c
+      real(dp), intent(inout) :: zx(:, :), zy(:, :)
       real(dp), intent(inout) :: dx(:, :), dy(:, :)
       real(dp), intent(out) :: slope
       real(dp), intent(out) :: curvature
       real(dp) :: sums(2)
       integer :: j
 
-      !$omp parallel do default(none) shared(problem, operator, beta, zx, zy, dx, dy) private(j) &
-      !$omp num_threads(problem%threads)
+      !$omp parallel do default(none) shared(problem, operator, beta, shift, zx, zy, dx, dy) &
+      !$omp private(j) num_threads(problem%threads)
       do j = 1, problem%ny
-         call direction_row(problem, beta, j, zx(:, j), zy(:, j), dx(:, j), dy(:, j))
+         call direction_row(problem, beta, shift, j, zx(:, j), zy(:, j), dx(:, j), dy(:, j))
          call operator%forward_row(1, j, dx(:, j))
          call operator%forward_row(2, j, dy(:, j))
       end do
@@ -191,13 +234,14 @@ contains
    end subroutine new_direction
 
    !> A row of d.
-   subroutine direction_row(problem, beta, j, zx, zy, dx, dy)
+   subroutine direction_row(problem, beta, shift, j, zx, zy, dx, dy)
       type(friction_problem_type), intent(inout) :: problem
       real(dp), intent(in) :: beta
+      real(dp), intent(in) :: shift(2)
       integer, intent(in) :: j
-      real(dp), intent(in) :: zx(:), zy(:)
+      real(dp), intent(inout) :: zx(:), zy(:)
       real(dp), intent(inout) :: dx(:), dy(:)
-      real(dp) :: normal(2), g(2), v(2), curvature
+      real(dp) :: normal(2), g(2), v(2), z(2), curvature, w
       logical :: reversed
       integer :: i
 
@@ -210,6 +254,11 @@ contains
                v = beta*[dx(i), dy(i)]
                if (problem%contact(i, j) == contact_slip) v = along_bound(normal, v)
             end if
+            w = problem%compliance/(problem%compliance + curvature)
+            z = w*shift
+            if (problem%contact(i, j) == contact_slip) z = along_bound(normal, z)
+            zx(i) = zx(i) + z(1)
+            zy(i) = zy(i) + z(2)
             v = v + [zx(i), zy(i)]
             problem%row_sums(1, j) = problem%row_sums(1, j) + g(1)*v(1) + g(2)*v(2)
             problem%row_sums(2, j) = problem%row_sums(2, j) + curvature*(v(1)**2 + v(2)**2)

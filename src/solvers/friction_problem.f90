@@ -31,6 +31,7 @@ module friction_problem
       integer :: nx = 0, ny = 0
       integer :: threads = 1
       real(dp) :: compliance = 0.0_dp        !! a_0: displacement of a cell under its own unit traction
+      real(dp) :: mean_compliance = 0.0_dp   !! of the mean mode where it is stiff, by cells; else 0
       real(dp) :: slip_scale = 0.0_dp        !! the slip that the residual is measured by; 0: by U
       real(dp), pointer, contiguous :: p(:, :) => null()
       real(dp), pointer, contiguous :: hx(:, :) => null(), hy(:, :) => null()
@@ -43,6 +44,9 @@ module friction_problem
       integer :: slipping = 0                !! on the bound
       integer :: released = 0                !! left the bound since the last move
       logical :: fresh = .false.             !! r comes from DX - A T, not from a recurrence
+      real(dp) :: weighted_residual(2) = 0.0_dp       !! sum of w g
+      real(dp) :: weighted_tangent(2, 2) = 0.0_dp     !! E = sum of w Z
+      real(dp) :: curved_tangent(2, 2) = 0.0_dp       !! sum of lam w^2 Z
       real(dp) :: residual = 0.0_dp          !! largest |g| over the scale of displacement
       real(dp) :: change = 0.0_dp            !! |T' - T|/|T'| of the last move (thesis, eq. 3.15)
    contains
@@ -271,7 +275,7 @@ contains
       class(friction_problem_type), intent(inout) :: self
       integer, intent(in) :: j
       real(dp), intent(inout) :: largest           !! |g|^2
-      real(dp) :: v(2), g(2), curvature
+      real(dp) :: v(2), g(2), curvature, w, xx, xy, yy, vv
       logical :: reversed
       integer :: i
 
@@ -288,6 +292,19 @@ contains
             sums(3) = sums(3) + self%drive_x(i, j)**2 + self%drive_y(i, j)**2
             sums(4) = sums(4) + (self%drive_x(i, j) - self%rx(i, j))**2 &
                + (self%drive_y(i, j) - self%ry(i, j))**2
+            w = self%compliance/(self%compliance + curvature)
+            sums(5:6) = sums(5:6) + w*g
+            xx = 0.0_dp
+            xy = 0.0_dp
+            yy = 0.0_dp
+            vv = v(1)**2 + v(2)**2
+            if (self%contact(i, j) == contact_slip .and. vv > 0.0_dp) then
+               xx = v(1)**2/vv
+               xy = v(1)*v(2)/vv
+               yy = v(2)**2/vv
+            end if
+            sums(7:9) = sums(7:9) + w*[1.0_dp - xx, -xy, 1.0_dp - yy]
+            sums(10:12) = sums(10:12) + curvature*w**2*[1.0_dp - xx, -xy, 1.0_dp - yy]
             largest = max(largest, g(1)**2 + g(2)**2)
          end do
       end associate
@@ -297,11 +314,14 @@ contains
    subroutine finish_measure(self, largest)
       class(friction_problem_type), intent(inout) :: self
       real(dp), intent(in) :: largest              !! |g|^2
-      real(dp) :: scale, sums(4)
+      real(dp) :: scale, sums(12)
 
-      sums = self%totals(4)
+      sums = self%totals(12)
       self%released = nint(sums(1))
       self%slipping = nint(sums(2))
+      self%weighted_residual = sums(5:6)
+      self%weighted_tangent = reshape([sums(7), sums(8), sums(8), sums(9)], [2, 2])
+      self%curved_tangent = reshape([sums(10), sums(11), sums(11), sums(12)], [2, 2])
       scale = sqrt(max(sums(3), sums(4))/max(self%cells, 1))
       if (self%slip_scale > 0.0_dp) scale = min(scale, max(self%slip_scale, 1.0e-6_dp*scale))
       self%residual = sqrt(global_max(largest))
