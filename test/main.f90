@@ -6,6 +6,8 @@ program main
    use test_case_input, only : run_case_input
    use test_checkpoint, only : run_checkpoint
    use test_fft_conv, only : run_fft_conv
+   use test_friction_cg, only : run_friction_cg
+   use test_friction_law, only : run_friction_law
    use test_hdf5_file, only : run_hdf5_file
    use test_interpolation, only : run_interpolation
    use test_namelist, only : run_namelist
@@ -39,6 +41,8 @@ program main
    if (wanted('result_file')) call run_result_file()
    if (wanted('checkpoint')) call run_checkpoint()
    if (wanted('simulation')) call run_simulation()
+   if (wanted('friction_law')) call run_friction_law()
+   if (wanted('friction_cg')) call run_friction_cg()
    call finish()
 
 contains

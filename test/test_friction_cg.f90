@@ -1,0 +1,614 @@
+!> Tests of the tangential solver.
+module test_friction_cg
+   use check, only : begin_suite, check_close, check_no_error, check_that
+   use errors, only : error_type
+   use fft_conv, only : convolution_type, new_tangential_operator
+   use friction_cg, only : friction_fast, friction_gradient, friction_solver_type, friction_thesis, &
+      new_friction_solver, set_mean_compliance
+   use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type, &
+      largest_excess, new_friction_law, return_tractions
+   use precision, only : dp, int8, pi
+   use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
+   use solver_result, only : solver_result_type
+   implicit none
+   private
+
+   public :: run_friction_cg
+
+   !> A tangential problem with its fields.
+   type :: case_type
+      type(grid_type) :: grid
+      type(convolution_type) :: operator
+      type(friction_solver_type) :: solver
+      type(friction_law_type) :: law
+      type(solver_result_type) :: result
+      real(dp), allocatable :: p(:, :), hx(:, :), hy(:, :), drive_x(:, :), drive_y(:, :)
+      real(dp), allocatable :: tx(:, :), ty(:, :), rx(:, :), ry(:, :)
+      integer(int8), allocatable :: contact(:, :)
+   end type case_type
+
+contains
+
+   subroutine run_friction_cg()
+      call begin_suite('friction_cg')
+      call test_mindlin_exact()
+      call test_mindlin_poisson()
+      call test_unloading()
+      call test_products()
+      call test_limits()
+      call test_isotropy()
+      call test_rough()
+      call test_methods()
+      call test_frictionless_slope()
+      call test_constant_shear()
+      call test_adhesion()
+      call test_line()
+      call test_mean_mode()
+      call test_warm_start()
+   end subroutine run_friction_cg
+
+   !> Fields, operator and solver.
+   subroutine new_case(self, nx, ny, lx, ly, boundary, poisson, thickness)
+      type(case_type), intent(out) :: self
+      integer, intent(in) :: nx, ny, boundary
+      real(dp), intent(in) :: lx, ly, poisson, thickness
+      type(error_type), allocatable :: error
+
+      self%grid = new_grid(nx, ny, lx, ly, boundary)
+      call new_tangential_operator(self%operator, self%grid, poisson, thickness, error)
+      call check_no_error(error, 'operator')
+      call new_friction_solver(self%solver, self%grid, poisson, self%operator, error)
+      call check_no_error(error, 'solver')
+      allocate (self%p(nx, ny), self%contact(nx, ny))
+      allocate (self%hx, self%hy, self%drive_x, self%drive_y, self%tx, self%ty, self%rx, self%ry, &
+         mold=self%p)
+      self%p = 0.0_dp
+      self%hx = 0.0_dp
+      self%hy = 0.0_dp
+      self%drive_x = 0.0_dp
+      self%drive_y = 0.0_dp
+      self%tx = 0.0_dp
+      self%ty = 0.0_dp
+      self%contact = contact_stick
+      self%solver%tolerance = 1e-9_dp
+   end subroutine new_case
+
+   !> Solve, and prove the result without the solver: bound, stick, direction, no reversed slip, and the
+   !> slip itself from another product.
+   subroutine run_case(self, what, accuracy)
+      type(case_type), intent(inout) :: self
+      character(*), intent(in) :: what
+      real(dp), intent(in) :: accuracy       !! of the law of slip, over the displacements
+
+      where (self%contact /= contact_open) self%contact = contact_stick
+      call self%solver%solve(self%operator, self%law, self%p, self%hx, self%hy, self%drive_x, &
+         self%drive_y, self%contact, self%tx, self%ty, self%rx, self%ry, self%result)
+      call check_that(self%result%converged, what//': converged, '//trim(self%result%reason))
+      call prove(self, what, accuracy)
+   end subroutine run_case
+
+   !> The proof of `run_case`.
+   subroutine prove(self, what, accuracy)
+      type(case_type), intent(inout) :: self
+      character(*), intent(in) :: what
+      real(dp), intent(in) :: accuracy
+      real(dp), allocatable :: ux(:, :), uy(:, :)
+      real(dp) :: scale, r(2), d(2), slope(2), force(3), slip(3), normal(3), s, bad, wrong
+      integer :: i, j
+
+      allocate (ux, uy, mold=self%tx)
+      call self%operator%apply_vector(self%tx, self%ty, ux, uy)
+      scale = max(maxval(hypot(self%drive_x, self%drive_y)), maxval(hypot(ux, uy)), tiny(1.0_dp))
+      bad = maxval(hypot(self%drive_x - ux - self%rx, self%drive_y - uy - self%ry))
+      call check_that(bad <= 1e-12_dp*scale, what//': slip = DX - A T')
+      bad = largest_excess(self%law, self%p, self%hx, self%hy, self%contact, self%tx, self%ty)
+      call check_that(bad <= 1e-13_dp*max(maxval(hypot(self%tx, self%ty)), tiny(1.0_dp)), &
+         what//': within the bound')
+      bad = 0.0_dp
+      wrong = 0.0_dp
+      do j = 1, self%grid%ny
+         do i = 1, self%grid%nx
+            if (self%contact(i, j) == contact_open) cycle
+            r = [self%drive_x(i, j) - ux(i, j), self%drive_y(i, j) - uy(i, j)]
+            slope = 0.0_dp
+            if (self%law%slope) slope = [self%hx(i, j), self%hy(i, j)]
+            d = [self%tx(i, j), self%ty(i, j)] - self%law%normal_traction(self%p(i, j), slope)
+            s = self%law%bound_ratio(self%p(i, j), slope, d)
+            if (s > 1.0_dp + 1e-8_dp) then
+               bad = max(bad, norm2(r))
+            else if (norm2(d) > 0.0_dp) then
+               if (.not. self%law%physical_slip) slope = 0.0_dp
+               normal = [-slope(1), -slope(2), 1.0_dp]/sqrt(1.0_dp + sum(slope**2))
+               force = [d(1), d(2), 0.0_dp]
+               force = force - dot_product(force, normal)*normal
+               force = force/norm2(force)
+               slip = [r(1), r(2), dot_product(slope, r)]
+               bad = max(bad, norm2(slip - dot_product(slip, force)*force))
+               wrong = min(wrong, dot_product(slip, force))
+            end if
+         end do
+      end do
+      call check_that(bad <= accuracy*scale, what//': stick or slip along the traction')
+      call check_that(-wrong <= accuracy*scale, what//': no slip against the traction')
+   end subroutine prove
+
+   !> Free plans.
+   subroutine end_case(self)
+      type(case_type), intent(inout) :: self
+
+      call self%operator%destroy()
+      call self%solver%destroy()
+   end subroutine end_case
+
+   !> Hertz's pressure of radius 1 and maximum 1 at the centres of cells, G = 1.
+   subroutine set_hertz(self)
+      type(case_type), intent(inout) :: self
+      real(dp) :: x, y
+      integer :: i, j
+
+      do j = 1, self%grid%ny
+         do i = 1, self%grid%nx
+            x = (i - 0.5_dp - 0.5_dp*self%grid%nx)*self%grid%dx
+            y = (j - 0.5_dp - 0.5_dp*self%grid%ny)*self%grid%dy
+            self%p(i, j) = sqrt(max(1.0_dp - x**2 - y**2, 0.0_dp))
+         end do
+      end do
+   end subroutine set_hertz
+
+   !> Displacement at full slip, 3 mu F (2-nu)/(16 a G).
+   pure function full_slip(self, mu, poisson) result(shift)
+      type(case_type), intent(in) :: self
+      real(dp), intent(in) :: mu, poisson
+      real(dp) :: shift
+
+      shift = 3.0_dp*mu*(2.0_dp*pi/3.0_dp)*(2.0_dp - poisson)/16.0_dp
+      if (size(self%p) == 0) shift = 0.0_dp
+   end function full_slip
+
+   !> Cattaneo (1938), Mindlin (1949): exact for nu = 0. Force, traction, radius of stick; oblique.
+   subroutine test_mindlin_exact()
+      type(case_type) :: self
+      real(dp), parameter :: mu = 0.4_dp, angle = 0.7_dp
+      real(dp) :: delta, ratio, force, load, stick, x, y, expected, error, q, area
+      integer :: k, i, j
+
+      call new_case(self, 128, 128, 2.5_dp, 2.5_dp, boundary_free, 0.0_dp, 0.0_dp)
+      call set_hertz(self)
+      self%law = new_friction_law('coulomb', mu, 0.0_dp, 0.0_dp, .false., .true.)
+      load = sum(self%p)
+      do k = 1, 9, 2
+         ! A slip of k/10 of that of full slip.
+         delta = 0.1_dp*k*full_slip(self, mu, 0.0_dp)
+         ratio = 1.0_dp - (1.0_dp - 0.1_dp*k)**1.5_dp
+         self%drive_x = delta*cos(angle)
+         self%drive_y = delta*sin(angle)
+         call run_case(self, 'Mindlin', 1e-8_dp)
+         force = hypot(sum(self%tx), sum(self%ty))/(mu*load)
+         call check_close(force, ratio, 3e-5_dp, 'Mindlin, force')
+         call check_close(sum(self%ty)/sum(self%tx), tan(angle), 1e-8_dp, 'Mindlin, direction')
+      end do
+      ! The last one, slip 0.9: stick inside c = (1 - Q/mu F)^(1/3) = sqrt(0.1).
+      stick = sqrt(0.1_dp)
+      error = 0.0_dp
+      q = 0.0_dp
+      do j = 1, self%grid%ny
+         do i = 1, self%grid%nx
+            x = (i - 0.5_dp - 0.5_dp*self%grid%nx)*self%grid%dx
+            y = (j - 0.5_dp - 0.5_dp*self%grid%ny)*self%grid%dy
+            expected = self%p(i, j) - stick*sqrt(max(1.0_dp - (x**2 + y**2)/stick**2, 0.0_dp))
+            force = self%tx(i, j)*cos(angle) + self%ty(i, j)*sin(angle)
+            error = error + (force - mu*expected)**2
+            q = q + (mu*expected)**2
+         end do
+      end do
+      ! Cells at the edge of stick, of size 0.06 c, are the error.
+      call check_that(sqrt(error/q) < 5e-3_dp, 'Mindlin, traction')
+      area = count(self%contact == contact_stick)*self%grid%dx*self%grid%dy
+      call check_close(sqrt(area/pi), stick, 0.5_dp*self%grid%dx, 'Mindlin, radius of stick')
+      call end_case(self)
+   end subroutine test_mindlin_exact
+
+   !> nu = 0.42 and 0.5: Mindlin's solution leaves out the slip across the load, 1.2e-3 of the force.
+   subroutine test_mindlin_poisson()
+      type(case_type) :: self
+      real(dp), parameter :: mu = 0.4_dp, poisson(2) = [0.42_dp, 0.5_dp]
+      real(dp) :: ratio
+      integer :: k, l
+
+      do l = 1, 2
+         call new_case(self, 64, 64, 2.5_dp, 2.5_dp, boundary_free, poisson(l), 0.0_dp)
+         call set_hertz(self)
+         self%law = new_friction_law('coulomb', mu, 0.0_dp, 0.0_dp, .false., .true.)
+         do k = 1, 9, 2
+            self%drive_y = 0.1_dp*k*full_slip(self, mu, poisson(l))
+            ratio = 1.0_dp - (1.0_dp - 0.1_dp*k)**1.5_dp
+            call run_case(self, 'Mindlin, nu > 0', 1e-8_dp)
+            call check_close(sum(self%ty)/(mu*sum(self%p)), ratio, 1.2e-3_dp, 'Mindlin, nu > 0')
+         end do
+         call end_case(self)
+      end do
+   end subroutine test_mindlin_poisson
+
+   !> Loading, unloading and reloading (Mindlin and Deresiewicz, 1953), nu = 0: with the curve of
+   !> loading Q = f(u), unloading from u1 follows Q1 - 2 f((u1 - u)/2), reloading from u2 goes back up by
+   !> Q2 + 2 f((u - u2)/2), and closes the loop at u1.
+   subroutine test_unloading()
+      type(case_type) :: self
+      real(dp), parameter :: mu = 0.4_dp
+      real(dp), parameter :: path(6) = [0.4_dp, 0.8_dp, 0.3_dp, -0.4_dp, 0.2_dp, 0.8_dp]
+      real(dp) :: expected(6), force, before
+      integer :: k
+
+      expected(1) = loading(0.4_dp)
+      expected(2) = loading(0.8_dp)
+      expected(3) = expected(2) - 2.0_dp*loading(0.25_dp)
+      expected(4) = expected(2) - 2.0_dp*loading(0.6_dp)
+      expected(5) = expected(4) + 2.0_dp*loading(0.3_dp)
+      expected(6) = expected(2)
+      call new_case(self, 96, 80, 2.5_dp, 2.4_dp, boundary_free, 0.0_dp, 0.0_dp)
+      call set_hertz(self)
+      self%law = new_friction_law('coulomb', mu, 0.0_dp, 0.0_dp, .false., .true.)
+      before = 0.0_dp
+      self%drive_x = 0.0_dp
+      do k = 1, 6
+         ! DX = U of the step before + step of the road; U = DX - slip.
+         self%drive_x = self%drive_x + (path(k) - before)*full_slip(self, mu, 0.0_dp)
+         before = path(k)
+         call run_case(self, 'loading and unloading', 1e-8_dp)
+         self%drive_x = self%drive_x - self%rx
+         self%drive_y = self%drive_y - self%ry
+         force = sum(self%tx)/(mu*sum(self%p))
+         call check_close(force, expected(k), 2e-4_dp, 'Mindlin-Deresiewicz')
+      end do
+      call end_case(self)
+   end subroutine test_unloading
+
+   !> Q/(mu F) of first loading by u of full slip.
+   pure function loading(u) result(q)
+      real(dp), intent(in) :: u
+      real(dp) :: q
+
+      q = 1.0_dp - (1.0_dp - u)**1.5_dp
+   end function loading
+
+   !> Products of the operator (4 transforms each) for a sphere at half of full slip.
+   subroutine test_products()
+      type(case_type) :: self
+      integer, parameter :: sizes(3) = [64, 128, 256]
+      real(dp), parameter :: tolerances(2) = [1e-5_dp, 1e-8_dp], mu = 0.4_dp
+      integer, parameter :: most(2) = [30, 45]
+      integer :: k, l
+
+      do k = 1, 3
+         call new_case(self, sizes(k), sizes(k), 2.5_dp, 2.5_dp, boundary_free, 0.42_dp, 0.0_dp)
+         call set_hertz(self)
+         self%law = new_friction_law('coulomb', mu, 0.0_dp, 0.0_dp, .false., .true.)
+         self%drive_x = (1.0_dp - 0.5_dp**(2.0_dp/3.0_dp))*full_slip(self, mu, 0.42_dp)
+         do l = 1, 2
+            self%tx = 0.0_dp
+            self%ty = 0.0_dp
+            self%solver%tolerance = tolerances(l)
+            self%operator%ffts = 0
+            call self%solver%solve(self%operator, self%law, self%p, self%hx, self%hy, self%drive_x, &
+               self%drive_y, self%contact, self%tx, self%ty, self%rx, self%ry, self%result)
+            call check_that(self%result%converged, 'half slip: converged')
+            call check_that(self%operator%ffts <= 4*most(l), 'half slip: products')
+         end do
+         call end_case(self)
+      end do
+   end subroutine test_products
+
+   !> Full stick and full slip.
+   subroutine test_limits()
+      type(case_type) :: self
+      real(dp), parameter :: mu = 0.4_dp
+      real(dp) :: big, bad
+
+      call new_case(self, 48, 40, 2.5_dp, 2.5_dp, boundary_free, 0.3_dp, 0.0_dp)
+      call set_hertz(self)
+      self%law = new_friction_law('coulomb', 1e6_dp, 0.0_dp, 0.0_dp, .false., .true.)
+      self%drive_x = 1.0_dp
+      call run_case(self, 'full stick', 1e-8_dp)
+      call check_that(count(self%contact == contact_slip) == 0, 'full stick: nothing slips')
+      bad = maxval(hypot(self%rx, self%ry), self%contact == contact_stick)
+      call check_that(bad < 1e-8_dp, 'full stick: no slip')
+      self%law = new_friction_law('coulomb', mu, 0.0_dp, 0.0_dp, .false., .true.)
+      big = 3.0_dp*full_slip(self, mu, 0.3_dp)
+      self%drive_x = 0.6_dp*big
+      self%drive_y = -0.8_dp*big
+      call run_case(self, 'full slip', 1e-8_dp)
+      call check_that(count(self%contact == contact_stick) == 0, 'full slip: nothing sticks')
+      call check_close(maxval(abs(hypot(self%tx, self%ty) - mu*self%p)), 0.0_dp, 1e-14_dp, &
+         'full slip: T = mu P')
+      self%p = 0.0_dp
+      call run_case(self, 'no contact', 1e-8_dp)
+      call check_that(self%result%reason == 'no contact', 'no contact is named')
+      call end_case(self)
+   end subroutine test_limits
+
+   !> A rough problem: waves of wave numbers 2 to 6, its pressure where it stands out by `threshold`.
+   subroutine set_rough(self, seed, slope, threshold)
+      type(case_type), intent(inout) :: self
+      integer, intent(in) :: seed
+      real(dp), intent(in) :: slope          !! rms of the gradient
+      real(dp), intent(in) :: threshold      !! in units of the rms height
+      real(dp) :: qx, qy, q, phase, amplitude, argument, rms
+      integer :: a, b, i, j
+
+      associate (nx => self%grid%nx, ny => self%grid%ny)
+         do b = -6, 6
+            do a = 0, 6
+               if (a**2 + b**2 < 4 .or. a**2 + b**2 > 36) cycle
+               if (2*a >= nx .or. 2*abs(b) >= ny) cycle
+               qx = 2.0_dp*pi*a/self%grid%lx
+               qy = 2.0_dp*pi*b/self%grid%ly
+               q = hypot(qx, qy)
+               phase = modulo(1e4_dp*sin(12.9898_dp*seed + 78.233_dp*a + 37.719_dp*b), 1.0_dp)
+               amplitude = q**(-1.8_dp)
+               do j = 1, ny
+                  do i = 1, nx
+                     argument = qx*(i - 1)*self%grid%dx + qy*(j - 1)*self%grid%dy + 2.0_dp*pi*phase
+                     self%p(i, j) = self%p(i, j) + amplitude*cos(argument)
+                     self%hx(i, j) = self%hx(i, j) - qx*amplitude*sin(argument)
+                     self%hy(i, j) = self%hy(i, j) - qy*amplitude*sin(argument)
+                  end do
+               end do
+            end do
+         end do
+         rms = sqrt(sum(self%p**2)/(nx*ny))
+         self%p = sqrt(max(self%p/rms - threshold, 0.0_dp))
+         rms = sqrt(sum(self%hx**2 + self%hy**2)/(nx*ny))
+         self%hx = self%hx*slope/rms
+         self%hy = self%hy*slope/rms
+      end associate
+   end subroutine set_rough
+
+   !> Rough, periodic and free, flat and sloping, both laws of slip, weak and strong friction.
+   subroutine test_rough()
+      type(case_type) :: self
+      real(dp), parameter :: mu(4) = [0.05_dp, 0.2_dp, 0.7_dp, 1.5_dp]
+      real(dp), parameter :: slopes(3) = [0.0_dp, 0.1_dp, 0.2_dp], drives(2) = [0.03_dp, 0.4_dp]
+      real(dp), parameter :: thickness(2) = [0.2_dp, 1.5_dp]
+      integer :: boundary, k, l, m, seed
+      real(dp) :: drive
+
+      seed = 0
+      do boundary = boundary_periodic, boundary_free
+         do l = 1, 3
+            do k = 1, 4
+               do m = 1, 2
+                  seed = seed + 1
+                  call new_case(self, 45, 32, 1.0_dp, 0.8_dp, boundary, 0.48_dp, &
+                     thickness(1 + mod(seed/2, 2)))
+                  call set_rough(self, seed, slopes(l), 0.8_dp*mod(seed, 3) - 0.4_dp)
+                  self%law = new_friction_law('coulomb', mu(k), 0.0_dp, 0.0_dp, l > 1, mod(seed, 5) > 0)
+                  drive = mu(k)*sum(self%p)/size(self%p)*drives(m)
+                  self%drive_x = drive*cos(1.0_dp*seed)
+                  self%drive_y = drive*sin(1.0_dp*seed)
+                  call run_case(self, 'rough', 1e-8_dp)
+                  call end_case(self)
+               end do
+            end do
+         end do
+      end do
+   end subroutine test_rough
+
+   !> The methods agree.
+   subroutine test_methods()
+      type(case_type) :: self
+      real(dp), allocatable :: tx(:, :), ty(:, :)
+      integer, parameter :: methods(3) = [friction_fast, friction_thesis, friction_gradient]
+      real(dp) :: drive, bad
+      integer :: k, l, boundary
+
+      do boundary = boundary_periodic, boundary_free
+         do l = 0, 1
+            call new_case(self, 40, 28, 1.0_dp, 0.8_dp, boundary, 0.4_dp, 0.3_dp)
+            call set_rough(self, 17, 0.1_dp, 0.3_dp)
+            self%law = new_friction_law('coulomb_orowan', 0.4_dp, 0.3_dp, 0.0_dp, l == 1, .true.)
+            drive = 0.1_dp*sum(self%p)/size(self%p)
+            self%drive_x = drive
+            self%drive_y = 0.5_dp*drive
+            self%solver%max_iterations = 5000
+            do k = 1, 3
+               self%solver%method = methods(k)
+               self%tx = 0.0_dp
+               self%ty = 0.0_dp
+               call run_case(self, 'method', 1e-8_dp)
+               if (k == 1) then
+                  tx = self%tx
+                  ty = self%ty
+                  call check_that(count(self%contact == contact_slip) > 50 &
+                     .and. count(self%contact == contact_stick) > 50, 'stick and slip')
+               else
+                  bad = maxval(hypot(self%tx - tx, self%ty - ty))/maxval(hypot(tx, ty))
+                  call check_that(bad < 1e-5_dp, 'the methods agree')
+               end if
+            end do
+            deallocate (tx, ty)
+            call end_case(self)
+         end do
+      end do
+   end subroutine test_methods
+
+   !> A turn by 90 degrees and a mirror, on a grid with nx /= ny, dx /= dy.
+   subroutine test_isotropy()
+      type(case_type) :: self, turned
+      integer, parameter :: nx = 36, ny = 27
+      real(dp), parameter :: drive = 0.02_dp
+      real(dp) :: bad
+      integer :: boundary, i, j
+
+      do boundary = boundary_periodic, boundary_free
+         call new_case(self, nx, ny, 1.1_dp, 0.7_dp, boundary, 0.45_dp, 0.4_dp)
+         call set_rough(self, 5, 0.15_dp, 0.2_dp)
+         self%law = new_friction_law('coulomb', 0.3_dp, 0.0_dp, 0.0_dp, .true., .true.)
+         self%drive_x = drive
+         self%drive_y = 0.4_dp*drive
+         call run_case(self, 'isotropy', 1e-8_dp)
+
+         ! x' = y, y' = -x, with cell (i, j) at (j, -i).
+         call new_case(turned, ny, nx, 0.7_dp, 1.1_dp, boundary, 0.45_dp, 0.4_dp)
+         turned%law = self%law
+         do i = 1, nx
+            do j = 1, ny
+               turned%p(j, nx + 1 - i) = self%p(i, j)
+               turned%hx(j, nx + 1 - i) = self%hy(i, j)
+               turned%hy(j, nx + 1 - i) = -self%hx(i, j)
+               turned%drive_x(j, nx + 1 - i) = self%drive_y(i, j)
+               turned%drive_y(j, nx + 1 - i) = -self%drive_x(i, j)
+            end do
+         end do
+         call run_case(turned, 'turned', 1e-8_dp)
+         bad = 0.0_dp
+         do i = 1, nx
+            do j = 1, ny
+               bad = max(bad, abs(turned%tx(j, nx + 1 - i) - self%ty(i, j)), &
+                  abs(turned%ty(j, nx + 1 - i) + self%tx(i, j)))
+            end do
+         end do
+         call check_that(bad < 1e-6_dp*maxval(hypot(self%tx, self%ty)), 'turned by 90 degrees')
+         call end_case(turned)
+
+         call new_case(turned, nx, ny, 1.1_dp, 0.7_dp, boundary, 0.45_dp, 0.4_dp)
+         turned%law = self%law
+         turned%p = self%p(:, ny:1:-1)
+         turned%hx = self%hx(:, ny:1:-1)
+         turned%hy = -self%hy(:, ny:1:-1)
+         turned%drive_x = self%drive_x(:, ny:1:-1)
+         turned%drive_y = -self%drive_y(:, ny:1:-1)
+         call run_case(turned, 'mirrored', 1e-8_dp)
+         bad = max(maxval(abs(turned%tx - self%tx(:, ny:1:-1))), &
+            maxval(abs(turned%ty + self%ty(:, ny:1:-1))))
+         call check_that(bad < 1e-6_dp*maxval(hypot(self%tx, self%ty)), 'mirrored')
+         call end_case(turned)
+         call end_case(self)
+      end do
+   end subroutine test_isotropy
+
+   !> mu = 0 with slope: the traction of a frictionless contact, whatever the motion.
+   subroutine test_frictionless_slope()
+      type(case_type) :: self
+
+      call new_case(self, 40, 25, 1.0_dp, 1.0_dp, boundary_periodic, 0.5_dp, 0.2_dp)
+      call set_rough(self, 3, 0.4_dp, 0.5_dp)
+      self%law = new_friction_law('coulomb', 0.0_dp, 0.0_dp, 0.0_dp, .true., .true.)
+      self%drive_x = 0.3_dp
+      self%drive_y = -0.1_dp
+      call run_case(self, 'no friction', 1e-8_dp)
+      call check_close(sum(self%tx), -sum(self%p*self%hx), 1e-12_dp*sum(self%p), 'sum T_x = -sum P H_x')
+      call check_close(sum(self%ty), -sum(self%p*self%hy), 1e-12_dp*sum(self%p), 'sum T_y = -sum P H_y')
+      call end_case(self)
+   end subroutine test_frictionless_slope
+
+   !> Constant shear: sigma_max up to the edge of the contact where P goes to 0, nothing outside.
+   subroutine test_constant_shear()
+      type(case_type) :: self
+      real(dp), parameter :: strength = 0.3_dp
+
+      call new_case(self, 50, 64, 2.5_dp, 2.5_dp, boundary_free, 0.5_dp, 0.0_dp)
+      call set_hertz(self)
+      self%law = new_friction_law('constant_shear', 0.0_dp, strength, 0.0_dp, .false., .true.)
+      self%drive_x = 2.0_dp
+      self%tx = 7.0_dp                 ! a start outside every bound, in the open too
+      call run_case(self, 'constant shear', 1e-8_dp)
+      call check_close(sum(self%tx), strength*count(self%p > 0.0_dp), &
+         1e-3_dp*strength*count(self%p > 0.0_dp), 'constant shear times the area of contact')
+      call check_that(all(hypot(self%tx, self%ty) <= 0.0_dp .or. self%p > 0.0_dp), 'none outside')
+      self%drive_x = 0.1_dp
+      call run_case(self, 'constant shear, partial slip', 1e-8_dp)
+      call check_that(any(self%contact == contact_stick) .and. any(self%contact == contact_slip), &
+         'constant shear: stick and slip')
+      call end_case(self)
+   end subroutine test_constant_shear
+
+   !> Adhesion: the bound is mu (P + p_a), where the pressure is negative too; no load needed.
+   subroutine test_adhesion()
+      type(case_type) :: self
+      real(dp), parameter :: mu = 0.5_dp, pa = 0.3_dp
+
+      call new_case(self, 48, 48, 2.5_dp, 2.5_dp, boundary_free, 0.5_dp, 0.0_dp)
+      call set_hertz(self)
+      where (self%p <= 0.0_dp) self%contact = contact_open
+      self%p = self%p - 0.25_dp
+      self%law = new_friction_law('coulomb', mu, 0.0_dp, pa, .false., .true.)
+      self%drive_x = 3.0_dp
+      call run_case(self, 'adhesion, full slip', 1e-8_dp)
+      call check_close(sum(hypot(self%tx, self%ty)), &
+         mu*sum(self%p + pa, self%contact /= contact_open), 1e-11_dp, 'adhesion: mu (P + p_a)')
+      self%drive_x = 0.05_dp
+      call run_case(self, 'adhesion, partial slip', 1e-8_dp)
+      call check_that(any(self%contact == contact_stick) .and. any(self%contact == contact_slip), &
+         'adhesion: stick and slip')
+      call end_case(self)
+   end subroutine test_adhesion
+
+   !> One row along x or along y: the same problem, the line contact.
+   subroutine test_line()
+      type(case_type) :: self, other
+      integer, parameter :: n = 60
+      integer :: i
+
+      call new_case(self, n, 1, 1.0_dp, 1.0_dp, boundary_periodic, 0.3_dp, 0.2_dp)
+      call new_case(other, 1, n, 1.0_dp, 1.0_dp, boundary_periodic, 0.3_dp, 0.2_dp)
+      do i = 1, n
+         self%p(i, 1) = sqrt(max(0.1_dp - (1.0_dp*(i - 0.5_dp)/n - 0.5_dp)**2, 0.0_dp))
+         self%hx(i, 1) = 0.2_dp*sin(2.0_dp*pi*i/n)
+      end do
+      self%drive_x = 0.02_dp
+      self%drive_y = 0.01_dp
+      self%law = new_friction_law('coulomb', 0.4_dp, 0.0_dp, 0.0_dp, .true., .true.)
+      other%law = self%law
+      other%p = transpose(self%p)
+      other%hy = transpose(self%hx)
+      other%drive_x = 0.01_dp
+      other%drive_y = 0.02_dp
+      call run_case(self, 'line along x', 1e-8_dp)
+      call run_case(other, 'line along y', 1e-8_dp)
+      call check_that(maxval(abs(self%tx - transpose(other%ty))) < 1e-7_dp, 'lines: along')
+      call check_that(maxval(abs(self%ty - transpose(other%tx))) < 1e-7_dp, 'lines: across')
+      call check_that(any(self%contact == contact_stick) .and. any(self%contact == contact_slip), &
+         'lines: stick and slip')
+      call end_case(self)
+      call end_case(other)
+   end subroutine test_line
+
+   !> A uniform contact in full stick moves by the mean mode alone: T = DX/compliance.
+   subroutine test_mean_mode()
+      type(case_type) :: self
+      real(dp) :: measured
+
+      call new_case(self, 30, 20, 1.0_dp, 1.0_dp, boundary_periodic, 0.5_dp, 0.7_dp)
+      self%p = 1.0_dp
+      self%law = new_friction_law('coulomb', 10.0_dp, 0.0_dp, 0.0_dp, .false., .true.)
+      self%drive_x = 0.1_dp
+      call run_case(self, 'block', 1e-8_dp)
+      call check_close(self%tx(3, 7), 0.1_dp/0.7_dp, 1e-8_dp, 'block: T = G DX/h')
+      call set_mean_compliance(self%operator, 0.02_dp)
+      call run_case(self, 'block with inertia', 1e-8_dp)
+      measured = sum(self%tx)/size(self%tx)
+      call check_close(measured, 0.1_dp/0.02_dp, 1e-7_dp, 'mean compliance set by the caller')
+      call end_case(self)
+   end subroutine test_mean_mode
+
+   !> From its own solution it comes back at once; a return to a lower pressure stays within the bound.
+   subroutine test_warm_start()
+      type(case_type) :: self
+
+      call new_case(self, 40, 32, 1.0_dp, 0.8_dp, boundary_periodic, 0.5_dp, 0.5_dp)
+      call set_rough(self, 8, 0.1_dp, 0.2_dp)
+      self%law = new_friction_law('coulomb', 0.3_dp, 0.0_dp, 0.0_dp, .true., .true.)
+      self%drive_x = 0.05_dp
+      call run_case(self, 'first', 1e-8_dp)
+      self%solver%tolerance = 1e-8_dp
+      call run_case(self, 'again', 1e-7_dp)
+      call check_that(self%result%iterations == 0, 'nothing to do')
+      self%p = max(0.5_dp*self%p - 0.1_dp, 0.0_dp)
+      call return_tractions(self%law, self%p, self%hx, self%hy, self%contact, self%tx, self%ty)
+      call check_that(largest_excess(self%law, self%p, self%hx, self%hy, self%contact, self%tx, &
+         self%ty) < 1e-14_dp, 'returned to the bound of a new pressure')
+      call check_that(all((self%contact /= contact_open) .eqv. self%p > 0.0_dp), 'contact of it')
+      call end_case(self)
+   end subroutine test_warm_start
+
+end module test_friction_cg
