@@ -208,7 +208,9 @@ contains
       call end_case(self)
    end subroutine test_mindlin_exact
 
-   !> nu = 0.42 and 0.5: Mindlin's solution leaves out the slip across the load, 1.2e-3 of the force.
+   !> nu = 0.42 and 0.5: Mindlin's solution leaves out the slip across the load. That is an effect of
+   !> second order in nu/(2-nu), the ratio of the two kernels: 1.05e-3 of full slip for 0.42 and 1.66e-3
+   !> for 0.5, at n = 128 and 256 alike.
    subroutine test_mindlin_poisson()
       type(case_type) :: self
       real(dp), parameter :: mu = 0.4_dp, poisson(2) = [0.42_dp, 0.5_dp]
@@ -223,7 +225,8 @@ contains
             self%drive_y = 0.1_dp*k*full_slip(self, mu, poisson(l))
             ratio = 1.0_dp - (1.0_dp - 0.1_dp*k)**1.5_dp
             call run_case(self, 'Mindlin, nu > 0', 1e-8_dp)
-            call check_close(sum(self%ty)/(mu*sum(self%p)), ratio, 1.2e-3_dp, 'Mindlin, nu > 0')
+            call check_close(sum(self%ty)/(mu*sum(self%p)), ratio, &
+               1.2e-3_dp*((poisson(l)/(2.0_dp - poisson(l)))/(0.42_dp/1.58_dp))**2, 'Mindlin, nu > 0')
          end do
          call end_case(self)
       end do
