@@ -238,6 +238,13 @@ contains
 
       ! 64 x 32 cells: 9 fields and a buffer of 66 x 32
       call check_close(memory_needed(case), 8.0_dp*(9*64*32 + 66*32) + 20.0e6_dp, 1.0e-6_dp, 'memory')
+      case%phases(3)%velocity_y = -1.0_dp
+      call check_close(memory_needed(case), 8.0_dp*(12*64*32 + 66*32) + 20.0e6_dp, 1.0e-6_dp, 'memory, sliding')
+      case%phases(3)%velocity_y = 0.0_dp
+      case%material%prony_g = [1.0_dp, 2.0_dp]
+      call check_close(memory_needed(case), 8.0_dp*(14*64*32 + 66*32) + 20.0e6_dp, 1.0e-6_dp, 'memory, arms')
+      deallocate (case%material%prony_g)
+      allocate (case%material%prony_g(0))
       case%grid%boundary = boundary_free
       call check_close(memory_needed(case), 8.0_dp*(9*64*32 + 4*66*32) + 20.0e6_dp, 1.0e-6_dp, 'memory, free')
       call check_that(index(case_summary(case), '3 phases, 3 static solves, 0 time steps in 0 s') > 0, &

@@ -130,6 +130,24 @@ def test_templates_are_good_inputs(program, folder):
         assert check(program, folder, text).returncode == 0
 
 
+def test_templates_run(program, tmp_path):
+    for name in [line.split()[0] for line in call(program, "template").out.splitlines()]:
+        path = tmp_path / f"{name}.nml"
+        path.write_text(call(program, "template", name).out)
+        done = call(program, "run", path, "--threads", "1")
+        assert done.returncode == 0, done.err
+        told = call(program, "info", tmp_path / f"{name}.h5").out
+        assert re.search(r"finished +yes", told)
+        with h5py.File(tmp_path / f"{name}.h5") as file:
+            assert file.attrs["finished"] == 1
+            assert file["history/contact_area"][0] > 0
+
+
+def test_reference_page_is_current(program, root):
+    page = (root / "docs" / "input_reference.md").read_text()
+    assert page == call(program, "template", "--reference").out
+
+
 def test_reference(program):
     text = call(program, "template", "--reference").out
     for group in [
@@ -219,7 +237,7 @@ def test_info(program, folder):
 # Inputs that hypothesis makes. The program may accept what is right; it must never crash.
 
 lines = settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 pieces = st.sampled_from(
     [
@@ -336,7 +354,7 @@ GROUPS = {
 VARIABLES = [(group, name) for group, names in GROUPS.items() for name in names]
 
 
-@settings(lines, max_examples=150)
+@settings(lines, max_examples=80)
 @given(
     variable=st.sampled_from(VARIABLES),
     value=st.one_of(st.integers(), st.floats(), st.text(max_size=20), st.booleans(), pieces),

@@ -374,7 +374,10 @@ contains
 
       allocate (groups, source=group_entries())
       allocate (variables, source=variable_entries())
-      text = ''
+      text = '# Reference of the input'//nl//nl// &
+         'An input is a file of Fortran namelists, in any order; all numbers are SI.'//nl// &
+         'Defaults in parentheses are derived or absent. Intervals: a parenthesis excludes the end,'//nl// &
+         'a bracket includes it. `asperity template --reference` prints this page.'//nl//nl
       do i = 1, size(groups)
          text = text//'## `&'//trim(groups(i)%name)//'`'//nl//nl//trim(groups(i)%meaning)
          if (groups(i)%required) text = text//' Required.'
