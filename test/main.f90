@@ -11,11 +11,13 @@ program main
    use test_hdf5_file, only : run_hdf5_file
    use test_interpolation, only : run_interpolation
    use test_namelist, only : run_namelist
+   use test_progress, only : run_progress
    use test_prony, only : run_prony
    use test_result_file, only : run_result_file
    use test_roughness, only : run_roughness
    use test_surface, only : run_surface
    use test_viscoelastic_energy, only : run_viscoelastic_energy
+   use test_xdmf, only : run_xdmf
    use test_zener, only : run_zener
    use test_normal_cg, only : run_normal_cg
    use test_simulation, only : run_simulation
@@ -43,6 +45,8 @@ program main
    if (wanted('simulation')) call run_simulation()
    if (wanted('friction_law')) call run_friction_law()
    if (wanted('friction_cg')) call run_friction_cg()
+   if (wanted('xdmf')) call run_xdmf()
+   if (wanted('progress')) call run_progress()
    call finish()
 
 contains

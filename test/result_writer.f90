@@ -55,7 +55,7 @@ contains
       call write_result(trim(path), rows, compression, command_argument_count() > 4, error)
       if (.not. allocated(error)) return
       write (error_unit, '(a)') error%message
-      error stop 3
+      stop 3
    end subroutine run_writer
 
    !> Write `rows` rows, a snapshot every third, a checkpoint every fourth step.

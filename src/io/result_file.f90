@@ -115,7 +115,12 @@ contains
          return
       end if
       temporary = self%path//'.new'
-      call self%file%open(temporary, 'create', error)
+      ! The group that grows is made first, in pages of its own.
+      call self%file%open(temporary, 'create', error, alignment=4096)
+      if (.not. allocated(error)) call self%file%create_group('/snapshots', error, &
+         expected_snapshots)
+      if (.not. allocated(error)) call self%file%close(error)
+      if (.not. allocated(error)) call self%file%open(temporary, 'append', error)
       if (.not. allocated(error)) call write_frame()
       if (allocated(error)) then
          call self%file%close(closing)
@@ -171,8 +176,6 @@ contains
             self%compression)
          if (allocated(error)) return
          call self%file%create_group('/material', error)
-         if (allocated(error)) return
-         call self%file%create_group('/snapshots', error, expected_snapshots)
          if (allocated(error)) return
          call self%file%create_group('/history', error, column_count)
          if (allocated(error)) return
