@@ -107,6 +107,7 @@ contains
       restart = .true.
       age = 0
       fresh = .true.
+      self%step = 0.0_dp
       self%direction = 0.0_dp
       self%residual = 0.0_dp
       call first_pressure(problem, self%grid, self%operator, height, pressure, history)

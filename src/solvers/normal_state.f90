@@ -175,7 +175,10 @@ contains
          end do
          if (present(history)) pressure(:, :) = pressure - history
       end if
-      if (problem%control == control_pressure) then
+      if (problem%control == control_pressure .and. warm) then
+         ! Rescaled, not projected: a missing load would be spread over every empty cell.
+         call rescale(pressure, problem%target*grid%nx*grid%ny, operator%threads)
+      else if (problem%control == control_pressure) then
          call project_simplex(pressure, problem%target*grid%nx*grid%ny)
       else
          !$omp parallel do default(none) shared(pressure, operator) private(j) &
@@ -185,6 +188,28 @@ contains
          end do
       end if
    end subroutine first_pressure
+
+   !> Give a field that is nowhere negative the sum `total`.
+   subroutine rescale(field, total, threads)
+      real(dp), intent(inout) :: field(:, :)
+      real(dp), intent(in) :: total
+      integer, intent(in) :: threads
+      real(dp), allocatable :: rows(:)
+      real(dp) :: factor
+      integer :: j
+
+      allocate (rows(size(field, 2)))
+      !$omp parallel do default(none) shared(field, rows) private(j) num_threads(threads)
+      do j = 1, size(field, 2)
+         field(:, j) = max(field(:, j), 0.0_dp)
+         rows(j) = sum(field(:, j))
+      end do
+      factor = total/global_sum(sum(rows))
+      !$omp parallel do default(none) shared(field, factor) private(j) num_threads(threads)
+      do j = 1, size(field, 2)
+         field(:, j) = factor*field(:, j)
+      end do
+   end subroutine rescale
 
    !> Root mean square of a field about its mean.
    function rms_about_mean(field, threads) result(rms)
