@@ -2,6 +2,8 @@
 program main
    use check, only : finish
    use result_writer, only : run_writer
+   use test_adhesion_cg, only : run_adhesion_cg
+   use test_adhesion_potential, only : run_adhesion_potential
    use test_base, only : run_base
    use test_case_input, only : run_case_input
    use test_checkpoint, only : run_checkpoint
@@ -47,6 +49,8 @@ program main
    if (wanted('friction_cg')) call run_friction_cg()
    if (wanted('xdmf')) call run_xdmf()
    if (wanted('progress')) call run_progress()
+   if (wanted('adhesion_potential')) call run_adhesion_potential()
+   if (wanted('adhesion_cg')) call run_adhesion_cg()
    call finish()
 
 contains

@@ -1,0 +1,172 @@
+!> The adhesive potential e(g): energy per area between two surfaces at the gap g >= 0.
+!>
+!> (Thesis, eq. 2.20 and 2.21.)
+!>     exponential        e = -gamma_0 exp(-g/z_0)
+!>     gauss              e = -gamma_0 exp(-(g/z_0)^2)
+!>     maugis_dugdale     e = -gamma_0 (1 - g/z_0) for g < z_0, else 0
+!> The adhesive pressure is -e'(g). A point in contact lets go where its pressure falls below
+!> -e'(0+): -gamma_0/z_0 for the exponential and Maugis-Dugdale potentials, 0 for Gauss.
+!>
+!> The derivative of maugis_dugdale jumps at g = z_0; its value there is 0. That kink bends the energy
+!> down, so no minimum lies on it.
+module adhesion_potential
+   use errors, only : add_fault, error_input, error_type
+   use precision, only : dp
+   implicit none
+   private
+
+   public :: adhesion_potential_type, adhesive_curvature, adhesive_energy, adhesive_slope, &
+      adhesive_terms, new_adhesion_potential, release_pressure
+
+   integer, parameter, public :: potential_none = 0
+   integer, parameter, public :: potential_exponential = 1
+   integer, parameter, public :: potential_gauss = 2
+   integer, parameter, public :: potential_maugis_dugdale = 3
+
+   real(dp), parameter :: far = 40.0_dp        !! exp(-far) is nothing beside 1
+
+   type :: adhesion_potential_type
+      integer :: kind = potential_none
+      real(dp) :: energy = 0.0_dp              !! gamma_0, J/m2, >= 0
+      real(dp) :: range = 0.0_dp               !! z_0, m, > 0 (0 for 'none')
+   end type adhesion_potential_type
+
+contains
+
+   !> Make a potential from its name.
+   subroutine new_adhesion_potential(self, name, energy, range, error)
+      type(adhesion_potential_type), intent(out) :: self
+      character(*), intent(in) :: name         !! 'none', 'exponential', 'gauss', 'maugis_dugdale'
+      real(dp), intent(in) :: energy           !! gamma_0, J/m2, >= 0; ignored for 'none'
+      real(dp), intent(in) :: range            !! z_0, m, > 0; ignored for 'none'
+      type(error_type), allocatable, intent(out) :: error
+      character(120) :: text
+
+      select case (name)
+      case ('none')
+         return
+      case ('exponential')
+         self%kind = potential_exponential
+      case ('gauss')
+         self%kind = potential_gauss
+      case ('maugis_dugdale')
+         self%kind = potential_maugis_dugdale
+      case default
+         call add_fault(error, error_input, "adhesion: potential = '"//trim(name)// &
+            "': must be 'none', 'exponential', 'gauss' or 'maugis_dugdale'")
+      end select
+      if (.not. (energy >= 0.0_dp .and. energy <= huge(1.0_dp))) then
+         write (text, '("adhesion: energy = ", es11.4, ": must be 0 or more (J/m2)")') energy
+         call add_fault(error, error_input, trim(text))
+      end if
+      if (.not. (range > 0.0_dp .and. range <= huge(1.0_dp))) then
+         write (text, '("adhesion: range = ", es11.4, ": must be positive (m)")') range
+         call add_fault(error, error_input, trim(text))
+      end if
+      self%energy = energy
+      self%range = range
+   end subroutine new_adhesion_potential
+
+   !> e(g), J/m2.
+   elemental function adhesive_energy(self, gap) result(value)
+      type(adhesion_potential_type), intent(in) :: self
+      real(dp), intent(in) :: gap              !! m, >= 0
+      real(dp) :: value
+      real(dp) :: x
+
+      value = 0.0_dp
+      if (gap >= far*self%range) return
+      x = gap/self%range
+      select case (self%kind)
+      case (potential_exponential)
+         value = -self%energy*exp(-x)
+      case (potential_gauss)
+         value = -self%energy*exp(-x**2)
+      case (potential_maugis_dugdale)
+         if (x < 1.0_dp) value = -self%energy*(1.0_dp - x)
+      end select
+   end function adhesive_energy
+
+   !> e'(g), Pa: the attraction.
+   elemental function adhesive_slope(self, gap) result(value)
+      type(adhesion_potential_type), intent(in) :: self
+      real(dp), intent(in) :: gap
+      real(dp) :: value
+      real(dp) :: x
+
+      value = 0.0_dp
+      if (gap >= far*self%range) return
+      x = gap/self%range
+      select case (self%kind)
+      case (potential_exponential)
+         value = self%energy/self%range*exp(-x)
+      case (potential_gauss)
+         value = 2.0_dp*self%energy/self%range*x*exp(-x**2)
+      case (potential_maugis_dugdale)
+         if (x < 1.0_dp) value = self%energy/self%range
+      end select
+   end function adhesive_slope
+
+   !> e''(g), Pa/m.
+   elemental function adhesive_curvature(self, gap) result(value)
+      type(adhesion_potential_type), intent(in) :: self
+      real(dp), intent(in) :: gap
+      real(dp) :: value
+      real(dp) :: x
+
+      value = 0.0_dp
+      if (gap >= far*self%range) return
+      x = gap/self%range
+      select case (self%kind)
+      case (potential_exponential)
+         value = -self%energy/self%range**2*exp(-x)
+      case (potential_gauss)
+         value = 2.0_dp*self%energy/self%range**2*(1.0_dp - 2.0_dp*x**2)*exp(-x**2)
+      end select
+   end function adhesive_curvature
+
+   !> e, e' and e'' at once, with one exponential.
+   elemental subroutine adhesive_terms(self, gap, energy, slope, curvature)
+      type(adhesion_potential_type), intent(in) :: self
+      real(dp), intent(in) :: gap              !! m, >= 0
+      real(dp), intent(out) :: energy          !! e, J/m2
+      real(dp), intent(out) :: slope           !! e', Pa
+      real(dp), intent(out) :: curvature       !! e'', Pa/m
+      real(dp) :: x, y
+
+      energy = 0.0_dp
+      slope = 0.0_dp
+      curvature = 0.0_dp
+      if (gap >= far*self%range) return
+      x = gap/self%range
+      select case (self%kind)
+      case (potential_exponential)
+         energy = -self%energy*exp(-x)
+         slope = -energy/self%range
+         curvature = -slope/self%range
+      case (potential_gauss)
+         energy = -self%energy*exp(-x**2)
+         y = -2.0_dp*energy/self%range
+         slope = x*y
+         curvature = (1.0_dp - 2.0_dp*x**2)*y/self%range
+      case (potential_maugis_dugdale)
+         if (x < 1.0_dp) then
+            energy = -self%energy*(1.0_dp - x)
+            slope = self%energy/self%range
+         end if
+      end select
+   end subroutine adhesive_terms
+
+   !> The least pressure that a point in contact can bear, -e'(0+), Pa.
+   elemental function release_pressure(self) result(value)
+      type(adhesion_potential_type), intent(in) :: self
+      real(dp) :: value
+
+      value = 0.0_dp
+      select case (self%kind)
+      case (potential_exponential, potential_maugis_dugdale)
+         value = -self%energy/self%range
+      end select
+   end function release_pressure
+
+end module adhesion_potential

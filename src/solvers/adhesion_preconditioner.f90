@@ -1,0 +1,226 @@
+!> Preconditioners M ~ 1/(|q| + c) of the adhesive problem, and a coarse estimate of d.B d.
+!>
+!> 'full': the symbol on the grid itself, two transforms. 'coarse': theta r + R^T M_c R r, where R is a
+!> weighted mean onto a grid of about a quarter of the cells each way, R^T (up to a factor) linear
+!> interpolation back, and M_c has the low symbols of M less theta: 2/16 of a transform. Both are
+!> symmetric and positive for any numbers of cells.
+!>
+!> Rows go in by `put_row`, `transform` does the work between, rows come back by `get_row`: the passes
+!> over memory are the caller's. The estimate of d.B d serves to predict a step length.
+!>
+!> Memory: a spectrum and a symbol for 'full'; 1/4 of a field for 'coarse' and for the estimate.
+module adhesion_preconditioner
+   use errors, only : error_input, error_type, fail
+   use fft_conv, only : columns_apply, convolution_type, new_symbol_operator
+   use precision, only : dp
+   implicit none
+   private
+
+   public :: adhesion_preconditioner_type, new_adhesion_preconditioner
+
+   real(dp), parameter :: ratio = 4.0_dp          !! cells of the grid to one of the coarse grid
+
+   !> Not to be copied.
+   type :: adhesion_preconditioner_type
+      logical :: full = .false.                   !! which of the two forms
+      integer :: nx = 0, ny = 0                   !! the grid
+      integer :: mx = 0, my = 0                   !! the coarse grid
+      real(dp) :: theta = 0.0_dp                  !! M at high wave numbers
+      real(dp) :: fine_symbol = 0.0_dp            !! B of what the coarse grid does not see
+      real(dp) :: cells = 1.0_dp                  !! cells to one coarse cell
+      integer, allocatable :: left(:), below(:)   !! lower coarse neighbour of a cell
+      real(dp), allocatable :: wx(:), wy(:)       !! weight of the upper one
+      real(dp), allocatable :: rows(:, :)         !! restricted along x, [mx, ny]
+      real(dp), allocatable :: field(:, :)        !! on the coarse grid, [mx, my]
+      type(convolution_type) :: fine              !! M, 'full'
+      type(convolution_type) :: coarse            !! M_c, 'coarse'
+      type(convolution_type) :: stiffness         !! low symbols of B
+   contains
+      procedure :: put_row
+      procedure :: transform
+      procedure :: get_row
+      procedure :: put_estimate_row
+      procedure :: estimate
+      procedure :: transforms
+      procedure :: destroy
+   end type adhesion_preconditioner_type
+
+contains
+
+   !> Make one from the symbols of M and B on the grid.
+   subroutine new_adhesion_preconditioner(self, kind, nx, ny, m_symbol, b_symbol, theta, &
+      fine_symbol, error)
+      type(adhesion_preconditioner_type), intent(out) :: self
+      character(*), intent(in) :: kind              !! 'full' or 'coarse'
+      integer, intent(in) :: nx, ny
+      real(dp), intent(in) :: m_symbol(0:, 0:)      !! M, (0:nx/2, 0:ny/2), > 0
+      real(dp), intent(in) :: b_symbol(0:, 0:)      !! B, the same
+      real(dp), intent(in) :: theta                 !! M of the wave numbers off the coarse grid, > 0
+      real(dp), intent(in) :: fine_symbol           !! B of those, > 0
+      type(error_type), allocatable, intent(out) :: error
+
+      self%nx = nx
+      self%ny = ny
+      self%theta = theta
+      self%fine_symbol = fine_symbol
+      self%mx = max(1, nint(nx/ratio))
+      self%my = max(1, nint(ny/ratio))
+      self%cells = real(nx, dp)*ny/(real(self%mx, dp)*self%my)
+      allocate (self%left(nx), self%wx(nx), self%below(ny), self%wy(ny))
+      call neighbours(nx, self%mx, self%left, self%wx)
+      call neighbours(ny, self%my, self%below, self%wy)
+      allocate (self%rows(self%mx, ny), self%field(self%mx, self%my))
+      call new_symbol_operator(self%stiffness, self%mx, self%my, &
+         b_symbol(0:self%mx/2, 0:self%my/2), error)
+      if (allocated(error)) return
+      select case (kind)
+      case ('full')
+         self%full = .true.
+         call new_symbol_operator(self%fine, nx, ny, m_symbol, error)
+      case ('coarse')
+         call new_symbol_operator(self%coarse, self%mx, self%my, &
+            max(m_symbol(0:self%mx/2, 0:self%my/2), 0.0_dp), error)
+      case default
+         call fail(error, error_input, "preconditioner = '"//kind//"': must be 'full' or 'coarse'")
+      end select
+   end subroutine new_adhesion_preconditioner
+
+   !> Between which coarse cells the centres of the cells lie; the grid is periodic.
+   pure subroutine neighbours(n, m, lower, weight)
+      integer, intent(in) :: n, m
+      integer, intent(out) :: lower(n)
+      real(dp), intent(out) :: weight(n)
+      real(dp) :: x
+      integer :: i
+
+      do i = 1, n
+         x = (i - 0.5_dp)*m/n - 0.5_dp
+         lower(i) = modulo(floor(x), m) + 1
+         weight(i) = x - floor(x)
+      end do
+   end subroutine neighbours
+
+   !> Hand in row j of r.
+   subroutine put_row(self, j, row)
+      class(adhesion_preconditioner_type), intent(inout) :: self
+      integer, intent(in) :: j
+      real(dp), intent(in) :: row(:)
+
+      if (self%full) then
+         call self%fine%forward_row(1, j, row)
+      else
+         call restrict_row(self, j, row)
+      end if
+   end subroutine put_row
+
+   !> Hand in row j of d for the estimate.
+   subroutine put_estimate_row(self, j, row)
+      class(adhesion_preconditioner_type), intent(inout) :: self
+      integer, intent(in) :: j
+      real(dp), intent(in) :: row(:)
+
+      call restrict_row(self, j, row)
+   end subroutine put_estimate_row
+
+   !> Weighted sums of a row onto the coarse cells.
+   subroutine restrict_row(self, j, row)
+      class(adhesion_preconditioner_type), intent(inout) :: self
+      integer, intent(in) :: j
+      real(dp), intent(in) :: row(:)
+      integer :: i, k, l
+
+      self%rows(:, j) = 0.0_dp
+      do i = 1, self%nx
+         k = self%left(i)
+         l = merge(1, k + 1, k == self%mx)
+         self%rows(k, j) = self%rows(k, j) + (1.0_dp - self%wx(i))*row(i)
+         self%rows(l, j) = self%rows(l, j) + self%wx(i)*row(i)
+      end do
+   end subroutine restrict_row
+
+   !> Finish the restriction: weighted means on the coarse grid.
+   subroutine restrict_columns(self)
+      class(adhesion_preconditioner_type), intent(inout) :: self
+      integer :: j, k, l
+
+      self%field = 0.0_dp
+      do j = 1, self%ny
+         k = self%below(j)
+         l = merge(1, k + 1, k == self%my)
+         self%field(:, k) = self%field(:, k) + (1.0_dp - self%wy(j))/self%cells*self%rows(:, j)
+         self%field(:, l) = self%field(:, l) + self%wy(j)/self%cells*self%rows(:, j)
+      end do
+   end subroutine restrict_columns
+
+   !> Between putting and getting rows.
+   subroutine transform(self)
+      class(adhesion_preconditioner_type), intent(inout) :: self
+      real(dp), allocatable :: product(:, :)
+      real(dp) :: form
+
+      if (self%full) then
+         call self%fine%columns(columns_apply, form)
+      else
+         call restrict_columns(self)
+         allocate (product(self%mx, self%my))
+         call self%coarse%apply(self%field, product)
+         call move_alloc(product, self%field)
+      end if
+   end subroutine transform
+
+   !> Row j of z = M r.
+   subroutine get_row(self, j, r, z)
+      class(adhesion_preconditioner_type), intent(inout) :: self
+      integer, intent(in) :: j
+      real(dp), intent(in) :: r(:)                !! row j of r
+      real(dp), intent(out) :: z(:)
+      real(dp) :: upper, a, b
+      integer :: i, k, l, below, above
+
+      if (self%full) then
+         call self%fine%backward_row(1, j, z)
+         return
+      end if
+      below = self%below(j)
+      above = merge(1, below + 1, below == self%my)
+      upper = self%wy(j)
+      do i = 1, self%nx
+         k = self%left(i)
+         l = merge(1, k + 1, k == self%mx)
+         a = self%field(k, below) + upper*(self%field(k, above) - self%field(k, below))
+         b = self%field(l, below) + upper*(self%field(l, above) - self%field(l, below))
+         z(i) = self%theta*r(i) + a + self%wx(i)*(b - a)
+      end do
+   end subroutine get_row
+
+   !> Estimate of d.B d over the cells after `put_estimate_row` of every row.
+   function estimate(self, squares) result(form)
+      class(adhesion_preconditioner_type), intent(inout) :: self
+      real(dp), intent(in) :: squares             !! d.d over the cells
+      real(dp) :: form
+
+      call restrict_columns(self)
+      call self%stiffness%quadratic_form(self%field, form)
+      form = self%cells*form &
+         + max(squares - self%cells*sum(self%field**2), 0.0_dp)*self%fine_symbol
+   end function estimate
+
+   !> Transforms done so far, counted in those of the grid.
+   pure function transforms(self) result(count)
+      class(adhesion_preconditioner_type), intent(in) :: self
+      real(dp) :: count
+
+      count = real(self%fine%ffts, dp) &
+         + real(self%coarse%ffts + self%stiffness%ffts, dp)/self%cells
+   end function transforms
+
+   !> Free plans and memory.
+   subroutine destroy(self)
+      class(adhesion_preconditioner_type), intent(inout) :: self
+
+      call self%fine%destroy()
+      call self%coarse%destroy()
+      call self%stiffness%destroy()
+   end subroutine destroy
+
+end module adhesion_preconditioner

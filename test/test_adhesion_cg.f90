@@ -1,0 +1,560 @@
+!> Tests of adhesive contact in periodic mode.
+module test_adhesion_cg
+   use adhesion_cg, only : adhesion_solver_type, new_adhesion_solver
+   use adhesion_potential, only : adhesion_potential_type, adhesive_energy, adhesive_slope, &
+      new_adhesion_potential, release_pressure
+   use adhesion_state, only : adhesion_problem_type, control_approach, control_pressure, &
+      reason_closed, reason_detached
+   use check, only : begin_suite, check_close, check_error, check_no_error, check_that
+   use errors, only : error_type
+   use fft_conv, only : convolution_type, new_symbol_operator
+   use parallel, only : set_threads
+   use precision, only : dp, pi
+   use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
+   use solver_result, only : solver_result_type
+   implicit none
+   private
+
+   public :: run_adhesion_cg
+
+   real(dp), parameter :: poisson = 0.3_dp
+   real(dp), parameter :: modulus = 0.35_dp            !! E* = 2 modulus/(1 - poisson) = 1
+   character(14), parameter :: potentials(3) = &
+      [character(14) :: 'exponential', 'gauss', 'maugis_dugdale']
+
+contains
+
+   subroutine run_adhesion_cg()
+      integer :: k
+
+      call begin_suite('adhesion_cg')
+      do k = 1, size(potentials)
+         call test_gradient(trim(potentials(k)))
+         call test_solution(36, 25, 1.0_dp, 0.6_dp, trim(potentials(k)), 'coarse')
+         call test_solution(31, 48, 0.5_dp, 1.0_dp, trim(potentials(k)), 'full')
+         call test_energy_falls(trim(potentials(k)))
+      end do
+      call test_force_from_energy()
+      call test_wave_without_adhesion()
+      call test_johnson_wave()
+      call test_strong_and_rough()
+      call test_load_unload()
+      call test_outcomes()
+      call test_threads()
+   end subroutine run_adhesion_cg
+
+   !> Adhesive energy gamma_0 with the range z_0 in units of E* = 1 and of the length of the cell.
+   function potential_of(name, energy, range) result(potential)
+      character(*), intent(in) :: name
+      real(dp), intent(in) :: energy, range
+      type(adhesion_potential_type) :: potential
+      type(error_type), allocatable :: error
+
+      call new_adhesion_potential(potential, name, energy, range, error)
+      call check_no_error(error, name)
+   end function potential_of
+
+   !> An uneven surface of a few oblique waves.
+   function waves(grid, amplitude) result(height)
+      type(grid_type), intent(in) :: grid
+      real(dp), intent(in) :: amplitude
+      real(dp) :: height(grid%nx, grid%ny)
+      real(dp) :: x, y
+      integer :: i, j
+
+      do j = 1, grid%ny
+         do i = 1, grid%nx
+            x = 2.0_dp*pi*(i - 1)/grid%nx
+            y = 2.0_dp*pi*(j - 1)/grid%ny
+            height(i, j) = amplitude*(cos(x + y + 0.3_dp) + 0.6_dp*cos(2*x - y) &
+               + 0.3_dp*sin(3*y + x) + 0.2_dp*cos(4*x + 2*y) + 5.0_dp)
+         end do
+      end do
+   end function waves
+
+   !> A fixed uneven field of values between -1 and 1.
+   function noise(nx, ny) result(field)
+      integer, intent(in) :: nx, ny
+      real(dp) :: field(nx, ny)
+      integer :: i, j
+
+      do j = 1, ny
+         do i = 1, nx
+            field(i, j) = 2.0_dp*modulo(sin(12.9898_dp*i + 78.233_dp*j)*43758.5453_dp, 1.0_dp) - 1.0_dp
+         end do
+      end do
+   end function noise
+
+   !> B u for G = 1 by a sum over the wave vectors, without any FFT: as slow as it is independent.
+   function stiffness_sum(grid, u) result(traction)
+      type(grid_type), intent(in) :: grid
+      real(dp), intent(in) :: u(:, :)
+      real(dp) :: traction(grid%nx, grid%ny)
+      complex(dp) :: ex(0:grid%nx - 1), ey(0:grid%ny - 1), amplitude
+      real(dp) :: q
+      integer :: k, l, i, j
+
+      ex = [(exp(cmplx(0.0_dp, 2.0_dp*pi*i/grid%nx, dp)), i=0, grid%nx - 1)]
+      ey = [(exp(cmplx(0.0_dp, 2.0_dp*pi*j/grid%ny, dp)), j=0, grid%ny - 1)]
+      traction = 0.0_dp
+      do l = 0, grid%ny - 1
+         do k = 0, grid%nx - 1
+            q = 2.0_dp*pi*hypot(min(k, grid%nx - k)/grid%lx, min(l, grid%ny - l)/grid%ly)
+            amplitude = 0.0_dp
+            do j = 0, grid%ny - 1
+               do i = 0, grid%nx - 1
+                  amplitude = amplitude + u(i + 1, j + 1) &
+                     *conjg(ex(modulo(k*i, grid%nx))*ey(modulo(l*j, grid%ny)))
+               end do
+            end do
+            amplitude = amplitude*q/(1.0_dp - poisson)/(grid%nx*grid%ny)
+            do j = 0, grid%ny - 1
+               do i = 0, grid%nx - 1
+                  traction(i + 1, j + 1) = traction(i + 1, j + 1) &
+                     + real(amplitude*ex(modulo(k*i, grid%nx))*ey(modulo(l*j, grid%ny)), dp)
+               end do
+            end do
+         end do
+      end do
+   end function stiffness_sum
+
+   !> E(g) by that sum; history and load as given.
+   function energy_sum(grid, problem, height, gap, history, load) result(energy)
+      type(grid_type), intent(in) :: grid
+      type(adhesion_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: height(:, :), gap(:, :), history(:, :)
+      real(dp), intent(in) :: load
+      real(dp) :: energy
+
+      energy = sum(0.5_dp*problem%modulus*(height + gap)*stiffness_sum(grid, height + gap) &
+         - history*gap + adhesive_energy(problem%potential, gap) + load*gap)
+   end function energy_sum
+
+   !> The pressure of any state is the gradient of the energy, less e': central differences.
+   subroutine test_gradient(name)
+      character(*), intent(in) :: name
+      type(grid_type) :: grid
+      type(adhesion_solver_type) :: solver
+      type(adhesion_problem_type) :: problem
+      type(solver_result_type) :: outcome
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: height(:, :), gap(:, :), start(:, :), pressure(:, :), history(:, :)
+      real(dp) :: level, h, slope
+      integer :: k, i, j
+
+      grid = new_grid(9, 7, 1.0_dp, 0.6_dp, boundary_periodic)
+      call new_adhesion_solver(solver, grid, poisson, error)
+      call check_no_error(error, 'solver')
+      height = waves(grid, 0.01_dp)
+      start = 0.02_dp*(1.2_dp + noise(9, 7))
+      history = 0.05_dp*noise(9, 7)
+      history = history - sum(history)/size(history)
+      gap = start
+      pressure = 0.0_dp*gap
+      problem%potential = potential_of(name, 5e-4_dp, 0.02_dp)
+      problem%modulus = modulus
+      problem%target = 0.03_dp
+      problem%max_iterations = 0
+      call solver%solve(problem, height, gap, pressure, level, outcome, history)
+      call check_that(outcome%iterations == 0 .and. .not. outcome%converged, 'no iteration')
+      call check_that(all(gap == start), 'no iteration leaves the gap')
+      h = 1e-6_dp
+      do k = 1, 8
+         i = 1 + modulo(5*k, 9)
+         j = 1 + modulo(3*k, 7)
+         start(i, j) = gap(i, j) + h
+         slope = energy_sum(grid, problem, height, start, history, 0.03_dp)
+         start(i, j) = gap(i, j) - h
+         slope = (slope - energy_sum(grid, problem, height, start, history, 0.03_dp))/(2*h)
+         start(i, j) = gap(i, j)
+         ! Pressures are of order 0.1; h^2/6 e''' = 1e-9 of gamma/z_0, round-off 1e-16/1e-6.
+         call check_close(pressure(i, j) + adhesive_slope(problem%potential, gap(i, j)), slope, &
+            2e-9_dp, name//': gradient by differences')
+      end do
+      call solver%destroy()
+   end subroutine test_gradient
+
+   !> Conditions of a solution, recomputed; both controls, both starts of the control, a history.
+   subroutine test_solution(nx, ny, lx, ly, name, preconditioner)
+      integer, intent(in) :: nx, ny
+      real(dp), intent(in) :: lx, ly
+      character(*), intent(in) :: name, preconditioner
+      type(grid_type) :: grid
+      type(adhesion_solver_type) :: solver
+      type(adhesion_problem_type) :: problem
+      type(solver_result_type) :: outcome
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :), history(:, :), other(:, :), &
+         traction(:, :), shifted(:, :)
+      type(convolution_type) :: operator
+      real(dp), allocatable :: symbol(:, :)
+      real(dp) :: level, scale, again, range
+      integer :: i, j
+
+      range = 0.02_dp
+      grid = new_grid(nx, ny, lx, ly, boundary_periodic)
+      call new_adhesion_solver(solver, grid, poisson, error, preconditioner=preconditioner)
+      call check_no_error(error, 'solver')
+      height = waves(grid, 0.01_dp)
+      history = 0.05_dp*waves(grid, 1.0_dp)
+      problem%potential = potential_of(name, 3e-4_dp, range)
+      problem%modulus = modulus
+      problem%target = 0.05_dp
+      problem%tolerance = 1e-8_dp
+      gap = maxval(height) - height
+      pressure = 0.0_dp*gap
+      call solver%solve(problem, height, gap, pressure, level, outcome, history)
+      call check_that(outcome%converged, name//': '//trim(outcome%reason))
+      scale = 3e-4_dp/range
+      traction = modulus*stiffness_sum(grid, height + gap) - history
+      traction = traction - sum(traction)/size(traction) + 0.05_dp
+      call check_close(maxval(abs(traction - pressure)), 0.0_dp, 1e-11_dp, name//': pressure')
+      call check_that(minval(gap) >= 0.0_dp .and. any(gap == 0.0_dp) .and. any(gap > 0.0_dp), &
+         name//': a partial contact')
+      traction = traction + adhesive_slope(problem%potential, gap)
+      call check_close(maxval(abs(min(gap/range, traction/scale))), 0.0_dp, 1.01e-8_dp, &
+         name//': natural residual')
+      call check_close(outcome%residual, maxval(abs(min(gap/range, traction/scale))), 1e-10_dp, &
+         name//': the residual told')
+      call check_that(minval(pressure, mask=gap == 0.0_dp) >= &
+         release_pressure(problem%potential) - 1e-8_dp*scale, name//': release rule')
+      call check_close(sum(pressure)/size(pressure), 0.05_dp, 1e-14_dp, name//': load')
+      call check_close(sum(gap + height)/size(gap) + level, 0.0_dp, 1e-14_dp, name//': level')
+
+      ! The level prescribed, from that state, gives it back; and the pressure.
+      problem%control = control_approach
+      problem%target = level
+      other = gap
+      again = 0.0_dp
+      call solver%solve(problem, height, other, pressure, again, outcome, history)
+      call check_that(outcome%converged, name//': level prescribed: '//trim(outcome%reason))
+      call check_close(sum(pressure)/size(pressure), 0.05_dp, 1e-7_dp, name//': multiplier')
+      call check_close(again, level, 1e-14_dp, name//': level kept')
+      call check_close(maxval(abs(other - gap)), 0.0_dp, 1e-6_dp*range, name//': same gap')
+
+      ! A history is a change of the height, H' = H - A P_h/Q.
+      allocate (symbol(0:nx/2, 0:ny/2), source=0.0_dp)
+      do j = 0, ny/2
+         do i = 0, nx/2
+            if (i + j > 0) symbol(i, j) = (1.0_dp - poisson)/(2.0_dp*pi*hypot(i/lx, j/ly))
+         end do
+      end do
+      call new_symbol_operator(operator, nx, ny, symbol, error)
+      shifted = height
+      call operator%apply(history, shifted)
+      shifted = height - shifted/modulus
+      problem%control = control_pressure
+      problem%target = 0.05_dp
+      other = gap
+      call solver%solve(problem, shifted, other, pressure, again, outcome)
+      call check_that(outcome%converged, name//': no history: '//trim(outcome%reason))
+      call check_close(maxval(abs(other - gap)), 0.0_dp, 1e-6_dp*range, name//': history as height')
+      call operator%destroy()
+      call solver%destroy()
+   end subroutine test_solution
+
+   !> The energy after k iterations falls with k.
+   subroutine test_energy_falls(name)
+      character(*), intent(in) :: name
+      type(grid_type) :: grid
+      type(adhesion_solver_type) :: solver
+      type(adhesion_problem_type) :: problem
+      type(solver_result_type) :: outcome
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :), none(:, :)
+      real(dp) :: level, energy, before
+      integer :: k
+
+      grid = new_grid(20, 14, 1.0_dp, 0.9_dp, boundary_periodic)
+      call new_adhesion_solver(solver, grid, poisson, error)
+      height = waves(grid, 0.02_dp)
+      none = 0.0_dp*height
+      problem%potential = potential_of(name, 2e-3_dp, 0.004_dp)
+      problem%modulus = modulus
+      problem%target = 0.02_dp
+      before = huge(1.0_dp)
+      do k = 0, 24
+         problem%max_iterations = k
+         gap = maxval(height) - height
+         pressure = none
+         call solver%solve(problem, height, gap, pressure, level, outcome)
+         energy = energy_sum(grid, problem, height, gap, none, 0.02_dp)
+         ! Round-off of energies of 0.5.
+         call check_that(energy <= before + 1e-13_dp, name//': the energy never rises')
+         before = energy
+         if (outcome%converged) exit
+      end do
+      call solver%destroy()
+   end subroutine test_energy_falls
+
+   !> dE/d(level) = N p along the states of prescribed level.
+   subroutine test_force_from_energy()
+      type(grid_type) :: grid
+      type(adhesion_solver_type) :: solver
+      type(adhesion_problem_type) :: problem
+      type(solver_result_type) :: outcome
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :), none(:, :)
+      real(dp) :: level, energy(-1:1), load, h
+      integer :: k, step
+
+      grid = new_grid(24, 15, 1.0_dp, 0.6_dp, boundary_periodic)
+      call new_adhesion_solver(solver, grid, poisson, error)
+      height = waves(grid, 0.01_dp)
+      none = 0.0_dp*height
+      problem%potential = potential_of('exponential', 5e-4_dp, 0.03_dp)
+      problem%modulus = modulus
+      problem%control = control_approach
+      problem%tolerance = 1e-10_dp
+      h = 1e-5_dp
+      gap = maxval(height) - height
+      pressure = none
+      do k = 1, 3
+         do step = -1, 1
+            problem%target = -maxval(height) + 0.008_dp*(k - 2) + step*h
+            call solver%solve(problem, height, gap, pressure, level, outcome)
+            call check_that(outcome%converged, 'level: '//trim(outcome%reason))
+            energy(step) = energy_sum(grid, problem, height, gap, none, 0.0_dp)
+            if (step == 0) load = sum(pressure)
+         end do
+         ! The curvature of the energy changes where cells come into contact: h times that.
+         call check_close((energy(1) - energy(-1))/(2*h), load, 1e-4_dp, 'force from the energy')
+      end do
+      call solver%destroy()
+   end subroutine test_force_from_energy
+
+   !> Without adhesion: Westergaard's wave, mean pressure p* sin^2(pi a/L), a line contact.
+   subroutine test_wave_without_adhesion()
+      type(grid_type) :: grid
+      type(adhesion_solver_type) :: solver
+      type(adhesion_problem_type) :: problem
+      type(solver_result_type) :: outcome
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :), other(:, :)
+      real(dp) :: level, peak
+      integer :: i
+      integer, parameter :: n = 400
+
+      grid = new_grid(n, 1, 1.0_dp, 1.0_dp, boundary_periodic)
+      call new_adhesion_solver(solver, grid, poisson, error)
+      allocate (height(n, 1))
+      do i = 1, n
+         height(i, 1) = 0.01_dp*cos(2.0_dp*pi*(i - 0.5_dp)/n)
+      end do
+      peak = pi*0.01_dp
+      problem%modulus = modulus
+      problem%target = peak*sin(pi*0.2_dp)**2
+      problem%tolerance = 1e-9_dp
+      gap = maxval(height) - height
+      pressure = 0.0_dp*gap
+      call solver%solve(problem, height, gap, pressure, level, outcome)
+      call check_that(outcome%converged, 'no adhesion: '//trim(outcome%reason))
+      call check_that(abs(count(gap == 0.0_dp)/real(n, dp) - 0.4_dp) <= 1.01_dp/n*2, 'width')
+      ! p(0) = 2 p_mean/sin(psi_a): second order in the cell but for the edge.
+      call check_close(maxval(pressure), 2*problem%target/sin(pi*0.2_dp), 1e-3_dp*peak, 'peak')
+      problem%potential = potential_of('exponential', 0.0_dp, 1e-3_dp)
+      other = maxval(height) - height
+      call solver%solve(problem, height, other, pressure, level, outcome)
+      call check_that(outcome%converged, 'no energy: '//trim(outcome%reason))
+      call check_close(maxval(abs(other - gap)), 0.0_dp, 1e-8_dp, 'no energy is no adhesion')
+      call solver%destroy()
+   end subroutine test_wave_without_adhesion
+
+   !> Johnson's (1995) adhesive wave, a line contact of short range: at the half-width a
+   !>     p = p* sin^2(psi) - sqrt(2 E* gamma tan(psi)/L),  psi = pi a/L.
+   subroutine test_johnson_wave()
+      real(dp) :: coarse, fine
+
+      call wave(200, 6e-3_dp, coarse)
+      call wave(800, 3e-3_dp, fine)
+      call check_close(fine, 0.0_dp, 0.02_dp, 'Johnson''s wave')
+      call check_that(abs(fine) < 0.7_dp*abs(coarse), 'Johnson''s wave: converges with the mesh')
+
+   contains
+
+      !> Error of the load at the half-width found, in units of p*.
+      subroutine wave(n, range, error_of_load)
+         integer, intent(in) :: n
+         real(dp), intent(in) :: range
+         real(dp), intent(out) :: error_of_load
+         type(grid_type) :: grid
+         type(adhesion_solver_type) :: solver
+         type(adhesion_problem_type) :: problem
+         type(solver_result_type) :: outcome
+         type(error_type), allocatable :: error
+         real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :)
+         real(dp) :: level, psi, peak
+         integer :: i
+         real(dp), parameter :: amplitude = 0.1_dp, gamma = 2e-3_dp
+
+         grid = new_grid(n, 1, 1.0_dp, 1.0_dp/n, boundary_periodic)
+         call new_adhesion_solver(solver, grid, poisson, error)
+         allocate (height(n, 1))
+         do i = 1, n
+            height(i, 1) = amplitude*cos(2.0_dp*pi*(i - 0.5_dp)/n)
+         end do
+         problem%modulus = modulus
+         problem%control = control_approach
+         problem%target = -0.05_dp
+         problem%potential = potential_of('exponential', gamma, range)
+         gap = maxval(height) - height
+         pressure = 0.0_dp*gap
+         call solver%solve(problem, height, gap, pressure, level, outcome)
+         call check_that(outcome%converged, 'Johnson''s wave: '//trim(outcome%reason))
+         psi = pi*0.5_dp*count(gap == 0.0_dp)/n
+         peak = pi*amplitude
+         error_of_load = (sum(pressure)/n - (peak*sin(psi)**2 - sqrt(2*gamma*tan(psi))))/peak
+         call solver%destroy()
+      end subroutine wave
+
+   end subroutine test_johnson_wave
+
+   !> Strong attraction of short range on a rough surface: the solver gets there, by both forms.
+   subroutine test_strong_and_rough()
+      type(grid_type) :: grid
+      type(adhesion_solver_type) :: solver
+      type(adhesion_problem_type) :: problem
+      type(solver_result_type) :: outcome
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :)
+      character(6), parameter :: forms(2) = ['coarse', 'full  ']
+      real(dp) :: level
+      integer :: k, l
+
+      grid = new_grid(80, 66, 1.0_dp, 0.9_dp, boundary_periodic)
+      height = waves(grid, 0.02_dp) + 0.002_dp*noise(80, 66)
+      do l = 1, size(potentials)
+         do k = 1, 2
+            call new_adhesion_solver(solver, grid, poisson, error, preconditioner=trim(forms(k)))
+            problem%modulus = modulus
+            problem%target = 0.01_dp
+            problem%potential = potential_of(trim(potentials(l)), 2e-3_dp, 1e-3_dp)
+            gap = maxval(height) - height
+            pressure = 0.0_dp*gap
+            call solver%solve(problem, height, gap, pressure, level, outcome)
+            call check_that(outcome%converged .and. outcome%residual <= 1e-6_dp, &
+               'strong '//trim(potentials(l))//' '//trim(forms(k))//': '//trim(outcome%reason))
+            call check_that(all(abs(pressure) < 1e3_dp) .and. all(gap >= 0.0_dp), 'no NaN')
+            call solver%destroy()
+         end do
+      end do
+   end subroutine test_strong_and_rough
+
+   !> In and out at prescribed level, each from the state before: attraction before contact, pull-off,
+   !> and the way out needs more work than the way in gives.
+   subroutine test_load_unload()
+      type(grid_type) :: grid
+      type(adhesion_solver_type) :: solver
+      type(adhesion_problem_type) :: problem
+      type(solver_result_type) :: outcome
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :)
+      real(dp) :: level, loads(0:40), levels(0:40), work
+      integer :: k
+
+      grid = new_grid(48, 40, 1.0_dp, 0.9_dp, boundary_periodic)
+      call new_adhesion_solver(solver, grid, poisson, error)
+      height = waves(grid, 0.02_dp)
+      problem%modulus = modulus
+      problem%control = control_approach
+      problem%potential = potential_of('exponential', 2e-3_dp, 0.008_dp)
+      gap = maxval(height) - height
+      pressure = 0.0_dp*gap
+      do k = 0, 40
+         levels(k) = -maxval(height) + 0.02_dp - 0.004_dp*abs(k - 20)
+         problem%target = levels(k)
+         call solver%solve(problem, height, gap, pressure, level, outcome)
+         call check_that(outcome%converged, 'loop: '//trim(outcome%reason))
+         loads(k) = sum(pressure)/size(pressure)
+      end do
+      call check_that(all(abs(loads([0, 40])) < 1e-3_dp), 'apart at the ends')
+      call check_that(minval(loads) < -5e-3_dp, 'there is a pull-off')
+      call check_that(maxval(abs(loads - loads(40:0:-1))) > 1e-3_dp, 'there is hysteresis')
+      work = sum(0.5_dp*(loads(1:) + loads(:39))*(levels(1:) - levels(:39)))
+      call check_that(work > 0.0_dp, 'the loop loses energy')
+      call solver%destroy()
+   end subroutine test_load_unload
+
+   !> Detachment, a closed gap, a wrong preconditioner, a free grid.
+   subroutine test_outcomes()
+      type(grid_type) :: grid
+      type(adhesion_solver_type) :: solver
+      type(adhesion_problem_type) :: problem
+      type(solver_result_type) :: outcome
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :)
+      real(dp) :: level
+      integer :: k
+
+      grid = new_grid(32, 24, 1.0_dp, 0.8_dp, boundary_periodic)
+      height = waves(grid, 0.02_dp)
+      call new_adhesion_solver(solver, grid, poisson, error)
+      do k = 1, size(potentials)
+         problem%modulus = modulus
+         problem%control = control_pressure
+         problem%target = 0.02_dp
+         problem%potential = potential_of(trim(potentials(k)), 2e-3_dp, 0.01_dp)
+         gap = maxval(height) - height
+         pressure = 0.0_dp*gap
+         call solver%solve(problem, height, gap, pressure, level, outcome)
+         call check_that(outcome%converged, 'pressed: '//trim(outcome%reason))
+         problem%target = -1e-3_dp
+         call solver%solve(problem, height, gap, pressure, level, outcome)
+         call check_that(outcome%converged, trim(potentials(k))//' holds: '//trim(outcome%reason))
+         call check_close(sum(pressure)/size(pressure), -1e-3_dp, 1e-14_dp, 'a pull is held')
+         problem%target = -0.3_dp
+         call solver%solve(problem, height, gap, pressure, level, outcome)
+         call check_that(outcome%reason == reason_detached .and. .not. outcome%converged, &
+            trim(potentials(k))//' lets go: '//trim(outcome%reason))
+      end do
+      problem%control = control_approach
+      problem%target = -sum(height)/size(height) + 1e-3_dp
+      call solver%solve(problem, height, gap, pressure, level, outcome)
+      call check_that(outcome%reason == reason_closed, 'no gap left')
+      call solver%destroy()
+      call new_adhesion_solver(solver, grid, poisson, error, preconditioner='fine')
+      call check_error(error, 'coarse', 'unknown preconditioner')
+      grid%boundary = boundary_free
+      call new_adhesion_solver(solver, grid, poisson, error)
+      call check_error(error, 'periodic', 'free grid')
+   end subroutine test_outcomes
+
+   !> The same bits with one and with two threads.
+   subroutine test_threads()
+      type(grid_type) :: grid
+      real(dp), allocatable :: height(:, :), first(:, :), second(:, :)
+
+      grid = new_grid(160, 131, 1.0_dp, 0.7_dp, boundary_periodic)
+      height = waves(grid, 0.01_dp)
+      call one(1, first)
+      call one(2, second)
+      call set_threads(0)
+      call check_that(all(first == second), 'threads do not matter')
+
+   contains
+
+      subroutine one(threads, gap)
+         integer, intent(in) :: threads
+         real(dp), allocatable, intent(out) :: gap(:, :)
+         type(adhesion_solver_type) :: solver
+         type(adhesion_problem_type) :: problem
+         type(solver_result_type) :: outcome
+         type(error_type), allocatable :: error
+         real(dp), allocatable :: pressure(:, :)
+         real(dp) :: level
+
+         call set_threads(threads)
+         call new_adhesion_solver(solver, grid, poisson, error)
+         problem%modulus = modulus
+         problem%target = 0.02_dp
+         problem%potential = potential_of('exponential', 1e-3_dp, 0.02_dp)
+         gap = maxval(height) - height
+         pressure = 0.0_dp*gap
+         call solver%solve(problem, height, gap, pressure, level, outcome)
+         call check_that(outcome%converged, trim(outcome%reason))
+         call solver%destroy()
+      end subroutine one
+
+   end subroutine test_threads
+
+end module test_adhesion_cg
