@@ -10,16 +10,14 @@
 module adhesion_state
    use adhesion_potential, only : adhesion_potential_type, adhesive_terms, &
       potential_maugis_dugdale, potential_none
+   use normal_state, only : control_approach, control_pressure
    use parallel, only : global_sum
    use precision, only : dp
    implicit none
    private
 
-   public :: adhesion_problem_type, choose_step, clipped_step, row_total, step_sums_type, &
-      stepped_gap, sum_shift, traction_scale
-
-   integer, parameter, public :: control_pressure = 1   !! the mean pressure is prescribed
-   integer, parameter, public :: control_approach = 2   !! U - H where the gap is zero is prescribed
+   public :: adhesion_problem_type, choose_step, clipped_step, control_approach, control_pressure, &
+      row_total, step_sums_type, stepped_gap, sum_shift, traction_scale
 
    character(*), parameter, public :: reason_converged = 'converged'
    character(*), parameter, public :: reason_detached = 'detached'
