@@ -1,6 +1,6 @@
 !> The program `asperity`: from the command line to an exit status. The only place that stops.
 program main
-   use case_input, only : read_case
+   use case_input, only : overwritten_file, read_case
    use case_run, only : run_type
    use case_report, only : case_summary, resolved_input
    use case_settings, only : case_type, path_length
@@ -105,6 +105,11 @@ contains
             return
          end if
          case%output%file = command%output
+         if (overwritten_file(case) /= '') then
+            call fail(error, error_input, 'asperity: --output '//command%output// &
+               ': would be written over '//overwritten_file(case))
+            return
+         end if
       end if
       if (command%threads > 0) case%solver%threads = command%threads
       if (case%warnings /= '') call say_error(case%warnings)

@@ -174,6 +174,19 @@ def test_message_has_the_stated_form(program, folder):
     assert not list(folder.glob("*.h5"))
 
 
+def test_a_result_never_replaces_what_it_comes_from(program, tmp_path):
+    path = tmp_path / "case.nml"
+    path.write_text(GOOD)
+    (tmp_path / "link.nml").symlink_to(path)
+    for other in ("case.nml", "./case.nml", f"../{tmp_path.name}/case.nml", "link.nml"):
+        done = call(program, "run", "case.nml", "--output", other, cwd=tmp_path)
+        assert done.returncode == 2
+        assert "would be written over the input" in done.err
+    path.write_text(GOOD + "&output file = './link.nml' /\n")
+    assert "over the input" in call(program, "run", path).err
+    assert path.read_text().startswith(GOOD)
+
+
 def test_check_reads_height_maps(program, folder):
     text = GOOD.replace("shape = 'sphere', radius = 0.01", "shape = 'file', file = 'map.h5'")
     path = folder / "map.h5"

@@ -10,6 +10,7 @@ module case_input
    use input_group, only : group_values_type
    use input_reference, only : group_entries, group_entry_type
    use input_values, only : default_group, read_groups
+   use path_identity, only : same_file
    use precision, only : dp
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use surface_warnings, only : find_warnings, warning_length
@@ -17,7 +18,7 @@ module case_input
    implicit none
    private
 
-   public :: parse_case, read_case, read_text_file
+   public :: overwritten_file, parse_case, read_case, read_text_file
 
    integer, parameter :: largest_file = 4000000      !! characters of an input
 
@@ -301,6 +302,9 @@ contains
 
       call resolve_path(group, case%path, output%file, faults)
       if (.not. group%given('file')) output%file = default_result(case%path)
+      case%output%file = output%file
+      if (overwritten_file(case) /= '' .and. .not. group%bad('file')) call group%fault('file', &
+         'would be written over '//overwritten_file(case)//': the result must have a file of its own', faults)
       output%snapshot_every = group%integer_value('snapshot_every')
       output%snapshot_times = group%reals_value('snapshot_times')
       output%checkpoint_every = group%integer_value('checkpoint_every')
@@ -335,6 +339,21 @@ contains
       end if
       case%output = output
    end subroutine resolve_output
+
+   !> What the result would be written over: the input, a height map, or '' for neither.
+   function overwritten_file(case) result(what)
+      type(case_type), intent(in) :: case
+      character(:), allocatable :: what
+      integer :: i
+
+      what = ''
+      if (case%output%file == '') return
+      if (same_file(case%output%file, case%path)) what = 'the input'
+      do i = 1, size(case%surfaces)
+         if (case%surfaces(i)%file == '') cycle
+         if (same_file(case%output%file, case%surfaces(i)%file)) what = 'the height map of a &surface'
+      end do
+   end function overwritten_file
 
    !> Is this a field of friction?
    elemental logical function is_tangential(field)

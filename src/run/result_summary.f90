@@ -60,7 +60,7 @@ contains
       text = text//'written     '//written//' by asperity '//maker//nl
       text = text//'grid        '//to_text(nx)//' x '//to_text(ny)//' cells, '//to_text(lx)//' m x '// &
          to_text(ly)//' m, '//boundary//nl
-      text = text//phases_text(input, path)
+      text = text//phases_text(input)
       call history_text(file, text, error)
       if (allocated(error)) return
       if (finished == 1) then
@@ -74,16 +74,15 @@ contains
    end subroutine describe
 
    !> The phases of the input that the result keeps.
-   function phases_text(input, path) result(text)
+   function phases_text(input) result(text)
       character(*), intent(in) :: input
-      character(*), intent(in) :: path
       character(:), allocatable :: text
       type(case_type) :: case
       type(error_type), allocatable :: error
       integer :: i
 
       text = ''
-      call parse_case(input, path, case, error)
+      call parse_case(input, 'input.nml', case, error)
       if (allocated(error)) return                   ! of another version, say
       text = 'phases      '//to_text(size(case%phases))//nl
       do i = 1, size(case%phases)
