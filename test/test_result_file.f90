@@ -137,7 +137,7 @@ contains
       call file%close(error)
 
       call output%reopen(path, 14, 0, error)
-      call check_error(error, 'the history has 14 rows, the run would go on after row 14', 'too far')
+      call check_error(error, 'the history has 14 rows, the run would go on after row 14', 'far')
       call check_that(error%status == error_file, 'status')
    end subroutine run_goes_on
 

@@ -156,7 +156,7 @@ contains
       character(*), intent(in) :: path
       character(*), intent(in) :: mode      !! 'read', 'create' (replaces a file) or 'append'
       type(error_type), allocatable, intent(out) :: error
-      integer, intent(in), optional :: alignment  !! of what is added to the file, bytes; default 512
+      integer, intent(in), optional :: alignment  !! of what is added, bytes; default 512
       integer(hid_t) :: access_list, creation
       integer(hsize_t) :: step
       integer :: status, ignored
