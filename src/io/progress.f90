@@ -1,4 +1,4 @@
-!> How far a run is: one line that is written over on a terminal, plain lines now and then elsewhere.
+!> How far a run is: a line written over on a terminal, plain lines now and then elsewhere.
 module progress
    use, intrinsic :: iso_fortran_env, only : error_unit
    use file_system, only : is_terminal
