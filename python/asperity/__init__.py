@@ -11,8 +11,9 @@ from .contact import NormalContact, solve_normal
 from .errors import NotConverged
 from .result import Run
 from .result import open_result as open
+from .runner import run
 
-__all__ = ["NormalContact", "NotConverged", "Run", "__version__", "material", "open",
+__all__ = ["NormalContact", "NotConverged", "Run", "__version__", "material", "open", "run",
            "set_threads", "solve_normal", "surface", "theory"]
 
 __version__ = version()

@@ -12,8 +12,7 @@ module asperity_flat
    public :: library_version, set_thread_count
    public :: surface_height, surface_psd, surface_radial_psd, surface_statistics
    public :: contact_normal
-
-   integer, parameter :: message_length = 2000    !! written out below: f2py knows no parameters
+   public :: run_close, run_interrupt, run_open, run_step
 
 contains
 
@@ -231,6 +230,149 @@ contains
       call report(error, status, message)
    end subroutine contact_normal
 
+   !> Read a case and prepare its run: the handle is for the calls that follow.
+   subroutine run_open(path, output, threads, restart, handle, rows, first, result_path, warnings, &
+      status, message)
+      use case_input, only : read_case
+      use case_run, only : run_type
+      use case_settings, only : case_type
+      use errors, only : error_input, error_type, fail
+      use run_handles, only : free_run, new_run, run_of
+      character(len=*), intent(in) :: path
+      character(len=*), intent(in) :: output               !! of the result; blank: what the case says
+      integer(c_int), intent(in) :: threads                !! 0: what the case says
+      integer(c_int), intent(in) :: restart                !! 1: go on from the checkpoint
+      integer(c_int), intent(out) :: handle
+      integer(c_int), intent(out) :: rows                  !! rows of the whole history
+      integer(c_int), intent(out) :: first                 !! rows done before
+      character(len=1024), intent(out) :: result_path
+      character(len=20000), intent(out) :: warnings
+      integer(c_int), intent(out) :: status
+      character(len=20000), intent(out) :: message
+      type(error_type), allocatable :: error, closing
+      type(case_type) :: case
+      type(run_type), pointer :: run
+      integer :: number
+!f2py threadsafe
+
+      handle = 0
+      rows = 0
+      first = 0
+      result_path = ''
+      warnings = ''
+      call read_case(trim(path), case, error)
+      if (.not. allocated(error)) then
+         if (output /= '') case%output%file = output
+         if (threads > 0) case%solver%threads = threads
+         result_path = case%output%file
+         warnings = case%warnings
+         call new_run(number)
+         if (number == 0) then
+            call fail(error, error_input, 'too many runs are open: close some')
+         else
+            run => run_of(number)
+            call run%open(case, restart == 1, error)
+            if (allocated(error)) then
+               call run%close(closing)
+               call free_run(number)
+            else
+               handle = number
+               rows = run%rows
+               if (restart == 1) first = run%sim%row%step + 1
+               call take_warnings(run%warnings, warnings)
+               run%warnings = ''
+            end if
+         end if
+      end if
+      call report(error, status, message)
+   end subroutine run_open
+
+   !> Do a row of the history; after an error the run is to be closed.
+   subroutine run_step(handle, finished, step, time, contact_area, friction, warnings, status, &
+      message)
+      use case_run, only : run_type
+      use errors, only : error_input, error_type, fail
+      use run_handles, only : run_of
+      integer(c_int), intent(in) :: handle
+      integer(c_int), intent(out) :: finished              !! 1: no row is left
+      integer(c_int), intent(out) :: step
+      real(c_double), intent(out) :: time, contact_area, friction
+      character(len=20000), intent(out) :: warnings
+      integer(c_int), intent(out) :: status
+      character(len=2000), intent(out) :: message
+      type(error_type), allocatable :: error
+      type(run_type), pointer :: run
+!f2py threadsafe
+
+      finished = 1
+      step = 0
+      time = 0.0_c_double
+      contact_area = 0.0_c_double
+      friction = 0.0_c_double
+      warnings = ''
+      run => run_of(int(handle))
+      if (associated(run)) then
+         if (.not. run%finished) call run%step(error)
+         finished = merge(1, 0, run%finished)
+         step = run%sim%row%step
+         time = run%sim%row%time
+         contact_area = run%sim%row%contact_area
+         friction = run%sim%row%friction
+         call take_warnings(run%warnings, warnings)
+         run%warnings = ''
+      else
+         call fail(error, error_input, 'the run is closed')
+      end if
+      call report(error, status, message)
+   end subroutine run_step
+
+   !> Write a snapshot and a checkpoint of where a run stands.
+   subroutine run_interrupt(handle, status, message)
+      use case_run, only : run_type
+      use errors, only : error_input, error_type, fail
+      use run_handles, only : run_of
+      integer(c_int), intent(in) :: handle
+      integer(c_int), intent(out) :: status
+      character(len=2000), intent(out) :: message
+      type(error_type), allocatable :: error
+      type(run_type), pointer :: run
+
+      run => run_of(int(handle))
+      if (associated(run)) then
+         call run%interrupt(error)
+      else
+         call fail(error, error_input, 'the run is closed')
+      end if
+      call report(error, status, message)
+   end subroutine run_interrupt
+
+   !> Close a run; a handle that is not in use is no error.
+   subroutine run_close(handle, status, message)
+      use case_run, only : run_type
+      use errors, only : error_type
+      use run_handles, only : free_run, run_of
+      integer(c_int), intent(in) :: handle
+      integer(c_int), intent(out) :: status
+      character(len=2000), intent(out) :: message
+      type(error_type), allocatable :: error
+      type(run_type), pointer :: run
+
+      run => run_of(int(handle))
+      if (associated(run)) call run%close(error)
+      call free_run(int(handle))
+      call report(error, status, message)
+   end subroutine run_close
+
+   !> Add new warnings, a line each.
+   subroutine take_warnings(new, warnings)
+      character(len=*), intent(in) :: new
+      character(len=*), intent(inout) :: warnings
+
+      if (len_trim(new) == 0) return
+      if (len_trim(warnings) > 0) warnings = trim(warnings)//new_line('a')//new
+      if (len_trim(warnings) == 0) warnings = new
+   end subroutine take_warnings
+
    !> The grid of plain numbers.
    function grid_of(nx, ny, lx, ly, is_free) result(grid)
       use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
@@ -246,7 +388,7 @@ contains
       use errors, only : error_type
       type(error_type), allocatable, intent(in) :: error
       integer(c_int), intent(out) :: status
-      character(len=message_length), intent(out) :: message
+      character(len=*), intent(out) :: message
 
       status = 0
       message = ''

@@ -1,0 +1,100 @@
+"""Runs in process: the loop over the steps is Python's, so that Ctrl-C stops between two steps."""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+
+from . import _library
+from .errors import NotConverged
+from .result import Run
+
+__all__ = ["run"]
+
+_open = _library.call("run_open")
+_step = _library.call("run_step")
+_interrupt = _library.call("run_interrupt")
+_close = _library.call("run_close")
+
+
+def run(
+    path: str | os.PathLike[str],
+    *,
+    output: str | os.PathLike[str] | None = None,
+    threads: int | None = None,
+    restart: bool = False,
+    quiet: bool = True,
+) -> Run:
+    """Run a case in this process, as the command ``asperity run`` does, and open its result.
+
+    Ctrl-C finishes the step in hand, writes a checkpoint and raises KeyboardInterrupt;
+    ``restart=True`` goes on from there to the same numbers.
+
+    Parameters
+    ----------
+    path : str or path
+        The input, CASE.nml.
+    output : str or path, optional
+        The result; what the case says if left out.
+    threads : int, optional
+        Number of threads; what the case says if left out.
+    restart : bool
+        Go on from the checkpoint of an interrupted run.
+    quiet : bool
+        Do not tell the progress on stderr.
+
+    Returns
+    -------
+    Run
+        The opened result.
+
+    Raises
+    ------
+    ValueError
+        If the input is wrong; all faults are named.
+    OSError
+        If a file cannot be read or written.
+    NotConverged
+        If a solver fails; its ``result`` is the opened result, with all steps up to that one.
+
+    Examples
+    --------
+    >>> import asperity
+    >>> asperity.run("nowhere.nml")
+    Traceback (most recent call last):
+    ...
+    OSError: nowhere.nml: there is no such file
+    """
+    if threads is not None and (int(threads) != threads or threads < 1):
+        raise ValueError(f"threads = {threads}: must be a positive integer")
+    target = b"" if output is None else os.fsencode(output)
+    if output is not None and not 0 < len(target) <= 1024:
+        raise ValueError(f"output: has {len(target)} characters: must have 1 to 1024")
+    handle, rows, first, result, told = _open(os.fsencode(path), target, threads or 0,
+                                              int(restart))
+    result_path = os.fsdecode(result.rstrip())
+    try:
+        _warn(told)
+        finished = first >= rows
+        while not finished:
+            finished, step, time, area, friction, told = _step(handle)
+            _warn(told)
+            if not quiet:
+                print(f"step {step} of {rows - 1}, t = {time:.6g} s, contact area {area:.4g},"
+                      f" friction {friction:.4g}", file=sys.stderr)
+    except KeyboardInterrupt:
+        _interrupt(handle)
+        raise
+    except NotConverged as error:
+        _close(handle)
+        raise NotConverged(str(error), Run(result_path)) from None
+    finally:
+        _close(handle)
+    return Run(result_path)
+
+
+def _warn(told: bytes) -> None:
+    """Raise the warnings of the library as those of Python."""
+    for line in told.decode(errors="replace").strip().splitlines():
+        warnings.warn(line, UserWarning, stacklevel=3)

@@ -1,0 +1,145 @@
+"""Runs in process, and that they are those of the program."""
+
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import asperity
+from asperity import runner
+
+SLIDING = """
+&case title = 'Sliding wave' /
+&grid nx = 32, ny = 24, lx = 1e-3, ly = 0.9e-3 /
+&surface shape = 'sine', amplitude = 2e-6, wavelength = 1e-3 /
+&material shear_modulus = 1e6, prony_g = 2e6, prony_tau = 1e-3, poisson = 0.5 /
+&phase pressure = 1e4, relaxed = .true. /
+&phase duration = 4e-3, steps = 8, velocity_x = 0.1 /
+&output snapshot_every = 4 /
+"""
+
+
+@pytest.fixture
+def case(tmp_path):
+    path = tmp_path / "sliding.nml"
+    path.write_text(SLIDING)
+    return path
+
+
+def columns(run):
+    """Return the history but for the wall time."""
+    return {name: run.history[name] for name in run.history if name != "seconds"}
+
+
+def test_the_program_gives_the_same_numbers(case, program, tmp_path):
+    here = asperity.run(case, threads=1)
+    assert here.path == case.with_suffix(".h5")
+    assert here.finished
+    assert here.title == "Sliding wave"
+    assert here.input == SLIDING
+    assert here.history.rows == 9
+    assert here.history["friction"][-1] > 0
+    other = tmp_path / "other.h5"
+    subprocess.run([program, "run", str(case), "--output", str(other), "--quiet", "--threads", "1"],
+                   check=True)
+    there = asperity.open(other)
+    for name, column in columns(there).items():
+        np.testing.assert_array_equal(here.history[name], column, err_msg=name)
+    assert here.snapshots.steps == there.snapshots.steps
+    np.testing.assert_array_equal(here.snapshots[-1].pressure, there.snapshots[-1].pressure)
+    np.testing.assert_array_equal(here.height, there.height)
+
+
+def test_ctrl_c_and_restart(case, tmp_path, monkeypatch):
+    whole = asperity.run(case, output=tmp_path / "whole.h5", threads=1)
+    step = runner._step
+    done = []
+
+    def step_with_signal(handle):
+        outputs = step(handle)
+        done.append(outputs[1])
+        if len(done) == 4:
+            signal.raise_signal(signal.SIGINT)
+        return outputs
+
+    monkeypatch.setattr(runner, "_step", step_with_signal)
+    with pytest.raises(KeyboardInterrupt):
+        asperity.run(case, output=tmp_path / "parts.h5", threads=1)
+    assert done == [0, 1, 2, 3]
+    stopped = asperity.open(tmp_path / "parts.h5")
+    assert not stopped.finished
+    assert stopped.history.rows == 4
+    assert stopped.snapshots.steps[-1] == 3
+    monkeypatch.undo()
+    parts = asperity.run(case, output=tmp_path / "parts.h5", threads=1, restart=True)
+    assert parts.finished
+    for name, column in columns(whole).items():
+        np.testing.assert_array_equal(parts.history[name], column, err_msg=name)
+    with pytest.raises(OSError, match="checkpoint"):
+        asperity.run(case, output=tmp_path / "none.h5", restart=True)
+
+
+def test_a_look_at_a_run_that_goes_on(case, monkeypatch):
+    rows = []
+    step = runner._step
+
+    def step_and_look(handle):
+        outputs = step(handle)
+        rows.append(asperity.open(case.with_suffix(".h5")).history.rows)
+        return outputs
+
+    monkeypatch.setattr(runner, "_step", step_and_look)
+    asperity.run(case)
+    assert rows == list(range(1, 10))
+
+
+def test_faults_of_the_input_are_all_told(case):
+    case.write_text(SLIDING.replace("nx = 32", "nx = -4").replace("'sine'", "'sinus'"))
+    with pytest.raises(ValueError, match=r"nx = -4") as caught:
+        asperity.run(case)
+    assert "sinus" in str(caught.value)
+    assert not case.with_suffix(".h5").exists()
+
+
+def test_no_convergence_keeps_the_result(case):
+    case.write_text(SLIDING + "&solver max_iterations = 1, tolerance = 1e-12 /\n")
+    with pytest.raises(asperity.NotConverged, match="did not converge") as caught:
+        asperity.run(case)
+    assert isinstance(caught.value.result, asperity.Run)
+    assert not caught.value.result.finished
+    assert caught.value.result.history.rows == 1
+
+
+def test_files_and_arguments(case, tmp_path):
+    with pytest.raises(OSError, match="nowhere"):
+        asperity.run(tmp_path / "nowhere.nml")
+    with pytest.raises(OSError, match=r"lost.*x\.h5"):
+        asperity.run(case, output=tmp_path / "lost" / "x.h5")
+    with pytest.raises(ValueError, match="threads = 0"):
+        asperity.run(case, threads=0)
+    with pytest.raises(ValueError, match="output: has 0 characters"):
+        asperity.run(case, output="")
+
+
+def test_many_runs_one_after_the_other(case):
+    case.write_text(SLIDING.replace("steps = 8", "steps = 1"))
+    for _ in range(70):
+        assert asperity.run(case).history.rows == 2
+
+
+def test_progress_goes_to_stderr(case, capsys):
+    asperity.run(case, quiet=False)
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert told.err.splitlines()[-1].startswith("step 8 of 8, t = 0.004 s, contact area ")
+
+
+def test_a_run_leaves_numpy_threads_alone():
+    # The library's OpenMP and HDF5 live beside h5py's in one process.
+    done = subprocess.run(
+        [sys.executable, "-c", "import h5py, asperity, io; f = h5py.File(io.BytesIO(), 'w');"
+         "f['x'] = 1; print(asperity.set_threads(1), f['x'][()])"],
+        capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["1", "1"]
