@@ -50,7 +50,7 @@ contains
       type(solver_result_type) :: outcome
       real(dp), allocatable :: h(:, :), p(:, :), gap(:, :)
       real(dp) :: level
-      
+
       grid = new_grid(128, 96, 1.0_dp, 0.8_dp, boundary_periodic)
       term(1) = default_surface(grid)
       term(1)%shape = 'self_affine'

@@ -302,11 +302,29 @@ contains
          if (group == '&solver' .and. index(line, 'threads') == 1) cycle
          note = index(line, ' ! ')
          if (note == 0) note = len(line) + 1
-         pairs = [pairs, pair_type(group//' ('//to_text(groups)//') '//trim(line(:equals - 1)), &
-            trim(adjustl(line(equals + 1:note - 1))))]
+         call add_pair(pairs, group//' ('//to_text(groups)//') '//trim(line(:equals - 1)), &
+            trim(adjustl(line(equals + 1:note - 1))))
       end do
-      pairs = [pairs, pair_type('height map: rms height', exact_text(sim%rms_height)), &
-         pair_type('height map: summit', exact_text(sim%summit))]
+      call add_pair(pairs, 'height map: rms height', exact_text(sim%rms_height))
+      call add_pair(pairs, 'height map: summit', exact_text(sim%summit))
    end function identity
+
+   !> Add a pair. (In an array constructor, gfortran 12 loses the length of a text that a function
+   !> returns.)
+   subroutine add_pair(pairs, name, value)
+      type(pair_type), allocatable, intent(inout) :: pairs(:)
+      character(*), intent(in) :: name, value
+      type(pair_type), allocatable :: longer(:)
+      integer :: i
+
+      allocate (longer(size(pairs) + 1))
+      do i = 1, size(pairs)
+         longer(i)%name = pairs(i)%name
+         longer(i)%value = pairs(i)%value
+      end do
+      longer(size(longer))%name = name
+      longer(size(longer))%value = value
+      call move_alloc(longer, pairs)
+   end subroutine add_pair
 
 end module case_run
