@@ -23,6 +23,8 @@ program main
    use test_zener, only : run_zener
    use test_normal_cg, only : run_normal_cg
    use test_simulation, only : run_simulation
+   use test_normal_invariance, only : run_normal_invariance
+   use test_normal_limits, only : run_normal_limits
    implicit none
 
    ! check writer FILE ROWS COMPRESSION [restart]: a run for tests that kill it, and no test.
@@ -41,7 +43,6 @@ program main
    if (wanted('interpolation')) call run_interpolation()
    if (wanted('zener')) call run_zener()
    if (wanted('viscoelastic_energy')) call run_viscoelastic_energy()
-   if (wanted('normal_cg')) call run_normal_cg()
    if (wanted('result_file')) call run_result_file()
    if (wanted('checkpoint')) call run_checkpoint()
    if (wanted('simulation')) call run_simulation()
@@ -51,6 +52,11 @@ program main
    if (wanted('progress')) call run_progress()
    if (wanted('adhesion_potential')) call run_adhesion_potential()
    if (wanted('adhesion_cg')) call run_adhesion_cg()
+   if (wanted('normal_cg')) then
+      call run_normal_cg()
+      call run_normal_limits()
+      call run_normal_invariance()
+   end if
    call finish()
 
 contains

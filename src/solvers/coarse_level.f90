@@ -19,7 +19,7 @@ module coarse_level
 
    real(dp), parameter, public :: stencil_c0 = 1.0_dp       !! of the local stencil
    real(dp), parameter, public :: stencil_c1 = 1.80063_dp   !! the same, cells of unit size
-   real(dp), parameter :: ratio = 8.0_dp                    !! cells of a block along a side
+   real(dp), parameter :: ratio = 8.0_dp                    !! cells of a block along a side, if square
    real(dp), parameter :: band = pi/16.0_dp                 !! wave number a cell, below which it acts
 
    !> Not to be copied.
@@ -58,11 +58,14 @@ contains
       real(dp) :: h, qx, qy, q, q_least
       integer :: i, j
 
-      self%nx = max(1, nint(grid%nx/ratio))
-      self%ny = max(1, nint(grid%ny/ratio))
+      h = sqrt(grid%dx*grid%dy)
+      if (grid%ny == 1) h = grid%dx
+      if (grid%nx == 1) h = grid%dy
+      ! Blocks about as long as wide, in metres, of whole cells.
+      self%nx = min(max(1, nint(grid%lx/(ratio*h))), grid%nx)
+      self%ny = min(max(1, nint(grid%ly/(ratio*h))), grid%ny)
       self%cells = real(grid%nx, dp)*grid%ny/(real(self%nx, dp)*self%ny)
-      h = merge(grid%dx, sqrt(grid%dx*grid%dy), grid%ny == 1)
-      self%wx = stencil_c1*(h/grid%dx)**2
+      self%wx = merge(0.0_dp, stencil_c1*(h/grid%dx)**2, grid%nx == 1)
       self%wy = merge(0.0_dp, stencil_c1*(h/grid%dy)**2, grid%ny == 1)
       self%fine_symbol = (1.0_dp - poisson)*ratio*h/(2.0_dp*pi)
 
@@ -82,7 +85,7 @@ contains
       if (allocated(error)) return
 
       allocate (symbol(0:self%nx/2, 0:self%ny/2))
-      q_least = pi*h/max(grid%lx, merge(0.0_dp, grid%ly, grid%ny == 1))
+      q_least = pi*h/max(merge(0.0_dp, grid%lx, grid%nx == 1), merge(0.0_dp, grid%ly, grid%ny == 1), h)
       do j = 0, self%ny/2
          do i = 0, self%nx/2
             qx = 2.0_dp*pi*i/grid%lx

@@ -21,7 +21,9 @@ module normal_cg
    use errors, only : error_type
    use fft_conv, only : columns_apply, convolution_type, new_normal_operator
    use normal_state, only : combine_measures, control_pressure, evaluate_gap, first_pressure, &
-      gap_measure_type, normal_problem_type, row_measure
+      gap_measure_type, normal_problem_type, prepare_problem, reason_converged, reason_iterations, &
+      reason_undetermined, row_measure
+   use omp_lib, only : omp_get_wtime
    use parallel, only : global_min, global_sum
    use precision, only : dp, int64
    use regular_grid, only : boundary_periodic, grid_type
@@ -32,7 +34,7 @@ module normal_cg
    public :: new_normal_solver, normal_solver_type
 
    integer, parameter :: width = 16            !! cells of an active block
-   integer, parameter :: refresh = 40          !! iterations between fresh products A P
+   integer, parameter :: longest_age = 40      !! iterations between fresh products A P
 
    !> The solver with its operators and work fields, kept from step to step. Not to be copied.
    type :: normal_solver_type
@@ -41,7 +43,7 @@ module normal_cg
       type(coarse_level_type), private :: coarse
       real(dp), allocatable, private :: residual(:, :)    !! with a rim: (0:nx+1, 0:ny+1)
       real(dp), allocatable, private :: direction(:, :)
-      real(dp), allocatable :: step(:, :)                 !! work field, free between solves
+      real(dp), allocatable, private :: step(:, :)
       real(dp), allocatable, private :: least(:, :)       !! least gap of each block
       logical, allocatable, private :: loaded(:, :)       !! blocks that hold P > 0
       logical, allocatable, private :: live(:, :)         !! active blocks
@@ -49,6 +51,7 @@ module normal_cg
       integer, allocatable, private :: last(:, :)         !! their last cells
       integer, allocatable, private :: runs(:)            !! number of a row's active runs
       real(dp), allocatable, private :: rows(:, :)        !! partial sums of each row
+      real(dp), allocatable, private :: surveyed(:, :)    !! the same for the measure of error
    contains
       procedure :: solve
       procedure :: destroy
@@ -75,7 +78,7 @@ contains
       allocate (self%least(nb, grid%ny), self%loaded(nb, grid%ny))
       allocate (self%live(nb, grid%ny), source=.false.)
       allocate (self%first(nb, grid%ny), self%last(nb, grid%ny), self%runs(grid%ny))
-      allocate (self%rows(6, grid%ny))
+      allocate (self%rows(5, grid%ny), self%surveyed(6, grid%ny))
    end subroutine new_normal_solver
 
    !> Solve a contact problem by the fast method.
@@ -90,14 +93,15 @@ contains
       real(dp), intent(out) :: level                   !! U - H where the gap is zero, m
       type(solver_result_type), intent(out) :: outcome
       real(dp), intent(in), optional :: history(:, :)  !! P_h, Pa
+      type(normal_problem_type) :: task
       type(gap_measure_type) :: measure
       real(dp) :: scale, old, rz, rd, kappa, squares, alpha, form, trial
-      real(dp) :: best, limit, cells, mean, offset, beta
-      logical :: fresh, restart, clipped
+      real(dp) :: best, limit, cells, mean, offset, beta, began, coarse_before
+      logical :: fresh, restart, clipped, determined
       integer :: age
       integer(int64) :: before
-      real(dp) :: coarse_before
 
+      began = omp_get_wtime()
       before = self%operator%ffts
       coarse_before = self%coarse%transforms()
       cells = global_sum(real(size(gap), dp))
@@ -105,40 +109,36 @@ contains
       kappa = 1.0_dp
       old = 0.0_dp
       restart = .true.
-      age = 0
-      fresh = .true.
       self%step = 0.0_dp
       self%direction = 0.0_dp
       self%residual = 0.0_dp
-      call first_pressure(problem, self%grid, self%operator, height, pressure, history)
-      call evaluate_gap(problem, self%operator, height, pressure, gap, history)
-      call survey(self, problem, pressure, gap)
-      outcome%iterations = 0
-      outcome%reason = 'the limit of iterations was reached'
+      call prepare_problem(problem, self%grid, self%operator%threads, height, task, determined)
+      call first_pressure(task, self%grid, self%operator, height, pressure, history)
+      call refresh()
+      outcome%reason = reason_iterations
+      if (.not. determined) outcome%reason = reason_undetermined
       do
-         measure = combine_measures(problem, cells, self%rows)
-         call activate(self, measure%level)
-         if (measure%error <= problem%tolerance) then
+         measure = combine_measures(task, cells, self%surveyed)
+         if (.not. determined) exit
+         if (measure%error <= task%tolerance) then
             if (fresh) then
                outcome%converged = .true.
-               outcome%reason = 'converged'
+               outcome%reason = reason_converged
                exit
             end if
-            call evaluate_gap(problem, self%operator, height, pressure, gap, history)
-            call survey(self, problem, pressure, gap)
-            fresh = .true.
-            age = 0
+            call refresh()
             cycle
          end if
          if (outcome%iterations == problem%max_iterations) exit
          outcome%iterations = outcome%iterations + 1
 
-         call form_residual(self, problem, measure%level, pressure, gap)
-         call precondition(self, problem, pressure, mean, rz)
+         call activate(self, measure%level)
+         call form_residual(self, task, measure%level, pressure, gap)
+         call precondition(self, task, pressure, mean, rz)
          beta = 0.0_dp
          if (.not. restart .and. old > 0.0_dp) beta = rz/old
-         call new_direction(self, problem, mean, beta, offset, rd, squares)
-         if (rd <= 0.0_dp) call new_direction(self, problem, mean, 0.0_dp, offset, rd, squares)
+         call new_direction(self, task, mean, beta, offset, rd, squares)
+         if (rd <= 0.0_dp) call new_direction(self, task, mean, 0.0_dp, offset, rd, squares)
          old = rz
          restart = .false.
          if (rd <= 0.0_dp) then
@@ -147,7 +147,7 @@ contains
          end if
          trial = scale*self%coarse%predict_form(squares)
          alpha = rd/max(kappa*trial, tiny(1.0_dp))
-         call clipped_step(self, problem, alpha, offset, pressure, gap, measure%level, clipped, rd, &
+         call clipped_step(self, task, alpha, offset, pressure, gap, measure%level, clipped, rd, &
             squares, limit)
          if (rd <= 0.0_dp) then
             ! The projection bent the step too far: once more from the steepest descent.
@@ -170,22 +170,35 @@ contains
             alpha = min(best, limit)
          end if
          age = age + 1
-         call update(self, problem, scale*alpha, alpha, pressure, gap)
+         call update(self, task, scale*alpha, alpha, pressure, gap)
          fresh = .false.
-         if (age == refresh) then
-            call evaluate_gap(problem, self%operator, height, pressure, gap, history)
-            call survey(self, problem, pressure, gap)
-            fresh = .true.
-            age = 0
-         end if
+         if (age == longest_age) call refresh()
       end do
 
+      if (.not. fresh) then
+         call refresh()
+         measure = combine_measures(task, cells, self%surveyed)
+         outcome%converged = measure%error <= task%tolerance
+         if (outcome%converged) outcome%reason = reason_converged
+      end if
       level = measure%weighted_level
+      call shift_gap(self, level, gap)
       outcome%residual = measure%error
       outcome%load_error = measure%load_error
       outcome%ffts = self%operator%ffts - before &
          + nint(self%coarse%transforms() - coarse_before, int64)
-      call shift_gap(self, level, gap)
+      outcome%seconds = omp_get_wtime() - began
+
+   contains
+
+      !> The gap by a fresh product, and its survey.
+      subroutine refresh()
+         call evaluate_gap(task, self%operator, height, pressure, gap, history)
+         call survey(self, task, pressure, gap)
+         fresh = .true.
+         age = 0
+      end subroutine refresh
+
    end subroutine solve
 
    !> Which blocks hold pressure, the least gap of each, and the measures of the rows.
@@ -233,7 +246,7 @@ contains
             self%loaded(b, j) = .false.
          end if
       end do
-      self%rows(:, j) = sums
+      self%surveyed(:, j) = sums
    end subroutine survey_row
 
    !> List the runs of blocks that hold a cell with P > 0 or a gap below the level; clear those that

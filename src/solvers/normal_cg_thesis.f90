@@ -7,7 +7,9 @@
 module normal_cg_thesis
    use fft_conv, only : convolution_type
    use normal_state, only : control_pressure, evaluate_gap, first_pressure, gap_measure_type, &
-      measure_gap, normal_problem_type
+      measure_gap, normal_problem_type, prepare_problem, reason_converged, reason_iterations, &
+      reason_undetermined
+   use omp_lib, only : omp_get_wtime
    use parallel, only : global_sum
    use precision, only : dp, int64
    use regular_grid, only : grid_type
@@ -31,48 +33,59 @@ contains
       real(dp), intent(out) :: level                   !! m
       type(solver_result_type), intent(out) :: outcome
       real(dp), intent(in), optional :: history(:, :)  !! P_h, Pa
+      type(normal_problem_type) :: task
       type(gap_measure_type) :: measure
       real(dp), allocatable :: residual(:, :), previous(:, :), direction(:, :)
-      real(dp) :: alpha, beta, form, slope, change
+      real(dp) :: alpha, beta, form, slope, change, began
       integer(int64) :: before
+      logical :: determined, held
 
+      began = omp_get_wtime()
       allocate (residual(grid%nx, grid%ny), previous(grid%nx, grid%ny), source=0.0_dp)
       allocate (direction(grid%nx, grid%ny), source=0.0_dp)
       before = operator%ffts
       alpha = 0.0_dp
       form = 0.0_dp
-      call first_pressure(problem, grid, operator, height, pressure, history)
-      outcome%reason = 'the limit of iterations was reached'
+      call prepare_problem(problem, grid, operator%threads, height, task, determined)
+      call first_pressure(task, grid, operator, height, pressure, history)
+      outcome%reason = reason_iterations
+      if (.not. determined) outcome%reason = reason_undetermined
       do
-         call evaluate_gap(problem, operator, height, pressure, gap, history)
-         measure = measure_gap(problem, pressure, gap, operator%threads)
-         if (measure%error <= problem%tolerance) then
+         call evaluate_gap(task, operator, height, pressure, gap, history)
+         measure = measure_gap(task, pressure, gap, operator%threads)
+         if (.not. determined) exit
+         if (measure%error <= task%tolerance) then
             outcome%converged = .true.
-            outcome%reason = 'converged'
+            outcome%reason = reason_converged
             exit
          end if
-         if (outcome%iterations == problem%max_iterations) exit
+         if (outcome%iterations == task%max_iterations) exit
          outcome%iterations = outcome%iterations + 1
 
-         call new_residual(problem, measure%level, pressure, gap, residual, previous, slope, change)
+         call new_residual(task, measure%level, pressure, gap, residual, previous, slope, change)
          beta = 0.0_dp
          if (form > 0.0_dp) beta = max(change/(alpha*form), 0.0_dp)     ! eq. 2.7
          call turn(beta, residual, direction, slope)
          if (slope <= 0.0_dp) call turn(0.0_dp, residual, direction, slope)
          call operator%quadratic_form(direction, form)
-         form = form/problem%modulus
+         form = form/task%modulus
          if (slope <= 0.0_dp .or. form <= 0.0_dp) then
             outcome%reason = 'no direction of descent is left'
             exit
          end if
          alpha = slope/form                                              ! eq. 2.6
-         call move(problem, alpha, direction, pressure)
+         call move(task, alpha, direction, pressure, held)
+         if (.not. held) then
+            outcome%reason = 'a step emptied the contact'
+            exit
+         end if
       end do
       level = measure%weighted_level
       outcome%residual = measure%error
       outcome%load_error = measure%load_error
       outcome%ffts = operator%ffts - before
       gap(:, :) = gap - level
+      outcome%seconds = omp_get_wtime() - began
    end subroutine solve_normal_thesis
 
    !> residual = H - U less its mean, on the contact; residual.(residual - previous).
@@ -135,26 +148,32 @@ contains
    end subroutine turn
 
    !> P = P + alpha direction, clipped, and rescaled where the load is prescribed.
-   subroutine move(problem, alpha, direction, pressure)
+   subroutine move(problem, alpha, direction, pressure, held)
       type(normal_problem_type), intent(in) :: problem
       real(dp), intent(in) :: alpha
       real(dp), intent(in) :: direction(:, :)
       real(dp), intent(inout) :: pressure(:, :)
+      logical, intent(out) :: held                     !! false: left alone, nothing would be loaded
       real(dp), allocatable :: rows(:)
-      real(dp) :: factor
+      real(dp) :: factor, load
       integer :: j
 
       allocate (rows(size(pressure, 2)))
-      !$omp parallel do default(none) shared(alpha, direction, pressure, rows) private(j)
+      factor = 1.0_dp
+      held = .true.
+      if (problem%control == control_pressure) then
+         !$omp parallel do default(none) shared(alpha, direction, pressure, rows) private(j)
+         do j = 1, size(pressure, 2)
+            rows(j) = sum(max(pressure(:, j) + alpha*direction(:, j), 0.0_dp))
+         end do
+         load = global_sum(sum(rows))
+         held = load > 0.0_dp
+         if (.not. held) return
+         factor = problem%target*size(pressure)/load
+      end if
+      !$omp parallel do default(none) shared(alpha, direction, pressure, factor) private(j)
       do j = 1, size(pressure, 2)
-         pressure(:, j) = max(pressure(:, j) + alpha*direction(:, j), 0.0_dp)
-         rows(j) = sum(pressure(:, j))
-      end do
-      if (problem%control /= control_pressure) return
-      factor = problem%target*size(pressure)/global_sum(sum(rows))
-      !$omp parallel do default(none) shared(pressure, factor) private(j)
-      do j = 1, size(pressure, 2)
-         pressure(:, j) = factor*pressure(:, j)
+         pressure(:, j) = factor*max(pressure(:, j) + alpha*direction(:, j), 0.0_dp)
       end do
    end subroutine move
 

@@ -9,7 +9,12 @@ module normal_state
    private
 
    public :: combine_measures, evaluate_gap, first_pressure, gap_measure_type, measure_gap, &
-      normal_problem_type, row_measure, rms_about_mean
+      normal_problem_type, prepare_problem, row_measure, rms_about_mean
+
+   character(*), parameter, public :: reason_converged = 'converged'
+   character(*), parameter, public :: reason_iterations = 'the limit of iterations was reached'
+   character(*), parameter, public :: reason_undetermined = &
+      'the mean gap is 0 or less: no pressure is determined'
 
    integer, parameter, public :: control_pressure = 1   !! the mean pressure is prescribed
    integer, parameter, public :: control_approach = 2   !! U - H where the gap is zero is prescribed
@@ -22,7 +27,7 @@ module normal_state
       real(dp) :: tolerance = 1e-6_dp       !! of the duality gap and of the load
       integer :: max_iterations = 1000
       logical :: warm = .false.             !! the pressure handed in is a start
-      real(dp) :: rms_height = 0.0_dp       !! of H about its mean, m
+      real(dp) :: rms_height = 0.0_dp       !! of H about its mean, m; 0: not known yet
    end type normal_problem_type
 
    !> How far a state is from the solution.
@@ -35,6 +40,47 @@ module normal_state
    end type gap_measure_type
 
 contains
+
+   !> Complete a problem for its fields: a height to which errors are compared that round-off resolves
+   !> (for a flat surface, what the load moves it by); and whether a pressure is determined: in periodic
+   !> mode no approach may close the mean gap.
+   subroutine prepare_problem(problem, grid, threads, height, task, determined)
+      type(normal_problem_type), intent(in) :: problem
+      type(grid_type), intent(in) :: grid
+      integer, intent(in) :: threads
+      real(dp), intent(in) :: height(:, :)             !! H, m
+      type(normal_problem_type), intent(out) :: task
+      logical, intent(out) :: determined
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: highest, lowest, mean, moved, resolved
+      integer :: j
+
+      allocate (rows(3, size(height, 2)))
+      !$omp parallel do default(none) shared(height, rows) private(j) num_threads(threads)
+      do j = 1, size(height, 2)
+         rows(:, j) = [maxval(height(:, j)), minval(height(:, j)), sum(height(:, j))]
+      end do
+      highest = global_max(maxval(rows(1, :)))
+      lowest = global_min(minval(rows(2, :)))
+      mean = global_sum(sum(rows(3, :)))/(real(grid%nx, dp)*grid%ny)
+
+      task = problem
+      if (task%rms_height <= 0.0_dp) task%rms_height = rms_about_mean(height, threads)
+      determined = .true.
+      if (problem%control == control_pressure) then
+         moved = problem%target*max(grid%lx, grid%ly)/problem%modulus
+      else
+         moved = abs(problem%target + highest)
+         if (grid%boundary == boundary_periodic) determined = problem%target < -mean
+      end if
+      resolved = 10.0_dp*epsilon(1.0_dp)*(moved + max(abs(highest), abs(lowest)))
+      if (highest - lowest <= resolved) then
+         task%rms_height = moved
+      else
+         task%rms_height = max(task%rms_height, resolved/problem%tolerance)
+      end if
+      task%rms_height = max(task%rms_height, tiny(1.0_dp))
+   end subroutine prepare_problem
 
    !> Sums over cells of a row: P, P g, g where P > 0, the number of those, P |g - level|.
    function row_measure(pressure, gap, level) result(sums)
@@ -75,7 +121,7 @@ contains
       end do
       sums = global_sum(sums)
       least = global_min(minval(rows(6, :)))
-      height = max(problem%rms_height, tiny(1.0_dp))
+      height = problem%rms_height
       measure%load = sums(1)
       if (problem%control == control_approach) then
          measure%level = problem%target
@@ -88,8 +134,11 @@ contains
          measure%load_error = abs(sums(1)/(cells*problem%target) - 1.0_dp)
          measure%error = max((measure%weighted_level - least)/height, measure%load_error)
       else
+         ! No load, and none is wanted: the surfaces just touch.
          measure%level = least
          measure%weighted_level = least
+         measure%load_error = merge(1.0_dp, 0.0_dp, problem%target > 0.0_dp)
+         measure%error = measure%load_error
       end if
    end function combine_measures
 
@@ -155,30 +204,32 @@ contains
       logical :: warm
       integer :: j
 
-      warm = problem%warm
-      if (warm) warm = global_max(maxval(pressure)) > 0.0_dp
-      base = 0.0_dp
-      if (.not. warm) then
-         if (grid%boundary == boundary_periodic) then
-            call operator%apply_inverse(height, pressure)
-            factor = problem%modulus
-            if (problem%control == control_pressure) base = problem%target
-         else
-            factor = 2.0_dp*pi*problem%modulus/max(grid%lx, grid%ly)
-            pressure(:, :) = height
-            if (problem%control == control_approach) base = factor*problem%target
-         end if
-         !$omp parallel do default(none) shared(pressure, factor, base, operator) private(j) &
-         !$omp num_threads(operator%threads)
-         do j = 1, operator%ny
-            pressure(:, j) = base + factor*pressure(:, j)
-         end do
-         if (present(history)) pressure(:, :) = pressure - history
+      if (problem%control == control_pressure .and. problem%target <= 0.0_dp) then
+         call project_simplex(pressure, 0.0_dp)
+         return
       end if
-      if (problem%control == control_pressure .and. warm) then
-         ! Rescaled, not projected: a missing load would be spread over every empty cell.
-         call rescale(pressure, problem%target*grid%nx*grid%ny, operator%threads)
-      else if (problem%control == control_pressure) then
+      warm = problem%warm
+      if (warm) then
+         call rescale(problem, grid, operator%threads, pressure, warm)
+         if (warm) return
+      end if
+      base = 0.0_dp
+      if (grid%boundary == boundary_periodic) then
+         call operator%apply_inverse(height, pressure)
+         factor = problem%modulus
+         if (problem%control == control_pressure) base = problem%target
+      else
+         factor = 2.0_dp*pi*problem%modulus/max(grid%lx, grid%ly)
+         pressure(:, :) = height
+         if (problem%control == control_approach) base = factor*problem%target
+      end if
+      !$omp parallel do default(none) shared(pressure, factor, base, operator) private(j) &
+      !$omp num_threads(operator%threads)
+      do j = 1, operator%ny
+         pressure(:, j) = base + factor*pressure(:, j)
+      end do
+      if (present(history)) pressure(:, :) = pressure - history
+      if (problem%control == control_pressure) then
          call project_simplex(pressure, problem%target*grid%nx*grid%ny)
       else
          !$omp parallel do default(none) shared(pressure, operator) private(j) &
@@ -189,25 +240,32 @@ contains
       end if
    end subroutine first_pressure
 
-   !> Give a field that is nowhere negative the sum `total`.
-   subroutine rescale(field, total, threads)
-      real(dp), intent(inout) :: field(:, :)
-      real(dp), intent(in) :: total
+   !> Clip a start, and scale it to the load where that is prescribed: unlike a projection, that keeps
+   !> the contact where it is.
+   subroutine rescale(problem, grid, threads, pressure, usable)
+      type(normal_problem_type), intent(in) :: problem
+      type(grid_type), intent(in) :: grid
       integer, intent(in) :: threads
+      real(dp), intent(inout) :: pressure(:, :)
+      logical, intent(out) :: usable                   !! there was any pressure
       real(dp), allocatable :: rows(:)
-      real(dp) :: factor
+      real(dp) :: load, target
       integer :: j
 
-      allocate (rows(size(field, 2)))
-      !$omp parallel do default(none) shared(field, rows) private(j) num_threads(threads)
-      do j = 1, size(field, 2)
-         field(:, j) = max(field(:, j), 0.0_dp)
-         rows(j) = sum(field(:, j))
+      allocate (rows(size(pressure, 2)))
+      !$omp parallel do default(none) shared(pressure, rows) private(j) num_threads(threads)
+      do j = 1, size(pressure, 2)
+         pressure(:, j) = max(pressure(:, j), 0.0_dp)
+         rows(j) = sum(pressure(:, j))
       end do
-      factor = total/global_sum(sum(rows))
-      !$omp parallel do default(none) shared(field, factor) private(j) num_threads(threads)
-      do j = 1, size(field, 2)
-         field(:, j) = factor*field(:, j)
+      load = global_sum(sum(rows))
+      usable = load > 0.0_dp
+      if (.not. usable .or. problem%control /= control_pressure) return
+      target = problem%target*grid%nx*grid%ny
+      if (abs(load - target) <= 1e-14_dp*target) return
+      !$omp parallel do default(none) shared(pressure, load, target) private(j) num_threads(threads)
+      do j = 1, size(pressure, 2)
+         pressure(:, j) = (target/load)*pressure(:, j)
       end do
    end subroutine rescale
 

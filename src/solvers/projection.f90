@@ -9,33 +9,42 @@ module projection
 
 contains
 
-   !> The nearest field to x that is nowhere negative and has the sum `total` > 0: max(x - t, 0).
-   !> A field that is already so is left alone to the last bit.
+   !> The nearest field to x that is nowhere negative and has the sum `total`: max(x - t, 0).
+   !> A field that is already so is left alone to the last bit. A total that all but drowns in the
+   !> round-off of x is met all the same, in the proportions that are left.
    subroutine project_simplex(x, total)
       real(dp), intent(inout) :: x(:, :)       !! [nx, ny]
-      real(dp), intent(in) :: total
-      real(dp) :: level, next, above, negative
-      integer :: i, j, count, cells, threads
+      real(dp), intent(in) :: total            !! x becomes 0 where this is 0 or less
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: level, next, above, negative, kept
+      integer :: count, next_count, threads
 
-      cells = size(x)
-      threads = merge(1, thread_count(), cells < 16384)
+      threads = merge(1, thread_count(), size(x) < 16384)
+      allocate (rows(3, size(x, 2)))
+      if (total <= 0.0_dp) then
+         call fill(0.0_dp)
+         return
+      end if
       call sum_above(0.0_dp, above, count, negative)
-      if (abs(above - total) <= 1e-15_dp*count*total .and. negative == 0.0_dp) return
+      if (abs(above - total) <= 1e-15_dp*count*total .and. abs(negative) <= 0.0_dp) return
       ! The first level is below the solution; Newton's steps rise to it.
-      level = (above + negative - total)/cells
+      level = (above + negative - total)/size(x)
+      call sum_above(level, above, count, negative)
+      if (count == 0) then
+         ! All cells are equal.
+         call fill(total/size(x))
+         return
+      end if
       do
-         call sum_above(level, above, count, negative)
-         if (count == 0) exit
          next = (above - total)/count
          if (next <= level) exit
+         call sum_above(next, above, next_count, negative)
+         if (next_count == 0) exit
          level = next
+         count = next_count
       end do
-      !$omp parallel do default(none) shared(x, level) private(i, j) num_threads(threads)
-      do j = 1, size(x, 2)
-         do i = 1, size(x, 1)
-            x(i, j) = max(x(i, j) - level, 0.0_dp)
-         end do
-      end do
+      call clip(level, kept)
+      if (abs(kept - total) > 1e-14_dp*total) call scale(total/kept)
 
    contains
 
@@ -45,39 +54,82 @@ contains
          real(dp), intent(out) :: sum
          integer, intent(out) :: number
          real(dp), intent(out) :: others
-         real(dp), allocatable :: rows(:, :)
-         real(dp) :: a, b
-         integer :: k, l, n
+         real(dp) :: a, b, n
+         integer :: i, j
 
-         allocate (rows(3, size(x, 2)))
-         !$omp parallel do default(none) shared(x, rows, limit) private(k, l, n, a, b) &
+         !$omp parallel do default(none) shared(x, rows, limit) private(i, j, n, a, b) &
          !$omp num_threads(threads)
-         do l = 1, size(x, 2)
+         do j = 1, size(x, 2)
             a = 0.0_dp
             b = 0.0_dp
-            n = 0
-            do k = 1, size(x, 1)
-               if (x(k, l) > limit) then
-                  a = a + x(k, l)
-                  n = n + 1
-               else
-                  b = b + x(k, l)
-               end if
+            n = 0.0_dp
+            !$omp simd reduction(+:a, b, n)
+            do i = 1, size(x, 1)
+               a = a + merge(x(i, j), 0.0_dp, x(i, j) > limit)
+               b = b + merge(0.0_dp, x(i, j), x(i, j) > limit)
+               n = n + merge(1.0_dp, 0.0_dp, x(i, j) > limit)
             end do
-            rows(:, l) = [a, b, real(n, dp)]
+            rows(:, j) = [a, b, n]
          end do
-         sum = global_sum(add(rows(1, :)))
-         others = global_sum(add(rows(2, :)))
-         number = nint(global_sum(add(rows(3, :))))
+         sum = row_sum(1)
+         others = row_sum(2)
+         number = nint(row_sum(3))
       end subroutine sum_above
 
-      !> Sum in order, so that the threads do not matter.
-      pure function add(values) result(total)
-         real(dp), intent(in) :: values(:)
-         real(dp) :: total
+      !> x = max(x - limit, 0) and its sum.
+      subroutine clip(limit, sum)
+         real(dp), intent(in) :: limit
+         real(dp), intent(out) :: sum
+         real(dp) :: a
+         integer :: i, j
 
-         total = sum(values)
-      end function add
+         !$omp parallel do default(none) shared(x, rows, limit) private(i, j, a) num_threads(threads)
+         do j = 1, size(x, 2)
+            a = 0.0_dp
+            !$omp simd reduction(+:a)
+            do i = 1, size(x, 1)
+               x(i, j) = max(x(i, j) - limit, 0.0_dp)
+               a = a + x(i, j)
+            end do
+            rows(1, j) = a
+         end do
+         sum = row_sum(1)
+      end subroutine clip
+
+      !> x = factor x.
+      subroutine scale(factor)
+         real(dp), intent(in) :: factor
+         integer :: j
+
+         !$omp parallel do default(none) shared(x, factor) private(j) num_threads(threads)
+         do j = 1, size(x, 2)
+            x(:, j) = factor*x(:, j)
+         end do
+      end subroutine scale
+
+      !> x = value.
+      subroutine fill(value)
+         real(dp), intent(in) :: value
+         integer :: j
+
+         !$omp parallel do default(none) shared(x, value) private(j) num_threads(threads)
+         do j = 1, size(x, 2)
+            x(:, j) = value
+         end do
+      end subroutine fill
+
+      !> Sum of the rows' partial sums, in order, so that the threads do not matter.
+      function row_sum(which) result(sum)
+         integer, intent(in) :: which
+         real(dp) :: sum
+         integer :: j
+
+         sum = 0.0_dp
+         do j = 1, size(x, 2)
+            sum = sum + rows(which, j)
+         end do
+         sum = global_sum(sum)
+      end function row_sum
 
    end subroutine project_simplex
 

@@ -1,0 +1,234 @@
+!> Tests of normal contact: what must not change a solution, or changes it in a known way.
+module test_normal_invariance
+   use check, only : begin_suite, check_close, check_no_error, check_that
+   use errors, only : error_type
+   use fft_conv, only : convolution_type, new_normal_operator
+   use normal_fixture, only : distance, poisson, rms, rough_height, run_problem, solution_type, &
+      unit_modulus
+   use normal_state, only : control_approach, control_pressure, normal_problem_type
+   use parallel, only : set_threads, thread_count
+   use precision, only : dp
+   use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
+   implicit none
+   private
+
+   public :: run_normal_invariance
+
+   !> Twice (2 sqrt(tolerance))^2: see `distance`.
+   real(dp), parameter :: tolerance = 1e-9_dp
+   real(dp), parameter :: bound = 8.0_dp*tolerance
+
+contains
+
+   subroutine run_normal_invariance()
+      integer :: boundary
+
+      call begin_suite('normal_cg')
+      do boundary = boundary_periodic, boundary_free
+         call test_moves(boundary)
+         call test_scales(boundary)
+         call test_threads(boundary)
+         call test_methods(boundary)
+         call test_starts(boundary)
+         call test_history(boundary)
+      end do
+   end subroutine run_normal_invariance
+
+   !> A problem in the middle of things.
+   subroutine set_problem(boundary, nx, ny, grid, problem, h)
+      integer, intent(in) :: boundary, nx, ny
+      type(grid_type), intent(out) :: grid
+      type(normal_problem_type), intent(out) :: problem
+      real(dp), allocatable, intent(out) :: h(:, :)
+
+      grid = new_grid(nx, ny, 1.0_dp, 0.8_dp, boundary)
+      call rough_height(grid, 6.0_dp, h)
+      problem%modulus = unit_modulus
+      problem%target = 0.005_dp
+      problem%tolerance = tolerance
+      problem%rms_height = rms(h)
+   end subroutine set_problem
+
+   !> Shift by whole cells, mirror, transpose.
+   subroutine test_moves(boundary)
+      integer, intent(in) :: boundary
+      type(grid_type) :: grid, turned
+      type(normal_problem_type) :: problem
+      type(solution_type) :: s, t
+      real(dp), allocatable :: h(:, :)
+      real(dp) :: d
+
+      call set_problem(boundary, 75, 64, grid, problem, h)
+      call run_problem(grid, problem, h, s)
+      call check_that(s%outcome%converged, s%outcome%reason)
+      if (boundary == boundary_periodic) then
+         call run_problem(grid, problem, cshift(cshift(h, 13, 1), -7, 2), t)
+         call distance(grid, unit_modulus, h, s%pressure, cshift(cshift(t%pressure, -13, 1), 7, 2), d)
+         call check_close(d, 0.0_dp, bound, 'shifted: the pressure')
+         call check_close(t%level, s%level, 1e-6_dp*rms(h), 'shifted: the level')
+      end if
+      call run_problem(grid, problem, h(grid%nx:1:-1, :), t)
+      call distance(grid, unit_modulus, h, s%pressure, t%pressure(grid%nx:1:-1, :), d)
+      call check_close(d, 0.0_dp, bound, 'mirrored: the pressure')
+      call check_close(t%level, s%level, 1e-6_dp*rms(h), 'mirrored: the level')
+      turned = new_grid(grid%ny, grid%nx, grid%ly, grid%lx, boundary)
+      call run_problem(turned, problem, transpose(h), t)
+      call distance(grid, unit_modulus, h, s%pressure, transpose(t%pressure), d)
+      call check_close(d, 0.0_dp, bound, 'transposed: the pressure')
+      call check_close(t%level, s%level, 1e-6_dp*rms(h), 'transposed: the level')
+   end subroutine test_moves
+
+   !> Lengths by 4, moduli by 8: the same bits but for these factors.
+   subroutine test_scales(boundary)
+      integer, intent(in) :: boundary
+      type(grid_type) :: grid, large
+      type(normal_problem_type) :: problem, scaled
+      type(solution_type) :: s, t
+      real(dp), allocatable :: h(:, :)
+      integer :: k
+
+      call set_problem(boundary, 72, 50, grid, problem, h)
+      large = new_grid(grid%nx, grid%ny, 4.0_dp*grid%lx, 4.0_dp*grid%ly, boundary)
+      do k = 1, 2
+         if (k == 2) then
+            problem%control = control_approach
+            problem%target = s%level
+         end if
+         call run_problem(grid, problem, h, s)
+         call check_that(s%outcome%converged, s%outcome%reason)
+         scaled = problem
+         scaled%modulus = 8.0_dp*problem%modulus
+         scaled%rms_height = 4.0_dp*problem%rms_height
+         scaled%target = merge(8.0_dp, 4.0_dp, k == 1)*problem%target
+         call run_problem(large, scaled, 4.0_dp*h, t)
+         call check_that(t%outcome%iterations == s%outcome%iterations, 'scaled: iterations')
+         call check_close(maxval(abs(t%pressure/8.0_dp - s%pressure)), 0.0_dp, &
+            1e-12_dp*maxval(s%pressure), 'scaled: the pressure')
+         call check_close(maxval(abs(t%gap/4.0_dp - s%gap)), 0.0_dp, 1e-12_dp*rms(h), 'scaled: the gap')
+      end do
+   end subroutine test_scales
+
+   !> One thread and two: the same bits.
+   subroutine test_threads(boundary)
+      integer, intent(in) :: boundary
+      type(grid_type) :: grid
+      type(normal_problem_type) :: problem
+      type(solution_type) :: s, t
+      real(dp), allocatable :: h(:, :)
+      integer :: threads, k
+      logical :: thesis
+
+      threads = thread_count()
+      call set_problem(boundary, 150, 131, grid, problem, h)
+      do k = 1, 2
+         thesis = k == 2
+         problem%tolerance = merge(1e-9_dp, 1e-4_dp, k == 1)
+         call set_threads(1)
+         call run_problem(grid, problem, h, s, thesis)
+         call set_threads(2)
+         call run_problem(grid, problem, h, t, thesis)
+         call check_that(s%outcome%converged, s%outcome%reason)
+         call check_that(all(abs(s%pressure - t%pressure) <= 0.0_dp), 'threads: the same pressure')
+         call check_that(all(abs(s%gap - t%gap) <= 0.0_dp), 'threads: the same gap')
+         call check_that(s%outcome%iterations == t%outcome%iterations, 'threads: iterations')
+      end do
+      call set_threads(threads)
+   end subroutine test_threads
+
+   !> 'fast' against 'thesis', from few to many contacts.
+   subroutine test_methods(boundary)
+      integer, intent(in) :: boundary
+      type(grid_type) :: grid
+      type(normal_problem_type) :: problem
+      type(solution_type) :: s, t
+      real(dp), allocatable :: h(:, :)
+      real(dp) :: d
+      integer :: k
+
+      call set_problem(boundary, 81, 64, grid, problem, h)
+      do k = 1, 3
+         problem%target = 0.05_dp*0.1_dp**(k - 1)
+         call run_problem(grid, problem, h, s)
+         call run_problem(grid, problem, h, t, .true.)
+         call check_that(s%outcome%converged .and. t%outcome%converged, 'both methods')
+         call distance(grid, unit_modulus, h, s%pressure, t%pressure, d)
+         call check_close(d, 0.0_dp, bound, 'both methods: the pressure')
+         call check_close(t%level, s%level, 1e-6_dp*rms(h), 'both methods: the level')
+         call check_that(s%outcome%iterations < t%outcome%iterations, 'fast needs fewer iterations')
+      end do
+   end subroutine test_methods
+
+   !> Warm starts: from the solution, from another load, from another place.
+   subroutine test_starts(boundary)
+      integer, intent(in) :: boundary
+      type(grid_type) :: grid
+      type(normal_problem_type) :: problem
+      type(solution_type) :: s, t
+      real(dp), allocatable :: h(:, :), u(:, :)
+      real(dp) :: d
+      integer :: k
+
+      call set_problem(boundary, 81, 64, grid, problem, h)
+      call run_problem(grid, problem, h, s)
+      call run_problem(grid, problem, h, t, start=s%pressure)
+      call check_that(t%outcome%iterations == 0 .and. t%outcome%converged, 'from the solution: at once')
+      call check_that(all(abs(s%pressure - t%pressure) <= 0.0_dp), 'from the solution: untouched')
+      do k = 1, 3
+         if (k == 1) call run_problem(grid, problem, h, t, start=1.001_dp*s%pressure)
+         if (k == 2) call run_problem(grid, problem, h, t, start=cshift(s%pressure, 1, 1) - 1e-3_dp)
+         if (k == 3) call run_problem(grid, problem, h, t, start=0.0_dp*s%pressure)
+         call check_that(t%outcome%converged, 'warm: '//t%outcome%reason)
+         call distance(grid, unit_modulus, h, s%pressure, t%pressure, d)
+         call check_close(d, 0.0_dp, bound, 'warm: the pressure')
+         if (k == 1) call check_that(t%outcome%iterations <= 1, 'scaled to the load')
+      end do
+      problem%target = 1.001_dp*problem%target
+      u = s%pressure
+      call run_problem(grid, problem, h, s)
+      call run_problem(grid, problem, h, t, start=u)
+      call distance(grid, unit_modulus, h, s%pressure, t%pressure, d)
+      call check_close(d, 0.0_dp, bound, 'a little more load: the pressure')
+      call check_that(t%outcome%iterations < s%outcome%iterations, 'a little more load: fewer iterations')
+   end subroutine test_starts
+
+   !> A memory P_h acts as a change of height A P_h/Q.
+   subroutine test_history(boundary)
+      integer, intent(in) :: boundary
+      type(grid_type) :: grid
+      type(normal_problem_type) :: problem
+      type(solution_type) :: s, t
+      type(convolution_type) :: operator
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: h(:, :), history(:, :), u(:, :)
+      real(dp) :: d
+      integer :: i, j, k
+      logical :: thesis
+
+      call set_problem(boundary, 60, 75, grid, problem, h)
+      allocate (history(60, 75), u(60, 75))
+      do j = 1, 75
+         do i = 1, 60
+            history(i, j) = 0.01_dp*sin(0.31_dp*i + 0.17_dp*j) - 0.003_dp
+         end do
+      end do
+      call new_normal_operator(operator, grid, poisson, error)
+      call check_no_error(error, 'an operator')
+      call operator%apply(history, u)
+      call operator%destroy()
+      do k = 1, 3
+         thesis = k == 2
+         if (k == 3) then
+            problem%control = control_approach
+            problem%target = s%level
+         end if
+         call run_problem(grid, problem, h, s, thesis, history=history)
+         call run_problem(grid, problem, h - u/unit_modulus, t)
+         call check_that(s%outcome%converged, 'memory: '//s%outcome%reason)
+         call distance(grid, unit_modulus, h, s%pressure, t%pressure, d)
+         ! The bound is for a fixed load; by approach the load is free, within the same energy.
+         call check_close(d, 0.0_dp, bound, 'memory: the pressure')
+         call check_close(s%level, t%level, 1e-6_dp*rms(h), 'memory: the level')
+      end do
+   end subroutine test_history
+
+end module test_normal_invariance
