@@ -43,7 +43,7 @@ module normal_cg
       type(coarse_level_type), private :: coarse
       real(dp), allocatable, private :: residual(:, :)    !! with a rim: (0:nx+1, 0:ny+1)
       real(dp), allocatable, private :: direction(:, :)
-      real(dp), allocatable, private :: step(:, :)
+      real(dp), allocatable :: step(:, :)                 !! work field, free between solves
       real(dp), allocatable, private :: least(:, :)       !! least gap of each block
       logical, allocatable, private :: loaded(:, :)       !! blocks that hold P > 0
       logical, allocatable, private :: live(:, :)         !! active blocks
