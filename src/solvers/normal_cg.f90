@@ -518,7 +518,7 @@ contains
       if (problem%control == control_pressure .and. clipped) then
          do
             cells = row_sum(self, 2)
-            if (cells == 0.0_dp) exit
+            if (cells < 1.0_dp) exit
             next = (row_sum(self, 1) - problem%target*self%grid%nx*self%grid%ny)/cells
             if (next <= shift) exit
             shift = next
