@@ -1,101 +1,369 @@
-!> Tests of the step loop.
+!> Tests of the step loop without sliding: creep, ramps, jumps, energies, schemes.
 module test_simulation
-   use case_input, only : parse_case
-   use case_settings, only : case_type
-   use check, only : begin_suite, check_close, check_no_error, check_that
-   use errors, only : error_type
-   use history_row, only : history_row_type
+   use check, only : begin_suite, check_close, check_that
    use precision, only : dp, pi
-   use schedule, only : count_rows
-   use simulation, only : new_simulation, simulation_type
+   use simulation_runs, only : check_books, check_same_rows, creep_compliance, last, nl, record_type, &
+      run_case
+   use text_tools, only : to_text
    implicit none
    private
 
    public :: run_simulation
 
-   character, parameter :: nl = new_line('a')
+   real(dp), parameter :: radius = 1.0e-3_dp, force = 0.02e-3_dp
+   character(*), parameter :: thesis_sphere = '&surface shape = ''paraboloid'', radius = 1e-3 /'//nl
+   character(*), parameter :: thesis_rubber = &
+      '&material zener_g0 = 1e6, zener_g1 = 0.1e6, zener_eta = 0.1e6 /'//nl
+   character(*), parameter :: small_map = &
+      '&grid nx = 40, ny = 36, lx = 0.1e-3, ly = 0.1e-3, boundary = ''free'' /'//nl
+   character(*), parameter :: schemes(3) = [character(14) :: 'backward_euler', 'exponential', &
+      'exponential2']
+   character(*), parameter :: rough = '&grid nx = 48, ny = 45, lx = 1.2e-3, ly = 1.0e-3 /'//nl// &
+      '&surface shape = ''self_affine'', hurst = 0.8, wavelength_long = 0.6e-3, '// &
+      'wavelength_short = 0.12e-3, rms_height = 5e-6, seed = 3 /'//nl
+   character(*), parameter :: two_arms = '&material shear_modulus = 0.5e6, prony_g = 1e6, 0.7e6, '// &
+      'prony_tau = 1e-3, 0.1 /'//nl
+   character(*), parameter :: slow_arms = '&material shear_modulus = 0.5e6, prony_g = 1e6, 0.7e6, '// &
+      'prony_tau = 0.02, 0.1 /'//nl
 
 contains
 
    subroutine run_simulation()
       call begin_suite('simulation')
       call test_lee_radok()
-      call test_hunter()
+      call test_several_arms()
+      call test_order_in_mesh()
+      call test_order_in_time()
+      call test_ramped_sphere()
+      call test_many_decades()
+      call test_area_after_a_drop()
+      call test_books()
+      call test_split_arm()
+      call test_relaxed()
+      call test_loads()
    end subroutine run_simulation
 
-   !> Run a case given as text to its end; all rows.
-   subroutine run_case(text, rows)
-      character(*), intent(in) :: text
-      type(history_row_type), allocatable, intent(out) :: rows(:)
-      type(case_type) :: case
-      type(simulation_type) :: sim
-      type(error_type), allocatable :: error
-      integer :: k, expected
-
-      call parse_case(text, 'test.nml', case, error)
-      call check_no_error(error, 'input')
-      if (allocated(error)) return
-      call new_simulation(sim, case, error)
-      call check_no_error(error, 'simulation')
-      if (allocated(error)) return
-      expected = count_rows(case%phases)
-      allocate (rows(0:expected - 1))
-      do k = 0, expected - 1
-         call sim%advance(error)
-         call check_no_error(error, 'step')
-         call check_that(sim%converged, 'converged')
-         rows(k) = sim%row
-      end do
-      call check_that(sim%finished, 'as many rows as expected')
-      call check_that(rows(expected - 1)%step == expected - 1, 'rows are numbered from 0')
-      call sim%destroy()
-   end subroutine run_case
-
-   !> The energy books close in each row.
-   subroutine check_books(rows, what)
-      type(history_row_type), intent(in) :: rows(0:)
-      character(*), intent(in) :: what
-      real(dp) :: worst, scale
-      integer :: k
-
-      worst = 0.0_dp
-      scale = maxval(rows%energy_elastic)
-      do k = 0, size(rows) - 1
-         worst = max(worst, abs(rows(k)%work_normal + rows(k)%work_tangential - rows(k)%energy_elastic &
-            - rows(k)%dissipated_viscous - rows(k)%dissipated_friction))
-      end do
-      call check_close(worst/scale, 0.0_dp, 1e-12_dp, what//': energy books')
-   end subroutine check_books
-
-   !> Lee-Radok: a sphere under a constant load (thesis, 2.2.1).
+   !> Lee-Radok: a sphere under a constant load, a^3 = (3/16) R F J(t), approach a^2/R (thesis, 2.2.1).
    subroutine test_lee_radok()
-      type(history_row_type), allocatable :: rows(:)
+      type(record_type) :: record
+      real(dp), parameter :: thesis(3) = [0.015536e-3_dp, 0.030167e-3_dp, 0.034552e-3_dp]
+      real(dp) :: a
       integer :: k
 
-      call run_case('&grid nx = 64, ny = 64, lx = 0.1e-3, boundary = ''free'' /'//nl// &
-         '&surface shape = ''paraboloid'', radius = 1e-3 /'//nl// &
-         '&material zener_g0 = 1e6, zener_g1 = 0.1e6, zener_eta = 0.1e6 /'//nl// &
-         '&phase force = 0.02e-3, duration = 1, steps = 32 /'//nl// &
-         '&solver tolerance = 1e-8 /', rows)
-      if (.not. allocated(rows)) return
-      do k = 0, size(rows) - 1, 8
-         print *, rows(k)%time, sqrt(rows(k)%contact_area*1e-8_dp/pi), rows(k)%displacement, rows(k)%ffts
+      call run_case('&grid nx = 60, ny = 64, lx = 0.1e-3, ly = 0.1e-3, boundary = ''free'' /'//nl// &
+         thesis_sphere//thesis_rubber//'&phase force = 0.02e-3, duration = 1, steps = 24 /'//nl// &
+         '&phase duration = 19, steps = 20 /'//nl//'&solver tolerance = 1e-8 /', 'Lee-Radok', record)
+      do k = 0, last(record)
+         a = (3.0_dp/16.0_dp*radius*force*creep_compliance(1.0e6_dp/11.0_dp, [1.0e6_dp/1.1_dp], &
+            [1.0_dp/11.0_dp], record%rows(k)%time))**(1.0_dp/3.0_dp)
+         ! the area is a count of cells: half a cell along the edge of the contact
+         if (k <= 24) then
+            call check_close(record%rows(k)%displacement*radius/a**2, 1.0_dp, 1e-3_dp, 'Lee-Radok: approach')
+            call check_close(sqrt(record%rows(k)%contact_area*1e-8_dp/pi)/a, 1.0_dp, 1.6e-2_dp, &
+               'Lee-Radok: contact radius')
+         end if
+         if (k == 0) call check_close(a, thesis(1), 1e-9_dp, 'a(0) of the thesis')
+         if (k == 24) call check_close(a, thesis(2), 1e-9_dp, 'a(1 s) of the thesis')
+         if (k == 44) call check_close(a, thesis(3), 1e-9_dp, 'a(inf) of the thesis')
       end do
-      call check_books(rows, 'Lee-Radok')
+      call check_close(record%rows(last(record))%displacement*radius/a**2, 1.0_dp, 2e-4_dp, &
+         'Lee-Radok: approach in the end')
+      call check_books(record, 'Lee-Radok')
    end subroutine test_lee_radok
 
-   !> Hunter: a cylinder slides steadily.
-   subroutine test_hunter()
-      type(history_row_type), allocatable :: rows(:)
+   !> Lee-Radok with arms from 1 ms to 1 s, in steps that grow from phase to phase.
+   subroutine test_several_arms()
+      type(record_type) :: record
+      real(dp), parameter :: g(4) = [0.4e6_dp, 0.3e6_dp, 0.2e6_dp, 0.1e6_dp]
+      real(dp), parameter :: tau(4) = [1e-3_dp, 1e-2_dp, 1e-1_dp, 1.0_dp]
+      real(dp), parameter :: g_e = 0.1e6_dp
+      real(dp) :: reference, worst
+      integer :: k
 
-      call run_case('&grid nx = 512, ny = 1, lx = 2.0e-3 /'//nl// &
-         '&surface shape = ''paraboloid'', radius = 10e-3 /'//nl// &
-         '&material zener_g0 = 2.75e6, zener_g1 = 0.3055555555e6, zener_eta = 0.003055555555e6 /'//nl// &
-         '&phase force = 1, control = ''pressure'', pressure = 25e3, relaxed = .true., duration = 0.4, velocity_x = 5e-3 /'//nl// &
-         '&solver tolerance = 1e-8 /', rows)
-      if (.not. allocated(rows)) return
-      print *, size(rows), rows(size(rows) - 1)%friction, rows(size(rows) - 1)%contact_area*2e-3, sum(rows%ffts)/size(rows)
-      call check_books(rows, 'Hunter')
-   end subroutine test_hunter
+      call check_close(creep_compliance(g_e, g, tau, 0.0_dp)*(g_e + sum(g)), 1.0_dp, 1e-12_dp, 'J(0)')
+      call run_case(small_map//thesis_sphere// &
+         '&material shear_modulus = 0.1e6, prony_g = 0.4e6, 0.3e6, 0.2e6, 0.1e6, '// &
+         'prony_tau = 1e-3, 1e-2, 1e-1, 1 /'//nl// &
+         '&phase force = 0.02e-3, duration = 4e-3, steps = 16 /'//nl// &
+         '&phase duration = 0.036, steps = 16 /'//nl//'&phase duration = 0.36, steps = 16 /'//nl// &
+         '&phase duration = 3.6, steps = 16 /'//nl//'&solver tolerance = 1e-8 /', 'four arms', record)
+      worst = 0.0_dp
+      do k = 0, last(record)
+         reference = (3.0_dp/16.0_dp*radius*force*creep_compliance(g_e, g, tau, &
+            record%rows(k)%time))**(2.0_dp/3.0_dp)/radius
+         worst = max(worst, abs(record%rows(k)%displacement/reference - 1.0_dp))
+      end do
+      call check_close(worst, 0.0_dp, 1e-2_dp, 'four arms: approach')
+      call check_close(record%rows(last(record))%time, 4.0_dp, 1e-14_dp, 'four arms: time')
+      call check_books(record, 'four arms')
+   end subroutine test_several_arms
+
+   !> The approach of a sphere against the number of cells over the contact.
+   subroutine test_order_in_mesh()
+      type(record_type) :: record
+      integer, parameter :: cells(3) = [24, 48, 96]
+      real(dp) :: errors(3)
+      integer :: k
+
+      do k = 1, 3
+         call run_case('&grid nx = '//to_text(cells(k))//', ny = '//to_text(cells(k) - 2)// &
+            ', lx = 0.1e-3, ly = 0.1e-3, boundary = ''free'' /'//nl//thesis_sphere//thesis_rubber// &
+            '&phase force = 0.02e-3, duration = 0.2, steps = 16 /'//nl//'&solver tolerance = 1e-8 /', &
+            'mesh', record)
+         errors(k) = abs(record%rows(last(record))%displacement*radius/(3.0_dp/16.0_dp*radius*force &
+            *creep_compliance(1.0e6_dp/11.0_dp, [1.0e6_dp/1.1_dp], [1.0_dp/11.0_dp], 0.2_dp)) &
+            **(2.0_dp/3.0_dp) - 1.0_dp)
+      end do
+      call check_that(errors(2) < errors(1)/1.8_dp .and. errors(3) < errors(2)/1.8_dp &
+         .and. errors(3) < errors(1)/6.0_dp, 'the approach converges with the mesh')
+      call check_close(errors(3), 0.0_dp, 2e-4_dp, 'approach with 75 cells over the contact')
+   end subroutine test_order_in_mesh
+
+   !> Orders in time on one mesh, against a run with fine steps: the error of the mesh cancels.
+   subroutine test_order_in_time()
+      type(record_type) :: record
+      real(dp) :: reference, errors(3)
+      real(dp), parameter :: least(3) = [0.95_dp, 1.9_dp, 1.9_dp]
+      real(dp), parameter :: most(3) = [1.05_dp, 2.1_dp, 3.2_dp]
+      real(dp) :: orders(2)
+      integer, parameter :: steps(3) = [8, 16, 32]
+      integer :: k, s
+
+      reference = displacement('exponential2', 512)
+      do s = 1, 3
+         do k = 1, 3
+            errors(k) = abs(displacement(trim(schemes(s)), steps(k))/reference - 1.0_dp)
+         end do
+         orders = log(errors(1:2)/errors(2:3))/log(2.0_dp)
+         call check_that(minval(orders) > least(s) .and. maxval(orders) < most(s), &
+            trim(schemes(s))//': orders '//to_text(orders(1))//', '//to_text(orders(2)))
+      end do
+      call check_close(errors(1), 0.0_dp, 1e-4_dp, 'exponential2, a step of half a relaxation time')
+
+   contains
+
+      !> The approach at the end.
+      real(dp) function displacement(scheme, n)
+         character(*), intent(in) :: scheme
+         integer, intent(in) :: n
+
+         call run_case(small_map//thesis_sphere//thesis_rubber// &
+            '&phase force = 0.02e-3, duration = 0.4, steps = '//to_text(n)//' /'//nl// &
+            '&solver tolerance = 1e-9, time_scheme = '''//scheme//''' /', scheme, record)
+         displacement = record%rows(last(record))%displacement
+      end function displacement
+
+   end subroutine test_order_in_time
+
+   !> A sphere under a force that grows linearly: a^3 = (3/16) R (F/T) times the integral of J.
+   subroutine test_ramped_sphere()
+      type(record_type) :: record
+      real(dp), parameter :: j_glassy = 1e-6_dp, j_relaxed = 11e-6_dp, creep_time = 1.0_dp
+      real(dp) :: t, integral, reference, worst
+      integer :: k
+
+      call run_case(small_map//thesis_sphere//thesis_rubber// &
+         '&phase force = 0.02e-3, ramp = ''linear'', duration = 2, steps = 64 /'//nl// &
+         '&solver tolerance = 1e-8 /', 'ramp', record)
+      worst = 0.0_dp
+      do k = 0, last(record)
+         t = record%rows(k)%time
+         call check_close(record%rows(k)%force, force*t/2.0_dp, 1e-8_dp*force, 'ramp: force')
+         integral = j_relaxed*t - (j_relaxed - j_glassy)*creep_time*(1.0_dp - exp(-t/creep_time))
+         reference = (3.0_dp/16.0_dp*radius*force/2.0_dp*integral)**(2.0_dp/3.0_dp)/radius
+         if (t > 0.4_dp) worst = max(worst, abs(record%rows(k)%displacement/reference - 1.0_dp))
+      end do
+      call check_close(record%rows(0)%displacement, 0.0_dp, 1e-12_dp, 'ramp: first touch')
+      call check_close(worst, 0.0_dp, 1e-2_dp, 'ramp: approach')
+      call check_books(record, 'ramp')
+   end subroutine test_ramped_sphere
+
+   !> Twenty arms over 15 decades, in steps far longer than most relaxation times: no ringing.
+   subroutine test_many_decades()
+      type(record_type) :: record
+      integer, parameter :: arms = 20
+      real(dp) :: g(arms), tau(arms), reference, worst, growth, before
+      character(:), allocatable :: g_text, tau_text
+      logical :: steady
+      integer :: k, s
+
+      g_text = ''
+      tau_text = ''
+      do k = 1, arms
+         tau(k) = 10.0_dp**(-12.0_dp + 15.0_dp*(k - 1)/(arms - 1.0_dp))
+         g(k) = 0.2e6_dp
+         g_text = g_text//', '//to_text(g(k))
+         tau_text = tau_text//', '//to_text(tau(k))
+      end do
+      do s = 1, 3
+         call run_case(small_map//thesis_sphere//'&material shear_modulus = 0.2e6, prony_g = '// &
+            g_text(3:)//', prony_tau = '//tau_text(3:)//' /'//nl// &
+            '&phase force = 0.02e-3, duration = 1000, steps = 20 /'//nl//'&solver tolerance = 1e-9, '// &
+            'time_scheme = '''//trim(schemes(s))//''' /', '20 arms, '//trim(schemes(s)), record)
+         steady = .true.
+         worst = 0.0_dp
+         before = huge(1.0_dp)
+         do k = 1, last(record)
+            growth = record%rows(k)%displacement - record%rows(k - 1)%displacement
+            steady = steady .and. growth > 0.0_dp .and. growth < before
+            before = growth
+            reference = (3.0_dp/16.0_dp*radius*force*creep_compliance(0.2e6_dp, g, tau, &
+               record%rows(k)%time))**(2.0_dp/3.0_dp)/radius
+            ! the first steps hold most of the spectrum
+            if (k == 1) call check_close(record%rows(k)%displacement/reference, 1.0_dp, 0.08_dp, &
+               '20 arms, '//trim(schemes(s))//': first step')
+            if (k > 4) worst = max(worst, abs(record%rows(k)%displacement/reference - 1.0_dp))
+         end do
+         call check_that(steady, '20 arms, '//trim(schemes(s))//': creep slows down without ringing')
+         call check_close(worst, 0.0_dp, 0.015_dp, '20 arms, '//trim(schemes(s))//': approach')
+         call check_books(record, '20 arms, '//trim(schemes(s)))
+      end do
+   end subroutine test_many_decades
+
+   !> After a drop of load the contact area never falls again (arXiv 2511.19402).
+   subroutine test_area_after_a_drop()
+      type(record_type) :: record
+      integer :: k, s, fallen
+      real(dp) :: least
+
+      do s = 1, 3
+         call run_case(rough//two_arms//'&phase pressure = 60e3, duration = 0.3, steps = 10 /'//nl// &
+            '&phase pressure = 20e3, duration = 0.3, steps = 60 /'//nl// &
+            '&solver tolerance = 1e-8, time_scheme = '''//trim(schemes(s))//''' /', 'drop of load', record)
+         fallen = 0
+         do k = 12, last(record)
+            if (record%rows(k)%contact_area < record%rows(k - 1)%contact_area) fallen = fallen + 1
+         end do
+         least = record%rows(11)%contact_area
+         call check_that(least < 0.9_dp*record%rows(10)%contact_area, 'a drop of load opens contact')
+         call check_that(record%rows(last(record))%contact_area > 1.04_dp*least, 'then contact grows')
+         call check_that(fallen == 0, 'and never falls, '//trim(schemes(s)))
+         call check_books(record, 'drop of load, '//trim(schemes(s)))
+      end do
+   end subroutine test_area_after_a_drop
+
+   !> Work against the load's own: equal as the steps shrink; numerical loss only of backward Euler.
+   subroutine test_books()
+      type(record_type) :: record
+      real(dp) :: difference(2), numerical(2)
+      integer :: n, s
+
+      do s = 1, 3
+         do n = 1, 2
+            call run_case(rough//slow_arms//'&phase pressure = 40e3, duration = 0.1, steps = ' &
+               //to_text(20*n)//' /'//nl//'&phase pressure = 10e3, ramp = ''linear'', duration = 0.1, '// &
+               'steps = '//to_text(20*n)//' /'//nl//'&solver tolerance = 1e-9, time_scheme = '''// &
+               trim(schemes(s))//''' /', 'works', record)
+            associate (end => record%rows(last(record)))
+               difference(n) = abs(end%work_load - end%work_normal)/end%work_normal
+               numerical(n) = end%dissipated_numerical/end%dissipated_viscous
+            end associate
+            call check_books(record, 'works')
+         end do
+         call check_that(difference(2) < 0.6_dp*difference(1) .and. difference(2) < 0.01_dp, &
+            'work of the load and of the traction, '//trim(schemes(s))//': '//to_text(difference(1))// &
+            ', '//to_text(difference(2)))
+         if (s == 1) then
+            call check_that(numerical(1) > 0.0_dp .and. numerical(2) < 0.7_dp*numerical(1), &
+               'the numerical loss shrinks with the step')
+         else
+            call check_close(numerical(1), 0.0_dp, 0.0_dp, 'no numerical loss')
+         end if
+      end do
+   end subroutine test_books
+
+   !> One arm and the same arm in two; Zener branches and their Prony arms; the order of the arms.
+   subroutine test_split_arm()
+      type(record_type) :: one, two
+      character(*), parameter :: phases = '&phase pressure = 40e3, duration = 0.1, steps = 10 /'//nl// &
+         '&phase pressure = 10e3, duration = 0.1, steps = 5 /'//nl//'&solver tolerance = 1e-8 /'
+      integer :: s
+
+      do s = 1, 3
+         call run_case(rough//'&material shear_modulus = 0.5e6, prony_g = 1.0e6, prony_tau = 0.02 /'//nl// &
+            phases(:len(phases) - 1)//' time_scheme = '''//trim(schemes(s))//''' /', 'one arm', one)
+         call run_case(rough//'&material shear_modulus = 0.5e6, prony_g = 0.3e6, 0.7e6, '// &
+            'prony_tau = 0.02, 0.02 /'//nl// &
+            phases(:len(phases) - 1)//' time_scheme = '''//trim(schemes(s))//''' /', 'split arm', two)
+         call check_same_rows(one, two, 1e-9_dp, 'an arm split in two, '//trim(schemes(s)))
+      end do
+      call run_case(rough//two_arms//phases, 'two arms', one)
+      call run_case(rough//'&material shear_modulus = 0.5e6, prony_g = 0.7e6, 1.0e6, '// &
+         'prony_tau = 0.1, 1e-3 /'//nl//phases, 'two arms', two)
+      call check_same_rows(one, two, 1e-9_dp, 'arms in another order')
+   end subroutine test_split_arm
+
+   !> A block long at rest holds its load without creep, like an elastic one of the long-term modulus.
+   subroutine test_relaxed()
+      type(record_type) :: rested, elastic
+      integer :: k
+
+      call run_case(rough//two_arms//'&phase pressure = 40e3, relaxed = .true., duration = 0.2, '// &
+         'steps = 7 /'//nl//'&solver tolerance = 1e-9 /', 'relaxed', rested)
+      call run_case(rough//'&material shear_modulus = 0.5e6 /'//nl//'&phase pressure = 40e3 /'//nl// &
+         '&solver tolerance = 1e-9 /', 'elastic', elastic)
+      do k = 0, last(rested)
+         associate (row => rested%rows(k), held => elastic%rows(0))
+            call check_close(row%displacement, held%displacement, 1e-7_dp*held%displacement, 'relaxed: approach')
+            call check_close(row%contact_area, held%contact_area, 1e-12_dp, 'relaxed: area')
+            call check_close(row%energy_elastic, held%energy_elastic, 1e-7_dp*held%energy_elastic, &
+               'relaxed: energy')
+            call check_close(row%dissipated_viscous, 0.0_dp, 1e-12_dp*held%energy_elastic, 'relaxed: no loss')
+         end associate
+      end do
+      call check_books(rested, 'relaxed')
+   end subroutine test_relaxed
+
+   !> Loads as prescribed: ramps in each control, changes of control, phases that inherit.
+   subroutine test_loads()
+      type(record_type) :: record
+      real(dp), parameter :: area = 1.2e-6_dp
+      real(dp) :: start
+      integer :: k
+
+      call run_case(rough//two_arms// &
+         '&phase pressure = 20e3, ramp = ''linear'', duration = 0.1, steps = 4 /'//nl// &    ! rows 0-4
+         '&phase duration = 0.1, steps = 3 /'//nl// &                                        ! 5-7
+         '&phase force = 0.06, ramp = ''linear'', duration = 0.1, steps = 5 /'//nl// &       ! 8-12
+         '&phase displacement = 12.0e-6, ramp = ''linear'', duration = 0.2, steps = 4 /'//nl// &! 13-16
+         '&phase duration = 0.1, steps = 2 /'//nl// &                                        ! 17-18
+         '&phase pressure = 10e3 /'//nl// &                                                  ! 19
+         '&phase duration = 0.1, steps = 2 /'//nl// &                                        ! 20-21
+         '&phase displacement = 12.2e-6, duration = 0.1, steps = 2 /'//nl// &                   ! 22-24
+         '&solver tolerance = 1e-9 /', 'loads', record)
+      call check_that(last(record) == 24, 'loads: rows')
+      if (last(record) /= 24) return
+      associate (rows => record%rows)
+         do k = 0, 4
+            call check_close(rows(k)%pressure, 5e3_dp*k, 1e-4_dp, 'ramp of pressure from 0')
+         end do
+         do k = 5, 7
+            call check_close(rows(k)%pressure, 20e3_dp, 1e-4_dp, 'a phase that inherits its load')
+         end do
+         do k = 8, 12
+            call check_close(rows(k)%force, 20e3_dp*area + (0.06_dp - 20e3_dp*area)*(k - 7)/5.0_dp, &
+               1e-9_dp, 'ramp of force after a pressure')
+            call check_close(rows(k)%pressure*area, rows(k)%force, 1e-12_dp, 'force and pressure')
+         end do
+         start = rows(12)%displacement
+         do k = 13, 16
+            call check_close(rows(k)%displacement, start + (12.0e-6_dp - start)*(k - 12)/4.0_dp, 1e-15_dp, &
+               'ramp of displacement after a force')
+         end do
+         do k = 17, 18
+            call check_close(rows(k)%displacement, 12.0e-6_dp, 1e-15_dp, 'a displacement held')
+            call check_that(rows(k)%pressure < rows(k - 1)%pressure, 'the pressure relaxes')
+         end do
+         call check_close(rows(19)%time, rows(18)%time, 0.0_dp, 'a static phase takes no time')
+         call check_close(rows(19)%pressure, 10e3_dp, 1e-4_dp, 'a static phase')
+         call check_close(rows(21)%pressure, 10e3_dp, 1e-4_dp, 'its load is held')
+         call check_close(rows(22)%time, rows(21)%time, 0.0_dp, 'a jump takes no time')
+         call check_close(rows(22)%displacement, 12.2e-6_dp, 1e-15_dp, 'a jump to a displacement')
+         call check_close(rows(24)%time, 0.8_dp, 1e-14_dp, 'the last time')
+         call check_that(all(rows(:)%phase == [1, 1, 1, 1, 1, 2, 2, 2, 3, 3, 3, 3, 3, 4, 4, 4, 4, 5, 5, &
+            6, 7, 7, 8, 8, 8]), 'phases of the rows')
+      end associate
+      call check_books(record, 'loads')
+   end subroutine test_loads
 
 end module test_simulation
