@@ -1,7 +1,9 @@
 """The package as it is installed."""
 
+import json
 import subprocess
-from importlib.metadata import version
+import sys
+from importlib.metadata import distribution, version
 
 import asperity
 
@@ -12,3 +14,34 @@ def test_versions_agree(program, root):
     assert version("asperity") == written
     printed = subprocess.run([program, "--version"], capture_output=True, text=True, check=True)
     assert printed.stdout.split() == ["asperity", written]
+
+
+def test_what_an_installation_holds(root):
+    files = {str(path) for path in distribution("asperity").files or []}
+    if not any(name.endswith("asperity/result.py") for name in files):
+        # Installed in place: the plan of the build says what a wheel would hold.
+        plan = json.loads((root / ".venv" / "python" / "meson-info" / "intro-install_plan.json")
+                          .read_text())
+        files = {entry["destination"].replace("{bindir}", "bin")
+                 for part in plan.values() for entry in part.values()}
+    ends = ["bin/asperity", "asperity/__init__.py", "asperity/result.py", "asperity/py.typed",
+            "asperity/theory/__init__.py"]
+    for end in ends:
+        assert any(name.endswith(end) for name in files), end
+    assert any("asperity/_core." in name for name in files)
+
+
+def test_public_names_are_documented():
+    for name in asperity.__all__:
+        thing = getattr(asperity, name)
+        assert name == "__version__" or (thing.__doc__ or "").strip(), name
+    for module in (asperity.surface, asperity.theory, asperity.material):
+        for name in module.__all__:
+            assert (getattr(module, name).__doc__ or "").strip(), name
+
+
+def test_import_does_not_open_windows_or_load_pandas():
+    done = subprocess.run(
+        [sys.executable, "-c", "import sys, asperity; print('pandas' in sys.modules,"
+         " 'matplotlib.pyplot' in sys.modules)"], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "False"]
