@@ -514,6 +514,7 @@ contains
       call solver%destroy()
       call new_adhesion_solver(solver, grid, poisson, error, preconditioner='fine')
       call check_error(error, 'coarse', 'unknown preconditioner')
+      call solver%destroy()
       grid%boundary = boundary_free
       call new_adhesion_solver(solver, grid, poisson, error)
       call check_error(error, 'periodic', 'free grid')

@@ -5,13 +5,21 @@
 2
 """
 
-from . import material, surface, theory
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from . import surface
 from ._library import set_threads, version
 from .contact import NormalContact, solve_normal
 from .errors import NotConverged
 from .result import Run
 from .result import open_result as open
 from .runner import run
+
+if TYPE_CHECKING:
+    from . import material, theory
 
 __all__ = ["NormalContact", "NotConverged", "Run", "__version__", "material", "open", "run",
            "set_threads", "solve_normal", "surface", "theory"]
@@ -20,3 +28,14 @@ __version__ = version()
 """The version of the Fortran library that is loaded, such as ``"0.1.0"``."""
 
 del version
+
+
+def __getattr__(name: str) -> Any:
+    """Load the modules that need SciPy when they are used first: it takes its time."""
+    if name in ("material", "theory"):
+        return importlib.import_module(f".{name}", __name__)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

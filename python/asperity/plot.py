@@ -13,8 +13,6 @@ import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from numpy.typing import ArrayLike, NDArray
 
-from .theory import persson_area
-
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -206,6 +204,8 @@ def _load_panel(run: Run, axes: Axes) -> None:
         modulus = 2.0 * float(run.material.shear_modulus) / (1.0 - float(run.material.poisson))
         slope = _rms_slope(run.grid, run.height)
         if slope > 0.0 and pressure.max(initial=0.0) > 0.0:
+            from .theory import persson_area  # SciPy takes its time to load
+
             loads = np.linspace(0.0, 1.05 * pressure.max(), 200)
             areas = persson_area(loads, modulus, slope)
             axes.plot(loads * factor, areas, color=COLOURS[1], linestyle="--",
