@@ -4,9 +4,10 @@
 !> friction law such that the slip r = DX - A T is zero where T is inside its bound, and along D = T - T*
 !> where it is on it (thesis, eq. 3.1; modules `friction_law`, `friction_problem`).
 !>
-!> The operator A is that of G = 1. For a scheme of time (Q, Hist) pass DX' = Q DX - Hist: r is then
-!> Q times the slip, and the displacement is U = DX - r/Q, without another product. With inertia the
-!> mean mode of the operator differs from A(0): set it by `set_mean_compliance`.
+!> The operator A is that of G = 1. For a scheme of time with the factor Q pass DX' = Q DX and the
+!> traction T_h of the memory: r = Q DX - A (T + T_h) is then Q times the slip, and the displacement is
+!> U = DX - r/Q, without another product. With inertia the mean mode of the operator differs from A(0):
+!> set it by `set_mean_compliance`.
 !>
 !> Methods: 'fast' (module `friction_cg_fast`, falling back on `friction_cg_gradient`), 'gradient' (the
 !> fallback alone) and 'thesis' (`friction_cg_thesis`). Converged means both the criterion of the thesis,
@@ -14,8 +15,8 @@
 !> point, part of the slip across its traction, or slip against it, over the RMS of DX or of A T in the
 !> contact, whichever is larger, or over `slip_scale`.
 !>
-!> Memory beside the caller's fields: four fields, the two of the operator's spectrum and the two of the
-!> preconditioner's with its symbols (3/4 of a field); 'thesis' takes two fields more.
+!> Memory beside the caller's fields: six fields, the two of the operator's spectrum and the two of the
+!> preconditioner's with its symbols (3/4 of a field).
 module friction_cg
    use errors, only : error_type
    use fft_conv, only : convolution_type, new_tensor_symbol_operator
@@ -54,6 +55,7 @@ module friction_cg
       real(dp), private :: length = 0.0_dp       !! of the longer side, m
       real(dp), private :: compliance = 0.0_dp   !! a_0
       real(dp), allocatable, private :: zx(:, :), zy(:, :), dx(:, :), dy(:, :)
+      real(dp), allocatable, private :: old_x(:, :), old_y(:, :)
    contains
       procedure :: solve
       procedure :: destroy
@@ -93,11 +95,13 @@ contains
       if (allocated(error)) return
       self%compliance = self_compliance(operator, self%periodic)
       allocate (self%zx(grid%nx, grid%ny))
-      allocate (self%zy, self%dx, self%dy, mold=self%zx)
+      allocate (self%zy, self%dx, self%dy, self%old_x, self%old_y, mold=self%zx)
       self%zx = 0.0_dp
       self%zy = 0.0_dp
       self%dx = 0.0_dp
       self%dy = 0.0_dp
+      self%old_x = 0.0_dp
+      self%old_y = 0.0_dp
    end subroutine new_friction_solver
 
    !> a_0, the mean of the symbols over the whole spectrum; without the mean mode where periodic.
@@ -130,8 +134,8 @@ contains
 
    !> Solve for T, starting from the T given.
    subroutine solve(self, operator, law, p, slope_x, slope_y, drive_x, drive_y, contact, tx, ty, &
-      slip_x, slip_y, result)
-      class(friction_solver_type), intent(inout) :: self
+      slip_x, slip_y, result, past_x, past_y)
+      class(friction_solver_type), intent(inout), target :: self
       type(convolution_type), intent(inout) :: operator
       type(friction_law_type), intent(in) :: law
       real(dp), intent(in), contiguous, target :: p(:, :)            !! [nx, ny] pressure, Pa
@@ -139,14 +143,17 @@ contains
       real(dp), intent(in), contiguous, target :: slope_y(:, :)      !! [nx, ny] H_y
       real(dp), intent(in), contiguous, target :: drive_x(:, :)      !! [nx, ny] DX', m
       real(dp), intent(in), contiguous, target :: drive_y(:, :)      !! [nx, ny]
-      !> [nx, ny] In: 0 open, else in contact (without adhesion a point with p <= 0 is taken as open);
-      !> out: 0 open, 1 stick, 2 slip.
+      !> [nx, ny] In: 0 open, 1 in contact, 2 in contact and likely to slip, as it did in the step before:
+      !> its traction starts on the bound. Without adhesion a point with p <= 0 is taken as open.
+      !> Out: 0 open, 1 stick, 2 slip.
       integer(int8), intent(inout), contiguous, target :: contact(:, :)
       real(dp), intent(inout), contiguous, target :: tx(:, :)        !! [nx, ny] T_x, Pa; in: the start
       real(dp), intent(inout), contiguous, target :: ty(:, :)        !! [nx, ny] T_y, Pa
       real(dp), intent(inout), contiguous, target :: slip_x(:, :)    !! [nx, ny] out: r, everywhere, m
       real(dp), intent(inout), contiguous, target :: slip_y(:, :)    !! [nx, ny]
       type(solver_result_type), intent(out) :: result
+      !> [nx, ny] T_h, a given traction, Pa: r = DX' - A (T + T_h) at no cost of a product. Both or none.
+      real(dp), intent(in), contiguous, target, optional :: past_x(:, :), past_y(:, :)
       type(friction_problem_type) :: problem
       real(dp) :: start_time
       logical :: moving, converged
@@ -169,7 +176,13 @@ contains
       problem%rx => slip_x
       problem%ry => slip_y
       problem%contact => contact
-      allocate (problem%row_sums(12, problem%ny))
+      if (present(past_x)) problem%past_x => past_x
+      if (present(past_y)) problem%past_y => past_y
+      if (self%method == friction_fast) then
+         problem%old_x => self%old_x
+         problem%old_y => self%old_y
+      end if
+      allocate (problem%row_sums(13, problem%ny))
       if (self%periodic) problem%mean_compliance = operator%symbol(0, 0, 1)
       call set_mean_stiffness(self, operator)
 
@@ -183,7 +196,7 @@ contains
          if (problem%residual > self%tolerance) call iterate(self, problem, operator, result%iterations)
          converged = problem%residual <= self%tolerance .and. problem%change <= self%tolerance
          if (problem%fresh .or. .not. converged) exit
-         call problem%forward_tractions(operator)       ! the residual of a recurrence proves nothing
+         call problem%transform_tractions(operator)       ! the residual of a recurrence proves nothing
          call problem%update_slip(operator)
          if (problem%residual <= self%tolerance) exit
       end do
@@ -217,7 +230,7 @@ contains
       select case (self%method)
       case (friction_thesis)
          call iterate_thesis(problem, operator, self%tolerance, limit, self%zx, self%zy, &
-            self%dx, self%dy, iterations)
+            self%dx, self%dy, self%old_x, self%old_y, iterations)
       case (friction_gradient)
          call iterate_gradient(problem, operator, self%tolerance, 0.0_dp, limit, self%zx, self%zy, &
             self%dx, self%dy, iterations)
@@ -252,7 +265,9 @@ contains
       class(friction_solver_type), intent(inout) :: self
 
       call self%preconditioner%destroy()
-      if (allocated(self%zx)) deallocate (self%zx, self%zy, self%dx, self%dy)
+      if (allocated(self%zx)) then
+         deallocate (self%zx, self%zy, self%dx, self%dy, self%old_x, self%old_y)
+      end if
    end subroutine destroy
 
 end module friction_cg

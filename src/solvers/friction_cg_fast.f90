@@ -18,6 +18,10 @@
 !>     g - E^-1 sum(w g) goes through the preconditioner to z0
 !>     z = z0 + w Z c,  c = E^-1 (N/h E^-1 sum(w g) - sum(z0))
 !>
+!> Points that are put back in great number change the total traction, and a stiff mean mode then throws
+!> the slip to the other side: the part of the move after which g'.(T' - T) vanishes is taken
+!> instead where that has become less than -alpha g.d/2. This needs no energy, which does not exist where the slope counts.
+!>
 !> An iteration costs two operator products, of which the first needs no inverse transform where points
 !> slip, and one preconditioner. beta is formed with z_old (M is symmetric), so that no old g is kept:
 !> four work fields z and d beside T, r and DX.
@@ -34,6 +38,8 @@ module friction_cg_fast
    public :: iterate_fast
 
    integer, parameter :: patience = 30      !! iterations in which the residual has to fall tenfold
+   integer, parameter :: trials = 2         !! of a shorter step
+   real(dp), parameter :: overshoot = 0.5_dp
 
 contains
 
@@ -47,10 +53,10 @@ contains
       integer, intent(in) :: limit                 !! of `iterations`
       real(dp), intent(inout) :: zx(:, :), zy(:, :), dx(:, :), dy(:, :)    !! work [nx, ny]
       integer, intent(inout) :: iterations
-      real(dp) :: rho, rho_old, cross, beta, slope, curvature, form, alpha, milestone
+      real(dp) :: rho, rho_old, cross, beta, slope, curvature, form, alpha, milestone, gain, fraction
       real(dp) :: shift(2)
       logical :: restart, slipping
-      integer :: returned, first
+      integer :: returned, first, trial
 
       restart = .true.
       rho_old = 0.0_dp
@@ -74,13 +80,23 @@ contains
          if (slipping) then
             call problem%update_slip(operator)
          else if (returned > 0) then
-            call problem%forward_tractions(operator)
+            call problem%transform_tractions(operator)
             call problem%update_slip(operator)
          else
             call problem%advance_slip(operator, alpha)
          end if
+         restart = .false.
+         gain = alpha*slope
+         do trial = 1, trials
+            if (problem%gain_left >= -overshoot*gain) exit
+            fraction = max(0.1_dp, gain/(gain - problem%gain_left))
+            call problem%step_back(operator, fraction)
+            call problem%update_slip(operator)
+            gain = fraction*gain
+            restart = .true.
+         end do
          if (problem%residual <= tolerance .and. problem%change <= tolerance) return
-         restart = problem%released > 0
+         restart = restart .or. problem%released > 0
          rho_old = rho
          if (iterations - first == patience) then
             if (problem%residual > 0.1_dp*milestone) return

@@ -28,18 +28,18 @@ module friction_cg_thesis
 contains
 
    !> Iterate until converged, broken down, or at the limit. On entry r belongs to T.
-   subroutine iterate_thesis(problem, operator, tolerance, limit, gx, gy, dx, dy, iterations)
+   subroutine iterate_thesis(problem, operator, tolerance, limit, gx, gy, dx, dy, tx, ty, &
+      iterations)
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
       real(dp), intent(in) :: tolerance            !! of the residual and of the change of T
       integer, intent(in) :: limit                 !! of `iterations`
       real(dp), intent(inout) :: gx(:, :), gy(:, :), dx(:, :), dy(:, :)    !! work [nx, ny]
+      real(dp), intent(inout) :: tx(:, :), ty(:, :)                        !! work [nx, ny]
       integer, intent(inout) :: iterations
-      real(dp), allocatable :: tx(:, :), ty(:, :)  ! t
       real(dp) :: beta, ascent, bend, form, alpha, sums(4)
       integer :: returned
 
-      allocate (tx(problem%nx, problem%ny), ty(problem%nx, problem%ny))
       beta = 0.0_dp
       do while (iterations < limit)
          iterations = iterations + 1

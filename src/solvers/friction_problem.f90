@@ -1,6 +1,6 @@
 !> What the methods of `friction_cg` share: the tangential problem of one step, with its passes.
 !>
-!> Unknown: the traction T on the contact. The slip is r = DX - A T. Wanted is T within the bound of
+!> Unknown: the traction T on the contact. The slip is r = DX - A (T + T_h), T_h a given traction. Wanted is T within the bound of
 !> module `friction_law`, with r = 0 where T is inside (stick) and, where T is on the bound (slip), r
 !> along the direction of slip v (D = T - T*, or D - n (n.D) by the physical law). The residual of a point
 !>
@@ -38,6 +38,10 @@ module friction_problem
       real(dp), pointer, contiguous :: drive_x(:, :) => null(), drive_y(:, :) => null()
       real(dp), pointer, contiguous :: tx(:, :) => null(), ty(:, :) => null()
       real(dp), pointer, contiguous :: rx(:, :) => null(), ry(:, :) => null()
+      real(dp), pointer, contiguous :: past_x(:, :) => null()   !! T_h, where there is a memory
+      real(dp), pointer, contiguous :: past_y(:, :) => null()
+      real(dp), pointer, contiguous :: old_x(:, :) => null()    !! T before the last move, if kept
+      real(dp), pointer, contiguous :: old_y(:, :) => null()
       integer(int8), pointer, contiguous :: contact(:, :) => null()
       real(dp), allocatable :: row_sums(:, :)
       integer :: cells = 0                   !! in contact
@@ -47,6 +51,7 @@ module friction_problem
       real(dp) :: weighted_residual(2) = 0.0_dp       !! sum of w g
       real(dp) :: weighted_tangent(2, 2) = 0.0_dp     !! E = sum of w Z
       real(dp) :: curved_tangent(2, 2) = 0.0_dp       !! sum of lam w^2 Z
+      real(dp) :: gain_left = 0.0_dp         !! g'.(T' - T) of the last move, with g' after it
       real(dp) :: residual = 0.0_dp          !! largest |g| over the scale of displacement
       real(dp) :: change = 0.0_dp            !! |T' - T|/|T'| of the last move (thesis, eq. 3.15)
    contains
@@ -59,21 +64,23 @@ module friction_problem
       procedure :: advance_slip
       procedure :: start_from_rest
       procedure :: move
-      procedure :: forward_tractions
+      procedure :: step_back
+      procedure :: transform_tractions
       procedure :: totals
    end type friction_problem_type
 
 contains
 
-   !> Bring the first T within its bound, and transform its rows.
+   !> Bring the first T within its bound, slip points of the step before onto it, and transform its rows.
    subroutine start(self, operator, moving)
       class(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
-      logical, intent(out) :: moving         !! T is not zero everywhere
+      logical, intent(out) :: moving         !! T + T_h is not zero everywhere
       real(dp) :: slope(2), star(2), d(2), s
+      logical :: guess
       integer :: i, j
 
-      !$omp parallel do default(none) shared(self, operator) private(i, j, slope, star, d, s) &
+      !$omp parallel do default(none) shared(self, operator) private(i, j, slope, star, d, s, guess) &
       !$omp num_threads(self%threads)
       do j = 1, self%ny
          self%row_sums(:, j) = 0.0_dp
@@ -89,8 +96,9 @@ contains
                star = self%law%normal_traction(self%p(i, j), slope)
                d = [self%tx(i, j), self%ty(i, j)] - star
                s = self%law%bound_ratio(self%p(i, j), slope, d)
-               self%contact(i, j) = merge(contact_slip, contact_stick, s <= on_bound)
-               if (s < 1.0_dp) then
+               guess = self%contact(i, j) == contact_slip .and. s <= outermost
+               self%contact(i, j) = merge(contact_slip, contact_stick, guess .or. s <= on_bound)
+               if (guess .or. s < 1.0_dp) then
                   self%tx(i, j) = star(1) + s*d(1)
                   self%ty(i, j) = star(2) + s*d(2)
                end if
@@ -98,12 +106,11 @@ contains
                self%row_sums(2, j) = self%row_sums(2, j) + self%tx(i, j)**2 + self%ty(i, j)**2
             end if
          end do
-         call operator%forward_row(1, j, self%tx(:, j))
-         call operator%forward_row(2, j, self%ty(:, j))
+         call transform_row(self, operator, j)
       end do
       associate (sums => self%totals(2))
          self%cells = nint(sums(1))
-         moving = sums(2) > 0.0_dp
+         moving = sums(2) > 0.0_dp .or. associated(self%past_x)
       end associate
       self%change = 0.0_dp
    end subroutine start
@@ -305,6 +312,10 @@ contains
             end if
             sums(7:9) = sums(7:9) + w*[1.0_dp - xx, -xy, 1.0_dp - yy]
             sums(10:12) = sums(10:12) + curvature*w**2*[1.0_dp - xx, -xy, 1.0_dp - yy]
+            if (associated(self%old_x)) then
+               sums(13) = sums(13) + g(1)*(self%tx(i, j) - self%old_x(i, j)) &
+                  + g(2)*(self%ty(i, j) - self%old_y(i, j))
+            end if
             largest = max(largest, g(1)**2 + g(2)**2)
          end do
       end associate
@@ -314,14 +325,15 @@ contains
    subroutine finish_measure(self, largest)
       class(friction_problem_type), intent(inout) :: self
       real(dp), intent(in) :: largest              !! |g|^2
-      real(dp) :: scale, sums(12)
+      real(dp) :: scale, sums(13)
 
-      sums = self%totals(12)
+      sums = self%totals(13)
       self%released = nint(sums(1))
       self%slipping = nint(sums(2))
       self%weighted_residual = sums(5:6)
       self%weighted_tangent = reshape([sums(7), sums(8), sums(8), sums(9)], [2, 2])
       self%curved_tangent = reshape([sums(10), sums(11), sums(11), sums(12)], [2, 2])
+      self%gain_left = sums(13)
       scale = sqrt(max(sums(3), sums(4))/max(self%cells, 1))
       if (self%slip_scale > 0.0_dp) scale = min(scale, max(self%slip_scale, 1.0e-6_dp*scale))
       self%residual = sqrt(global_max(largest))
@@ -336,47 +348,100 @@ contains
       real(dp), intent(in) :: dx(:, :), dy(:, :)    !! [nx, ny] direction d, Pa
       logical, intent(in) :: transform
       integer, intent(out) :: returned              !! points that were put back
-      real(dp) :: t(2), sums(3)
+      real(dp) :: t(2), step_t(2), sums(3)
       logical :: moved
       integer :: i, j
 
       !$omp parallel do default(none) shared(self, operator, step, dx, dy, transform) &
-      !$omp private(i, j, t, moved) num_threads(self%threads)
+      !$omp private(i, j, t, step_t, moved) num_threads(self%threads)
       do j = 1, self%ny
-         self%row_sums(:, j) = 0.0_dp
+         self%row_sums(1:3, j) = 0.0_dp
          do i = 1, self%nx
             if (self%contact(i, j) == contact_open) cycle
             t = [self%tx(i, j) + step*dx(i, j), self%ty(i, j) + step*dy(i, j)]
             call self%put_back(i, j, t, self%contact(i, j), moved)
             if (moved) self%row_sums(1, j) = self%row_sums(1, j) + 1.0_dp
-            self%row_sums(2, j) = self%row_sums(2, j) + (t(1) - self%tx(i, j))**2 &
-               + (t(2) - self%ty(i, j))**2
+            if (associated(self%old_x)) then
+               self%old_x(i, j) = self%tx(i, j)
+               self%old_y(i, j) = self%ty(i, j)
+            end if
+            step_t = t - [self%tx(i, j), self%ty(i, j)]
+            self%row_sums(2, j) = self%row_sums(2, j) + step_t(1)**2 + step_t(2)**2
             self%row_sums(3, j) = self%row_sums(3, j) + t(1)**2 + t(2)**2
             self%tx(i, j) = t(1)
             self%ty(i, j) = t(2)
          end do
-         if (transform) then
-            call operator%forward_row(1, j, self%tx(:, j))
-            call operator%forward_row(2, j, self%ty(:, j))
-         end if
+         if (transform) call transform_row(self, operator, j)
       end do
       sums = self%totals(3)
       returned = nint(sums(1))
       self%change = sqrt(sums(2)/max(sums(3), tiny(1.0_dp)))
    end subroutine move
 
+   !> Undo a part of the last move: T' = T_old + fraction (T - T_old), put back; its rows are transformed.
+   subroutine step_back(self, operator, fraction)
+      class(friction_problem_type), intent(inout) :: self
+      type(convolution_type), intent(inout) :: operator
+      real(dp), intent(in) :: fraction             !! 0 to 1
+      real(dp) :: t(2), old(2), slope(2), d(2), sums(3)
+      integer(int8) :: state
+      logical :: moved
+      integer :: i, j
+
+      !$omp parallel do default(none) shared(self, operator, fraction) &
+      !$omp private(i, j, t, old, slope, d, state, moved) num_threads(self%threads)
+      do j = 1, self%ny
+         self%row_sums(2:3, j) = 0.0_dp
+         do i = 1, self%nx
+            if (self%contact(i, j) == contact_open) cycle
+            old = [self%old_x(i, j), self%old_y(i, j)]
+            t = old + fraction*([self%tx(i, j), self%ty(i, j)] - old)
+            ! Points that only came to the bound by the move leave it again.
+            state = contact_stick
+            if (self%contact(i, j) == contact_slip) then
+               slope = self%slope_at(i, j)
+               d = old - self%law%normal_traction(self%p(i, j), slope)
+               if (self%law%bound_ratio(self%p(i, j), slope, d) <= on_bound) state = contact_slip
+            end if
+            call self%put_back(i, j, t, state, moved)
+            self%contact(i, j) = state
+            self%row_sums(2, j) = self%row_sums(2, j) + sum((t - old)**2)
+            self%row_sums(3, j) = self%row_sums(3, j) + sum(t**2)
+            self%tx(i, j) = t(1)
+            self%ty(i, j) = t(2)
+         end do
+         call transform_row(self, operator, j)
+      end do
+      sums = self%totals(3)
+      self%change = sqrt(sums(2)/max(sums(3), tiny(1.0_dp)))
+   end subroutine step_back
+
+   !> Transform a row of T, or of T + T_h.
+   subroutine transform_row(self, operator, j)
+      class(friction_problem_type), intent(in) :: self
+      type(convolution_type), intent(inout) :: operator
+      integer, intent(in) :: j
+
+      if (associated(self%past_x)) then
+         call operator%forward_row(1, j, self%tx(:, j) + self%past_x(:, j))
+         call operator%forward_row(2, j, self%ty(:, j) + self%past_y(:, j))
+      else
+         call operator%forward_row(1, j, self%tx(:, j))
+         call operator%forward_row(2, j, self%ty(:, j))
+      end if
+   end subroutine transform_row
+
    !> Transform the rows of T.
-   subroutine forward_tractions(self, operator)
+   subroutine transform_tractions(self, operator)
       class(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
       integer :: j
 
       !$omp parallel do default(none) shared(self, operator) private(j) num_threads(self%threads)
       do j = 1, self%ny
-         call operator%forward_row(1, j, self%tx(:, j))
-         call operator%forward_row(2, j, self%ty(:, j))
+         call transform_row(self, operator, j)
       end do
-   end subroutine forward_tractions
+   end subroutine transform_tractions
 
    !> The first n sums over all rows, in order.
    function totals(self, n) result(sums)
