@@ -96,7 +96,7 @@ contains
             restart = .true.
          end do
          if (problem%residual <= tolerance .and. problem%change <= tolerance) return
-         restart = restart .or. problem%released > 0
+         restart = restart .or. 10*problem%released > problem%cells
          rho_old = rho
          if (iterations - first == patience) then
             if (problem%residual > 0.1_dp*milestone) return
