@@ -15,7 +15,7 @@
 !> point, part of the slip across its traction, or slip against it, over the RMS of DX or of A T in the
 !> contact, whichever is larger, or over `slip_scale`.
 !>
-!> Memory beside the caller's fields: six fields, the two of the operator's spectrum and the two of the
+!> Memory beside the caller's fields: eight fields, the two of the operator's spectrum and the two of the
 !> preconditioner's with its symbols (3/4 of a field).
 module friction_cg
    use errors, only : error_type
@@ -55,7 +55,7 @@ module friction_cg
       real(dp), private :: length = 0.0_dp       !! of the longer side, m
       real(dp), private :: compliance = 0.0_dp   !! a_0
       real(dp), allocatable, private :: zx(:, :), zy(:, :), dx(:, :), dy(:, :)
-      real(dp), allocatable, private :: old_x(:, :), old_y(:, :)
+      real(dp), allocatable, private :: old_x(:, :), old_y(:, :), normal_x(:, :), normal_y(:, :)
    contains
       procedure :: solve
       procedure :: destroy
@@ -95,13 +95,16 @@ contains
       if (allocated(error)) return
       self%compliance = self_compliance(operator, self%periodic)
       allocate (self%zx(grid%nx, grid%ny))
-      allocate (self%zy, self%dx, self%dy, self%old_x, self%old_y, mold=self%zx)
+      allocate (self%zy, self%dx, self%dy, self%old_x, self%old_y, self%normal_x, self%normal_y, &
+         mold=self%zx)
       self%zx = 0.0_dp
       self%zy = 0.0_dp
       self%dx = 0.0_dp
       self%dy = 0.0_dp
       self%old_x = 0.0_dp
       self%old_y = 0.0_dp
+      self%normal_x = 0.0_dp
+      self%normal_y = 0.0_dp
    end subroutine new_friction_solver
 
    !> a_0, the mean of the symbols over the whole spectrum; without the mean mode where periodic.
@@ -178,6 +181,8 @@ contains
       problem%contact => contact
       if (present(past_x)) problem%past_x => past_x
       if (present(past_y)) problem%past_y => past_y
+      problem%normal_x => self%normal_x
+      problem%normal_y => self%normal_y
       if (self%method == friction_fast) then
          problem%old_x => self%old_x
          problem%old_y => self%old_y
@@ -266,7 +271,8 @@ contains
 
       call self%preconditioner%destroy()
       if (allocated(self%zx)) then
-         deallocate (self%zx, self%zy, self%dx, self%dy, self%old_x, self%old_y)
+         deallocate (self%zx, self%zy, self%dx, self%dy, self%old_x, self%old_y, self%normal_x, &
+            self%normal_y)
       end if
    end subroutine destroy
 

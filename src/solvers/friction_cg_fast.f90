@@ -167,8 +167,7 @@ contains
       real(dp), intent(in) :: mean(2), c(2)
       integer, intent(in) :: j
       real(dp), intent(in) :: zx(:), zy(:)         !! z_old
-      real(dp) :: normal(2), g(2), curvature, w, gx(problem%nx), gy(problem%nx)
-      logical :: reversed
+      real(dp) :: normal(2), g(2), w, gx(problem%nx), gy(problem%nx)
       integer :: i
 
       problem%row_sums(1:5, j) = 0.0_dp
@@ -177,11 +176,10 @@ contains
             gx(i) = 0.0_dp
             gy(i) = 0.0_dp
          else
-            call problem%point_residual(i, j, normal, g, curvature, reversed)
+            call problem%projected_residual(i, j, normal, g, w)
             if (.not. restart) then
                problem%row_sums(1, j) = problem%row_sums(1, j) + g(1)*zx(i) + g(2)*zy(i)
             end if
-            w = problem%compliance/(problem%compliance + curvature)
             g = g - mean - problem%compliance*(1.0_dp - w)*c
             if (problem%contact(i, j) == contact_slip) g = along_bound(normal, g)
             gx(i) = w*g(1)
@@ -199,8 +197,7 @@ contains
       real(dp), intent(in) :: mean(2), c(2)
       integer, intent(in) :: j
       real(dp), intent(inout) :: zx(:), zy(:)
-      real(dp) :: normal(2), g(2), z(2), curvature, w
-      logical :: reversed
+      real(dp) :: normal(2), g(2), z(2), w
       integer :: i
 
       call preconditioner%backward_row(1, j, zx)
@@ -209,8 +206,7 @@ contains
       do i = 1, problem%nx
          z = 0.0_dp
          if (problem%contact(i, j) /= contact_open) then
-            call problem%point_residual(i, j, normal, g, curvature, reversed)
-            w = problem%compliance/(problem%compliance + curvature)
+            call problem%projected_residual(i, j, normal, g, w)
             z = g - mean - problem%compliance*(1.0_dp - w)*c
             z = w*([zx(i), zy(i)] + (1.0_dp - w)/problem%compliance*z)
             if (problem%contact(i, j) == contact_slip) z = along_bound(normal, z)
@@ -257,27 +253,28 @@ contains
       integer, intent(in) :: j
       real(dp), intent(inout) :: zx(:), zy(:)
       real(dp), intent(inout) :: dx(:), dy(:)
-      real(dp) :: normal(2), g(2), v(2), z(2), curvature, w
-      logical :: reversed
+      real(dp) :: normal(2), g(2), v(2), z(2), w
       integer :: i
 
       problem%row_sums(1:2, j) = 0.0_dp
       do i = 1, problem%nx
          v = 0.0_dp
          if (problem%contact(i, j) /= contact_open) then
-            call problem%point_residual(i, j, normal, g, curvature, reversed)
+            call problem%projected_residual(i, j, normal, g, w)
             if (beta > 0.0_dp) then
                v = beta*[dx(i), dy(i)]
                if (problem%contact(i, j) == contact_slip) v = along_bound(normal, v)
             end if
-            w = problem%compliance/(problem%compliance + curvature)
             z = w*shift
             if (problem%contact(i, j) == contact_slip) z = along_bound(normal, z)
             zx(i) = zx(i) + z(1)
             zy(i) = zy(i) + z(2)
             v = v + [zx(i), zy(i)]
             problem%row_sums(1, j) = problem%row_sums(1, j) + g(1)*v(1) + g(2)*v(2)
-            problem%row_sums(2, j) = problem%row_sums(2, j) + curvature*(v(1)**2 + v(2)**2)
+            if (w < 1.0_dp .and. w > 0.0_dp) then
+               problem%row_sums(2, j) = problem%row_sums(2, j) &
+                  + problem%compliance*(1.0_dp/w - 1.0_dp)*(v(1)**2 + v(2)**2)
+            end if
          end if
          dx(i) = v(1)
          dy(i) = v(2)

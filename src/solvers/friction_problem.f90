@@ -40,6 +40,9 @@ module friction_problem
       real(dp), pointer, contiguous :: rx(:, :) => null(), ry(:, :) => null()
       real(dp), pointer, contiguous :: past_x(:, :) => null()   !! T_h, where there is a memory
       real(dp), pointer, contiguous :: past_y(:, :) => null()
+      !> The direction of slip times sqrt(w): its square is the weight w = a_0/(a_0 + curvature) of a slip
+      !> point. 0 where nothing but T* is allowed; not defined elsewhere.
+      real(dp), pointer, contiguous :: normal_x(:, :) => null(), normal_y(:, :) => null()
       real(dp), pointer, contiguous :: old_x(:, :) => null()    !! T before the last move, if kept
       real(dp), pointer, contiguous :: old_y(:, :) => null()
       integer(int8), pointer, contiguous :: contact(:, :) => null()
@@ -59,6 +62,7 @@ module friction_problem
       procedure :: slope_at
       procedure :: friction_part
       procedure :: point_residual
+      procedure :: projected_residual
       procedure :: put_back
       procedure :: update_slip
       procedure :: advance_slip
@@ -174,6 +178,29 @@ contains
          end if
       end if
    end subroutine point_residual
+
+   !> Residual, normal and weight of a point in contact, as measured last.
+   pure subroutine projected_residual(self, i, j, normal, g, w)
+      class(friction_problem_type), intent(in) :: self
+      integer, intent(in) :: i, j
+      real(dp), intent(out) :: normal(2)     !! direction of slip times sqrt(w); 0 inside the bound
+      real(dp), intent(out) :: g(2)          !! m
+      real(dp), intent(out) :: w             !! 1 inside the bound
+
+      g(1) = self%rx(i, j)
+      g(2) = self%ry(i, j)
+      normal = 0.0_dp
+      w = 1.0_dp
+      if (self%contact(i, j) /= contact_slip) return
+      normal(1) = self%normal_x(i, j)
+      normal(2) = self%normal_y(i, j)
+      w = normal(1)**2 + normal(2)**2
+      if (w > 0.0_dp) then
+         g = g - ((g(1)*normal(1) + g(2)*normal(2))/w)*normal
+      else
+         g = 0.0_dp
+      end if
+   end subroutine projected_residual
 
    !> The traction and the state of a point that moved to T: slip points go back on their bound from
    !> both sides, others only from outside.
@@ -305,10 +332,18 @@ contains
             xy = 0.0_dp
             yy = 0.0_dp
             vv = v(1)**2 + v(2)**2
-            if (self%contact(i, j) == contact_slip .and. vv > 0.0_dp) then
-               xx = v(1)**2/vv
-               xy = v(1)*v(2)/vv
-               yy = v(2)**2/vv
+            if (self%contact(i, j) == contact_slip) then
+               if (vv > 0.0_dp) then
+                  xx = v(1)**2/vv
+                  xy = v(1)*v(2)/vv
+                  yy = v(2)**2/vv
+                  v = v*sqrt(w/vv)
+               else
+                  xx = 1.0_dp
+                  yy = 1.0_dp
+               end if
+               self%normal_x(i, j) = v(1)
+               self%normal_y(i, j) = v(2)
             end if
             sums(7:9) = sums(7:9) + w*[1.0_dp - xx, -xy, 1.0_dp - yy]
             sums(10:12) = sums(10:12) + curvature*w**2*[1.0_dp - xx, -xy, 1.0_dp - yy]
