@@ -49,6 +49,7 @@ module friction_law
       procedure :: bound_ratio
       procedure :: bound_variation
       procedure :: return_to_bound
+      procedure :: place_on_bound
       procedure :: slip_direction
       procedure :: slip_along_slope
    end type friction_law_type
@@ -102,21 +103,21 @@ contains
       real(dp), intent(in) :: slope(2)      !! H_x, H_y; not looked at without slope
       real(dp), intent(in) :: d(2)          !! D = T - T*, Pa
       real(dp) :: s                         !! >= 0; `unbounded` where the ray meets no bound
-      real(dp) :: nz, nd, m
+      real(dp) :: root, nd, m, reach
 
       if (self%slope) then
-         nz = 1.0_dp/sqrt(1.0_dp + slope(1)**2 + slope(2)**2)
-         nd = -nz*(slope(1)*d(1) + slope(2)*d(2))
+         root = sqrt(1.0_dp + slope(1)**2 + slope(2)**2)       ! 1/N_z
+         nd = -(slope(1)*d(1) + slope(2)*d(2))/root
          m = sqrt(max(d(1)**2 + d(2)**2 - nd**2, 0.0_dp))
       else
-         nz = 1.0_dp
+         root = 1.0_dp
          nd = 0.0_dp
          m = sqrt(d(1)**2 + d(2)**2)
       end if
       s = unbounded
       if (self%law /= law_constant_shear) then
-         s = ratio(self%coefficient*max(p/nz + self%adhesive_pressure*nz, 0.0_dp), &
-            m - self%coefficient*nd)
+         reach = m - self%coefficient*nd
+         s = ratio(self%coefficient*max(p*root + self%adhesive_pressure/root, 0.0_dp), reach)
       end if
       if (self%law /= law_coulomb) s = min(s, ratio(self%shear_strength, m))
    end function bound_ratio
@@ -186,14 +187,38 @@ contains
       real(dp), intent(in) :: slope(2)
       real(dp), intent(inout) :: t(2)       !! Pa
       logical, intent(out) :: returned      !! it lay outside
-      real(dp) :: star(2), d(2), s
+      real(dp) :: s
 
-      star = self%normal_traction(p, slope)
-      d = t - star
-      s = self%bound_ratio(p, slope, d)
+      call self%place_on_bound(p, slope, 1.0_dp, t, s)
       returned = s < 1.0_dp
-      if (returned) t = star + s*d
    end subroutine return_to_bound
+
+   !> Put a traction on the bound along D if its s is below a limit.
+   pure subroutine place_on_bound(self, p, slope, limit, t, s)
+      class(friction_law_type), intent(in) :: self
+      real(dp), intent(in) :: p
+      real(dp), intent(in) :: slope(2)
+      real(dp), intent(in) :: limit         !! of s; 1: only from outside
+      real(dp), intent(inout) :: t(2)       !! Pa
+      real(dp), intent(out) :: s            !! before
+      real(dp) :: d(2)
+
+      if (self%slope) then
+         d(1) = t(1) + p*slope(1)
+         d(2) = t(2) + p*slope(2)
+         s = bound_ratio(self, p, slope, d)
+         if (s < limit) then
+            t(1) = s*d(1) - p*slope(1)
+            t(2) = s*d(2) - p*slope(2)
+         end if
+      else
+         s = bound_ratio(self, p, slope, t)
+         if (s < limit) then
+            t(1) = s*t(1)
+            t(2) = s*t(2)
+         end if
+      end if
+   end subroutine place_on_bound
 
    !> The direction of slip on the bound: D - n (n.D), or D itself in the thesis.
    pure function slip_direction(self, slope, d) result(direction)

@@ -80,11 +80,11 @@ contains
       class(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
       logical, intent(out) :: moving         !! T + T_h is not zero everywhere
-      real(dp) :: slope(2), star(2), d(2), s
-      logical :: guess
+      real(dp) :: t(2)
+      logical :: moved
       integer :: i, j
 
-      !$omp parallel do default(none) shared(self, operator) private(i, j, slope, star, d, s, guess) &
+      !$omp parallel do default(none) shared(self, operator) private(i, j, t, moved) &
       !$omp num_threads(self%threads)
       do j = 1, self%ny
          self%row_sums(:, j) = 0.0_dp
@@ -96,16 +96,10 @@ contains
                self%tx(i, j) = 0.0_dp
                self%ty(i, j) = 0.0_dp
             else
-               slope = self%slope_at(i, j)
-               star = self%law%normal_traction(self%p(i, j), slope)
-               d = [self%tx(i, j), self%ty(i, j)] - star
-               s = self%law%bound_ratio(self%p(i, j), slope, d)
-               guess = self%contact(i, j) == contact_slip .and. s <= outermost
-               self%contact(i, j) = merge(contact_slip, contact_stick, guess .or. s <= on_bound)
-               if (guess .or. s < 1.0_dp) then
-                  self%tx(i, j) = star(1) + s*d(1)
-                  self%ty(i, j) = star(2) + s*d(2)
-               end if
+               t = [self%tx(i, j), self%ty(i, j)]
+               call self%put_back(i, j, t, self%contact(i, j), moved)
+               self%tx(i, j) = t(1)
+               self%ty(i, j) = t(2)
                self%row_sums(1, j) = self%row_sums(1, j) + 1.0_dp
                self%row_sums(2, j) = self%row_sums(2, j) + self%tx(i, j)**2 + self%ty(i, j)**2
             end if
@@ -152,27 +146,35 @@ contains
       real(dp), intent(out) :: g(2)          !! m
       real(dp), intent(out) :: curvature     !! m/Pa; 0 inside the bound
       logical, intent(out) :: reversed       !! on the bound, but slips against the traction
-      real(dp) :: slope(2), d(2), r(2), rv, vv
+      real(dp) :: slope(2), d(2), rv, vv
 
-      r = [self%rx(i, j), self%ry(i, j)]
-      g = r
+      g(1) = self%rx(i, j)
+      g(2) = self%ry(i, j)
       v = 0.0_dp
       curvature = 0.0_dp
       reversed = .false.
       if (self%contact(i, j) /= contact_slip) return
-      slope = self%slope_at(i, j)
-      d = self%friction_part(i, j, slope)
-      v = self%law%slip_direction(slope, d)
+      d(1) = self%tx(i, j)
+      d(2) = self%ty(i, j)
+      if (self%law%slope) then
+         slope(1) = self%hx(i, j)
+         slope(2) = self%hy(i, j)
+         d = d + self%p(i, j)*slope
+         v = self%law%slip_direction(slope, d)
+      else
+         v = d
+      end if
       vv = v(1)**2 + v(2)**2
-      rv = r(1)*v(1) + r(2)*v(2)
+      rv = g(1)*v(1) + g(2)*v(2)
       if (vv <= 0.0_dp) then                 ! nothing but T* is allowed here
          g = 0.0_dp
       else if (rv < 0.0_dp) then
          reversed = .true.
       else
-         g = r - rv/vv*v
-         curvature = min(rv, stiffest*self%compliance*vv)/vv
-         if (self%law%slope) then            ! e = v turned by 90 degrees; S^-1 e = D turned
+         g = g - (rv/vv)*v
+         curvature = min(rv/vv, stiffest*self%compliance)
+         ! e = v turned by 90 degrees, S^-1 e = D turned: e.S^-1 e/|e|^2
+         if (self%law%slope .and. self%law%physical_slip) then
             d = [-v(2), v(1)]
             curvature = curvature*dot_product(d, self%law%slip_direction(slope, d))/vv
          end if
@@ -210,19 +212,17 @@ contains
       real(dp), intent(inout) :: t(2)              !! Pa
       integer(int8), intent(inout) :: state
       logical, intent(out) :: returned             !! it was moved
-      real(dp) :: slope(2), star(2), d(2), s
+      real(dp) :: slope(2), s
 
-      slope = self%slope_at(i, j)
-      star = self%law%normal_traction(self%p(i, j), slope)
-      d = t - star
-      s = self%law%bound_ratio(self%p(i, j), slope, d)
-      returned = s < 1.0_dp .or. (state == contact_slip .and. s <= outermost)
-      if (returned) then
-         t = star + s*d
-         state = contact_slip
-      else
-         state = merge(contact_slip, contact_stick, s <= on_bound)
+      slope = 0.0_dp
+      if (self%law%slope) then
+         slope(1) = self%hx(i, j)
+         slope(2) = self%hy(i, j)
       end if
+      call self%law%place_on_bound(self%p(i, j), slope, &
+         merge(outermost, 1.0_dp, state == contact_slip), t, s)
+      returned = s < 1.0_dp .or. (state == contact_slip .and. s < outermost)
+      state = merge(contact_slip, contact_stick, returned .or. s <= on_bound)
    end subroutine put_back
 
    !> r = DX - A T from the transformed rows of T; then measure.
