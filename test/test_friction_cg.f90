@@ -7,6 +7,7 @@ module test_friction_cg
       new_friction_solver, set_mean_compliance
    use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type, &
       largest_excess, new_friction_law, return_tractions
+   use parallel, only : set_threads, thread_count
    use precision, only : dp, int8, pi
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use solver_result, only : solver_result_type
@@ -45,6 +46,9 @@ contains
       call test_line()
       call test_mean_mode()
       call test_warm_start()
+      call test_memory()
+      call test_slide()
+      call test_threads()
    end subroutine run_friction_cg
 
    !> Fields, operator and solver.
@@ -613,5 +617,100 @@ contains
       call check_that(all((self%contact /= contact_open) .eqv. self%p > 0.0_dp), 'contact of it')
       call end_case(self)
    end subroutine test_warm_start
+
+   !> A given traction T_h of the memory is the same as -A T_h in the drive.
+   subroutine test_memory()
+      type(case_type) :: self
+      real(dp), allocatable :: past_x(:, :), past_y(:, :), ux(:, :), uy(:, :), tx(:, :), ty(:, :)
+      real(dp) :: largest
+
+      call new_case(self, 36, 30, 1.0_dp, 0.8_dp, boundary_periodic, 0.5_dp, 0.5_dp)
+      call set_rough(self, 4, 0.1_dp, 0.1_dp)
+      self%law = new_friction_law('coulomb', 0.4_dp, 0.0_dp, 0.0_dp, .true., .true.)
+      self%drive_x = 0.04_dp
+      past_x = 0.1_dp*self%p**2
+      past_y = -0.05_dp*self%p
+      allocate (ux, uy, mold=self%tx)
+      call self%solver%solve(self%operator, self%law, self%p, self%hx, self%hy, self%drive_x, &
+         self%drive_y, self%contact, self%tx, self%ty, self%rx, self%ry, self%result, past_x, past_y)
+      call check_that(self%result%converged, 'memory: converged')
+      tx = self%tx
+      ty = self%ty
+      ! U = A (T + T_h) = DX - r, with no product of the caller's.
+      call self%operator%apply_vector(tx + past_x, ty + past_y, ux, uy)
+      largest = maxval(hypot(self%drive_x - self%rx - ux, self%drive_y - self%ry - uy))
+      call check_that(largest < 1e-13_dp, 'memory: slip = DX - A (T + T_h)')
+      call self%operator%apply_vector(past_x, past_y, ux, uy)
+      self%drive_x = self%drive_x - ux
+      self%drive_y = self%drive_y - uy
+      self%tx = 0.0_dp
+      self%ty = 0.0_dp
+      call run_case(self, 'memory in the drive', 1e-8_dp)
+      largest = maxval(hypot(self%tx - tx, self%ty - ty))/maxval(hypot(tx, ty))
+      call check_that(largest < 1e-6_dp, 'memory: the two ways agree')
+      call end_case(self)
+   end subroutine test_memory
+
+   !> A block dragged over a moving pressure in small steps, from rest into full slip and back: each step
+   !> proved, and the total traction of full slip, without slope, mu times the load.
+   subroutine test_slide()
+      type(case_type) :: self
+      real(dp), parameter :: mu = 0.5_dp, step = 0.02_dp
+      integer :: k
+      integer :: iterations
+
+      call new_case(self, 40, 25, 1.0_dp, 0.7_dp, boundary_periodic, 0.5_dp, 1.2_dp)
+      call set_rough(self, 6, 0.1_dp, -0.3_dp)
+      self%law = new_friction_law('coulomb', mu, 0.0_dp, 0.0_dp, .false., .true.)
+      self%solver%tolerance = 1e-8_dp
+      self%solver%slip_scale = step
+      iterations = 0
+      do k = 1, 60
+         self%p = cshift(self%p, -1, 1)
+         self%drive_x = self%drive_x + merge(step, -step, k <= 50)
+         where (self%contact /= contact_slip) self%contact = contact_stick
+         call self%solver%solve(self%operator, self%law, self%p, self%hx, self%hy, self%drive_x, &
+            self%drive_y, self%contact, self%tx, self%ty, self%rx, self%ry, self%result)
+         call check_that(self%result%converged, 'slide: converged')
+         call prove(self, 'slide', 1e-7_dp)
+         iterations = iterations + self%result%iterations
+         self%drive_x = self%drive_x - self%rx
+         self%drive_y = self%drive_y - self%ry
+         if (k == 50) then
+            call check_that(count(self%contact == contact_stick) == 0, 'slide: all slips')
+            call check_close(sum(self%tx)/sum(self%p), mu, 1e-3_dp*mu, 'slide: mu')
+         end if
+      end do
+      call check_that(any(self%contact == contact_stick), 'slide: sticks after the turn')
+      call check_that(sum(self%tx) < mu*sum(self%p), 'slide: unloads after the turn')
+      call check_that(iterations < 60*40, 'slide: iterations')
+      call end_case(self)
+   end subroutine test_slide
+
+   !> One thread and two give the same: FFTW may plan anew, so to round-off.
+   subroutine test_threads()
+      type(case_type) :: self
+      real(dp), allocatable :: tx(:, :)
+      integer :: k, threads
+
+      threads = thread_count()
+      do k = 1, 2
+         call set_threads(k)
+         call new_case(self, 160, 120, 1.0_dp, 0.8_dp, boundary_periodic, 0.5_dp, 0.3_dp)
+         call set_rough(self, 12, 0.1_dp, 0.4_dp)
+         self%law = new_friction_law('coulomb', 0.3_dp, 0.0_dp, 0.0_dp, .true., .true.)
+         self%drive_x = 0.03_dp
+         self%solver%tolerance = 1e-6_dp
+         call run_case(self, 'threads', 1e-5_dp)
+         if (k == 1) then
+            tx = self%tx
+         else
+            call check_that(maxval(abs(self%tx - tx)) <= 1e-9_dp*maxval(abs(tx)), &
+               'the same for one thread and two')
+         end if
+         call end_case(self)
+      end do
+      call set_threads(threads)
+   end subroutine test_threads
 
 end module test_friction_cg
