@@ -8,7 +8,7 @@ module history_row
 
    public :: column_type, history_columns, history_row_type, row_values, row_from_values
 
-   integer, parameter, public :: column_count = 31     !! number of columns
+   integer, parameter, public :: column_count = 32     !! number of columns
 
    !> What a column holds.
    type :: column_type
@@ -33,6 +33,7 @@ module history_row
       real(dp) :: traction_x = 0.0_dp       !! mean tangential traction on the rubber along x, Pa
       real(dp) :: traction_y = 0.0_dp       !! mean tangential traction on the rubber along y, Pa
       real(dp) :: stick_area = 0.0_dp       !! fraction of the grid that sticks
+      real(dp) :: sliding_speed = 0.0_dp    !! speed of the road over the rubber, m/s
       real(dp) :: friction_viscous = 0.0_dp !! -mean(P dH/ds)/mean(P) along the road's velocity
       real(dp) :: friction = 0.0_dp         !! apparent friction coefficient along the road's velocity
       real(dp) :: work_normal = 0.0_dp      !! work of the normal traction, with the change of the adhesive energy, J
@@ -75,10 +76,12 @@ contains
          column_type('traction_y', 'Pa', &
             'mean tangential traction on the rubber along y', .false.), &
          column_type('stick_area', '1', 'fraction of the grid that sticks', .false.), &
+         column_type('sliding_speed', 'm/s', &
+            'mean speed of the road over the rubber''s surface along the road''s velocity', .false.), &
          column_type('friction_viscous', '1', &
-            "-mean(P dH/ds)/mean(P) along the road's velocity", .false.), &
+            '-mean(P dH/ds)/mean(P) along the road''s velocity', .false.), &
          column_type('friction', '1', &
-            "apparent friction coefficient along the road's velocity", .false.), &
+            'apparent friction coefficient along the road''s velocity', .false.), &
          column_type('work_normal', 'J', &
             'work of the normal traction, with the change of the adhesive energy', .false.), &
          column_type('work_tangential', 'J', &
@@ -91,9 +94,9 @@ contains
          column_type('energy_adhesive', 'J', 'energy of adhesion', .false.), &
          column_type('energy_kinetic', 'J', 'kinetic energy of the interface', .false.), &
          column_type('dissipated_viscous', 'J', &
-            "energy lost in the rubber, the scheme's own loss included", .false.), &
+            'energy lost in the rubber, the scheme''s own loss included', .false.), &
          column_type('dissipated_numerical', 'J', &
-            "the part of the lost energy that is the scheme's own", .false.), &
+            'the part of the lost energy that is the scheme''s own', .false.), &
          column_type('dissipated_friction', 'J', &
             'energy lost by friction in the interface', .false.), &
          column_type('iterations_normal', '1', 'iterations of the normal solver', .true.), &
@@ -124,24 +127,25 @@ contains
       values(11) = row%traction_x
       values(12) = row%traction_y
       values(13) = row%stick_area
-      values(14) = row%friction_viscous
-      values(15) = row%friction
-      values(16) = row%work_normal
-      values(17) = row%work_tangential
-      values(18) = row%work_load
-      values(19) = row%work_drive
-      values(20) = row%energy_elastic
-      values(21) = row%energy_adhesive
-      values(22) = row%energy_kinetic
-      values(23) = row%dissipated_viscous
-      values(24) = row%dissipated_numerical
-      values(25) = row%dissipated_friction
-      values(26) = real(row%iterations_normal, dp)
-      values(27) = real(row%iterations_tangential, dp)
-      values(28) = row%residual_normal
-      values(29) = row%residual_tangential
-      values(30) = row%ffts
-      values(31) = row%seconds
+      values(14) = row%sliding_speed
+      values(15) = row%friction_viscous
+      values(16) = row%friction
+      values(17) = row%work_normal
+      values(18) = row%work_tangential
+      values(19) = row%work_load
+      values(20) = row%work_drive
+      values(21) = row%energy_elastic
+      values(22) = row%energy_adhesive
+      values(23) = row%energy_kinetic
+      values(24) = row%dissipated_viscous
+      values(25) = row%dissipated_numerical
+      values(26) = row%dissipated_friction
+      values(27) = real(row%iterations_normal, dp)
+      values(28) = real(row%iterations_tangential, dp)
+      values(29) = row%residual_normal
+      values(30) = row%residual_tangential
+      values(31) = row%ffts
+      values(32) = row%seconds
    end function row_values
 
    !> The row that `row_values` made into an array.
@@ -162,24 +166,25 @@ contains
       row%traction_x = values(11)
       row%traction_y = values(12)
       row%stick_area = values(13)
-      row%friction_viscous = values(14)
-      row%friction = values(15)
-      row%work_normal = values(16)
-      row%work_tangential = values(17)
-      row%work_load = values(18)
-      row%work_drive = values(19)
-      row%energy_elastic = values(20)
-      row%energy_adhesive = values(21)
-      row%energy_kinetic = values(22)
-      row%dissipated_viscous = values(23)
-      row%dissipated_numerical = values(24)
-      row%dissipated_friction = values(25)
-      row%iterations_normal = nint(values(26))
-      row%iterations_tangential = nint(values(27))
-      row%residual_normal = values(28)
-      row%residual_tangential = values(29)
-      row%ffts = values(30)
-      row%seconds = values(31)
+      row%sliding_speed = values(14)
+      row%friction_viscous = values(15)
+      row%friction = values(16)
+      row%work_normal = values(17)
+      row%work_tangential = values(18)
+      row%work_load = values(19)
+      row%work_drive = values(20)
+      row%energy_elastic = values(21)
+      row%energy_adhesive = values(22)
+      row%energy_kinetic = values(23)
+      row%dissipated_viscous = values(24)
+      row%dissipated_numerical = values(25)
+      row%dissipated_friction = values(26)
+      row%iterations_normal = nint(values(27))
+      row%iterations_tangential = nint(values(28))
+      row%residual_normal = values(29)
+      row%residual_tangential = values(30)
+      row%ffts = values(31)
+      row%seconds = values(32)
    end function row_from_values
 
 end module history_row

@@ -15,9 +15,8 @@ contains
       type(case_type), intent(in) :: case
       type(faults_type), intent(inout) :: faults
 
-      associate (a => case%adhesion, f => case%friction)
+      associate (a => case%adhesion)
          call missing(a%potential /= 'none', '&adhesion: potential = '//trim(a%potential), 'adhesion')
-         call missing(f%law /= 'none', '&friction: law = '//trim(f%law), 'friction')
          call missing(case%solver%precision == 'mixed', '&solver: precision = ''mixed''', 'mixed precision')
       end associate
 

@@ -4,13 +4,18 @@
 !> solves the contact, ends the step of the material and books the energies. Who calls it writes
 !> files or fills arrays. The state can be saved and taken up again (module simulation_state).
 !>
+!> A step with friction is made of passes (thesis, 3.5): tangential solve, heights and slopes where
+!> the rubber then is, normal solve; until the pressure settles or `passes` are done. A last tangential
+!> solve under the last pressure hands out a traction that belongs to it.
+!>
 !> Fields of doubles beside those of the normal solver: H, P, gap, U; with sliding the original map and
-!> the two slopes; with Prony arms the history (S, S - S_old and one field an arm) and its traction.
+!> the two slopes; with Prony arms the history (S, S - S_old and one field an arm) and its traction; with
+!> friction those of module tangential_state and the pressure of the pass before.
 module simulation
    use case_settings, only : case_type
    use errors, only : error_type
    use history_row, only : history_row_type
-   use interpolation, only : interpolation_type, new_interpolation, shifted
+   use interpolation, only : displaced, interpolation_type, new_interpolation, shifted
    use normal_cg, only : new_normal_solver, normal_solver_type
    use normal_cg_thesis, only : solve_normal_thesis
    use normal_state, only : control_approach, control_pressure, normal_problem_type, rms_about_mean
@@ -20,6 +25,7 @@ module simulation
    use schedule, only : next_row, planned_row_type, schedule_type
    use solver_result, only : solver_result_type
    use surface, only : new_height
+   use tangential_state, only : new_tangential_state, tangential_state_type
    use viscoelastic_energy, only : book_step, energy_books_type, new_books
    use zener, only : commit_history, destroy_history, finish_step, history_field, history_type, &
       is_elastic, new_history, new_products, new_zener, products_type, restart_order, start_jump, &
@@ -34,7 +40,6 @@ module simulation
       type(case_type) :: case
       type(grid_type) :: grid
       type(schedule_type) :: schedule
-      type(planned_row_type) :: plan                !! of the last row
       type(history_row_type) :: row                 !! the last row
       logical :: converged = .true.                 !! the last row's solvers met the tolerance
       logical :: finished = .false.                 !! no row is left
@@ -50,8 +55,14 @@ module simulation
       real(dp) :: summit = 0.0_dp                   !! highest point of the original map, m
       real(dp) :: direction(2) = 0.0_dp             !! of the road's last motion
       real(dp) :: drive_force(2) = 0.0_dp           !! horizontal force on the rubber, N
+      real(dp) :: velocity(2) = 0.0_dp              !! of the road in the last step, m/s
+      real(dp) :: drifted(2) = 0.0_dp               !! sum of the expected motions of the surface, m
+      integer :: moved_cells(2) = 0                 !! by which P has been shifted so far
       type(interpolation_type), private :: road
+      logical :: frictional = .false.               !! there is a friction law, and the road moves
+      type(tangential_state_type) :: tangential
       logical, private :: slides = .false.          !! some phase moves the road
+      real(dp), allocatable, private :: settled(:, :)   !! pressure of the pass before, Pa
       logical, private :: edge_reported = .false.
       type(normal_solver_type), private :: normal
       real(dp), allocatable, private :: slope_x(:, :), slope_y(:, :)
@@ -101,6 +112,10 @@ contains
          allocate (self%slope_x(nx, ny), self%slope_y(nx, ny))
          call self%place_road(0.0_dp, 0.0_dp)
       end if
+      self%frictional = self%slides .and. case%friction%law /= 'none'
+      if (.not. self%frictional) return
+      call new_tangential_state(self%tangential, case, self%material, error)
+      allocate (self%settled(nx, ny), source=0.0_dp)
    end subroutine new_simulation
 
    !> Do the next row. Where the solvers did not converge, the state reached is kept.
@@ -108,8 +123,7 @@ contains
       class(simulation_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
       type(planned_row_type) :: plan
-      type(solver_result_type) :: outcome
-      type(products_type) :: products
+      type(solver_result_type) :: outcome, rubbing
       real(dp) :: level
       integer(int64) :: start, now, rate
 
@@ -118,19 +132,99 @@ contains
       if (self%finished) return
       call begin_step(self, plan, error)
       if (allocated(error)) return
+      call system_clock(start, rate)
+      if (.not. is_elastic(self%material)) call history_field(self%history, self%material, self%past)
+      if (self%frictional) call self%tangential%begin(self%material, &
+         [plan%road_x - self%row%road_x, plan%road_y - self%row%road_y], plan%dt)
       call move_road(self, plan)
 
-      call system_clock(start, rate)
-      if (.not. is_elastic(self%material)) then
-         call history_field(self%history, self%material, self%past)
-         call solve_normal(self, plan, outcome, level, self%past)
-      else
+      rubbing%converged = .true.
+      if (.not. rubs(self)) then
          call solve_normal(self, plan, outcome, level)
+      else if (plan%instantaneous) then
+         call solve_normal(self, plan, outcome, level)
+         call self%tangential%return_to_bound(self%pressure, self%slope_x, self%slope_y)
+      else
+         call coupled_passes(self, plan, outcome, rubbing, level)
       end if
+      self%converged = outcome%converged .and. rubbing%converged
+      self%reason = outcome%reason
+      if (outcome%converged) self%reason = 'friction: '//rubbing%reason
+
+      call commit_step(self, level)
       call system_clock(now)
       outcome%seconds = real(now - start, dp)/real(rate, dp)
-      self%converged = outcome%converged
-      self%reason = outcome%reason
+      call fill_row(self, plan, outcome, rubbing, level)
+      self%finished = self%schedule%phase > size(self%case%phases)
+   end subroutine advance
+
+   !> Does friction act yet?
+   pure function rubs(self) result(yes)
+      type(simulation_type), intent(in) :: self
+      logical :: yes
+
+      yes = .false.
+      if (self%frictional) yes = self%tangential%moved
+   end function rubs
+
+   !> The passes of a step with friction.
+   subroutine coupled_passes(self, plan, outcome, rubbing, level)
+      type(simulation_type), intent(inout) :: self
+      type(planned_row_type), intent(in) :: plan
+      type(solver_result_type), intent(out) :: outcome   !! of the normal solves together
+      type(solver_result_type), intent(out) :: rubbing   !! of the tangential solves together
+      real(dp), intent(out) :: level
+      type(solver_result_type) :: part
+      integer :: pass
+
+      do pass = 1, self%case%solver%passes
+         call self%tangential%solve(self%pressure, self%slope_x, self%slope_y, part)
+         call add_result(rubbing, part)
+         call displaced(self%road, plan%road_x, plan%road_y, self%tangential%trial(:, :, 1), &
+            self%tangential%trial(:, :, 2), self%height, self%slope_x, self%slope_y)
+         self%settled(:, :) = self%pressure
+         call solve_normal(self, plan, part, level)
+         call add_result(outcome, part)
+         if (.not. part%converged) exit
+         if (unsettled(self) <= self%case%solver%tolerance) exit
+      end do
+      call self%tangential%solve(self%pressure, self%slope_x, self%slope_y, part)
+      call add_result(rubbing, part)
+   end subroutine coupled_passes
+
+   !> Add the record of a solve to that of the step: the last outcome, all the work.
+   subroutine add_result(total, part)
+      type(solver_result_type), intent(inout) :: total
+      type(solver_result_type), intent(in) :: part
+      type(solver_result_type) :: before
+
+      before = total
+      total = part
+      total%iterations = before%iterations + part%iterations
+      total%ffts = before%ffts + part%ffts
+   end subroutine add_result
+
+   !> By how much a pass changed the pressure, over the pressure.
+   function unsettled(self) result(change)
+      type(simulation_type), intent(in) :: self
+      real(dp) :: change
+      real(dp), allocatable :: rows(:, :)
+      integer :: j
+
+      allocate (rows(2, self%grid%ny))
+      !$omp parallel do default(none) shared(self, rows) private(j)
+      do j = 1, self%grid%ny
+         rows(1, j) = sum(abs(self%pressure(:, j) - self%settled(:, j)))
+         rows(2, j) = sum(abs(self%pressure(:, j)))
+      end do
+      change = global_sum(sum(rows(1, :)))/max(global_sum(sum(rows(2, :))), tiny(1.0_dp))
+   end function unsettled
+
+   !> End the step: histories and energies of both directions.
+   subroutine commit_step(self, level)
+      type(simulation_type), intent(inout) :: self
+      real(dp), intent(in) :: level
+      type(products_type) :: products
 
       products = new_products(self%material)
       call new_displacement(self, level)
@@ -138,12 +232,10 @@ contains
          self%normal%step, products)
       self%displacement(:, :) = self%normal%step
       call book_step(self%books, self%material, products)
+      if (self%frictional) &
+         call self%tangential%commit(self%material, self%pressure, self%slope_x, self%slope_y)
       call finish_step(self%material)
-
-      call fill_row(self, plan, outcome, level)
-      self%plan = plan
-      self%finished = self%schedule%phase > size(self%case%phases)
-   end subroutine advance
+   end subroutine commit_step
 
    !> The material's coefficients for the step.
    subroutine begin_step(self, plan, error)
@@ -165,15 +257,39 @@ contains
    subroutine move_road(self, plan)
       type(simulation_type), intent(inout) :: self
       type(planned_row_type), intent(in) :: plan
-      integer :: cells_x, cells_y
+      integer :: cells(2), c
+      real(dp) :: drift(2), seen(2)
 
       if (abs(plan%velocity_x) > 0.0_dp .or. abs(plan%velocity_y) > 0.0_dp) &
          self%direction = [plan%velocity_x, plan%velocity_y]/hypot(plan%velocity_x, plan%velocity_y)
       if (.not. self%slides) return
-      cells_x = nint(plan%road_x/self%grid%dx) - nint(self%row%road_x/self%grid%dx)
-      cells_y = nint(plan%road_y/self%grid%dy) - nint(self%row%road_y/self%grid%dy)
-      if (cells_x /= 0 .or. cells_y /= 0) call shift_field(self, cells_x, cells_y, self%pressure)
-      call self%place_road(plan%road_x, plan%road_y)
+      drift = 0.0_dp
+      if (rubs(self)) then
+         ! The surface is expected to move on as in the step before; where the road starts, with it.
+         drift = self%tangential%rate*plan%dt
+         if (plan%new_speed .and. .not. any(abs(self%velocity) > 0.0_dp)) &
+            drift = [plan%velocity_x, plan%velocity_y]*plan%dt
+      end if
+      self%velocity = [plan%velocity_x, plan%velocity_y]
+      self%drifted = self%drifted + drift
+      seen = [plan%road_x, plan%road_y] - self%drifted
+      cells = nint(seen/[self%grid%dx, self%grid%dy])
+      if (any(cells /= self%moved_cells)) then
+         call shift_field(self, cells - self%moved_cells, self%pressure)
+         if (rubs(self)) then
+            do c = 1, 2
+               call shift_field(self, cells - self%moved_cells, self%tangential%traction(:, :, c))
+            end do
+         end if
+         self%moved_cells = cells
+      end if
+      if (rubs(self)) then
+         call displaced(self%road, plan%road_x - drift(1), plan%road_y - drift(2), &
+            self%tangential%displacement(:, :, 1), self%tangential%displacement(:, :, 2), self%height, &
+            self%slope_x, self%slope_y)
+      else
+         call self%place_road(plan%road_x, plan%road_y)
+      end if
    end subroutine move_road
 
    !> Heights and slopes of the road at a displacement.
@@ -185,20 +301,20 @@ contains
    end subroutine place_road
 
    !> Shift a field by whole cells; what enters a free map is zero.
-   subroutine shift_field(self, cells_x, cells_y, field)
+   subroutine shift_field(self, cells, field)
       type(simulation_type), intent(inout) :: self
-      integer, intent(in) :: cells_x, cells_y
+      integer, intent(in) :: cells(2)
       real(dp), intent(inout) :: field(:, :)
       integer :: i, j, from_i, from_j
       logical :: free
 
       free = self%grid%boundary == boundary_free
-      !$omp parallel do default(none) shared(self, field, cells_x, cells_y, free) &
+      !$omp parallel do default(none) shared(self, field, cells, free) &
       !$omp private(i, j, from_i, from_j)
       do j = 1, self%grid%ny
-         from_j = j - cells_y
+         from_j = j - cells(2)
          do i = 1, self%grid%nx
-            from_i = i - cells_x
+            from_i = i - cells(1)
             if (.not. free) then
                self%normal%step(i, j) = field(modulo(from_i - 1, self%grid%nx) + 1, &
                   modulo(from_j - 1, self%grid%ny) + 1)
@@ -214,12 +330,11 @@ contains
    end subroutine shift_field
 
    !> Solve the normal contact under the row's load.
-   subroutine solve_normal(self, plan, outcome, level, past)
+   subroutine solve_normal(self, plan, outcome, level)
       type(simulation_type), intent(inout) :: self
       type(planned_row_type), intent(in) :: plan
       type(solver_result_type), intent(out) :: outcome
       real(dp), intent(out) :: level
-      real(dp), intent(in), optional :: past(:, :)
       type(normal_problem_type) :: problem
 
       problem%modulus = self%material%q
@@ -240,9 +355,10 @@ contains
       end select
       if (self%case%solver%method == 'thesis') then
          call solve_normal_thesis(self%grid, self%normal%operator, problem, self%height, &
-            self%pressure, self%gap, level, outcome, past)
+            self%pressure, self%gap, level, outcome, self%past)
       else
-         call self%normal%solve(problem, self%height, self%pressure, self%gap, level, outcome, past)
+         ! Not allocated, where there are no arms, is not present.
+         call self%normal%solve(problem, self%height, self%pressure, self%gap, level, outcome, self%past)
       end if
    end subroutine solve_normal
 
@@ -259,14 +375,14 @@ contains
    end subroutine new_displacement
 
    !> The row of the history.
-   subroutine fill_row(self, plan, outcome, level)
+   subroutine fill_row(self, plan, outcome, rubbing, level)
       type(simulation_type), intent(inout) :: self
       type(planned_row_type), intent(in) :: plan
-      type(solver_result_type), intent(in) :: outcome
+      type(solver_result_type), intent(in) :: outcome, rubbing
       real(dp), intent(in) :: level
       type(history_row_type) :: row
       real(dp), allocatable :: rows(:, :)
-      real(dp) :: sums(5), cells, area
+      real(dp) :: sums(5), cells, area, force(2)
       integer :: j
 
       allocate (rows(5, self%grid%ny), source=0.0_dp)
@@ -298,45 +414,69 @@ contains
       row%friction_viscous = 0.0_dp
       if (sums(1) > 0.0_dp) &
          row%friction_viscous = -dot_product(sums(4:5), self%direction)/sums(1)
-      row%friction = row%friction_viscous
+      force = -sums(4:5)*self%grid%dx*self%grid%dy
       row%work_normal = self%books%work
       row%energy_elastic = self%books%stored
       row%dissipated_viscous = self%books%dissipated
       row%dissipated_numerical = self%books%numerical
+      if (self%frictional) call add_friction(self, plan, rubbing, force, row)
+      row%friction = 0.0_dp
+      if (abs(row%force) > 0.0_dp) row%friction = dot_product(force, self%direction)/row%force
       if (plan%instantaneous) then
          ! The path of a jump is not known: its work is what it stores.
-         row%work_load = self%row%work_load + row%work_normal - self%row%work_normal
+         row%work_load = self%row%work_load + row%work_normal - self%row%work_normal &
+            + row%work_tangential - self%row%work_tangential
       else
          row%work_load = self%row%work_load + 0.5_dp*(row%force + self%row%force) &
             *(row%displacement - self%row%displacement)
       end if
       row%iterations_normal = outcome%iterations
       row%residual_normal = outcome%residual
-      row%ffts = real(outcome%ffts, dp)
+      row%ffts = real(outcome%ffts + rubbing%ffts, dp)
       row%seconds = outcome%seconds
-      call book_drive(self, sums(4:5)*self%grid%dx*self%grid%dy, row)
+      row%work_drive = self%row%work_drive &
+         + 0.5_dp*(force(1) + self%drive_force(1))*(row%road_x - self%row%road_x) &
+         + 0.5_dp*(force(2) + self%drive_force(2))*(row%road_y - self%row%road_y)
+      self%drive_force = force
       self%row = row
    end subroutine fill_row
 
-   !> Work of the road's motion: the horizontal force on the rubber times the displacement.
-   subroutine book_drive(self, slope_force, row)
-      type(simulation_type), intent(inout) :: self
-      real(dp), intent(in) :: slope_force(2)        !! sum of P grad H over the cells, N
+   !> The part of friction in a row, and the whole horizontal force. With slope it is the sum of T,
+   !> which holds -P grad H; without, both are added.
+   subroutine add_friction(self, plan, rubbing, force, row)
+      type(simulation_type), intent(in) :: self
+      type(planned_row_type), intent(in) :: plan
+      type(solver_result_type), intent(in) :: rubbing
+      real(dp), intent(inout) :: force(2)           !! in: sum of -P grad H; out: all of it, N
       type(history_row_type), intent(inout) :: row
-      real(dp) :: force(2)
+      real(dp) :: traction(2), slip(2)
 
-      force = -slope_force
-      row%work_drive = self%row%work_drive + 0.5_dp*( &
-         (force(1) + self%drive_force(1))*(row%road_x - self%row%road_x) &
-         + (force(2) + self%drive_force(2))*(row%road_y - self%row%road_y))
-      self%drive_force = force
-   end subroutine book_drive
+      call self%tangential%sums(traction, row%stick_area, slip)
+      row%traction_x = traction(1)
+      row%traction_y = traction(2)
+      if (self%tangential%law%slope .and. self%tangential%moved) force = 0.0_dp
+      force = force + traction*self%grid%lx*self%grid%ly
+      row%sliding_speed = 0.0_dp
+      if (plan%dt > 0.0_dp) row%sliding_speed = dot_product(slip, self%direction)/plan%dt
+      row%work_tangential = self%tangential%books%work + self%tangential%work_mass &
+         + self%tangential%lost_friction
+      row%energy_elastic = row%energy_elastic + self%tangential%books%stored
+      row%energy_kinetic = self%tangential%kinetic()
+      row%dissipated_viscous = row%dissipated_viscous + self%tangential%books%dissipated &
+         + self%tangential%lost_mass
+      row%dissipated_numerical = row%dissipated_numerical + self%tangential%books%numerical &
+         + self%tangential%lost_mass
+      row%dissipated_friction = self%tangential%lost_friction
+      row%iterations_tangential = rubbing%iterations
+      row%residual_tangential = rubbing%residual
+   end subroutine add_friction
 
    !> A field of the state by its name in the result.
    subroutine field(self, name, values)
       class(simulation_type), intent(in) :: self
-      character(*), intent(in) :: name              !! 'pressure', 'gap' or 'displacement_z'
+      character(*), intent(in) :: name              !! as in /snapshots; the last two parts with friction
       real(dp), allocatable, intent(out) :: values(:, :)
+      integer :: c
 
       select case (name)
       case ('pressure')
@@ -345,6 +485,13 @@ contains
          values = self%gap
       case ('displacement_z')
          values = self%displacement
+      case default
+         allocate (values(self%grid%nx, self%grid%ny), source=0.0_dp)
+         if (.not. self%frictional) return
+         c = merge(1, 2, index(name, '_x') > 0)
+         if (index(name, 'traction') == 1) values = self%tangential%traction(:, :, c)
+         if (index(name, 'displacement') == 1) values = self%tangential%displacement(:, :, c)
+         if (index(name, 'slip') == 1) values = self%tangential%slip(:, :, c)
       end select
    end subroutine field
 
@@ -354,6 +501,10 @@ contains
       integer(int8), allocatable, intent(out) :: states(:, :)
       integer :: j
 
+      if (rubs(self)) then
+         states = self%tangential%contact
+         return
+      end if
       allocate (states(self%grid%nx, self%grid%ny))
       do j = 1, self%grid%ny
          states(:, j) = merge(2_int8, 0_int8, self%pressure(:, j) > 0.0_dp)
@@ -366,6 +517,7 @@ contains
 
       call self%normal%destroy()
       call destroy_history(self%history)
+      if (self%frictional) call self%tangential%destroy()
    end subroutine destroy
 
 end module simulation

@@ -32,7 +32,8 @@ contains
       end associate
       call writer%put('row', row_values(sim%row), '1', error)
       if (allocated(error)) return
-      call writer%put('motion', [sim%direction, sim%drive_force], '1', error)
+      call writer%put('motion', [sim%direction, sim%drive_force, sim%velocity, sim%drifted, &
+         real(sim%moved_cells, dp)], '1', error)
       if (allocated(error)) return
       call writer%put('pressure', sim%pressure, 'Pa', error)
       if (allocated(error)) return
@@ -41,6 +42,8 @@ contains
       call writer%put('displacement_z', sim%displacement, 'm', error)
       if (allocated(error)) return
       call writer%put('books', books_values(sim%books), 'J', error)
+      if (allocated(error)) return
+      if (sim%frictional) call save_tangential(sim, writer, error)
       if (allocated(error)) return
       if (is_elastic(sim%material)) return
       call writer%put('dt_old', sim%material%dt_old, error)
@@ -57,7 +60,7 @@ contains
       type(simulation_type), intent(inout) :: sim
       type(checkpoint_reader_type), intent(inout) :: reader
       type(error_type), allocatable, intent(out) :: error
-      real(dp) :: numbers(schedule_values), row(column_count), motion(4)
+      real(dp) :: numbers(schedule_values), row(column_count), motion(10)
       real(dp), allocatable :: books(:)
       character(:), allocatable :: control
 
@@ -86,6 +89,9 @@ contains
       if (allocated(error)) return
       sim%direction = motion(1:2)
       sim%drive_force = motion(3:4)
+      sim%velocity = motion(5:6)
+      sim%drifted = motion(7:8)
+      sim%moved_cells = nint(motion(9:10))
       call reader%get('pressure', sim%pressure, error)
       if (allocated(error)) return
       call reader%get('gap', sim%gap, error)
@@ -96,6 +102,8 @@ contains
       call reader%get('books', books, error)
       if (allocated(error)) return
       sim%books = books_from_values(books)
+      if (sim%frictional) call load_tangential(sim, reader, error)
+      if (allocated(error)) return
       if (.not. is_elastic(sim%material)) then
          call reader%get('dt_old', sim%material%dt_old, error)
          if (allocated(error)) return
@@ -109,5 +117,63 @@ contains
       call sim%place_road(sim%row%road_x, sim%row%road_y)
       sim%finished = sim%schedule%phase > size(sim%case%phases)
    end subroutine load_state
+
+   !> The tangential part of the state.
+   subroutine save_tangential(sim, writer, error)
+      type(simulation_type), intent(in) :: sim
+      type(checkpoint_writer_type), intent(inout) :: writer
+      type(error_type), allocatable, intent(out) :: error
+
+      associate (t => sim%tangential)
+         call writer%put('tangential', [merge(1.0_dp, 0.0_dp, t%moved), t%speed, t%rate, t%work_mass, &
+            t%lost_mass, t%lost_friction], '1', error)
+         if (allocated(error)) return
+         call writer%put('traction', t%traction, 'Pa', error)
+         if (allocated(error)) return
+         call writer%put('displacement', t%displacement, 'm', error)
+         if (allocated(error)) return
+         call writer%put('tangential_books', books_values(t%books), 'J', error)
+         if (allocated(error) .or. is_elastic(sim%material)) return
+         call writer%put('tangential_s', t%history%s, 'Pa', error)
+         if (allocated(error)) return
+         if (size(t%history%ds) > 0) call writer%put('tangential_ds', t%history%ds, 'Pa', error)
+         if (allocated(error)) return
+         call writer%put('tangential_arm', t%history%arm, 'Pa', error)
+      end associate
+   end subroutine save_tangential
+
+   !> The same from a checkpoint.
+   subroutine load_tangential(sim, reader, error)
+      type(simulation_type), intent(inout) :: sim
+      type(checkpoint_reader_type), intent(inout) :: reader
+      type(error_type), allocatable, intent(out) :: error
+      real(dp) :: numbers(8)
+      real(dp), allocatable :: books(:)
+
+      associate (t => sim%tangential)
+         call reader%get('tangential', numbers, error)
+         if (allocated(error)) return
+         t%moved = numbers(1) > 0.5_dp
+         t%speed = numbers(2:3)
+         t%rate = numbers(4:5)
+         t%work_mass = numbers(6)
+         t%lost_mass = numbers(7)
+         t%lost_friction = numbers(8)
+         call reader%get('traction', t%traction, error)
+         if (allocated(error)) return
+         call reader%get('displacement', t%displacement, error)
+         if (allocated(error)) return
+         allocate (books, source=books_values(t%books))
+         call reader%get('tangential_books', books, error)
+         if (allocated(error)) return
+         t%books = books_from_values(books)
+         if (is_elastic(sim%material)) return
+         call reader%get('tangential_s', t%history%s, error)
+         if (allocated(error)) return
+         if (size(t%history%ds) > 0) call reader%get('tangential_ds', t%history%ds, error)
+         if (allocated(error)) return
+         call reader%get('tangential_arm', t%history%arm, error)
+      end associate
+   end subroutine load_tangential
 
 end module simulation_state

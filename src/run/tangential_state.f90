@@ -1,0 +1,337 @@
+!> The tangential side of the step loop: tractions, displacements and slip of a rubber block that is
+!> driven over a road, with the block's viscoelasticity and the inertia of its mean motion.
+!>
+!> Slip of a step: r = DX - U', DX = U + (D' - D), U' = A(T + T_h)/Q with the traction T_h of the
+!> history. The solver works with Q r = DX' - A T, DX' = Q DX - A T_h. The mean mode of a block of
+!> thickness h and mass m an area follows backward Euler (thesis, eq. 3.18, 3.19):
+!>
+!>    (Q + h m/dt^2) U' = h (T + T_h) + h m ((U - dU_top)/dt^2 + v/dt),    v' = (U' - U + dU_top)/dt
+!>
+!> with v the speed of the interface over the road, dU_top = -(D' - D) the motion of the block's top
+!> against it. What of the mean traction moves the mass does not strain the rubber.
+!>
+!> Fields of doubles, two components each: T, U, the trial U', slip, DX', T_h; those of the solver; the
+!> history (S, S - S_old, one field an arm).
+module tangential_state
+   use case_settings, only : case_type
+   use errors, only : error_type
+   use fft_conv, only : convolution_type, new_tangential_operator
+   use friction_cg, only : friction_fast, friction_solver_type, friction_thesis, new_friction_solver, &
+      set_mean_compliance
+   use friction_law, only : friction_law_type, new_friction_law, return_tractions
+   use parallel, only : global_sum
+   use precision, only : dp, int64, int8
+   use regular_grid, only : boundary_periodic, grid_type
+   use solver_result, only : solver_result_type
+   use viscoelastic_energy, only : book_step, energy_books_type, new_books
+   use zener, only : commit_history, destroy_history, history_field, history_type, is_elastic, &
+      new_history, new_products, products_type, zener_type
+   implicit none
+   private
+
+   public :: new_tangential_state, tangential_state_type
+
+   !> The tangential state of a run. Not to be copied.
+   type :: tangential_state_type
+      type(grid_type) :: grid
+      type(friction_law_type) :: law
+      logical :: moved = .false.                      !! the road has moved: friction acts
+      real(dp) :: thickness = 0.0_dp                  !! h, m
+      real(dp) :: mass = 0.0_dp                       !! m, kg/m2
+      real(dp), allocatable :: traction(:, :, :)      !! T, Pa [nx, ny, 2]
+      real(dp), allocatable :: displacement(:, :, :)  !! U_T, m
+      real(dp), allocatable :: trial(:, :, :)         !! U_T of the step in hand, m
+      real(dp), allocatable :: slip(:, :, :)          !! of the step, m
+      integer(int8), allocatable :: contact(:, :)     !! 0 open, 1 stick, 2 slip
+      type(history_type) :: history
+      type(energy_books_type) :: books                !! of the strain of the rubber
+      real(dp) :: speed(2) = 0.0_dp                   !! v, m/s
+      real(dp) :: rate(2) = 0.0_dp                    !! mean speed of the surface in the contact, m/s
+      real(dp) :: work_mass = 0.0_dp                  !! done on the mass, J
+      real(dp) :: lost_mass = 0.0_dp                  !! by backward Euler in its motion, J
+      real(dp) :: lost_friction = 0.0_dp              !! J
+      type(convolution_type), private :: operator
+      type(friction_solver_type), private :: solver
+      real(dp), allocatable, private :: drive(:, :, :)    !! DX'
+      real(dp), allocatable, private :: past(:, :, :)     !! T_h
+      real(dp), private :: motion(2) = 0.0_dp             !! D' - D of the step in hand, m
+      real(dp), private :: dt = 0.0_dp
+      real(dp), private :: q = 0.0_dp
+      real(dp), private :: past_mean(2) = 0.0_dp
+   contains
+      procedure :: begin
+      procedure :: solve
+      procedure :: return_to_bound
+      procedure :: commit
+      procedure :: kinetic
+      procedure :: sums
+      procedure :: destroy
+   end type tangential_state_type
+
+contains
+
+   !> Prepare the operator, the solver and fields at rest.
+   subroutine new_tangential_state(self, case, material, error)
+      type(tangential_state_type), intent(out) :: self
+      type(case_type), intent(in) :: case
+      type(zener_type), intent(in) :: material
+      type(error_type), allocatable, intent(out) :: error
+      real(dp) :: adhesive
+      integer :: nx, ny
+
+      self%grid = case%grid
+      nx = self%grid%nx
+      ny = self%grid%ny
+      adhesive = 0.0_dp
+      if (case%adhesion%potential /= 'none') adhesive = case%adhesion%energy/case%adhesion%range
+      self%law = new_friction_law(trim(case%friction%law), case%friction%coefficient, &
+         case%friction%shear_strength, adhesive, case%friction%slope_effect, &
+         case%solver%slip_law == 'physical')
+      self%thickness = case%material%thickness
+      self%mass = 0.5_dp*case%material%density*case%material%thickness
+      call new_tangential_operator(self%operator, self%grid, case%material%poisson, self%thickness, &
+         error)
+      if (allocated(error)) return
+      call new_friction_solver(self%solver, self%grid, case%material%poisson, self%operator, error)
+      if (allocated(error)) return
+      self%solver%method = merge(friction_thesis, friction_fast, case%solver%method == 'thesis')
+      self%solver%tolerance = case%solver%tolerance
+      self%solver%max_iterations = case%solver%max_iterations
+      allocate (self%traction(nx, ny, 2), source=0.0_dp)
+      allocate (self%displacement, self%trial, self%slip, self%drive, self%past, source=self%traction)
+      allocate (self%contact(nx, ny), source=0_int8)
+      call new_history(self%history, material, nx*ny, 2, error)
+      if (allocated(error)) return
+      call new_books(self%books, material, self%grid%dx*self%grid%dy)
+   end subroutine new_tangential_state
+
+   !> Begin a step: what the road's motion and the past ask for. The material's step has begun.
+   subroutine begin(self, material, motion, dt)
+      class(tangential_state_type), intent(inout) :: self
+      type(zener_type), intent(in) :: material
+      real(dp), intent(in) :: motion(2)               !! D' - D, m
+      real(dp), intent(in) :: dt                      !! s; 0: instantaneous
+      real(dp) :: stiffness, known, shift
+      integer :: c, j
+
+      self%motion = motion
+      self%dt = dt
+      self%q = material%q
+      self%moved = self%moved .or. any(abs(motion) > 0.0_dp)
+      if (.not. self%moved) return
+      call history_field(self%history, material, self%past)
+      if (is_elastic(material)) then
+         self%drive = 0.0_dp
+      else
+         call set_thickness(self, self%thickness)
+         call self%operator%apply_vector(self%past(:, :, 1), self%past(:, :, 2), self%drive(:, :, 1), &
+            self%drive(:, :, 2))
+      end if
+      self%past_mean = means(self, self%past)
+      do c = 1, 2
+         shift = self%q*motion(c)
+         if (self%mass > 0.0_dp .and. dt > 0.0_dp) then
+            stiffness = self%q + self%thickness*self%mass/dt**2
+            known = self%thickness*(self%past_mean(c) + self%mass*((mean_of(self, c) + motion(c))/dt**2 &
+               + self%speed(c)/dt))/stiffness
+            shift = shift + self%thickness*self%past_mean(c) - self%q*known
+         end if
+         !$omp parallel do default(none) shared(self, c, shift) private(j)
+         do j = 1, self%grid%ny
+            self%drive(:, j, c) = self%q*self%displacement(:, j, c) + shift - self%drive(:, j, c)
+         end do
+      end do
+      if (self%mass > 0.0_dp .and. dt > 0.0_dp) then
+         call set_thickness(self, self%q*self%thickness/(self%q + self%thickness*self%mass/dt**2))
+      else
+         call set_thickness(self, self%thickness)
+      end if
+      ! Slips far below the road's motion in the step are no slips.
+      self%solver%slip_scale = self%q*hypot(motion(1), motion(2))
+   end subroutine begin
+
+   !> The compliance of the mean mode, periodic mode only.
+   subroutine set_thickness(self, thickness)
+      type(tangential_state_type), intent(inout) :: self
+      real(dp), intent(in) :: thickness
+
+      if (self%grid%boundary == boundary_periodic) call set_mean_compliance(self%operator, thickness)
+   end subroutine set_thickness
+
+   !> Mean displacement along a direction.
+   function mean_of(self, c) result(mean)
+      type(tangential_state_type), intent(in) :: self
+      integer, intent(in) :: c
+      real(dp) :: mean
+      real(dp) :: both(2)
+
+      both = means(self, self%displacement)
+      mean = both(c)
+   end function mean_of
+
+   !> Means of a vector field over the grid.
+   function means(self, field) result(mean)
+      type(tangential_state_type), intent(in) :: self
+      real(dp), intent(in) :: field(:, :, :)
+      real(dp) :: mean(2)
+      real(dp), allocatable :: rows(:, :)
+      integer :: j
+
+      allocate (rows(2, self%grid%ny))
+      !$omp parallel do default(none) shared(self, field, rows) private(j)
+      do j = 1, self%grid%ny
+         rows(1, j) = sum(field(:, j, 1))
+         rows(2, j) = sum(field(:, j, 2))
+      end do
+      mean = global_sum([sum(rows(1, :)), sum(rows(2, :))])/(real(self%grid%nx, dp)*self%grid%ny)
+   end function means
+
+   !> Solve for the traction under a pressure: T, the trial displacement, the slip.
+   subroutine solve(self, pressure, slope_x, slope_y, outcome)
+      class(tangential_state_type), intent(inout) :: self
+      real(dp), intent(in), contiguous, target :: pressure(:, :)
+      real(dp), intent(in), contiguous, target :: slope_x(:, :), slope_y(:, :)
+      type(solver_result_type), intent(out) :: outcome
+      integer :: i, j, c
+
+      !$omp parallel do default(none) shared(self, pressure) private(i, j)
+      do j = 1, self%grid%ny
+         do i = 1, self%grid%nx
+            self%contact(i, j) = merge(1_int8, 0_int8, pressure(i, j) > 0.0_dp)
+         end do
+      end do
+      call self%solver%solve(self%operator, self%law, pressure, slope_x, slope_y, self%drive(:, :, 1), &
+         self%drive(:, :, 2), self%contact, self%traction(:, :, 1), self%traction(:, :, 2), &
+         self%slip(:, :, 1), self%slip(:, :, 2), outcome)
+      do c = 1, 2
+         !$omp parallel do default(none) shared(self, c) private(j)
+         do j = 1, self%grid%ny
+            self%slip(:, j, c) = self%slip(:, j, c)/self%q
+            self%trial(:, j, c) = self%displacement(:, j, c) + self%motion(c) - self%slip(:, j, c)
+         end do
+      end do
+   end subroutine solve
+
+   !> An instantaneous row: T stays as it is but for the bound of the new pressure, and the rubber
+   !> answers at once. A mass does not move in no time.
+   subroutine return_to_bound(self, pressure, slope_x, slope_y)
+      class(tangential_state_type), intent(inout) :: self
+      real(dp), intent(in) :: pressure(:, :)
+      real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)
+      real(dp) :: before(2), after(2)
+      integer :: i, j, c
+
+      if (.not. self%moved) return
+      !$omp parallel do default(none) shared(self, pressure) private(i, j)
+      do j = 1, self%grid%ny
+         do i = 1, self%grid%nx
+            self%contact(i, j) = merge(1_int8, 0_int8, pressure(i, j) > 0.0_dp)
+         end do
+      end do
+      call return_tractions(self%law, pressure, slope_x, slope_y, self%contact, &
+         self%traction(:, :, 1), self%traction(:, :, 2))
+      self%drive = self%traction + self%past
+      call set_thickness(self, self%thickness)
+      call self%operator%apply_vector(self%drive(:, :, 1), self%drive(:, :, 2), self%trial(:, :, 1), &
+         self%trial(:, :, 2))
+      self%trial = self%trial/self%q
+      if (self%mass > 0.0_dp) then
+         before = means(self, self%displacement)
+         after = means(self, self%trial)
+         do c = 1, 2
+            self%trial(:, :, c) = self%trial(:, :, c) + (before(c) - after(c))
+         end do
+      end if
+      self%slip = self%displacement - self%trial
+   end subroutine return_to_bound
+
+   !> End the step: history, energies, the motion of the mass.
+   subroutine commit(self, material, pressure, slope_x, slope_y)
+      class(tangential_state_type), intent(inout) :: self
+      type(zener_type), intent(in) :: material
+      real(dp), intent(in) :: pressure(:, :)
+      real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)
+      type(products_type) :: products
+      real(dp) :: carried(2), before(2), after(2), top(2), speed(2), area
+
+      if (.not. self%moved) return
+      area = self%grid%lx*self%grid%ly
+      products = new_products(material)
+      carried = 0.0_dp
+      if (self%mass > 0.0_dp) then
+         before = means(self, self%displacement)
+         after = means(self, self%trial)
+         carried = means(self, self%traction) + self%past_mean - self%q*after/self%thickness
+         if (self%dt > 0.0_dp) then
+            top = -self%motion
+            speed = (after - before + top)/self%dt
+            self%work_mass = self%work_mass + area*dot_product(carried, after - before + top)
+            self%lost_mass = self%lost_mass + 0.5_dp*self%mass*area*sum((speed - self%speed)**2)
+            self%speed = speed
+         end if
+      end if
+      call commit_history(self%history, material, self%traction, self%displacement, self%trial, &
+         products, carried)
+      call book_step(self%books, material, products)
+      call book_friction(self, pressure, slope_x, slope_y)
+      self%displacement(:, :, :) = self%trial
+   end subroutine commit
+
+   !> Energy lost by friction, and the mean speed of the surface in the contact.
+   subroutine book_friction(self, pressure, slope_x, slope_y)
+      class(tangential_state_type), intent(inout) :: self
+      real(dp), intent(in) :: pressure(:, :)
+      real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: star(2), slope(2), total(4)
+      integer :: i, j
+
+      allocate (rows(4, self%grid%ny), source=0.0_dp)
+      slope = 0.0_dp
+      !$omp parallel do default(none) shared(self, pressure, slope_x, slope_y, rows) &
+      !$omp private(i, j, star) firstprivate(slope)
+      do j = 1, self%grid%ny
+         do i = 1, self%grid%nx
+            if (self%contact(i, j) == 0_int8) cycle
+            if (self%law%slope) slope = [slope_x(i, j), slope_y(i, j)]
+            star = self%law%normal_traction(pressure(i, j), slope)
+            rows(1, j) = rows(1, j) + dot_product(self%traction(i, j, :) - star, self%slip(i, j, :))
+            rows(2:3, j) = rows(2:3, j) + self%trial(i, j, :) - self%displacement(i, j, :)
+            rows(4, j) = rows(4, j) + 1.0_dp
+         end do
+      end do
+      total = global_sum([(sum(rows(i, :)), i = 1, 4)])
+      self%lost_friction = self%lost_friction + total(1)*self%grid%dx*self%grid%dy
+      if (self%dt > 0.0_dp .and. total(4) > 0.0_dp) self%rate = total(2:3)/(total(4)*self%dt)
+   end subroutine book_friction
+
+   !> Kinetic energy of the mass, J.
+   function kinetic(self) result(energy)
+      class(tangential_state_type), intent(in) :: self
+      real(dp) :: energy
+
+      energy = 0.5_dp*self%mass*sum(self%speed**2)*self%grid%lx*self%grid%ly
+   end function kinetic
+
+   !> Means of the traction, part of the grid that sticks, mean slip of the step.
+   subroutine sums(self, traction, stick, slip)
+      class(tangential_state_type), intent(in) :: self
+      real(dp), intent(out) :: traction(2)            !! Pa
+      real(dp), intent(out) :: stick
+      real(dp), intent(out) :: slip(2)                !! m
+
+      traction = means(self, self%traction)
+      slip = means(self, self%slip)
+      stick = real(global_sum(count(self%contact == 1_int8)), dp)/(real(self%grid%nx, dp)*self%grid%ny)
+   end subroutine sums
+
+   !> Free plans and fields.
+   subroutine destroy(self)
+      class(tangential_state_type), intent(inout) :: self
+
+      call self%operator%destroy()
+      call self%solver%destroy()
+      call destroy_history(self%history)
+   end subroutine destroy
+
+end module tangential_state
