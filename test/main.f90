@@ -3,6 +3,7 @@ program main
    use check, only : finish
    use result_writer, only : run_writer
    use test_adhesion_cg, only : run_adhesion_cg
+   use test_adhesion_free, only : run_adhesion_free
    use test_adhesion_potential, only : run_adhesion_potential
    use test_base, only : run_base
    use test_case_input, only : run_case_input
@@ -57,6 +58,7 @@ program main
       call run_normal_limits()
       call run_normal_invariance()
    end if
+   if (wanted('adhesion_free')) call run_adhesion_free()
    call finish()
 
 contains

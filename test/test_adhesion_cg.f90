@@ -10,7 +10,7 @@ module test_adhesion_cg
    use fft_conv, only : convolution_type, new_symbol_operator
    use parallel, only : set_threads
    use precision, only : dp, pi
-   use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
+   use regular_grid, only : boundary_periodic, grid_type, new_grid
    use solver_result, only : solver_result_type
    implicit none
    private
@@ -475,7 +475,7 @@ contains
       call solver%destroy()
    end subroutine test_load_unload
 
-   !> Detachment, a closed gap, a wrong preconditioner, a free grid.
+   !> Detachment, a closed gap, a wrong preconditioner.
    subroutine test_outcomes()
       type(grid_type) :: grid
       type(adhesion_solver_type) :: solver
@@ -514,10 +514,13 @@ contains
       call solver%destroy()
       call new_adhesion_solver(solver, grid, poisson, error, preconditioner='fine')
       call check_error(error, 'coarse', 'unknown preconditioner')
+<<<<<<< HEAD
       call solver%destroy()
       grid%boundary = boundary_free
       call new_adhesion_solver(solver, grid, poisson, error)
       call check_error(error, 'periodic', 'free grid')
+=======
+>>>>>>> 75af71e (Adhesive contact on an unbounded half-space, by the doubled grid)
    end subroutine test_outcomes
 
    !> The same bits with one and with two threads.

@@ -8,7 +8,7 @@
 !>
 !> Sums are made row by row and then in the order of the rows: they do not depend on the threads.
 module adhesion_state
-   use adhesion_potential, only : adhesion_potential_type, adhesive_terms, &
+   use adhesion_potential, only : adhesion_potential_type, adhesive_curvature, adhesive_terms, &
       potential_maugis_dugdale, potential_none
    use normal_state, only : control_approach, control_pressure
    use parallel, only : global_sum
@@ -17,7 +17,7 @@ module adhesion_state
    private
 
    public :: adhesion_problem_type, choose_step, clipped_step, control_approach, control_pressure, &
-      row_total, step_sums_type, stepped_gap, sum_shift, traction_scale
+      diagonal_scaling, row_total, step_sums_type, stepped_gap, sum_shift, traction_scale
 
    character(*), parameter, public :: reason_converged = 'converged'
    character(*), parameter, public :: reason_detached = 'detached'
@@ -37,6 +37,7 @@ module adhesion_state
       real(dp) :: target = 0.0_dp
       real(dp) :: tolerance = 1e-6_dp       !! of the natural residual max|min(g/z_0, G z_0/gamma_0)|
       integer :: max_iterations = 2000
+      logical :: full_contact = .false.     !! start from full contact, not from what is handed in
    end type adhesion_problem_type
 
    !> What is known of E along the segment g + t s, 0 <= t.
@@ -65,6 +66,17 @@ contains
       end do
       total = global_sum(total)
    end function row_total
+
+   !> Scaling of the preconditioner at a cell, from both sides: (1 + max(e'', 0)/k)^(-1/2).
+   pure function diagonal_scaling(problem, gap, stiffness) result(scaling)
+      type(adhesion_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: gap                  !! m
+      real(dp), intent(in) :: stiffness            !! k, Pa/m
+      real(dp) :: scaling
+
+      scaling = 1.0_dp/sqrt(1.0_dp &
+         + max(adhesive_curvature(problem%potential, gap), 0.0_dp)/stiffness)
+   end function diagonal_scaling
 
    !> Is e' continuous?
    pure function has_smooth_potential(potential) result(smooth)
@@ -153,8 +165,8 @@ contains
             rows(1, j) = s1
             rows(2, j) = s2
          end do
-         first = row_total(rows, 1)
-         second = row_total(rows, 2)
+         first = row_total(rows(:, 1:size(gap, 2)), 1)
+         second = row_total(rows(:, 1:size(gap, 2)), 2)
       end subroutine sums
 
    end function clipped_step
@@ -254,8 +266,8 @@ contains
             rows(1, j) = s1
             rows(2, j) = s2
          end do
-         slopes = row_total(rows, 1)
-         energies = row_total(rows, 2)
+         slopes = row_total(rows(:, 1:size(gap, 2)), 1)
+         energies = row_total(rows(:, 1:size(gap, 2)), 2)
       end subroutine segment
 
    end function choose_step
@@ -301,8 +313,8 @@ contains
             rows(1, j) = s1
             rows(2, j) = real(n, dp)
          end do
-         above = row_total(rows, 1)
-         count = nint(row_total(rows, 2))
+         above = row_total(rows(:, 1:size(gap, 2)), 1)
+         count = nint(row_total(rows(:, 1:size(gap, 2)), 2))
          if (count == 0) exit
          next = (above - total)/count
          if (next <= shift) then

@@ -1,0 +1,415 @@
+!> Tests of adhesive contact on an unbounded half-space.
+!>
+!> Units of the spheres: R = 1, pi gamma_0 = 1, K = 4 E*/3 = 1, so that contact radii are in
+!> (pi gamma_0 R^2/K)^(1/3), loads in pi gamma_0 R, and Maugis's lambda = 2 gamma_0/z_0.
+module test_adhesion_free
+   use adhesion_cg, only : adhesion_solver_type, new_adhesion_solver
+   use adhesion_potential, only : adhesion_potential_type, adhesive_energy, adhesive_slope, &
+      new_adhesion_potential
+   use adhesion_state, only : adhesion_problem_type, control_approach, control_pressure, &
+      reason_detached
+   use check, only : begin_suite, check_close, check_error, check_no_error, check_that
+   use errors, only : error_type
+   use influence, only : love_normal
+   use parallel, only : set_threads
+   use precision, only : dp, pi
+   use regular_grid, only : boundary_free, grid_type, new_grid
+   use solver_result, only : solver_result_type
+   implicit none
+   private
+
+   public :: run_adhesion_free
+
+   real(dp), parameter :: poisson = 0.5_dp
+   real(dp), parameter :: modulus = 0.1875_dp             !! E* = 2 modulus/(1 - poisson) = 3/4
+
+contains
+
+   subroutine run_adhesion_free()
+      call begin_suite('adhesion_free')
+      call test_solution('exponential', 'coarse')
+      call test_solution('gauss', 'full')
+      call test_solution('maugis_dugdale', 'coarse')
+      call test_sphere_limits()
+      call test_sphere_mesh()
+      ! Long range: a sharp minimum at first touch, where half a step of 0.02 costs 0.003; and a disc of
+      ! 25 cells' radius is full of cells to 0.6 %: 1 % in all.
+      call test_pull_off('maugis_dugdale', 0.1_dp, 32, -0.25_dp, 0.02_dp, 0.02_dp)
+      ! First order in the cell (pinned edge of the cohesive zone, see test_sphere_mesh); the minimum
+      ! is smooth: steps of 0.1 miss it by less than 1e-3.
+      call test_pull_off('maugis_dugdale', 1.0_dp, 40, 0.6_dp, 0.1_dp, 0.05_dp)
+      ! Another potential; beyond Tabor 1 its form matters little: 3 % of 1.5.
+      call test_pull_off('exponential', 3.5_dp, 40, 0.5_dp, 0.1_dp, 0.04_dp)
+      call test_force_from_energy()
+      call test_strong()
+      call test_threads()
+      call test_outcomes()
+   end subroutine run_adhesion_free
+
+   !> A paraboloid of radius 1 with its summit, height 0, on a cell.
+   function paraboloid(grid) result(height)
+      type(grid_type), intent(in) :: grid
+      real(dp) :: height(grid%nx, grid%ny)
+      integer :: i, j
+
+      do j = 1, grid%ny
+         do i = 1, grid%nx
+            height(i, j) = -0.5_dp*(((i - 1 - grid%nx/2)*grid%dx)**2 &
+               + ((j - 1 - grid%ny/2)*grid%dy)**2)
+         end do
+      end do
+   end function paraboloid
+
+   !> Displacement by the sum over Love's coefficients.
+   function displacement_sum(grid, pressure) result(u)
+      type(grid_type), intent(in) :: grid
+      real(dp), intent(in) :: pressure(:, :)
+      real(dp) :: u(grid%nx, grid%ny)
+      real(dp) :: table(0:grid%nx - 1, 0:grid%ny - 1)
+      integer :: i, j, k, l
+
+      do j = 0, grid%ny - 1
+         do i = 0, grid%nx - 1
+            table(i, j) = love_normal(i*grid%dx, j*grid%dy, grid%dx, grid%dy, poisson)
+         end do
+      end do
+      u = 0.0_dp
+      do l = 1, grid%ny
+         do k = 1, grid%nx
+            do j = 1, grid%ny
+               do i = 1, grid%nx
+                  u(i, j) = u(i, j) + table(abs(i - k), abs(j - l))*pressure(k, l)
+               end do
+            end do
+         end do
+      end do
+   end function displacement_sum
+
+   !> Conditions of a solution by that sum; both controls; a history; from full contact.
+   subroutine test_solution(name, preconditioner)
+      character(*), intent(in) :: name, preconditioner
+      type(grid_type) :: grid
+      type(adhesion_solver_type) :: solver
+      type(adhesion_problem_type) :: problem
+      type(solver_result_type) :: outcome
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :), history(:, :), true_gap(:, :), &
+         other(:, :)
+      real(dp) :: level, scale, force, deep
+      integer :: i, j
+
+      grid = new_grid(27, 22, 5.0_dp, 6.0_dp, boundary_free)
+      call new_adhesion_solver(solver, grid, poisson, error, preconditioner=preconditioner)
+      call check_no_error(error, 'solver')
+      height = paraboloid(grid)
+      do j = 1, grid%ny
+         do i = 1, grid%nx
+            height(i, j) = height(i, j) + 0.1_dp*cos(3.0_dp*i*grid%dx + 2.0_dp*j*grid%dy)
+         end do
+      end do
+      history = 0.05_dp*cos(height)
+      call new_adhesion_potential(problem%potential, name, 1.0_dp/pi, 0.6_dp, error)
+      problem%modulus = modulus
+      force = 0.4_dp
+      problem%target = force/(grid%lx*grid%ly)
+      problem%tolerance = 1e-7_dp
+      pressure = 0.0_dp*height
+      gap = pressure
+      level = 0.0_dp
+      call solver%solve(problem, height, gap, pressure, level, outcome, history)
+      call check_that(outcome%converged, name//': '//trim(outcome%reason))
+      call check_close(sum(pressure)*grid%dx*grid%dy, force, 1e-6_dp, name//': load')
+      true_gap = displacement_sum(grid, pressure + history)/modulus - height - level
+      scale = 1.0_dp/(pi*0.6_dp)
+      call check_close(maxval(abs(true_gap - gap)), 0.0_dp, 3e-7_dp*0.6_dp, name//': gap')
+      call check_that(any(gap == 0.0_dp) .and. any(gap > 0.0_dp), name//': a partial contact')
+      call check_close(maxval(abs(min(true_gap/0.6_dp, &
+         (pressure + adhesive_slope(problem%potential, max(true_gap, 0.0_dp)))/scale))), &
+         outcome%residual, 1e-10_dp + outcome%load_error, name//': true residual, as told')
+      call check_that(outcome%residual <= 1e-7_dp, name//': true residual')
+
+      problem%control = control_approach
+      problem%target = level
+      other = pressure
+      call solver%solve(problem, height, gap, other, level, outcome, history)
+      call check_that(outcome%converged, name//': level: '//trim(outcome%reason))
+      call check_close(maxval(abs(other - pressure)), 0.0_dp, 1e-5_dp*scale, name//': controls')
+      deep = level + 0.3_dp
+      problem%target = deep
+      call solver%solve(problem, height, gap, other, level, outcome, history)
+      call check_that(outcome%converged .and. sum(other) > sum(pressure), name//': deeper')
+      problem%full_contact = .true.
+      gap = 0.0_dp
+      call solver%solve(problem, height, gap, other, level, outcome, history)
+      call check_that(outcome%converged, name//': from full contact: '//trim(outcome%reason))
+      call check_close(level, deep, 0.0_dp, name//': the level is kept')
+      call solver%destroy()
+   end subroutine test_solution
+
+   !> One sphere under a load: contact radius from the number of cells in contact.
+   subroutine solve_sphere(n, side, name, range, load, radius, level)
+      integer, intent(in) :: n
+      real(dp), intent(in) :: side                 !! of the patch
+      character(*), intent(in) :: name
+      real(dp), intent(in) :: range                !! z_0
+      real(dp), intent(in) :: load                 !! in pi gamma_0 R
+      real(dp), intent(out) :: radius, level
+      type(grid_type) :: grid
+      type(adhesion_solver_type) :: solver
+      type(adhesion_problem_type) :: problem
+      type(solver_result_type) :: outcome
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :)
+
+      grid = new_grid(n, n, side, side, boundary_free)
+      call new_adhesion_solver(solver, grid, poisson, error)
+      height = paraboloid(grid)
+      call new_adhesion_potential(problem%potential, name, 1.0_dp/pi, range, error)
+      problem%modulus = modulus
+      problem%target = load/side**2
+      pressure = 0.0_dp*height
+      gap = pressure
+      level = 0.0_dp
+      call solver%solve(problem, height, gap, pressure, level, outcome)
+      call check_that(outcome%converged, 'sphere: '//trim(outcome%reason))
+      call check_close(sum(pressure)*grid%dx*grid%dy, load, 1e-5_dp, 'sphere: load')
+      radius = sqrt(count(gap == 0.0_dp)*grid%dx*grid%dy/pi)
+      call solver%destroy()
+   end subroutine solve_sphere
+
+   !> Hertz, JKR and DMT: a^3 = F, a^3 - sqrt(6) a^1.5 = F, a^3 - 2 = F.
+   subroutine test_sphere_limits()
+      real(dp) :: radius, level, jkr
+
+      call solve_sphere(64, 4.0_dp, 'none', 0.0_dp, 1.0_dp, radius, level)
+      ! A radius from a count of cells is good to a fraction of a cell, here 0.06.
+      call check_close(radius, 1.0_dp, 0.03_dp, 'Hertz: radius')
+      call check_close(level, 1.0_dp, 0.01_dp, 'Hertz: approach a^2/R')
+      ! Tabor 3.3 with the exponential: within 3 % of JKR at the load 2, a = 2.1.
+      jkr = ((sqrt(6.0_dp) + sqrt(6.0_dp + 8.0_dp))/2)**(2.0_dp/3.0_dp)
+      call solve_sphere(96, 6.0_dp, 'exponential', 0.17_dp, 2.0_dp, radius, level)
+      call check_close(radius, jkr, 0.03_dp*jkr, 'JKR: radius')
+      call check_close(level, jkr**2 - 2*sqrt(6.0_dp)/3*sqrt(jkr), 0.05_dp, 'JKR: approach')
+      ! Long range: DMT. The attraction reaches as far as sqrt(2 z_0): a wide patch.
+      call solve_sphere(96, 24.0_dp, 'maugis_dugdale', 20.0_dp, 4.0_dp, radius, level)
+      call check_close(radius, 6.0_dp**(1.0_dp/3.0_dp), 0.06_dp, 'DMT: radius')
+   end subroutine test_sphere_limits
+
+   !> The approach converges with the mesh to Maugis's, lambda = 0.5. The edge of the cohesive zone is
+   !> pinned by the cells, within u = gamma_0/z_0 times the compliance of a cell: an error of first order
+   !> that extrapolation takes away.
+   subroutine test_sphere_mesh()
+      real(dp) :: radius, a, m, load, lambda, approach, levels(3)
+      integer :: k
+
+      lambda = 0.5_dp
+      a = 1.6_dp
+      m = maugis_ratio(a, lambda)
+      load = maugis_load(a, m, lambda)
+      approach = a**2 - 4.0_dp/3.0_dp*lambda*a*sqrt(m**2 - 1)
+      do k = 1, 3
+         call solve_sphere(24*2**(k - 1), 8.0_dp, 'maugis_dugdale', 2.0_dp/(pi*lambda), load, radius, &
+            levels(k))
+      end do
+      call check_that(abs(levels(3) - approach) < 0.5_dp*abs(levels(1) - approach), &
+         'Maugis: converges with the mesh')
+      call check_close(levels(3), approach, 0.03_dp, 'Maugis: approach')
+      call check_close(2*levels(3) - levels(2), approach, 0.01_dp, 'Maugis: approach, no mesh')
+      call check_close(radius, a, 0.05_dp, 'Maugis: radius')
+   end subroutine test_sphere_mesh
+
+   !> Maugis's condition for the outer radius c = m a of the cohesive zone, zero where it holds.
+   pure function maugis_condition(a, m, lambda) result(value)
+      real(dp), intent(in) :: a, m, lambda
+      real(dp) :: value
+      real(dp) :: s
+
+      s = sqrt(m**2 - 1)
+      value = lambda*a**2/2*(s + (m**2 - 2)*atan(s)) &
+         + 4*lambda**2*a/3*(s*atan(s) - m + 1) - 1
+   end function maugis_condition
+
+   !> m by bisection.
+   pure function maugis_ratio(a, lambda) result(m)
+      real(dp), intent(in) :: a, lambda
+      real(dp) :: m
+      real(dp) :: low, high
+      integer :: k
+
+      low = 1.0_dp
+      high = 1e3_dp
+      do k = 1, 100
+         m = 0.5_dp*(low + high)
+         if (maugis_condition(a, m, lambda) < 0.0_dp) then
+            low = m
+         else
+            high = m
+         end if
+      end do
+   end function maugis_ratio
+
+   pure function maugis_load(a, m, lambda) result(load)
+      real(dp), intent(in) :: a, m, lambda
+      real(dp) :: load
+      real(dp) :: s
+
+      s = sqrt(m**2 - 1)
+      load = a**3 - lambda*a**2*(s + m**2*atan(s))
+   end function maugis_load
+
+   !> The least load while the sphere is drawn off, against Maugis's, from two meshes.
+   subroutine test_pull_off(name, lambda, n, first, step, tolerance)
+      character(*), intent(in) :: name
+      real(dp), intent(in) :: lambda
+      integer, intent(in) :: n                     !! cells of the coarser mesh
+      real(dp), intent(in) :: first, step          !! levels: the first, and how far between two
+      real(dp), intent(in) :: tolerance            !! in pi gamma_0 R
+      real(dp) :: exact, loads(2)
+      integer :: k
+
+      exact = 0.0_dp
+      do k = 1, 400
+         exact = min(exact, maugis_load(0.01_dp*k, maugis_ratio(0.01_dp*k, lambda), lambda))
+      end do
+      do k = 1, 2
+         call draw_off(name, lambda, k*n, first, step, loads(k))
+      end do
+      call check_close(loads(2), exact, tolerance, 'pull-off '//name)
+      call check_that(abs(loads(2) - exact) < 0.65_dp*abs(loads(1) - exact) + 3e-3_dp, &
+         'pull-off '//name//': converges with the mesh')
+   end subroutine test_pull_off
+
+   !> The least load on the way from contact to nothing, at prescribed level, in steps.
+   subroutine draw_off(name, lambda, n, first, step, least)
+      character(*), intent(in) :: name
+      real(dp), intent(in) :: lambda
+      integer, intent(in) :: n
+      real(dp), intent(in) :: first, step
+      real(dp), intent(out) :: least
+      type(grid_type) :: grid
+      type(adhesion_solver_type) :: solver
+      type(adhesion_problem_type) :: problem
+      type(solver_result_type) :: outcome
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :)
+      real(dp) :: level, range, side, load
+      integer :: k
+
+      range = 2.0_dp/(pi*lambda)
+      side = max(4.0_dp, 2.6_dp*sqrt(2*range))
+      grid = new_grid(n, n, side, side, boundary_free)
+      call new_adhesion_solver(solver, grid, poisson, error)
+      height = paraboloid(grid)
+      call new_adhesion_potential(problem%potential, name, 1.0_dp/pi, range, error)
+      problem%modulus = modulus
+      problem%control = control_approach
+      pressure = 0.0_dp*height
+      gap = pressure
+      least = 0.0_dp
+      do k = 0, 22
+         problem%target = first - step*k
+         level = problem%target
+         call solver%solve(problem, height, gap, pressure, level, outcome)
+         call check_that(outcome%converged, 'pull-off '//name//': '//trim(outcome%reason))
+         load = sum(pressure)*grid%dx*grid%dy
+         least = min(least, load)
+      end do
+      call solver%destroy()
+   end subroutine draw_off
+
+   !> dE/d(level) = sum P.
+   subroutine test_force_from_energy()
+      type(grid_type) :: grid
+      type(adhesion_solver_type) :: solver
+      type(adhesion_problem_type) :: problem
+      type(solver_result_type) :: outcome
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :)
+      real(dp) :: level, load, energy(-1:1), h
+      integer :: k, step
+
+      grid = new_grid(24, 31, 5.0_dp, 6.0_dp, boundary_free)
+      call new_adhesion_solver(solver, grid, poisson, error)
+      height = paraboloid(grid)
+      call new_adhesion_potential(problem%potential, 'exponential', 1.0_dp/pi, 0.5_dp, error)
+      problem%modulus = modulus
+      problem%control = control_approach
+      problem%tolerance = 1e-9_dp
+      pressure = 0.0_dp*height
+      gap = pressure
+      h = 1e-4_dp
+      load = 0.0_dp
+      do k = 1, 3
+         do step = -1, 1
+            problem%target = 0.7_dp*(k - 2) + step*h
+            call solver%solve(problem, height, gap, pressure, level, outcome)
+            call check_that(outcome%converged, 'energy: '//trim(outcome%reason))
+            energy(step) = sum(0.5_dp*pressure*(height + gap + level) &
+               + adhesive_energy(problem%potential, gap))
+            if (step == 0) load = sum(pressure)
+         end do
+         call check_close((energy(1) - energy(-1))/(2*h), load, 2e-3_dp, 'force from the energy')
+      end do
+      call solver%destroy()
+   end subroutine test_force_from_energy
+
+   !> Tabor 5 and 8 on a mesh too coarse for them: the solver gets there all the same.
+   subroutine test_strong()
+      real(dp) :: radius, level
+
+      call solve_sphere(64, 8.0_dp, 'exponential', 0.113_dp, 1.0_dp, radius, level)
+      call check_that(radius > 1.2_dp .and. radius < 2.1_dp, 'Tabor 5')
+      call solve_sphere(64, 8.0_dp, 'exponential', 0.07_dp, 1.0_dp, radius, level)
+      call check_that(radius > 1.1_dp .and. radius < 2.1_dp, 'Tabor 8')
+      call solve_sphere(64, 8.0_dp, 'maugis_dugdale', 0.113_dp, 1.0_dp, radius, level)
+      call check_that(radius > 1.1_dp .and. radius < 2.1_dp, 'Tabor 5, Maugis')
+   end subroutine test_strong
+
+   !> The same bits with one and with two threads.
+   subroutine test_threads()
+      real(dp) :: radius(2), level(2)
+      integer :: k
+
+      do k = 1, 2
+         call set_threads(k)
+         call solve_sphere(70, 6.0_dp, 'exponential', 0.5_dp, 1.0_dp, radius(k), level(k))
+      end do
+      call set_threads(0)
+      call check_that(level(1) == level(2), 'threads do not matter')
+   end subroutine test_threads
+
+   !> Held, and detached, under a prescribed pull; a line contact is refused.
+   subroutine test_outcomes()
+      type(grid_type) :: grid
+      type(adhesion_solver_type) :: solver
+      type(adhesion_problem_type) :: problem
+      type(solver_result_type) :: outcome
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :)
+      real(dp) :: level
+
+      grid = new_grid(40, 40, 5.0_dp, 5.0_dp, boundary_free)
+      call new_adhesion_solver(solver, grid, poisson, error)
+      height = paraboloid(grid)
+      call new_adhesion_potential(problem%potential, 'exponential', 1.0_dp/pi, 0.4_dp, error)
+      problem%modulus = modulus
+      problem%target = 1.0_dp/25
+      pressure = 0.0_dp*height
+      gap = pressure
+      level = 0.0_dp
+      call solver%solve(problem, height, gap, pressure, level, outcome)
+      call check_that(outcome%converged, 'pressed')
+      problem%target = -1.3_dp/25
+      call solver%solve(problem, height, gap, pressure, level, outcome)
+      call check_that(outcome%converged, 'a pull is held: '//trim(outcome%reason))
+      problem%target = -2.2_dp/25
+      call solver%solve(problem, height, gap, pressure, level, outcome)
+      call check_that(.not. outcome%converged .and. outcome%reason == reason_detached, &
+         'lets go: '//trim(outcome%reason))
+      call solver%destroy()
+      grid = new_grid(40, 1, 5.0_dp, 5.0_dp, boundary_free)
+      call new_adhesion_solver(solver, grid, poisson, error)
+      call check_error(error, 'ny > 1', 'free line contact')
+   end subroutine test_outcomes
+
+end module test_adhesion_free
