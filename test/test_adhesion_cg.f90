@@ -514,13 +514,6 @@ contains
       call solver%destroy()
       call new_adhesion_solver(solver, grid, poisson, error, preconditioner='fine')
       call check_error(error, 'coarse', 'unknown preconditioner')
-<<<<<<< HEAD
-      call solver%destroy()
-      grid%boundary = boundary_free
-      call new_adhesion_solver(solver, grid, poisson, error)
-      call check_error(error, 'periodic', 'free grid')
-=======
->>>>>>> 75af71e (Adhesive contact on an unbounded half-space, by the doubled grid)
    end subroutine test_outcomes
 
    !> The same bits with one and with two threads.
