@@ -16,6 +16,7 @@ module simulation
    use errors, only : error_type
    use history_row, only : history_row_type
    use interpolation, only : displaced, interpolation_type, new_interpolation, shifted
+   use map_edge, only : edge_clear, look_at_edge
    use normal_cg, only : new_normal_solver, normal_solver_type
    use normal_cg_thesis, only : solve_normal_thesis
    use normal_state, only : control_approach, control_pressure, normal_problem_type, rms_about_mean
@@ -26,6 +27,7 @@ module simulation
    use solver_result, only : solver_result_type
    use surface, only : new_height
    use tangential_state, only : new_tangential_state, tangential_state_type
+   use text_tools, only : to_text
    use viscoelastic_energy, only : book_step, energy_books_type, new_books
    use zener, only : commit_history, destroy_history, finish_step, history_field, history_type, &
       is_elastic, new_history, new_products, new_zener, products_type, restart_order, start_jump, &
@@ -63,7 +65,7 @@ module simulation
       type(tangential_state_type) :: tangential
       logical, private :: slides = .false.          !! some phase moves the road
       real(dp), allocatable, private :: settled(:, :)   !! pressure of the pass before, Pa
-      logical, private :: edge_reported = .false.
+      integer, private :: edge = edge_clear         !! worst found at the edge of a free map
       type(normal_solver_type), private :: normal
       real(dp), allocatable, private :: slope_x(:, :), slope_y(:, :)
       real(dp), allocatable, private :: past(:, :)  !! traction of the history, Pa
@@ -154,6 +156,7 @@ contains
       call commit_step(self, level)
       call system_clock(now)
       outcome%seconds = real(now - start, dp)/real(rate, dp)
+      call watch_edge(self, plan)
       call fill_row(self, plan, outcome, rubbing, level)
       self%finished = self%schedule%phase > size(self%case%phases)
    end subroutine advance
@@ -236,6 +239,21 @@ contains
          call self%tangential%commit(self%material, self%pressure, self%slope_x, self%slope_y)
       call finish_step(self%material)
    end subroutine commit_step
+
+   !> Warn where a free map is too small.
+   subroutine watch_edge(self, plan)
+      type(simulation_type), intent(inout) :: self
+      type(planned_row_type), intent(in) :: plan
+      character(:), allocatable :: message
+
+      message = ''
+      call look_at_edge(self%grid, self%pressure, self%gap, plan%road_x - self%row%road_x, &
+         plan%road_y - self%row%road_y, self%rms_height, self%edge, message)
+      if (len(message) == 0) return
+      if (len(self%warnings) > 0) self%warnings = self%warnings//new_line('a')
+      self%warnings = self%warnings//'step '//to_text(self%schedule%row)//', t = '//to_text(plan%time)// &
+         ' s: '//message
+   end subroutine watch_edge
 
    !> The material's coefficients for the step.
    subroutine begin_step(self, plan, error)
