@@ -6,7 +6,8 @@
 !>
 !> A step with friction is made of passes (thesis, 3.5): tangential solve, heights and slopes where
 !> the rubber then is, normal solve; until the pressure settles or `passes` are done. A last tangential
-!> solve under the last pressure hands out a traction that belongs to it.
+!> solve under the last pressure hands out a traction that belongs to it,
+!> unless the pressure has settled.
 !>
 !> Fields of doubles beside those of the normal solver: H, P, gap, U; with sliding the original map and
 !> the two slopes; with Prony arms the history (S, S - S_old and one field an arm) and its traction; with
@@ -68,6 +69,7 @@ module simulation
       integer, private :: edge = edge_clear         !! worst found at the edge of a free map
       type(normal_solver_type), private :: normal
       real(dp), allocatable, private :: slope_x(:, :), slope_y(:, :)
+      real(dp), allocatable, private :: new_slope_x(:, :), new_slope_y(:, :)   !! of the pass in hand
       real(dp), allocatable, private :: past(:, :)  !! traction of the history, Pa
       real(dp) :: rms_height = 0.0_dp               !! of the original map about its mean, m
    contains
@@ -117,7 +119,8 @@ contains
       self%frictional = self%slides .and. case%friction%law /= 'none'
       if (.not. self%frictional) return
       call new_tangential_state(self%tangential, case, self%material, error)
-      allocate (self%settled(nx, ny), source=0.0_dp)
+      allocate (self%settled(nx, ny), self%new_slope_x(nx, ny), self%new_slope_y(nx, ny), &
+         source=0.0_dp)
    end subroutine new_simulation
 
    !> Do the next row. Where the solvers did not converge, the state reached is kept.
@@ -184,16 +187,32 @@ contains
          call self%tangential%solve(self%pressure, self%slope_x, self%slope_y, part)
          call add_result(rubbing, part)
          call displaced(self%road, plan%road_x, plan%road_y, self%tangential%trial(:, :, 1), &
-            self%tangential%trial(:, :, 2), self%height, self%slope_x, self%slope_y)
+            self%tangential%trial(:, :, 2), self%height, self%new_slope_x, self%new_slope_y)
          self%settled(:, :) = self%pressure
          call solve_normal(self, plan, part, level)
          call add_result(outcome, part)
          if (.not. part%converged) exit
-         if (unsettled(self) <= self%case%solver%tolerance) exit
+         if (unsettled(self) <= self%case%solver%tolerance) then
+            ! The traction of this pass belongs to the pressure, but for what is below the tolerance.
+            call self%tangential%trim(self%pressure, self%slope_x, self%slope_y)
+            return
+         end if
+         call swap(self%slope_x, self%new_slope_x)
+         call swap(self%slope_y, self%new_slope_y)
       end do
       call self%tangential%solve(self%pressure, self%slope_x, self%slope_y, part)
       call add_result(rubbing, part)
    end subroutine coupled_passes
+
+   !> Exchange two fields.
+   subroutine swap(a, b)
+      real(dp), allocatable, intent(inout) :: a(:, :), b(:, :)
+      real(dp), allocatable :: c(:, :)
+
+      call move_alloc(a, c)
+      call move_alloc(b, a)
+      call move_alloc(c, b)
+   end subroutine swap
 
    !> Add the record of a solve to that of the step: the last outcome, all the work.
    subroutine add_result(total, part)

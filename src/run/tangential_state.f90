@@ -62,6 +62,7 @@ module tangential_state
       procedure :: begin
       procedure :: solve
       procedure :: return_to_bound
+      procedure :: trim => trim_traction
       procedure :: commit
       procedure :: kinetic
       procedure :: sums
@@ -147,7 +148,7 @@ contains
          call set_thickness(self, self%thickness)
       end if
       ! Slips far below the road's motion in the step are no slips.
-      self%solver%slip_scale = self%q*hypot(motion(1), motion(2))
+      self%solver%slip_scale = 0.0_dp
    end subroutine begin
 
    !> The compliance of the mean mode, periodic mode only.
@@ -211,6 +212,27 @@ contains
          end do
       end do
    end subroutine solve
+
+   !> Return T to the bound of a pressure that differs by less than the tolerance from its own.
+   subroutine trim_traction(self, pressure, slope_x, slope_y)
+      class(tangential_state_type), intent(inout) :: self
+      real(dp), intent(in) :: pressure(:, :)
+      real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)
+      integer :: i, j
+
+      !$omp parallel do default(none) shared(self, pressure) private(i, j)
+      do j = 1, self%grid%ny
+         do i = 1, self%grid%nx
+            if (pressure(i, j) <= 0.0_dp) then
+               self%contact(i, j) = 0_int8
+            else if (self%contact(i, j) == 0_int8) then
+               self%contact(i, j) = 1_int8
+            end if
+         end do
+      end do
+      call return_tractions(self%law, pressure, slope_x, slope_y, self%contact, &
+         self%traction(:, :, 1), self%traction(:, :, 2))
+   end subroutine trim_traction
 
    !> An instantaneous row: T stays as it is but for the bound of the new pressure, and the rubber
    !> answers at once. A mass does not move in no time.
