@@ -77,8 +77,8 @@ contains
       self%solver%tolerance = 1e-9_dp
    end subroutine new_case
 
-   !> Solve, and prove the result without the solver: bound, stick, direction, no reversed slip, and the
-   !> slip itself from another product.
+   !> Solve, and prove the result without the solver: bound, stick, direction, no reversed slip, and
+   !> the slip itself from another product.
    subroutine run_case(self, what, accuracy)
       type(case_type), intent(inout) :: self
       character(*), intent(in) :: what
@@ -212,9 +212,9 @@ contains
       call end_case(self)
    end subroutine test_mindlin_exact
 
-   !> nu = 0.42 and 0.5: Mindlin's solution leaves out the slip across the load. That is an effect of
-   !> second order in nu/(2-nu), the ratio of the two kernels: 1.05e-3 of full slip for 0.42 and 1.66e-3
-   !> for 0.5, at n = 128 and 256 alike.
+   !> nu = 0.42 and 0.5: Mindlin's solution leaves out the slip across the load. That is an effect
+   !> of second order in nu/(2-nu), the ratio of the two kernels: 1.05e-3 of full slip for 0.42 and
+   !> 1.66e-3 for 0.5, at n = 128 and 256 alike.
    subroutine test_mindlin_poisson()
       type(case_type) :: self
       real(dp), parameter :: mu = 0.4_dp, poisson(2) = [0.42_dp, 0.5_dp]
@@ -237,8 +237,8 @@ contains
    end subroutine test_mindlin_poisson
 
    !> Loading, unloading and reloading (Mindlin and Deresiewicz, 1953), nu = 0: with the curve of
-   !> loading Q = f(u), unloading from u1 follows Q1 - 2 f((u1 - u)/2), reloading from u2 goes back up by
-   !> Q2 + 2 f((u - u2)/2), and closes the loop at u1.
+   !> loading Q = f(u), unloading from u1 follows Q1 - 2 f((u1 - u)/2), reloading from u2 goes back
+   !> up by Q2 + 2 f((u - u2)/2), and closes the loop at u1.
    subroutine test_unloading()
       type(case_type) :: self
       real(dp), parameter :: mu = 0.4_dp
@@ -333,7 +333,8 @@ contains
       call end_case(self)
    end subroutine test_limits
 
-   !> A rough problem: waves of wave numbers 2 to 6, its pressure where it stands out by `threshold`.
+   !> A rough problem: waves of wave numbers 2 to 6, its pressure where it stands out by
+   !> `threshold`.
    subroutine set_rough(self, seed, slope, threshold)
       type(case_type), intent(inout) :: self
       integer, intent(in) :: seed
@@ -417,6 +418,7 @@ contains
             self%drive_x = drive
             self%drive_y = 0.5_dp*drive
             self%solver%max_iterations = 5000
+            self%solver%tolerance = 1e-8_dp
             do k = 1, 3
                self%solver%method = methods(k)
                self%tx = 0.0_dp
@@ -596,9 +598,20 @@ contains
       measured = sum(self%tx)/size(self%tx)
       call check_close(measured, 0.1_dp/0.02_dp, 1e-7_dp, 'mean compliance set by the caller')
       call end_case(self)
+      call new_case(self, 1, 1, 1.0_dp, 1.0_dp, boundary_periodic, 0.5_dp, 0.7_dp)
+      self%p = 1.0_dp
+      self%law = new_friction_law('coulomb', 0.5_dp, 0.0_dp, 0.0_dp, .false., .true.)
+      self%drive_x = 0.1_dp
+      call run_case(self, 'one cell', 1e-8_dp)
+      call check_close(self%tx(1, 1), 0.1_dp/0.7_dp, 1e-8_dp, 'one cell: sticks')
+      self%drive_x = 1.0_dp
+      call run_case(self, 'one cell', 1e-8_dp)
+      call check_close(self%tx(1, 1), 0.5_dp, 1e-12_dp, 'one cell: slips')
+      call end_case(self)
    end subroutine test_mean_mode
 
-   !> From its own solution it comes back at once; a return to a lower pressure stays within the bound.
+   !> From its own solution it comes back at once; a return to a lower pressure stays within the
+   !> bound.
    subroutine test_warm_start()
       type(case_type) :: self
 
@@ -651,8 +664,8 @@ contains
       call end_case(self)
    end subroutine test_memory
 
-   !> A block dragged over a moving pressure in small steps, from rest into full slip and back: each step
-   !> proved, and the total traction of full slip, without slope, mu times the load.
+   !> A block dragged over a moving pressure in small steps, from rest into full slip and back: each
+   !> step proved, and the total traction of full slip, without slope, mu times the load.
    subroutine test_slide()
       type(case_type) :: self
       real(dp), parameter :: mu = 0.5_dp, step = 0.02_dp

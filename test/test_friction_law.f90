@@ -105,8 +105,8 @@ contains
       call check_that(hits > 1000, 'most rays meet the bound')
    end subroutine test_cone
 
-   !> One slope in the direction of the traction: P (mu + tan)/(1 - mu tan) (thesis, eq. 3.2), uphill
-   !> and downhill; no bound above mu tan = 1.
+   !> One slope in the direction of the traction: P (mu + tan)/(1 - mu tan) (thesis, eq. 3.2),
+   !> uphill and downhill; no bound above mu tan = 1.
    subroutine test_slope_formula()
       type(friction_law_type) :: law
       real(dp), parameter :: mu = 0.7_dp, h = 0.3_dp, p = 2.0_dp

@@ -1,7 +1,8 @@
 !> The friction laws: the bound of the tangential traction, at one point.
 !>
-!> Coulomb, constant shear stress and Coulomb-Orowan (thesis, section 3.1.2), on the true local slope of
-!> the road (thesis, section 3.1.3) and with the pressure that adhesion adds (thesis, appendix B).
+!> Coulomb, constant shear stress and Coulomb-Orowan (thesis, section 3.1.2), on the true local
+!> slope of the road (thesis, section 3.1.3) and with the pressure that adhesion adds (thesis,
+!> appendix B).
 !>
 !> Rubber lies above, the road H pushes up into it. With the unit normal N = (-H_x, -H_y, 1) N_z and
 !> n = (N_x, N_y) a purely normal reaction has the tangential traction T* = P n/N_z = -P grad H.
@@ -12,13 +13,14 @@
 !>     constant shear   s = sigma_max/m
 !>     Coulomb-Orowan   the smaller of the two
 !>
-!> T is out of bounds where s < 1; T* + s D is then the returned traction. This is the admissible root of
-!> the quadratic equation of the thesis (eq. 3.10 and B.5), without its second nappe.
+!> T is out of bounds where s < 1; T* + s D is then the returned traction. This is the admissible
+!> root of the quadratic equation of the thesis (eq. 3.10 and B.5), without its second nappe.
 !> Without slope n = 0 and T* = 0.
 !>
-!> Direction of slip. `r` is the slip of the road over the rubber. The slip along the slope is parallel to
-!> the force along it if r + n (n.r)/N_z^2 = r + grad H (grad H . r) is parallel to D, which is the same
-!> as r parallel to D - n (n.D): the physical law. The thesis (eq. 3.16) asks for r parallel to D.
+!> Direction of slip. `r` is the slip of the road over the rubber. The slip along the slope is
+!> parallel to the force along it if r + n (n.r)/N_z^2 = r + grad H (grad H . r) is parallel to D,
+!> which is the same as r parallel to D - n (n.D): the physical law. The thesis (eq. 3.16) asks for
+!> r parallel to D.
 module friction_law
    use precision, only : dp, int8
    implicit none
@@ -246,14 +248,14 @@ contains
       end if
    end function slip_along_slope
 
-   !> Give tractions to a new pressure: return them to its bound, and clear them outside the contact.
-   !> Points that were returned become slip points.
+   !> Give tractions to a new pressure: return them to its bound, and clear them outside the
+   !> contact. Points that were returned become slip points.
    subroutine return_tractions(law, p, slope_x, slope_y, contact, tx, ty)
       type(friction_law_type), intent(in) :: law
       real(dp), intent(in) :: p(:, :)                       !! [nx, ny], Pa
       real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)  !! [nx, ny]; any size without slope
-      !> [nx, ny] In: 0 open, else in contact; out: 0 open, 1 stick, 2 slip. Without adhesion a point
-      !> with p <= 0 is taken as open.
+      !> [nx, ny] In: 0 open, else in contact; out: 0 open, 1 stick, 2 slip. Without adhesion a
+      !> point with p <= 0 is taken as open.
       integer(int8), intent(inout) :: contact(:, :)
       real(dp), intent(inout) :: tx(:, :), ty(:, :)         !! [nx, ny], Pa
       real(dp) :: slope(2), t(2)

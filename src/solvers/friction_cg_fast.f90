@@ -1,30 +1,37 @@
-!> The fast method for the tangential problem: conjugate gradients in the tangent space of the bounds.
+!> The fast method for the tangential problem: conjugate gradients in the tangent space of the
+!> bounds.
 !>
-!> Points on the bound move along it only (the active set), and their Hessian gains the curvature of the
-!> bound. With Z the projection that takes the part along D from the slipping points:
+!> Points on the bound move along it only (the active set), and their Hessian gains the curvature of
+!> the bound. With v the direction of slip (module `friction_law`) and Z the projection that takes the
+!> part along v from the slipping points:
 !>
 !>     g = Z r                               the residual of module `friction_problem`
-!>     lam = r.D/|D|^2                       curvature of the bound, 0 where it sticks
+!>     lam = curvature of the bound          about r.v/|v|^2, 0 where it sticks
 !>     w = a_0/(a_0 + lam)                   a_0: displacement of a cell under its own unit traction
 !>     z = Z [w M (w g) + (1-w)/(a_0+lam) g] M: inverse of the periodic 2 x 2 symbol
-!>     d = z + beta Z d                      beta Polak-Ribiere+, 0 where a point left the bound
+!>     d = z + beta Z d                      beta Polak-Ribiere+
 !>     alpha = g.d/(d.A d + sum lam |d|^2)
-!>     T' = put back(T + alpha d)            r from A T' where points were put back, else by recurrence
+!>     T' = put back(T + alpha d)            r from A T', or by recurrence where all points stick
 !>
-!> A thick block makes the mean mode h/G of a periodic operator its largest by far, which every masked
-!> field excites. It is taken out of g and z by the two fields e = w Z of uniform traction, with
-!> E = sum of e and A e = (h/N) E:
+!> beta = 0 where more than a tenth of the contact left the bound, and after a shortened step.
 !>
-!>     g - E^-1 sum(w g) goes through the preconditioner to z0
-!>     z = z0 + w Z c,  c = E^-1 (N/h E^-1 sum(w g) - sum(z0))
+!> A thick block makes the mean mode h/G of a periodic operator its largest by far, which every
+!> masked field excites. It is taken out of g and z by the two fields e = w Z of uniform traction:
+!> with E = sum of w Z, H = A + lam and A ~ h/N on the mean, H e = (h/N) E + lam w Z and
+!> K = e.H e = (h/N) E E + sum of lam w^2 Z,
 !>
-!> Points that are put back in great number change the total traction, and a stiff mean mode then throws
-!> the slip to the other side: the part of the move after which g'.(T' - T) vanishes is taken
-!> instead where that has become less than -alpha g.d/2. This needs no energy, which does not exist where the slope counts.
+!>     c = K^-1 sum(w g)
+!>     Z (g - H e c) goes through the preconditioner to z0
+!>     z = z0 + e (c - K^-1 (H e).z0)
 !>
-!> An iteration costs two operator products, of which the first needs no inverse transform where points
-!> slip, and one preconditioner. beta is formed with z_old (M is symmetric), so that no old g is kept:
-!> four work fields z and d beside T, r and DX.
+!> Points that are put back in great number change the total traction, and a stiff mean mode then
+!> throws the slip to the other side: the part of the move after which g'.(T' - T) vanishes is taken
+!> instead where that has become less than -alpha g.d/2. This needs no energy, which does not exist
+!> where the slope counts.
+!>
+!> An iteration costs two operator products, of which the first needs no inverse transform where
+!> points slip, and one preconditioner. beta is formed with z_old (M is symmetric), so that no old g
+!> is kept: the work fields are z, d, T before the move, and the directions v.
 !>
 !> There is no proof that it converges: `friction_cg` falls back on spectral projected gradients.
 module friction_cg_fast
@@ -159,7 +166,7 @@ contains
       end if
    end subroutine mean_mode
 
-   !> Transform a row of w Z (g - mean).
+   !> Transform a row of w Z (g - H e c).
    subroutine scale_row(problem, preconditioner, restart, mean, c, j, zx, zy)
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: preconditioner
@@ -220,7 +227,8 @@ contains
       end do
    end subroutine unscale_row
 
-   !> d = z + beta Z d with its transform, its slope g.d and the part of its curvature by the bounds.
+   !> d = z + beta Z d with its transform, its slope g.d and the part of its curvature by the
+   !> bounds.
    subroutine new_direction(problem, operator, beta, shift, zx, zy, dx, dy, slope, curvature)
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator

@@ -5,8 +5,8 @@
 !>                                    one where the two differ much
 !>
 !> One product of the operator an iteration, no preconditioner. The radial return is no Euclidean
-!> projection where the slope counts, but its fixed points are the solution: T + alpha r returns to T
-!> where r = 0, and where T is on the bound and r is along D.
+!> projection where the slope counts, but its fixed points are the solution: T + alpha r returns to
+!> T where r = 0, and where T is on the bound and r is along D.
 module friction_cg_gradient
    use fft_conv, only : convolution_type
    use friction_law, only : contact_open, contact_stick

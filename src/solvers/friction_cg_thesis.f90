@@ -9,10 +9,10 @@
 !>     y = g' - g ; beta = -y.g'/t.y + theta t.g' y.y/(t.y)^2   (eq. 3.14)
 !>     d = g' + beta d
 !>
-!> Repaired against the printed text: the denominator of eq. 3.16 is |D|^2; the K_2 term takes the whole
-!> residual r, which holds the curvature of the bound; slip points go back on the bound from both sides;
-!> K_1 and K_2 are in closed form (module `friction_law`). Restarts with d = g where t.g <= 0.
-!> Two products of the operator an iteration, the first without its inverse transform.
+!> Repaired against the printed text: the denominator of eq. 3.16 is |D|^2; the K_2 term takes the
+!> whole residual r, which holds the curvature of the bound; slip points go back on the bound from
+!> both sides; K_1 and K_2 are in closed form (module `friction_law`). Restarts with d = g where t.g
+!> <= 0. Two products of the operator an iteration, the first without its inverse transform.
 module friction_cg_thesis
    use fft_conv, only : columns_form, convolution_type
    use friction_law, only : contact_open, contact_slip

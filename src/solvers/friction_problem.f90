@@ -1,8 +1,9 @@
 !> What the methods of `friction_cg` share: the tangential problem of one step, with its passes.
 !>
-!> Unknown: the traction T on the contact. The slip is r = DX - A (T + T_h), T_h a given traction. Wanted is T within the bound of
-!> module `friction_law`, with r = 0 where T is inside (stick) and, where T is on the bound (slip), r
-!> along the direction of slip v (D = T - T*, or D - n (n.D) by the physical law). The residual of a point
+!> Unknown: the traction T on the contact. The slip is r = DX - A (T + T_h), T_h a given traction.
+!> Wanted is T within the bound of module `friction_law`, with r = 0 where T is inside (stick) and,
+!> where T is on the bound (slip), r along the direction of slip v (D = T - T*, or D - n (n.D) by
+!> the physical law). The residual of a point
 !>
 !>     g = r                      inside, or on the bound with r.v < 0
 !>     g = r - (r.v) v/|v|^2      on the bound with r.v >= 0
@@ -40,8 +41,8 @@ module friction_problem
       real(dp), pointer, contiguous :: rx(:, :) => null(), ry(:, :) => null()
       real(dp), pointer, contiguous :: past_x(:, :) => null()   !! T_h, where there is a memory
       real(dp), pointer, contiguous :: past_y(:, :) => null()
-      !> The direction of slip times sqrt(w): its square is the weight w = a_0/(a_0 + curvature) of a slip
-      !> point. 0 where nothing but T* is allowed; not defined elsewhere.
+      !> The direction of slip times sqrt(w): its square is the weight w = a_0/(a_0 + curvature) of
+      !> a slip point. 0 where nothing but T* is allowed; not defined elsewhere.
       real(dp), pointer, contiguous :: normal_x(:, :) => null(), normal_y(:, :) => null()
       real(dp), pointer, contiguous :: old_x(:, :) => null()    !! T before the last move, if kept
       real(dp), pointer, contiguous :: old_y(:, :) => null()
@@ -75,7 +76,8 @@ module friction_problem
 
 contains
 
-   !> Bring the first T within its bound, slip points of the step before onto it, and transform its rows.
+   !> Bring the first T within its bound, slip points of the step before onto it, and transform its
+   !> rows.
    subroutine start(self, operator, moving)
       class(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
@@ -136,9 +138,9 @@ contains
       d = [self%tx(i, j), self%ty(i, j)] - self%law%normal_traction(self%p(i, j), slope)
    end function friction_part
 
-   !> Residual and curvature of a point in contact. With the direction of slip v = S^-1 D the bound is
-   !> |S^-1/2 D| = const to first order (its change with n.D left out): a multiplier lam = r.v/|v|^2 and
-   !> the curvature lam e.(S^-1 e)/|e|^2 along its tangent e.
+   !> Residual and curvature of a point in contact. With the direction of slip v = S^-1 D the bound
+   !> is |S^-1/2 D| = const to first order (its change with n.D left out): a multiplier lam =
+   !> r.v/|v|^2 and the curvature lam e.(S^-1 e)/|e|^2 along its tangent e.
    pure subroutine point_residual(self, i, j, v, g, curvature, reversed)
       class(friction_problem_type), intent(in) :: self
       integer, intent(in) :: i, j
@@ -413,7 +415,8 @@ contains
       self%change = sqrt(sums(2)/max(sums(3), tiny(1.0_dp)))
    end subroutine move
 
-   !> Undo a part of the last move: T' = T_old + fraction (T - T_old), put back; its rows are transformed.
+   !> Undo a part of the last move: T' = T_old + fraction (T - T_old), put back; its rows are
+   !> transformed.
    subroutine step_back(self, operator, fraction)
       class(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
