@@ -514,6 +514,7 @@ contains
       call solver%destroy()
       call new_adhesion_solver(solver, grid, poisson, error, preconditioner='fine')
       call check_error(error, 'coarse', 'unknown preconditioner')
+      call solver%destroy()
    end subroutine test_outcomes
 
    !> The same bits with one and with two threads.
