@@ -5,8 +5,9 @@
 module adhesion_cg
    use adhesion_cg_free, only : adhesion_free_type, new_adhesion_free
    use adhesion_cg_periodic, only : adhesion_periodic_type, new_adhesion_periodic
+   use adhesion_cg_thesis, only : adhesion_thesis_type, new_adhesion_thesis
    use adhesion_state, only : adhesion_problem_type
-   use errors, only : error_type
+   use errors, only : error_input, error_type, fail
    use precision, only : dp
    use regular_grid, only : boundary_periodic, grid_type
    use solver_result, only : solver_result_type
@@ -15,11 +16,16 @@ module adhesion_cg
 
    public :: adhesion_solver_type, new_adhesion_solver
 
+   integer, parameter :: kind_periodic = 1
+   integer, parameter :: kind_free = 2
+   integer, parameter :: kind_thesis = 3
+
    !> The solver with its operators and work fields, kept from step to step. Not to be copied.
    type :: adhesion_solver_type
-      logical, private :: is_periodic = .true.
+      integer, private :: kind = kind_periodic
       type(adhesion_periodic_type), private :: periodic
       type(adhesion_free_type), private :: free
+      type(adhesion_thesis_type), private :: thesis
    contains
       procedure :: solve
       procedure :: destroy
@@ -28,20 +34,29 @@ module adhesion_cg
 contains
 
    !> Make a solver for a grid; in free mode ny > 1.
-   subroutine new_adhesion_solver(self, grid, poisson, error, preconditioner)
+   subroutine new_adhesion_solver(self, grid, poisson, error, method, preconditioner)
       type(adhesion_solver_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: poisson
       type(error_type), allocatable, intent(out) :: error
-      character(*), intent(in), optional :: preconditioner  !! 'coarse' (default) or 'full'
-      character(8) :: form
+      character(*), intent(in), optional :: method          !! 'fast' (default) or 'thesis' (periodic)
+      character(*), intent(in), optional :: preconditioner  !! 'coarse' (default) or 'full', of 'fast'
+      character(16) :: name, form
 
+      name = 'fast'
+      if (present(method)) name = method
       form = 'coarse'
       if (present(preconditioner)) form = preconditioner
-      self%is_periodic = grid%boundary == boundary_periodic
-      if (self%is_periodic) then
+      if (name == 'thesis') then
+         self%kind = kind_thesis
+         call new_adhesion_thesis(self%thesis, grid, poisson, error)
+      else if (name /= 'fast') then
+         call fail(error, error_input, "method = '"//trim(name)//"': must be 'fast' or 'thesis'")
+      else if (grid%boundary == boundary_periodic) then
+         self%kind = kind_periodic
          call new_adhesion_periodic(self%periodic, grid, poisson, trim(form), error)
       else
+         self%kind = kind_free
          call new_adhesion_free(self%free, grid, poisson, trim(form), error)
       end if
    end subroutine new_adhesion_solver
@@ -61,11 +76,14 @@ contains
       type(solver_result_type), intent(out) :: outcome
       real(dp), intent(in), optional :: history(:, :)  !! P_h, Pa
 
-      if (self%is_periodic) then
+      select case (self%kind)
+      case (kind_periodic)
          call self%periodic%solve(problem, height, gap, pressure, level, outcome, history)
-      else
+      case (kind_free)
          call self%free%solve(problem, height, gap, pressure, level, outcome, history)
-      end if
+      case (kind_thesis)
+         call self%thesis%solve(problem, height, gap, pressure, level, outcome, history)
+      end select
    end subroutine solve
 
    !> Free plans and memory.
@@ -74,6 +92,7 @@ contains
 
       call self%periodic%destroy()
       call self%free%destroy()
+      call self%thesis%destroy()
    end subroutine destroy
 
 end module adhesion_cg

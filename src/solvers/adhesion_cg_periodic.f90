@@ -20,10 +20,12 @@
 !> spectrum of B and with 'full' of M.
 module adhesion_cg_periodic
    use adhesion_potential, only : adhesive_slope, adhesive_terms, potential_gauss
+   use adhesion_periodic_state, only : evaluate_traction, field_sum, finish, residual_units, &
+      start_gap
    use adhesion_preconditioner, only : adhesion_preconditioner_type, new_adhesion_preconditioner
    use adhesion_state, only : adhesion_problem_type, choose_step, clipped_step, control_approach, &
       control_pressure, diagonal_scaling, reason_closed, reason_converged, reason_detached, &
-      reason_limit, reason_stalled, row_total, step_sums_type, stepped_gap, sum_shift, traction_scale
+      reason_limit, reason_stalled, row_total, step_sums_type, stepped_gap, sum_shift
    use errors, only : error_input, error_type, fail
    use fft_conv, only : columns_apply, convolution_type, new_symbol_operator
    use omp_lib, only : omp_get_wtime
@@ -125,7 +127,7 @@ contains
       before = self%stiffness%ffts
       transforms_before = self%preconditioner%transforms()
       cells = real(self%grid%nx, dp)*self%grid%ny
-      mean_height = field_sum(self, height)/cells
+      mean_height = field_sum(self%stiffness, self%rows, height)/cells
       load = 0.0_dp
       if (problem%control == control_pressure) load = problem%target
       total = -cells*(problem%target + mean_height)
@@ -141,17 +143,16 @@ contains
       self%direction = 0.0_dp
       self%residual = 0.0_dp
       if (problem%full_contact) gap(:, :) = 0.0_dp
-      call start_gap(self, problem, total, gap)
-      call evaluate_traction(self, problem, height, gap, pressure, history)
+      call start_gap(self%stiffness, self%rows, problem, total, gap)
+      call evaluate_traction(self%stiffness, self%rows, problem, height, gap, pressure, &
+         history)
       fresh = .true.
       age = 0
       failures = 0
       kappa = 1.0_dp
       old_rz = 0.0_dp
-      length = max(problem%potential%range, tiny(1.0_dp))
-      if (problem%potential%range <= 0.0_dp) length = rms(self, height, mean_height)
-      scale = traction_scale(problem%potential, max(abs(load), largest(self, pressure), &
-         problem%modulus*self%longest*rms(self, height, mean_height)))
+      call residual_units(self%stiffness, self%rows, problem, height, pressure, load, self%longest, &
+         length, scale)
       do
          call evaluate_gradient(self, problem, gap, pressure, length, scale, load, &
             outcome%residual, least)
@@ -161,7 +162,8 @@ contains
                outcome%reason = reason_converged
                exit
             end if
-            call evaluate_traction(self, problem, height, gap, pressure, history)
+            call evaluate_traction(self%stiffness, self%rows, problem, height, gap, pressure, &
+               history)
             fresh = .true.
             age = 0
             cycle
@@ -218,13 +220,15 @@ contains
             end if
          end if
          if (age == refresh .or. failures == 2) then
-            call evaluate_traction(self, problem, height, gap, pressure, history)
+            call evaluate_traction(self%stiffness, self%rows, problem, height, gap, pressure, &
+               history)
             fresh = .true.
             age = 0
          end if
       end do
       if (.not. fresh) then
-         call evaluate_traction(self, problem, height, gap, pressure, history)
+         call evaluate_traction(self%stiffness, self%rows, problem, height, gap, pressure, &
+            history)
          call evaluate_gradient(self, problem, gap, pressure, length, scale, load, &
             outcome%residual, least)
          if (outcome%reason == reason_stalled .and. outcome%residual <= problem%tolerance) then
@@ -232,67 +236,12 @@ contains
             outcome%reason = reason_converged
          end if
       end if
-      call finish(self, problem, load, total, gap, pressure, outcome)
-      level = -mean_height - field_sum(self, gap)/cells
+      call finish(self%stiffness, self%rows, problem, load, total, gap, pressure, outcome)
+      level = -mean_height - field_sum(self%stiffness, self%rows, gap)/cells
       outcome%ffts = self%stiffness%ffts - before &
          + nint(self%preconditioner%transforms() - transforms_before, int64)
       outcome%seconds = omp_get_wtime() - outcome%seconds
    end subroutine solve
-
-   !> Put the start on what is allowed.
-   subroutine start_gap(self, problem, total, gap)
-      type(adhesion_periodic_type), intent(inout) :: self
-      type(adhesion_problem_type), intent(in) :: problem
-      real(dp), intent(in) :: total
-      real(dp), intent(inout) :: gap(:, :)
-      real(dp) :: shift
-      integer :: j
-
-      !$omp parallel do default(none) shared(gap) private(j) num_threads(self%stiffness%threads)
-      do j = 1, size(gap, 2)
-         gap(:, j) = max(gap(:, j), 0.0_dp)
-      end do
-      if (problem%control /= control_approach) return
-      if (field_sum(self, gap) > 0.0_dp) then
-         shift = sum_shift(gap, self%direction, 0.0_dp, total, self%rows, self%stiffness%threads)
-         !$omp parallel do default(none) shared(gap, shift) private(j) &
-         !$omp num_threads(self%stiffness%threads)
-         do j = 1, size(gap, 2)
-            gap(:, j) = stepped_gap(gap(:, j), 0.0_dp, 0.0_dp, shift)
-         end do
-      else
-         gap(:, :) = total/size(gap)
-      end if
-   end subroutine start_gap
-
-   !> traction = Q B(H + g) - P_h, of zero mean.
-   subroutine evaluate_traction(self, problem, height, gap, traction, history)
-      type(adhesion_periodic_type), intent(inout) :: self
-      type(adhesion_problem_type), intent(in) :: problem
-      real(dp), intent(in) :: height(:, :), gap(:, :)
-      real(dp), intent(inout) :: traction(:, :)
-      real(dp), intent(in), optional :: history(:, :)
-      real(dp) :: mean, form
-      logical :: remembers
-      integer :: j
-
-      remembers = present(history)
-      mean = 0.0_dp
-      if (remembers) mean = field_sum(self, history)/(real(self%grid%nx, dp)*self%grid%ny)
-      !$omp parallel do default(none) shared(self, height, gap) private(j) &
-      !$omp num_threads(self%stiffness%threads)
-      do j = 1, size(gap, 2)
-         call self%stiffness%forward_row(1, j, height(:, j) + gap(:, j))
-      end do
-      call self%stiffness%columns(columns_apply, form)
-      !$omp parallel do default(none) shared(self, problem, traction, history, mean, remembers) &
-      !$omp private(j) num_threads(self%stiffness%threads)
-      do j = 1, size(gap, 2)
-         call self%stiffness%backward_row(1, j, traction(:, j))
-         traction(:, j) = problem%modulus*traction(:, j)
-         if (remembers) traction(:, j) = traction(:, j) - (history(:, j) - mean)
-      end do
-   end subroutine evaluate_traction
 
    !> The gradient less the load, the load (multiplier) where the approach is prescribed, the natural
    !> residual, and the residual r = -G on the free cells, handed to the preconditioner.
@@ -529,77 +478,6 @@ contains
       !$omp end do
       !$omp end parallel
    end subroutine take_step
-
-   !> P = p + traction, and the error of the load or of the mean gap.
-   subroutine finish(self, problem, load, total, gap, pressure, outcome)
-      type(adhesion_periodic_type), intent(inout) :: self
-      type(adhesion_problem_type), intent(in) :: problem
-      real(dp), intent(in) :: load, total
-      real(dp), intent(in) :: gap(:, :)
-      real(dp), intent(inout) :: pressure(:, :)
-      type(solver_result_type), intent(inout) :: outcome
-      real(dp) :: mean
-      integer :: j
-
-      !$omp parallel do default(none) shared(pressure, load) private(j) &
-      !$omp num_threads(self%stiffness%threads)
-      do j = 1, size(pressure, 2)
-         pressure(:, j) = pressure(:, j) + load
-      end do
-      if (problem%control == control_approach) then
-         outcome%load_error = abs(field_sum(self, gap) - total)/total
-      else
-         mean = field_sum(self, pressure)/(real(self%grid%nx, dp)*self%grid%ny)
-         outcome%load_error = abs(mean - load)/max(abs(load), &
-            epsilon(1.0_dp)*largest(self, pressure), tiny(1.0_dp))
-      end if
-   end subroutine finish
-
-   !> Sum of a field.
-   function field_sum(self, field) result(total)
-      type(adhesion_periodic_type), intent(inout) :: self
-      real(dp), intent(in) :: field(:, :)
-      real(dp) :: total
-      integer :: j
-
-      !$omp parallel do default(none) shared(self, field) private(j) &
-      !$omp num_threads(self%stiffness%threads)
-      do j = 1, size(field, 2)
-         self%rows(1, j) = sum(field(:, j))
-      end do
-      total = row_total(self%rows, 1)
-   end function field_sum
-
-   !> Largest magnitude of a field.
-   function largest(self, field) result(value)
-      type(adhesion_periodic_type), intent(inout) :: self
-      real(dp), intent(in) :: field(:, :)
-      real(dp) :: value
-      integer :: j
-
-      !$omp parallel do default(none) shared(self, field) private(j) &
-      !$omp num_threads(self%stiffness%threads)
-      do j = 1, size(field, 2)
-         self%rows(1, j) = maxval(abs(field(:, j)))
-      end do
-      value = max(global_max(maxval(self%rows(1, :))), tiny(1.0_dp))
-   end function largest
-
-   !> Root mean square of a field about its mean.
-   function rms(self, field, mean) result(value)
-      type(adhesion_periodic_type), intent(inout) :: self
-      real(dp), intent(in) :: field(:, :)
-      real(dp), intent(in) :: mean
-      real(dp) :: value
-      integer :: j
-
-      !$omp parallel do default(none) shared(self, field, mean) private(j) &
-      !$omp num_threads(self%stiffness%threads)
-      do j = 1, size(field, 2)
-         self%rows(1, j) = sum((field(:, j) - mean)**2)
-      end do
-      value = max(sqrt(row_total(self%rows, 1)/(real(self%grid%nx, dp)*self%grid%ny)), tiny(1.0_dp))
-   end function rms
 
    !> Free plans and memory.
    subroutine destroy(self)
