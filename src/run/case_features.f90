@@ -15,10 +15,7 @@ contains
       type(case_type), intent(in) :: case
       type(faults_type), intent(inout) :: faults
 
-      associate (a => case%adhesion)
-         call missing(a%potential /= 'none', '&adhesion: potential = '//trim(a%potential), 'adhesion')
          call missing(case%solver%precision == 'mixed', '&solver: precision = ''mixed''', 'mixed precision')
-      end associate
 
    contains
 

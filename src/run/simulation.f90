@@ -18,10 +18,8 @@ module simulation
    use history_row, only : history_row_type
    use interpolation, only : displaced, interpolation_type, new_interpolation, shifted
    use map_edge, only : edge_clear, look_at_edge
-   use normal_cg, only : new_normal_solver, normal_solver_type
-   use normal_cg_thesis, only : solve_normal_thesis
-   use normal_state, only : control_approach, control_pressure, normal_problem_type, rms_about_mean
-   use parallel, only : global_max, global_sum
+   use normal_step, only : new_normal_step, normal_step_type
+   use parallel, only : global_sum
    use precision, only : dp, int64, int8
    use regular_grid, only : boundary_free, grid_type
    use schedule, only : next_row, planned_row_type, schedule_type
@@ -67,7 +65,9 @@ module simulation
       logical, private :: slides = .false.          !! some phase moves the road
       real(dp), allocatable, private :: settled(:, :)   !! pressure of the pass before, Pa
       integer, private :: edge = edge_clear         !! worst found at the edge of a free map
-      type(normal_solver_type), private :: normal
+      type(normal_step_type), private :: side
+      logical :: first = .true.                     !! no state yet
+      real(dp) :: level = 0.0_dp                    !! U - H where the gap is zero, m
       real(dp), allocatable, private :: slope_x(:, :), slope_y(:, :)
       real(dp), allocatable, private :: new_slope_x(:, :), new_slope_y(:, :)   !! of the pass in hand
       real(dp), allocatable, private :: past(:, :)  !! traction of the history, Pa
@@ -97,10 +97,10 @@ contains
       self%slides = any(abs(case%phases%velocity_x) > 0.0_dp .or. abs(case%phases%velocity_y) > 0.0_dp)
       call new_height(self%grid, case%surfaces, self%height, error)
       if (allocated(error)) return
-      self%summit = global_max(maxval(self%height))
-      call new_normal_solver(self%normal, self%grid, case%material%poisson, error)
+      call new_normal_step(self%side, case, self%height, error)
       if (allocated(error)) return
-      self%rms_height = rms_about_mean(self%height, self%normal%operator%threads)
+      self%summit = self%side%summit
+      self%rms_height = self%side%rms_height
       call new_zener(self%material, case%material%shear_modulus, case%material%prony_g, &
          case%material%prony_tau, trim(case%solver%time_scheme), error)
       if (allocated(error)) return
@@ -148,7 +148,7 @@ contains
          call solve_normal(self, plan, outcome, level)
       else if (plan%instantaneous) then
          call solve_normal(self, plan, outcome, level)
-         call self%tangential%return_to_bound(self%pressure, self%slope_x, self%slope_y)
+         call self%tangential%return_to_bound(self%pressure, self%gap, self%slope_x, self%slope_y)
       else
          call coupled_passes(self, plan, outcome, rubbing, level)
       end if
@@ -184,7 +184,7 @@ contains
       integer :: pass
 
       do pass = 1, self%case%solver%passes
-         call self%tangential%solve(self%pressure, self%slope_x, self%slope_y, part)
+         call self%tangential%solve(self%pressure, self%gap, self%slope_x, self%slope_y, part)
          call add_result(rubbing, part)
          call displaced(self%road, plan%road_x, plan%road_y, self%tangential%trial(:, :, 1), &
             self%tangential%trial(:, :, 2), self%height, self%new_slope_x, self%new_slope_y)
@@ -194,13 +194,13 @@ contains
          if (.not. part%converged) exit
          if (unsettled(self) <= self%case%solver%tolerance) then
             ! The traction of this pass belongs to the pressure, but for what is below the tolerance.
-            call self%tangential%trim(self%pressure, self%slope_x, self%slope_y)
+            call self%tangential%trim(self%pressure, self%gap, self%slope_x, self%slope_y)
             return
          end if
          call swap(self%slope_x, self%new_slope_x)
          call swap(self%slope_y, self%new_slope_y)
       end do
-      call self%tangential%solve(self%pressure, self%slope_x, self%slope_y, part)
+      call self%tangential%solve(self%pressure, self%gap, self%slope_x, self%slope_y, part)
       call add_result(rubbing, part)
    end subroutine coupled_passes
 
@@ -251,8 +251,8 @@ contains
       products = new_products(self%material)
       call new_displacement(self, level)
       call commit_history(self%history, self%material, self%pressure, self%displacement, &
-         self%normal%step, products)
-      self%displacement(:, :) = self%normal%step
+         self%side%normal%step, products)
+      self%displacement(:, :) = self%side%normal%step
       call book_step(self%books, self%material, products)
       if (self%frictional) &
          call self%tangential%commit(self%material, self%pressure, self%slope_x, self%slope_y)
@@ -313,6 +313,8 @@ contains
       cells = nint(seen/[self%grid%dx, self%grid%dy])
       if (any(cells /= self%moved_cells)) then
          call shift_field(self, cells - self%moved_cells, self%pressure)
+         if (self%side%adhesive .and. self%grid%boundary /= boundary_free) &
+            call shift_field(self, cells - self%moved_cells, self%gap)
          if (rubs(self)) then
             do c = 1, 2
                call shift_field(self, cells - self%moved_cells, self%tangential%traction(:, :, c))
@@ -353,17 +355,17 @@ contains
          do i = 1, self%grid%nx
             from_i = i - cells(1)
             if (.not. free) then
-               self%normal%step(i, j) = field(modulo(from_i - 1, self%grid%nx) + 1, &
+               self%side%normal%step(i, j) = field(modulo(from_i - 1, self%grid%nx) + 1, &
                   modulo(from_j - 1, self%grid%ny) + 1)
             else if (from_i >= 1 .and. from_i <= self%grid%nx .and. &
                from_j >= 1 .and. from_j <= self%grid%ny) then
-               self%normal%step(i, j) = field(from_i, from_j)
+               self%side%normal%step(i, j) = field(from_i, from_j)
             else
-               self%normal%step(i, j) = 0.0_dp
+               self%side%normal%step(i, j) = 0.0_dp
             end if
          end do
       end do
-      field(:, :) = self%normal%step
+      field(:, :) = self%side%normal%step
    end subroutine shift_field
 
    !> Solve the normal contact under the row's load.
@@ -372,31 +374,13 @@ contains
       type(planned_row_type), intent(in) :: plan
       type(solver_result_type), intent(out) :: outcome
       real(dp), intent(out) :: level
-      type(normal_problem_type) :: problem
 
-      problem%modulus = self%material%q
-      problem%tolerance = self%case%solver%tolerance
-      problem%max_iterations = self%case%solver%max_iterations
-      problem%rms_height = self%rms_height
-      problem%warm = self%schedule%row > 0
-      select case (plan%control)
-      case ('displacement')
-         problem%control = control_approach
-         problem%target = plan%load - self%summit
-      case ('force')
-         problem%control = control_pressure
-         problem%target = plan%load/(self%grid%lx*self%grid%ly)
-      case default
-         problem%control = control_pressure
-         problem%target = plan%load
-      end select
-      if (self%case%solver%method == 'thesis') then
-         call solve_normal_thesis(self%grid, self%normal%operator, problem, self%height, &
-            self%pressure, self%gap, level, outcome, self%past)
-      else
-         ! Not allocated, where there are no arms, is not present.
-         call self%normal%solve(problem, self%height, self%pressure, self%gap, level, outcome, self%past)
-      end if
+      level = self%level
+      ! The past, where there are no arms, is not allocated and so not present.
+      call self%side%solve(plan, self%material%q, self%first, self%height, self%pressure, self%gap, &
+         level, outcome, self%past)
+      self%level = level
+      self%first = .false.
    end subroutine solve_normal
 
    !> U = gap + H + level, into the solver's work field.
@@ -407,7 +391,7 @@ contains
 
       !$omp parallel do default(none) shared(self, level) private(j)
       do j = 1, self%grid%ny
-         self%normal%step(:, j) = self%gap(:, j) + self%height(:, j) + level
+         self%side%normal%step(:, j) = self%gap(:, j) + self%height(:, j) + level
       end do
    end subroutine new_displacement
 
@@ -419,21 +403,25 @@ contains
       real(dp), intent(in) :: level
       type(history_row_type) :: row
       real(dp), allocatable :: rows(:, :)
-      real(dp) :: sums(5), cells, area, force(2)
+      real(dp) :: sums(7), cells, area, force(2), outside(2)
       integer :: j
 
-      allocate (rows(5, self%grid%ny), source=0.0_dp)
+      allocate (rows(7, self%grid%ny), source=0.0_dp)
       !$omp parallel do default(none) shared(self, rows) private(j)
       do j = 1, self%grid%ny
          rows(1, j) = sum(self%pressure(:, j))
-         rows(2, j) = count(self%pressure(:, j) > 0.0_dp)
+         rows(2, j) = count(touches(self, j))
          rows(3, j) = sum(self%gap(:, j))
          if (self%slides) then
             rows(4, j) = sum(self%pressure(:, j)*self%slope_x(:, j))
             rows(5, j) = sum(self%pressure(:, j)*self%slope_y(:, j))
+            if (self%side%adhesive) then
+               rows(6, j) = sum(self%pressure(:, j)*self%slope_x(:, j), .not. touches(self, j))
+               rows(7, j) = sum(self%pressure(:, j)*self%slope_y(:, j), .not. touches(self, j))
+            end if
          end if
       end do
-      sums = global_sum([(sum(rows(j, :)), j = 1, 5)])
+      sums = global_sum([(sum(rows(j, :)), j = 1, 7)])
       cells = real(self%grid%nx, dp)*self%grid%ny
       area = self%grid%lx*self%grid%ly
 
@@ -449,14 +437,18 @@ contains
       row%road_x = plan%road_x
       row%road_y = plan%road_y
       row%friction_viscous = 0.0_dp
-      if (sums(1) > 0.0_dp) &
+      if (abs(sums(1)) > 0.0_dp) &
          row%friction_viscous = -dot_product(sums(4:5), self%direction)/sums(1)
       force = -sums(4:5)*self%grid%dx*self%grid%dy
-      row%work_normal = self%books%work
+      row%energy_adhesive = self%side%energy(self%gap)
+      row%work_normal = self%books%work + row%energy_adhesive
       row%energy_elastic = self%books%stored
       row%dissipated_viscous = self%books%dissipated
       row%dissipated_numerical = self%books%numerical
-      if (self%frictional) call add_friction(self, plan, rubbing, force, row)
+      if (self%frictional) then
+         outside = -sums(6:7)*self%grid%dx*self%grid%dy
+         call add_friction(self, plan, rubbing, outside, force, row)
+      end if
       row%friction = 0.0_dp
       if (abs(row%force) > 0.0_dp) row%friction = dot_product(force, self%direction)/row%force
       if (plan%instantaneous) then
@@ -478,12 +470,26 @@ contains
       self%row = row
    end subroutine fill_row
 
+   !> Which cells of a row touch: P > 0, or with adhesion a gap of zero.
+   function touches(self, j) result(yes)
+      type(simulation_type), intent(in) :: self
+      integer, intent(in) :: j
+      logical :: yes(self%grid%nx)
+
+      if (self%side%adhesive) then
+         yes = self%gap(:, j) <= 0.0_dp
+      else
+         yes = self%pressure(:, j) > 0.0_dp
+      end if
+   end function touches
+
    !> The part of friction in a row, and the whole horizontal force. With slope it is the sum of T,
    !> which holds -P grad H; without, both are added.
-   subroutine add_friction(self, plan, rubbing, force, row)
+   subroutine add_friction(self, plan, rubbing, outside, force, row)
       type(simulation_type), intent(in) :: self
       type(planned_row_type), intent(in) :: plan
       type(solver_result_type), intent(in) :: rubbing
+      real(dp), intent(in) :: outside(2)            !! sum of -P grad H outside the contact, N
       real(dp), intent(inout) :: force(2)           !! in: sum of -P grad H; out: all of it, N
       type(history_row_type), intent(inout) :: row
       real(dp) :: traction(2), slip(2)
@@ -491,7 +497,7 @@ contains
       call self%tangential%sums(traction, row%stick_area, slip)
       row%traction_x = traction(1)
       row%traction_y = traction(2)
-      if (self%tangential%law%slope .and. self%tangential%moved) force = 0.0_dp
+      if (self%tangential%law%slope .and. self%tangential%moved) force = outside
       force = force + traction*self%grid%lx*self%grid%ly
       row%sliding_speed = 0.0_dp
       if (plan%dt > 0.0_dp) row%sliding_speed = dot_product(slip, self%direction)/plan%dt
@@ -544,7 +550,7 @@ contains
       end if
       allocate (states(self%grid%nx, self%grid%ny))
       do j = 1, self%grid%ny
-         states(:, j) = merge(2_int8, 0_int8, self%pressure(:, j) > 0.0_dp)
+         states(:, j) = merge(2_int8, 0_int8, touches(self, j))
       end do
    end subroutine contact_states
 
@@ -552,7 +558,7 @@ contains
    subroutine destroy(self)
       class(simulation_type), intent(inout) :: self
 
-      call self%normal%destroy()
+      call self%side%destroy()
       call destroy_history(self%history)
       if (self%frictional) call self%tangential%destroy()
    end subroutine destroy

@@ -33,7 +33,7 @@ contains
       call writer%put('row', row_values(sim%row), '1', error)
       if (allocated(error)) return
       call writer%put('motion', [sim%direction, sim%drive_force, sim%velocity, sim%drifted, &
-         real(sim%moved_cells, dp)], '1', error)
+         real(sim%moved_cells, dp), sim%level], '1', error)
       if (allocated(error)) return
       call writer%put('pressure', sim%pressure, 'Pa', error)
       if (allocated(error)) return
@@ -60,7 +60,7 @@ contains
       type(simulation_type), intent(inout) :: sim
       type(checkpoint_reader_type), intent(inout) :: reader
       type(error_type), allocatable, intent(out) :: error
-      real(dp) :: numbers(schedule_values), row(column_count), motion(10)
+      real(dp) :: numbers(schedule_values), row(column_count), motion(11)
       real(dp), allocatable :: books(:)
       character(:), allocatable :: control
 
@@ -92,6 +92,8 @@ contains
       sim%velocity = motion(5:6)
       sim%drifted = motion(7:8)
       sim%moved_cells = nint(motion(9:10))
+      sim%level = motion(11)
+      sim%first = .false.
       call reader%get('pressure', sim%pressure, error)
       if (allocated(error)) return
       call reader%get('gap', sim%gap, error)

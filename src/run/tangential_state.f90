@@ -188,19 +188,15 @@ contains
    end function means
 
    !> Solve for the traction under a pressure: T, the trial displacement, the slip.
-   subroutine solve(self, pressure, slope_x, slope_y, outcome)
+   subroutine solve(self, pressure, gap, slope_x, slope_y, outcome)
       class(tangential_state_type), intent(inout) :: self
       real(dp), intent(in), contiguous, target :: pressure(:, :)
+      real(dp), intent(in) :: gap(:, :)
       real(dp), intent(in), contiguous, target :: slope_x(:, :), slope_y(:, :)
       type(solver_result_type), intent(out) :: outcome
-      integer :: i, j, c
+      integer :: j, c
 
-      !$omp parallel do default(none) shared(self, pressure) private(i, j)
-      do j = 1, self%grid%ny
-         do i = 1, self%grid%nx
-            self%contact(i, j) = merge(1_int8, 0_int8, pressure(i, j) > 0.0_dp)
-         end do
-      end do
+      call mark_contact(self, pressure, gap)
       call self%solver%solve(self%operator, self%law, pressure, slope_x, slope_y, self%drive(:, :, 1), &
          self%drive(:, :, 2), self%contact, self%traction(:, :, 1), self%traction(:, :, 2), &
          self%slip(:, :, 1), self%slip(:, :, 2), outcome)
@@ -213,43 +209,50 @@ contains
       end do
    end subroutine solve
 
-   !> Return T to the bound of a pressure that differs by less than the tolerance from its own.
-   subroutine trim_traction(self, pressure, slope_x, slope_y)
-      class(tangential_state_type), intent(inout) :: self
-      real(dp), intent(in) :: pressure(:, :)
-      real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)
+   !> Which cells may carry friction, kept where they slipped: P > 0, or with adhesion no gap.
+   subroutine mark_contact(self, pressure, gap)
+      type(tangential_state_type), intent(inout) :: self
+      real(dp), intent(in) :: pressure(:, :), gap(:, :)
+      logical :: adhesive, touches
       integer :: i, j
 
-      !$omp parallel do default(none) shared(self, pressure) private(i, j)
+      adhesive = self%law%adhesive_pressure > 0.0_dp
+      !$omp parallel do default(none) shared(self, pressure, gap, adhesive) private(i, j, touches)
       do j = 1, self%grid%ny
          do i = 1, self%grid%nx
-            if (pressure(i, j) <= 0.0_dp) then
+            touches = pressure(i, j) > 0.0_dp
+            if (adhesive) touches = gap(i, j) <= 0.0_dp
+            if (.not. touches) then
                self%contact(i, j) = 0_int8
             else if (self%contact(i, j) == 0_int8) then
                self%contact(i, j) = 1_int8
             end if
          end do
       end do
+   end subroutine mark_contact
+
+   !> Return T to the bound of a pressure that differs by less than the tolerance from its own.
+   subroutine trim_traction(self, pressure, gap, slope_x, slope_y)
+      class(tangential_state_type), intent(inout) :: self
+      real(dp), intent(in) :: pressure(:, :), gap(:, :)
+      real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)
+
+      call mark_contact(self, pressure, gap)
       call return_tractions(self%law, pressure, slope_x, slope_y, self%contact, &
          self%traction(:, :, 1), self%traction(:, :, 2))
    end subroutine trim_traction
 
    !> An instantaneous row: T stays as it is but for the bound of the new pressure, and the rubber
    !> answers at once. A mass does not move in no time.
-   subroutine return_to_bound(self, pressure, slope_x, slope_y)
+   subroutine return_to_bound(self, pressure, gap, slope_x, slope_y)
       class(tangential_state_type), intent(inout) :: self
-      real(dp), intent(in) :: pressure(:, :)
+      real(dp), intent(in) :: pressure(:, :), gap(:, :)
       real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)
       real(dp) :: before(2), after(2)
-      integer :: i, j, c
+      integer :: c
 
       if (.not. self%moved) return
-      !$omp parallel do default(none) shared(self, pressure) private(i, j)
-      do j = 1, self%grid%ny
-         do i = 1, self%grid%nx
-            self%contact(i, j) = merge(1_int8, 0_int8, pressure(i, j) > 0.0_dp)
-         end do
-      end do
+      call mark_contact(self, pressure, gap)
       call return_tractions(self%law, pressure, slope_x, slope_y, self%contact, &
          self%traction(:, :, 1), self%traction(:, :, 2))
       self%drive = self%traction + self%past

@@ -1,0 +1,200 @@
+!> The normal side of a row: the contact solved under the row's load, without or with adhesion.
+!>
+!> With adhesion the start is part of the case (there is real hysteresis): the first row starts from the
+!> solution without adhesion, or from full contact; later ones from the state before.
+module normal_step
+   use adhesion_cg, only : adhesion_solver_type, new_adhesion_solver
+   use adhesion_potential, only : adhesion_potential_type, adhesive_energy, new_adhesion_potential
+   use adhesion_state, only : adhesion_problem_type
+   use case_settings, only : case_type
+   use errors, only : error_input, error_type, fail
+   use normal_cg, only : new_normal_solver, normal_solver_type
+   use normal_cg_thesis, only : solve_normal_thesis
+   use normal_state, only : control_approach, control_pressure, normal_problem_type, rms_about_mean
+   use parallel, only : global_max, global_sum
+   use precision, only : dp
+   use regular_grid, only : boundary_free, grid_type
+   use schedule, only : planned_row_type
+   use solver_result, only : solver_result_type
+   implicit none
+   private
+
+   public :: new_normal_step, normal_step_type
+
+   !> Solvers and settings of the normal side. Not to be copied.
+   type :: normal_step_type
+      type(grid_type) :: grid
+      logical :: adhesive = .false.
+      real(dp) :: summit = 0.0_dp                  !! highest point of the original map, m
+      real(dp) :: rms_height = 0.0_dp              !! of the original map about its mean, m
+      type(normal_solver_type) :: normal
+      type(adhesion_potential_type), private :: potential
+      type(adhesion_solver_type), private :: sticky
+      logical, private :: thesis = .false.
+      logical, private :: full_contact = .false.
+      real(dp), private :: tolerance = 1e-6_dp
+      integer, private :: max_iterations = 1000
+   contains
+      procedure :: solve
+      procedure :: energy
+      procedure :: destroy
+   end type normal_step_type
+
+contains
+
+   !> Prepare the solvers that a case needs.
+   subroutine new_normal_step(self, case, height, error)
+      type(normal_step_type), intent(out) :: self
+      type(case_type), intent(in) :: case
+      real(dp), intent(in) :: height(:, :)         !! the original map, m
+      type(error_type), allocatable, intent(out) :: error
+
+      self%grid = case%grid
+      self%thesis = case%solver%method == 'thesis'
+      self%tolerance = case%solver%tolerance
+      self%max_iterations = case%solver%max_iterations
+      self%adhesive = case%adhesion%potential /= 'none'
+      self%summit = global_max(maxval(height))
+      call new_normal_solver(self%normal, self%grid, case%material%poisson, error)
+      if (allocated(error)) return
+      self%rms_height = rms_about_mean(height, self%normal%operator%threads)
+      if (.not. self%adhesive) return
+      self%full_contact = case%adhesion%start == 'full_contact'
+      if (self%thesis .and. self%grid%boundary == boundary_free) then
+         call fail(error, error_input, '&solver: method = ''thesis'' with &adhesion: needs boundary = '// &
+            '''periodic''; ''fast'' serves both')
+         return
+      end if
+      call new_adhesion_potential(self%potential, trim(case%adhesion%potential), case%adhesion%energy, &
+         case%adhesion%range, error)
+      if (allocated(error)) return
+      call new_adhesion_solver(self%sticky, self%grid, case%material%poisson, error, &
+         trim(case%solver%method))
+   end subroutine new_normal_step
+
+   !> Solve under the row's load, from the pressure and gap handed in; `first`: there is no state yet.
+   subroutine solve(self, plan, modulus, first, height, pressure, gap, level, outcome, past)
+      class(normal_step_type), intent(inout) :: self
+      type(planned_row_type), intent(in) :: plan
+      real(dp), intent(in) :: modulus                  !! Q, Pa
+      logical, intent(in) :: first
+      real(dp), intent(in) :: height(:, :)             !! H under the rubber, m
+      real(dp), intent(inout) :: pressure(:, :)        !! Pa
+      real(dp), intent(inout) :: gap(:, :)             !! m
+      real(dp), intent(inout) :: level                 !! U - H where the gap is zero, m
+      type(solver_result_type), intent(out) :: outcome
+      real(dp), intent(in), optional :: past(:, :)     !! traction of the history, Pa
+      type(adhesion_problem_type) :: problem
+      type(solver_result_type) :: before
+
+      if (.not. self%adhesive) then
+         call solve_bare(self, plan, modulus, .not. first, height, pressure, gap, level, outcome, past)
+         return
+      end if
+      if (first) call start(self, plan, modulus, height, pressure, gap, level, before, past)
+      problem%potential = self%potential
+      problem%modulus = modulus
+      problem%tolerance = self%tolerance
+      problem%max_iterations = self%max_iterations
+      problem%full_contact = first .and. self%full_contact
+      call load_of(self, plan, problem%control, problem%target)
+      call self%sticky%solve(problem, height, gap, pressure, level, outcome, past)
+      outcome%iterations = outcome%iterations + before%iterations
+      outcome%ffts = outcome%ffts + before%ffts
+   end subroutine solve
+
+   !> The load of a row as the solvers want it: mean pressure, or level.
+   subroutine load_of(self, plan, control, target)
+      type(normal_step_type), intent(in) :: self
+      type(planned_row_type), intent(in) :: plan
+      integer, intent(out) :: control
+      real(dp), intent(out) :: target
+
+      control = control_pressure
+      target = plan%load
+      if (plan%control == 'force') target = plan%load/(self%grid%lx*self%grid%ly)
+      if (plan%control == 'displacement') then
+         control = control_approach
+         target = plan%load - self%summit
+      end if
+   end subroutine load_of
+
+   !> The first state with adhesion: the solution without, or mere touch where the load does not press.
+   subroutine start(self, plan, modulus, height, pressure, gap, level, outcome, past)
+      type(normal_step_type), intent(inout) :: self
+      type(planned_row_type), intent(in) :: plan
+      real(dp), intent(in) :: modulus
+      real(dp), intent(in) :: height(:, :)
+      real(dp), intent(inout) :: pressure(:, :), gap(:, :)
+      real(dp), intent(inout) :: level
+      type(solver_result_type), intent(out) :: outcome
+      real(dp), intent(in), optional :: past(:, :)
+      type(planned_row_type) :: touch
+      integer :: j
+
+      touch = plan
+      if (plan%control /= 'displacement' .and. plan%load <= 0.0_dp) then
+         touch%control = 'displacement'
+         touch%load = 0.0_dp
+      end if
+      call solve_bare(self, touch, modulus, .false., height, pressure, gap, level, outcome, past)
+      !$omp parallel do default(none) shared(self, gap) private(j)
+      do j = 1, self%grid%ny
+         gap(:, j) = max(gap(:, j), 0.0_dp)
+      end do
+   end subroutine start
+
+   !> The contact without adhesion.
+   subroutine solve_bare(self, plan, modulus, warm, height, pressure, gap, level, outcome, past)
+      type(normal_step_type), intent(inout) :: self
+      type(planned_row_type), intent(in) :: plan
+      real(dp), intent(in) :: modulus
+      logical, intent(in) :: warm
+      real(dp), intent(in) :: height(:, :)
+      real(dp), intent(inout) :: pressure(:, :), gap(:, :)
+      real(dp), intent(out) :: level
+      type(solver_result_type), intent(out) :: outcome
+      real(dp), intent(in), optional :: past(:, :)
+      type(normal_problem_type) :: problem
+
+      problem%modulus = modulus
+      problem%tolerance = self%tolerance
+      problem%max_iterations = self%max_iterations
+      problem%rms_height = self%rms_height
+      problem%warm = warm
+      call load_of(self, plan, problem%control, problem%target)
+      if (self%thesis) then
+         call solve_normal_thesis(self%grid, self%normal%operator, problem, height, pressure, gap, level, &
+            outcome, past)
+      else
+         call self%normal%solve(problem, height, pressure, gap, level, outcome, past)
+      end if
+   end subroutine solve_bare
+
+   !> Energy of adhesion of a gap over the whole cell, J.
+   function energy(self, gap) result(total)
+      class(normal_step_type), intent(in) :: self
+      real(dp), intent(in) :: gap(:, :)                !! m
+      real(dp) :: total
+      real(dp), allocatable :: rows(:)
+      integer :: j
+
+      total = 0.0_dp
+      if (.not. self%adhesive) return
+      allocate (rows(self%grid%ny))
+      !$omp parallel do default(none) shared(self, gap, rows) private(j)
+      do j = 1, self%grid%ny
+         rows(j) = sum(adhesive_energy(self%potential, gap(:, j)))
+      end do
+      total = global_sum(sum(rows))*self%grid%dx*self%grid%dy
+   end function energy
+
+   !> Free plans and memory.
+   subroutine destroy(self)
+      class(normal_step_type), intent(inout) :: self
+
+      call self%normal%destroy()
+      if (self%adhesive) call self%sticky%destroy()
+   end subroutine destroy
+
+end module normal_step
