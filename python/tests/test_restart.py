@@ -1,0 +1,227 @@
+"""A run that stops and goes on gives the numbers of one that never stopped."""
+
+from __future__ import annotations
+
+import os
+import random
+import re
+import resource
+import shutil
+import signal
+from pathlib import Path
+
+import pytest
+import viscoelastic_case as vc
+
+import asperity
+
+
+@pytest.fixture(scope="module")
+def reference(program: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the result of a run without a stop."""
+    case = tmp_path_factory.mktemp("whole") / "case.nml"
+    case.write_text(vc.text())
+    done = vc.run(program, case)
+    assert done.returncode == 0, done.stderr
+    return case.with_suffix(".h5")
+
+
+@pytest.fixture
+def case(tmp_path: Path) -> Path:
+    """Return the input of the same run."""
+    path = tmp_path / "case.nml"
+    path.write_text(vc.text())
+    return path
+
+
+def stop(program: str, case: Path, rows: int, number: signal.Signals = signal.SIGTERM) -> None:
+    """Start a run and stop it once it has written some rows."""
+    process = vc.start(program, case)
+    vc.wait_for_rows(process, case.with_suffix(".h5"), rows)
+    process.send_signal(number)
+    _, message = process.communicate(timeout=60)
+    assert process.returncode == 128 + number, (process.returncode, message)
+    assert "--restart" in message
+
+
+@pytest.mark.parametrize("scheme", ["exponential2", "exponential", "backward_euler"])
+def test_schemes(program: str, tmp_path: Path, scheme: str) -> None:
+    whole, parts = tmp_path / "whole.nml", tmp_path / "parts.nml"
+    for path in (whole, parts):
+        path.write_text(vc.text(scheme=scheme))
+    assert vc.run(program, whole).returncode == 0
+    stops = 0
+    for rows in (1, 20, 45):
+        done = vc.start(program, parts, *(["--restart"] if rows > 1 else []))
+        vc.wait_for_rows(done, parts.with_suffix(".h5"), rows)
+        done.terminate()
+        done.communicate(timeout=60)
+        if done.returncode == 0:  # it was faster than the signal
+            break
+        assert done.returncode == 128 + signal.SIGTERM
+        stops += 1
+    else:
+        assert vc.run(program, parts, "--restart").returncode == 0
+    assert stops >= 2
+    vc.assert_same(parts.with_suffix(".h5"), whole.with_suffix(".h5"))
+
+
+def test_a_finished_run_leaves_no_checkpoint(reference: Path) -> None:
+    assert sorted(path.name for path in reference.parent.iterdir()) == [
+        "case.h5", "case.nml", "case.xdmf"]
+
+
+def test_killed_at_any_moment(program: str, tmp_path: Path, reference: Path) -> None:
+    """kill -9 again and again: the result opens each time, and going on gives the same numbers."""
+    case = tmp_path / "case.nml"
+    case.write_text(vc.text(output="checkpoint_every = 3, checkpoint_minutes = 0"))
+    result = case.with_suffix(".h5")
+    chance = random.Random(4)
+    kills = 0
+    for _ in range(60):
+        restart = case.with_suffix(".checkpoint.h5").exists()
+        before = vc.count(result) if restart else 0
+        process = vc.start(program, case, *(["--restart"] if restart else []))
+        if kills < 12:
+            if restart:
+                vc.wait_for_rows(process, result, max(before - 3, 1))
+            try:
+                process.wait(chance.uniform(0.0, 0.06))
+            except vc.subprocess.TimeoutExpired:
+                process.kill()
+                kills += 1
+        _, message = process.communicate(timeout=60)
+        if process.returncode == 0:
+            break
+        assert process.returncode == -signal.SIGKILL, message
+        if case.with_suffix(".checkpoint.h5").exists():
+            rows = vc.count(result)
+            assert rows >= 0, "the result does not open"
+            assert not asperity.open(result).finished
+    assert process.returncode == 0
+    assert kills > 3
+    vc.assert_same(result, reference)
+
+
+def test_other_case(program: str, case: Path) -> None:
+    """A checkpoint of another case is refused; the message says what differs."""
+    stop(program, case, 5)
+    rows = vc.count(case.with_suffix(".h5"))
+    for old, new, names in (
+        ("shear_modulus = 0.5e6", "shear_modulus = 0.6e6", ["shear_modulus", "500000", "600000"]),
+        ("prony_tau = 1e-3", "prony_tau = 2e-3", ["prony_tau"]),
+        ("seed = 3", "seed = 4", ["seed", "3", "4"]),
+        ("velocity_y = -7e-3", "velocity_y = 7e-3", ["velocity_y"]),
+        ("nx = 48", "nx = 50", ["nx", "48", "50"]),
+        ("time_scheme = 'exponential2'", "time_scheme = 'exponential'", ["time_scheme"]),
+    ):
+        other = vc.text().replace(old, new)
+        assert other != vc.text()
+        case.write_text(other)
+        done = vc.run(program, case, "--restart")
+        assert done.returncode == 2, done.stderr
+        for name in names:
+            assert name in done.stderr, done.stderr
+        assert vc.count(case.with_suffix(".h5")) == rows
+    # what the numbers do not depend on may change
+    case.write_text(vc.text(output="checkpoint_every = 7").replace("threads = 1", "threads = 2"))
+    assert vc.run(program, case, "--restart").returncode == 0
+
+
+def test_no_checkpoint(program: str, case: Path) -> None:
+    done = vc.run(program, case, "--restart")
+    assert done.returncode == 3
+    assert "case.checkpoint.h5" in done.stderr
+    assert not case.with_suffix(".h5").exists()
+
+
+def test_damaged_checkpoint(program: str, case: Path) -> None:
+    stop(program, case, 5)
+    checkpoint = case.with_suffix(".checkpoint.h5")
+    whole = checkpoint.read_bytes()
+    checkpoint.write_bytes(whole[: len(whole) // 2])
+    rows = vc.count(case.with_suffix(".h5"))
+    done = vc.run(program, case, "--restart")
+    assert done.returncode == 3, done.stderr
+    assert "case.checkpoint.h5" in done.stderr
+    assert vc.count(case.with_suffix(".h5")) == rows
+
+
+def test_checkpoint_without_its_result(program: str, case: Path) -> None:
+    stop(program, case, 5)
+    case.with_suffix(".h5").unlink()
+    done = vc.run(program, case, "--restart")
+    assert done.returncode == 3, done.stderr
+    assert "case.h5" in done.stderr
+
+
+def test_output_elsewhere(program: str, case: Path, tmp_path: Path, reference: Path) -> None:
+    """--restart goes on with the result that --output names."""
+    elsewhere = tmp_path / "folder"
+    elsewhere.mkdir()
+    process = vc.start(program, case, "--output", str(elsewhere / "road.h5"))
+    vc.wait_for_rows(process, elsewhere / "road.h5", 10)
+    process.terminate()
+    process.communicate(timeout=60)
+    assert process.returncode == 143
+    done = vc.run(program, case, "--restart", "--output", str(elsewhere / "road.h5"))
+    assert done.returncode == 0, done.stderr
+    vc.assert_same(elsewhere / "road.h5", reference)
+
+
+def test_file_too_large(program: str, case: Path, reference: Path) -> None:
+    """A full disk: exit 3, the rows are kept; with room again the run goes on."""
+    case.write_text(vc.text(output="checkpoint_every = 5, snapshot_every = 2"))
+    size = reference.stat().st_size
+    done = vc.run(program, case, preexec_fn=lambda: resource.setrlimit(
+        resource.RLIMIT_FSIZE, (3 * size, resource.RLIM_INFINITY)))
+    assert done.returncode == 3, (done.returncode, done.stderr)
+    assert "case.h5" in done.stderr
+    rows = vc.count(case.with_suffix(".h5"))
+    assert 5 < rows < vc.rows()
+    assert not asperity.open(case.with_suffix(".h5")).finished
+    done = vc.run(program, case, "--restart")
+    assert done.returncode == 0, done.stderr
+    vc.assert_same(case.with_suffix(".h5"), reference)
+
+
+def test_nowhere_to_write(program: str, case: Path, tmp_path: Path) -> None:
+    missing = tmp_path / "missing" / "result.h5"
+    done = vc.run(program, case, "--output", str(missing))
+    assert done.returncode == 3
+    assert str(missing) in done.stderr
+    done = vc.run(program, case, "--output", "/proc/version")
+    assert done.returncode == 3
+    assert "/proc/version" in done.stderr
+    if os.geteuid() != 0:  # root may write everywhere
+        folder = tmp_path / "locked"
+        folder.mkdir(mode=0o500)
+        assert vc.run(program, case, "--output", str(folder / "result.h5")).returncode == 3
+
+
+def test_no_convergence(program: str, tmp_path: Path) -> None:
+    """Exit 4 keeps all there is, and the file says that the run is not finished."""
+    case = tmp_path / "case.nml"
+    case.write_text(vc.text(extra=", max_iterations = 1, tolerance = 1e-9"))
+    done = vc.run(program, case)
+    assert done.returncode == 4
+    assert re.search(r"case\.h5: step \d+ of phase 1.*did not converge", done.stderr), done.stderr
+    history, fields, finished = vc.contents(case.with_suffix(".h5"))
+    assert finished == 0
+    assert len(history["step"]) >= 1
+    assert history["residual_normal"][-1] > 1e-9
+    assert "pressure" in fields
+
+
+def test_checkpoint_is_not_touched_by_a_failing_write(program: str, case: Path,
+                                                      tmp_path: Path) -> None:
+    """A checkpoint that cannot be written leaves the old one."""
+    stop(program, case, 5)
+    checkpoint = case.with_suffix(".checkpoint.h5")
+    kept = tmp_path / "kept.h5"
+    shutil.copy(checkpoint, kept)
+    done = vc.run(program, case, "--restart", preexec_fn=lambda: resource.setrlimit(
+        resource.RLIMIT_FSIZE, (checkpoint.stat().st_size // 4, resource.RLIM_INFINITY)))
+    assert done.returncode == 3, (done.returncode, done.stderr)
+    assert checkpoint.read_bytes() == kept.read_bytes()
+    assert vc.run(program, case, "--restart").returncode == 0

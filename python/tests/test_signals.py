@@ -1,0 +1,118 @@
+"""Signals to a run, and a look at it while it goes on."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import viscoelastic_case as vc
+
+import asperity
+
+
+@pytest.fixture
+def case(tmp_path: Path) -> Path:
+    """Return an input."""
+    path = tmp_path / "case.nml"
+    path.write_text(vc.text(steps=60))
+    return path
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_stop(program: str, case: Path, number: signal.Signals) -> None:
+    """The step in hand is finished, a checkpoint written, and the exit status names the signal."""
+    result = case.with_suffix(".h5")
+    process = vc.start(program, case)
+    vc.wait_for_rows(process, result, 7)
+    process.send_signal(number)
+    _, message = process.communicate(timeout=60)
+    assert process.returncode == 128 + number
+    assert number.name in message
+    history, fields, finished = vc.contents(result)
+    rows = len(history["step"])
+    assert finished == 0
+    assert 7 <= rows < vc.rows(60)
+    assert {len(column) for column in history.values()} == {rows}
+    assert f"step {rows - 1}" in message
+    run = asperity.open(result)
+    assert run.snapshots[-1].step == rows - 1  # the state at the stop is there to look at
+    assert np.all(np.isfinite(fields["pressure"]))
+    whole = case.with_name("whole.nml")
+    whole.write_text(case.read_text())
+    assert vc.run(program, case, "--restart").returncode == 0
+    assert vc.run(program, whole).returncode == 0
+    vc.assert_same(result, whole.with_suffix(".h5"))
+
+
+def test_stop_before_the_first_row(program: str, case: Path) -> None:
+    """A signal at any time at the start ends the run with the status of the signal."""
+    for delay in (0.0, 0.005, 0.01, 0.02, 0.04):
+        process = vc.start(program, case)
+        time.sleep(delay)
+        process.terminate()
+        _, message = process.communicate(timeout=60)
+        # before the handler is in place the system itself ends the run
+        assert process.returncode in (143, -signal.SIGTERM), (process.returncode, message)
+
+
+def test_checkpoint_on_demand(program: str, case: Path) -> None:
+    """SIGUSR1 writes a checkpoint and the run goes on to its end."""
+    result, checkpoint = case.with_suffix(".h5"), case.with_suffix(".checkpoint.h5")
+    process = vc.start(program, case)
+    vc.wait_for_rows(process, result, 5)
+    assert not checkpoint.exists()
+    process.send_signal(signal.SIGUSR1)
+    end = time.monotonic() + 30.0
+    while not checkpoint.exists() and process.poll() is None and time.monotonic() < end:
+        time.sleep(0.001)
+    assert checkpoint.exists()
+    process.kill()
+    process.communicate(timeout=60)
+    assert process.returncode == -signal.SIGKILL
+    whole = case.with_name("whole.nml")
+    whole.write_text(case.read_text())
+    assert vc.run(program, case, "--restart").returncode == 0
+    process = vc.start(program, whole)
+    vc.wait_for_rows(process, whole.with_suffix(".h5"), 5)
+    process.send_signal(signal.SIGUSR1)
+    assert process.wait(60) == 0  # goes on
+    process.communicate()
+    vc.assert_same(result, whole.with_suffix(".h5"))
+
+
+def test_look_at_a_run_that_goes_on(program: str, case: Path) -> None:
+    """h5py and asperity.open read the rows there are, as often as asked."""
+    result = case.with_suffix(".h5")
+    process = vc.start(program, case)
+    vc.wait_for_rows(process, result, 3)
+    seen = []
+    while process.poll() is None and len(seen) < 200:
+        with h5py.File(result, "r") as file:
+            assert file.attrs["finished"] in (0, 1)
+            steps = file["history/step"][:]
+            np.testing.assert_array_equal(steps, np.arange(len(steps)))
+            area = file["history/contact_area"][:]
+            assert np.all((area > 0) & (area < 1))
+        run = asperity.open(result)
+        seen.append(len(run.history["step"]))
+    _, message = process.communicate(timeout=60)
+    assert process.returncode == 0, message
+    assert seen == sorted(seen)
+    assert len(set(seen)) > 3, "no row came up while the run was read"
+    assert len(asperity.open(result).history["step"]) == vc.rows(60)
+
+
+def test_threads_and_checkpoints_leave_the_numbers(program: str, tmp_path: Path) -> None:
+    """The numbers depend neither on checkpoints nor on the number of threads."""
+    plain, other = tmp_path / "plain.nml", tmp_path / "other.nml"
+    plain.write_text(vc.text(steps=10))
+    other.write_text(vc.text(steps=10, output="checkpoint_every = 1"))
+    assert vc.run(program, plain).returncode == 0
+    threads = str(min(2, os.cpu_count() or 1))
+    assert vc.run(program, other, "--threads", threads).returncode == 0
+    vc.assert_same(other.with_suffix(".h5"), plain.with_suffix(".h5"))
