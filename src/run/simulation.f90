@@ -319,6 +319,7 @@ contains
             do c = 1, 2
                call shift_field(self, cells - self%moved_cells, self%tangential%traction(:, :, c))
             end do
+            call shift_states(self, cells - self%moved_cells, self%tangential%contact)
          end if
          self%moved_cells = cells
       end if
@@ -367,6 +368,19 @@ contains
       end do
       field(:, :) = self%side%normal%step
    end subroutine shift_field
+
+   !> The same for the states of contact.
+   subroutine shift_states(self, cells, states)
+      type(simulation_type), intent(in) :: self
+      integer, intent(in) :: cells(2)
+      integer(int8), intent(inout) :: states(:, :)
+
+      if (self%grid%boundary == boundary_free) then
+         states(:, :) = eoshift(eoshift(states, -cells(1), dim=1), -cells(2), dim=2)
+      else
+         states(:, :) = cshift(cshift(states, -cells(1), dim=1), -cells(2), dim=2)
+      end if
+   end subroutine shift_states
 
    !> Solve the normal contact under the row's load.
    subroutine solve_normal(self, plan, outcome, level)

@@ -2,7 +2,7 @@
 !> driven over a road, with the block's viscoelasticity and the inertia of its mean motion.
 !>
 !> Slip of a step: r = DX - U', DX = U + (D' - D), U' = A(T + T_h)/Q with the traction T_h of the
-!> history. The solver works with Q r = DX' - A T, DX' = Q DX - A T_h. The mean mode of a block of
+!> history. The solver works with Q r = DX' - A(T + T_h), DX' = Q DX. The mean mode of a block of
 !> thickness h and mass m an area follows backward Euler (thesis, eq. 3.18, 3.19):
 !>
 !>    (Q + h m/dt^2) U' = h (T + T_h) + h m ((U - dU_top)/dt^2 + v/dt),    v' = (U' - U + dU_top)/dt
@@ -121,13 +121,6 @@ contains
       self%moved = self%moved .or. any(abs(motion) > 0.0_dp)
       if (.not. self%moved) return
       call history_field(self%history, material, self%past)
-      if (is_elastic(material)) then
-         self%drive = 0.0_dp
-      else
-         call set_thickness(self, self%thickness)
-         call self%operator%apply_vector(self%past(:, :, 1), self%past(:, :, 2), self%drive(:, :, 1), &
-            self%drive(:, :, 2))
-      end if
       self%past_mean = means(self, self%past)
       do c = 1, 2
          shift = self%q*motion(c)
@@ -135,11 +128,12 @@ contains
             stiffness = self%q + self%thickness*self%mass/dt**2
             known = self%thickness*(self%past_mean(c) + self%mass*((mean_of(self, c) + motion(c))/dt**2 &
                + self%speed(c)/dt))/stiffness
-            shift = shift + self%thickness*self%past_mean(c) - self%q*known
+            ! The solver's own mean of A T_h, by the compliance set below, is put right here.
+            shift = shift + self%q*self%thickness/stiffness*self%past_mean(c) - self%q*known
          end if
          !$omp parallel do default(none) shared(self, c, shift) private(j)
          do j = 1, self%grid%ny
-            self%drive(:, j, c) = self%q*self%displacement(:, j, c) + shift - self%drive(:, j, c)
+            self%drive(:, j, c) = self%q*self%displacement(:, j, c) + shift
          end do
       end do
       if (self%mass > 0.0_dp .and. dt > 0.0_dp) then
@@ -199,7 +193,7 @@ contains
       call mark_contact(self, pressure, gap)
       call self%solver%solve(self%operator, self%law, pressure, slope_x, slope_y, self%drive(:, :, 1), &
          self%drive(:, :, 2), self%contact, self%traction(:, :, 1), self%traction(:, :, 2), &
-         self%slip(:, :, 1), self%slip(:, :, 2), outcome)
+         self%slip(:, :, 1), self%slip(:, :, 2), outcome, self%past(:, :, 1), self%past(:, :, 2))
       do c = 1, 2
          !$omp parallel do default(none) shared(self, c) private(j)
          do j = 1, self%grid%ny
