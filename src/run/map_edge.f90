@@ -21,8 +21,9 @@ module map_edge
 contains
 
    !> Look at the cells at the edge: those that enter or leave within a step, one at least.
-   subroutine look_at_edge(grid, pressure, gap, move_x, move_y, rms_height, state, message)
+   subroutine look_at_edge(grid, adhesive, pressure, gap, move_x, move_y, rms_height, state, message)
       type(grid_type), intent(in) :: grid
+      logical, intent(in) :: adhesive                !! contact is where the gap is zero, not where P > 0
       real(dp), intent(in) :: pressure(:, :)         !! Pa, [nx, ny]
       real(dp), intent(in) :: gap(:, :)              !! m, [nx, ny]
       real(dp), intent(in) :: move_x, move_y         !! of the road in the step, m
@@ -39,12 +40,12 @@ contains
       least = huge(1.0_dp)
       do j = 1, grid%ny
          if (j <= wy .or. j > grid%ny - wy) then
-            touching = touching + count(pressure(:, j) > 0.0_dp)
+            touching = touching + count(merge(gap(:, j) <= 0.0_dp, pressure(:, j) > 0.0_dp, adhesive))
             least = min(least, minval(gap(:, j)))
          else
             do i = 1, grid%nx
                if (i > wx .and. i <= grid%nx - wx) cycle
-               if (pressure(i, j) > 0.0_dp) touching = touching + 1
+               if (merge(gap(i, j) <= 0.0_dp, pressure(i, j) > 0.0_dp, adhesive)) touching = touching + 1
                least = min(least, gap(i, j))
             end do
          end if

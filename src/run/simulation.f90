@@ -266,8 +266,8 @@ contains
       character(:), allocatable :: message
 
       message = ''
-      call look_at_edge(self%grid, self%pressure, self%gap, plan%road_x - self%row%road_x, &
-         plan%road_y - self%row%road_y, self%rms_height, self%edge, message)
+      call look_at_edge(self%grid, self%side%adhesive, self%pressure, self%gap, &
+         plan%road_x - self%row%road_x, plan%road_y - self%row%road_y, self%rms_height, self%edge, message)
       if (len(message) == 0) return
       if (len(self%warnings) > 0) self%warnings = self%warnings//new_line('a')
       self%warnings = self%warnings//'step '//to_text(self%schedule%row)//', t = '//to_text(plan%time)// &
