@@ -37,8 +37,8 @@ module coarse_level
       type(convolution_type), private :: normal
       type(convolution_type), private :: missing
    contains
-      procedure :: add_means
-      procedure :: add_shares
+      procedure :: set_means
+      procedure :: set_shares
       procedure :: precondition
       procedure :: predict_form
       procedure :: transforms
@@ -109,46 +109,42 @@ contains
 
    end subroutine new_coarse_level
 
-   !> Add cells of a row to the block means.
-   pure subroutine add_means(self, block_y, first, cells)
+   !> Set the block means of a row of blocks.
+   pure subroutine set_means(self, block_y, column)
       class(coarse_level_type), intent(inout) :: self
-      integer, intent(in) :: block_y           !! block of the row along y
-      integer, intent(in) :: first             !! first of the cells
-      real(dp), intent(in) :: cells(:)
+      integer, intent(in) :: block_y           !! the row of blocks
+      real(dp), intent(in) :: column(:)        !! sums over its rows of cells, [nx of the grid]
 
-      call add_blocks(self, first, cells, self%mean(:, block_y))
-   end subroutine add_means
+      call sum_blocks(self, column, self%mean(:, block_y))
+   end subroutine set_means
 
-   !> Add cells of a row, 1 where they take part, to the shares.
-   pure subroutine add_shares(self, block_y, first, cells)
+   !> Set the shares of a row of blocks.
+   pure subroutine set_shares(self, block_y, column)
       class(coarse_level_type), intent(inout) :: self
       integer, intent(in) :: block_y
-      integer, intent(in) :: first
-      real(dp), intent(in) :: cells(:)
+      real(dp), intent(in) :: column(:)        !! numbers of cells that take part
 
-      call add_blocks(self, first, cells, self%share(:, block_y))
-   end subroutine add_shares
+      call sum_blocks(self, column, self%share(:, block_y))
+   end subroutine set_shares
 
-   !> Add cells of a row to the blocks that hold them, divided by the mean number of cells.
-   pure subroutine add_blocks(self, first, cells, blocks)
+   !> Sums over the blocks, divided by the mean number of cells.
+   pure subroutine sum_blocks(self, column, blocks)
       type(coarse_level_type), intent(in) :: self
-      integer, intent(in) :: first
-      real(dp), intent(in) :: cells(:)
+      real(dp), intent(in) :: column(:)
       real(dp), intent(inout) :: blocks(:)
-      integer :: i, k, last, b
+      integer :: b, i, first
       real(dp) :: total
 
-      i = 1
-      do b = self%block_x(first), self%block_x(first + size(cells) - 1)
-         last = min(self%last_x(b) - first + 1, size(cells))
+      first = 1
+      do b = 1, self%nx
          total = 0.0_dp
-         do k = i, last
-            total = total + cells(k)
+         do i = first, self%last_x(b)
+            total = total + column(i)
          end do
-         blocks(b) = blocks(b) + total/self%cells
-         i = last + 1
+         blocks(b) = total/self%cells
+         first = self%last_x(b) + 1
       end do
-   end subroutine add_blocks
+   end subroutine sum_blocks
 
    !> From the block means of a residual: `correction`, to be added to the stencil's result.
    subroutine precondition(self)

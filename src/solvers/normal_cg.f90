@@ -23,6 +23,8 @@ module normal_cg
    use normal_state, only : combine_measures, control_pressure, evaluate_gap, first_pressure, &
       gap_measure_type, normal_problem_type, prepare_problem, reason_converged, reason_iterations, &
       reason_undetermined, row_measure
+   use normal_sweeps, only : above_cells, clip_cells, coupling_cells, direction_cells, load_cells, &
+      longest_cells, residual_cells, trial_cells
    use omp_lib, only : omp_get_wtime
    use parallel, only : global_min, global_sum
    use precision, only : dp, int64
@@ -87,16 +89,16 @@ contains
    subroutine solve(self, problem, height, pressure, gap, level, outcome, history)
       class(normal_solver_type), intent(inout) :: self
       type(normal_problem_type), intent(in) :: problem
-      real(dp), intent(in) :: height(:, :)             !! H, [nx, ny], m
-      real(dp), intent(inout) :: pressure(:, :)        !! P, Pa; a start where problem%warm
-      real(dp), intent(inout) :: gap(:, :)             !! U - H - level, m
+      real(dp), contiguous, intent(in) :: height(:, :)             !! H, [nx, ny], m
+      real(dp), contiguous, intent(inout) :: pressure(:, :)        !! P, Pa; a start where problem%warm
+      real(dp), contiguous, intent(inout) :: gap(:, :)             !! U - H - level, m
       real(dp), intent(out) :: level                   !! U - H where the gap is zero, m
       type(solver_result_type), intent(out) :: outcome
       real(dp), intent(in), optional :: history(:, :)  !! P_h, Pa
       type(normal_problem_type) :: task
       type(gap_measure_type) :: measure
       real(dp) :: scale, old, rz, rd, kappa, squares, alpha, form, trial
-      real(dp) :: best, limit, cells, mean, offset, beta, began, coarse_before
+      real(dp) :: cells, offset, beta, began, coarse_before
       logical :: fresh, restart, clipped, determined
       integer :: age
       integer(int64) :: before
@@ -108,6 +110,7 @@ contains
       scale = 1.0_dp/problem%modulus
       kappa = 1.0_dp
       old = 0.0_dp
+      offset = 0.0_dp
       restart = .true.
       self%step = 0.0_dp
       self%direction = 0.0_dp
@@ -133,12 +136,11 @@ contains
          outcome%iterations = outcome%iterations + 1
 
          call activate(self, measure%level)
-         call form_residual(self, task, measure%level, pressure, gap)
-         call precondition(self, task, pressure, mean, rz)
+         call form_residual(self, measure%level, pressure, gap, rz)
          beta = 0.0_dp
          if (.not. restart .and. old > 0.0_dp) beta = rz/old
-         call new_direction(self, task, mean, beta, offset, rd, squares)
-         if (rd <= 0.0_dp) call new_direction(self, task, mean, 0.0_dp, offset, rd, squares)
+         call new_direction(self, task, beta, pressure, offset, rd, squares)
+         if (rd <= 0.0_dp) call new_direction(self, task, 0.0_dp, pressure, offset, rd, squares)
          old = rz
          restart = .false.
          if (rd <= 0.0_dp) then
@@ -148,7 +150,7 @@ contains
          trial = scale*self%coarse%predict_form(squares)
          alpha = rd/max(kappa*trial, tiny(1.0_dp))
          call clipped_step(self, task, alpha, offset, pressure, gap, measure%level, clipped, rd, &
-            squares, limit)
+            squares)
          if (rd <= 0.0_dp) then
             ! The projection bent the step too far: once more from the steepest descent.
             if (kappa > 1e6_dp) then
@@ -159,15 +161,19 @@ contains
             restart = .true.
             cycle
          end if
-         call transform_step(self, form)
+         call self%operator%columns(columns_apply, form)
          form = scale*form
+         if (form <= 0.0_dp) then
+            outcome%reason = 'no direction of descent is left'
+            exit
+         end if
          trial = scale*self%coarse%predict_form(squares)
          kappa = min(max(form/max(trial, tiny(1.0_dp)), 0.1_dp), 10.0_dp)
-         best = rd/form
-         if (clipped .and. best > 0.55_dp) then
+         alpha = rd/form
+         if (clipped .and. alpha > 0.55_dp) then
             alpha = 1.0_dp
-         else
-            alpha = min(best, limit)
+         else if (alpha > 1.0_dp) then
+            alpha = min(alpha, longest_multiple(self, pressure))
          end if
          age = age + 1
          call update(self, task, scale*alpha, alpha, pressure, gap)
@@ -205,28 +211,27 @@ contains
    subroutine survey(self, problem, pressure, gap)
       type(normal_solver_type), intent(inout) :: self
       type(normal_problem_type), intent(in) :: problem
-      real(dp), intent(in) :: pressure(:, :), gap(:, :)
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny), gap(self%grid%nx, self%grid%ny)
       integer :: j
 
       !$omp parallel do default(none) shared(self, problem, pressure, gap) private(j) &
       !$omp num_threads(self%operator%threads)
       do j = 1, self%grid%ny
-         call survey_row(self, problem, .true., j, pressure(:, j), gap(:, j))
+         self%surveyed(1:5, j) = row_measure(pressure(:, j), gap(:, j), problem%target)
+         call survey_blocks(self, .true., j, pressure(:, j), gap(:, j))
       end do
    end subroutine survey
 
-   !> The survey of a row.
-   subroutine survey_row(self, problem, all_blocks, j, pressure, gap)
+   !> Which blocks of a row hold pressure, and the least gap of each.
+   subroutine survey_blocks(self, everywhere, j, pressure, gap)
       type(normal_solver_type), intent(inout) :: self
-      type(normal_problem_type), intent(in) :: problem
-      logical, intent(in) :: all_blocks        !! look for pressure off the active blocks, too
+      logical, intent(in) :: everywhere        !! look for pressure off the active blocks, too
       integer, intent(in) :: j
-      real(dp), intent(in) :: pressure(:), gap(:)
-      integer :: b, first, last
-      real(dp) :: sums(6), least
-      integer :: i
+      real(dp), intent(in) :: pressure(self%grid%nx), gap(self%grid%nx)
+      integer :: b, first, last, i
+      real(dp) :: least, most, lowest
 
-      sums = [0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, huge(1.0_dp)]
+      lowest = huge(1.0_dp)
       do b = 1, size(self%least, 1)
          first = (b - 1)*width + 1
          last = min(b*width, self%grid%nx)
@@ -236,18 +241,19 @@ contains
             least = min(least, gap(i))
          end do
          self%least(b, j) = least
-         sums(6) = min(sums(6), least)
+         lowest = min(lowest, least)
          ! Where the solver did not act, there is no pressure.
-         if (all_blocks .or. self%live(b, j)) then
-            self%loaded(b, j) = maxval(pressure(first:last)) > 0.0_dp
-            if (self%loaded(b, j)) sums(1:5) = sums(1:5) &
-               + row_measure(pressure(first:last), gap(first:last), problem%target)
-         else
-            self%loaded(b, j) = .false.
+         most = 0.0_dp
+         if (everywhere .or. self%live(b, j)) then
+            !$omp simd reduction(max:most)
+            do i = first, last
+               most = max(most, pressure(i))
+            end do
          end if
+         self%loaded(b, j) = most > 0.0_dp
       end do
-      self%surveyed(:, j) = sums
-   end subroutine survey_row
+      self%surveyed(6, j) = lowest
+   end subroutine survey_blocks
 
    !> List the runs of blocks that hold a cell with P > 0 or a gap below the level; clear those that
    !> left.
@@ -284,186 +290,119 @@ contains
       end do
    end subroutine activate
 
-   !> The residual -(gap - mean) on S = {P > 0 or gap < level}, its rim, and its block means.
-   subroutine form_residual(self, problem, level, pressure, gap)
+   !> The residual level - gap on S = {P > 0 or gap < level}, its rim and block means; the coarse
+   !> correction; and the product r.z with z = M r = stencil and correction.
+   subroutine form_residual(self, level, pressure, gap, rz)
       type(normal_solver_type), intent(inout) :: self
-      type(normal_problem_type), intent(in) :: problem
       real(dp), intent(in) :: level
-      real(dp), intent(in) :: pressure(:, :), gap(:, :)
-      real(dp) :: mean, total, cells
-      integer :: i, j, k, jb
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny), gap(self%grid%nx, self%grid%ny)
+      real(dp), intent(out) :: rz
+      real(dp), allocatable :: column(:)
+      real(dp) :: square, coupling, wx, wy
+      integer :: j, k, jb, n, nx, ny
+      logical :: periodic
 
-      mean = level
-      if (problem%control == control_pressure) then
-         !$omp parallel do default(none) shared(self, pressure, gap, level) &
-         !$omp private(i, j, k, total, cells) num_threads(self%operator%threads)
-         do j = 1, self%grid%ny
-            total = 0.0_dp
-            cells = 0.0_dp
-            do k = 1, self%runs(j)
-               !$omp simd reduction(+:total, cells)
-               do i = self%first(k, j), self%last(k, j)
-                  total = total + merge(gap(i, j), 0.0_dp, &
-                     pressure(i, j) > 0.0_dp .or. gap(i, j) < level)
-                  cells = cells + merge(1.0_dp, 0.0_dp, &
-                     pressure(i, j) > 0.0_dp .or. gap(i, j) < level)
-               end do
-            end do
-            self%rows(1, j) = total
-            self%rows(2, j) = cells
-         end do
-         mean = row_sum(self, 1)/max(row_sum(self, 2), 1.0_dp)
-      end if
-      !$omp parallel do default(none) shared(self, pressure, gap, level, mean) &
-      !$omp private(i, j, k, jb) num_threads(self%operator%threads)
-      do jb = 1, self%coarse%ny
-         self%coarse%mean(:, jb) = 0.0_dp
-         do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
-            do k = 1, self%runs(j)
-               !$omp simd
-               do i = self%first(k, j), self%last(k, j)
-                  self%residual(i, j) = merge(mean - gap(i, j), 0.0_dp, &
-                     pressure(i, j) > 0.0_dp .or. gap(i, j) < level)
-               end do
-               call self%coarse%add_means(jb, self%first(k, j), &
-                  self%residual(self%first(k, j):self%last(k, j), j))
-            end do
-         end do
-      end do
-      call fill_rim(self)
-   end subroutine form_residual
-
-   !> The rim of the residual: the other side's values where periodic, zero where free.
-   subroutine fill_rim(self)
-      type(normal_solver_type), intent(inout) :: self
-      integer :: nx, ny
-
-      if (self%grid%boundary /= boundary_periodic) return
+      wx = self%coarse%wx
+      wy = self%coarse%wy
       nx = self%grid%nx
       ny = self%grid%ny
-      self%residual(0, 1:ny) = self%residual(nx, 1:ny)
-      self%residual(nx + 1, 1:ny) = self%residual(1, 1:ny)
-      self%residual(1:nx, 0) = self%residual(1:nx, ny)
-      self%residual(1:nx, ny + 1) = self%residual(1:nx, 1)
-   end subroutine fill_rim
+      periodic = self%grid%boundary == boundary_periodic
+      !$omp parallel default(none) shared(self, pressure, gap, level, wx, wy, nx, periodic) &
+      !$omp private(j, k, jb, n, column, square, coupling) num_threads(self%operator%threads)
+      allocate (column(nx))
+      !$omp do schedule(dynamic)
+      do jb = 1, self%coarse%ny
+         column(:) = 0.0_dp
+         do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
+            square = 0.0_dp
+            coupling = 0.0_dp
+            do k = 1, self%runs(j)
+               associate (first => self%first(k, j))
+                  n = self%last(k, j) - first + 1
+                  call residual_cells(n, level, pressure(first, j), gap(first, j), &
+                     self%residual(first, j), column(first), square)
+               end associate
+            end do
+            if (periodic) then
+               self%residual(0, j) = self%residual(nx, j)
+               self%residual(nx + 1, j) = self%residual(1, j)
+            end if
+            if (j > self%coarse%first_y(jb)) call couple_row(self, wx, wy, j, coupling)
+            self%rows(1:2, j) = [square, coupling]
+         end do
+         call self%coarse%set_means(jb, column)
+      end do
+      !$omp end parallel
+      if (periodic) then
+         self%residual(1:nx, 0) = self%residual(1:nx, ny)
+         self%residual(1:nx, ny + 1) = self%residual(1:nx, 1)
+      end if
+      ! The first rows of blocks look at rows of another thread.
+      do jb = 1, self%coarse%ny
+         call couple_row(self, wx, wy, self%coarse%first_y(jb), self%rows(2, self%coarse%first_y(jb)))
+      end do
+      call self%coarse%precondition()
+      rz = (stencil_c0 + 2.0_dp*(wx + wy))*row_sum(self, 1) - 2.0_dp*row_sum(self, 2) &
+         + self%coarse%cells*sum(self%coarse%mean*self%coarse%correction)
+   end subroutine form_residual
 
-   !> step = M residual on S, without its mean, without empty cells that it would empty further
-   !> (they hold `huge`); the mean still to be taken off, and the product with the residual.
-   subroutine precondition(self, problem, pressure, mean, rz)
+   !> Add the products of a row's residuals with those west and south of them.
+   subroutine couple_row(self, wx, wy, j, coupling)
+      type(normal_solver_type), intent(in) :: self
+      real(dp), intent(in) :: wx, wy
+      integer, intent(in) :: j
+      real(dp), intent(inout) :: coupling
+      integer :: k
+
+      do k = 1, self%runs(j)
+         associate (first => self%first(k, j))
+            call coupling_cells(self%last(k, j) - first + 1, wx, wy, self%residual(first - 1, j), &
+               self%residual(first, j - 1), coupling)
+         end associate
+      end do
+   end subroutine couple_row
+
+   !> direction = z + beta direction where it acts: on S, but for empty cells that z would empty
+   !> further. What must be taken off it to keep the load stays apart, as `offset` (the old one
+   !> comes in). Of the direction with it: the product with the residual, the square, the block means.
+   subroutine new_direction(self, problem, beta, pressure, offset, rd, squares)
       type(normal_solver_type), intent(inout) :: self
       type(normal_problem_type), intent(in) :: problem
-      real(dp), intent(in) :: pressure(:, :)
-      real(dp), intent(out) :: mean, rz
-      real(dp), allocatable :: correction(:)
-      real(dp) :: total, cells, product, residuals, wx, wy, centre
-      integer :: i, j, k, jb
+      real(dp), intent(in) :: beta
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny)
+      real(dp), intent(inout) :: offset
+      real(dp), intent(out) :: rd, squares
+      real(dp), allocatable :: correction(:), column(:), shares(:)
+      real(dp) :: wx, wy, centre, sums(5), total
+      integer :: j, k, jb, n
 
       wx = self%coarse%wx
       wy = self%coarse%wy
       centre = stencil_c0 + 2.0_dp*(wx + wy)
-      call self%coarse%precondition()
-      !$omp parallel default(none) shared(self, wx, wy, centre) &
-      !$omp private(i, j, k, jb, total, cells, correction) num_threads(self%operator%threads)
-      allocate (correction(self%grid%nx))
+      !$omp parallel default(none) shared(self, wx, wy, centre, beta, offset, pressure) &
+      !$omp private(j, k, jb, n, sums, correction, column, shares) &
+      !$omp num_threads(self%operator%threads)
+      allocate (correction(self%grid%nx), column(self%grid%nx), shares(self%grid%nx))
       !$omp do
       do jb = 1, self%coarse%ny
          correction(:) = self%coarse%correction(self%coarse%block_x, jb)
+         column(:) = 0.0_dp
+         shares(:) = 0.0_dp
          do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
-            total = 0.0_dp
-            cells = 0.0_dp
+            sums = 0.0_dp
             do k = 1, self%runs(j)
-               !$omp simd reduction(+:total, cells)
-               do i = self%first(k, j), self%last(k, j)
-                  self%step(i, j) = merge(centre*self%residual(i, j) &
-                     - wx*(self%residual(i - 1, j) + self%residual(i + 1, j)) &
-                     - wy*(self%residual(i, j - 1) + self%residual(i, j + 1)) &
-                     + correction(i), 0.0_dp, abs(self%residual(i, j)) > 0.0_dp)
-                  total = total + self%step(i, j)
-                  cells = cells + merge(1.0_dp, 0.0_dp, abs(self%residual(i, j)) > 0.0_dp)
-               end do
+               associate (first => self%first(k, j))
+                  n = self%last(k, j) - first + 1
+                  call direction_cells(n, wx, wy, centre, self%residual(first, j - 1), &
+                     self%residual(first - 1, j), self%residual(first, j + 1), correction(first), &
+                     beta, offset, pressure(first, j), self%direction(first, j), &
+                     column(first), shares(first), sums)
+               end associate
             end do
-            self%rows(1, j) = total
-            self%rows(2, j) = cells
+            self%rows(1:5, j) = sums
          end do
-      end do
-      !$omp end parallel
-      mean = 0.0_dp
-      if (problem%control == control_pressure) &
-         mean = row_sum(self, 1)/max(row_sum(self, 2), 1.0_dp)
-
-      !$omp parallel do default(none) shared(self, pressure, mean) &
-      !$omp private(i, j, k, total, cells, product, residuals) num_threads(self%operator%threads)
-      do j = 1, self%grid%ny
-         total = 0.0_dp
-         cells = 0.0_dp
-         product = 0.0_dp
-         residuals = 0.0_dp
-         do k = 1, self%runs(j)
-            !$omp simd reduction(+:total, cells, product, residuals)
-            do i = self%first(k, j), self%last(k, j)
-               if (abs(self%residual(i, j)) > 0.0_dp .and. &
-                  (pressure(i, j) > 0.0_dp .or. self%step(i, j) > mean)) then
-                  total = total + self%step(i, j)
-                  cells = cells + 1.0_dp
-                  product = product + self%residual(i, j)*self%step(i, j)
-                  residuals = residuals + self%residual(i, j)
-               else
-                  self%step(i, j) = huge(1.0_dp)
-               end if
-            end do
-         end do
-         self%rows(1:4, j) = [total, cells, product, residuals]
-      end do
-      mean = 0.0_dp
-      if (problem%control == control_pressure) &
-         mean = row_sum(self, 1)/max(row_sum(self, 2), 1.0_dp)
-      rz = row_sum(self, 3) - mean*row_sum(self, 4)
-   end subroutine precondition
-
-   !> direction = step - mean + beta direction on S, zero elsewhere; `offset` is the mean that the next
-   !> pass takes off it. Without that mean: its product with the residual, its square, its block means.
-   subroutine new_direction(self, problem, mean, beta, offset, rd, squares)
-      type(normal_solver_type), intent(inout) :: self
-      type(normal_problem_type), intent(in) :: problem
-      real(dp), intent(in) :: mean, beta
-      real(dp), intent(out) :: offset, rd, squares
-      real(dp), allocatable :: inside(:)
-      real(dp) :: total, cells, product, residuals, square
-      integer :: i, j, k, jb
-
-      !$omp parallel default(none) shared(self, mean, beta) &
-      !$omp private(i, j, k, jb, total, cells, product, residuals, square, inside) &
-      !$omp num_threads(self%operator%threads)
-      allocate (inside(self%grid%nx))
-      !$omp do
-      do jb = 1, self%coarse%ny
-         self%coarse%mean(:, jb) = 0.0_dp
-         self%coarse%share(:, jb) = 0.0_dp
-         do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
-            total = 0.0_dp
-            cells = 0.0_dp
-            product = 0.0_dp
-            residuals = 0.0_dp
-            square = 0.0_dp
-            do k = 1, self%runs(j)
-               !$omp simd reduction(+:total, cells, product, residuals, square)
-               do i = self%first(k, j), self%last(k, j)
-                  inside(i) = merge(1.0_dp, 0.0_dp, self%step(i, j) < huge(1.0_dp))
-                  self%direction(i, j) = merge(self%step(i, j) - mean + beta*self%direction(i, j), &
-                     0.0_dp, self%step(i, j) < huge(1.0_dp))
-                  total = total + self%direction(i, j)
-                  cells = cells + inside(i)
-                  product = product + self%residual(i, j)*self%direction(i, j)
-                  residuals = residuals + self%residual(i, j)*inside(i)
-                  square = square + self%direction(i, j)**2
-               end do
-               call self%coarse%add_means(jb, self%first(k, j), &
-                  self%direction(self%first(k, j):self%last(k, j), j))
-               call self%coarse%add_shares(jb, self%first(k, j), &
-                  inside(self%first(k, j):self%last(k, j)))
-            end do
-            self%rows(1:5, j) = [total, cells, product, residuals, square]
-         end do
+         call self%coarse%set_means(jb, column)
+         call self%coarse%set_shares(jb, shares)
       end do
       !$omp end parallel
       offset = 0.0_dp
@@ -471,140 +410,144 @@ contains
       squares = row_sum(self, 5)
       if (problem%control /= control_pressure) return
       total = row_sum(self, 1)
-      cells = max(row_sum(self, 2), 1.0_dp)
-      offset = total/cells
+      offset = total/max(row_sum(self, 2), 1.0_dp)
       rd = rd - offset*row_sum(self, 4)
       squares = squares - offset*total
       self%coarse%mean(:, :) = self%coarse%mean - offset*self%coarse%share
    end subroutine new_direction
 
    !> step = (P + alpha direction, put back on what is allowed) - P; whether anything was clipped, the
-   !> slope of the energy along it, its square and block means, and the longest multiple allowed.
-   subroutine clipped_step(self, problem, alpha, offset, pressure, gap, level, clipped, slope, &
-      squares, limit)
+   !> slope of the energy along it, its square and block means. Its rows are transformed at once.
+   subroutine clipped_step(self, problem, alpha, offset, pressure, gap, level, clipped, slope, squares)
       type(normal_solver_type), intent(inout) :: self
       type(normal_problem_type), intent(in) :: problem
       real(dp), intent(in) :: alpha
       real(dp), intent(in) :: offset                 !! to be taken off the direction
-      real(dp), intent(in) :: pressure(:, :), gap(:, :)
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny), gap(self%grid%nx, self%grid%ny)
       real(dp), intent(in) :: level
       logical, intent(out) :: clipped
-      real(dp), intent(out) :: slope, squares, limit
-      real(dp) :: shift, next, total, cells, trial, longest, product, lowest
-      integer :: i, j, k, jb
+      real(dp), intent(out) :: slope, squares
+      real(dp), allocatable :: column(:)
+      real(dp) :: shift, sums(2), least
+      integer :: j, k, jb, n
 
       !$omp parallel do default(none) shared(self, pressure, alpha, offset) &
-      !$omp private(i, j, k, total, cells, trial, lowest) num_threads(self%operator%threads)
+      !$omp private(j, k, n, sums, least) schedule(dynamic, 8) num_threads(self%operator%threads)
       do j = 1, self%grid%ny
-         total = 0.0_dp
-         cells = 0.0_dp
-         lowest = 0.0_dp
+         sums = 0.0_dp
+         least = 0.0_dp
          do k = 1, self%runs(j)
-            !$omp simd reduction(+:total, cells) reduction(min:lowest)
-            do i = self%first(k, j), self%last(k, j)
-               self%direction(i, j) = merge(self%direction(i, j) - offset, 0.0_dp, &
-                  self%step(i, j) < huge(1.0_dp))
-               trial = pressure(i, j) + alpha*self%direction(i, j)
-               self%step(i, j) = trial
-               total = total + max(trial, 0.0_dp)
-               cells = cells + merge(1.0_dp, 0.0_dp, trial > 0.0_dp)
-               lowest = min(lowest, trial)
-            end do
+            associate (first => self%first(k, j))
+               n = self%last(k, j) - first + 1
+               call trial_cells(n, alpha, offset, pressure(first, j), self%direction(first, j), &
+                  self%step(first, j), sums, least)
+            end associate
          end do
-         self%rows(1:3, j) = [total, cells, lowest]
+         self%rows(1:3, j) = [sums, least]
       end do
       clipped = global_min(minval(self%rows(3, :))) < 0.0_dp
       shift = 0.0_dp
-      if (problem%control == control_pressure .and. clipped) then
-         do
-            cells = row_sum(self, 2)
-            if (cells < 1.0_dp) exit
-            next = (row_sum(self, 1) - problem%target*self%grid%nx*self%grid%ny)/cells
-            if (next <= shift) exit
-            shift = next
-            !$omp parallel do default(none) shared(self, shift) private(i, j, k, total, cells) &
-            !$omp num_threads(self%operator%threads)
-            do j = 1, self%grid%ny
-               total = 0.0_dp
-               cells = 0.0_dp
-               do k = 1, self%runs(j)
-                  !$omp simd reduction(+:total, cells)
-                  do i = self%first(k, j), self%last(k, j)
-                     total = total + merge(self%step(i, j), 0.0_dp, self%step(i, j) > shift)
-                     cells = cells + merge(1.0_dp, 0.0_dp, self%step(i, j) > shift)
-                  end do
-               end do
-               self%rows(1:2, j) = [total, cells]
-            end do
-         end do
-      end if
+      if (problem%control == control_pressure .and. clipped) call find_shift(self, problem, shift)
 
-      !$omp parallel do default(none) shared(self, pressure, gap, level, shift) &
-      !$omp private(i, j, k, jb, total, product, longest) num_threads(self%operator%threads)
+      !$omp parallel default(none) shared(self, pressure, gap, level, shift) &
+      !$omp private(j, k, jb, n, sums, column) num_threads(self%operator%threads)
+      allocate (column(self%grid%nx))
+      !$omp do schedule(dynamic)
       do jb = 1, self%coarse%ny
-         self%coarse%mean(:, jb) = 0.0_dp
+         column(:) = 0.0_dp
          do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
-            product = 0.0_dp
-            total = 0.0_dp
-            longest = huge(1.0_dp)
+            sums = 0.0_dp
             do k = 1, self%runs(j)
-               !$omp simd reduction(+:product, total) reduction(min:longest)
-               do i = self%first(k, j), self%last(k, j)
-                  self%step(i, j) = max(self%step(i, j) - shift, 0.0_dp) - pressure(i, j)
-                  product = product - (gap(i, j) - level)*self%step(i, j)
-                  total = total + self%step(i, j)**2
-                  longest = min(longest, merge(-pressure(i, j)/min(self%step(i, j), -tiny(1.0_dp)), &
-                     huge(1.0_dp), self%step(i, j) < 0.0_dp))
-               end do
-               call self%coarse%add_means(jb, self%first(k, j), &
-                  self%step(self%first(k, j):self%last(k, j), j))
+               associate (first => self%first(k, j))
+                  n = self%last(k, j) - first + 1
+                  call clip_cells(n, shift, level, pressure(first, j), gap(first, j), &
+                     self%step(first, j), column(first), sums)
+               end associate
             end do
-            self%rows(1:3, j) = [product, total, longest]
+            self%rows(1:2, j) = sums
+            if (self%runs(j) == 0) then
+               call self%operator%forward_zero_row(1, j)
+            else
+               call self%operator%forward_row(1, j, self%step(:, j))
+            end if
          end do
+         call self%coarse%set_means(jb, column)
       end do
+      !$omp end parallel
       slope = row_sum(self, 1)
       squares = row_sum(self, 2)
-      limit = global_min(minval(self%rows(3, :)))
    end subroutine clipped_step
 
-   !> Transform the step and multiply by the operator; step.A step.
-   subroutine transform_step(self, form)
+   !> The shift t for which max(trial - t, 0) has the load's sum, by Newton's method from below; the
+   !> rows hold the sums for t = 0.
+   subroutine find_shift(self, problem, shift)
       type(normal_solver_type), intent(inout) :: self
-      real(dp), intent(out) :: form
-      integer :: j
+      type(normal_problem_type), intent(in) :: problem
+      real(dp), intent(inout) :: shift
+      real(dp) :: excess, load, cells, sums(2)
+      integer :: j, k, n
 
-      !$omp parallel do default(none) shared(self) private(j) num_threads(self%operator%threads) &
-      !$omp schedule(dynamic, 8)
-      do j = 1, self%grid%ny
-         if (self%runs(j) == 0) then
-            call self%operator%forward_zero_row(1, j)
-         else
-            call self%operator%forward_row(1, j, self%step(:, j))
-         end if
+      load = problem%target*self%grid%nx*self%grid%ny
+      do
+         cells = row_sum(self, 2)
+         if (cells < 1.0_dp) exit
+         excess = row_sum(self, 1) - load
+         if (excess <= 1e-15_dp*load) exit
+         shift = shift + excess/cells
+         !$omp parallel do default(none) shared(self, shift) private(j, k, n, sums) &
+         !$omp schedule(dynamic, 8) num_threads(self%operator%threads)
+         do j = 1, self%grid%ny
+            sums = 0.0_dp
+            do k = 1, self%runs(j)
+               n = self%last(k, j) - self%first(k, j) + 1
+               call above_cells(n, shift, self%step(self%first(k, j), j), sums)
+            end do
+            self%rows(1:2, j) = sums
+         end do
       end do
-      call self%operator%columns(columns_apply, form)
-   end subroutine transform_step
+   end subroutine find_shift
+
+   !> The longest multiple of the step that leaves no pressure negative.
+   function longest_multiple(self, pressure) result(longest)
+      type(normal_solver_type), intent(in) :: self
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny)
+      real(dp) :: longest
+      integer :: j, k
+
+      longest = huge(1.0_dp)
+      do j = 1, self%grid%ny
+         do k = 1, self%runs(j)
+            call longest_cells(self%last(k, j) - self%first(k, j) + 1, &
+               pressure(self%first(k, j), j), self%step(self%first(k, j), j), longest)
+         end do
+      end do
+      longest = global_min(longest)
+   end function longest_multiple
 
    !> P = P + alpha step, gap = gap + factor A step, and the survey of the new state.
    subroutine update(self, problem, factor, alpha, pressure, gap)
       type(normal_solver_type), intent(inout) :: self
       type(normal_problem_type), intent(in) :: problem
       real(dp), intent(in) :: factor, alpha
-      real(dp), intent(inout) :: pressure(:, :), gap(:, :)
-      integer :: i, j, k
+      real(dp), intent(inout) :: pressure(self%grid%nx, self%grid%ny)
+      real(dp), intent(inout) :: gap(self%grid%nx, self%grid%ny)
+      real(dp) :: sums(5)
+      integer :: j, k, n
 
       !$omp parallel do default(none) shared(self, problem, factor, alpha, pressure, gap) &
-      !$omp private(i, j, k) num_threads(self%operator%threads)
+      !$omp private(j, k, n, sums) schedule(dynamic, 8) num_threads(self%operator%threads)
       do j = 1, self%grid%ny
          call self%operator%add_backward_row(1, j, factor, gap(:, j))
+         sums = 0.0_dp
          do k = 1, self%runs(j)
-            !$omp simd
-            do i = self%first(k, j), self%last(k, j)
-               ! Round-off may not leave a trace where the step empties a cell.
-               pressure(i, j) = max(pressure(i, j) + alpha*self%step(i, j), 0.0_dp)
-            end do
+            associate (first => self%first(k, j))
+               n = self%last(k, j) - first + 1
+               call load_cells(n, alpha, problem%target, gap(first, j), self%step(first, j), &
+                  pressure(first, j), sums)
+            end associate
          end do
-         call survey_row(self, problem, .false., j, pressure(:, j), gap(:, j))
+         self%surveyed(1:5, j) = sums
+         call survey_blocks(self, .false., j, pressure(:, j), gap(:, j))
       end do
    end subroutine update
 
@@ -612,7 +555,7 @@ contains
    subroutine shift_gap(self, level, gap)
       type(normal_solver_type), intent(in) :: self
       real(dp), intent(in) :: level
-      real(dp), intent(inout) :: gap(:, :)
+      real(dp), contiguous, intent(inout) :: gap(:, :)
       integer :: j
 
       !$omp parallel do default(none) shared(self, gap, level) private(j) &

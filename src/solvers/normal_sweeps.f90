@@ -1,0 +1,215 @@
+!> The passes of module normal_cg over neighbouring cells of one row.
+!>
+!> Each is one loop without branches, so that it runs in vector registers. The contact set S needs
+!> no field of its own: the residual is not zero in S alone, and the direction where it acts alone.
+module normal_sweeps
+   use precision, only : dp
+   implicit none
+   private
+
+   public :: above_cells, clip_cells, coupling_cells, direction_cells, load_cells, longest_cells, &
+      residual_cells, trial_cells
+
+contains
+
+   !> The residual level - gap on S = {P > 0 or gap < level}, zero elsewhere; the sum of its square.
+   pure subroutine residual_cells(n, level, pressure, gap, residual, column, square)
+      integer, intent(in) :: n
+      real(dp), intent(in) :: level
+      real(dp), intent(in) :: pressure(n), gap(n)
+      real(dp), intent(inout) :: residual(n)
+      real(dp), intent(inout) :: column(n)          !! sums over the rows of a block
+      real(dp), intent(inout) :: square
+      real(dp) :: total, r
+      integer :: i
+
+      total = 0.0_dp
+      !$omp simd reduction(+:total) private(r)
+      do i = 1, n
+         r = (level - gap(i))*positive(max(level - gap(i), pressure(i)))
+         residual(i) = r
+         column(i) = column(i) + r
+         total = total + r**2
+      end do
+      square = square + total
+   end subroutine residual_cells
+
+   !> Sum of r (wx r_west + wy r_south).
+   pure subroutine coupling_cells(n, wx, wy, residual, south, sum)
+      integer, intent(in) :: n
+      real(dp), intent(in) :: wx, wy                !! weights of the stencil
+      real(dp), intent(in) :: residual(0:n), south(n)
+      real(dp), intent(inout) :: sum
+      real(dp) :: total
+      integer :: i
+
+      total = 0.0_dp
+      !$omp simd reduction(+:total)
+      do i = 1, n
+         total = total + residual(i)*(wx*residual(i - 1) + wy*south(i))
+      end do
+      sum = sum + total
+   end subroutine coupling_cells
+
+   !> direction = z + beta (direction - offset), z = M r, where it acts: on S but for empty cells that z
+   !> would empty further. Sums: of it, of 1, of r times it, of r, of its square.
+   pure subroutine direction_cells(n, wx, wy, centre, south, residual, north, correction, &
+      beta, offset, pressure, direction, column, shares, sums)
+      integer, intent(in) :: n
+      real(dp), intent(in) :: wx, wy, centre        !! weights of the stencil
+      real(dp), intent(in) :: south(n), residual(0:n + 1), north(n)
+      real(dp), intent(in) :: correction(n)         !! of the coarse level
+      real(dp), intent(in) :: beta
+      real(dp), intent(in) :: offset                !! mean of the old direction
+      real(dp), intent(in) :: pressure(n)
+      real(dp), intent(inout) :: direction(n)
+      real(dp), intent(inout) :: column(n)          !! sums over the rows of a block
+      real(dp), intent(inout) :: shares(n)          !! the same of 1 where it acts
+      real(dp), intent(inout) :: sums(5)
+      real(dp) :: total, cells, product, residuals, square, z, d, inside
+      integer :: i
+
+      total = 0.0_dp
+      cells = 0.0_dp
+      product = 0.0_dp
+      residuals = 0.0_dp
+      square = 0.0_dp
+      !$omp simd reduction(+:total, cells, product, residuals, square) private(z, d, inside)
+      do i = 1, n
+         z = centre*residual(i) - wx*(residual(i - 1) + residual(i + 1)) &
+            - wy*(south(i) + north(i)) + correction(i)
+         inside = positive(min(abs(residual(i)), max(pressure(i), z)))
+         d = inside*(z + beta*(direction(i) &
+            - offset*positive(abs(direction(i)))))
+         direction(i) = d
+         column(i) = column(i) + d
+         shares(i) = shares(i) + inside
+         total = total + d
+         cells = cells + inside
+         product = product + residual(i)*d
+         residuals = residuals + residual(i)*inside
+         square = square + d**2
+      end do
+      sums = sums + [total, cells, product, residuals, square]
+   end subroutine direction_cells
+
+   !> trial = P + alpha (direction - offset); the sum and number of what is positive, the least.
+   pure subroutine trial_cells(n, alpha, offset, pressure, direction, trial, sums, least)
+      integer, intent(in) :: n
+      real(dp), intent(in) :: alpha, offset
+      real(dp), intent(in) :: pressure(n), direction(n)
+      real(dp), intent(inout) :: trial(n)
+      real(dp), intent(inout) :: sums(2)
+      real(dp), intent(inout) :: least
+      real(dp) :: total, cells, lowest
+      integer :: i
+
+      total = 0.0_dp
+      cells = 0.0_dp
+      lowest = least
+      !$omp simd reduction(+:total, cells) reduction(min:lowest)
+      do i = 1, n
+         trial(i) = pressure(i) + alpha*(direction(i) &
+            - offset*positive(abs(direction(i))))
+         total = total + max(trial(i), 0.0_dp)
+         cells = cells + positive(trial(i))
+         lowest = min(lowest, trial(i))
+      end do
+      sums = sums + [total, cells]
+      least = lowest
+   end subroutine trial_cells
+
+   !> Sum of what is above a limit, and the number of such values.
+   pure subroutine above_cells(n, limit, values, sums)
+      integer, intent(in) :: n
+      real(dp), intent(in) :: limit
+      real(dp), intent(in) :: values(n)
+      real(dp), intent(inout) :: sums(2)            !! of (value - limit) and of 1
+      real(dp) :: total, cells
+      integer :: i
+
+      total = 0.0_dp
+      cells = 0.0_dp
+      !$omp simd reduction(+:total, cells)
+      do i = 1, n
+         total = total + max(values(i) - limit, 0.0_dp)
+         cells = cells + positive(values(i) - limit)
+      end do
+      sums = sums + [total, cells]
+   end subroutine above_cells
+
+   !> step = max(trial - shift, 0) - P, in the place of trial; sums of (level - gap) step and step^2.
+   pure subroutine clip_cells(n, shift, level, pressure, gap, step, column, sums)
+      integer, intent(in) :: n
+      real(dp), intent(in) :: shift, level
+      real(dp), intent(in) :: pressure(n), gap(n)
+      real(dp), intent(inout) :: step(n)
+      real(dp), intent(inout) :: column(n)          !! sums over the rows of a block
+      real(dp), intent(inout) :: sums(2)
+      real(dp) :: product, square
+      integer :: i
+
+      product = 0.0_dp
+      square = 0.0_dp
+      !$omp simd reduction(+:product, square)
+      do i = 1, n
+         step(i) = max(step(i) - shift, 0.0_dp) - pressure(i)
+         column(i) = column(i) + step(i)
+         product = product + (level - gap(i))*step(i)
+         square = square + step(i)**2
+      end do
+      sums = sums + [product, square]
+   end subroutine clip_cells
+
+   !> The longest multiple of the step that leaves no pressure negative, if less than `longest`.
+   pure subroutine longest_cells(n, pressure, step, longest)
+      integer, intent(in) :: n
+      real(dp), intent(in) :: pressure(n), step(n)
+      real(dp), intent(inout) :: longest
+      integer :: i
+
+      do i = 1, n
+         if (step(i) < 0.0_dp) longest = min(longest, -pressure(i)/step(i))
+      end do
+   end subroutine longest_cells
+
+   !> 1 where x > 0, else 0, without a branch.
+   elemental function positive(x)
+      real(dp), intent(in) :: x
+      real(dp) :: positive
+
+      positive = 0.5_dp - sign(0.5_dp, 0.0_dp - x)
+   end function positive
+
+   !> P = P + alpha step; sums as those of `row_measure`.
+   pure subroutine load_cells(n, alpha, target, gap, step, pressure, sums)
+      integer, intent(in) :: n
+      real(dp), intent(in) :: alpha
+      real(dp), intent(in) :: target                !! prescribed level
+      real(dp), intent(in) :: gap(n), step(n)
+      real(dp), intent(inout) :: pressure(n)
+      real(dp), intent(inout) :: sums(5)
+      real(dp) :: load, work, touched, cells, distance, p, inside
+      integer :: i
+
+      load = 0.0_dp
+      work = 0.0_dp
+      touched = 0.0_dp
+      cells = 0.0_dp
+      distance = 0.0_dp
+      !$omp simd reduction(+:load, work, touched, cells, distance) private(p, inside)
+      do i = 1, n
+         ! Round-off may not leave a trace where the step empties a cell.
+         p = max(pressure(i) + alpha*step(i), 0.0_dp)
+         pressure(i) = p
+         load = load + p
+         work = work + p*gap(i)
+         distance = distance + p*abs(gap(i) - target)
+         inside = positive(p)
+         touched = touched + inside*gap(i)
+         cells = cells + inside
+      end do
+      sums = sums + [load, work, touched, cells, distance]
+   end subroutine load_cells
+
+end module normal_sweeps
