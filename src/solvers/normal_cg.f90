@@ -15,7 +15,12 @@
 !> Converged means that the duality gap e1 = (mean gap under the pressure - least gap)/h_rms and the
 !> error of the load, both of a fresh U = A P, are below the tolerance.
 !>
-!> Fields of doubles: H, P, gap, and the work fields residual, direction, step; the operator's spectrum.
+!> The passes themselves are in module normal_sweeps. S and the set where d acts are read off r and d,
+!> which are zero elsewhere; what must be taken off d to keep the load is carried as a number.
+!>
+!> Fields of doubles: H, P, gap, and the work fields residual, direction, step; the operator's spectrum
+!> and a quarter for its symbol, a tenth for blocks and the coarse level: 7.4, measured 7.7 at n = 4096
+!> with all else the process holds. In free mode spectrum and symbol take three.
 module normal_cg
    use coarse_level, only : coarse_level_type, new_coarse_level, stencil_c0
    use errors, only : error_type
@@ -65,7 +70,7 @@ contains
    subroutine new_normal_solver(self, grid, poisson, error)
       type(normal_solver_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
-      real(dp), intent(in) :: poisson
+      real(dp), intent(in) :: poisson                  !! -1 < nu <= 0.5
       type(error_type), allocatable, intent(out) :: error
       integer :: nb
 
