@@ -47,7 +47,9 @@ contains
       if (present(thesis)) by_thesis = thesis
       task = problem
       if (task%rms_height <= 0.0_dp) task%rms_height = rms(height)
-      allocate (solution%pressure(grid%nx, grid%ny), solution%gap(grid%nx, grid%ny), source=0.0_dp)
+      allocate (solution%pressure(grid%nx, grid%ny), solution%gap(grid%nx, grid%ny))
+      solution%pressure(:, :) = 0.0_dp
+      solution%gap(:, :) = 0.0_dp
       if (present(start)) then
          solution%pressure = start
          task%warm = .true.

@@ -144,9 +144,15 @@ contains
          call form_residual(self, measure%level, pressure, gap, rz)
          beta = 0.0_dp
          if (.not. restart .and. old > 0.0_dp) beta = rz/old
-         call new_direction(self, task, beta, pressure, offset, rd, squares)
-         if (rd <= 0.0_dp) call new_direction(self, task, 0.0_dp, pressure, offset, rd, squares)
+         call new_direction(self, task, .true., beta, pressure, offset, rd, squares)
+         if (rd <= 0.0_dp) &
+            call new_direction(self, task, .true., 0.0_dp, pressure, offset, rd, squares)
          old = rz
+         if (rd <= 0.0_dp) then
+            ! M r may point uphill once the load is kept; r itself never does.
+            call new_direction(self, task, .false., 0.0_dp, pressure, offset, rd, squares)
+            old = 0.0_dp
+         end if
          restart = .false.
          if (rd <= 0.0_dp) then
             outcome%reason = 'no direction of descent is left'
@@ -370,9 +376,10 @@ contains
    !> direction = z + beta direction where it acts: on S, but for empty cells that z would empty
    !> further. What must be taken off it to keep the load stays apart, as `offset` (the old one
    !> comes in). Of the direction with it: the product with the residual, the square, the block means.
-   subroutine new_direction(self, problem, beta, pressure, offset, rd, squares)
+   subroutine new_direction(self, problem, preconditioned, beta, pressure, offset, rd, squares)
       type(normal_solver_type), intent(inout) :: self
       type(normal_problem_type), intent(in) :: problem
+      logical, intent(in) :: preconditioned          !! z = M r, else z = r
       real(dp), intent(in) :: beta
       real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny)
       real(dp), intent(inout) :: offset
@@ -381,16 +388,17 @@ contains
       real(dp) :: wx, wy, centre, sums(5), total
       integer :: j, k, jb, n
 
-      wx = self%coarse%wx
-      wy = self%coarse%wy
-      centre = stencil_c0 + 2.0_dp*(wx + wy)
-      !$omp parallel default(none) shared(self, wx, wy, centre, beta, offset, pressure) &
+      wx = merge(self%coarse%wx, 0.0_dp, preconditioned)
+      wy = merge(self%coarse%wy, 0.0_dp, preconditioned)
+      centre = merge(stencil_c0, 1.0_dp, preconditioned) + 2.0_dp*(wx + wy)
+      !$omp parallel default(none) shared(self, preconditioned, wx, wy, centre, beta, offset, pressure) &
       !$omp private(j, k, jb, n, sums, correction, column, shares) &
       !$omp num_threads(self%operator%threads)
       allocate (correction(self%grid%nx), column(self%grid%nx), shares(self%grid%nx))
       !$omp do
       do jb = 1, self%coarse%ny
-         correction(:) = self%coarse%correction(self%coarse%block_x, jb)
+         correction(:) = 0.0_dp
+         if (preconditioned) correction(:) = self%coarse%correction(self%coarse%block_x, jb)
          column(:) = 0.0_dp
          shares(:) = 0.0_dp
          do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
