@@ -94,7 +94,7 @@ contains
       call new_symbol_operator(self%stiffness, self%mx, self%my, stiffness, error)
       if (allocated(error)) return
       call new_adhesion_preconditioner(self%preconditioner, preconditioner, self%mx, self%my, &
-         compliance, stiffness, 2.0_dp/self%nyquist, 0.5_dp*self%nyquist, error)
+         compliance, stiffness, 1.4_dp/self%nyquist, 0.5_dp*self%nyquist, error)
       if (allocated(error)) return
       call new_normal_operator(self%operator, grid, poisson, error)
       if (allocated(error)) return

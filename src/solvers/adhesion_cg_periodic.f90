@@ -96,7 +96,7 @@ contains
       call new_symbol_operator(self%stiffness, grid%nx, grid%ny, stiffness, error)
       if (allocated(error)) return
       call new_adhesion_preconditioner(self%preconditioner, preconditioner, grid%nx, grid%ny, &
-         inverse, stiffness, 2.0_dp/self%nyquist, 0.5_dp*self%nyquist, error)
+         inverse, stiffness, 1.4_dp/self%nyquist, 0.5_dp*self%nyquist, error)
       if (allocated(error)) return
       allocate (self%gradient(grid%nx, grid%ny), self%residual(grid%nx, grid%ny), &
          self%direction(grid%nx, grid%ny), self%old(grid%nx, grid%ny), source=0.0_dp)
