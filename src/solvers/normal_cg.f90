@@ -42,6 +42,7 @@ module normal_cg
 
    integer, parameter :: width = 16            !! cells of an active block
    integer, parameter :: longest_age = 40      !! iterations between fresh products A P
+   real(dp), parameter :: useless = 0.1_dp     !! part of a clipped step that is taken, at the most
 
    !> The solver with its operators and work fields, kept from step to step. Not to be copied.
    type :: normal_solver_type
@@ -181,6 +182,8 @@ contains
          trial = scale*self%coarse%predict_form(squares)
          kappa = min(max(form/max(trial, tiny(1.0_dp)), 0.1_dp), 10.0_dp)
          alpha = rd/form
+         ! A direction that points out of what is allowed only grows: leave it.
+         restart = clipped .and. alpha < useless
          if (clipped .and. alpha > 0.55_dp) then
             alpha = 1.0_dp
          else if (alpha > 1.0_dp) then
