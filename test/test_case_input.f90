@@ -433,8 +433,7 @@ contains
       call refuse(no_phase//'&phase control = ''force'', pressure = 1.0 /', 'needs force in the same phase')
       call refuse(no_phase//'&phase pressure=1.0, duration=1.0, ramp=''linear'', relaxed=.true. /', &
          'relaxed = .true.: excludes ramp')
-      call refuse(no_phase//'&phase pressure=1.0, ramp=''linear'' /', 'ramp = ''linear'': needs a duration')
-      call refuse(no_phase//'&phase pressure=1.0, steps=4 /', 'steps = 4: needs a duration')
+      call refuse(no_phase//'&phase pressure=1.0, steps=4 /', 'steps = 4: needs a duration, or ramp')
       call refuse(no_phase//'&phase pressure=1.0, velocity_x=4 /', 'velocity_x = 4: needs a duration')
       call refuse(no_phase//'&phase pressure=1.0, duration=-1 /', 'duration = -1: must be 0 or a positive number')
       call refuse(no_phase//'&phase pressure=1.0, duration=1, dt=2 /', 'dt = 2: must be at most the duration')

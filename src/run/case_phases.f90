@@ -130,7 +130,7 @@ contains
       type(phase_settings_type), intent(in) :: phase
       type(material_settings_type), intent(in) :: material
       type(faults_type), intent(inout) :: faults
-      character(*), parameter :: timed(4) = [character(10) :: 'steps', 'dt', 'velocity_x', 'velocity_y']
+      character(*), parameter :: timed(3) = [character(10) :: 'dt', 'velocity_x', 'velocity_y']
       integer :: i
 
       if (phase%relaxed .and. phase%linear) call group%fault('relaxed', &
@@ -140,12 +140,14 @@ contains
       if (.not. phase%static) return
       do i = 1, size(timed)
          if (.not. group%usable(trim(timed(i)))) cycle
-         if (i > 2 .and. abs(group%real_value(trim(timed(i)))) <= 0.0_dp) cycle
+         if (i > 1 .and. abs(group%real_value(trim(timed(i)))) <= 0.0_dp) cycle
          call group%fault(trim(timed(i)), 'needs a duration: a phase without one is one static solve', &
             faults)
       end do
-      if (phase%linear) call group%fault('ramp', &
-         'needs a duration: a phase without one is one static solve', faults)
+      if (group%usable('steps') .and. .not. phase%linear) then
+         if (group%integer_value('steps') > 1) call group%fault('steps', &
+            'needs a duration, or ramp = ''linear'' for a series of static solves up to the load', faults)
+      end if
    end subroutine check_combination
 
    !> Number of steps and time step.
@@ -161,8 +163,9 @@ contains
       phase%steps = 1
       phase%dt = 0.0_dp
       phase%dt_reason = 'static'
-      if (phase%static .or. .not. phase%duration > 0.0_dp) return
       if (group%bad('steps') .or. group%bad('dt')) return
+      if (phase%static .and. group%given('steps')) phase%steps = group%integer_value('steps')
+      if (phase%static .or. .not. phase%duration > 0.0_dp) return
 
       if (group%given('steps')) then
          phase%steps = group%integer_value('steps')

@@ -161,6 +161,7 @@ contains
       text = '&phase'//nl//string('name', phase%name)//number('duration', phase%duration, 's')
       if (.not. phase%static) text = text//line('steps', to_text(phase%steps), 'dt = '// &
          to_text(phase%dt)//' s: '//trim(phase%dt_reason))
+      if (phase%static .and. phase%steps > 1) text = text//whole('steps', phase%steps)
       text = text//string('control', phase%control)
       if (phase%given) then
          text = text//number(trim(phase%control), phase%target, control_units(phase%control))

@@ -76,7 +76,7 @@ contains
          '&material|shear_modulus = 1e6|prony_g = 2e6, 1e6|prony_tau = 1e-5, 1e-3|'// &
          'thickness = 4e-3|density = 20.0|/|'// &
          '&friction|law = ''coulomb''|coefficient = 1.0|/|'// &
-         '&phase|name = ''load''|duration = 1e-3|steps = 50|pressure = 0.4e6|/|'// &
+         '&phase|name = ''load''|duration = 1e-3|steps = 100|pressure = 0.4e6|/|'// &
          '&phase|name = ''slide''|duration = 0.5e-3|velocity_x = 1.0|/|'// &
          '&output|snapshot_every = 32|/|')]
    end function templates
