@@ -1,0 +1,395 @@
+"""Run the validation cases and write docs/validation.md with its figures.
+
+    python tools/validation.py [NAME ...]
+
+Each case runs the program and is compared with a known solution of `asperity.theory` or with a
+figure of the literature. With names, only those chapters are run and drawn; the page needs all.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import h5py
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+import asperity
+from asperity import theory
+from asperity.material import Prony
+from asperity.plot import COLOURS
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+FIGURES = DOCS / "figures"
+SCHEMES = ("backward_euler", "exponential", "exponential2")
+BLUE, RED, GREEN, PURPLE = COLOURS[:4]
+
+
+@dataclass
+class Row:
+    """One comparison: what, our value, the reference, and what the error is measured against."""
+
+    what: str
+    value: float
+    reference: float
+    units: str = ""
+
+    def markdown(self) -> str:
+        """Return the row of the table."""
+        error = self.value / self.reference - 1.0
+        return (f"| {self.what} | {self.value:.6g} {self.units} "
+                f"| {self.reference:.6g} {self.units} | {100 * error:+.3g} % |")
+
+
+@dataclass
+class Chapter:
+    """A chapter of the page."""
+
+    title: str
+    text: str
+    rows: list[Row] = field(default_factory=list)
+    figure: str = ""
+    caption: str = ""
+
+    def markdown(self) -> str:
+        """Return the chapter."""
+        parts = [f"## {self.title}", self.text]
+        if self.rows:
+            parts.append("\n".join(["| quantity | Asperity | reference | difference |",
+                                    "| --- | --- | --- | --- |",
+                                    *(row.markdown() for row in self.rows)]))
+        if self.figure:
+            parts.append(f"![{self.caption}](figures/{self.figure})\n\n*{self.caption}*")
+        return "\n\n".join(parts)
+
+
+def run(text: str) -> asperity.result.Run:
+    """Run a case given as text; the result stays open in a folder that is removed at the end."""
+    folder = Path(tempfile.mkdtemp(dir=run.folder))
+    case = folder / "case.nml"
+    case.write_text(text)
+    return asperity.run(case, threads=1)
+
+
+def finish(figure, name: str) -> str:
+    """Save a figure."""
+    FIGURES.mkdir(parents=True, exist_ok=True)
+    figure.savefig(FIGURES / name, dpi=110)
+    plt.close(figure)
+    return name
+
+
+def hertz() -> Chapter:
+    """Press a sphere on an elastic half-space, free boundary."""
+    radius, modulus, force = 0.05, 344.828e6, 9.19540
+    known = theory.hertz(radius, modulus, force=force)
+    errors, cells = [], []
+    for n in (16, 32, 64, 128, 256):
+        result = run(f"""&grid nx = {n}, ny = {n}, lx = 2.4e-3, boundary = 'free' /
+&surface shape = 'paraboloid', radius = {radius} /
+&material poisson = 0.42, shear_modulus = {modulus * 0.58 / 2!r} /
+&phase force = {force!r} /
+&solver tolerance = 1e-8 /
+""")
+        cells.append(2 * known.contact_radius / (2.4e-3 / n))
+        errors.append((abs(result.history["displacement"][-1] / known.approach - 1),
+                       abs(result.snapshots[-1].pressure.max() / known.peak_pressure - 1)))
+    snapshot = result.snapshots[-1]
+    x = result.grid.x - 1.2e-3
+    area = result.history["contact_area"][-1] * result.grid.lx * result.grid.ly
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+    r = np.linspace(-1.2e-3, 1.2e-3, 600)
+    left.plot(r * 1e3, known.pressure(np.abs(r)) / 1e6, color=BLUE, label="Hertz")
+    left.plot(x[::6] * 1e3, snapshot.pressure[128, ::6] / 1e6, "o", ms=3.5, color=RED,
+              label="Asperity")
+    left.set(xlabel="x (mm)", ylabel="Pressure (MPa)")
+    left.legend()
+    errors = np.array(errors)
+    right.loglog(cells, errors[:, 0], "o-", color=BLUE, label="approach")
+    right.loglog(cells, errors[:, 1], "s-", color=RED, label="peak pressure")
+    right.loglog(cells, 0.5 / np.array(cells) ** 2, "k:", label="order 2")
+    right.set(xlabel="Cells over the contact", ylabel="Relative error")
+    right.set_xticks([20, 50, 100, 200], ["20", "50", "100", "200"])
+    right.minorticks_off()
+    right.legend()
+    return Chapter(
+        "Hertz: a sphere on an elastic half-space",
+        "E\\* = 344.828 MPa, R = 50 mm, F = 9.19540 N: a contact radius of 1 mm. Free boundary,"
+        f" 256 x 256 cells, {cells[-1]:.0f} over the contact; a paraboloid, as in the theory."
+        " The contact radius is that of the cells in contact, sqrt(area/pi).",
+        [Row("approach", result.history["displacement"][-1] * 1e3, known.approach * 1e3, "mm"),
+         Row("peak pressure", snapshot.pressure.max() / 1e6, known.peak_pressure / 1e6, "MPa"),
+         Row("contact radius", math.sqrt(area / math.pi) * 1e3, known.contact_radius * 1e3, "mm")],
+        finish(figure, "hertz.png"), "Pressure through the middle, and errors against the mesh.")
+
+
+def westergaard() -> Chapter:
+    """Press a wave on an elastic half-space, line contact."""
+    amplitude, wavelength, shear = 1e-6, 1e-3, 0.25e6
+    modulus = 4 * shear
+    full = math.pi * modulus * amplitude / wavelength
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+    loads = [0.05, 0.2, 0.4, 0.6, 0.8, 0.95]
+    areas, rows = [], []
+    for load in loads:
+        result = run(f"""&grid nx = 1024, ny = 1, lx = {wavelength!r} /
+&surface shape = 'sine', amplitude = {amplitude!r}, wavelength = {wavelength!r} /
+&material shear_modulus = {shear!r} /
+&phase pressure = {load * full!r} /
+&solver tolerance = 1e-9 /
+""")
+        known = theory.westergaard(amplitude, wavelength, modulus, load * full)
+        areas.append(result.history["contact_area"][-1])
+        if load in (0.2, 0.6):
+            x = result.grid.x - wavelength / 2
+            colour = BLUE if load == 0.2 else GREEN
+            right.plot(x * 1e3, known.pressure(x), color=colour, label=f"{load} p*")
+            right.plot(x[::16] * 1e3, result.snapshots[-1].pressure[0, ::16], "o", ms=3.5,
+                       color=colour)
+            rows += [Row(f"contact fraction at {load} p*", areas[-1], known.area_fraction),
+                     Row(f"mean gap at {load} p*", result.history["mean_gap"][-1] * 1e9,
+                         known.mean_gap * 1e9, "nm"),
+                     Row(f"peak pressure at {load} p*", result.snapshots[-1].pressure.max(),
+                         float(known.pressure(0.0)), "Pa")]
+    p = np.linspace(0, 1, 400)
+    known = [theory.westergaard(amplitude, wavelength, modulus, q * full) for q in p]
+    left.plot(p, [wave.area_fraction for wave in known], color=BLUE, label="Westergaard")
+    left.plot(loads, areas, "o", color=RED, label="Asperity")
+    left.set(xlabel="p/p*", ylabel="Contact fraction")
+    left.legend()
+    right.set(xlabel="x (mm)", ylabel="Pressure (Pa)")
+    right.legend(title="lines: theory")
+    return Chapter(
+        "Westergaard: a wave on an elastic half-space",
+        "Plane strain, 1024 cells a wave, E\\* = 1 MPa, amplitude 1 µm, wavelength 1 mm;"
+        " p\\* = pi E\\* D/L closes the gap. The contact fraction counts cells: one is 0.001.",
+        rows, finish(figure, "westergaard.png"), "Contact fraction against load; pressure.")
+
+
+def lee_radok() -> Chapter:
+    """Hold a sphere under a step of load on a viscoelastic half-space."""
+    radius, force = 1e-3, 0.02e-3
+    solids = {
+        "one branch": (Prony.from_zener(0.0, [1e6], [1e5], [1e5]),
+                       "zener_g0 = 1e6, zener_g1 = 1e5, zener_eta = 1e5", (0.25, 0.75, 4.0)),
+        "four arms": (Prony(1e5, [4e5, 3e5, 2e5, 1e5], [1e-3, 1e-2, 1e-1, 1.0]),
+                      "shear_modulus = 1e5, prony_g = 4e5, 3e5, 2e5, 1e5, "
+                      "prony_tau = 1e-3, 1e-2, 1e-1, 1", (4e-3, 0.036, 0.36, 3.6)),
+    }
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+    rows = []
+    for name, colour in zip(solids, (BLUE, GREEN), strict=True):
+        solid, material, durations = solids[name]
+        phases = "".join(f"&phase {f'force = {force!r}, ' if k == 0 else ''}duration = {t!r}, "
+                         "steps = 24 /\n" for k, t in enumerate(durations))
+        result = run(f"""&grid nx = 128, ny = 128, lx = 0.1e-3, boundary = 'free' /
+&surface shape = 'paraboloid', radius = {radius!r} /
+&material {material} /
+{phases}&solver tolerance = 1e-8 /
+""")
+        t = result.history["time"]
+        known = theory.lee_radok(radius, force, solid, t)
+        a = np.sqrt(result.history["contact_area"] / math.pi) * 0.1e-3
+        late = np.maximum(t, 1e-4)
+        fine = np.geomspace(1e-4, t[-1], 200)
+        curve = theory.lee_radok(radius, force, solid, fine).contact_radius
+        left.semilogx(fine, curve * 1e6, color=colour, label=f"theory, {name}")
+        left.semilogx(late[::4], a[::4] * 1e6, "o", ms=4, color=colour)
+        approach = result.history["displacement"]
+        right.loglog(late, np.abs(approach / known.approach - 1), color=colour, label=name)
+        for moment in (0.0, 1.0) if name == "one branch" else (0.04, 4.0):
+            k = int(np.argmin(np.abs(t - moment)))
+            rows += [Row(f"contact radius, {name}, t = {t[k]:.3g} s", a[k] * 1e6,
+                         known.contact_radius[k] * 1e6, "µm"),
+                     Row(f"approach, {name}, t = {t[k]:.3g} s", approach[k] * 1e6,
+                         known.approach[k] * 1e6, "µm")]
+    left.set(xlabel="Time (s), 0 drawn at 0.1 ms", ylabel="Contact radius (µm)")
+    left.legend(title="circles: Asperity")
+    right.set(xlabel="Time (s), 0 drawn at 0.1 ms", ylabel="Relative error of the approach")
+    right.legend()
+    return Chapter(
+        "Lee and Radok: creep under a sphere",
+        "Bugnicourt (thesis, INSA Lyon 2017, section 2.2.1): R = 1 mm, F = 0.02 mN, G0 = 1 MPa,"
+        " G1 = 0.1 MPa, creep time 1 s; and a Prony series of four arms from 1 ms to 1 s."
+        " 128 x 128 cells, free boundary, `exponential2`, steps that grow from phase to phase: the"
+        " first ones of a phase are the coarsest beside the relaxation in hand.",
+        rows, finish(figure, "lee_radok.png"), "Contact radius and error of the approach in time.")
+
+
+def lee_radok_order() -> Chapter:
+    """Measure the orders in time, on one mesh."""
+    def approach(scheme: str, steps: int) -> float:
+        result = run(f"""&grid nx = 40, ny = 40, lx = 0.1e-3, boundary = 'free' /
+&surface shape = 'paraboloid', radius = 1e-3 /
+&material zener_g0 = 1e6, zener_g1 = 1e5, zener_eta = 1e5 /
+&phase force = 0.02e-3, duration = 0.4, steps = {steps} /
+&solver tolerance = 1e-9, time_scheme = '{scheme}' /
+""")
+        return float(result.history["displacement"][-1])
+
+    reference = approach("exponential2", 512)
+    counts = np.array([4, 8, 16, 32, 64])
+    tau = 1 / 11
+    figure, axes = plt.subplots(figsize=(5.2, 3.8), layout="constrained")
+    lines = []
+    for scheme, colour in zip(SCHEMES, (RED, GREEN, BLUE), strict=True):
+        errors = np.array([abs(approach(scheme, int(n)) / reference - 1) for n in counts])
+        axes.loglog(0.4 / counts / tau, errors, "o-", color=colour, label=scheme)
+        order = math.log(errors[1] / errors[3]) / math.log(4)
+        lines.append(f"| `{scheme}` | {order:.2f} | {errors[2]:.1e} |")
+    axes.set(xlabel="Time step over relaxation time", ylabel="Relative error of the approach")
+    axes.legend()
+    return Chapter(
+        "Orders in time",
+        "The sphere of Lee and Radok at 0.4 s on one mesh, against 512 steps of `exponential2`, so"
+        " that the error of the mesh cancels.\n\n"
+        "| scheme | order | error at 16 steps |\n| --- | --- | --- |\n" + "\n".join(lines),
+        [], finish(figure, "orders.png"), "Error in time of the three schemes.")
+
+
+def hunter() -> Chapter:
+    """Slide a cylinder."""
+    solid = Prony.from_zener(0.0, [2.75e6], [2.75e6 / 9], [2.75e6 / 9 * 0.01])
+    radius, load = 0.01, 50.0
+    speeds = (0.001, 0.005, 0.02, 0.05, 0.1)
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+    v = np.geomspace(0.5e-3, 2.0, 200)
+    left.semilogx(v * 1e3, [theory.hunter(radius, load, s, solid).friction for s in v], color=BLUE,
+                  label="Hunter")
+    rows = []
+    for speed in speeds:
+        known = theory.hunter(radius, load, speed, solid)
+        dx = known.half_width / 50
+        cells = 4096
+        steps = 150 + round(0.05 * speed / dx)
+        result = run(f"""&grid nx = {cells}, ny = 1, lx = {cells * dx!r} /
+&surface shape = 'paraboloid', radius = {radius!r} /
+&material zener_g0 = 2.75e6, zener_g1 = {2.75e6 / 9!r}, zener_eta = {2.75e4 / 9!r} /
+&phase pressure = {load / (cells * dx)!r}, relaxed = .true., velocity_x = {speed!r},
+   duration = {steps * dx / speed!r}, steps = {steps} /
+&solver tolerance = 1e-9 /
+""")
+        friction = float(result.history["friction"][-1])
+        rows.append(Row(f"friction at {speed * 1e3:g} mm/s", friction, known.friction))
+        left.semilogx(speed * 1e3, friction, "o", color=RED,
+                      label="Asperity" if speed == speeds[0] else None)
+        if speed in (0.005, 0.1):
+            road = float(result.history["road_x"][-1])
+            length = cells * dx
+            x = (result.grid.x - road) % length - length / 2
+            order = np.argsort(x)
+            near = order[np.abs(x[order]) < 1e-3]
+            colour = GREEN if speed == 0.005 else PURPLE
+            right.plot(x[near] * 1e3, known.pressure(x[near]) / 1e3, color=colour,
+                       label=f"{speed * 1e3:g} mm/s")
+            every = near[:: max(1, len(near) // 40)]
+            right.plot(x[every] * 1e3, result.snapshots[-1].pressure[0, every] / 1e3, "o", ms=3.5,
+                       color=colour)
+    left.set(xlabel="Speed (mm/s)", ylabel="Friction coefficient")
+    left.legend()
+    right.set(xlabel="x from the axis (mm), moving to the right", ylabel="Pressure (kPa)")
+    right.set_xticks([-1, -0.5, 0, 0.5, 1])
+    right.legend(title="lines: theory")
+    return Chapter(
+        "Hunter: a cylinder sliding on a viscoelastic half-space",
+        "R = 10 mm, 50 N/m, G0 = 2.75 MPa, G0/G1 = 9, creep time 10 ms. One cell a step, 100 cells"
+        " over the contact, `exponential2`, plane strain in a periodic cell of 41 contact widths:"
+        " its images take part as 1/L^2: that is left at 100 mm/s.",
+        rows, finish(figure, "hunter.png"), "Friction against speed; pressure.")
+
+
+def waves() -> Chapter:
+    """Slide oblique waves in full contact: start-up and steady sliding."""
+    lx, ly = 0.96e-3, 0.6e-3
+    solid = Prony(0.5e6, [1e6, 2e6], [5e-3, 5e-2])
+    velocity = np.array([30e-3, -24e-3])
+    vectors = 2 * math.pi * np.array([[1 / lx, 1 / ly], [2 / lx, -1 / ly], [0.0, 1 / ly]])
+    amplitudes = np.array([0.6e-6, 0.4e-6, 0.5e-6])
+    nx, ny = 128, 100
+    figure, axes = plt.subplots(figsize=(6.4, 3.8), layout="constrained")
+    rows = []
+    x, y = np.arange(nx) * lx / nx, np.arange(ny) * ly / ny
+    height = sum(a * np.cos(q[0] * x + q[1] * y[:, None])
+                 for a, q in zip(amplitudes, vectors, strict=True))
+    path = Path(tempfile.mkdtemp(dir=run.folder)) / "waves.h5"
+    with h5py.File(path, "w") as file:
+        file["surface"] = height
+    for angle, colour in ((0, BLUE), (1, RED)):
+        direction = velocity if angle == 0 else np.array([0.0, 24e-3])
+        result = run(f"""&grid nx = {nx}, ny = {ny}, lx = {lx!r}, ly = {ly!r} /
+&surface shape = 'file', file = '{path}' /
+&material shear_modulus = 0.5e6, prony_g = 1e6, 2e6, prony_tau = 5e-3, 5e-2 /
+&phase pressure = 1e6, relaxed = .true., duration = 0.5, steps = 2000,
+   velocity_x = {float(direction[0])!r}, velocity_y = {float(direction[1])!r} /
+&solver tolerance = 1e-7, interpolation = 'cubic' /
+""")
+        t = result.history["time"]
+        known = theory.full_contact_waves(amplitudes, vectors, direction, solid, times=t)
+        steady = theory.full_contact_waves(amplitudes, vectors, direction, solid)
+        along = direction / np.hypot(*direction)
+        ours = result.history["friction"] * result.history["pressure"]
+        name = "oblique" if angle == 0 else "along y"
+        stress = known.friction_stress @ along
+        axes.plot(t[:800] * 1e3, stress[:800], color=colour, label=f"closed form, {name}")
+        axes.plot(t[:800:8] * 1e3, ours[:800:8], "o", ms=3.5, color=colour)
+        for moment in (0.005, 0.05):
+            k = int(np.argmin(np.abs(t - moment)))
+            rows.append(Row(f"friction stress, {name}, t = {t[k] * 1e3:.3g} ms", ours[k],
+                            float(stress[k]), "Pa"))
+        rows.append(Row(f"friction stress, {name}, steady", ours[-1],
+                        float(steady.friction_stress @ along), "Pa"))
+    axes.set(xlabel="Time (ms)", ylabel="Friction stress (Pa)")
+    axes.legend(title="circles: Asperity")
+    return Chapter(
+        "Waves in full contact: start-up and steady sliding",
+        "Three waves of different directions on a grid of oblong cells, two arms, from rest; the"
+        " road moves obliquely at 30 and -24 mm/s or along y at 24 mm/s, in whole cells a step. In"
+        " steady sliding each wave adds the stress q^2 D^2 E''(q.V)/4 along q.",
+        rows, finish(figure, "waves.png"), "Friction stress after the start.")
+
+
+CHAPTERS: dict[str, Callable[[], Chapter]] = {
+    "hertz": hertz,
+    "westergaard": westergaard,
+    "lee_radok": lee_radok,
+    "lee_radok_order": lee_radok_order,
+    "hunter": hunter,
+    "waves": waves,
+}
+
+HEAD = """# Validation
+
+Runs of the program beside known solutions. `python tools/validation.py` makes this page and its
+figures; the tests hold the same cases, and many more, within stated tolerances. The references are
+those of `asperity.theory`, which cites the papers.
+"""
+
+
+def main() -> None:
+    """Run the chapters; write the page if all were asked for."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
+    parser.add_argument("names", nargs="*", metavar="NAME", choices=[[], *CHAPTERS],
+                        help=f"only these chapters, without the page: {', '.join(CHAPTERS)}")
+    names = parser.parse_args().names
+    chapters = []
+    with tempfile.TemporaryDirectory() as folder:
+        run.folder = folder
+        for name in names or CHAPTERS:
+            chapters.append(CHAPTERS[name]())
+            print(chapters[-1].markdown(), "\n", flush=True)
+    if not names:
+        DOCS.mkdir(exist_ok=True)
+        (DOCS / "validation.md").write_text(
+            "\n".join([HEAD, *(chapter.markdown() + "\n" for chapter in chapters)]))
+
+
+if __name__ == "__main__":
+    main()
