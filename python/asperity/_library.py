@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import os
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -10,10 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from asperity._core import asperity_flat
+# Idle threads sleep: spinning, they slow a run tenfold where others use the machine too. OpenMP reads
+# this when its library is loaded, so it comes first.
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
-from ._check import choice, positive
-from .errors import raise_for_status
+from asperity._core import asperity_flat  # noqa: E402
+
+from ._check import choice, positive  # noqa: E402
+from .errors import raise_for_status  # noqa: E402
 
 __all__ = ["call", "flag_of_boundary", "height_map", "lengths", "set_threads", "version"]
 
