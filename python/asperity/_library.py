@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-# Idle threads sleep: spinning, they slow a run tenfold where others use the machine too. OpenMP reads
+# Idle threads sleep: spinning, they slow a run tenfold where others use the machine. OpenMP reads
 # this when its library is loaded, so it comes first.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
-from asperity._core import asperity_flat  # noqa: E402
+from asperity._core import asperity_flat
 
-from ._check import choice, positive  # noqa: E402
-from .errors import raise_for_status  # noqa: E402
+from ._check import choice, positive
+from .errors import raise_for_status
 
 __all__ = ["call", "flag_of_boundary", "height_map", "lengths", "set_threads", "version"]
 
