@@ -10,7 +10,7 @@ root=$PWD
 cd "$caller"
 
 case ${1:--} in
-  -*) input=$root/examples/rough_contact/input.nml ;;
+  -*) input=$root/examples/speed_jump/input.nml ;;
   *) input=$1; shift ;;
 esac
 program=$root/.venv/python/asperity

@@ -222,17 +222,43 @@ def _load_panel(run: Run, axes: Axes) -> None:
 
 
 def _time_panel(run: Run, axes: Axes) -> None:
-    """Contact area, and friction where the road moves, against time."""
-    plot_history(run, "contact_area", "time", axes)
-    axes.set_title("Contact area")
-    if not np.any(run.history["friction"]):
-        return
-    axes.yaxis.label.set_color(COLOURS[0])
-    other = axes.twinx()
-    plot_history(run, "friction", "time", other, color=COLOURS[1], marker="")
-    other.grid(False)
-    other.yaxis.label.set_color(COLOURS[1])
-    axes.set_title("Contact area and friction")
+    """Contact area, and friction where the road moves, against time or the road's travel."""
+    names = ["contact_area", *(["friction"] if np.any(run.history["friction"]) else [])]
+    travel = _travel(run)
+    for number, (name, panel) in enumerate(zip(names, (axes, None), strict=False)):
+        panel = panel or axes.twinx()
+        if travel is None:
+            plot_history(run, name, "time", panel, color=COLOURS[number], marker="")
+        else:
+            factor, unit = si_scale(travel, "m")
+            panel.plot(travel * factor, run.history[name], color=COLOURS[number])
+            panel.set_xlabel(_axis("Travel of the road", unit))
+            panel.set_ylabel(LABELS[name])
+        if len(names) == 2:
+            panel.yaxis.label.set_color(COLOURS[number])
+        panel.set_ylim(bottom=min(0.0, 1.05 * float(np.nanmin(run.history[name]))))
+    axes.grid(alpha=0.3)
+    axes.set_title("Contact area and friction" if len(names) == 2 else "Contact area")
+
+
+def _travel(run: Run) -> NDArray[np.float64] | None:
+    """Return the way of the road, m, where its speeds differ so much that time hides the fast part.
+
+    A phase that covers a tenth of the way in less than a twentieth of the time would be a vertical
+    line over time.
+    """
+    history = run.history
+    if "road_x" not in history or "road_y" not in history:
+        return None
+    moved = np.hypot(np.diff(history["road_x"]), np.diff(history["road_y"]))
+    passed = np.diff(history["time"])
+    phases = history["phase"][1:]
+    if not np.any(moved):
+        return None
+    hidden = any(moved[phases == phase].sum() > 0.1 * moved.sum()
+                 and passed[phases == phase].sum() < 0.05 * passed.sum()
+                 for phase in np.unique(phases))
+    return np.concatenate([[0.0], np.cumsum(moved)]) if hidden else None
 
 
 def _map(grid: Grid, field: NDArray[Any], name: str, label: str, units: str,

@@ -133,3 +133,19 @@ def test_command_from_the_shell(result, tmp_path):
     assert missing.returncode == 3
     assert "none.h5: no such file" in missing.stderr
     assert "Traceback" not in missing.stderr
+
+
+def test_a_jump_of_speed_is_drawn_over_the_travel(tmp_path):
+    path = write_result(tmp_path / "jump.h5", moving=True)
+    with h5py.File(path, "a") as file:
+        history = file["history"]
+        rows = len(history["time"])
+        del history["phase"], history["time"]
+        for name, values, units in (
+                ("phase", [1, 2, 2, 3, 3, 3], "1"), ("time", [0, 1, 2, 2.01, 2.02, 2.03], "s"),
+                ("road_x", [0, 1e-4, 2e-4, 3e-4, 4e-4, 5e-4], "m"), ("road_y", np.zeros(6), "m")):
+            history[name] = np.asarray(values)[:rows]
+            history[name].attrs.update(units=units, long_name=name)
+    panel = asperity.open(path).overview().axes[2]
+    assert panel.get_xlabel() == "Travel of the road (µm)"
+    assert panel.lines[0].get_xdata()[-1] == pytest.approx(500.0)
