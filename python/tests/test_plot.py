@@ -3,6 +3,7 @@
 import subprocess
 import sys
 
+import h5py
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
