@@ -19,7 +19,7 @@ module interpolation
    use errors, only : error_input, error_type, fail
    use precision, only : dp
    use regular_grid, only : boundary_periodic, grid_type
-   use surface_slopes, only : neighbours
+   use surface_slopes, only : central_slopes, neighbours
    implicit none
    private
 
@@ -130,6 +130,13 @@ contains
 
       call split(self%periodic, self%grid%nx, shift_x/self%grid%dx, whole_x, part_x)
       call split(self%periodic, self%grid%ny, shift_y/self%grid%dy, whole_y, part_y)
+      if (self%periodic .and. .not. self%cubic &
+         .and. .not. (abs(part_x) > 0.0_dp .or. abs(part_y) > 0.0_dp)) then
+         ! Moving by whole cells and taking differences may change places.
+         call shifted_height(self, shift_x, shift_y, height)
+         call central_slopes(self%grid, height, slope_x, slope_y)
+         return
+      end if
       !$omp parallel do default(none) private(i) &
       !$omp shared(self, height, slope_x, slope_y, whole_x, whole_y, part_x, part_y)
       do j = 1, self%grid%ny
