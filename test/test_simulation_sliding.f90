@@ -31,6 +31,7 @@ contains
       call test_threads()
       call test_free_map()
       call test_edge()
+      call test_few_cells()
    end subroutine run_simulation_sliding
 
    !> Friction of Hunter's cylinder, one cell a step, 100 cells over the contact.
@@ -373,6 +374,54 @@ contains
       call check_same_rows(one, two, 0.0_dp, 'one and two threads')
       call check_close(maxval(abs(one%pressure - two%pressure)), 0.0_dp, 0.0_dp, 'pressure of two threads')
    end subroutine test_threads
+
+   !> Contacts of one to three cells, in which a step's first directions are of no use.
+   subroutine test_few_cells()
+      type(record_type) :: record
+
+      call run_case( &
+         '&grid nx = 64, ny = 1, lx = 0.009494, boundary = ''periodic'' /'//nl// &
+         '&surface shape = ''paraboloid'', radius = 0.202563 /'//nl// &
+         '&surface shape = ''self_affine'', hurst = 0.8, wavelength_long = 0.006646, '// &
+         'wavelength_short = 0.001151, rms_slope = 0.054349, seed = 73 /'//nl// &
+         '&material shear_modulus = 1327430.215246, prony_g = 933765.253037, '// &
+         '5499582.087455, prony_tau = 9.472567e-05, 0.003724 /'//nl// &
+         '&phase pressure = 7131.637629, relaxed = F, velocity_x = 0.233306, duration = '// &
+         '0.025434, steps = 20 /'//nl// &
+         '&phase pressure = 1744.824596, duration = 0.003179, steps = 5, velocity_x = '// &
+         '-0.233306 /'//nl// &
+         '&solver threads = 1, tolerance = 0.0001, time_scheme = ''exponential'', '// &
+         'interpolation = ''cubic'' /', &
+         'few cells', record)
+      call check_books(record, 'few cells')
+      call run_case( &
+         '&grid nx = 64, ny = 1, lx = 0.000317, boundary = ''periodic'' /'//nl// &
+         '&surface shape = ''paraboloid'', radius = 0.003607 /'//nl// &
+         '&material shear_modulus = 31947.349923, prony_g = 133334.289205, '// &
+         '17404.709599, prony_tau = 0.032593, 0.003037 /'//nl// &
+         '&phase pressure = 8.018665, relaxed = F, velocity_x = 0.001770, duration = '// &
+         '0.020770, steps = 20 /'//nl// &
+         '&phase pressure = 5.437121, duration = 0.014033, steps = 5, velocity_x = '// &
+         '-0.001770 /'//nl// &
+         '&solver threads = 1, tolerance = 1e-06, time_scheme = ''exponential2'', '// &
+         'interpolation = ''cubic'' /', &
+         'few cells', record)
+      call check_books(record, 'few cells')
+      call run_case( &
+         '&grid nx = 1024, ny = 1, lx = 0.001126, boundary = ''periodic'' /'//nl// &
+         '&surface shape = ''self_affine'', hurst = 0.8, wavelength_long = 0.000788, '// &
+         'wavelength_short = 5.653182e-06, rms_slope = 0.469553, seed = 26 /'//nl// &
+         '&material shear_modulus = 101867.036015, prony_g = 13565.950936, '// &
+         '1798185.566612, 40911.932489, prony_tau = 0.002554, 0.006220, 4.933643e-05 /'//nl// &
+         '&phase pressure = 582.894346, relaxed = T, velocity_x = 0.000174, duration = '// &
+         '0.126304, steps = 20 /'//nl// &
+         '&phase pressure = 453.212203, duration = 0.031576, steps = 5, velocity_x = '// &
+         '-0.000174 /'//nl// &
+         '&solver threads = 1, tolerance = 1e-08, time_scheme = ''exponential'', '// &
+         'interpolation = ''linear'' /', &
+         'few cells', record)
+      call check_books(record, 'few cells')
+   end subroutine test_few_cells
 
    !> A sphere crosses a free map; a periodic cell far larger than the contact sees the same.
    subroutine test_free_map()

@@ -42,6 +42,7 @@ module normal_cg
 
    integer, parameter :: width = 16            !! cells of an active block
    integer, parameter :: longest_age = 40      !! iterations between fresh products A P
+   real(dp), parameter :: often_bent = 1e3_dp  !! kappa after some steps that did not descend
    real(dp), parameter :: useless = 0.1_dp     !! part of a clipped step that is taken, at the most
 
    !> The solver with its operators and work fields, kept from step to step. Not to be copied.
@@ -149,8 +150,8 @@ contains
          if (rd <= 0.0_dp) &
             call new_direction(self, task, .true., 0.0_dp, pressure, offset, rd, squares)
          old = rz
-         if (rd <= 0.0_dp) then
-            ! M r may point uphill once the load is kept; r itself never does.
+         if (rd <= 0.0_dp .or. kappa > often_bent) then
+            ! M r may point uphill once the load is kept, or once clipped; r itself never does.
             call new_direction(self, task, .false., 0.0_dp, pressure, offset, rd, squares)
             old = 0.0_dp
          end if
@@ -165,7 +166,7 @@ contains
             squares)
          if (rd <= 0.0_dp) then
             ! The projection bent the step too far: once more from the steepest descent.
-            if (kappa > 1e6_dp) then
+            if (kappa > 1e9_dp) then
                outcome%reason = 'no step lowers the energy'
                exit
             end if

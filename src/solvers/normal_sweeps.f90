@@ -78,7 +78,7 @@ contains
       do i = 1, n
          z = centre*residual(i) - wx*(residual(i - 1) + residual(i + 1)) &
             - wy*(south(i) + north(i)) + correction(i)
-         inside = positive(min(abs(residual(i)), max(pressure(i), z)))
+         inside = positive(max(pressure(i), min(abs(residual(i)), z)))
          d = inside*(z + beta*(direction(i) &
             - offset*positive(abs(direction(i)))))
          direction(i) = d
