@@ -9,6 +9,7 @@ program main
    use command_line, only : command_type, help_text, read_command_line
    use errors, only : error_input, error_type, fail
    use input_reference, only : reference_markdown
+   use progress, only : progress_type
    use result_summary, only : summarise_result
    use signals, only : catch_signals, checkpoint_asked, forget_checkpoint, signal_interrupt, stop_signal
    use standard_streams, only : say, say_error
@@ -122,13 +123,14 @@ contains
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
       type(run_type) :: run
+      type(progress_type) :: progress
       type(error_type), allocatable :: closing
 
       call run%open(case, command%restart, error)
       if (.not. allocated(error)) then
+         call progress%start(run%rows, max(run%sim%schedule%row + 1, 0), command%quiet)
          do while (.not. run%finished)
-            if (len(run%warnings) > 0) call say_error(run%warnings)
-            run%warnings = ''
+            call tell_warnings(run, progress)
             if (stop_signal() /= 0) then
                call run%interrupt(error)
                if (.not. allocated(error)) call fail(error, 128 + stop_signal(), 'asperity: stopped by '// &
@@ -142,11 +144,25 @@ contains
                if (allocated(error)) exit
             end if
             call run%step(error)
+            if (run%sim%schedule%row >= 0) call progress%update(run%sim%row)
             if (allocated(error)) exit
          end do
+         call tell_warnings(run, progress)
+         call progress%finish()
       end if
       call run%close(closing)
       if (.not. allocated(error) .and. allocated(closing)) call move_alloc(closing, error)
    end subroutine run_steps
+
+   !> New warnings of a run, on lines of their own.
+   subroutine tell_warnings(run, progress)
+      type(run_type), intent(inout) :: run
+      type(progress_type), intent(inout) :: progress
+
+      if (len(run%warnings) == 0) return
+      call progress%finish()
+      call say_error(run%warnings)
+      run%warnings = ''
+   end subroutine tell_warnings
 
 end program main

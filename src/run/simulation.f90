@@ -452,8 +452,8 @@ contains
       row%road_y = plan%road_y
       row%friction_viscous = 0.0_dp
       if (abs(sums(1)) > 0.0_dp) &
-         row%friction_viscous = -dot_product(sums(4:5), self%direction)/sums(1)
-      force = -sums(4:5)*self%grid%dx*self%grid%dy
+         row%friction_viscous = (0.0_dp - dot_product(sums(4:5), self%direction))/sums(1)
+      force = 0.0_dp - sums(4:5)*self%grid%dx*self%grid%dy
       row%energy_adhesive = self%side%energy(self%gap)
       row%work_normal = self%books%work + row%energy_adhesive
       row%energy_elastic = self%books%stored
