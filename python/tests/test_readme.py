@@ -1,0 +1,151 @@
+"""The texts hold: snippets run, tables agree with what the program and the validation give."""
+
+import re
+import shutil
+import subprocess
+
+import h5py
+import pytest
+from conftest import ROOT
+
+README = (ROOT / "README.md").read_text()
+FIRST_RUN = (ROOT / "docs" / "first_run.md").read_text()
+PAGE = (ROOT / "docs" / "result_file.md").read_text()
+
+
+def blocks(text, language):
+    """Return the fenced blocks of a language."""
+    return re.findall(rf"```{language}\n(.*?)```", text, flags=re.DOTALL)
+
+
+def rows(text):
+    """Return the cells of all table rows."""
+    return [[cell.strip() for cell in line.strip("|").split("|")]
+            for line in text.splitlines() if line.startswith("|") and "---" not in line]
+
+
+@pytest.fixture(scope="module")
+def folder(program, tmp_path_factory):
+    """Return a folder with the README's input and its result."""
+    folder = tmp_path_factory.mktemp("readme")
+    (case,) = blocks(README, "fortran")
+    (folder / "road.nml").write_text(case)
+    checked = subprocess.run([program, "check", "road.nml"], cwd=folder, check=True,
+                             capture_output=True, text=True)
+    assert checked.stderr == ""
+    subprocess.run([program, "run", "road.nml", "--quiet"], cwd=folder, check=True)
+    return folder
+
+
+def test_namelist_of_the_readme_is_ten_lines(folder):
+    (case,) = blocks(README, "fortran")
+    assert case.count("\n") <= 10
+    with h5py.File(folder / "road.h5") as file:
+        assert file.attrs["finished"] == 1
+        assert file["history/friction"][-1] > 0.5  # friction and the loss in the rubber
+
+
+def test_python_of_the_readme_runs(folder, monkeypatch, capsys):
+    (snippet,) = blocks(README, "python")
+    assert snippet.count("\n") <= 11
+    monkeypatch.chdir(folder)
+    exec(compile(snippet, "README.md", "exec"), {})
+    numbers = [float(word) for word in capsys.readouterr().out.split()]
+    friction, area, computed, theory = numbers
+    assert friction > 0.5 and 0.0 < area < 1.0
+    assert 0.8 * theory < computed < 2.0 * theory
+    for picture in ("friction.png", "pressure.png"):
+        assert (folder / picture).stat().st_size > 10000
+
+
+def test_the_first_run_runs(program, tmp_path, monkeypatch, capsys):
+    template = subprocess.run([program, "template", "hertz"], check=True, capture_output=True)
+    (tmp_path / "hertz.nml").write_bytes(template.stdout)
+    subprocess.run([program, "run", "hertz.nml", "--quiet"], cwd=tmp_path, check=True)
+    (snippet,) = blocks(FIRST_RUN, "python")
+    monkeypatch.chdir(tmp_path)
+    exec(compile(snippet, "first_run.md", "exec"), {})
+    (approach, exact), (peak, exact_peak) = (
+        map(float, line.split()) for line in capsys.readouterr().out.splitlines()[-2:])
+    assert approach == pytest.approx(exact, rel=1e-3)
+    assert exact == pytest.approx(1e-4, rel=1e-3)
+    assert peak == pytest.approx(exact_peak, rel=5e-3)
+
+
+def test_values_of_the_readme_are_those_of_the_validation():
+    def number(cell):
+        return float(cell.split()[0])
+
+    chapters = {}
+    for chapter in (ROOT / "docs" / "validation.md").read_text().split("\n## ")[1:]:
+        title = re.split(r"\W", chapter)[0].lower()
+        chapters[title] = {row[0]: row for row in rows(chapter)}
+    table = README.split("## Is it right?")[1].split("\n## ")[0]
+    names = {"hertz": "hertz", "westergaard": "westergaard", "lee": "lee", "hunter": "hunter",
+             "three": "waves"}
+    checked = 0
+    for head, ours, reference in rows(table)[1:]:
+        case, name = head.split(": ")
+        row = chapters[names[re.split(r"\W", case)[0].lower()]][name]
+        for shown, kept in ((ours, row[1]), (reference, row[2])):
+            assert number(shown) == pytest.approx(number(kept), rel=4e-4)
+            assert shown.split()[1:] == kept.split()[1:]
+        checked += 1
+    assert checked == 5
+
+
+def test_links_lead_somewhere():
+    pages = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")]
+    pages += [*(ROOT / "docs").glob("*.md"), *(ROOT / "examples").glob("*/README.md")]
+    for page in pages:
+        for target in re.findall(r"\]\(([^)#]+?)\)", page.read_text()):
+            if not target.startswith("http"):
+                assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+def test_result_page_names_every_dataset(program, tmp_path):
+    text = subprocess.run([program, "template", "friction"], check=True, capture_output=True,
+                          text=True).stdout
+    text = text.replace("nx = 128", "nx = 32").replace("ny = 74", "ny = 18")
+    (tmp_path / "case.nml").write_text(text)
+    subprocess.run([program, "run", "case.nml", "--quiet"], cwd=tmp_path, check=True)
+    with h5py.File(tmp_path / "case.h5") as file:
+        assert {row[0].strip("`") for row in rows(PAGE.split("## `/grid`")[0])[1:]
+                for row in [row] if row[0] != "attribute"} >= {"title", "input"}
+        for name in file.attrs:
+            assert f"`{name}`" in PAGE.split("## `/grid`")[0], name
+        last = "snapshots/" + sorted(file["snapshots"])[-1]
+        for title, group in (("/grid", "grid"), ("/surface", "surface"), ("/material", "material"),
+                             ("/history", "history"), ("/snapshots/NNNNNN", last)):
+            chapter = PAGE.split(f"## `{title}`")[1].split("\n## ")[0]
+            documented = {row[0].strip("`"): row[1:] for row in rows(chapter)[1:]}
+            found = {name: [data.attrs["units"].replace("1", "-"), data.attrs["long_name"]]
+                     for name, data in file[group].items()}
+            assert documented == found, title
+
+
+def test_input_page_is_the_program_s(program):
+    page = subprocess.run([program, "template", "--reference"], check=True, capture_output=True,
+                          text=True).stdout
+    assert (ROOT / "docs" / "input_reference.md").read_text() == page
+
+
+def test_citation_has_the_version():
+    version = (ROOT / "VERSION").read_text().strip()
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
+
+
+def test_help_of_every_verb(program):
+    for verb in ("run", "check", "template", "info"):
+        text = subprocess.run([program, verb, "--help"], check=True, capture_output=True,
+                              text=True).stdout
+        assert text.startswith(f"asperity {verb}")
+        assert max(map(len, text.splitlines())) <= 100
+
+
+@pytest.mark.skipif(shutil.which("sh") is None, reason="needs a shell")
+def test_run_sh_runs_the_main_example():
+    text = (ROOT / "run.sh").read_text()
+    (main,) = re.findall(r"input=\$root/(\S+)", text)
+    assert (ROOT / main).is_file()
+    assert f"]({main.replace('input.nml', 'picture.png')})" in README
