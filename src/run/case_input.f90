@@ -1,5 +1,6 @@
 !> Reads a case: a file of namelists becomes checked settings, or one error with all its faults.
 module case_input
+   use adhesion_advice, only : adhesion_warning
    use case_features, only : check_features
    use case_material, only : resolve_material
    use case_phases, only : resolve_phases
@@ -127,24 +128,36 @@ contains
       call resolve_output(group, case, faults)
 
       if (.not. allocated(faults%error)) then
-         call add_surface_warnings(case)
+         call add_warnings(case)
          call check_features(case, faults)
       end if
       if (allocated(faults%error)) call move_alloc(faults%error, error)
    end subroutine parse_case
 
-   !> Doubts about the surfaces, with numbers.
-   subroutine add_surface_warnings(case)
+   !> Doubts about the surfaces and the adhesion, with numbers.
+   subroutine add_warnings(case)
       type(case_type), intent(inout) :: case
       character(warning_length), allocatable :: found(:)
       integer :: i
 
       call find_warnings(case%grid, case%surfaces, found)
       do i = 1, size(found)
-         if (case%warnings /= '') case%warnings = case%warnings//new_line('a')
-         case%warnings = case%warnings//trim(found(i))
+         call add(trim(found(i)))
       end do
-   end subroutine add_surface_warnings
+      call add(adhesion_warning(case))
+
+   contains
+
+      !> One more line, if there is one.
+      subroutine add(line)
+         character(*), intent(in) :: line
+
+         if (line == '') return
+         if (case%warnings /= '') case%warnings = case%warnings//new_line('a')
+         case%warnings = case%warnings//line
+      end subroutine add
+
+   end subroutine add_warnings
 
    !> Report groups that are missing.
    subroutine check_presence(groups, faults)

@@ -1,5 +1,6 @@
 !> A case in words: every resolved setting as an input of its own, time steps and memory.
 module case_report
+   use adhesion_advice, only : adhesion_notes
    use case_settings, only : case_type, phase_settings_type
    use precision, only : dp
    use regular_grid, only : boundary_free
@@ -43,13 +44,12 @@ contains
       text = text//solver_text(case)
    end function resolved_input
 
-   !> Steps, memory and warnings, as comment lines.
+   !> Steps, memory, what adhesion will do, and warnings, as comment lines.
    function case_summary(case) result(text)
       type(case_type), intent(in) :: case
       character(:), allocatable :: text
       character(:), allocatable :: unit
       real(dp) :: memory
-      integer :: at, next
 
       memory = memory_needed(case)/1.0e6_dp
       unit = ' MB'
@@ -63,13 +63,23 @@ contains
          counted(sum(case%phases%steps, mask=.not. case%phases%static), 'time step')//' in '// &
          to_text(sum(case%phases%duration))//' s'//nl
       text = text//'! memory: about '//to_text(real(nint(memory*10.0_dp), dp)/10.0_dp)//unit//nl
+      text = text//marked('! ', adhesion_notes(case))//marked('! warning: ', case%warnings)
+   end function case_summary
+
+   !> Lines with a mark before each.
+   pure function marked(mark, lines) result(text)
+      character(*), intent(in) :: mark, lines
+      character(:), allocatable :: text
+      integer :: at, next
+
+      text = ''
       at = 1
-      do while (at <= len(case%warnings))
-         next = index(case%warnings(at:)//nl, nl)
-         text = text//'! warning: '//case%warnings(at:at + next - 2)//nl
+      do while (at <= len(lines))
+         next = index(lines(at:)//nl, nl)
+         text = text//mark//lines(at:at + next - 2)//nl
          at = at + next
       end do
-   end function case_summary
+   end function marked
 
    !> Memory of a run, bytes: fields of doubles, transform buffers, and what the program itself takes.
    !>

@@ -171,7 +171,8 @@ contains
          row('adhesion', 'potential', kind_word, '''none''', '', &
             '''none'' | ''exponential'' | ''gauss'' | ''maugis_dugdale''', &
             'Energy against gap: -w exp(-g/r), -w exp(-g^2/r^2), or -w (1 - g/r) up to g = r.'), &
-         row('adhesion', 'energy', kind_real, '(required)', 'J/m2', 'positive', 'Work of adhesion w.'), &
+         row('adhesion', 'energy', kind_real, '(required)', 'J/m2', 'not negative', &
+         'Work of adhesion w.'), &
          row('adhesion', 'range', kind_real, '(required)', 'm', 'positive', 'Range r.'), &
          row('adhesion', 'start', kind_word, '''non_adhesive''', '', '''non_adhesive'' | ''full_contact''', &
             'State from which the first one is sought; hysteresis is real.'), &

@@ -86,12 +86,20 @@ contains
       real(dp), intent(in), optional :: past(:, :)     !! traction of the history, Pa
       type(adhesion_problem_type) :: problem
       type(solver_result_type) :: before
+      integer :: j
 
       if (.not. self%adhesive) then
          call solve_bare(self, plan, modulus, .not. first, height, pressure, gap, level, outcome, past)
          return
       end if
-      if (first) call start(self, plan, modulus, height, pressure, gap, level, before, past)
+      if (first .and. self%full_contact) then
+         !$omp parallel do default(none) shared(self, gap) private(j)
+         do j = 1, self%grid%ny
+            gap(:, j) = 0.0_dp
+         end do
+      else if (first) then
+         call start(self, plan, modulus, height, pressure, gap, level, before, past)
+      end if
       problem%potential = self%potential
       problem%modulus = modulus
       problem%tolerance = self%tolerance

@@ -155,7 +155,9 @@ contains
          self%scaling = 0.02_dp*problem%modulus*self%nyquist
       self%direction = 0.0_dp
       self%residual = 0.0_dp
-      call start_state(self, problem, height, gap, pressure, level, history)
+      length = problem%potential%range
+      if (length <= 0.0_dp) length = max(maxval(height) - minval(height), tiny(1.0_dp))
+      call start_state(self, problem, height, gap, pressure, level, problem%tolerance*length, history)
       call evaluate_traction(self, problem, height, level, history)
       fresh = .true.
       age = 0
@@ -164,8 +166,6 @@ contains
       old_rz = 0.0_dp
       dd = 0.0_dp
       missing = 0.0_dp
-      length = problem%potential%range
-      if (length <= 0.0_dp) length = max(maxval(height) - minval(height), tiny(1.0_dp))
       scale = traction_scale(problem%potential, max(maxval(abs(self%traction)), &
          problem%modulus*self%longest*(maxval(height) - minval(height)), tiny(1.0_dp)))
       limit = problem%tolerance
@@ -270,12 +270,14 @@ contains
       outcome%seconds = omp_get_wtime() - outcome%seconds
    end subroutine solve
 
-   !> The start: from the pressure and the level handed in, or from full contact.
-   subroutine start_state(self, problem, height, gap, pressure, level, history)
+   !> The start: from the pressure and the level handed in, or from full contact. The gap of a pressure
+   !> is not sharp: a contact that is handed in stays one.
+   subroutine start_state(self, problem, height, gap, pressure, level, closed, history)
       type(adhesion_free_type), intent(inout) :: self
       type(adhesion_problem_type), intent(in) :: problem
       real(dp), intent(in) :: height(:, :), gap(:, :), pressure(:, :)
       real(dp), intent(inout) :: level
+      real(dp), intent(in) :: closed                   !! gaps up to this count as none, m
       real(dp), intent(in), optional :: history(:, :)
       integer :: i, j
 
@@ -300,7 +302,8 @@ contains
          self%state(:, j) = self%state(:, j)/problem%modulus
          if (j > self%ny) cycle
          do i = 1, self%nx
-            self%state(i, j) = max(self%state(i, j) - height(i, j) - level, 0.0_dp)
+            self%state(i, j) = self%state(i, j) - height(i, j) - level
+            if (self%state(i, j) <= closed) self%state(i, j) = 0.0_dp
          end do
       end do
    end subroutine start_state

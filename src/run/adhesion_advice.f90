@@ -1,0 +1,234 @@
+!> What is worth knowing about the adhesion of a case before it runs: is the grid fine enough, and does
+!> adhesion matter.
+!>
+!> * Resolution. The zone where surfaces part is about E* z_0^2/gamma_0 wide. On cells of more than 0.7
+!>   of it the contact edge sticks to the grid, and different ways lead to different states.
+!> * Tabor's parameter of a sphere, (R gamma_0^2/(E*^2 z_0^3))^(1/3) (thesis, eq. 1.2).
+!> * The criteria of (thesis, eq. 4.7-4.9) for each wave or random term; where one of them is small
+!>   compared with 1, adhesion may be neglected:
+!>       C1 = 3 pi gamma_0 R_c N/p     adhesive over applied force of N summits an area, of radius R_c
+!>       C2 = gamma_0/W                adhesive over elastic energy an area, in full contact
+!>   Hexagonal wave: R_c = wavelength^2/(3 sqrt(3) pi^2 amplitude) (the thesis has 6 in place of
+!>   3 sqrt(3), which makes C1 smaller by 13 %), N = 2 sqrt(3)/wavelength^2,
+!>   W = 3 pi E* amplitude^2/(32 wavelength). Sine: W = pi E* amplitude^2/(4 wavelength); it has no
+!>   summits. Self-affine: W = E*/4 <q h^2> and, with the moments m2, m4 of a profile, R_c =
+!>   3 sqrt(pi/m4)/8, N = m4/(6 sqrt(3) pi m2) (P. R. Nayak, J. Lubr. Technol. 93 (1971) 398; J. A.
+!>   Greenwood, Proc. R. Soc. A 393 (1984) 133), from the continuous spectrum.
+!>
+!> Modulus of a viscoelastic material: that to which it relaxes in the time of the run (at once: static
+!> solves only), long-term with a relaxed phase. That is the softest state, with the narrowest zone.
+module adhesion_advice
+   use case_settings, only : case_type, surface_settings_type
+   use precision, only : dp, pi
+   use prony, only : instantaneous_modulus, relaxation_modulus
+   use text_tools, only : to_text
+   implicit none
+   private
+
+   public :: adhesion_criteria, adhesion_notes, adhesion_warning, largest_cell, softest_modulus
+
+   character(*), parameter :: nl = new_line('a')
+   real(dp), parameter :: cells_a_zone = 0.7_dp
+
+contains
+
+   !> A warning where the grid is too coarse for the adhesion; empty if it is fine enough.
+   function adhesion_warning(case) result(text)
+      type(case_type), intent(in) :: case
+      character(:), allocatable :: text
+      real(dp) :: cell, limit
+
+      text = ''
+      if (.not. sticks(case)) return
+      cell = case%grid%dx
+      if (case%grid%ny > 1) cell = max(cell, case%grid%dy)
+      limit = largest_cell(case, softest_modulus(case))
+      if (cell <= limit) return
+      text = '&adhesion: cells of '//to_text(cell)//' m are larger than 0.7 E* range^2/energy = '// &
+         to_text(limit)//' m'//with_modulus(case)//': the edge of the contact sticks to the grid'
+   end function adhesion_warning
+
+   !> Numbers that tell what adhesion will do, a line each without its end mark; empty without adhesion.
+   function adhesion_notes(case) result(text)
+      type(case_type), intent(in) :: case
+      character(:), allocatable :: text
+      real(dp) :: modulus, c1, c2, pressure
+      integer :: i
+
+      text = ''
+      if (.not. sticks(case)) return
+      modulus = softest_modulus(case)
+      pressure = largest_pressure(case)
+      text = 'adhesion: 0.7 E* range^2/energy = '//to_text(largest_cell(case, modulus))// &
+         ' m, cells should not be larger'//with_modulus(case)
+      do i = 1, size(case%surfaces)
+         associate (term => case%surfaces(i), adhesion => case%adhesion)
+            select case (term%shape)
+            case ('sphere', 'paraboloid')
+               text = text//nl//'adhesion: '//trim(term%shape)//': Tabor parameter '// &
+                  to_text(rounded((term%radius*(adhesion%energy/contact_modulus(case, modulus))**2) &
+                  **(1.0_dp/3.0_dp)/adhesion%range))
+            case ('sine', 'hexagonal_wave', 'self_affine')
+               call adhesion_criteria(term, adhesion%energy, contact_modulus(case, modulus), pressure, &
+                  c1, c2)
+               text = text//nl//'adhesion: '//trim(term%shape)//':'
+               if (c1 > 0.0_dp) text = text//' C1 = '//to_text(rounded(c1))//' at '// &
+                  to_text(pressure)//' Pa,'
+               if (c2 > 0.0_dp) text = text//' C2 = '//to_text(rounded(c2))// &
+                  ': may be neglected if one is much less than 1'
+            case default
+               continue                        ! nothing to say of a plane, a ridge or a file
+            end select
+         end associate
+      end do
+   end function adhesion_notes
+
+   !> The criteria C1 and C2 of one term; 0 for what cannot be said.
+   pure subroutine adhesion_criteria(term, energy, modulus, pressure, c1, c2)
+      type(surface_settings_type), intent(in) :: term
+      real(dp), intent(in) :: energy               !! gamma_0, J/m2
+      real(dp), intent(in) :: modulus              !! E*, Pa
+      real(dp), intent(in) :: pressure             !! mean, Pa; C1 needs it above 0
+      real(dp), intent(out) :: c1, c2
+      real(dp) :: summits, stored, m2, m4, scale
+
+      summits = 0.0_dp                             ! R_c N, 1/m
+      stored = 0.0_dp                              ! W, J/m2
+      select case (term%shape)
+      case ('sine')
+         stored = pi*modulus*term%amplitude**2/(4.0_dp*term%wavelength)
+      case ('hexagonal_wave')
+         stored = 3.0_dp*pi*modulus*term%amplitude**2/(32.0_dp*term%wavelength)
+         if (abs(term%amplitude) > 0.0_dp) summits = 2.0_dp/(3.0_dp*pi**2*abs(term%amplitude))
+      case ('self_affine')
+         if (term%rms_slope > 0.0_dp) then
+            scale = term%rms_slope**2/moment(term, 2)
+         else
+            scale = term%rms_height**2/moment(term, 0)
+         end if
+         stored = 0.25_dp*modulus*scale*moment(term, 1)
+         m2 = 0.5_dp*scale*moment(term, 2)
+         m4 = 0.375_dp*scale*moment(term, 4)
+         summits = sqrt(m4/(3.0_dp*pi))/(16.0_dp*m2)
+      case default
+         continue
+      end select
+      c1 = 0.0_dp
+      if (pressure > 0.0_dp) c1 = 3.0_dp*pi*energy*summits/pressure
+      c2 = 0.0_dp
+      if (stored > 0.0_dp) c2 = energy/stored
+   end subroutine adhesion_criteria
+
+   !> <q^n h^2> of a self-affine spectrum, up to a factor that is the same for all n.
+   pure function moment(term, n) result(total)
+      type(surface_settings_type), intent(in) :: term
+      integer, intent(in) :: n
+      real(dp) :: total
+      real(dp) :: low, bend, high
+
+      low = term%wavelength_short/term%wavelength_long       ! wave numbers over the highest
+      bend = term%wavelength_short/term%wavelength_rolloff
+      high = 1.0_dp
+      total = power_integral(low, bend, n + 1.0_dp) + bend**(2.0_dp + 2.0_dp*term%hurst) &
+         *power_integral(bend, high, n - 1.0_dp - 2.0_dp*term%hurst)
+      total = total*(2.0_dp*pi/term%wavelength_short)**n
+   end function moment
+
+   !> Integral of q^e from a to b.
+   pure function power_integral(a, b, e) result(integral)
+      real(dp), intent(in) :: a, b, e
+      real(dp) :: integral
+
+      if (abs(e + 1.0_dp) < 1.0e-6_dp) then
+         integral = log(b/a)
+      else
+         integral = (b**(e + 1.0_dp) - a**(e + 1.0_dp))/(e + 1.0_dp)
+      end if
+   end function power_integral
+
+   !> The largest cell that resolves the adhesion, 0.7 E* z_0^2/gamma_0, m.
+   pure function largest_cell(case, modulus) result(cell)
+      type(case_type), intent(in) :: case
+      real(dp), intent(in) :: modulus              !! shear modulus, Pa
+      real(dp) :: cell
+
+      cell = cells_a_zone*contact_modulus(case, modulus)*case%adhesion%range**2/case%adhesion%energy
+   end function largest_cell
+
+   !> The lowest shear modulus with which the material responds in a case, Pa.
+   pure function softest_modulus(case) result(modulus)
+      type(case_type), intent(in) :: case
+      real(dp) :: modulus
+
+      modulus = case%material%shear_modulus
+      if (any(case%phases%relaxed)) return
+      modulus = relaxation_modulus(modulus, case%material%prony_g, case%material%prony_tau, &
+         sum(case%phases%duration))
+   end function softest_modulus
+
+   !> E* = 2 G/(1 - nu), Pa.
+   pure function contact_modulus(case, modulus)
+      type(case_type), intent(in) :: case
+      real(dp), intent(in) :: modulus              !! shear modulus, Pa
+      real(dp) :: contact_modulus
+
+      contact_modulus = 2.0_dp*modulus/(1.0_dp - case%material%poisson)
+   end function contact_modulus
+
+   !> The largest mean pressure that the phases prescribe, Pa; 0 if none does.
+   pure function largest_pressure(case) result(pressure)
+      type(case_type), intent(in) :: case
+      real(dp) :: pressure
+      integer :: i
+
+      pressure = 0.0_dp
+      do i = 1, size(case%phases)
+         if (case%phases(i)%control == 'pressure') pressure = max(pressure, case%phases(i)%target)
+         if (case%phases(i)%control == 'force') pressure = max(pressure, &
+            case%phases(i)%target/(case%grid%lx*case%grid%ly))
+      end do
+   end function largest_pressure
+
+   !> Is there adhesion with an energy?
+   pure function sticks(case)
+      type(case_type), intent(in) :: case
+      logical :: sticks
+
+      sticks = case%adhesion%potential /= 'none' .and. case%adhesion%energy > 0.0_dp
+   end function sticks
+
+   !> Which modulus a number belongs to, in words; nothing for an elastic material.
+   function with_modulus(case) result(text)
+      type(case_type), intent(in) :: case
+      character(:), allocatable :: text
+      real(dp) :: soft, hard
+
+      text = ''
+      if (size(case%material%prony_g) == 0) return
+      soft = softest_modulus(case)
+      hard = instantaneous_modulus(case%material%shear_modulus, case%material%prony_g)
+      if (any(case%phases%relaxed)) then
+         text = ' (long-term E* = '
+      else if (sum(case%phases%duration) > 0.0_dp) then
+         text = ' (E* relaxed over the run = '
+      else
+         text = ' (instantaneous E* = '
+      end if
+      text = text//to_text(contact_modulus(case, soft))//' Pa'
+      if (hard > soft) text = text//', instantaneous '//to_text(contact_modulus(case, hard))//' Pa'
+      text = text//')'
+   end function with_modulus
+
+   !> To three digits, for shows.
+   pure function rounded(value)
+      real(dp), intent(in) :: value
+      real(dp) :: rounded
+      real(dp) :: unit
+
+      rounded = value
+      if (.not. (value > 0.0_dp .and. value < huge(value))) return
+      unit = 10.0_dp**(floor(log10(value)) - 2)
+      rounded = anint(value/unit)*unit
+   end function rounded
+
+end module adhesion_advice
