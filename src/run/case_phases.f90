@@ -17,6 +17,7 @@ module case_phases
    public :: resolve_phases
 
    real(dp), parameter :: most_steps = 1.0e9_dp
+   character(*), parameter :: one_cell = 'for one cell a step'   !! where a step comes from
    character(*), parameter :: loads(3) = [character(12) :: 'pressure', 'force', 'displacement']
 
 contains
@@ -157,7 +158,7 @@ contains
       type(grid_type), intent(in) :: grid
       type(material_settings_type), intent(in) :: material
       type(faults_type), intent(inout) :: faults
-      real(dp) :: dt
+      real(dp) :: dt, cells
       real(dp), parameter :: same = 1.0e-6_dp       !! relative difference of times that are one
 
       phase%steps = 1
@@ -194,8 +195,9 @@ contains
       if (.not. group%given('steps')) phase%steps = max(1, nint(phase%duration/dt))
       phase%dt = phase%duration/phase%steps
       if (grid%nx == 0) return
-      if (cells_a_step(phase, grid) > 0.0_dp) phase%dt_reason = trim(phase%dt_reason)//', '// &
-         to_text(cells_a_step(phase, grid))//' cells a step'
+      cells = cells_a_step(phase, grid)
+      if (phase%dt_reason == one_cell .and. abs(cells - 1.0_dp) < 1.0e-3_dp) return
+      if (cells > 0.0_dp) phase%dt_reason = trim(phase%dt_reason)//', '//to_text(cells)//' cells a step'
    end subroutine resolve_steps
 
    !> How far a step moves the road, in cells.
@@ -223,7 +225,7 @@ contains
          if (grid%ny > 1) rate = max(rate, abs(phase%velocity_y)/grid%dy)
          if (rate > 0.0_dp) then
             dt = 1.0_dp/rate
-            phase%dt_reason = 'for one cell a step'
+            phase%dt_reason = one_cell
             return
          end if
       end if
