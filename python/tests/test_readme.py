@@ -1,6 +1,7 @@
 """The texts hold: snippets run, tables agree with what the program and the validation give."""
 
 import re
+import runpy
 import shutil
 import subprocess
 
@@ -149,3 +150,13 @@ def test_run_sh_runs_the_main_example():
     (main,) = re.findall(r"input=\$root/(\S+)", text)
     assert (ROOT / main).is_file()
     assert f"]({main.replace('input.nml', 'picture.png')})" in README
+
+
+def test_the_advice_on_the_mesh_is_measured(capsys):
+    runpy.run_path(str(ROOT / "tools" / "choosing.py"))["mesh"]()
+    measured = rows(capsys.readouterr().out)[1:]
+    told = rows((ROOT / "docs" / "choosing.md").read_text())[1:len(measured) + 1]
+    assert len(measured) == 5
+    for row, text in zip(measured, told, strict=True):
+        assert [float(cell) for cell in text] == pytest.approx([float(cell) for cell in row],
+                                                              abs=2e-4)
