@@ -207,7 +207,8 @@ contains
       select case (verb)
       case ('run')
          text = 'asperity run CASE.nml [--output FILE.h5] [--threads N] [--restart] [--quiet]'//nl//nl// &
-            'Run a case. The result is an HDF5 file, beside the input by default.'//nl//nl// &
+            'Run a case. The result is an HDF5 file, beside the input by default. To draw it:'//nl// &
+            'python -m asperity plot RESULT.h5'//nl//nl// &
             '  --output FILE.h5  write the result there'//nl// &
             '  --threads N       use N threads; all processors by default'//nl// &
             '  --restart         go on from the last checkpoint in the result'//nl// &
@@ -230,7 +231,8 @@ contains
             'asperity check CASE.nml      validate only: settings, time steps, memory'//nl// &
             'asperity template [NAME]     print an input to start from; without a name, list them'//nl// &
             'asperity info RESULT.h5      what a result holds'//nl// &
-            'asperity --version | --help  each command also has --help'//nl//nl//statuses()
+            'asperity --version | --help  each command also has --help'//nl//nl// &
+            'To begin: asperity template hertz > hertz.nml; asperity run hertz.nml'//nl//nl//statuses()
       end select
    end function help_text
 
