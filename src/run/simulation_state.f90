@@ -3,7 +3,7 @@ module simulation_state
    use checkpoint, only : checkpoint_reader_type, checkpoint_writer_type
    use errors, only : error_type
    use history_row, only : column_count, row_from_values, row_values
-   use precision, only : dp
+   use precision, only : dp, int8
    use simulation, only : simulation_type
    use viscoelastic_energy, only : books_from_values, books_values
    use zener, only : is_elastic
@@ -128,9 +128,13 @@ contains
 
       associate (t => sim%tangential)
          call writer%put('tangential', [merge(1.0_dp, 0.0_dp, t%moved), t%speed, t%rate, t%work_mass, &
-            t%lost_mass, t%lost_friction], '1', error)
+            t%lost_mass, t%lost_friction, t%pace], '1', error)
          if (allocated(error)) return
          call writer%put('traction', t%traction, 'Pa', error)
+         if (allocated(error)) return
+         call writer%put('contact', real(t%contact, dp), '1', error)
+         if (allocated(error)) return
+         call writer%put('traction_before', t%before, 'Pa', error)
          if (allocated(error)) return
          call writer%put('displacement', t%displacement, 'm', error)
          if (allocated(error)) return
@@ -149,8 +153,8 @@ contains
       type(simulation_type), intent(inout) :: sim
       type(checkpoint_reader_type), intent(inout) :: reader
       type(error_type), allocatable, intent(out) :: error
-      real(dp) :: numbers(8)
-      real(dp), allocatable :: books(:)
+      real(dp) :: numbers(9)
+      real(dp), allocatable :: books(:), states(:, :)
 
       associate (t => sim%tangential)
          call reader%get('tangential', numbers, error)
@@ -161,7 +165,14 @@ contains
          t%work_mass = numbers(6)
          t%lost_mass = numbers(7)
          t%lost_friction = numbers(8)
+         t%pace = numbers(9)
          call reader%get('traction', t%traction, error)
+         if (allocated(error)) return
+         states = real(t%contact, dp)
+         call reader%get('contact', states, error)
+         if (allocated(error)) return
+         t%contact = nint(states, int8)
+         call reader%get('traction_before', t%before, error)
          if (allocated(error)) return
          call reader%get('displacement', t%displacement, error)
          if (allocated(error)) return

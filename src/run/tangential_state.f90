@@ -10,7 +10,7 @@
 !> with v the speed of the interface over the road, dU_top = -(D' - D) the motion of the block's top
 !> against it. What of the mean traction moves the mass does not strain the rubber.
 !>
-!> Fields of doubles, two components each: T, U, the trial U', slip, DX', T_h; those of the solver; the
+!> Fields of doubles, two components each: T, that of the step before, U, the trial U', slip, DX', T_h; those of the solver; the
 !> history (S, S - S_old, one field an arm).
 module tangential_state
    use case_settings, only : case_type
@@ -39,6 +39,8 @@ module tangential_state
       real(dp) :: thickness = 0.0_dp                  !! h, m
       real(dp) :: mass = 0.0_dp                       !! m, kg/m2
       real(dp), allocatable :: traction(:, :, :)      !! T, Pa [nx, ny, 2]
+      real(dp), allocatable :: before(:, :, :)        !! T of the step before, seen from where T is, Pa
+      real(dp) :: pace = 0.0_dp                       !! length of the step that led from it to T, s; 0: none
       real(dp), allocatable :: displacement(:, :, :)  !! U_T, m
       real(dp), allocatable :: trial(:, :, :)         !! U_T of the step in hand, m
       real(dp), allocatable :: slip(:, :, :)          !! of the step, m
@@ -60,6 +62,7 @@ module tangential_state
       real(dp), private :: past_mean(2) = 0.0_dp
    contains
       procedure :: begin
+      procedure :: extrapolate
       procedure :: solve
       procedure :: return_to_bound
       procedure :: trim => trim_traction
@@ -96,10 +99,9 @@ contains
       call new_friction_solver(self%solver, self%grid, case%material%poisson, self%operator, error)
       if (allocated(error)) return
       self%solver%method = merge(friction_thesis, friction_fast, case%solver%method == 'thesis')
-      self%solver%tolerance = case%solver%tolerance
       self%solver%max_iterations = case%solver%max_iterations
       allocate (self%traction(nx, ny, 2), source=0.0_dp)
-      allocate (self%displacement, self%trial, self%slip, self%drive, self%past, source=self%traction)
+      allocate (self%before, self%displacement, self%trial, self%slip, self%drive, self%past, source=self%traction)
       allocate (self%contact(nx, ny), source=0_int8)
       call new_history(self%history, material, nx*ny, 2, error)
       if (allocated(error)) return
@@ -145,6 +147,29 @@ contains
       self%solver%slip_scale = 0.0_dp
    end subroutine begin
 
+   !> Start the step's traction from the change of the last step going on. To be called when the road
+   !> has moved, once a step.
+   subroutine extrapolate(self, steady)
+      class(tangential_state_type), intent(inout) :: self
+      logical, intent(in) :: steady                   !! the road moves as in the step before
+      real(dp) :: factor, t(2)
+      integer :: i, j
+
+      factor = 0.0_dp
+      if (steady .and. self%pace > 0.0_dp) factor = self%dt/self%pace
+      !$omp parallel do default(none) shared(self, factor) private(i, j, t)
+      do j = 1, self%grid%ny
+         do i = 1, self%grid%nx
+            t = self%traction(i, j, :)
+            if (self%contact(i, j) == 1_int8) &
+               self%traction(i, j, :) = t + factor*(t - self%before(i, j, :))
+            self%before(i, j, :) = t
+         end do
+      end do
+      self%pace = self%dt
+      self%solver%near = factor > 0.0_dp
+   end subroutine extrapolate
+
    !> The compliance of the mean mode, periodic mode only.
    subroutine set_thickness(self, thickness)
       type(tangential_state_type), intent(inout) :: self
@@ -182,14 +207,16 @@ contains
    end function means
 
    !> Solve for the traction under a pressure: T, the trial displacement, the slip.
-   subroutine solve(self, pressure, gap, slope_x, slope_y, outcome)
+   subroutine solve(self, pressure, gap, slope_x, slope_y, tolerance, outcome)
       class(tangential_state_type), intent(inout) :: self
       real(dp), intent(in), contiguous, target :: pressure(:, :)
       real(dp), intent(in) :: gap(:, :)
       real(dp), intent(in), contiguous, target :: slope_x(:, :), slope_y(:, :)
+      real(dp), intent(in) :: tolerance
       type(solver_result_type), intent(out) :: outcome
       integer :: j, c
 
+      self%solver%tolerance = tolerance
       call mark_contact(self, pressure, gap)
       call self%solver%solve(self%operator, self%law, pressure, slope_x, slope_y, self%drive(:, :, 1), &
          self%drive(:, :, 2), self%contact, self%traction(:, :, 1), self%traction(:, :, 2), &
@@ -246,6 +273,7 @@ contains
       integer :: c
 
       if (.not. self%moved) return
+      self%pace = 0.0_dp
       call mark_contact(self, pressure, gap)
       call return_tractions(self%law, pressure, slope_x, slope_y, self%contact, &
          self%traction(:, :, 1), self%traction(:, :, 2))

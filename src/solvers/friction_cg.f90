@@ -15,7 +15,7 @@
 !> slip of a sticking point, part of the slip across its traction, or slip against it, over the RMS
 !> of DX or of A T in the contact, whichever is larger, or over `slip_scale`.
 !>
-!> Memory beside the caller's fields: eight fields, the two of the operator's spectrum and the two
+!> Memory beside the caller's fields: eleven fields, the two of the operator's spectrum and the two
 !> of the preconditioner's with its symbols (3/4 of a field).
 !>
 !> Measured, a sphere at half of full slip (free, nu = 0.42), iterations / products of the operator
@@ -38,7 +38,7 @@ module friction_cg
    use friction_cg_fast, only : iterate_fast
    use friction_cg_gradient, only : iterate_gradient
    use friction_cg_thesis, only : iterate_thesis
-   use friction_law, only : friction_law_type
+   use friction_law, only : friction_law_type, law_constant_shear
    use friction_problem, only : friction_problem_type
    use influence, only : tangential_symbol
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
@@ -69,12 +69,14 @@ module friction_cg
       !> smaller than the displacements, as in a small step of a long slide. 0: by the
       !> displacements.
       real(dp) :: slip_scale = 0.0_dp
+      logical :: near = .false.                  !! T starts near the solution, as in a step like the last
       type(convolution_type), private :: preconditioner
       logical, private :: periodic = .true.
       real(dp), private :: length = 0.0_dp       !! of the longer side, m
       real(dp), private :: compliance = 0.0_dp   !! a_0
       real(dp), allocatable, private :: zx(:, :), zy(:, :), dx(:, :), dy(:, :)
-      real(dp), allocatable, private :: old_x(:, :), old_y(:, :), normal_x(:, :), normal_y(:, :)
+      real(dp), allocatable, private :: old_x(:, :), old_y(:, :), vx(:, :), vy(:, :)
+      real(dp), allocatable, private :: weight(:, :), force(:, :), nz(:, :)
    contains
       procedure :: solve
       procedure :: destroy
@@ -115,16 +117,19 @@ contains
       self%compliance = self_compliance(operator, self%periodic)
       if (self%compliance <= 0.0_dp) self%compliance = self%length     ! one cell has no modes
       allocate (self%zx(grid%nx, grid%ny))
-      allocate (self%zy, self%dx, self%dy, self%old_x, self%old_y, self%normal_x, self%normal_y, &
-         mold=self%zx)
+      allocate (self%zy, self%dx, self%dy, self%old_x, self%old_y, self%vx, self%vy, self%weight, &
+         self%force, self%nz, mold=self%zx)
       self%zx = 0.0_dp
       self%zy = 0.0_dp
       self%dx = 0.0_dp
       self%dy = 0.0_dp
       self%old_x = 0.0_dp
       self%old_y = 0.0_dp
-      self%normal_x = 0.0_dp
-      self%normal_y = 0.0_dp
+      self%vx = 0.0_dp
+      self%vy = 0.0_dp
+      self%weight = 0.0_dp
+      self%force = 0.0_dp
+      self%nz = 1.0_dp
    end subroutine new_friction_solver
 
    !> a_0, the mean of the symbols over the whole spectrum; without the mean mode where periodic.
@@ -190,6 +195,7 @@ contains
       problem%threads = operator%threads
       problem%compliance = self%compliance
       problem%slip_scale = self%slip_scale
+      problem%near = self%near .and. law%law /= law_constant_shear
       problem%p => p
       problem%hx => slope_x
       problem%hy => slope_y
@@ -202,13 +208,13 @@ contains
       problem%contact => contact
       if (present(past_x)) problem%past_x => past_x
       if (present(past_y)) problem%past_y => past_y
-      problem%normal_x => self%normal_x
-      problem%normal_y => self%normal_y
-      if (self%method == friction_fast) then
-         problem%old_x => self%old_x
-         problem%old_y => self%old_y
-      end if
-      allocate (problem%row_sums(13, problem%ny))
+      problem%vx => self%vx
+      problem%vy => self%vy
+      problem%weight => self%weight
+      problem%force => self%force
+      problem%nz => self%nz
+      problem%old_x => self%old_x
+      problem%old_y => self%old_y
       cells = real(operator%nx, dp)*operator%ny
       if (self%periodic .and. operator%symbol(0, 0, 1)*cells > thick*self%length) then
          problem%mean_compliance = operator%symbol(0, 0, 1)
@@ -253,13 +259,15 @@ contains
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
       integer, intent(inout) :: iterations
+      real(dp), allocatable :: spare_x(:, :), spare_y(:, :)
       integer :: limit
 
       limit = self%max_iterations
       select case (self%method)
       case (friction_thesis)
+         allocate (spare_x, spare_y, source=self%zx)
          call iterate_thesis(problem, operator, self%tolerance, limit, self%zx, self%zy, &
-            self%dx, self%dy, self%old_x, self%old_y, iterations)
+            self%dx, self%dy, spare_x, spare_y, iterations)
       case (friction_gradient)
          call iterate_gradient(problem, operator, self%tolerance, 0.0_dp, limit, self%zx, self%zy, &
             self%dx, self%dy, iterations)
@@ -295,8 +303,8 @@ contains
 
       call self%preconditioner%destroy()
       if (allocated(self%zx)) then
-         deallocate (self%zx, self%zy, self%dx, self%dy, self%old_x, self%old_y, self%normal_x, &
-            self%normal_y)
+         deallocate (self%zx, self%zy, self%dx, self%dy, self%old_x, self%old_y, self%vx, self%vy, &
+            self%weight, self%force, self%nz)
       end if
    end subroutine destroy
 

@@ -26,8 +26,8 @@
 !>
 !> Points that are put back in great number change the total traction, and a stiff mean mode then
 !> throws the slip to the other side: the part of the move after which g'.(T' - T) vanishes is taken
-!> instead where that has become less than -alpha g.d/2. This needs no energy, which does not exist
-!> where the slope counts.
+!> instead where that has become less than -alpha g.d/2 (from a good start -2 alpha g.d). This needs no
+!> energy, which does not exist where the slope counts.
 !>
 !> An iteration costs two operator products, of which the first needs no inverse transform where
 !> points slip, and one preconditioner. beta is formed with z_old (M is symmetric), so that no old g
@@ -36,8 +36,8 @@
 !> There is no proof that it converges: `friction_cg` falls back on spectral projected gradients.
 module friction_cg_fast
    use fft_conv, only : columns_apply, columns_form, convolution_type
-   use friction_law, only : contact_open, contact_slip
    use friction_problem, only : friction_problem_type
+   use friction_rows, only : turned_row, scaled_row, unscaled_row
    use precision, only : dp
    implicit none
    private
@@ -46,7 +46,11 @@ module friction_cg_fast
 
    integer, parameter :: patience = 30      !! iterations in which the residual has to fall tenfold
    integer, parameter :: trials = 2         !! of a shorter step
-   real(dp), parameter :: overshoot = 0.5_dp
+   !> A move is shortened where it leaves less than -overshoot*alpha*g.d: in the first iterations of a
+   !> step that goes on from another seldom, for that costs more than it gains (163 for 207
+   !> transforms a step of a two-scale road). Not with constant shear, where that was seen to fail.
+   real(dp), parameter :: overshoot = 0.5_dp, overshoot_near = 2.0_dp
+   integer, parameter :: near_steps = 15
 
 contains
 
@@ -61,6 +65,7 @@ contains
       real(dp), intent(inout) :: zx(:, :), zy(:, :), dx(:, :), dy(:, :)    !! work [nx, ny]
       integer, intent(inout) :: iterations
       real(dp) :: rho, rho_old, cross, beta, slope, curvature, form, alpha, milestone, gain, fraction
+      real(dp) :: excess
       real(dp) :: shift(2)
       logical :: restart, slipping
       integer :: returned, first, trial
@@ -69,8 +74,10 @@ contains
       rho_old = 0.0_dp
       milestone = problem%residual
       first = iterations
+      excess = merge(overshoot_near, overshoot, problem%near)
       do while (iterations < limit)
          iterations = iterations + 1
+         if (iterations > near_steps) excess = overshoot
          call precondition(problem, preconditioner, restart, zx, zy, shift, cross, rho)
          beta = 0.0_dp
          if (.not. restart) beta = max(0.0_dp, (rho - cross)/rho_old)
@@ -95,7 +102,7 @@ contains
          restart = .false.
          gain = alpha*slope
          do trial = 1, trials
-            if (problem%gain_left >= -overshoot*gain) exit
+            if (problem%gain_left >= -excess*gain) exit
             fraction = max(0.1_dp, gain/(gain - problem%gain_left))
             call problem%step_back(operator, fraction)
             call problem%update_slip(operator)
@@ -128,13 +135,13 @@ contains
       call mean_mode(problem, inverse, coupling)
       c = matmul(inverse, problem%weighted_residual)
       mean = matmul(coupling, c)
-      !$omp parallel do default(none) shared(problem, preconditioner, restart, mean, c, zx, zy) &
+      !$omp parallel do default(none) shared(problem, preconditioner, mean, c, zx, zy) &
       !$omp private(j) num_threads(problem%threads)
       do j = 1, problem%ny
-         call scale_row(problem, preconditioner, restart, mean, c, j, zx(:, j), zy(:, j))
+         call scale_row(problem, preconditioner, mean, c, j, zx(:, j), zy(:, j))
       end do
-      sums = problem%totals(5)
-      cross = sums(1)
+      sums(1:1) = problem%totals(1)
+      cross = merge(0.0_dp, sums(1), restart)
       call preconditioner%columns(columns_apply, form)
       !$omp parallel do default(none) shared(problem, preconditioner, mean, c, zx, zy) &
       !$omp private(j) num_threads(problem%threads)
@@ -167,32 +174,17 @@ contains
    end subroutine mean_mode
 
    !> Transform a row of w Z (g - H e c).
-   subroutine scale_row(problem, preconditioner, restart, mean, c, j, zx, zy)
+   subroutine scale_row(problem, preconditioner, mean, c, j, zx, zy)
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: preconditioner
-      logical, intent(in) :: restart
       real(dp), intent(in) :: mean(2), c(2)
       integer, intent(in) :: j
       real(dp), intent(in) :: zx(:), zy(:)         !! z_old
-      real(dp) :: normal(2), g(2), w, gx(problem%nx), gy(problem%nx)
-      integer :: i
+      real(dp) :: gx(problem%nx), gy(problem%nx)
 
-      problem%row_sums(1:5, j) = 0.0_dp
-      do i = 1, problem%nx
-         if (problem%contact(i, j) == contact_open) then
-            gx(i) = 0.0_dp
-            gy(i) = 0.0_dp
-         else
-            call problem%projected_residual(i, j, normal, g, w)
-            if (.not. restart) then
-               problem%row_sums(1, j) = problem%row_sums(1, j) + g(1)*zx(i) + g(2)*zy(i)
-            end if
-            g = g - mean - problem%compliance*(1.0_dp - w)*c
-            if (problem%contact(i, j) == contact_slip) g = along_bound(normal, g)
-            gx(i) = w*g(1)
-            gy(i) = w*g(2)
-         end if
-      end do
+      call scaled_row(problem%nx, problem%compliance, mean, c, problem%rx(:, j), problem%ry(:, j), &
+         problem%vx(:, j), problem%vy(:, j), problem%weight(:, j), zx, zy, gx, gy, &
+         problem%row_sums(1, j))
       call preconditioner%forward_row(1, j, gx)
       call preconditioner%forward_row(2, j, gy)
    end subroutine scale_row
@@ -204,27 +196,11 @@ contains
       real(dp), intent(in) :: mean(2), c(2)
       integer, intent(in) :: j
       real(dp), intent(inout) :: zx(:), zy(:)
-      real(dp) :: normal(2), g(2), z(2), w
-      integer :: i
 
       call preconditioner%backward_row(1, j, zx)
       call preconditioner%backward_row(2, j, zy)
-      problem%row_sums(1:5, j) = 0.0_dp
-      do i = 1, problem%nx
-         z = 0.0_dp
-         if (problem%contact(i, j) /= contact_open) then
-            call problem%projected_residual(i, j, normal, g, w)
-            z = g - mean - problem%compliance*(1.0_dp - w)*c
-            z = w*([zx(i), zy(i)] + (1.0_dp - w)/problem%compliance*z)
-            if (problem%contact(i, j) == contact_slip) z = along_bound(normal, z)
-            problem%row_sums(1, j) = problem%row_sums(1, j) + g(1)*z(1) + g(2)*z(2)
-            problem%row_sums(2:3, j) = problem%row_sums(2:3, j) + z
-            problem%row_sums(4:5, j) = problem%row_sums(4:5, j) &
-               + problem%compliance*(1.0_dp - w)*z
-         end if
-         zx(i) = z(1)
-         zy(i) = z(2)
-      end do
+      call unscaled_row(problem%nx, problem%compliance, mean, c, problem%rx(:, j), problem%ry(:, j), &
+         problem%vx(:, j), problem%vy(:, j), problem%weight(:, j), zx, zy, problem%row_sums(1:5, j))
    end subroutine unscale_row
 
    !> d = z + beta Z d with its transform, its slope g.d and the part of its curvature by the
@@ -244,7 +220,9 @@ contains
       !$omp parallel do default(none) shared(problem, operator, beta, shift, zx, zy, dx, dy) &
       !$omp private(j) num_threads(problem%threads)
       do j = 1, problem%ny
-         call direction_row(problem, beta, shift, j, zx(:, j), zy(:, j), dx(:, j), dy(:, j))
+         call turned_row(problem%nx, problem%compliance, beta, shift, problem%rx(:, j), &
+            problem%ry(:, j), problem%vx(:, j), problem%vy(:, j), problem%weight(:, j), zx(:, j), &
+            zy(:, j), dx(:, j), dy(:, j), problem%row_sums(1:2, j))
          call operator%forward_row(1, j, dx(:, j))
          call operator%forward_row(2, j, dy(:, j))
       end do
@@ -252,53 +230,5 @@ contains
       slope = sums(1)
       curvature = sums(2)
    end subroutine new_direction
-
-   !> A row of d.
-   subroutine direction_row(problem, beta, shift, j, zx, zy, dx, dy)
-      type(friction_problem_type), intent(inout) :: problem
-      real(dp), intent(in) :: beta
-      real(dp), intent(in) :: shift(2)
-      integer, intent(in) :: j
-      real(dp), intent(inout) :: zx(:), zy(:)
-      real(dp), intent(inout) :: dx(:), dy(:)
-      real(dp) :: normal(2), g(2), v(2), z(2), w
-      integer :: i
-
-      problem%row_sums(1:2, j) = 0.0_dp
-      do i = 1, problem%nx
-         v = 0.0_dp
-         if (problem%contact(i, j) /= contact_open) then
-            call problem%projected_residual(i, j, normal, g, w)
-            if (beta > 0.0_dp) then
-               v = beta*[dx(i), dy(i)]
-               if (problem%contact(i, j) == contact_slip) v = along_bound(normal, v)
-            end if
-            z = w*shift
-            if (problem%contact(i, j) == contact_slip) z = along_bound(normal, z)
-            zx(i) = zx(i) + z(1)
-            zy(i) = zy(i) + z(2)
-            v = v + [zx(i), zy(i)]
-            problem%row_sums(1, j) = problem%row_sums(1, j) + g(1)*v(1) + g(2)*v(2)
-            if (w < 1.0_dp .and. w > 0.0_dp) then
-               problem%row_sums(2, j) = problem%row_sums(2, j) &
-                  + problem%compliance*(1.0_dp/w - 1.0_dp)*(v(1)**2 + v(2)**2)
-            end if
-         end if
-         dx(i) = v(1)
-         dy(i) = v(2)
-      end do
-   end subroutine direction_row
-
-   !> Z: v less its part across the bound.
-   pure function along_bound(normal, v) result(projected)
-      real(dp), intent(in) :: normal(2)      !! direction of slip
-      real(dp), intent(in) :: v(2)
-      real(dp) :: projected(2)
-      real(dp) :: nn
-
-      nn = normal(1)**2 + normal(2)**2
-      projected = 0.0_dp
-      if (nn > 0.0_dp) projected = v - (normal(1)*v(1) + normal(2)*v(2))/nn*normal
-   end function along_bound
 
 end module friction_cg_fast

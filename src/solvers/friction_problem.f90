@@ -14,7 +14,9 @@
 !> formed by row and added up in order: the results do not depend on the number of threads.
 module friction_problem
    use fft_conv, only : columns_apply, convolution_type
-   use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type, unbounded
+   use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type, &
+      law_constant_shear, law_coulomb_orowan
+   use friction_rows, only : bound_row, measured_row, measures, moved_row, row_constants_type
    use parallel, only : global_max, global_sum
    use precision, only : dp, int8
    implicit none
@@ -41,13 +43,17 @@ module friction_problem
       real(dp), pointer, contiguous :: rx(:, :) => null(), ry(:, :) => null()
       real(dp), pointer, contiguous :: past_x(:, :) => null()   !! T_h, where there is a memory
       real(dp), pointer, contiguous :: past_y(:, :) => null()
-      !> The direction of slip times sqrt(w): its square is the weight w = a_0/(a_0 + curvature) of
-      !> a slip point. 0 where nothing but T* is allowed; not defined elsewhere.
-      real(dp), pointer, contiguous :: normal_x(:, :) => null(), normal_y(:, :) => null()
-      real(dp), pointer, contiguous :: old_x(:, :) => null()    !! T before the last move, if kept
+      !> The measure of a point (module `friction_rows`): unit direction of slip and weight.
+      real(dp), pointer, contiguous :: vx(:, :) => null(), vy(:, :) => null(), weight(:, :) => null()
+      real(dp), pointer, contiguous :: force(:, :) => null()    !! F of the bound, Pa
+      real(dp), pointer, contiguous :: nz(:, :) => null()       !! N_z of the road
+      real(dp), allocatable :: level_row(:)  !! grad H of a row where the slope does not count
+      type(row_constants_type) :: constants
+      real(dp), pointer, contiguous :: old_x(:, :) => null()    !! T before the last move
       real(dp), pointer, contiguous :: old_y(:, :) => null()
       integer(int8), pointer, contiguous :: contact(:, :) => null()
       real(dp), allocatable :: row_sums(:, :)
+      logical :: near = .false.              !! T starts near the solution
       integer :: cells = 0                   !! in contact
       integer :: slipping = 0                !! on the bound
       integer :: released = 0                !! left the bound since the last move
@@ -62,8 +68,6 @@ module friction_problem
       procedure :: start
       procedure :: slope_at
       procedure :: friction_part
-      procedure :: point_residual
-      procedure :: projected_residual
       procedure :: put_back
       procedure :: update_slip
       procedure :: advance_slip
@@ -82,13 +86,33 @@ contains
       class(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
       logical, intent(out) :: moving         !! T + T_h is not zero everywhere
-      real(dp) :: t(2)
+      real(dp) :: t(2), mu, strength
       logical :: moved
       integer :: i, j
 
-      !$omp parallel do default(none) shared(self, operator) private(i, j, t, moved) &
+      allocate (self%row_sums(measures, self%ny), self%level_row(self%nx))
+      self%level_row = 0.0_dp
+      mu = self%law%coefficient
+      strength = -1.0_dp
+      if (self%law%law == law_constant_shear) then
+         mu = 0.0_dp
+         strength = self%law%shear_strength
+      end if
+      self%constants = row_constants_type(coefficient=mu, compliance=self%compliance, &
+         physical=self%law%slope .and. self%law%physical_slip, stiffest=stiffest, &
+         on_bound=on_bound, outermost=outermost)
+      if (self%law%law == law_coulomb_orowan) self%constants%strength = self%law%shear_strength
+
+      !$omp parallel do default(none) shared(self, operator, mu, strength) private(i, j, t, moved) &
       !$omp num_threads(self%threads)
       do j = 1, self%ny
+         if (self%law%slope) then
+            call bound_row(self%nx, mu, self%law%adhesive_pressure, strength, self%p(:, j), &
+               self%hx(:, j), self%hy(:, j), self%force(:, j), self%nz(:, j))
+         else
+            call bound_row(self%nx, mu, self%law%adhesive_pressure, strength, self%p(:, j), &
+               self%level_row, self%level_row, self%force(:, j), self%nz(:, j))
+         end if
          self%row_sums(:, j) = 0.0_dp
          do i = 1, self%nx
             if (self%p(i, j) <= 0.0_dp .and. self%law%adhesive_pressure <= 0.0_dp) then
@@ -106,6 +130,8 @@ contains
                self%row_sums(2, j) = self%row_sums(2, j) + self%tx(i, j)**2 + self%ty(i, j)**2
             end if
          end do
+         self%old_x(:, j) = self%tx(:, j)
+         self%old_y(:, j) = self%ty(:, j)
          call transform_row(self, operator, j)
       end do
       associate (sums => self%totals(2))
@@ -137,74 +163,6 @@ contains
 
       d = [self%tx(i, j), self%ty(i, j)] - self%law%normal_traction(self%p(i, j), slope)
    end function friction_part
-
-   !> Residual and curvature of a point in contact. With the direction of slip v = S^-1 D the bound
-   !> is |S^-1/2 D| = const to first order (its change with n.D left out): a multiplier lam =
-   !> r.v/|v|^2 and the curvature lam e.(S^-1 e)/|e|^2 along its tangent e.
-   pure subroutine point_residual(self, i, j, v, g, curvature, reversed)
-      class(friction_problem_type), intent(in) :: self
-      integer, intent(in) :: i, j
-      real(dp), intent(out) :: v(2)          !! direction of slip, Pa
-      real(dp), intent(out) :: g(2)          !! m
-      real(dp), intent(out) :: curvature     !! m/Pa; 0 inside the bound
-      logical, intent(out) :: reversed       !! on the bound, but slips against the traction
-      real(dp) :: slope(2), d(2), rv, vv
-
-      g(1) = self%rx(i, j)
-      g(2) = self%ry(i, j)
-      v = 0.0_dp
-      curvature = 0.0_dp
-      reversed = .false.
-      if (self%contact(i, j) /= contact_slip) return
-      d(1) = self%tx(i, j)
-      d(2) = self%ty(i, j)
-      if (self%law%slope) then
-         slope(1) = self%hx(i, j)
-         slope(2) = self%hy(i, j)
-         d = d + self%p(i, j)*slope
-         v = self%law%slip_direction(slope, d)
-      else
-         v = d
-      end if
-      vv = v(1)**2 + v(2)**2
-      rv = g(1)*v(1) + g(2)*v(2)
-      if (vv <= 0.0_dp) then                 ! nothing but T* is allowed here
-         g = 0.0_dp
-      else if (rv < 0.0_dp) then
-         reversed = .true.
-      else
-         g = g - (rv/vv)*v
-         curvature = min(rv/vv, stiffest*self%compliance)
-         ! e = v turned by 90 degrees, S^-1 e = D turned: e.S^-1 e/|e|^2
-         if (self%law%slope .and. self%law%physical_slip) then
-            d = [-v(2), v(1)]
-            curvature = curvature*dot_product(d, self%law%slip_direction(slope, d))/vv
-         end if
-      end if
-   end subroutine point_residual
-
-   !> Residual, normal and weight of a point in contact, as measured last.
-   pure subroutine projected_residual(self, i, j, normal, g, w)
-      class(friction_problem_type), intent(in) :: self
-      integer, intent(in) :: i, j
-      real(dp), intent(out) :: normal(2)     !! direction of slip times sqrt(w); 0 inside the bound
-      real(dp), intent(out) :: g(2)          !! m
-      real(dp), intent(out) :: w             !! 1 inside the bound
-
-      g(1) = self%rx(i, j)
-      g(2) = self%ry(i, j)
-      normal = 0.0_dp
-      w = 1.0_dp
-      if (self%contact(i, j) /= contact_slip) return
-      normal(1) = self%normal_x(i, j)
-      normal(2) = self%normal_y(i, j)
-      w = normal(1)**2 + normal(2)**2
-      if (w > 0.0_dp) then
-         g = g - ((g(1)*normal(1) + g(2)*normal(2))/w)*normal
-      else
-         g = 0.0_dp
-      end if
-   end subroutine projected_residual
 
    !> The traction and the state of a point that moved to T: slip points go back on their bound from
    !> both sides, others only from outside.
@@ -311,60 +269,31 @@ contains
       class(friction_problem_type), intent(inout) :: self
       integer, intent(in) :: j
       real(dp), intent(inout) :: largest           !! |g|^2
-      real(dp) :: v(2), g(2), curvature, w, xx, xy, yy, vv
-      logical :: reversed
-      integer :: i
+      real(dp) :: state(self%nx)
 
-      self%row_sums(:, j) = 0.0_dp
-      associate (sums => self%row_sums(:, j))
-         do i = 1, self%nx
-            if (self%contact(i, j) == contact_open) cycle
-            call self%point_residual(i, j, v, g, curvature, reversed)
-            if (reversed) then
-               self%contact(i, j) = contact_stick
-               sums(1) = sums(1) + 1.0_dp
-            end if
-            if (self%contact(i, j) == contact_slip) sums(2) = sums(2) + 1.0_dp
-            sums(3) = sums(3) + self%drive_x(i, j)**2 + self%drive_y(i, j)**2
-            sums(4) = sums(4) + (self%drive_x(i, j) - self%rx(i, j))**2 &
-               + (self%drive_y(i, j) - self%ry(i, j))**2
-            w = self%compliance/(self%compliance + curvature)
-            sums(5:6) = sums(5:6) + w*g
-            xx = 0.0_dp
-            xy = 0.0_dp
-            yy = 0.0_dp
-            vv = v(1)**2 + v(2)**2
-            if (self%contact(i, j) == contact_slip) then
-               if (vv > 0.0_dp) then
-                  xx = v(1)**2/vv
-                  xy = v(1)*v(2)/vv
-                  yy = v(2)**2/vv
-                  v = v*sqrt(w/vv)
-               else
-                  xx = 1.0_dp
-                  yy = 1.0_dp
-               end if
-               self%normal_x(i, j) = v(1)
-               self%normal_y(i, j) = v(2)
-            end if
-            sums(7:9) = sums(7:9) + w*[1.0_dp - xx, -xy, 1.0_dp - yy]
-            sums(10:12) = sums(10:12) + curvature*w**2*[1.0_dp - xx, -xy, 1.0_dp - yy]
-            if (associated(self%old_x)) then
-               sums(13) = sums(13) + g(1)*(self%tx(i, j) - self%old_x(i, j)) &
-                  + g(2)*(self%ty(i, j) - self%old_y(i, j))
-            end if
-            largest = max(largest, g(1)**2 + g(2)**2)
-         end do
-      end associate
+      state = self%contact(:, j)
+      if (self%law%slope) then
+         call measured_row(self%nx, self%constants, self%p(:, j), self%hx(:, j), self%hy(:, j), &
+            self%nz(:, j), self%tx(:, j), self%ty(:, j), self%old_x(:, j), self%old_y(:, j), &
+            self%rx(:, j), self%ry(:, j), self%drive_x(:, j), self%drive_y(:, j), state, &
+            self%vx(:, j), self%vy(:, j), self%weight(:, j), self%row_sums(:, j))
+      else
+         call measured_row(self%nx, self%constants, self%p(:, j), self%level_row, self%level_row, &
+            self%nz(:, j), self%tx(:, j), self%ty(:, j), self%old_x(:, j), self%old_y(:, j), &
+            self%rx(:, j), self%ry(:, j), self%drive_x(:, j), self%drive_y(:, j), state, &
+            self%vx(:, j), self%vy(:, j), self%weight(:, j), self%row_sums(:, j))
+      end if
+      self%contact(:, j) = int(state, int8)
+      largest = max(largest, self%row_sums(measures, j))
    end subroutine measure_row
 
    !> The residual from the sums of `measure_row`.
    subroutine finish_measure(self, largest)
       class(friction_problem_type), intent(inout) :: self
       real(dp), intent(in) :: largest              !! |g|^2
-      real(dp) :: scale, sums(13)
+      real(dp) :: scale, sums(measures - 1)
 
-      sums = self%totals(13)
+      sums = self%totals(measures - 1)
       self%released = nint(sums(1))
       self%slipping = nint(sums(2))
       self%weighted_residual = sums(5:6)
@@ -385,35 +314,40 @@ contains
       real(dp), intent(in) :: dx(:, :), dy(:, :)    !! [nx, ny] direction d, Pa
       logical, intent(in) :: transform
       integer, intent(out) :: returned              !! points that were put back
-      real(dp) :: t(2), step_t(2), sums(3)
-      logical :: moved
-      integer :: i, j
+      real(dp) :: sums(3)
+      integer :: j
 
       !$omp parallel do default(none) shared(self, operator, step, dx, dy, transform) &
-      !$omp private(i, j, t, step_t, moved) num_threads(self%threads)
+      !$omp private(j) num_threads(self%threads)
       do j = 1, self%ny
-         self%row_sums(1:3, j) = 0.0_dp
-         do i = 1, self%nx
-            if (self%contact(i, j) == contact_open) cycle
-            t = [self%tx(i, j) + step*dx(i, j), self%ty(i, j) + step*dy(i, j)]
-            call self%put_back(i, j, t, self%contact(i, j), moved)
-            if (moved) self%row_sums(1, j) = self%row_sums(1, j) + 1.0_dp
-            if (associated(self%old_x)) then
-               self%old_x(i, j) = self%tx(i, j)
-               self%old_y(i, j) = self%ty(i, j)
-            end if
-            step_t = t - [self%tx(i, j), self%ty(i, j)]
-            self%row_sums(2, j) = self%row_sums(2, j) + step_t(1)**2 + step_t(2)**2
-            self%row_sums(3, j) = self%row_sums(3, j) + t(1)**2 + t(2)**2
-            self%tx(i, j) = t(1)
-            self%ty(i, j) = t(2)
-         end do
+         call move_row(self, step, dx(:, j), dy(:, j), j)
          if (transform) call transform_row(self, operator, j)
       end do
       sums = self%totals(3)
       returned = nint(sums(1))
       self%change = sqrt(sums(2)/max(sums(3), tiny(1.0_dp)))
    end subroutine move
+
+   !> A row of T' = T + step d, put back.
+   subroutine move_row(self, step, dx, dy, j)
+      class(friction_problem_type), intent(inout) :: self
+      real(dp), intent(in) :: step
+      real(dp), intent(in) :: dx(:), dy(:)
+      integer, intent(in) :: j
+      real(dp) :: state(self%nx)
+
+      state = self%contact(:, j)
+      if (self%law%slope) then
+         call moved_row(self%nx, self%constants, step, self%p(:, j), self%hx(:, j), self%hy(:, j), &
+            self%force(:, j), self%nz(:, j), dx, dy, self%tx(:, j), self%ty(:, j), &
+            self%old_x(:, j), self%old_y(:, j), state, self%row_sums(1:3, j))
+      else
+         call moved_row(self%nx, self%constants, step, self%p(:, j), self%level_row, self%level_row, &
+            self%force(:, j), self%nz(:, j), dx, dy, self%tx(:, j), self%ty(:, j), &
+            self%old_x(:, j), self%old_y(:, j), state, self%row_sums(1:3, j))
+      end if
+      self%contact(:, j) = int(state, int8)
+   end subroutine move_row
 
    !> Undo a part of the last move: T' = T_old + fraction (T - T_old), put back; its rows are
    !> transformed.
