@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import surface
 from ._library import set_threads, version
+from .adhesive_contact import AdhesiveNormalContact, solve_adhesive
 from .contact import NormalContact, solve_normal
 from .errors import NotConverged
 from .result import Run
@@ -21,8 +22,9 @@ from .runner import run
 if TYPE_CHECKING:
     from . import material, theory
 
-__all__ = ["NormalContact", "NotConverged", "Run", "__version__", "material", "open", "run",
-           "set_threads", "solve_normal", "surface", "theory"]
+__all__ = ["AdhesiveNormalContact", "NormalContact", "NotConverged", "Run", "__version__",
+           "material", "open", "run", "set_threads", "solve_adhesive", "solve_normal", "surface",
+           "theory"]
 
 __version__ = version()
 """The version of the Fortran library that is loaded, such as ``"0.1.0"``."""

@@ -11,7 +11,7 @@ module asperity_flat
 
    public :: library_version, set_thread_count
    public :: surface_height, surface_psd, surface_radial_psd, surface_statistics
-   public :: contact_normal
+   public :: contact_adhesive, contact_normal
    public :: run_close, run_interrupt, run_open, run_step
 
 contains
@@ -229,6 +229,86 @@ contains
       reason = outcome%reason
       call report(error, status, message)
    end subroutine contact_normal
+
+   !> Elastic normal contact with adhesion: one row of the step loop.
+   subroutine contact_adhesive(height, pressure, gap, attraction, nx, ny, lx, ly, is_free, modulus, &
+      potential, energy, range_, approach, load, start, thesis, tolerance, max_iterations, old_level, &
+      level, energy_adhesive, iterations, ffts, residual, seconds, converged, reason, status, message)
+      use adhesion_potential, only : adhesion_potential_type, adhesive_slope, new_adhesion_potential
+      use case_settings, only : case_type
+      use errors, only : error_type
+      use normal_step, only : new_normal_step, normal_step_type
+      use precision, only : dp
+      use schedule, only : planned_row_type
+      use solver_result, only : solver_result_type
+      integer(c_int), intent(in) :: nx, ny
+      real(c_double), intent(in) :: height(nx, ny)           !! m
+      real(c_double), intent(inout) :: pressure(nx, ny)      !! Pa; a start where that is given
+      real(c_double), intent(inout) :: gap(nx, ny)           !! m; likewise
+      real(c_double), intent(inout) :: attraction(nx, ny)    !! -e'(gap), Pa
+      real(c_double), intent(in) :: lx, ly
+      integer(c_int), intent(in) :: is_free                  !! 1: free boundary, 0: periodic
+      real(c_double), intent(in) :: modulus                  !! E*, Pa
+      character(len=*), intent(in) :: potential
+      real(c_double), intent(in) :: energy, range_           !! J/m2 and m
+      integer(c_int), intent(in) :: approach                 !! 1: the load is a displacement
+      real(c_double), intent(in) :: load                     !! m, or mean pressure, Pa
+      integer(c_int), intent(in) :: start                    !! 0: non-adhesive, 1: full contact, 2: given
+      integer(c_int), intent(in) :: thesis                   !! 1 or 0
+      real(c_double), intent(in) :: tolerance
+      integer(c_int), intent(in) :: max_iterations
+      real(c_double), intent(in) :: old_level                !! of a start that is given, m
+      real(c_double), intent(out) :: level                   !! U - H in contact, m
+      real(c_double), intent(out) :: energy_adhesive         !! over the cell, J
+      integer(c_int), intent(out) :: iterations
+      real(c_double), intent(out) :: ffts, residual, seconds
+      integer(c_int), intent(out) :: converged               !! 1 or 0
+      character(len=64), intent(out) :: reason
+      integer(c_int), intent(out) :: status
+      character(len=2000), intent(out) :: message
+      type(error_type), allocatable :: error
+      type(adhesion_potential_type) :: law
+      type(case_type) :: case
+      type(normal_step_type) :: side
+      type(planned_row_type) :: plan
+      type(solver_result_type) :: outcome
+      integer :: j
+!f2py threadsafe
+
+      level = old_level
+      energy_adhesive = 0.0_dp
+      case%grid = grid_of(nx, ny, lx, ly, is_free)
+      case%material%poisson = 0.0_dp                         ! E* is all that matters
+      case%solver%method = 'fast'
+      if (thesis == 1) case%solver%method = 'thesis'
+      case%solver%tolerance = tolerance
+      case%solver%max_iterations = max_iterations
+      case%adhesion%potential = potential
+      case%adhesion%energy = energy
+      case%adhesion%range = range_
+      case%adhesion%start = 'non_adhesive'
+      if (start == 1) case%adhesion%start = 'full_contact'
+      plan%control = 'pressure'
+      if (approach == 1) plan%control = 'displacement'
+      plan%load = load
+      call new_adhesion_potential(law, potential, energy, range_, error)
+      if (.not. allocated(error)) call new_normal_step(side, case, height, error)
+      if (.not. allocated(error)) then
+         call side%solve(plan, 0.5_dp*modulus, start /= 2, height, pressure, gap, level, outcome)
+         energy_adhesive = side%energy(gap)
+         do j = 1, ny
+            attraction(:, j) = -adhesive_slope(law, gap(:, j))
+         end do
+         call side%destroy()
+      end if
+      iterations = outcome%iterations
+      ffts = real(outcome%ffts, dp)
+      residual = outcome%residual
+      seconds = outcome%seconds
+      converged = merge(1, 0, outcome%converged)
+      reason = outcome%reason
+      call report(error, status, message)
+   end subroutine contact_adhesive
 
    !> Read a case and prepare its run: the handle is for the calls that follow.
    subroutine run_open(path, output, threads, restart, handle, rows, first, result_path, warnings, &

@@ -1,0 +1,179 @@
+"""Elastic normal contact with adhesion, by the Fortran library."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import _library
+from ._check import choice, exactly_one, number, positive
+from .contact import FloatArray, NormalContact
+from .errors import NotConverged
+
+__all__ = ["AdhesiveNormalContact", "solve_adhesive"]
+
+POTENTIALS = ("exponential", "gauss", "maugis_dugdale")
+STARTS = ("non_adhesive", "full_contact")
+
+_solve = _library.call("contact_adhesive")
+
+
+@dataclass(frozen=True)
+class AdhesiveNormalContact(NormalContact):
+    """A solved contact with adhesion; the fields of `NormalContact`, and those below.
+
+    The pressure holds the attraction; ``pressure - adhesive_pressure`` is that of the wall, zero
+    where the gap is open. The contact area counts the cells whose gap is zero. The residual is the
+    largest of min(gap/range, G range/energy) in size, where G is the pressure of the wall.
+
+    Attributes
+    ----------
+    adhesive_pressure : ndarray
+        Attraction -e'(gap), Pa, not positive.
+    energy_adhesive : float
+        Energy of adhesion of the cell lx by ly, J, not positive.
+    energy_elastic : float
+        Elastic energy of the same, J.
+    """
+
+    adhesive_pressure: FloatArray = field(repr=False)
+    energy_adhesive: float
+    energy_elastic: float
+
+
+def solve_adhesive(
+    height: ArrayLike,
+    lx: float,
+    ly: float | None,
+    modulus: float,
+    *,
+    potential: str = "exponential",
+    energy: float,
+    range: float,
+    pressure: float | None = None,
+    force: float | None = None,
+    displacement: float | None = None,
+    boundary: str = "periodic",
+    tolerance: float = 1e-6,
+    max_iterations: int = 1000,
+    method: str = "fast",
+    start: str | AdhesiveNormalContact = "non_adhesive",
+) -> AdhesiveNormalContact:
+    """Press or pull an elastic half-space on a rigid rough surface that attracts it.
+
+    There is hysteresis: where the attraction is strong, the state depends on where it comes from.
+
+    Parameters
+    ----------
+    height : array_like
+        Height of the surface, m, shape (ny, nx); (nx,) or (1, nx) is a plane-strain line
+        contact. Any memory order and any real type.
+    lx, ly : float
+        Lengths, m; ``ly = None`` means square cells.
+    modulus : float
+        Contact modulus E* = E/(1 - nu^2) = 2 G/(1 - nu), Pa.
+    potential : str
+        'exponential', 'gauss' or 'maugis_dugdale'.
+    energy : float
+        Work of adhesion, J/m2, >= 0.
+    range : float
+        Range of the attraction, m. Cells should be smaller than 0.7 modulus range^2/energy.
+    pressure, force, displacement : float
+        The load, one of: mean pressure, Pa; force, N; approach from the first touch, m. Negative
+        values pull.
+    boundary : str
+        'periodic' or 'free'.
+    tolerance : float
+        Of the residual.
+    max_iterations : int
+        Most iterations.
+    method : str
+        'fast' or 'thesis' (periodic only).
+    start : str or AdhesiveNormalContact
+        Where from: 'non_adhesive', the contact without adhesion; 'full_contact'; or the solution
+        of a similar load on the same map.
+
+    Returns
+    -------
+    AdhesiveNormalContact
+
+    Raises
+    ------
+    ValueError
+        If an argument is wrong.
+    NotConverged
+        If the tolerance is not reached, or the surfaces part under a pull that no contact holds
+        (then the reason is 'detached'); its ``result`` holds the last state.
+
+    Examples
+    --------
+    >>> import asperity
+    >>> sphere = asperity.surface.shape("paraboloid", 64, lx=40e-6, radius=1e-4, boundary="free")
+    >>> contact = asperity.solve_adhesive(sphere, 40e-6, None, 4e6, energy=0.05, range=0.3e-6,
+    ...                                   displacement=0.0, boundary="free")
+    >>> contact.force < 0 < contact.contact_area
+    True
+    """
+    array = _library.height_map(height)
+    shape = np.shape(height)
+    lx, ly = _library.lengths(array.shape, lx, ly)
+    free = _library.flag_of_boundary(boundary)
+    if free and array.shape[0] == 1:
+        raise ValueError("boundary = 'free': a line contact has no finite displacement in free"
+                         " space: must be 'periodic'")
+    modulus = positive("modulus", modulus)
+    choice("potential", potential, POTENTIALS)
+    energy = number("energy", energy, 0.0)
+    range = positive("range", range)
+    tolerance = positive("tolerance", tolerance)
+    if int(max_iterations) != max_iterations or max_iterations < 1:
+        raise ValueError(f"max_iterations = {max_iterations}: must be a positive integer")
+    thesis = choice("method", method, ("fast", "thesis")) == "thesis"
+    if thesis and free:
+        raise ValueError("method = 'thesis': needs boundary = 'periodic'; 'fast' serves both")
+    top = float(array.max())
+    control = exactly_one(pressure=pressure, force=force, displacement=displacement)
+    load = number(control, {"pressure": pressure, "force": force,
+                            "displacement": displacement}[control])  # type: ignore[arg-type]
+    if control == "displacement" and not free and load >= top - float(array.mean()):
+        raise ValueError(
+            f"displacement = {displacement}: must be below {top - float(array.mean()):g} m, the"
+            " mean gap at first touch: beyond it the pressure of a periodic contact is not"
+            " determined")
+    if control == "force":
+        load /= lx * ly
+
+    traction, gap, attraction = (np.zeros_like(array) for _ in "pga")
+    level = 0.0
+    if isinstance(start, AdhesiveNormalContact):
+        if start.gap.shape != shape:
+            raise ValueError(f"start: has shape {start.gap.shape}: must be {shape}")
+        traction[...] = start.pressure.reshape(array.shape)
+        gap[...] = start.gap.reshape(array.shape)
+        level = start.displacement - top
+        origin = 2
+    elif isinstance(start, str):
+        origin = STARTS.index(choice("start", start, STARTS))
+    else:
+        raise ValueError(f"start: is of type {type(start).__name__}: must be one of "
+                         f"{', '.join(map(repr, STARTS))} or an AdhesiveNormalContact")
+    level, stuck, iterations, ffts, residual, seconds, converged, reason = _solve(
+        array.T, traction.T, gap.T, attraction.T, lx, ly, free, modulus, potential, energy, range,
+        int(control == "displacement"), load, origin, int(thesis), tolerance, int(max_iterations),
+        level)
+    mean = float(traction.mean())
+    displaced = gap + array + level
+    result = AdhesiveNormalContact(
+        traction.reshape(shape), gap.reshape(shape), displaced.reshape(shape), mean,
+        mean * lx * ly, float(level) + top, float(np.count_nonzero(gap <= 0.0) / gap.size),
+        int(iterations), int(ffts), float(residual), float(seconds), bool(converged),
+        reason.decode().strip(), attraction.reshape(shape), float(stuck),
+        0.5 * float(np.vdot(traction, displaced)) * lx * ly / array.size)
+    if not result.converged:
+        raise NotConverged(
+            f"the adhesive contact did not converge: {result.reason}; residual"
+            f" {result.residual:.2e} after {result.iterations} iterations, tolerance"
+            f" {tolerance:.2e}", result)
+    return result

@@ -1,0 +1,229 @@
+"""Adhesive contact on numpy arrays, against theory and against the program."""
+
+import signal
+import subprocess
+
+import numpy as np
+import pytest
+import viscoelastic_case as vc
+
+import asperity
+from asperity.theory import dmt, jkr, maugis
+
+RADIUS, MODULUS, ENERGY = 1e-4, 4e6, 0.05
+#: (R w^2/E*^2)^(1/3): the range of Tabor parameter 1
+LENGTH = (RADIUS * ENERGY**2 / MODULUS**2) ** (1 / 3)
+SIDE = 40e-6
+
+
+def sphere(n, lx=SIDE):
+    return asperity.surface.shape("paraboloid", n, lx=lx, radius=RADIUS, boundary="free")
+
+
+def press(n, lx=SIDE, **given):
+    given = {"energy": ENERGY, "boundary": "free", "potential": "maugis_dugdale"} | given
+    return asperity.solve_adhesive(sphere(n, lx), lx, None, MODULUS, **given)
+
+
+def wavy(nx=48, ny=40):
+    return asperity.surface.self_affine(nx, ny, 40e-6, 33e-6, wavelength_long=20e-6,
+                                        wavelength_short=5e-6, rms_height=0.25e-6, seed=4)
+
+
+def radius_of(contact, lx=SIDE):
+    return np.sqrt(contact.contact_area * lx**2 / np.pi)
+
+
+@pytest.mark.parametrize(("tabor", "side"), [(0.1, 64e-6), (0.3, 44e-6), (0.7, 40e-6)])
+def test_maugis(tabor, side):
+    contact = press(128, side, range=LENGTH / tabor, force=2e-5)
+    exact = maugis(RADIUS, MODULUS, ENERGY, force=2e-5, range=LENGTH / tabor)
+    # Some 20 cells a radius; the count of cells is good to a third of one.
+    assert radius_of(contact, side) == pytest.approx(exact.contact_radius, rel=0.015)
+    assert contact.force == pytest.approx(2e-5, rel=1e-5)
+    assert contact.displacement == pytest.approx(exact.approach, abs=0.03 * LENGTH)
+
+
+def test_long_range_is_dmt():
+    side, length = 130e-6, LENGTH / 0.02
+    contact = press(180, side, range=length, force=2e-5)
+    exact = dmt(RADIUS, MODULUS, ENERGY, force=2e-5)
+    # Tabor 0.02: Maugis's radius is 1.5 % above DMT's.
+    assert radius_of(contact, side) == pytest.approx(exact.contact_radius, rel=0.03)
+
+
+def test_short_range_is_jkr_and_converges():
+    exact = jkr(RADIUS, MODULUS, ENERGY, force=2e-5)
+    errors = []
+    for tabor in (1.0, 3.0):
+        contact = press(128, range=LENGTH / tabor, potential="exponential", force=2e-5)
+        errors.append(abs(contact.displacement / exact.approach - 1))
+    assert errors[1] < 0.5 * errors[0]
+    assert errors[1] < 0.05
+    assert radius_of(contact) == pytest.approx(exact.contact_radius, rel=0.03)
+
+
+@pytest.mark.parametrize("potential", ["exponential", "gauss", "maugis_dugdale"])
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_conditions_recomputed(potential, boundary):
+    height, z0 = wavy(), 0.4e-6
+    contact = asperity.solve_adhesive(
+        height, 40e-6, 33e-6, MODULUS, potential=potential, energy=0.01, range=z0, pressure=2e4,
+        boundary=boundary, tolerance=1e-8)
+    x = contact.gap / z0
+    slope = {"exponential": np.exp(-x), "gauss": 2 * x * np.exp(-x**2),
+             "maugis_dugdale": (x < 1.0) * 1.0}[potential] * 0.01 / z0
+    np.testing.assert_allclose(contact.adhesive_pressure, -slope, atol=1e-9)
+    wall = contact.pressure + slope
+    assert contact.gap.min() == 0.0
+    assert np.abs(np.minimum(x, wall * z0 / 0.01)).max() < 1e-7
+    assert 0.0 < contact.contact_area < 1.0
+    assert contact.contact_area == np.mean(contact.gap == 0.0)
+    assert contact.mean_pressure == pytest.approx(2e4, rel=1e-6)
+    # The displacement is that of the pressure.
+    if boundary == "periodic":
+        ny, nx = height.shape
+        q = 2 * np.pi * np.hypot(np.fft.fftfreq(ny, 33e-6 / ny)[:, None],
+                                 np.fft.rfftfreq(nx, 40e-6 / nx)[None, :])
+        q[0, 0] = np.inf
+        u = np.fft.irfft2(2 / (MODULUS * q) * np.fft.rfft2(contact.pressure), s=(ny, nx))
+        np.testing.assert_allclose(contact.displacement_z, u, atol=1e-7 * z0)
+        energy = 0.5 * (contact.pressure * u).sum() * 40e-6 * 33e-6 / (nx * ny)
+        assert contact.energy_elastic == pytest.approx(energy, rel=1e-6)
+
+
+def test_controls_agree_and_force_is_the_derivative_of_the_energy():
+    pressed = press(48, range=LENGTH, potential="exponential", force=1e-5, tolerance=1e-9)
+    driven = press(48, range=LENGTH, potential="exponential", tolerance=1e-9,
+                   displacement=pressed.displacement)
+    assert driven.force == pytest.approx(1e-5, rel=1e-6)
+    step = 2e-10
+    ends = [press(48, range=LENGTH, potential="exponential", tolerance=1e-9, start=driven,
+                  displacement=pressed.displacement + sign * step) for sign in (-1, 1)]
+    energies = [end.energy_elastic + end.energy_adhesive for end in ends]
+    assert (energies[1] - energies[0]) / (2 * step) == pytest.approx(driven.force, rel=2e-3)
+
+
+def test_start_matters():
+    height = asperity.surface.shape("hexagonal_wave", 48, 27, lx=40e-6, ly=40e-6 / 3**0.5,
+                                    amplitude=1e-6, wavelength=40e-6)
+    given = {"energy": ENERGY, "range": 0.1e-6, "pressure": 0.0}
+    apart = asperity.solve_adhesive(height, 40e-6, 40e-6 / 3**0.5, MODULUS, **given)
+    whole = asperity.solve_adhesive(height, 40e-6, 40e-6 / 3**0.5, MODULUS, start="full_contact",
+                                    **given)
+    assert 0 < apart.contact_area < whole.contact_area == 1.0
+    again = asperity.solve_adhesive(height, 40e-6, 40e-6 / 3**0.5, MODULUS, start=whole, **given)
+    assert again.iterations == 0
+    assert again.contact_area == 1.0
+
+
+def test_pulled_and_detached():
+    held = press(48, range=0.3e-6, potential="exponential", force=-1e-5)
+    assert held.contact_area > 0
+    with pytest.raises(asperity.NotConverged, match="detached") as caught:
+        press(48, range=0.3e-6, potential="exponential", force=-4e-5, start=held)
+    assert caught.value.result.reason == "detached"
+    assert np.isfinite(caught.value.result.pressure).all()
+
+
+def test_no_energy_is_no_adhesion():
+    given = {"pressure": 3e4, "tolerance": 1e-9}
+    bare = asperity.solve_normal(wavy(), 40e-6, 33e-6, MODULUS, **given)
+    zero = asperity.solve_adhesive(wavy(), 40e-6, 33e-6, MODULUS, energy=0.0, range=1e-7, **given)
+    np.testing.assert_allclose(zero.pressure, bare.pressure, atol=1e-4 * bare.pressure.max())
+    assert zero.energy_adhesive == 0.0
+
+
+def test_methods_memory_orders_and_lines():
+    given = {"energy": 0.01, "range": 0.4e-6, "pressure": 2e4, "tolerance": 1e-8}
+    fast = asperity.solve_adhesive(wavy(), 40e-6, 33e-6, MODULUS, **given)
+    other = asperity.solve_adhesive(np.asfortranarray(wavy()), 40e-6, 33e-6, MODULUS,
+                                    method="thesis", **given)
+    np.testing.assert_allclose(fast.pressure, other.pressure, atol=1e-5 * fast.pressure.max())
+    line = asperity.solve_adhesive(wavy()[0], 40e-6, None, MODULUS, **given)
+    assert line.pressure.shape == line.adhesive_pressure.shape == (48,)
+
+
+@pytest.mark.parametrize(("given", "message"), [
+    ({"energy": -1.0}, "energy = -1.0"),
+    ({"range": 0.0}, "range = 0.0"),
+    ({"potential": "morse"}, "potential = 'morse'"),
+    ({"start": "middle"}, "start = 'middle'"),
+    ({"start": 3}, "start: is of type int"),
+    ({"force": 1.0}, "pressure, force given"),
+    ({"pressure": float("nan")}, "pressure = nan"),
+    ({"method": "thesis", "boundary": "free"}, "method = 'thesis'"),
+    ({"max_iterations": 0}, "max_iterations = 0"),
+    ({"pressure": None, "displacement": 1.0}, "displacement = 1.0"),
+])
+def test_faults(given, message):
+    given = {"energy": 0.01, "range": 1e-7, "pressure": 1e4} | given
+    with pytest.raises(ValueError, match=message):
+        asperity.solve_adhesive(wavy(), 40e-6, 33e-6, MODULUS, **given)
+
+
+DETACHES = """
+&grid nx = 48, ny = 44, lx = 40e-6, ly = 38e-6, boundary = 'free' /
+&surface shape = 'paraboloid', radius = 1e-4 /
+&material shear_modulus = 1e6 /
+&adhesion potential = 'exponential', energy = 0.05, range = 0.3e-6 /
+&phase force = 1e-5 /
+&phase force = -1e-5 /
+&phase force = -4e-5 /
+&phase force = 1e-5 /
+"""
+
+
+def test_program_tells_detachment(program, tmp_path):
+    case = tmp_path / "pulled.nml"
+    case.write_text(DETACHES)
+    done = subprocess.run([program, "run", str(case), "--quiet"], capture_output=True, text=True)
+    assert done.returncode == 4
+    assert "detached" in done.stderr
+    result = asperity.open(case.with_suffix(".h5"))
+    assert not result.finished
+    assert list(result.history["force"][:2]) == pytest.approx([1e-5, -1e-5], rel=1e-5)
+    assert (result.history["contact_area"][:2] > 0).all()
+    assert len(result.history["force"]) <= 3
+    # The same state through the library.
+    first = asperity.solve_adhesive(sphere_map(), 40e-6, 38e-6, MODULUS, energy=ENERGY,
+                                    range=0.3e-6, force=1e-5, boundary="free")
+    assert first.displacement == pytest.approx(result.history["displacement"][0], rel=1e-9)
+
+
+def sphere_map():
+    return asperity.surface.shape("paraboloid", 48, 44, lx=40e-6, ly=38e-6, radius=RADIUS,
+                                  boundary="free")
+
+
+RESTARTED = """
+&grid nx = 48, ny = 44, lx = 40e-6, ly = 38e-6, boundary = '{boundary}' /
+&surface shape = 'paraboloid', radius = 1e-4 /
+&material shear_modulus = 0.5e6, prony_g = 1e6, prony_tau = 0.02 /
+&adhesion potential = 'exponential', energy = 0.02, range = 0.4e-6 /
+&phase displacement = 0.1e-6, duration = 0.1, steps = 60, ramp = 'linear'{velocity} /
+&phase displacement = -0.4e-6, duration = 0.1, steps = 60, ramp = 'linear'{velocity} /
+"""
+
+
+@pytest.mark.parametrize(("boundary", "velocity"), [
+    ("free", ""), ("periodic", ", velocity_x = 3e-5, velocity_y = 1e-5")])
+def test_restart_gives_the_same_numbers(program, tmp_path, boundary, velocity):
+    whole, parts = tmp_path / "whole.nml", tmp_path / "parts.nml"
+    for case in (whole, parts):
+        case.write_text(RESTARTED.format(boundary=boundary, velocity=velocity))
+    assert vc.run(program, whole).returncode == 0
+    process = vc.start(program, parts)
+    vc.wait_for_rows(process, parts.with_suffix(".h5"), 20)
+    process.send_signal(signal.SIGTERM)
+    process.communicate(timeout=60)
+    assert process.returncode == 128 + signal.SIGTERM
+    stopped = len(asperity.open(parts.with_suffix(".h5")).history["step"])
+    assert 20 <= stopped < 121
+    assert vc.run(program, parts, "--restart").returncode == 0
+    one, other = (asperity.open(case.with_suffix(".h5")) for case in (whole, parts))
+    assert len(other.history["step"]) == 121
+    for name in one.history:
+        if name != "seconds":
+            np.testing.assert_array_equal(one.history[name], other.history[name], err_msg=name)
+    np.testing.assert_array_equal(one.snapshots[-1].pressure, other.snapshots[-1].pressure)
