@@ -26,6 +26,7 @@ program main
    use test_simulation, only : run_simulation
    use test_simulation_adhesion, only : run_simulation_adhesion
    use test_simulation_sliding, only : run_simulation_sliding
+   use test_simulation_friction, only : run_simulation_friction
    use test_normal_invariance, only : run_normal_invariance
    use test_normal_limits, only : run_normal_limits
    implicit none
@@ -50,6 +51,7 @@ program main
    if (wanted('checkpoint')) call run_checkpoint()
    if (wanted('simulation')) call run_simulation()
    if (wanted('simulation_sliding')) call run_simulation_sliding()
+   if (wanted('simulation_friction')) call run_simulation_friction()
    if (wanted('simulation_adhesion')) call run_simulation_adhesion()
    if (wanted('friction_law')) call run_friction_law()
    if (wanted('friction_cg')) call run_friction_cg()

@@ -1,0 +1,198 @@
+!> Tests of the step loop with friction: Mindlin's contact, energy books, bounds, sums, stick and slip.
+module test_simulation_friction
+   use case_input, only : parse_case
+   use case_settings, only : case_type
+   use check, only : begin_suite, check_close, check_no_error, check_that
+   use errors, only : error_type
+   use friction_law, only : largest_excess
+   use parallel, only : set_threads
+   use precision, only : dp, int8, pi
+   use simulation, only : new_simulation, simulation_type
+   use simulation_runs, only : check_books, check_same_rows, last, nl, record_type, run_case
+   use text_tools, only : exact_text
+   implicit none
+   private
+
+   public :: run_simulation_friction
+
+   !> A block with two arms, a mass on a periodic row of summits, driven obliquely.
+   character(*), parameter :: block = &
+      '&grid nx = 45, ny = 30, lx = 1.1e-3, ly = 0.8e-3 /'//nl// &
+      '&surface shape = ''paraboloid'', radius = 10e-3 /'//nl
+   character(*), parameter :: rubber = &
+      '&material poisson = 0.4, shear_modulus = 1e6, prony_g = 2e6, 1e6, prony_tau = 1e-4, 1e-3, '// &
+      'thickness = 1e-3, density = 2e4 /'//nl
+   character(*), parameter :: drive = &
+      '&phase pressure = 0.3e6, duration = 2e-4, steps = 4 /'//nl// &
+      '&phase velocity_x = 0.4, velocity_y = -0.15, duration = 1e-3, steps = 20 /'//nl
+
+contains
+
+   subroutine run_simulation_friction()
+      call begin_suite('simulation_friction')
+      call test_mindlin()
+      call test_books()
+      call test_frictionless_slope()
+      call test_bound()
+      call test_stick_and_slip()
+      call test_threads()
+   end subroutine run_simulation_friction
+
+   !> Mindlin's sphere, nu = 0: tangential force against the motion of the road, under way, back and
+   !> there again (Mindlin and Deresiewicz 1953).
+   subroutine test_mindlin()
+      real(dp), parameter :: g = 1e6_dp, radius = 10e-3_dp, a = 1e-3_dp, mu = 0.01_dp, v = 1e-3_dp
+      real(dp), parameter :: full = mu*a**2/radius     !! road's motion to full slip, m
+      type(record_type) :: record
+      real(dp) :: load, expected, top, x, worst
+      character(:), allocatable :: text
+      integer :: k
+
+      load = 8.0_dp*g*a**3/(3.0_dp*radius)
+      text = '&grid nx = 72, ny = 64, lx = 2.7e-3, ly = 2.4e-3, boundary = ''free'' /'//nl// &
+         '&surface shape = ''sphere'', radius = 10e-3 /'//nl// &
+         '&material poisson = 0, shear_modulus = 1e6 /'//nl// &
+         '&friction law = ''coulomb'', coefficient = 0.01, slope_effect = .false. /'//nl// &
+         '&phase force = '//exact_text(load)//' /'//nl// &
+         '&phase velocity_x = 1e-3, duration = '//exact_text(0.7_dp*full/v)//', steps = 4 /'//nl// &
+         '&phase velocity_x = -1e-3, duration = '//exact_text(1.0_dp*full/v)//', steps = 4 /'//nl// &
+         '&phase velocity_x = 1e-3, duration = '//exact_text(1.0_dp*full/v)//', steps = 4 /'//nl// &
+         '&solver tolerance = 1e-7 /'
+      call run_case(text, 'Mindlin', record)
+      top = loading(0.7_dp)
+      worst = 0.0_dp
+      do k = 1, last(record)
+         x = record%rows(k)%road_x/full
+         if (k <= 4) then
+            expected = loading(x)
+         else if (k <= 8) then
+            expected = top - 2.0_dp*loading((0.7_dp - x)/2.0_dp)
+         else
+            expected = top - 2.0_dp*loading(0.5_dp) + 2.0_dp*loading((x + 0.3_dp)/2.0_dp)
+         end if
+         worst = max(worst, abs(record%drag(1, k)/(mu*load) - expected))
+      end do
+      call check_close(worst, 0.0_dp, 2e-3_dp, 'Mindlin: force there, back and there again')
+      call check_close(record%drag(1, last(record)), record%drag(1, 4), 1e-3_dp*mu*load, &
+         'Mindlin: the loop closes')
+      call check_that(record%rows(8)%dissipated_friction > record%rows(4)%dissipated_friction, &
+         'Mindlin: slip on the way back is lost too')
+
+   contains
+
+      !> Force over the full one for a motion x of the road over that of full slip.
+      pure real(dp) function loading(x)
+         real(dp), intent(in) :: x
+
+         loading = 1.0_dp - (1.0_dp - x)**1.5_dp
+      end function loading
+
+   end subroutine test_mindlin
+
+   !> The books close with friction, viscoelasticity, inertia and slope, and without slope.
+   subroutine test_books()
+      type(record_type) :: record
+
+      call run_case(block//rubber//'&friction law = ''coulomb'', coefficient = 0.6 /'//nl//drive// &
+         '&solver tolerance = 1e-9 /', 'all together', record)
+      call check_books(record, 'all together', 1e-8_dp)
+      call check_that(record%rows(last(record))%dissipated_friction > 0.0_dp, 'friction loses energy')
+      call check_that(maxval(record%rows%energy_kinetic) > 0.0_dp, 'the mass moves')
+      ! With slope T holds -P grad H: the whole force is the sum of T.
+      call check_close(record%drag(1, last(record)), record%rows(last(record))%traction_x*0.88e-6_dp, &
+         1e-12_dp*maxval(abs(record%drag)), 'with slope: the sum of T only')
+      call run_case(block//rubber//'&friction law = ''coulomb'', coefficient = 0.6, '// &
+         'slope_effect = .false. /'//nl//drive//'&solver tolerance = 1e-9 /', 'no slope', record)
+      call check_books(record, 'no slope', 1e-8_dp)
+      associate (row => record%rows(last(record)))
+         call check_close(row%friction, dot_product([row%traction_x, row%traction_y], &
+            [0.4_dp, -0.15_dp]/hypot(0.4_dp, 0.15_dp))/row%pressure + row%friction_viscous, 1e-12_dp, &
+            'without slope: sum of T and of -P grad H, once')
+      end associate
+   end subroutine test_books
+
+   !> mu = 0 with slope: the tangential force is that of no friction.
+   subroutine test_frictionless_slope()
+      type(record_type) :: record
+
+      call run_case(block//rubber//'&friction law = ''coulomb'', coefficient = 0 /'//nl//drive// &
+         '&solver tolerance = 1e-8 /', 'mu = 0', record)
+      associate (row => record%rows(last(record)))
+         call check_close(row%friction, row%friction_viscous, 1e-12_dp, 'mu = 0: viscous friction only')
+         call check_close(row%dissipated_friction, 0.0_dp, 1e-12_dp*row%work_normal, 'mu = 0: none lost')
+      end associate
+   end subroutine test_frictionless_slope
+
+   !> Each row's traction lies within the bound of its pressure.
+   subroutine test_bound()
+      type(case_type) :: case
+      type(simulation_type) :: sim
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: p(:, :), tx(:, :), ty(:, :), none(:, :)
+      integer(int8), allocatable :: contact(:, :)
+      real(dp) :: worst
+
+      call parse_case(block//rubber//'&friction law = ''coulomb'', coefficient = 0.6, '// &
+         'slope_effect = .false. /'//nl//drive//'&solver tolerance = 1e-6 /', 'bound.nml', case, error)
+      call check_no_error(error, 'bound: input')
+      if (allocated(error)) return
+      call new_simulation(sim, case, error)
+      call check_no_error(error, 'bound: simulation')
+      if (allocated(error)) return
+      allocate (none(1, 1), source=0.0_dp)
+      worst = 0.0_dp
+      do while (.not. sim%finished)
+         call sim%advance(error)
+         if (allocated(error)) exit
+         call sim%field('pressure', p)
+         call sim%field('traction_x', tx)
+         call sim%field('traction_y', ty)
+         call sim%contact_states(contact)
+         worst = max(worst, largest_excess(sim%tangential%law, p, none, none, contact, tx, ty) &
+            /maxval(0.6_dp*p))
+      end do
+      call check_no_error(error, 'bound: steps')
+      call check_that(count(contact == 2_int8) > 0, 'bound: points slip')
+      call check_close(worst, 0.0_dp, 1e-6_dp, 'traction within the bound of its pressure in each row')
+      call sim%destroy()
+   end subroutine test_bound
+
+   !> All sticks under a huge coefficient, all slips after a long way: friction is then the coefficient.
+   subroutine test_stick_and_slip()
+      type(record_type) :: record
+
+      call run_case(block//'&material poisson = 0.4, shear_modulus = 1e6, thickness = 1e-3 /'//nl// &
+         '&friction law = ''coulomb'', coefficient = 1e3, slope_effect = .false. /'//nl//drive// &
+         '&solver tolerance = 1e-7 /', 'full stick', record)
+      associate (row => record%rows(last(record)))
+         call check_close(row%stick_area, row%contact_area, 1e-12_dp, 'full stick')
+         call check_close(row%dissipated_friction, 0.0_dp, 1e-9_dp*row%work_tangential, &
+            'full stick loses nothing')
+      end associate
+      call run_case(block//'&material poisson = 0.4, shear_modulus = 3e6, thickness = 1e-3 /'//nl// &
+         '&friction law = ''coulomb'', coefficient = 0.2, slope_effect = .false. /'//nl//drive// &
+         '&solver tolerance = 1e-7 /', 'full slip', record)
+      associate (row => record%rows(last(record)))
+         call check_close(row%stick_area, 0.0_dp, 1e-12_dp, 'full slip: nothing sticks')
+         call check_close(hypot(row%traction_x, row%traction_y), 0.2_dp*row%pressure, &
+            1e-4_dp*row%pressure, 'full slip: the coefficient')
+         call check_close(row%traction_y/row%traction_x, -0.15_dp/0.4_dp, 1e-3_dp, &
+            'full slip: along the road''s motion')
+      end associate
+   end subroutine test_stick_and_slip
+
+   !> The result does not depend on the number of threads.
+   subroutine test_threads()
+      type(record_type) :: one, two
+      character(:), allocatable :: text
+
+      text = block//rubber//'&friction law = ''coulomb'', coefficient = 0.6 /'//nl//drive// &
+         '&solver tolerance = 1e-6 /'
+      call set_threads(1)
+      call run_case(text, 'one thread', one)
+      call set_threads(2)
+      call run_case(text, 'two threads', two)
+      call check_same_rows(one, two, 1e-12_dp, 'threads')
+   end subroutine test_threads
+
+end module test_simulation_friction
