@@ -29,6 +29,7 @@ program main
    use test_simulation_friction, only : run_simulation_friction
    use test_normal_invariance, only : run_normal_invariance
    use test_normal_limits, only : run_normal_limits
+   use test_facade, only : run_facade
    implicit none
 
    ! check writer FILE ROWS COMPRESSION [restart]: a run for tests that kill it, and no test.
@@ -65,6 +66,7 @@ program main
       call run_normal_invariance()
    end if
    if (wanted('adhesion_free')) call run_adhesion_free()
+   if (wanted('facade')) call run_facade()
    call finish()
 
 contains
