@@ -1,14 +1,10 @@
 """Prony series against closed forms, the Volterra identity in Laplace space, and known data."""
 
-import doctest
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import asperity._check
-import asperity.material
 from asperity.material import WLF, Prony, master_curve
 
 
@@ -18,12 +14,6 @@ def laplace_product(material, s):
     theta, compliance = material.retardation_times, material.retardation_compliances
     creep = 1 / material.instantaneous_modulus + np.sum(compliance / (1 + s * theta))
     return stiffness * (creep + material.fluidity / s)
-
-
-@pytest.mark.parametrize("module", [asperity.material, asperity._check])
-def test_examples_in_the_docstrings(module):
-    failed, tried = doctest.testmod(module)
-    assert tried > 0 and failed == 0
 
 
 def test_zener_creep_in_closed_form():

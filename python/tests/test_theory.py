@@ -1,29 +1,20 @@
 """Each known solution against an independent quadrature, model or published value."""
 
-import doctest
-import importlib
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
-from scipy.special import ellipk
+from scipy.special import ellipk, erf
 
 from asperity import theory
 from asperity.material import Prony
 
 # near round-off the quadratures warn that they cannot do better
 pytestmark = pytest.mark.filterwarnings("ignore::scipy.integrate.IntegrationWarning")
-
-
-@pytest.mark.parametrize(
-    "name", ["hertzian", "wavy", "adhesive", "tangential", "viscoelastic", "rough"]
-)
-def test_examples_in_the_docstrings(name):
-    failed, tried = doctest.testmod(importlib.import_module("asperity.theory." + name))
-    assert tried > 0 and failed == 0
 
 
 def boussinesq(stress, end, r, modulus, breaks=()):
@@ -39,7 +30,7 @@ def boussinesq(stress, end, r, modulus, breaks=()):
 
     points = sorted({0.0, math.pi / 2} | {math.asin(b / end) for b in (*breaks, r) if b < end})
     total = 0.0
-    for low, high in zip(points[:-1], points[1:], strict=True):
+    for low, high in pairwise(points):
         total += quad(integrand, low, high, epsabs=0, epsrel=1e-10, limit=200)[0]
     return 4 / (math.pi * modulus) * total
 
@@ -52,7 +43,7 @@ def axisymmetric_force(stress, end, breaks=()):
     points = sorted({0.0, math.pi / 2} | {math.asin(b / end) for b in breaks})
     return sum(
         quad(integrand, low, high, epsabs=0, epsrel=1e-11, limit=200)[0]
-        for low, high in zip(points[:-1], points[1:], strict=True)
+        for low, high in pairwise(points)
     )
 
 
@@ -218,6 +209,18 @@ def test_maugis_between_its_limits():
     assert loose.pull_off_force == pytest.approx(hard.pull_off_force, rel=1e-3)
 
 
+@pytest.mark.parametrize("lam", 10.0 ** np.arange(-9, 10, 3))
+def test_maugis_there_and_back(lam):
+    unit = math.pi * 0.05 * 2e-3
+    for force in (-1.4999, -1.2, 0.0, 1.0, 1e6):
+        c = theory.maugis(2e-3, 3e6, 0.05, force=force * unit, maugis_parameter=lam)
+        same = theory.maugis(
+            2e-3, 3e6, 0.05, contact_radius=c.contact_radius, maugis_parameter=lam
+        )
+        assert same.force / unit == pytest.approx(force, rel=1e-10, abs=1e-10)
+        assert -2.0 <= c.pull_off_force / unit <= -1.5 * (1 - 1e-12)
+
+
 def test_ways_to_give_the_range_agree():
     r, e, w, h = 1e-3, 1e6, 0.05, 1e-6
     tabor = theory.tabor_parameter(r, e, w, h)
@@ -295,8 +298,8 @@ def test_lee_radok_thesis_case():
     c = theory.lee_radok(1e-3, 2e-5, solid, t)
     creep = 1e-6 + 1e-5 * (1 - np.exp(-t))
     np.testing.assert_allclose(c.contact_radius**3, 3 / 16 * 1e-3 * 2e-5 * creep, rtol=1e-12)
-    radii = c.contact_radius[[0, 2, 3]] * 1e3
-    assert radii == pytest.approx([0.015536, 0.030167, 0.034552], abs=6e-7)
+    in_mm = c.contact_radius[[0, 2, 3]] * 1e3
+    assert in_mm == pytest.approx([0.015536, 0.030167, 0.034552], abs=6e-7)
 
 
 def test_lee_radok_is_hertz_for_an_elastic_solid():
@@ -428,6 +431,18 @@ def test_hunter_limits():
     assert 0 < fast.friction < 1e-6
 
 
+@pytest.mark.parametrize("velocity", 10.0 ** np.arange(-12, 13, 3))
+@pytest.mark.parametrize("ratio", [1e-6, 1.0, 1e3])
+def test_hunter_at_any_speed(velocity, ratio):
+    c = theory.hunter(0.01, 50.0, velocity, Prony(1e6, [1e6 * ratio], [1e-2]))
+    nodes, weights = np.polynomial.legendre.leggauss(300)
+    angle = (nodes + 1) * np.pi / 2
+    p = c.pressure(c.centre + c.half_width * np.cos(angle))
+    width = weights * np.pi / 2 * c.half_width * np.sin(angle)
+    assert np.sum(width * p) == pytest.approx(50.0, rel=1e-6)
+    assert 0 < c.friction < c.leading_edge / 0.01  # the resultant lies within the contact
+
+
 def test_thesis_cylinder():
     solid = Prony(0.333e6, [3e6], [1.11e-3])
     c = theory.hunter(0.01, 100.0, 0.11, solid)
@@ -538,6 +553,8 @@ def test_persson_is_elastic_when_very_slow_or_very_fast(velocity, modulus):
     assert float(found.contact_area) == pytest.approx(float(expected), rel=1e-8)
     assert float(found.friction) == pytest.approx(0.0, abs=1e-6)
     assert np.all(np.diff(found.area) <= 1e-15) and found.area[0] <= 1.0
+    fluid = theory.persson(*PSD, Prony(0.0, [1e6], [1.0]), 1.0, 0.0)
+    assert float(fluid.contact_area) == 1.0 and float(fluid.friction) == 0.0
 
 
 @pytest.mark.parametrize(("velocity", "gamma"), [(0.01, 1.0), (1.0, 0.45), (100.0, 0.0)])
@@ -557,8 +574,6 @@ def test_persson_against_direct_quadrature(velocity, gamma):
     modulus = np.array([WIDE.complex_modulus(a * velocity * cosine) for a in q]) * 2 / (1 - nu)
     f = q**3 * c * ((np.abs(modulus) ** 2) @ w) / 8 / p**2 * q
     g = np.concatenate([[0], np.cumsum((f[1:] + f[:-1]) / 2 * step)])
-    from scipy.special import erf
-
     with np.errstate(divide="ignore"):
         area = erf(0.5 / np.sqrt(g))
     s = gamma + (1 - gamma) * area**2
@@ -599,8 +614,6 @@ def test_persson_at_high_pressure_is_full_contact(times):
     else:
         found = theory.persson_speed_step(k, psd, WIDE, p, 0.0, v, times)
     variance = 0.5 * np.sum(np.abs(full.pressures) ** 2, axis=-1)
-    from scipy.special import erf
-
     np.testing.assert_allclose(found.contact_area, erf(p / np.sqrt(2 * variance)), rtol=1e-5)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -67,7 +68,7 @@ def _spectrum(wavenumber: ArrayLike, psd: ArrayLike) -> _Spectrum:
         )
     knots = np.log(k)
     edges = [knots[:1]]
-    for low, high in zip(knots[:-1], knots[1:], strict=True):
+    for low, high in pairwise(knots):
         edges.append(np.linspace(low, high, max(1, math.ceil((high - low) / 0.5)) + 1)[1:])
     edge = np.concatenate(edges)
     # where E* is far above p, the area falls from 1 close to the first wavenumber
@@ -235,6 +236,12 @@ def _squared_modulus(material: Prony, a: FloatArray) -> FloatArray:
     return material.g_inf**2 + 2.0 * np.sum(material.g * (material.g_inf + shared) * d, axis=-1)
 
 
+def _area_of(variance: FloatArray) -> FloatArray:
+    """Return the area fraction erf(1/(2 sqrt(g))), 1 where g = 0."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(erf(0.5 / np.sqrt(variance)))
+
+
 def _finish(
     s: _Spectrum,
     squared: FloatArray,
@@ -244,8 +251,7 @@ def _finish(
 ) -> PerssonContact:
     """Return the contact from the angular means of |E*|^2 and cos(phi) Im E*, at the points."""
     variance = s.running(s.psd * s.k**3 * squared) / (16.0 * math.pi * pressure**2)
-    with np.errstate(divide="ignore"):
-        area = erf(0.5 / np.sqrt(variance))
+    area = _area_of(variance)
     reduced = gamma + (1.0 - gamma) * area**2
     # (1/2) int q^3 C S P int_0^2pi cos(phi) Im E* dphi/p, with C = Phi/(4 pi^2)
     integrand = s.psd * s.k**3 * reduced * area * loss / (4.0 * math.pi * pressure)
@@ -254,16 +260,16 @@ def _finish(
     start = np.sum((s.half[:, None] * _WEIGHTS * s.k * integrand)[..., :-1, :], axis=(-2, -1))
     moment = s.psd * s.k**4 * squared
     whole = np.sum(s.half[:, None] * _WEIGHTS * moment, axis=(-2, -1))
-    end_area = erf(0.5 / np.sqrt(whole / (16.0 * math.pi * pressure**2)))
+    end_area = _area_of(whole / (16.0 * math.pi * pressure**2))
     lead = area.shape[:-2]
     edge = math.exp(math.log(s.k[-1, -1]) + s.half[-1] * (1.0 - _NODES[-1]))
     join = np.concatenate
     friction = start + last
     return PerssonContact(
         np.append(s.k.ravel(), edge),
-        join([area.reshape(*lead, -1), np.asarray(end_area)[..., None]], axis=-1),
+        join([area.reshape(*lead, -1), end_area[..., None]], axis=-1),
         join([running.reshape(*lead, -1), np.asarray(friction)[..., None]], axis=-1),
-        np.asarray(end_area),
+        end_area,
         np.asarray(friction),
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -61,7 +62,7 @@ class MindlinContact:
 def _segments(levels: tuple[float, ...] | list[float]) -> list[tuple[float, float]]:
     """Return (step, Masing factor) of the branches through the remembered turning points."""
     steps = [(levels[0], 1.0)]
-    steps += [(b - a, 2.0) for a, b in zip(levels[:-1], levels[1:], strict=True)]
+    steps += [(b - a, 2.0) for a, b in pairwise(levels)]
     return steps
 
 

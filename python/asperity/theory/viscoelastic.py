@@ -313,6 +313,22 @@ class HunterContact:
         return float(np.sum(width * self.pressure(x) * (mu - slope) / (1.0 + mu * slope)))
 
 
+def _scaled_bessel(x: float) -> tuple[FloatArray, FloatArray]:
+    """Return exp(-x) I_n(x) and exp(x) K_n(x), n = 0, 1, 2.
+
+    Beyond 1e6 by three terms of the asymptotic series; SciPy gives up at about 1e9.
+    """
+    order = np.arange(3)
+    if x < 1e6:
+        return ive(order, x), kve(order, x)
+    correction = (4.0 * order**2 - 1.0) / (8.0 * x)
+    second = 0.5 * correction * (4.0 * order**2 - 9.0) / (8.0 * x)
+    return (
+        (1.0 - correction + second) / math.sqrt(2.0 * math.pi * x),
+        (1.0 + correction + second) * math.sqrt(0.5 * math.pi / x),
+    )
+
+
 def hunter(
     radius: float,
     load: float,
@@ -380,8 +396,7 @@ def hunter(
     stiffness = math.pi * relaxed / (2.0 * r * (1.0 - nu))
 
     def bessel(h: float) -> tuple[FloatArray, FloatArray, float, float]:
-        order = np.arange(3)
-        i, k = ive(order, h / l_r), kve(order, h / l_c)
+        i, k = _scaled_bessel(h / l_r)[0], _scaled_bessel(h / l_c)[1]
         d = i[0] * k[1] + i[1] * k[0]
         return i, k, d, (i[2] * k[1] + i[1] * k[2]) / d
 
