@@ -36,6 +36,7 @@ contains
       call test_bound()
       call test_stick_and_slip()
       call test_threads()
+      call test_stick_slip()
    end subroutine run_simulation_friction
 
    !> Mindlin's sphere, nu = 0: tangential force against the motion of the road, under way, back and
@@ -194,5 +195,38 @@ contains
       call run_case(text, 'two threads', two)
       call check_same_rows(one, two, 1e-12_dp, 'threads')
    end subroutine test_threads
+
+   !> A thick elastic block on a short wave in one pass a step: the scheme sticks and slips in turn,
+   !> which is reported once. A mass ends it; a smooth case is silent.
+   subroutine test_stick_slip()
+      character(*), parameter :: report = 'numerical stick-slip'
+      type(record_type) :: record
+
+      call slide('0', record)
+      call check_that(index(record%warnings, report) > 0, 'numerical stick-slip is reported')
+      call check_that(index(record%warnings, report) == index(record%warnings, report, back=.true.), &
+         'and once')
+      call slide('30', record)
+      call check_that(index(record%warnings, report) == 0, 'a mass ends numerical stick-slip')
+      call run_case(block//rubber//'&friction law = ''coulomb'', coefficient = 0.6 /'//nl//drive, &
+         'smooth', record)
+      call check_that(index(record%warnings, report) == 0, 'no stick-slip in a smooth case')
+
+   contains
+
+      !> The block with a density, kg/m3.
+      subroutine slide(density, record)
+         character(*), intent(in) :: density
+         type(record_type), intent(out) :: record
+
+         call run_case('&grid nx = 48, ny = 1, lx = 1e-3, ly = 1e-3 /'//nl// &
+            '&surface shape = ''sine'', amplitude = 3e-5, wavelength = 0.5e-3 /'//nl// &
+            '&material poisson = 0.5, shear_modulus = 1e6, thickness = 2e-2, density = '//density// &
+            ' /'//nl//'&friction law = ''coulomb'', coefficient = 0.5 /'//nl// &
+            '&phase pressure = 0.15e6 /'//nl//'&phase velocity_x = 1, duration = 3e-3, steps = 60 /' &
+            //nl//'&solver passes = 1 /', 'stick-slip, density '//density, record)
+      end subroutine slide
+
+   end subroutine test_stick_slip
 
 end module test_simulation_friction

@@ -24,6 +24,7 @@ module simulation
    use regular_grid, only : boundary_free, grid_type
    use schedule, only : next_row, planned_row_type, schedule_type
    use solver_result, only : solver_result_type
+   use stick_slip_watch, only : stick_slip_watch_type, watch_slip
    use surface, only : new_height
    use tangential_state, only : new_tangential_state, tangential_state_type
    use text_tools, only : to_text
@@ -62,6 +63,7 @@ module simulation
       type(interpolation_type), private :: road
       logical :: frictional = .false.               !! there is a friction law, and the road moves
       type(tangential_state_type) :: tangential
+      type(stick_slip_watch_type), private :: watch
       logical, private :: slides = .false.          !! some phase moves the road
       real(dp), allocatable, private :: settled(:, :)   !! pressure of the pass before, Pa
       integer, private :: edge = edge_clear         !! worst found at the edge of a free map
@@ -276,11 +278,33 @@ contains
       message = ''
       call look_at_edge(self%grid, self%side%adhesive, self%pressure, self%gap, &
          plan%road_x - self%row%road_x, plan%road_y - self%row%road_y, self%rms_height, self%edge, message)
+      call add_warning(self, plan, message)
+   end subroutine watch_edge
+
+   !> Warn where the scheme makes the block stick and slip in turn.
+   subroutine watch_stick_slip(self, plan, slip_speed)
+      type(simulation_type), intent(inout) :: self
+      type(planned_row_type), intent(in) :: plan
+      real(dp), intent(in) :: slip_speed
+      character(:), allocatable :: message
+
+      if (.not. plan%dt > 0.0_dp) return
+      call watch_slip(self%watch, slip_speed, hypot(plan%velocity_x, plan%velocity_y), &
+         self%case%solver%passes, self%case%material%density, message)
+      call add_warning(self, plan, message)
+   end subroutine watch_stick_slip
+
+   !> Add a line to the warnings, unless it is empty.
+   subroutine add_warning(self, plan, message)
+      type(simulation_type), intent(inout) :: self
+      type(planned_row_type), intent(in) :: plan
+      character(*), intent(in) :: message
+
       if (len(message) == 0) return
       if (len(self%warnings) > 0) self%warnings = self%warnings//new_line('a')
       self%warnings = self%warnings//'step '//to_text(self%schedule%row)//', t = '//to_text(plan%time)// &
          ' s: '//message
-   end subroutine watch_edge
+   end subroutine add_warning
 
    !> The material's coefficients for the step.
    subroutine begin_step(self, plan, error)
@@ -471,6 +495,7 @@ contains
       if (self%frictional) then
          outside = -sums(6:7)*self%grid%dx*self%grid%dy
          call add_friction(self, plan, rubbing, outside, force, row)
+         call watch_stick_slip(self, plan, row%sliding_speed)
       end if
       row%friction = 0.0_dp
       if (abs(row%force) > 0.0_dp) row%friction = dot_product(force, self%direction)/row%force

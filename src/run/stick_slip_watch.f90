@@ -1,0 +1,53 @@
+!> Looks for numerical stick-slip: a mean slip that jumps up and down from step to step.
+!>
+!> The true stick-slip of a sliding block takes many steps for each turn. Where the mean slip speed
+!> rises and falls in turn, step by step, by a good part of the road's speed, it is the scheme that
+!> swings (thesis, section 3.6): pressure and traction answer each other one pass late.
+module stick_slip_watch
+   use precision, only : dp
+   use text_tools, only : to_text
+   implicit none
+   private
+
+   public :: stick_slip_watch_type, watch_slip
+
+   integer, parameter :: turns_to_report = 6          !! alternations in a row
+   real(dp), parameter :: large = 0.1_dp              !! a change that counts, of the road's speed
+
+   !> What has been seen so far.
+   type :: stick_slip_watch_type
+      logical :: reported = .false.
+      real(dp) :: speed = 0.0_dp                      !! of the mean slip, m/s
+      real(dp) :: change = 0.0_dp                     !! of it in the step before, m/s
+      integer :: turns = 0
+   end type stick_slip_watch_type
+
+contains
+
+   !> Look at a step's mean slip; the message is left empty but once.
+   subroutine watch_slip(self, slip_speed, road_speed, passes, density, message)
+      type(stick_slip_watch_type), intent(inout) :: self
+      real(dp), intent(in) :: slip_speed              !! mean over the surface, m/s
+      real(dp), intent(in) :: road_speed              !! m/s, >= 0
+      integer, intent(in) :: passes                   !! at most, a step
+      real(dp), intent(in) :: density                 !! of the block, kg/m3; 0: no inertia
+      character(:), allocatable, intent(out) :: message
+      real(dp) :: change
+
+      message = ''
+      change = slip_speed - self%speed
+      if (min(abs(change), abs(self%change)) > large*road_speed .and. change*self%change < 0.0_dp) then
+         self%turns = self%turns + 1
+      else
+         self%turns = 0
+      end if
+      self%speed = slip_speed
+      self%change = change
+      if (self%reported .or. self%turns < turns_to_report) return
+      self%reported = .true.
+      message = 'the mean slip rises and falls from step to step: numerical stick-slip. Allow more '// &
+         'passes (now '//to_text(passes)//'); if that does not end it, give the block the smallest '// &
+         'density that does (now '//to_text(density)//' kg/m3)'
+   end subroutine watch_slip
+
+end module stick_slip_watch
