@@ -65,8 +65,13 @@ def test_ctrl_c_and_restart(case, tmp_path, monkeypatch):
         return outputs
 
     monkeypatch.setattr(runner, "_step", step_with_signal)
-    with pytest.raises(KeyboardInterrupt):
-        asperity.run(case, output=tmp_path / "parts.h5", threads=1)
+    # A shell starts background jobs with Ctrl-C ignored, and then Python does not raise.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            asperity.run(case, output=tmp_path / "parts.h5", threads=1)
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert done == [0, 1, 2, 3]
     stopped = asperity.open(tmp_path / "parts.h5")
     assert not stopped.finished
