@@ -12,7 +12,8 @@
 !> * each transform is done by one thread, so the results do not depend on their number.
 !>
 !> Memory: one field (two for a vector operator), doubled along x in free mode, and a quarter of a
-!> field (a whole one in free mode) for each symbol.
+!> field (a whole one in free mode) for each symbol. An operator made with `single` takes half of that,
+!> works in single precision (module row_column_single), and is used in the same way.
 module fft_conv
    use, intrinsic :: iso_c_binding, only : c_associated, c_double_complex, c_f_pointer, c_int, &
       c_loc, c_null_ptr, c_ptr, c_size_t
@@ -25,6 +26,7 @@ module fft_conv
    use parallel, only : global_sum, thread_count
    use precision, only : dp, int64
    use regular_grid, only : boundary_periodic, grid_type
+   use row_column_single, only : new_row_column_single, row_column_single_type
    use wisdom, only : planning_flag, save_wisdom
    implicit none
    private
@@ -56,8 +58,10 @@ module fft_conv
       integer :: components = 0             !! 1 scalar, 2 vector
       integer :: threads = 1                !! for parallel loops around forward_row, backward_row
       integer(int64) :: ffts = 0            !! real transforms done so far
-      !> Symbols over (mx my): (0:, 0:my/2, 1) or xx, yy, xy; zero beyond mx/2.
+      logical :: single = .false.           !! the transforms are in single precision
+      !> Symbols over (mx my): (0:, 0:my/2, 1) or xx, yy, xy; zero beyond mx/2. Not there if single.
       real(dp), allocatable :: symbol(:, :, :)
+      type(row_column_single_type), private :: low         !! does the work if single
       type(c_ptr), private :: spectrum_memory = c_null_ptr
       complex(dp), pointer, contiguous, private :: spectrum(:, :, :) => null()   !! whole blocks
       type(buffer_type), allocatable, private :: buffers(:)
@@ -82,78 +86,86 @@ module fft_conv
 contains
 
    !> The normal operator A_zz for G = 1, m/Pa.
-   subroutine new_normal_operator(self, grid, poisson, error)
+   subroutine new_normal_operator(self, grid, poisson, error, single)
       type(convolution_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: poisson
       type(error_type), allocatable, intent(out) :: error
+      logical, intent(in), optional :: single      !! work in single precision
 
-      call plan(self, grid%nx, grid%ny, grid%boundary, 1, error)
+      call plan(self, grid%nx, grid%ny, grid%boundary, 1, error, single)
       if (allocated(error)) return
       call normal_symbol(grid, poisson, self%mx, self%my, self%symbol(0:self%mx/2, :, 1))
-      call scale_symbol(self)
+      call finish_symbol(self)
    end subroutine new_normal_operator
 
    !> The tangential operator A_T for G = 1, m/Pa.
-   subroutine new_tangential_operator(self, grid, poisson, thickness, error)
+   subroutine new_tangential_operator(self, grid, poisson, thickness, error, single)
       type(convolution_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: poisson
       real(dp), intent(in) :: thickness        !! of the block, m: its mean mode in periodic mode
       type(error_type), allocatable, intent(out) :: error
+      logical, intent(in), optional :: single      !! work in single precision
 
-      call plan(self, grid%nx, grid%ny, grid%boundary, 2, error)
+      call plan(self, grid%nx, grid%ny, grid%boundary, 2, error, single)
       if (allocated(error)) return
       call tangential_symbol(grid, poisson, thickness, self%mx, self%my, &
          self%symbol(0:self%mx/2, :, 1), self%symbol(0:self%mx/2, :, 2), &
          self%symbol(0:self%mx/2, :, 3))
-      call scale_symbol(self)
+      call finish_symbol(self)
    end subroutine new_tangential_operator
 
    !> A periodic scalar operator from its symbol, even in both wave numbers.
-   subroutine new_symbol_operator(self, nx, ny, symbol, error)
+   subroutine new_symbol_operator(self, nx, ny, symbol, error, single)
       type(convolution_type), intent(out) :: self
       integer, intent(in) :: nx, ny
       real(dp), intent(in) :: symbol(0:, 0:)      !! (0:nx/2, 0:ny/2)
       type(error_type), allocatable, intent(out) :: error
+      logical, intent(in), optional :: single      !! work in single precision
 
-      call plan(self, nx, ny, boundary_periodic, 1, error)
+      call plan(self, nx, ny, boundary_periodic, 1, error, single)
       if (allocated(error)) return
       self%symbol(0:nx/2, :, 1) = symbol
-      call scale_symbol(self)
+      call finish_symbol(self)
    end subroutine new_symbol_operator
 
    !> A periodic symmetric 2 x 2 operator from its symbols: xx and yy even, xy odd in both wave numbers.
-   subroutine new_tensor_symbol_operator(self, nx, ny, xx, yy, xy, error)
+   subroutine new_tensor_symbol_operator(self, nx, ny, xx, yy, xy, error, single)
       type(convolution_type), intent(out) :: self
       integer, intent(in) :: nx, ny
       real(dp), intent(in) :: xx(0:, 0:)          !! (0:nx/2, 0:ny/2)
       real(dp), intent(in) :: yy(0:, 0:)
       real(dp), intent(in) :: xy(0:, 0:)
       type(error_type), allocatable, intent(out) :: error
+      logical, intent(in), optional :: single      !! work in single precision
 
-      call plan(self, nx, ny, boundary_periodic, 2, error)
+      call plan(self, nx, ny, boundary_periodic, 2, error, single)
       if (allocated(error)) return
       self%symbol(0:nx/2, :, 1) = xx
       self%symbol(0:nx/2, :, 2) = yy
       self%symbol(0:nx/2, :, 3) = xy
-      call scale_symbol(self)
+      call finish_symbol(self)
    end subroutine new_tensor_symbol_operator
 
-   !> Put the factor of the inverse transform into the symbol.
-   subroutine scale_symbol(self)
+   !> Put the factor of the inverse transform into the symbol; hand it on where the work is done.
+   subroutine finish_symbol(self)
       type(convolution_type), intent(inout) :: self
 
       self%symbol = self%symbol/(real(self%mx, dp)*self%my)
-   end subroutine scale_symbol
+      if (.not. self%single) return
+      call self%low%set_symbol(self%symbol)
+      deallocate (self%symbol)
+   end subroutine finish_symbol
 
    !> Sizes, buffers and plans.
-   subroutine plan(self, nx, ny, boundary, components, error)
+   subroutine plan(self, nx, ny, boundary, components, error, single)
       type(convolution_type), intent(inout) :: self
       integer, intent(in) :: nx, ny, boundary, components
       type(error_type), allocatable, intent(out) :: error
-      integer :: mc, j, k
-      integer(c_int) :: flag, lx(1), ly(1), batch
+      logical, intent(in), optional :: single
+      integer :: mc
+      logical :: planned
       character(80) :: text
 
       self%nx = nx
@@ -164,12 +176,34 @@ contains
       self%threads = merge(1, thread_count(), nx*ny < small)
       mc = (self%mx/2 + block)/block*block
       allocate (self%symbol(0:mc - 1, 0:self%my/2, merge(1, 3, components == 1)), source=0.0_dp)
-      self%spectrum_memory = fftw_alloc_real(2_c_size_t*mc*ny*components)
-      call c_f_pointer(self%spectrum_memory, self%spectrum, [mc, ny, components])
-      !$omp parallel do default(none) shared(self, ny, components) private(j, k) &
+      if (present(single)) self%single = single
+      if (self%single) then
+         call new_row_column_single(self%low, [nx, ny], [self%mx, self%my], components, self%threads, &
+            planned)
+      else
+         call plan_double(self, mc, planned)
+      end if
+      if (.not. planned) then
+         write (text, '("FFTW has no plan for a grid of ", i0, " x ", i0)') self%mx, self%my
+         call fail(error, error_input, trim(text))
+         call self%destroy()
+      end if
+   end subroutine plan
+
+   !> Buffers and plans in double precision.
+   subroutine plan_double(self, mc, planned)
+      type(convolution_type), intent(inout) :: self
+      integer, intent(in) :: mc                    !! length of a spectral row, in whole blocks
+      logical, intent(out) :: planned              !! FFTW has plans for these sizes
+      integer(c_int) :: flag, lx(1), ly(1), batch
+      integer :: j, k
+
+      self%spectrum_memory = fftw_alloc_real(2_c_size_t*mc*self%ny*self%components)
+      call c_f_pointer(self%spectrum_memory, self%spectrum, [mc, self%ny, self%components])
+      !$omp parallel do default(none) shared(self) private(j, k) &
       !$omp num_threads(self%threads)
-      do j = 1, ny
-         do k = 1, components
+      do j = 1, self%ny
+         do k = 1, self%components
             self%spectrum(:, j, k) = (0.0_dp, 0.0_dp)
          end do
       end do
@@ -177,16 +211,16 @@ contains
       do k = 0, self%threads - 1
          associate (buffer => self%buffers(k))
             buffer%row_memory = fftw_alloc_real(int(self%mx, c_size_t))
-            buffer%column_memory = fftw_alloc_real(2_c_size_t*block*self%my*components)
+            buffer%column_memory = fftw_alloc_real(2_c_size_t*block*self%my*self%components)
             call c_f_pointer(buffer%row_memory, buffer%row, [self%mx])
             buffer%row = 0.0_dp
-            call c_f_pointer(buffer%column_memory, buffer%column, [block, components, self%my])
+            call c_f_pointer(buffer%column_memory, buffer%column, [block, self%components, self%my])
          end associate
       end do
 
       lx = int(self%mx, c_int)
       ly = int(self%my, c_int)
-      batch = int(block*components, c_int)
+      batch = int(block*self%components, c_int)
       !$omp critical (fftw_planner)
       flag = planning_flag()
       associate (row => self%buffers(0)%row_memory, column => self%buffers(0)%column_memory, &
@@ -202,14 +236,9 @@ contains
       end associate
       call save_wisdom()
       !$omp end critical (fftw_planner)
-
-      if (.not. (c_associated(self%row_forward) .and. c_associated(self%row_backward) &
-         .and. c_associated(self%column_forward) .and. c_associated(self%column_backward))) then
-         write (text, '("FFTW has no plan for a grid of ", i0, " x ", i0)') self%mx, self%my
-         call fail(error, error_input, trim(text))
-         call self%destroy()
-      end if
-   end subroutine plan
+      planned = c_associated(self%row_forward) .and. c_associated(self%row_backward) &
+         .and. c_associated(self%column_forward) .and. c_associated(self%column_backward)
+   end subroutine plan_double
 
    !> u = A p.
    subroutine apply(self, p, u, form)
@@ -310,6 +339,10 @@ contains
       integer, intent(in) :: j                     !! 1 <= j <= ny
       real(dp), intent(in) :: row(self%nx)
 
+      if (self%single) then
+         call self%low%forward_row(component, j, row)
+         return
+      end if
       associate (buffer => self%buffers(omp_get_thread_num()))
          buffer%row(1:self%nx) = row
          if (self%mx > self%nx) buffer%row(self%nx + 1:) = 0.0_dp
@@ -324,6 +357,10 @@ contains
       integer, intent(in) :: component
       integer, intent(in) :: j
 
+      if (self%single) then
+         call self%low%forward_zero_row(component, j)
+         return
+      end if
       self%spectrum(:, j, component) = (0.0_dp, 0.0_dp)
    end subroutine forward_zero_row
 
@@ -334,6 +371,10 @@ contains
       integer, intent(in) :: j
       real(dp), intent(out) :: row(self%nx)
 
+      if (self%single) then
+         call self%low%backward_row(component, j, row)
+         return
+      end if
       associate (buffer => self%buffers(omp_get_thread_num()))
          call fftw_execute_dft_c2r(self%row_backward, spectral_row(self, component, j), &
             buffer%row_memory)
@@ -349,6 +390,10 @@ contains
       real(dp), intent(in) :: factor
       real(dp), intent(inout) :: row(self%nx)
 
+      if (self%single) then
+         call self%low%add_backward_row(component, j, factor, row)
+         return
+      end if
       associate (buffer => self%buffers(omp_get_thread_num()))
          call fftw_execute_dft_c2r(self%row_backward, spectral_row(self, component, j), &
             buffer%row_memory)
@@ -374,6 +419,12 @@ contains
       real(dp), allocatable :: partial(:)
       integer :: blocks, b, c, j, first
 
+      self%ffts = self%ffts + merge(1, 2, action == columns_form)*self%components
+      if (self%single) then
+         call self%low%columns(action == columns_inverse, action /= columns_form, form)
+         form = global_sum(form)
+         return
+      end if
       blocks = (self%mx/2 + block)/block
       allocate (partial(blocks))
       !$omp parallel do default(none) shared(self, action, partial, blocks) &
@@ -413,7 +464,6 @@ contains
          form = form + partial(b)
       end do
       form = global_sum(form)
-      self%ffts = self%ffts + merge(1, 2, action == columns_form)*self%components
    end subroutine columns
 
    !> Multiply a block of columns by the scalar symbol and sum the quadratic form.
@@ -508,6 +558,7 @@ contains
       class(convolution_type), intent(inout) :: self
       integer :: k
 
+      if (self%single) call self%low%destroy()
       !$omp critical (fftw_planner)
       if (c_associated(self%row_forward)) call fftw_destroy_plan(self%row_forward)
       if (c_associated(self%row_backward)) call fftw_destroy_plan(self%row_backward)
