@@ -30,7 +30,7 @@ module normal_fixture
 contains
 
    !> Solve with a solver made for this one problem; `start` makes it a warm start.
-   subroutine run_problem(grid, problem, height, solution, thesis, history, start)
+   subroutine run_problem(grid, problem, height, solution, thesis, history, start, mixed)
       type(grid_type), intent(in) :: grid
       type(normal_problem_type), intent(in) :: problem
       real(dp), intent(in) :: height(:, :)
@@ -38,6 +38,7 @@ contains
       logical, intent(in), optional :: thesis
       real(dp), intent(in), optional :: history(:, :)
       real(dp), intent(in), optional :: start(:, :)
+      logical, intent(in), optional :: mixed           !! in mixed precision
       type(normal_solver_type) :: solver
       type(normal_problem_type) :: task
       type(error_type), allocatable :: error
@@ -54,7 +55,7 @@ contains
          solution%pressure = start
          task%warm = .true.
       end if
-      call new_normal_solver(solver, grid, poisson, error)
+      call new_normal_solver(solver, grid, poisson, error, mixed)
       call check_no_error(error, 'a solver')
       if (by_thesis) then
          call solve_normal_thesis(grid, solver%operator, task, height, solution%pressure, &

@@ -185,29 +185,22 @@ contains
 
    end subroutine test_steps
 
-   !> What is not available yet is refused, once it is otherwise right; each case here has one thing
-   !> that the program lacks, or none any more.
+   !> Adhesion allows pulling; mixed precision goes with the fast method alone.
    subroutine test_features()
-      character(*), parameter :: asks(2) = [character(70) :: &
-         '&adhesion potential = ''exponential'', energy = 0.05, range = 1e-6 /', &
-         '&friction law = ''coulomb'', coefficient = 0.5 /']
       type(case_type) :: case
       type(error_type), allocatable :: error
-      integer :: i
 
-      do i = 1, size(asks)
-         call parse_case(body//trim(asks(i)), 'a', case, error)
-         if (.not. allocated(error)) cycle
-         call check_that(error%status == error_input, 'a missing feature: status')
-         call check_error(error, 'is not available yet', trim(asks(i)))
-         call check_that(lines(error%message) == 1, 'a missing feature is one fault: '//error%message)
-      end do
-      call parse_case(body//asks(1)//'&phase pressure = -1.0 /&phase force = 0 /', 'a', case, error)
-      if (allocated(error)) then
-         call check_error(error, 'is not available yet', 'adhesion allows pulling')
-         call check_that(lines(error%message) == 1, 'adhesion allows pulling: '//error%message)
-      end if
+      call parse_case(body//'&adhesion potential = ''exponential'', energy = 0.05, range = 1e-6 /'// &
+         '&phase pressure = -1.0 /&phase force = 0 /', 'a', case, error)
+      call check_no_error(error, 'adhesion allows pulling')
       call check_close(case%phases(2)%target, -1.0_dp, 0.0_dp, 'a pulling pressure')
+      call parse_case(body//'&solver precision = ''mixed'' /', 'a', case, error)
+      call check_no_error(error, 'mixed precision')
+      call check_that(case%solver%precision == 'mixed', 'mixed precision is kept')
+      call parse_case(body//'&solver precision = ''mixed'', method = ''thesis'' /', 'a', case, error)
+      call check_error(error, 'precision', 'mixed precision of the thesis''s method')
+      call check_error(error, 'thesis', 'mixed precision of the thesis''s method')
+      if (allocated(error)) call check_that(error%status == error_input, 'its status')
    end subroutine test_features
 
    !> The resolved settings are an input of the same case.
@@ -243,6 +236,10 @@ contains
       case%phases(3)%velocity_y = 0.0_dp
       case%material%prony_g = [1.0_dp, 2.0_dp]
       call check_close(memory_needed(case), 8.0_dp*(14*64*32 + 66*32) + 20.0e6_dp, 1.0e-6_dp, 'memory, arms')
+      case%solver%precision = 'mixed'
+      call check_close(memory_needed(case), 8.0_dp*(14*64*32 + 1.6_dp*66*32) + 20.0e6_dp, 1.0e-6_dp, &
+         'memory, mixed')
+      case%solver%precision = 'double'
       deallocate (case%material%prony_g)
       allocate (case%material%prony_g(0))
       case%grid%boundary = boundary_free

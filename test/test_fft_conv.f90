@@ -17,14 +17,23 @@ contains
    subroutine run_fft_conv()
       call begin_suite('fft_conv')
       call test_quadrature()
-      call test_waves(8, 6, 3.0_dp, 2.0_dp)
-      call test_waves(9, 5, 1.0_dp, 2.0_dp)
-      call test_waves(16, 1, 1.0_dp, 2.0_dp)
-      call test_waves(160, 131, 1.0_dp, 0.7_dp)
-      call test_free_sums(7, 5)
-      call test_free_sums(6, 8)
-      call test_free_sums(1, 3)
-      call test_inverse()
+      call test_waves(8, 6, 3.0_dp, 2.0_dp, .false.)
+      call test_waves(8, 6, 3.0_dp, 2.0_dp, .true.)
+      call test_waves(9, 5, 1.0_dp, 2.0_dp, .false.)
+      call test_waves(9, 5, 1.0_dp, 2.0_dp, .true.)
+      call test_waves(16, 1, 1.0_dp, 2.0_dp, .false.)
+      call test_waves(16, 1, 1.0_dp, 2.0_dp, .true.)
+      call test_waves(160, 131, 1.0_dp, 0.7_dp, .false.)
+      call test_waves(160, 131, 1.0_dp, 0.7_dp, .true.)
+      call test_free_sums(7, 5, .false.)
+      call test_free_sums(7, 5, .true.)
+      call test_free_sums(6, 8, .false.)
+      call test_free_sums(6, 8, .true.)
+      call test_free_sums(1, 3, .false.)
+      call test_free_sums(1, 3, .true.)
+      call test_inverse(.false.)
+      call test_inverse(.true.)
+      call test_range()
       call test_periodic_against_free()
       call check_that(transform_length(7, boundary_periodic) == 7, 'no padding where periodic')
       call check_that(transform_length(509, boundary_free) == 1024, 'padding to small factors')
@@ -67,21 +76,24 @@ contains
    end subroutine test_quadrature
 
    !> Oblique waves are eigenfunctions of the periodic operators.
-   subroutine test_waves(nx, ny, lx, ly)
+   subroutine test_waves(nx, ny, lx, ly, single)
       integer, intent(in) :: nx, ny
       real(dp), intent(in) :: lx, ly
       real(dp), parameter :: nu = 0.3_dp, h = 0.25_dp
+      logical, intent(in) :: single            !! in single precision: to 1e-6 of the values
       type(grid_type) :: grid
       type(convolution_type) :: normal, tangential
       type(error_type), allocatable :: error
       real(dp), allocatable :: p(:, :), py(:, :), u(:, :), uy(:, :), w(:, :)
       real(dp) :: qx, qy, q, form
+      real(dp) :: loose
       integer :: i, j, kx, ky
 
+      loose = merge(SCALE, 0.0_dp, single)
       grid = new_grid(nx, ny, lx, ly, boundary_periodic)
-      call new_normal_operator(normal, grid, nu, error)
+      call new_normal_operator(normal, grid, nu, error, single)
       call check_no_error(error, 'normal operator')
-      call new_tangential_operator(tangential, grid, nu, h, error)
+      call new_tangential_operator(tangential, grid, nu, h, error, single)
       call check_no_error(error, 'tangential operator')
       allocate (p(nx, ny), py(nx, ny), u(nx, ny), uy(nx, ny), w(nx, ny))
       do ky = -min(2, (ny - 1)/2), min(2, (ny - 1)/2)
@@ -125,19 +137,22 @@ contains
    end subroutine test_waves
 
    !> The free operators against the double sum.
-   subroutine test_free_sums(nx, ny)
+   subroutine test_free_sums(nx, ny, single)
       integer, intent(in) :: nx, ny
       real(dp), parameter :: nu = 0.4_dp
+      logical, intent(in) :: single            !! in single precision: to 1e-6 of the values
       type(grid_type) :: grid
       type(convolution_type) :: normal, tangential
       type(error_type), allocatable :: error
       real(dp), allocatable :: p(:, :), py(:, :), u(:, :), ux(:, :), uy(:, :)
       real(dp) :: zz, xx, xy, yy, a_xx, a_xy, a_yy, form
+      real(dp) :: loose
       integer :: i, j, k, l
 
+      loose = merge(SCALE, 0.0_dp, single)
       grid = new_grid(nx, ny, 1.0_dp, 1.7_dp, boundary_free)
-      call new_normal_operator(normal, grid, nu, error)
-      call new_tangential_operator(tangential, grid, nu, 0.0_dp, error)
+      call new_normal_operator(normal, grid, nu, error, single)
+      call new_tangential_operator(tangential, grid, nu, 0.0_dp, error, single)
       allocate (p(nx, ny), py(nx, ny), u(nx, ny), ux(nx, ny), uy(nx, ny))
       do j = 1, ny
          do i = 1, nx
@@ -173,15 +188,18 @@ contains
    end subroutine test_free_sums
 
    !> The inverse undoes the periodic operator on what has no mean, and a symbol of one is the identity.
-   subroutine test_inverse()
+   subroutine test_inverse(single)
+      logical, intent(in) :: single            !! in single precision: to 1e-6 of the values
       type(grid_type) :: grid
       type(convolution_type) :: normal, identity
       type(error_type), allocatable :: error
       real(dp) :: p(12, 7), u(12, 7), back(12, 7), ones(0:6, 0:3)
+      real(dp) :: loose
       integer :: i, j
 
+      loose = merge(SCALE, 0.0_dp, single)
       grid = new_grid(12, 7, 2.0_dp, 1.0_dp, boundary_periodic)
-      call new_normal_operator(normal, grid, 0.5_dp, error)
+      call new_normal_operator(normal, grid, 0.5_dp, error, single)
       do j = 1, 7
          do i = 1, 12
             p(i, j) = sin(0.7_dp*i*j)
@@ -191,7 +209,7 @@ contains
       call normal%apply_inverse(u, back)
       call check_close(maxval(abs(back - p + sum(p)/84.0_dp)), 0.0_dp, 1e-13_dp, 'inverse')
       ones = 1.0_dp
-      call new_symbol_operator(identity, 12, 7, ones, error)
+      call new_symbol_operator(identity, 12, 7, ones, error, single)
       call identity%apply(p, back)
       call check_close(maxval(abs(back - p)), 0.0_dp, 1e-15_dp, 'identity')
       call check_that(identity%ffts == 2, 'an application is two transforms')

@@ -1,7 +1,6 @@
 !> Reads a case: a file of namelists becomes checked settings, or one error with all its faults.
 module case_input
    use adhesion_advice, only : adhesion_warning
-   use case_features, only : check_features
    use case_material, only : resolve_material
    use case_phases, only : resolve_phases
    use case_settings, only : case_type, output_settings_type, path_length, word_length
@@ -123,13 +122,12 @@ contains
       call resolve_phases(pack_phases(groups), case%grid, case%material, &
          case%adhesion%potential /= 'none' .or. group%bad('potential'), case%phases, faults, case%warnings)
       call pick(groups, 'solver', group)
-      call resolve_solver(group, case)
+      call resolve_solver(group, case, faults)
       call pick(groups, 'output', group)
       call resolve_output(group, case, faults)
 
       if (.not. allocated(faults%error)) then
          call add_warnings(case)
-         call check_features(case, faults)
       end if
       if (allocated(faults%error)) call move_alloc(faults%error, error)
    end subroutine parse_case
@@ -288,9 +286,10 @@ contains
    end subroutine resolve_friction
 
    !> `&solver`
-   subroutine resolve_solver(group, case)
+   subroutine resolve_solver(group, case, faults)
       type(group_values_type), intent(in) :: group
       type(case_type), intent(inout) :: case
+      type(faults_type), intent(inout) :: faults
 
       case%solver%tolerance = group%real_value('tolerance')
       case%solver%max_iterations = group%integer_value('max_iterations')
@@ -301,6 +300,9 @@ contains
       case%solver%interpolation = group%text_value('interpolation')
       case%solver%precision = group%text_value('precision')
       case%solver%threads = group%integer_value('threads')
+      if (case%solver%method == 'thesis' .and. case%solver%precision == 'mixed') &
+         call group%fault('precision', 'is ''mixed'', which method = ''fast'' has and ''thesis'' has not', &
+         faults)
    end subroutine resolve_solver
 
    !> `&output`

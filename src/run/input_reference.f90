@@ -235,7 +235,9 @@ contains
          row('solver', 'interpolation', kind_word, '''linear''', '', '''linear'' | ''cubic''', &
             'Of the road between cells.'), &
          row('solver', 'precision', kind_word, '''double''', '', '''double'' | ''mixed''', &
-            'Single precision inside the transforms where it is safe, or double throughout.'), &
+            '''mixed'': contact without adhesion takes its steps with transforms in single precision '// &
+            'and checks them in double, to the same tolerance; adhesion and friction stay double. '// &
+            'Needs method = ''fast''.'), &
          row('solver', 'threads', kind_integer, '0', '', '[0, 1024]', '0 takes all processors.'), &
          row('output', 'file', kind_text, '(the input''s name with .h5)', '', 'any', &
             'The result, an HDF5 file; a path from the input''s folder.'), &

@@ -55,7 +55,8 @@ contains
       self%max_iterations = case%solver%max_iterations
       self%adhesive = case%adhesion%potential /= 'none'
       self%summit = global_max(maxval(height))
-      call new_normal_solver(self%normal, self%grid, case%material%poisson, error)
+      call new_normal_solver(self%normal, self%grid, case%material%poisson, error, &
+         mixed=case%solver%precision == 'mixed')
       if (allocated(error)) return
       self%rms_height = rms_about_mean(height, self%normal%operator%threads)
       if (.not. self%adhesive) return

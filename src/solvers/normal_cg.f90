@@ -15,6 +15,11 @@
 !> Converged means that the duality gap e1 = (mean gap under the pressure - least gap)/h_rms and the
 !> error of the load, both of a fresh U = A P, are below the tolerance.
 !>
+!> In mixed precision the products A s of the steps are in single precision: their errors are small
+!> beside s. The pressure and the gap stay in double precision, and a product of the whole pressure in
+!> double precision, now and then and before anything is reported, leaves the errors of s behind. Where
+!> that does not help, the products of the steps go back to double precision.
+!>
 !> The passes themselves are in module normal_sweeps. S and the set where d acts are read off r and d,
 !> which are zero elsewhere; what must be taken off d to keep the load is carried as a number.
 !>
@@ -43,12 +48,18 @@ module normal_cg
    integer, parameter :: width = 16            !! cells of an active block
    integer, parameter :: longest_age = 40      !! iterations between fresh products A P
    real(dp), parameter :: often_bent = 1e3_dp  !! kappa after some steps that did not descend
+   integer, parameter :: mixed_age = 20        !! the same in mixed precision
+   integer, parameter :: careful_age = 10      !! the same for a tolerance below `careful`
+   real(dp), parameter :: careful = 1e-8_dp
    real(dp), parameter :: useless = 0.1_dp     !! part of a clipped step that is taken, at the most
 
    !> The solver with its operators and work fields, kept from step to step. Not to be copied.
    type :: normal_solver_type
       type(grid_type) :: grid
       type(convolution_type) :: operator              !! A for G = 1
+      logical :: mixed = .false.                      !! products of steps in single precision
+      type(convolution_type), private :: quick        !! A in single precision, if mixed
+      logical, private :: swift = .false.             !! the next product of a step is by `quick`
       type(coarse_level_type), private :: coarse
       real(dp), allocatable, private :: residual(:, :)    !! with a rim: (0:nx+1, 0:ny+1)
       real(dp), allocatable, private :: direction(:, :)
@@ -69,15 +80,19 @@ module normal_cg
 contains
 
    !> Make a solver for a grid.
-   subroutine new_normal_solver(self, grid, poisson, error)
+   subroutine new_normal_solver(self, grid, poisson, error, mixed)
       type(normal_solver_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: poisson                  !! -1 < nu <= 0.5
       type(error_type), allocatable, intent(out) :: error
+      logical, intent(in), optional :: mixed           !! in mixed precision
       integer :: nb
 
       self%grid = grid
       call new_normal_operator(self%operator, grid, poisson, error)
+      if (allocated(error)) return
+      if (present(mixed)) self%mixed = mixed
+      if (self%mixed) call new_normal_operator(self%quick, grid, poisson, error, single=.true.)
       if (allocated(error)) return
       call new_coarse_level(self%coarse, grid, poisson, error)
       if (allocated(error)) return
@@ -105,13 +120,13 @@ contains
       type(normal_problem_type) :: task
       type(gap_measure_type) :: measure
       real(dp) :: scale, old, rz, rd, kappa, squares, alpha, form, trial
-      real(dp) :: cells, offset, beta, began, coarse_before
+      real(dp) :: cells, offset, beta, began, coarse_before, error_before, expected
       logical :: fresh, restart, clipped, determined
-      integer :: age
+      integer :: age, oldest
       integer(int64) :: before
 
       began = omp_get_wtime()
-      before = self%operator%ffts
+      before = self%operator%ffts + self%quick%ffts
       coarse_before = self%coarse%transforms()
       cells = global_sum(real(size(gap), dp))
       scale = 1.0_dp/problem%modulus
@@ -119,25 +134,39 @@ contains
       old = 0.0_dp
       offset = 0.0_dp
       restart = .true.
-      self%step = 0.0_dp
-      self%direction = 0.0_dp
-      self%residual = 0.0_dp
+      error_before = huge(1.0_dp)
+      expected = huge(1.0_dp)
+      self%swift = self%mixed
+      oldest = longest_age
+      if (self%mixed) oldest = merge(careful_age, mixed_age, problem%tolerance < careful)
+      call clear(self)
       call prepare_problem(problem, self%grid, self%operator%threads, height, task, determined)
-      call first_pressure(task, self%grid, self%operator, height, pressure, history)
+      if (self%mixed) then
+         call first_pressure(task, self%grid, self%quick, height, pressure, history)
+      else
+         call first_pressure(task, self%grid, self%operator, height, pressure, history)
+      end if
       call refresh()
       outcome%reason = reason_iterations
       if (.not. determined) outcome%reason = reason_undetermined
       do
          measure = combine_measures(task, cells, self%surveyed)
          if (.not. determined) exit
-         if (measure%error <= task%tolerance) then
-            if (fresh) then
-               outcome%converged = .true.
-               outcome%reason = reason_converged
-               exit
-            end if
+         if (.not. fresh .and. (measure%error <= task%tolerance .or. age >= oldest)) then
+            expected = measure%error
             call refresh()
             cycle
+         end if
+         if (measure%error <= task%tolerance) then
+            outcome%converged = .true.
+            outcome%reason = reason_converged
+            exit
+         end if
+         if (fresh .and. self%swift) then
+            ! What the recurrence hid outweighs what was gained since the last look.
+            self%swift = measure%error <= 2.0_dp*expected .or. measure%error <= 0.5_dp*error_before
+            error_before = measure%error
+            expected = huge(1.0_dp)
          end if
          if (outcome%iterations == problem%max_iterations) exit
          outcome%iterations = outcome%iterations + 1
@@ -174,7 +203,11 @@ contains
             restart = .true.
             cycle
          end if
-         call self%operator%columns(columns_apply, form)
+         if (self%swift) then
+            call self%quick%columns(columns_apply, form)
+         else
+            call self%operator%columns(columns_apply, form)
+         end if
          form = scale*form
          if (form <= 0.0_dp) then
             outcome%reason = 'no direction of descent is left'
@@ -193,7 +226,6 @@ contains
          age = age + 1
          call update(self, task, scale*alpha, alpha, pressure, gap)
          fresh = .false.
-         if (age == longest_age) call refresh()
       end do
 
       if (.not. fresh) then
@@ -206,7 +238,7 @@ contains
       call shift_gap(self, level, gap)
       outcome%residual = measure%error
       outcome%load_error = measure%load_error
-      outcome%ffts = self%operator%ffts - before &
+      outcome%ffts = self%operator%ffts + self%quick%ffts - before &
          + nint(self%coarse%transforms() - coarse_before, int64)
       outcome%seconds = omp_get_wtime() - began
 
@@ -216,11 +248,32 @@ contains
       subroutine refresh()
          call evaluate_gap(task, self%operator, height, pressure, gap, history)
          call survey(self, task, pressure, gap)
+         if (self%swift) call self%quick%set_unit(surveyed_load(self)/cells)
          fresh = .true.
          age = 0
       end subroutine refresh
 
    end subroutine solve
+
+   !> Zero the work fields: the step, which others use between solves, wholly.
+   subroutine clear(self)
+      type(normal_solver_type), intent(inout) :: self
+      integer :: b, j, first, last
+
+      !$omp parallel do default(none) shared(self) private(b, j, first, last) &
+      !$omp num_threads(self%operator%threads)
+      do j = 1, self%grid%ny
+         self%step(:, j) = 0.0_dp
+         do b = 1, size(self%live, 1)
+            if (.not. self%live(b, j)) cycle
+            first = (b - 1)*width + 1
+            last = min(b*width, self%grid%nx)
+            self%residual(first:last, j) = 0.0_dp
+            self%direction(first:last, j) = 0.0_dp
+            self%live(b, j) = .false.
+         end do
+      end do
+   end subroutine clear
 
    !> Which blocks hold pressure, the least gap of each, and the measures of the rows.
    subroutine survey(self, problem, pressure, gap)
@@ -482,7 +535,11 @@ contains
                end associate
             end do
             self%rows(1:2, j) = sums
-            if (self%runs(j) == 0) then
+            if (self%swift .and. self%runs(j) == 0) then
+               call self%quick%forward_zero_row(1, j)
+            else if (self%swift) then
+               call self%quick%forward_row(1, j, self%step(:, j))
+            else if (self%runs(j) == 0) then
                call self%operator%forward_zero_row(1, j)
             else
                call self%operator%forward_row(1, j, self%step(:, j))
@@ -554,7 +611,11 @@ contains
       !$omp parallel do default(none) shared(self, problem, factor, alpha, pressure, gap) &
       !$omp private(j, k, n, sums) schedule(dynamic, 8) num_threads(self%operator%threads)
       do j = 1, self%grid%ny
-         call self%operator%add_backward_row(1, j, factor, gap(:, j))
+         if (self%swift) then
+            call self%quick%add_backward_row(1, j, factor, gap(:, j))
+         else
+            call self%operator%add_backward_row(1, j, factor, gap(:, j))
+         end if
          sums = 0.0_dp
          do k = 1, self%runs(j)
             associate (first => self%first(k, j))
@@ -567,6 +628,19 @@ contains
          call survey_blocks(self, .false., j, pressure(:, j), gap(:, j))
       end do
    end subroutine update
+
+   !> The sum of the pressure over the cells.
+   function surveyed_load(self) result(load)
+      type(normal_solver_type), intent(in) :: self
+      real(dp) :: load
+      integer :: j
+
+      load = 0.0_dp
+      do j = 1, self%grid%ny
+         load = load + self%surveyed(1, j)
+      end do
+      load = global_sum(load)
+   end function surveyed_load
 
    !> Subtract the level.
    subroutine shift_gap(self, level, gap)
@@ -601,6 +675,7 @@ contains
       class(normal_solver_type), intent(inout) :: self
 
       call self%operator%destroy()
+      if (self%mixed) call self%quick%destroy()
       call self%coarse%destroy()
    end subroutine destroy
 

@@ -58,7 +58,7 @@ contains
       allocate (rows(3, size(height, 2)))
       !$omp parallel do default(none) shared(height, rows) private(j) num_threads(threads)
       do j = 1, size(height, 2)
-         rows(:, j) = [maxval(height(:, j)), minval(height(:, j)), sum(height(:, j))]
+         rows(:, j) = row_extent(height(:, j))
       end do
       highest = global_max(maxval(rows(1, :)))
       lowest = global_min(minval(rows(2, :)))
@@ -81,6 +81,25 @@ contains
       end if
       task%rms_height = max(task%rms_height, tiny(1.0_dp))
    end subroutine prepare_problem
+
+   !> The highest, the lowest and the sum of a row.
+   function row_extent(row) result(extent)
+      real(dp), intent(in) :: row(:)
+      real(dp) :: extent(3)
+      real(dp) :: highest, lowest, total
+      integer :: i
+
+      highest = row(1)
+      lowest = row(1)
+      total = 0.0_dp
+      !$omp simd reduction(max:highest) reduction(min:lowest) reduction(+:total)
+      do i = 1, size(row)
+         highest = max(highest, row(i))
+         lowest = min(lowest, row(i))
+         total = total + row(i)
+      end do
+      extent = [highest, lowest, total]
+   end function row_extent
 
    !> Sums over cells of a row: P, P g, g where P > 0, the number of those, P |g - level|.
    function row_measure(pressure, gap, level) result(sums)

@@ -7,6 +7,8 @@ module projection
 
    public :: project_simplex
 
+   integer, parameter :: sample = 16        !! one row of so many gives a first level
+
 contains
 
    !> The nearest field to x that is nowhere negative and has the sum `total`: max(x - t, 0).
@@ -17,18 +19,21 @@ contains
       real(dp), intent(in) :: total            !! x becomes 0 where this is 0 or less
       real(dp), allocatable :: rows(:, :)
       real(dp) :: level, next, above, negative, kept
-      integer :: count, next_count, threads
+      integer :: count, next_count, threads, stride
 
       threads = merge(1, thread_count(), size(x) < 16384)
       allocate (rows(3, size(x, 2)))
+      stride = 1
       if (total <= 0.0_dp) then
          call fill(0.0_dp)
          return
       end if
       call sum_above(0.0_dp, above, count, negative)
       if (abs(above - total) <= 1e-15_dp*count*total .and. abs(negative) <= 0.0_dp) return
-      ! The first level is below the solution; Newton's steps rise to it.
+      ! The first level is below the solution; Newton's steps rise to it. From any other level the
+      ! first step leads below it, too: a few rows tell one that is close.
       level = (above + negative - total)/size(x)
+      if (size(x, 2) >= 4*sample) call guess()
       call sum_above(level, above, count, negative)
       if (count == 0) then
          ! All cells are equal.
@@ -48,6 +53,26 @@ contains
 
    contains
 
+      !> Raise the level by Newton's method on a sample of the rows, and a step of it on all.
+      subroutine guess()
+         real(dp) :: trial, raised, part
+         integer :: cells
+
+         stride = sample
+         part = total*((size(x, 2) - 1)/stride + 1)/size(x, 2)
+         trial = level
+         do
+            call sum_above(trial, above, cells, negative)
+            if (cells == 0) exit
+            raised = (above - part)/cells
+            if (raised <= trial) exit
+            trial = raised
+         end do
+         stride = 1
+         call sum_above(trial, above, cells, negative)
+         if (cells > 0) level = max(level, (above - total)/cells)
+      end subroutine guess
+
       !> Sum and number of the cells above a level, and the sum of the others.
       subroutine sum_above(limit, sum, number, others)
          real(dp), intent(in) :: limit
@@ -57,9 +82,9 @@ contains
          real(dp) :: a, b, n
          integer :: i, j
 
-         !$omp parallel do default(none) shared(x, rows, limit) private(i, j, n, a, b) &
-         !$omp num_threads(threads)
-         do j = 1, size(x, 2)
+         !$omp parallel do default(none) shared(x, rows, limit, stride) &
+         !$omp private(i, j, n, a, b) num_threads(threads)
+         do j = 1, size(x, 2), stride
             a = 0.0_dp
             b = 0.0_dp
             n = 0.0_dp
@@ -125,7 +150,7 @@ contains
          integer :: j
 
          sum = 0.0_dp
-         do j = 1, size(x, 2)
+         do j = 1, size(x, 2), stride
             sum = sum + rows(which, j)
          end do
          sum = global_sum(sum)

@@ -80,6 +80,7 @@ module fft_conv
       procedure :: columns
       procedure :: backward_row
       procedure :: add_backward_row
+      procedure :: set_unit
       procedure :: destroy
    end type convolution_type
 
@@ -400,6 +401,15 @@ contains
          row = row + factor*buffer%row(1:self%nx)
       end associate
    end subroutine add_backward_row
+
+   !> Tell a single operator how large values are, about, that it gets from the next `forward_row` on, so
+   !> that their squares are in its range: 1 at first. A double one needs no such help.
+   subroutine set_unit(self, size)
+      class(convolution_type), intent(inout) :: self
+      real(dp), intent(in) :: size                 !! 1 is taken where it is not positive
+
+      if (self%single) call self%low%set_unit(size)
+   end subroutine set_unit
 
    !> Address of row j of the spectrum of a component.
    function spectral_row(self, component, j) result(address)

@@ -2,7 +2,8 @@
 !>
 !> The same rows, blocks of columns and symbols; fields come in and go out in double precision and are
 !> converted row by row, and the quadratic form is summed in double. Results are good to about 1e-7 of
-!> the largest value.
+!> the largest value. Values and symbols are taken in units about as large as they are, so that their
+!> squares stay in the range of single precision whatever the units of the caller.
 module row_column_single
    use, intrinsic :: iso_c_binding, only : c_associated, c_f_pointer, c_float_complex, c_int, c_loc, &
       c_null_ptr, c_ptr, c_size_t
@@ -17,7 +18,7 @@ module row_column_single
 
    public :: new_row_column_single, row_column_single_type
 
-   integer, parameter :: block = 16                    !! columns at a time: 128 bytes a row
+   integer, parameter :: block = 8                     !! columns at a time: 64 bytes a row
 
    !> One thread's aligned buffers.
    type :: buffer_type
@@ -33,6 +34,9 @@ module row_column_single
       integer, private :: mx = 0, my = 0           !! lengths of the transforms
       integer, private :: components = 0
       integer, private :: threads = 1
+      real(dp), private :: unit = 1.0_dp           !! of the values, a power of two
+      real(dp), private :: scale = 1.0_dp          !! of the symbols, a power of two
+      real(dp), private :: product_unit = 1.0_dp   !! of the result
       real(sp), allocatable, private :: symbol(:, :, :)
       type(c_ptr), private :: spectrum_memory = c_null_ptr
       complex(sp), pointer, contiguous, private :: spectrum(:, :, :) => null()   !! whole blocks
@@ -43,6 +47,7 @@ module row_column_single
       type(c_ptr), private :: column_backward = c_null_ptr
    contains
       procedure :: set_symbol
+      procedure :: set_unit
       procedure :: forward_row
       procedure :: forward_zero_row
       procedure :: columns
@@ -120,8 +125,26 @@ contains
 
       allocate (self%symbol(0:size(self%spectrum, 1) - 1, 0:self%my/2, size(symbol, 3)), source=0.0_sp)
       last = self%mx/2
-      self%symbol(0:last, :, :) = real(symbol(0:last, :, :), sp)
+      self%scale = power_of_two(maxval(abs(symbol)))
+      self%symbol(0:last, :, :) = real(symbol(0:last, :, :)/self%scale, sp)
    end subroutine set_symbol
+
+   !> Set the unit in which values are taken from the next `forward_row` on.
+   pure subroutine set_unit(self, size)
+      class(row_column_single_type), intent(inout) :: self
+      real(dp), intent(in) :: size                 !! of a usual value; 1 where it is not positive
+
+      self%unit = power_of_two(size)
+   end subroutine set_unit
+
+   !> The power of two above a positive number, 1 for others.
+   elemental function power_of_two(x)
+      real(dp), intent(in) :: x
+      real(dp) :: power_of_two
+
+      power_of_two = 1.0_dp
+      if (x > 0.0_dp) power_of_two = scale(1.0_dp, exponent(x))
+   end function power_of_two
 
    !> Transform row j of a component.
    subroutine forward_row(self, component, j, row)
@@ -131,7 +154,7 @@ contains
       real(dp), intent(in) :: row(self%nx)
 
       associate (buffer => self%buffers(omp_get_thread_num()))
-         buffer%row(1:self%nx) = real(row, sp)
+         buffer%row(1:self%nx) = real((1.0_dp/self%unit)*row, sp)
          if (self%mx > self%nx) buffer%row(self%nx + 1:) = 0.0_sp
          call fftwf_execute_dft_r2c(self%row_forward, buffer%row_memory, &
             c_loc(self%spectrum(1, j, component)))
@@ -157,7 +180,7 @@ contains
       associate (buffer => self%buffers(omp_get_thread_num()))
          call fftwf_execute_dft_c2r(self%row_backward, c_loc(self%spectrum(1, j, component)), &
             buffer%row_memory)
-         row = real(buffer%row(1:self%nx), dp)
+         row = self%product_unit*real(buffer%row(1:self%nx), dp)
       end associate
    end subroutine backward_row
 
@@ -172,7 +195,7 @@ contains
       associate (buffer => self%buffers(omp_get_thread_num()))
          call fftwf_execute_dft_c2r(self%row_backward, c_loc(self%spectrum(1, j, component)), &
             buffer%row_memory)
-         row = row + factor*real(buffer%row(1:self%nx), dp)
+         row = row + (factor*self%product_unit)*real(buffer%row(1:self%nx), dp)
       end associate
    end subroutine add_backward_row
 
@@ -185,6 +208,7 @@ contains
       real(dp), allocatable :: partial(:)
       integer :: blocks, b, c, j, first
 
+      self%product_unit = self%unit*merge(1.0_dp/self%scale, self%scale, inverse)
       blocks = (self%mx/2 + block)/block
       allocate (partial(blocks))
       !$omp parallel do default(none) shared(self, inverse, back, partial, blocks) &
@@ -223,10 +247,10 @@ contains
       do b = 1, blocks
          form = form + partial(b)
       end do
+      form = form*self%unit*self%product_unit
    end subroutine columns
 
-   !> Multiply a block of columns by the scalar symbol and sum the quadratic form. Its terms may lie
-   !> outside the range of single precision.
+   !> Multiply a block of columns by the scalar symbol and sum the quadratic form.
    subroutine multiply_scalar(self, first, column, form)
       class(row_column_single_type), intent(in) :: self
       integer, intent(in) :: first                 !! wave number of the first column
@@ -240,7 +264,7 @@ contains
          k = min(j - 1, self%my - j + 1)
          do i = 1, block
             associate (factor => self%symbol(first + i - 1, k, 1))
-               sums(i) = sums(i) + factor*(real(column(i, j), dp)**2 + real(aimag(column(i, j)), dp)**2)
+               sums(i) = sums(i) + factor*(real(column(i, j))**2 + aimag(column(i, j))**2)
                column(i, j) = factor*column(i, j)
             end associate
          end do

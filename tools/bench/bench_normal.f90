@@ -1,11 +1,11 @@
 !> Bench of the normal solver: one rough problem, solved once, with its figures on one line.
 !>
-!>     fpm run --profile release --example bench_normal -- N LOAD THREADS [FOLDER]
+!>     fpm run --profile release --example bench_normal -- N LOAD THREADS PRECISION [FOLDER]
 !>
-!> N x N cells, L = 1 m, modes 4 to N/16, Hurst exponent 0.8, rms slope 0.1, E* = 1 Pa, mean pressure
+!> PRECISION is double or mixed. N x N cells, L = 1 m, modes 4 to N/16, Hurst exponent 0.8, rms slope 0.1, E* = 1 Pa, mean pressure
 !> LOAD x E* x slope, tolerance 1e-6. Printed: iterations, transforms, error, fraction in contact;
 !> seconds of processor and wall time of the solve; the same of one transform, from products with the
-!> operator before and after it; peak memory in fields of N x N doubles. With FOLDER, the height and
+!> double operator before and after it, and of one in single precision; peak memory in fields of N x N doubles. With FOLDER, the height and
 !> the pressure are written there as raw doubles.
 program bench_normal
    use errors, only : error_type
@@ -29,6 +29,8 @@ program bench_normal
    real(dp), allocatable :: height(:, :), pressure(:, :), gap(:, :)
    real(dp) :: load, level, start(2), finish(2), transform(2), solve(2), peak
    integer :: n, threads, j
+   character(8) :: precision
+   character(*), parameter :: usage = 'usage: bench_normal N LOAD THREADS double|mixed [FOLDER]'
 
    n = nint(number(1))
    load = number(2)
@@ -46,7 +48,9 @@ program bench_normal
    call new_height(grid, term, height, error)
    if (allocated(error)) error stop 'no surface'
    allocate (pressure(n, n), gap(n, n))
-   call new_normal_solver(solver, grid, 0.5_dp, error)
+   call get_command_argument(4, precision)
+   if (all(precision /= ['double', 'mixed '])) error stop usage
+   call new_normal_solver(solver, grid, 0.5_dp, error, precision == 'mixed')
    if (allocated(error)) error stop 'no solver'
    problem%modulus = 0.25_dp
    problem%target = 0.1_dp*load
@@ -68,7 +72,7 @@ program bench_normal
       ' area=', sum(gap)/size(gap), ' cpu=', solve(1), ' wall=', solve(2), &
       ' fft_cpu=', transform(1), ' fft_wall=', transform(2), ' fields=', peak, &
       ' reason=', trim(outcome%reason)
-   if (command_argument_count() > 3) then
+   if (command_argument_count() > 4) then
       call write_field('height', height)
       call write_field('pressure', pressure)
    end if
@@ -85,7 +89,7 @@ contains
 
       call get_command_argument(i, text)
       read (text, *, iostat=status) value
-      if (status /= 0) error stop 'usage: bench_normal N LOAD THREADS [FOLDER]'
+      if (status /= 0) error stop usage
    end function number
 
    !> Processor time of all threads and wall time, s.
@@ -136,7 +140,7 @@ contains
       character(1024) :: folder
       integer :: unit
 
-      call get_command_argument(4, folder)
+      call get_command_argument(5, folder)
       open (newunit=unit, file=trim(folder)//'/'//name, access='stream', form='unformatted', &
          status='replace', action='write')
       write (unit) field
