@@ -13,6 +13,7 @@ program main
    use test_friction_law, only : run_friction_law
    use test_hdf5_file, only : run_hdf5_file
    use test_interpolation, only : run_interpolation
+   use test_mixed, only : run_mixed
    use test_namelist, only : run_namelist
    use test_progress, only : run_progress
    use test_prony, only : run_prony
@@ -60,6 +61,7 @@ program main
    if (wanted('progress')) call run_progress()
    if (wanted('adhesion_potential')) call run_adhesion_potential()
    if (wanted('adhesion_cg')) call run_adhesion_cg()
+   if (wanted('mixed')) call run_mixed()
    if (wanted('normal_cg')) then
       call run_normal_cg()
       call run_normal_limits()

@@ -50,7 +50,7 @@ module normal_cg
    real(dp), parameter :: often_bent = 1e3_dp  !! kappa after some steps that did not descend
    integer, parameter :: mixed_age = 20        !! the same in mixed precision
    integer, parameter :: careful_age = 10      !! the same for a tolerance below `careful`
-   real(dp), parameter :: careful = 1e-8_dp
+   real(dp), parameter :: careful = 1e-7_dp
    real(dp), parameter :: useless = 0.1_dp     !! part of a clipped step that is taken, at the most
 
    !> The solver with its operators and work fields, kept from step to step. Not to be copied.
@@ -58,7 +58,7 @@ module normal_cg
       type(grid_type) :: grid
       type(convolution_type) :: operator              !! A for G = 1
       logical :: mixed = .false.                      !! products of steps in single precision
-      type(convolution_type), private :: quick        !! A in single precision, if mixed
+      type(convolution_type) :: quick                 !! A in single precision, if mixed
       logical, private :: swift = .false.             !! the next product of a step is by `quick`
       type(coarse_level_type), private :: coarse
       real(dp), allocatable, private :: residual(:, :)    !! with a rim: (0:nx+1, 0:ny+1)
@@ -163,8 +163,12 @@ contains
             exit
          end if
          if (fresh .and. self%swift) then
-            ! What the recurrence hid outweighs what was gained since the last look.
-            self%swift = measure%error <= 2.0_dp*expected .or. measure%error <= 0.5_dp*error_before
+            ! Of residuals that have drifted, old and new ones do not make a direction; and where the drift
+            ! outweighs what was gained since the last look, single precision is at its end.
+            if (measure%error > 2.0_dp*expected) then
+               restart = .true.
+               self%swift = measure%error <= 0.5_dp*error_before
+            end if
             error_before = measure%error
             expected = huge(1.0_dp)
          end if
