@@ -2,11 +2,12 @@
 !>
 !>     fpm run --profile release --example bench_normal -- N LOAD THREADS PRECISION [FOLDER]
 !>
-!> PRECISION is double or mixed. N x N cells, L = 1 m, modes 4 to N/16, Hurst exponent 0.8, rms slope 0.1, E* = 1 Pa, mean pressure
-!> LOAD x E* x slope, tolerance 1e-6. Printed: iterations, transforms, error, fraction in contact;
-!> seconds of processor and wall time of the solve; the same of one transform, from products with the
-!> double operator before and after it, and of one in single precision; peak memory in fields of N x N doubles. With FOLDER, the height and
-!> the pressure are written there as raw doubles.
+!> PRECISION is double or mixed. N x N cells, L = 1 m, modes 4 to N/16, Hurst exponent 0.8, rms slope
+!> 0.1, E* = 1 Pa, mean pressure LOAD x E* x slope, tolerance 1e-6. Printed: iterations, transforms,
+!> error, fraction in contact; seconds of processor and wall time of the solve; the same of one
+!> transform, from products with the double operator before and after it; the number of transforms in
+!> single precision and the processor time of one; peak memory in fields of N x N doubles. With FOLDER,
+!> the height and the pressure are written there as raw doubles.
 program bench_normal
    use errors, only : error_type
    use fft_conv, only : convolution_type

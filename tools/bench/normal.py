@@ -80,7 +80,8 @@ def best(
 ) -> dict[str, float]:
     """Choose the run with the least processor (one thread) or wall time."""
     key = "cpu" if threads == 1 else "wall"
-    return min((asperity(n, load, threads, precision) for _ in range(repeats)), key=lambda run: run[key])
+    runs = (asperity(n, load, threads, precision) for _ in range(repeats))
+    return min(runs, key=lambda run: run[key])
 
 
 def own_transforms(run: dict[str, float]) -> float:
@@ -199,7 +200,8 @@ def main() -> None:
             "PolonskyKeerRey of the wheel on PyPI (one thread), with a tolerance whose result has",
             "e1 between 0.5e-6 and 1e-6 where one is found; the last column is sum |P - P'|/sum P.",
             "",
-            "| n | p/(E* h') | precision | Asperity, s | e1 | Tamaas, s | e1 | ratio | difference |",
+            "| n | p/(E* h') | precision | Asperity, s | e1 | Tamaas, s | e1 | ratio "
+            "| difference |",
             "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
         ]
         for n in (512, 1024):
