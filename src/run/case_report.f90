@@ -87,7 +87,8 @@ contains
    !> each arm one field, and three for the steps before and their traction; sliding three, the
    !> original map and its slopes; adhesion 6 fields and a second buffer; friction 14 fields, two
    !> buffers, and two fields an arm; mixed precision 0.6 of a buffer. The
-   !> rest: 20 MB. Measured at 1024 x 1024 on two threads: 108 MB for 104 (elastic), 125 for 129 (free), 184 for 179 (three arms, sliding).
+   !> rest: 20 MB. Measured at 1024 x 1024 on two threads: 108 MB for 104 (elastic), 125 for 129
+   !> (free), 184 for 179 (three arms, sliding).
    pure function memory_needed(case) result(bytes)
       type(case_type), intent(in) :: case
       real(dp) :: bytes
