@@ -225,3 +225,37 @@ def test_checkpoint_is_not_touched_by_a_failing_write(program: str, case: Path,
     assert done.returncode == 3, (done.returncode, done.stderr)
     assert checkpoint.read_bytes() == kept.read_bytes()
     assert vc.run(program, case, "--restart").returncode == 0
+
+
+EVERYTHING = """
+&grid nx = 48, ny = 28, lx = 500e-6 /
+&surface shape = 'sine', amplitude = 2e-6, wavelength = 500e-6 /
+&material shear_modulus = 1e6, prony_g = 4e6, 1e6, prony_tau = 4e-5, 1e-3,
+  thickness = 2e-3, density = 20 /
+&adhesion potential = 'exponential', energy = 0.05, range = 2e-6 /
+&friction law = 'coulomb', coefficient = 0.6 /
+&phase pressure = 0.3e6, duration = 1e-4, steps = 4 /
+&phase velocity_x = 1, velocity_y = 0.3, duration = 2e-4 /
+&output checkpoint_every = 3, snapshot_every = 10 /
+"""
+
+
+def test_friction_adhesion_and_inertia(program: str, tmp_path: Path) -> None:
+    """All that a state can hold survives a kill, to the last bit."""
+    whole, parts = tmp_path / "whole.nml", tmp_path / "parts.nml"
+    for path in (whole, parts):
+        path.write_text(EVERYTHING)
+    assert vc.run(program, whole).returncode == 0
+    process = vc.start(program, parts)
+    vc.wait_for_rows(process, parts.with_suffix(".h5"), 12)
+    process.kill()
+    process.communicate(timeout=60)
+    if process.returncode != 0:  # it was not faster than the kill
+        assert vc.run(program, parts, "--restart").returncode == 0
+    vc.assert_same(parts.with_suffix(".h5"), whole.with_suffix(".h5"))
+    h = asperity.open(whole.with_suffix(".h5")).history
+    kept = h["energy_elastic"] + h["energy_adhesive"] + h["energy_kinetic"]
+    lost = h["dissipated_viscous"] + h["dissipated_friction"]
+    balance = h["work_normal"] + h["work_tangential"] - kept - lost
+    # To round-off, or to the tolerance of the tangential solver where its last return is felt.
+    assert abs(balance).max() < 1e-6 * abs(kept).max()
