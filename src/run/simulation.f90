@@ -498,7 +498,8 @@ contains
          call watch_stick_slip(self, plan, row%sliding_speed)
       end if
       row%friction = 0.0_dp
-      if (abs(row%force) > 0.0_dp) row%friction = dot_product(force, self%direction)/row%force
+      if (abs(row%force) > 0.0_dp .and. any(abs(self%direction) > 0.0_dp)) &
+         row%friction = dot_product(force, self%direction)/row%force
       if (plan%instantaneous) then
          ! The path of a jump is not known: its work is what it stores.
          row%work_load = self%row%work_load + row%work_normal - self%row%work_normal &

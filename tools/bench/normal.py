@@ -207,6 +207,10 @@ def main() -> None:
         for n in (512, 1024):
             text += compare(options.tamaas, n, 0.05)
             print(*text[-2:], sep="\n", file=sys.stderr)
+    # The other benches keep their parts between marks.
+    old = options.output.read_text() if options.output.exists() else ""
+    mark = old.find("<!--")
+    text += ["", old[mark:].rstrip()] if mark >= 0 else []
     options.output.write_text("\n".join(text) + "\n")
 
 
