@@ -281,6 +281,7 @@ contains
       case%material%poisson = 0.0_dp                         ! E* is all that matters
       case%solver%method = 'fast'
       if (thesis == 1) case%solver%method = 'thesis'
+      case%solver%precision = 'double'
       case%solver%tolerance = tolerance
       case%solver%max_iterations = max_iterations
       case%adhesion%potential = potential
