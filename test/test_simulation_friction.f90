@@ -10,6 +10,7 @@ module test_simulation_friction
    use simulation, only : new_simulation, simulation_type
    use simulation_runs, only : check_books, check_same_rows, last, nl, record_type, run_case
    use text_tools, only : exact_text
+   use stick_slip_watch, only : stick_slip_watch_type, watch_slip
    implicit none
    private
 
@@ -229,6 +230,22 @@ contains
    subroutine test_stick_slip()
       character(*), parameter :: report = 'numerical stick-slip'
       type(record_type) :: record
+      type(stick_slip_watch_type) :: watch
+      character(:), allocatable :: message
+      integer :: k, told
+
+      told = 0
+      do k = 1, 20
+         call watch_slip(watch, merge(1.2_dp, 0.8_dp, mod(k, 2) == 0), 1.0_dp, 2, 0.0_dp, message)
+         if (len(message) > 0) told = told + 1
+      end do
+      call check_that(told == 1, 'a slip that swings from step to step is told once')
+      watch = stick_slip_watch_type()
+      do k = 1, 100
+         call watch_slip(watch, 1.0_dp + 0.9_dp*sin(0.3_dp*k), 1.0_dp, 2, 0.0_dp, message)
+         if (len(message) > 0) told = told + 1
+      end do
+      call check_that(told == 1, 'a slip that swings over many steps is not')
 
       call slide('0', record)
       call check_that(index(record%warnings, report) > 0, 'numerical stick-slip is reported')

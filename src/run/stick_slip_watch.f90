@@ -11,7 +11,7 @@ module stick_slip_watch
 
    public :: stick_slip_watch_type, watch_slip
 
-   integer, parameter :: turns_to_report = 6          !! alternations in a row
+   integer, parameter :: turns_to_report = 6          !! alternations more than other steps
    real(dp), parameter :: large = 0.1_dp              !! a change that counts, of the road's speed
 
    !> What has been seen so far.
@@ -39,7 +39,7 @@ contains
       if (min(abs(change), abs(self%change)) > large*road_speed .and. change*self%change < 0.0_dp) then
          self%turns = self%turns + 1
       else
-         self%turns = 0
+         self%turns = max(self%turns - 1, 0)
       end if
       self%speed = slip_speed
       self%change = change
