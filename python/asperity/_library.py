@@ -74,6 +74,8 @@ def set_threads(number: int = 0) -> int:
 
 def height_map(height: ArrayLike, name: str = "height") -> NDArray[np.float64]:
     """Return a map as a C-ordered array of doubles of shape (ny, nx); a profile has ny = 1."""
+    if np.iscomplexobj(height):
+        raise ValueError(f"{name}: must be an array of real numbers")
     try:
         array = np.ascontiguousarray(height, dtype=np.float64)
     except (TypeError, ValueError):

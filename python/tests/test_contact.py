@@ -152,6 +152,7 @@ def test_no_convergence_carries_the_best_result():
     ({"height": np.zeros((2, 2, 2))}, r"height: has shape \(2, 2, 2\): must be \(ny, nx\)"),
     ({"height": np.array([[0.0, np.nan]])}, r"height\[0, 1\] = nan: must be finite"),
     ({"height": [["a"]]}, "height: must be an array of real numbers"),
+    ({"height": [[1.0 + 1.0j]]}, "height: must be an array of real numbers"),
     ({"lx": 0.0}, "lx = 0.0: must be a finite number > 0"),
     ({"ly": -1.0}, "ly = -1.0"),
     ({"modulus": np.inf}, "modulus = inf"),

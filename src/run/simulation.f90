@@ -574,7 +574,8 @@ contains
       case ('pressure')
          values = self%pressure
       case ('gap')
-         values = self%gap
+         ! Where the surfaces overlap by less than the tolerance they touch.
+         values = max(self%gap, 0.0_dp)
       case ('displacement_z')
          values = self%displacement
       case default
