@@ -1,5 +1,5 @@
 !> Inputs to start from, each complete and small enough to run in seconds. Comments come from the
-!> reference of the input. A template that asks for what is not available yet is not offered.
+!> reference of the input. A template that the input check refuses is not offered.
 module case_templates
    use case_input, only : parse_case
    use case_settings, only : case_type
