@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 from scipy.special import ellipk, erf
 
+import asperity
 from asperity import theory
 from asperity.material import Prony
 
@@ -630,6 +631,69 @@ def test_speed_step_joins_the_steady_states():
     assert found.friction[2] == pytest.approx(float(finer.friction[0]), rel=1e-4)
 
 
+def test_zero_knots_end_the_spectrum_half_way():
+    k, phi = np.array([0.5, 1.0, 2.0, 4.0, 8.0, 16.0]), np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0])
+    height, slope = theory.psd_moments(k, phi)
+    assert height**2 == pytest.approx((32 - 2) / 2 / (2 * np.pi), rel=1e-12)
+    assert slope**2 == pytest.approx((32**2 - 2**2) / 4 / (2 * np.pi), rel=1e-12)
+
+
+def test_persson_of_many_pressures_and_speeds():
+    pressure, velocity = np.array([[1e5], [4e5]]), np.array([0.0, 0.01, 1.0])
+    found = theory.persson(*PSD, WIDE, pressure, velocity, gamma=0.45)
+    assert found.friction.shape == found.contact_area.shape == (2, 3)
+    for i, p in enumerate(pressure[:, 0]):
+        for j, v in enumerate(velocity):
+            one = theory.persson(*PSD, WIDE, float(p), float(v), gamma=0.45)
+            assert found.friction[i, j] == pytest.approx(float(one.friction), rel=1e-13)
+            assert found.contact_area[i, j] == pytest.approx(float(one.contact_area), rel=1e-13)
+            np.testing.assert_allclose(found.area[i, j], one.area, rtol=1e-13)
+
+
+@pytest.mark.parametrize("generator", ["random_phase", "filtered_noise"])
+def test_spectrum_of_a_given_surface(generator):
+    lx, ly = 1e-3, 0.7e-3
+    height = asperity.surface.self_affine(
+        135, 108, lx, ly, hurst=0.7, wavelength_long=2.5e-4, wavelength_short=4e-5,
+        rms_slope=0.3, seed=5, generator=generator)
+    known = asperity.surface.statistics(height, lx, ly)
+    k, phi = theory.surface_psd(height, lx, ly)
+    moments = theory.psd_moments(k, phi)
+    assert moments[0] == pytest.approx(known.rms_height, rel=1e-6)
+    assert moments[1] == pytest.approx(known.rms_slope, rel=1e-6)
+    at_rest = theory.persson(k, phi, WIDE, 2e5, 0.0)
+    expected = theory.persson_area(2e5, 4 * WIDE.g_inf, known.rms_slope)
+    assert float(at_rest.contact_area) == pytest.approx(float(expected), rel=1e-6)
+    # bands of another width, the rings as they are, and the spectrum that it was made of
+    fine = theory.surface_psd(height, lx, ly, bands_per_decade=40)
+    rings = asperity.surface.psd(height, lx, ly)
+    target = theory.self_affine_psd(0.7, 2.5e-4, 2.5e-4, 4e-5, rms_slope=0.3)
+    speed = [0.01, 1.0, 100.0]
+    found = theory.persson(k, phi, WIDE, 2e5, speed)
+    for spectrum, error in ((fine, 0.01), ((rings.wavenumber, rings.psd), 0.04), (target, 0.04)):
+        other = theory.persson(*spectrum, WIDE, 2e5, speed)
+        np.testing.assert_allclose(other.contact_area, found.contact_area, rtol=error)
+        np.testing.assert_allclose(other.friction, found.friction, rtol=error)
+
+
+def test_full_contact_friction_of_a_given_surface():
+    """The bands against the sum over the modes of the map, each in full contact."""
+    n, lx, speed, pressure = 48, 1e-3, 0.3, 1e12
+    height = asperity.surface.self_affine(n, lx=lx, hurst=0.8, wavelength_long=3e-4,
+                                          wavelength_short=6e-5, rms_slope=0.2, seed=3)
+    share = asperity.surface.psd_map(height, lx) / lx**2
+    wave = 2 * np.pi * np.fft.fftfreq(n, lx / n)
+    k = np.hypot(wave, wave[:, None])
+    angle = (np.arange(400) + 0.5) * np.pi / 800       # mean over directions
+    loss = np.array([np.mean(np.cos(angle) * WIDE.loss_modulus(q * speed * np.cos(angle)))
+                     for q in k.ravel()]).reshape(k.shape)
+    # stress amplitude of a wave of height h: 2 G q h; its slope: q h
+    expected = np.sum(share * k**2 * 2 * loss)
+    found = theory.persson(*theory.surface_psd(height, lx), WIDE, pressure, speed)
+    assert float(found.friction) * pressure == pytest.approx(expected, rel=2e-3)
+    assert float(found.contact_area) == pytest.approx(1.0, rel=1e-9)
+
+
 # ---- wrong values -----------------------------------------------------------------------------
 
 
@@ -673,6 +737,11 @@ def test_speed_step_joins_the_steady_states():
         (lambda: theory.persson(*PSD, RUBBER, 0.0, 1.0), "pressure = 0.0"),
         (lambda: theory.persson(*PSD, RUBBER, 1.0, 1.0, gamma=1.5), "gamma = 1.5"),
         (lambda: theory.persson([2.0, 1.0], [1.0, 1.0], RUBBER, 1.0, 1.0), r"wavenumber\[1\]"),
+        (lambda: theory.persson([1.0, 2.0], [0.0, 0.0], RUBBER, 1.0, 1.0), "all values are 0.0"),
+        (lambda: theory.persson(*PSD, RUBBER, 1.0, [1.0, -2.0]), r"velocity\[1\] = -2.0"),
+        (lambda: theory.surface_psd(np.zeros((4, 4)), 1.0), "the map is flat"),
+        (lambda: theory.surface_psd(np.zeros((1, 4)), 1.0), "at least 2 x 2"),
+        (lambda: theory.surface_psd(np.eye(4), 1.0, bands_per_decade=0), "bands_per_decade = 0"),
         (lambda: theory.self_affine_psd(1.2, 3, 2, 1, rms_slope=1.0), "hurst = 1.2"),
         (lambda: theory.self_affine_psd(0.8, 3, 1, 2, rms_slope=1.0), "wavelength_rolloff = 1"),
         (lambda: theory.persson_area(-1.0, 1.0, 1.0), "pressure = -1.0"),

@@ -8,7 +8,7 @@ Elastic: `hertz`, `hertz_line`, `westergaard`, `persson_area`, `bush_gibson_thom
 Adhesive: `jkr`, `dmt`, `maugis`, `tabor_parameter`.
 Friction: `mindlin`.
 Viscoelastic: `lee_radok`, `hunter`, `full_contact_waves`, `persson`, `persson_speed_step`.
-Spectra: `self_affine_psd`, `psd_moments`.
+Spectra: `self_affine_psd`, `surface_psd`, `psd_moments`.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from .rough import (
     persson_speed_step,
     psd_moments,
     self_affine_psd,
+    surface_psd,
 )
 from .tangential import MindlinContact, mindlin
 from .viscoelastic import HunterContact, LeeRadokContact, hunter, lee_radok
@@ -53,6 +54,7 @@ __all__ = [
     "persson_speed_step",
     "psd_moments",
     "self_affine_psd",
+    "surface_psd",
     "tabor_parameter",
     "westergaard",
 ]

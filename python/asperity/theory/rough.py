@@ -2,7 +2,8 @@
 
 The power spectral density Phi(k) = |h_hat(k)|^2/A (thesis, eq. 1.5; m^4) is that of an isotropic
 surface: mean(h^2) = int Phi k dk/(2 pi), mean(|grad h|^2) = int Phi k^3 dk/(2 pi). Persson's
-C(q) is Phi/(4 pi^2).
+C(q) is Phi/(4 pi^2). It is given by knots: straight in log-log between them; where it is zero at
+one end of a stretch, the value of the other end holds for half of it.
 """
 
 from __future__ import annotations
@@ -13,8 +14,10 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
 from scipy.special import erf
 
+from .. import surface
 from .._check import array_of, exactly_one, number, poisson_ratio, positive
 from ..material import Prony
 
@@ -22,6 +25,8 @@ FloatArray = NDArray[np.float64]
 
 _ORDER = 8
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(_ORDER)
+
+_FEWEST = 16
 
 
 def _running_weights() -> FloatArray:
@@ -60,24 +65,50 @@ class _Spectrum:
 
 def _spectrum(wavenumber: ArrayLike, psd: ArrayLike) -> _Spectrum:
     k = array_of("wavenumber", wavenumber, low=0.0, low_open=True, ndim=1, increasing=True)
-    phi = array_of("psd", psd, low=0.0, low_open=True, ndim=1)
+    phi = array_of("psd", psd, low=0.0, ndim=1)
     if k.size < 2 or phi.size != k.size:
         raise ValueError(
             f"wavenumber, psd: have {k.size} and {phi.size} values:"
             " must have the same number, at least 2"
         )
-    knots = np.log(k)
-    edges = [knots[:1]]
-    for low, high in pairwise(knots):
-        edges.append(np.linspace(low, high, max(1, math.ceil((high - low) / 0.5)) + 1)[1:])
-    edge = np.concatenate(edges)
+    # numbers far below the rest are the round-off of a Fourier transform
+    moment = phi * k**3
+    present = moment > 1e-20 * moment.max()
+    if not np.any(present):
+        raise ValueError("psd: all values are 0.0: must have one > 0")
+    knots, level = np.log(k), np.log(np.where(present, phi, 1.0))
+    low, high, start, rise = [], [], [], []
+    for i in range(k.size - 1):
+        a, b = knots[i], knots[i + 1]
+        if present[i] and present[i + 1]:
+            slope = (level[i + 1] - level[i]) / (b - a)
+        elif present[i]:
+            b, slope = 0.5 * (a + b), 0.0
+        elif present[i + 1]:
+            a, slope = 0.5 * (a + b), 0.0
+        else:
+            continue
+        pieces = max(1, math.ceil((b - a) * max(2.0, 0.25 * abs(slope))))
+        edge = np.linspace(a, b, pieces + 1)
+        low.extend(edge[:-1])
+        high.extend(edge[1:])
+        base = level[i] if present[i] else level[i + 1]
+        start.extend(base + slope * (edge[:-1] - a))
+        rise.extend([slope] * pieces)
     # where E* is far above p, the area falls from 1 close to the first wavenumber
-    steps = np.diff(edge)
-    steps = np.append(steps[0] * np.append(2.0**-40, 0.5 ** np.arange(40, 0, -1)), steps[1:])
-    half = 0.5 * steps
-    middle = edge[0] + np.cumsum(steps) - half
-    x = middle[:, None] + half[:, None] * _NODES
-    return _Spectrum(np.exp(x), np.exp(np.interp(x, knots, np.log(phi))), half)
+    width = high[0] - low[0]
+    parts = width * np.append(0.0, 0.5 ** np.arange(40, -1, -1))
+    first = low[0] + parts
+    low_edge = np.append(first[:-1], low[1:])
+    half = 0.5 * np.append(np.diff(parts), np.subtract(high[1:], low[1:]))
+    base_level = np.append(start[0] + rise[0] * parts[:-1], start[1:])
+    slopes = np.append(np.full(41, rise[0]), rise[1:])
+    offset = half[:, None] * (1.0 + _NODES)
+    return _Spectrum(
+        np.exp(low_edge[:, None] + offset),
+        np.exp(base_level[:, None] + slopes[:, None] * offset),
+        half,
+    )
 
 
 def self_affine_psd(
@@ -140,6 +171,100 @@ def psd_moments(wavenumber: ArrayLike, psd: ArrayLike) -> tuple[float, float]:
         math.sqrt(s.total(s.psd * s.k) / (2.0 * math.pi)),
         math.sqrt(s.total(s.psd * s.k**3) / (2.0 * math.pi)),
     )
+
+
+def surface_psd(
+    height: ArrayLike, lx: float, ly: float | None = None, *, bands_per_decade: int = 10
+) -> tuple[FloatArray, FloatArray]:
+    """Return the knots of the PSD of a given map, for `persson` and `persson_speed_step`.
+
+    The modes of `asperity.surface.psd_map` are gathered in bands of wavenumber. In each band
+    the PSD is a power law that holds its share of the mean square height and slope, so that
+    `psd_moments` gives the rms height and slope of the map. Directions are averaged.
+
+    Parameters
+    ----------
+    height : array_like, shape (ny, nx)
+        Heights, m, taken as periodic; ny >= 2 and not flat.
+    lx, ly : float
+        Lengths of the map, m; `ly` defaults to square cells.
+    bands_per_decade : int
+        1..200. Bands with fewer than 16 modes are joined to the next.
+
+    Returns
+    -------
+    wavenumber : ndarray, shape (m,)
+        rad/m, ascending; inner edges of bands twice, 1e-9 apart.
+    psd : ndarray, shape (m,)
+        m^4.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of range or the map is flat.
+
+    Examples
+    --------
+    >>> import asperity
+    >>> map_ = asperity.surface.self_affine(64, lx=1e-3, wavelength_short=1e-4, rms_slope=0.2)
+    >>> round(psd_moments(*surface_psd(map_, 1e-3))[1], 6)
+    0.2
+    """
+    map_ = array_of("height", height, ndim=2)
+    if min(map_.shape) < 2:
+        raise ValueError(f"height: has the shape {map_.shape}: must have at least 2 x 2 cells")
+    across = positive("lx", lx)
+    along = across * map_.shape[0] / map_.shape[1] if ly is None else positive("ly", ly)
+    per_decade = number("bands_per_decade", bands_per_decade, 1, 200)
+    rows, columns = map_.shape
+    wave_x = 2.0 * math.pi * np.fft.fftfreq(columns, across / columns)
+    wave_y = 2.0 * math.pi * np.fft.fftfreq(rows, along / rows)
+    k = np.hypot(wave_x, wave_y[:, None]).ravel()[1:]
+    share = surface.psd_map(map_, across, along).ravel()[1:] / (across * along)
+    slope = share * k**2
+    # numbers far below the rest are the round-off of the Fourier transform
+    present = slope > 1e-20 * slope.max()
+    if not np.any(present):
+        raise ValueError("height: the map is flat: must have roughness")
+    k, share, slope = k[present], share[present], slope[present]
+    mesh = 2.0 * math.pi / max(across, along)
+    start, end = k.min() - 0.5 * mesh, k.max() + 0.5 * mesh
+    count = max(1, round(math.log10(end / start) * per_decade))
+    edges = [start]
+    for edge in np.geomspace(start, end, count + 1)[1:-1]:
+        if np.count_nonzero((k > edges[-1]) & (k <= edge)) >= _FEWEST:
+            edges.append(float(edge))
+    if len(edges) > 1 and np.count_nonzero(k > edges[-1]) < _FEWEST:
+        edges.pop()
+    edges.append(end)
+    knots, levels = [], []
+    for low, high in pairwise(edges):
+        inside = (k > low) & (k <= high)
+        ratio = float(np.sum(slope[inside]) / np.sum(share[inside]))
+        exponent = _band_exponent(ratio / low**2, high / low)
+        level = 2.0 * math.pi * float(np.sum(slope[inside])) / (
+            low**4 * _power_integral(exponent + 4.0, math.log(high / low)))
+        knots += [low * (1.0 + 5e-10), high * (1.0 - 5e-10)]
+        levels += [level, level * (high / low) ** exponent]
+    return np.array(knots), np.array(levels)
+
+
+def _power_integral(power: float, width: float) -> float:
+    """Return int_1^{e^width} x^(power - 1) dx."""
+    z = power * width
+    return width if abs(z) < 1e-12 else math.expm1(z) / power
+
+
+def _band_exponent(ratio: float, width: float) -> float:
+    """Return a, |a| <= 60, with int x^(a+3) dx = ratio int x^(a+1) dx over 1..width."""
+    span = math.log(width)
+
+    def excess(a: float) -> float:
+        return _power_integral(a + 4.0, span) / _power_integral(a + 2.0, span) - ratio
+
+    if excess(-60.0) >= 0.0:
+        return -60.0
+    return 60.0 if excess(60.0) <= 0.0 else float(brentq(excess, -60.0, 60.0, xtol=1e-13))
 
 
 def persson_area(pressure: ArrayLike, modulus: float, rms_slope: float) -> FloatArray:
@@ -246,10 +371,12 @@ def _finish(
     s: _Spectrum,
     squared: FloatArray,
     loss: FloatArray,
-    pressure: float,
+    pressure: FloatArray | float,
     gamma: float,
 ) -> PerssonContact:
     """Return the contact from the angular means of |E*|^2 and cos(phi) Im E*, at the points."""
+    load = pressure
+    pressure = np.asarray(load)[..., None, None]
     variance = s.running(s.psd * s.k**3 * squared) / (16.0 * math.pi * pressure**2)
     area = _area_of(variance)
     reduced = gamma + (1.0 - gamma) * area**2
@@ -260,7 +387,7 @@ def _finish(
     start = np.sum((s.half[:, None] * _WEIGHTS * s.k * integrand)[..., :-1, :], axis=(-2, -1))
     moment = s.psd * s.k**4 * squared
     whole = np.sum(s.half[:, None] * _WEIGHTS * moment, axis=(-2, -1))
-    end_area = _area_of(whole / (16.0 * math.pi * pressure**2))
+    end_area = _area_of(whole / (16.0 * math.pi * np.asarray(load) ** 2))
     lead = area.shape[:-2]
     edge = math.exp(math.log(s.k[-1, -1]) + s.half[-1] * (1.0 - _NODES[-1]))
     join = np.concatenate
@@ -278,8 +405,8 @@ def persson(
     wavenumber: ArrayLike,
     psd: ArrayLike,
     material: Prony,
-    pressure: float,
-    velocity: float,
+    pressure: ArrayLike,
+    velocity: ArrayLike,
     *,
     poisson: float = 0.5,
     gamma: float = 1.0,
@@ -301,14 +428,15 @@ def persson(
     wavenumber : array_like, shape (m,)
         Knots of the PSD, rad/m, > 0, ascending, m >= 2.
     psd : array_like, shape (m,)
-        Phi at the knots, m^4, > 0: straight in log-log between the knots, zero outside. From
-        `self_affine_psd`, or a radial average of a measured surface.
+        Phi at the knots, m^4, >= 0: straight in log-log between the knots, zero outside. From
+        `self_affine_psd`, or from a given surface by `surface_psd` (or, unbanded,
+        `asperity.surface.psd`).
     material : Prony
         Shear relaxation modulus.
-    pressure : float
+    pressure : array_like
         Nominal pressure p, Pa, > 0.
-    velocity : float
-        Sliding speed V, m/s, >= 0.
+    velocity : array_like
+        Sliding speed V, m/s, >= 0; broadcast with `pressure`.
     poisson : float
         Constant in time.
     gamma : float
@@ -317,6 +445,7 @@ def persson(
     Returns
     -------
     PerssonContact
+        Leading axes: those of `pressure` and `velocity`, broadcast.
 
     Raises
     ------
@@ -336,10 +465,12 @@ def persson(
     np.True_
     """
     s = _spectrum(wavenumber, psd)
-    p, v = positive("pressure", pressure), number("velocity", velocity, 0.0)
+    p = array_of("pressure", pressure, low=0.0, low_open=True)
+    v = array_of("velocity", velocity, low=0.0)
+    p, v = np.broadcast_arrays(p, v)
     nu = poisson_ratio(poisson)
     weight = number("gamma", gamma, 0.0, 1.0)
-    a = s.k[..., None] * v * material.tau
+    a = s.k[..., None] * v[..., None, None, None] * material.tau
     root = np.sqrt(1.0 + a * a)
     # mean over phi of cos(phi) G''(w cos phi)
     loss = np.sum(material.g * a / (root * (root + 1.0)), axis=-1)
