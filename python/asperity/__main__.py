@@ -23,17 +23,21 @@ def main(arguments: list[str] | None = None) -> int:
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
     plot = verbs.add_parser(
         "plot", help="draw a result",
-        description="Draw a result: by default an overview of the last pressure and gap and of the"
-                    " contact area, into RESULT.png.")
+        description="Draw a result: by default an overview, into RESULT.png. With friction it shows"
+                    " friction, contact and stick area and sliding speed in time, with the last"
+                    " pressure and what sticks and slips; without, the last pressure and gap with"
+                    " the contact area.")
     plot.add_argument("result", metavar="RESULT.h5", help="result of `asperity run`")
     plot.add_argument("-o", "--output", metavar="PNG", type=Path,
                       help="picture to write (.png, .pdf, .svg); default: RESULT.png beside the"
                            " result")
     plot.add_argument("--show", action="store_true", help="open a window instead of writing")
     what = plot.add_mutually_exclusive_group()
-    what.add_argument("--field", metavar="NAME", help="draw a field of a snapshot, as pressure")
+    what.add_argument("--field", metavar="NAME",
+                      help="draw a field of a snapshot, as pressure; contact shows what sticks"
+                           " and slips, with the tractions")
     what.add_argument("--history", metavar="NAME",
-                      help="draw a column of the history, as friction")
+                      help="draw a column of the history, as friction (with its causes), or energy")
     plot.add_argument("--step", type=int, help="the snapshot's step; default: the last one")
     plot.add_argument("--x", metavar="NAME", help="column to draw --history against")
     plot.set_defaults(call=_plot)
@@ -75,7 +79,7 @@ def _plot(chosen: argparse.Namespace) -> int:
         plt.show()
         return 0
     output = chosen.output or run.path.with_suffix(".png")
-    figure.savefig(output, dpi=150)
+    figure.savefig(output, dpi=300)
     plt.close(figure)
     print(f"wrote {output}")
     return 0

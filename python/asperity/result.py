@@ -199,19 +199,28 @@ class Snapshot:
             raise UnknownNameError(unknown_name("field of the snapshot", name, self._meanings))
         return self._meanings[name][1]
 
-    def plot(self, name: str = "pressure", ax: Axes | None = None) -> Axes:
+    def plot(self, name: str = "pressure", ax: Axes | None = None,
+             arrows: bool | None = None) -> Axes:
         """Draw a field: a map, or a profile if ny is 1.
 
         Parameters
         ----------
         name : str
-            Name of the field.
+            Name of the field; 'contact' shows what is open, sticks and slips.
         ax : matplotlib.axes.Axes, optional
-            Where to draw; a new figure if left out.
+            Where to draw; a new figure, one column wide, if left out.
+        arrows : bool, optional
+            Whether to draw the tractions as arrows; by default on 'contact' only.
+
+        Examples
+        --------
+        >>> import asperity
+        >>> run = asperity.open("road.h5")                                  # doctest: +SKIP
+        >>> run.snapshots[-1].plot("contact").figure.savefig("contact.pdf")  # doctest: +SKIP
         """
         from .plot import plot_field
 
-        return plot_field(self, name, ax)
+        return plot_field(self, name, ax, arrows)
 
     def __repr__(self) -> str:
         return (f"snapshot of step {self.step}, t = {self.time:g} s, phase {self.phase}:"
@@ -372,27 +381,47 @@ class Run:
 
         return _read(self.path, read)
 
-    def plot(self, name: str = "contact_area", x: str | None = None, ax: Axes | None = None,
-             **style: Any) -> Axes:
-        """Draw a column of the history against another one.
+    @overload
+    def plot(self) -> Figure: ...
+
+    @overload
+    def plot(self, name: str, x: str | None = None, ax: Axes | None = None,
+             **style: Any) -> Axes: ...
+
+    def plot(self, name: str | None = None, x: str | None = None, ax: Axes | None = None,
+             **style: Any) -> Axes | Figure:
+        """Draw a column of the history, or without a name an overview of the run.
+
+        With friction, 'friction' is drawn with its causes, 'contact_area' with the area that
+        sticks and 'sliding_speed' with the road's; 'energy' draws the books of energy.
 
         Parameters
         ----------
-        name : str
-            Column to draw.
+        name : str, optional
+            Column to draw, or 'energy'; the overview if left out.
         x : str, optional
             Column along the axis: time by default; where time stands still, pressure or step.
         ax : matplotlib.axes.Axes, optional
-            Where to draw; a new figure if left out.
+            Where to draw; a new figure, one column wide, if left out.
         **style
-            Passed on to `matplotlib.axes.Axes.plot`.
-        """
-        from .plot import plot_history
+            Passed on to `matplotlib.axes.Axes.plot` for the column itself.
 
+        Returns
+        -------
+        matplotlib.axes.Axes or matplotlib.figure.Figure
+            The axes of a column; the figure of the overview.
+        """
+        from .plot import plot_history, plot_overview
+
+        if name is None:
+            if x is not None or ax is not None or style:
+                raise ValueError("plot: x, ax and style need the name of a column, such as"
+                                 " 'friction'")
+            return plot_overview(self)
         return plot_history(self, name, x, ax, **style)
 
     def overview(self) -> Figure:
-        """Draw the last pressure, the last gap and the contact area or the friction."""
+        """Draw what tells most of the run, as `plot` does without a name."""
         from .plot import plot_overview
 
         return plot_overview(self)

@@ -97,3 +97,48 @@ def write_result(path, *, nx=24, ny=16, lx=2.4e-3, ly=1.6e-3, rows=6, moving=Fal
 def result(tmp_path):
     """Return the path of a result of an elastic contact at growing load."""
     return write_result(tmp_path / "rough.h5")
+
+
+def frictional_result(path, **options):
+    """Write a result of sliding with friction: `write_result` with what friction adds."""
+    write_result(path, moving=True, **options)
+    with h5py.File(path, "a") as file:
+        history = file["history"]
+        rows = len(history["step"])
+        part = np.linspace(0, 1, rows)
+        lost, rubbed, stored = 4e-9 * part**2, 9e-9 * part**2, 2e-9 * part
+        work = stored + lost + rubbed
+        work[-1] *= 1.001  # books that miss a thousandth
+        del history["work_normal"]
+        columns = {
+            "friction_viscous": (0.08 * part, "1"),
+            "stick_area": (0.1 * (1 - part), "1"),
+            "sliding_speed": (0.015 * part, "m/s"),
+            "road_x": (2e-5 * np.arange(rows), "m"),
+            "road_y": (np.zeros(rows), "m"),
+            "work_normal": (0.25 * work, "J"),
+            "work_tangential": (0.75 * work, "J"),
+            "energy_elastic": (stored, "J"),
+            "energy_adhesive": (np.zeros(rows), "J"),
+            "energy_kinetic": (np.zeros(rows), "J"),
+            "dissipated_viscous": (lost, "J"),
+            "dissipated_friction": (rubbed, "J"),
+            "iterations_normal": (np.arange(rows, dtype=np.int32) + 7, "1"),
+            "iterations_tangential": (np.arange(rows, dtype=np.int32) + 9, "1"),
+            "residual_normal": (np.full(rows, 3e-7), "1"),
+            "residual_tangential": (np.full(rows, 2e-7), "1"),
+            "seconds": (np.full(rows, 0.25), "s"),
+        }
+        for name, (values, units) in columns.items():
+            item = history.create_dataset(name, data=values, maxshape=(None,), chunks=(64,))
+            item.attrs.update(units=units, long_name=name.replace("_", " "))
+        for group in file["snapshots"].values():
+            item = group.create_dataset("traction_y", data=0.1 * group["pressure"][()])
+            item.attrs.update(units="Pa", long_name="traction along y")
+    return path
+
+
+@pytest.fixture
+def frictional(tmp_path):
+    """Return the path of a result of sliding with friction."""
+    return frictional_result(tmp_path / "friction.h5")

@@ -7,10 +7,14 @@ import h5py
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from conftest import write_result
+from conftest import frictional_result, write_result
+from matplotlib.colors import to_rgba
+from matplotlib.patches import Rectangle
+from matplotlib.quiver import Quiver, QuiverKey
 
 import asperity
 from asperity.__main__ import main
+from asperity._style import NO_CONTACT, SLIP, STICK
 from asperity.plot import si_scale
 
 
@@ -58,10 +62,172 @@ def test_signed_fields_have_a_symmetric_scale(result):
     assert image.norm.vmin == -image.norm.vmax
 
 
-def test_contact_map_names_its_states(result):
-    axes = asperity.open(result).snapshots[-1].plot("contact")
-    bar = next(other for other in axes.figure.axes if other is not axes)
-    assert [text.get_text() for text in bar.get_yticklabels()] == ["open", "stick", "slip"]
+def legend_of(axes):
+    """Return the texts of a legend."""
+    return [text.get_text() for text in axes.get_legend().get_texts()]
+
+
+def test_contact_map_names_its_states(frictional):
+    snapshot = asperity.open(frictional).snapshots[-1]
+    axes = snapshot.plot("contact")
+    shares = [100 * np.mean(snapshot.contact == state) for state in range(3)]
+    names = [f"{name} {share:.3g} %"
+             for name, share in zip(("open", "stick", "slip"), shares, strict=True)]
+    assert legend_of(axes) == names
+    image = axes.images[0]
+    colours = image.cmap(image.norm([0, 1, 2]))
+    np.testing.assert_allclose(
+        colours, [to_rgba(colour) for colour in (NO_CONTACT, STICK, SLIP)])
+    assert axes.get_title().startswith("Stick and slip, step 5")
+
+
+def test_traction_arrows_stand_in_contact(frictional):
+    snapshot = asperity.open(frictional).snapshots[-1]
+    axes = snapshot.plot("contact")
+    (arrows,) = (item for item in axes.collections if isinstance(item, Quiver))
+    i = np.rint(arrows.X / 0.1).astype(int)  # cells of 0.1 mm
+    j = np.rint(arrows.Y / 0.1).astype(int)
+    assert len(i) > 20
+    assert np.all(snapshot.contact[j, i] > 0)
+    np.testing.assert_allclose(arrows.U, snapshot.traction_x[j, i])
+    np.testing.assert_allclose(arrows.V, snapshot.traction_y[j, i])
+    # The key has a round length that is not longer than the longest arrow, and says its unit.
+    (key,) = (item for item in axes.get_children() if isinstance(item, QuiverKey))
+    assert f"{key.U:g}"[0] in "125"
+    assert 0.4 * np.hypot(arrows.U, arrows.V).max() < key.U
+    assert np.hypot(arrows.U, arrows.V).max() >= key.U
+    assert key.text.get_text() == "traction 50 kPa"
+    # The longest arrow is somewhat longer than the squares that the map is cut into.
+    assert np.hypot(arrows.U, arrows.V).max() / arrows.scale == pytest.approx(1.5 * 2.4 / 22)
+    assert not any(isinstance(item, Quiver)
+                   for item in snapshot.plot("contact", arrows=False).collections)
+    assert any(isinstance(item, Quiver)
+               for item in snapshot.plot("pressure", arrows=True).collections)
+
+
+def test_without_friction_there_is_contact_and_no_arrow(tmp_path):
+    path = write_result(tmp_path / "elastic.h5")
+    with h5py.File(path, "a") as file:
+        file.attrs["settings"] = "&friction\n  law = 'none'\n/\n"
+    axes = asperity.open(path).snapshots[-1].plot("contact")
+    names = legend_of(axes)
+    assert [name.split()[0] for name in names] == ["open", "contact"]
+    assert sum(float(name.split()[1]) for name in names) == pytest.approx(100.0, abs=0.2)
+    assert not any(isinstance(item, Quiver) for item in axes.collections)
+
+
+def test_line_contact_shades_stick_and_slip(tmp_path):
+    path = frictional_result(tmp_path / "line.h5", ny=1)
+    snapshot = asperity.open(path).snapshots[-1]
+    axes = snapshot.plot("contact")
+    spans = [patch for patch in axes.patches if isinstance(patch, Rectangle)]
+    assert len(spans) == 1 + np.count_nonzero(np.diff(snapshot.contact[0]))
+    lines = {line.get_label(): line.get_ydata() for line in axes.lines}
+    assert set(lines) == {"Pressure", "Traction along x", "Traction along y"}
+    np.testing.assert_allclose(lines["Pressure"], snapshot.pressure[0] / 1e3)
+
+
+def test_friction_is_split_into_its_causes(frictional):
+    run = asperity.open(frictional)
+    axes = run.plot("friction")
+    lines = {line.get_label(): line.get_ydata() for line in axes.lines}
+    np.testing.assert_allclose(lines["whole"], run.history["friction"])
+    np.testing.assert_allclose(lines["loss in the rubber"], run.history["friction_viscous"])
+    np.testing.assert_allclose(lines["loss in the rubber"] + lines["interface"], lines["whole"])
+    assert legend_of(axes) == ["whole", "loss in the rubber", "interface"]
+
+
+def test_attraction_outside_the_contact(tmp_path):
+    # One wave along x, moved by a known way; uniform attraction where the gap is open.
+    path = frictional_result(tmp_path / "adhesive.h5", nx=64, ny=4)
+    with h5py.File(path, "a") as file:
+        file.attrs["settings"] = "&adhesion\n  potential = 'gauss'\n/\n"
+        lx = file["grid"].attrs["lx"]
+        x = file["grid/x"][()]
+        file["surface/height"][...] = 1e-6 * np.cos(2 * np.pi * x / lx)
+        way = file["history/road_x"][-1]
+        pressure = np.where(x < lx / 4, -1e3, 3e3) * np.ones((4, 1))
+        group = file["snapshots/000005"]
+        group["pressure"][...] = pressure
+        group["contact"][...] = (pressure > 0).astype(np.int8)
+    run = asperity.open(path)
+    axes = run.plot("friction")
+    (line,) = (line for line in axes.lines if line.get_label().startswith("attraction"))
+    k = 2 * np.pi / lx
+    dx = lx / 64
+    slope = -1e-6 * np.sin(k * (x - way)) * np.sin(k * dx) / dx  # of central differences
+    expected = 1e3 * np.mean(slope * (x < lx / 4)) / pressure.mean()
+    assert line.get_ydata()[-1] == pytest.approx(expected, rel=5e-3)
+    assert line.get_xdata()[-1] == pytest.approx(5.0)  # ms
+
+
+def test_stick_area_and_sliding_speed(frictional):
+    run = asperity.open(frictional)
+    lines = {line.get_label(): line.get_ydata() for line in run.plot("contact_area").lines}
+    np.testing.assert_allclose(lines["sticking"], run.history["stick_area"])
+    lines = {line.get_label(): line.get_ydata() for line in run.plot("sliding_speed").lines}
+    # The road does 20 um in each millisecond.
+    np.testing.assert_allclose(lines["road against the block's top"][1:], 20.0)
+    np.testing.assert_allclose(lines["mean of the interface"],
+                               1e3 * run.history["sliding_speed"])
+
+
+def test_energy_tells_how_well_the_books_close(frictional):
+    axes = asperity.open(frictional).plot("energy")
+    lines = {line.get_label(): line.get_ydata() for line in axes.lines}
+    assert set(lines) == {"work put in", "stored", "lost in the rubber", "lost by friction"}
+    total = lines["stored"] + lines["lost in the rubber"] + lines["lost by friction"]
+    np.testing.assert_allclose(lines["work put in"][:-1], total[:-1], rtol=1e-12)
+    # The sample's last row misses a thousandth of the largest term.
+    assert axes.get_legend().get_title().get_text() == "books close to 0.001"
+    assert axes.get_ylabel() == "Energy (nJ)"
+
+
+def test_overview_of_friction(frictional):
+    figure = asperity.open(frictional).plot()
+    titles = [axes.get_title() for axes in figure.axes]
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    for name in ("Friction coefficient", "Contact area fraction", "Sliding speed (mm/s)"):
+        assert name in labels
+    assert "Pressure" in titles and "Stick and slip" in titles
+    assert figure.get_size_inches()[0] == pytest.approx(7.2)
+    with pytest.raises(ValueError, match="need the name of a column"):
+        asperity.open(frictional).plot(x="step")
+
+
+def test_nothing_overlaps_on_the_contact_map(frictional):
+    axes = asperity.open(frictional).snapshots[-1].plot("contact")
+    figure = axes.figure
+    figure.canvas.draw()
+    (key,) = (item for item in axes.get_children() if isinstance(item, QuiverKey))
+    boxes = [item.get_window_extent() for item in
+             (axes.title, axes.xaxis.label, axes.get_legend(), key.text)]
+    for number, box in enumerate(boxes):
+        assert not any(box.overlaps(other) for other in boxes[number + 1:])
+        assert figure.bbox.fully_containsx(box.x0) and figure.bbox.fully_containsx(box.x1)
+        assert figure.bbox.fully_containsy(box.y0) and figure.bbox.fully_containsy(box.y1)
+
+
+def test_run_of_one_row_shows_a_section(tmp_path):
+    path = write_result(tmp_path / "one.h5", rows=2)
+    with h5py.File(path, "a") as file:
+        file.attrs["input"] = "&surface shape = 'sphere' /\n"
+        for column in file["history"].values():
+            column.resize((1,))
+    run = asperity.open(path)
+    panel = run.plot().axes[2]
+    assert panel.get_title().startswith("Section at y = ")
+    pressure = run.snapshots[-1].pressure
+    np.testing.assert_allclose(panel.lines[0].get_ydata(), pressure[0] / 1e3)
+    assert pressure[0].max() == pressure.max()
+
+
+def test_run_without_snapshots_shows_its_history(frictional):
+    with h5py.File(frictional, "a") as file:
+        del file["snapshots"]
+    run = asperity.open(frictional)
+    assert run.plot().axes[0].get_ylabel() == "Friction coefficient"
+    assert len(run.plot().axes) == 3
 
 
 def test_line_contact_is_a_profile(tmp_path):
