@@ -13,18 +13,21 @@ from typing import TYPE_CHECKING, Any
 from . import surface
 from ._library import set_threads, version
 from .adhesive_contact import AdhesiveNormalContact, solve_adhesive
+from .case import Case
 from .contact import NormalContact, solve_normal
 from .errors import NotConverged
 from .result import Run
 from .result import open_result as open
 from .runner import run
+from .sweep_table import Sweep, SweepError
+from .sweeps import sweep
 
 if TYPE_CHECKING:
     from . import material, theory
 
-__all__ = ["AdhesiveNormalContact", "NormalContact", "NotConverged", "Run", "__version__",
-           "material", "open", "run", "set_threads", "solve_adhesive", "solve_normal", "surface",
-           "theory"]
+__all__ = ["AdhesiveNormalContact", "Case", "NormalContact", "NotConverged", "Run", "Sweep",
+           "SweepError", "__version__", "material", "open", "run", "set_threads", "solve_adhesive",
+           "solve_normal", "surface", "sweep", "theory"]
 
 __version__ = version()
 """The version of the Fortran library that is loaded, such as ``"0.1.0"``."""

@@ -20,7 +20,7 @@ from asperity._core import asperity_flat
 from ._check import choice, positive
 from .errors import raise_for_status
 
-__all__ = ["call", "flag_of_boundary", "height_map", "lengths", "set_threads", "version"]
+__all__ = ["bare", "call", "flag_of_boundary", "height_map", "lengths", "set_threads", "version"]
 
 _lock = threading.Lock()
 
@@ -40,6 +40,18 @@ def call(name: str) -> Callable[..., tuple[Any, ...]]:
         return tuple(outputs)
 
     return checked
+
+
+def bare(name: str) -> Callable[..., Any]:
+    """Return a routine of the library that has no status."""
+    routine = getattr(asperity_flat, name)
+
+    @functools.wraps(routine)
+    def locked(*arguments: Any) -> Any:
+        with _lock:
+            return routine(*arguments)
+
+    return locked
 
 
 def version() -> str:

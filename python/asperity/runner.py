@@ -6,7 +6,8 @@ import os
 import sys
 import warnings
 
-from . import _library
+from . import _input, _library
+from .case import Case
 from .errors import NotConverged
 from .result import Run
 
@@ -19,7 +20,7 @@ _close = _library.call("run_close")
 
 
 def run(
-    path: str | os.PathLike[str],
+    case: str | os.PathLike[str] | Case,
     *,
     output: str | os.PathLike[str] | None = None,
     threads: int | None = None,
@@ -33,10 +34,12 @@ def run(
 
     Parameters
     ----------
-    path : str or path
-        The input, CASE.nml.
+    case : str, path or Case
+        The input, CASE.nml; or its text, or an `asperity.Case`.
     output : str or path, optional
-        The result; what the case says if left out.
+        The result; what the case says if left out, which is the input's name with .h5 unless
+        ``output.file`` names another. A case without a file counts as ``case.nml`` in the
+        current folder.
     threads : int, optional
         Number of threads; what the case says if left out.
     restart : bool
@@ -71,8 +74,15 @@ def run(
     target = b"" if output is None else os.fsencode(output)
     if output is not None and not 0 < len(target) <= 1024:
         raise ValueError(f"output: has {len(target)} characters: must have 1 to 1024")
-    handle, rows, first, result, told = _open(os.fsencode(path), target, threads or 0,
-                                              int(restart))
+    path, text = "case.nml", ""
+    if isinstance(case, Case):
+        path, text = os.fspath(case.path or path), str(case) or "\n"
+    elif _input.is_text(case):
+        text = str(case)
+    else:
+        path = os.fspath(case)
+    handle, rows, first, result, told = _open(os.fsencode(path), _input.encode(text), target,
+                                              threads or 0, int(restart))
     result_path = os.fsdecode(result.rstrip())
     try:
         _warn(told)

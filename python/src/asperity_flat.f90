@@ -12,6 +12,7 @@ module asperity_flat
    public :: library_version, set_thread_count
    public :: surface_height, surface_psd, surface_radial_psd, surface_statistics
    public :: contact_adhesive, contact_normal
+   public :: input_check, input_groups, input_listed
    public :: run_close, run_interrupt, run_open, run_step
 
 contains
@@ -312,14 +313,15 @@ contains
    end subroutine contact_adhesive
 
    !> Read a case and prepare its run: the handle is for the calls that follow.
-   subroutine run_open(path, output, threads, restart, handle, rows, first, result_path, warnings, &
-      status, message)
-      use case_input, only : read_case
+   subroutine run_open(path, text, output, threads, restart, handle, rows, first, result_path, &
+      warnings, status, message)
+      use case_input, only : overwritten_file, parse_case, read_case
       use case_run, only : run_type
       use case_settings, only : case_type
       use errors, only : error_input, error_type, fail
       use run_handles, only : free_run, new_run, run_of
       character(len=*), intent(in) :: path
+      character(len=*), intent(in) :: text                 !! the input; empty: what the file holds
       character(len=*), intent(in) :: output               !! of the result; blank: what the case says
       integer(c_int), intent(in) :: threads                !! 0: what the case says
       integer(c_int), intent(in) :: restart                !! 1: go on from the checkpoint
@@ -341,9 +343,19 @@ contains
       first = 0
       result_path = ''
       warnings = ''
-      call read_case(trim(path), case, error)
+      if (len(text) > 0) then
+         call parse_case(text, trim(path), case, error)
+      else
+         call read_case(trim(path), case, error)
+      end if
       if (.not. allocated(error)) then
-         if (output /= '') case%output%file = output
+         if (output /= '') then
+            case%output%file = output
+            if (overwritten_file(case) /= '') call fail(error, error_input, 'output = '//output// &
+               ': would be written over '//overwritten_file(case))
+         end if
+      end if
+      if (.not. allocated(error)) then
          if (threads > 0) case%solver%threads = threads
          result_path = case%output%file
          warnings = case%warnings
@@ -443,6 +455,75 @@ contains
       call free_run(int(handle))
       call report(error, status, message)
    end subroutine run_close
+
+   !> The table of the input's groups and variables, as `input_table` writes it.
+   subroutine input_groups(most, buffer, length)
+      use input_listing, only : input_table
+      integer(c_int), intent(in) :: most                       !! characters that the buffer holds
+      integer(c_int), intent(inout) :: buffer(most)             !! codes of the characters
+      integer(c_int), intent(out) :: length                    !! of the text; above `most`: none is written
+
+      call put_text(input_table(), buffer, length)
+   end subroutine input_groups
+
+   !> The values of a text of namelists, as `list_values` writes them.
+   subroutine input_listed(text, path, most, buffer, length, status, message)
+      use errors, only : error_type
+      use input_listing, only : list_values
+      character(len=*), intent(in) :: text
+      character(len=*), intent(in) :: path                     !! for messages
+      integer(c_int), intent(in) :: most
+      integer(c_int), intent(inout) :: buffer(most)             !! codes of the characters
+      integer(c_int), intent(out) :: length
+      integer(c_int), intent(out) :: status
+      character(len=20000), intent(out) :: message
+      character(:), allocatable :: listing
+      type(error_type), allocatable :: error
+
+      length = 0
+      call list_values(text, path, listing, error)
+      if (.not. allocated(error)) call put_text(listing, buffer, length)
+      call report(error, status, message)
+   end subroutine input_listed
+
+   !> What `asperity check` prints about a text.
+   subroutine input_check(text, path, files, most, buffer, length, status, message)
+      use case_input, only : parse_case
+      use case_report, only : case_summary, resolved_input
+      use case_settings, only : case_type
+      use errors, only : error_type
+      use surface, only : check_files
+      character(len=*), intent(in) :: text
+      character(len=*), intent(in) :: path                     !! where paths start, and for messages
+      integer(c_int), intent(in) :: files                      !! 1: look into the height maps, too
+      integer(c_int), intent(in) :: most
+      integer(c_int), intent(inout) :: buffer(most)             !! codes of the characters
+      integer(c_int), intent(out) :: length
+      integer(c_int), intent(out) :: status
+      character(len=20000), intent(out) :: message
+      type(case_type) :: case
+      type(error_type), allocatable :: error
+
+      length = 0
+      call parse_case(text, path, case, error)
+      if (.not. allocated(error) .and. files == 1) call check_files(case%grid, case%surfaces, error)
+      if (.not. allocated(error)) call put_text(resolved_input(case)//case_summary(case), buffer, length)
+      call report(error, status, message)
+   end subroutine input_check
+
+   !> Copy a text into a buffer that holds it; the length tells how long it must be.
+   subroutine put_text(text, buffer, length)
+      character(len=*), intent(in) :: text
+      integer(c_int), intent(inout) :: buffer(:)
+      integer(c_int), intent(out) :: length
+      integer :: i
+
+      length = len(text)
+      if (length > size(buffer)) return
+      do i = 1, length
+         buffer(i) = ichar(text(i:i))
+      end do
+   end subroutine put_text
 
    !> Add new warnings, a line each.
    subroutine take_warnings(new, warnings)

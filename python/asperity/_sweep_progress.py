@@ -1,0 +1,90 @@
+"""What a sweep tells on stderr while it runs."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import TextIO
+
+__all__ = ["Progress"]
+
+
+class Progress:
+    """What is told on stderr: a line that is rewritten in a terminal, else one line a case."""
+
+    def __init__(self, total: int, waiting: int, quiet: bool, stream: TextIO | None = None) -> None:
+        self._stream = sys.stderr if stream is None else stream
+        self._quiet = quiet
+        self._terminal = self._stream.isatty()
+        self._total = total
+        self._kept = total - waiting
+        self._waiting = waiting
+        self._done = self._failed = 0
+        self._start = time.monotonic()
+        self._width = 0
+        if self._kept and not quiet:
+            self._line(f"sweep: {self._kept} of {total} results are there already")
+
+    def _line(self, text: str) -> None:
+        """Write a line of its own."""
+        if self._width:
+            self._stream.write("\r" + " " * self._width + "\r")
+            self._width = 0
+        self._stream.write(text + "\n")
+        self._stream.flush()
+
+    def show(self, running: int) -> None:
+        """Rewrite the line of a terminal."""
+        if self._quiet or not self._terminal:
+            return
+        text = f"sweep: {self._state()}, {running} running{self._left()}"
+        self._stream.write("\r" + text.ljust(self._width))
+        self._stream.flush()
+        self._width = len(text)
+
+    def _state(self) -> str:
+        """Return how far it is."""
+        failed = f", {self._failed} failed" if self._failed else ""
+        return f"{self._kept + self._done} of {self._total} done{failed}"
+
+    def _left(self) -> str:
+        """Return the time left, by the mean of the cases that are done."""
+        left = self._waiting - self._done
+        if not self._done or not left:
+            return ""
+        seconds = (time.monotonic() - self._start) / self._done * left
+        return f", about {_duration(seconds)} left"
+
+    def done(self, name: str, fault: str | None, seconds: float, running: int) -> None:
+        """Count a case; `fault` is None unless it failed."""
+        self._done += 1
+        self._failed += fault is not None
+        if self._quiet:
+            return
+        if fault is not None or not self._terminal:
+            how = f"done in {_duration(seconds)}" if fault is None else f"FAILED: {fault}"
+            self._line(f"sweep: {self._state()}{self._left()}: {name}: {how}")
+        self.show(running)
+
+    def end(self) -> None:
+        """Leave the line of a terminal."""
+        if self._width:
+            self._stream.write("\n")
+            self._stream.flush()
+            self._width = 0
+
+
+def _duration(seconds: float) -> str:
+    """Return a time in words.
+
+    Examples
+    --------
+    >>> _duration(3.21), _duration(75), _duration(7320)
+    ('3.2 s', '1 min 15 s', '2 h 02 min')
+    """
+    if seconds < 60:
+        return f"{seconds:.1f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    if minutes < 60:
+        return f"{minutes} min {rest:02d} s"
+    return f"{minutes // 60} h {minutes % 60:02d} min"

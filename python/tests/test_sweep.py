@@ -1,0 +1,319 @@
+"""Sweeps: values against solutions in closed form, resuming, failures, stopping."""
+
+import importlib.util
+import json
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import asperity
+from asperity.sweep_table import Failure
+
+AMPLITUDE, LENGTH, MODULUS = 1e-6, 1e-3, 4e6
+FULL = np.pi * MODULUS * AMPLITUDE / LENGTH  # Pa, the pressure of full contact of one wave
+
+
+def wave(**changes):
+    """Return a line contact of an elastic solid with a wave: Westergaard's."""
+    case = asperity.Case(
+        title="wave", grid=dict(nx=256, ny=1, lx=LENGTH),
+        surface=dict(shape="sine", amplitude=AMPLITUDE, wavelength=LENGTH),
+        material=dict(shear_modulus=1e6), phase=[dict(pressure=1e3)], solver=dict(threads=1))
+    for name, values in changes.items():
+        case[name].update(values)
+    return case
+
+
+def sliding():
+    """Return a case with several phases, two of which move."""
+    case = wave()
+    case.grid.nx = 32
+    case.material.update(prony_g=[1e6], prony_tau=[1e-3])
+    case.phase.append(velocity_x=0.03, duration=4e-3, steps=4)
+    case.phase.append(velocity_x=0.01, duration=4e-3, steps=4)
+    return case
+
+
+def sweep(*arguments, **options):
+    """Sweep without telling the progress."""
+    return asperity.sweep(*arguments, **{"quiet": True, **options})
+
+
+def test_areas_are_those_of_westergaard(tmp_path):
+    loads = np.array([0.1, 0.3, 0.6]) * FULL
+    table = sweep(wave(), {"phase.pressure": loads, "material.shear_modulus": [1e6, 2e6]},
+                  folder=tmp_path, jobs=2)
+    assert table.shape == (3, 2) and table.rows == 6
+    np.testing.assert_array_equal(table["phase.pressure"], np.repeat(loads, 2))
+    np.testing.assert_array_equal(table["material.shear_modulus"], [1e6, 2e6] * 3)
+    # 2/pi asin sqrt(p/p_full); two half cells on each rim are counted whole or not at all
+    exact = 2 / np.pi * np.arcsin(np.sqrt(loads[:, None] / (FULL * np.array([1, 2]))))
+    np.testing.assert_allclose(table.contact_area.reshape(table.shape), exact, atol=2 / 256)
+    np.testing.assert_allclose(table["pressure"], table["phase.pressure"], rtol=1e-6)
+    assert not table.failed
+    assert table.paths[1].name == (f"phase.pressure={loads[0].item()},"
+                                   "material.shear_modulus=2000000.0.h5")
+    assert [run.title for run in table.runs] == ["wave"] * 6
+    assert table.runs[-1].history["pressure"][-1] == pytest.approx(loads[-1])
+    assert len(table.runs[1:3]) == 2
+    index = json.loads((tmp_path / "sweep.json").read_text())
+    assert index[table.paths[1].name] == {"phase.pressure": loads[0],
+                                          "material.shear_modulus": 2e6}
+    assert "phase.pressure" in repr(table) and "sweep of 6 cases" in repr(table)
+    assert table.row(1)["pressure"] == table.pressure[1]
+    with pytest.raises(KeyError, match="did you mean 'friction'"):
+        table["fricton"]
+    with pytest.raises(AttributeError, match="did you mean 'friction'"):
+        _ = table.fricton
+    assert "friction" in dir(table)
+    if importlib.util.find_spec("pandas"):
+        assert list(table.to_pandas()["pressure"]) == list(table.pressure)
+    else:
+        with pytest.raises(ImportError, match="pip install pandas"):
+            table.to_pandas()
+
+
+def test_the_same_as_a_run_in_process(tmp_path):
+    table = sweep(sliding(), {"phase[2].velocity_x": [0.03, -0.02]}, folder=tmp_path / "sweep")
+    case = sliding()
+    case.phase[1].velocity_x = -0.02
+    run = case.run(output=tmp_path / "alone.h5", threads=1)
+    for name in table.results:
+        if name != "seconds":
+            assert table[name][1] == run.history[name][-1], name
+
+
+def test_which_groups_are_set(tmp_path):
+    # Without a number all phases that name the variable are set.
+    table = sweep(sliding(), {"phase.velocity_x": [0.025]}, folder=tmp_path)
+    inputs = asperity.Case.read(table.runs[0].input)
+    assert [phase.velocity_x for phase in inputs.phase] == [0.0, 0.025, 0.025]
+    case = sliding()
+    case.surface.append(shape="flat")
+    for name, told in [
+            ("phase.velocity_y", r"3 &phase and none names velocity_y.*phase\[3\]"),
+            ("phase[4].pressure", "there are 3 &phase, counted from 1"),
+            ("phase[0].pressure", "counted from 1"),
+            ("surface.seed", r"2 &surface: which one\? Say surface\[1\].seed"),
+            ("grid[1].nx", "only one &grid"),
+            ("grid.nxx", "did you mean 'nx'"),
+            ("grd.nx", "did you mean 'grid'"),
+            ("nx", "must be a name such as")]:
+        with pytest.raises(ValueError, match=told):
+            sweep(case, {name: [1]}, folder=tmp_path)
+
+
+def test_parallel_and_linked_lists(tmp_path):
+    table = sweep(wave(), {("grid.nx", "phase.pressure"): [(64, 1e3), (128, 2e3)],
+                           "solver.tolerance": [1e-5, 1e-7]}, zip=True, folder=tmp_path)
+    assert table.shape == (2,)
+    assert table["grid.nx"].tolist() == [64, 128]
+    assert table["phase.pressure"].tolist() == [1e3, 2e3]
+    assert table["solver.tolerance"].tolist() == [1e-5, 1e-7]
+    assert [run.grid.nx for run in table.runs] == [64, 128]
+    with pytest.raises(ValueError, match=r"one length, but grid.nx: 2, grid.lx: 1"):
+        sweep(wave(), {"grid.nx": [8, 16], "grid.lx": [1.0]}, zip=True, folder=tmp_path)
+    for parameters, told in [({"grid.nx": []}, "has no values"), ({"grid.nx": 8}, "list of values"),
+                             ({"grid.nx": [8, 8]}, "stands twice"), ({}, "must be a dict"),
+                             ({("grid.nx", "grid.ny"): [(1, 2, 3)]}, "must be 2 values"),
+                             ({"grid.nx": [8], ("grid.nx", "grid.ny"): [(1, 2)]}, "given twice")]:
+        with pytest.raises(ValueError, match=told):
+            sweep(wave(), parameters, folder=tmp_path)
+    assert not list(tmp_path.glob("*grid.lx*"))
+
+
+def test_lists_and_strings_as_values(tmp_path):
+    case = wave()
+    table = sweep(case, {("material.prony_g", "material.prony_tau"):
+                         [([1e6], [1.0]), (np.array([1e6, 2e6]), [1.0, 2.0])],
+                         "grid.boundary": ["periodic"]}, folder=tmp_path)
+    # Pressed at once: the area is that of G(0) = G + sum g.
+    stiff = np.array([2.0, 4.0]) * MODULUS
+    exact = 2 / np.pi * np.arcsin(np.sqrt(1e3 / (np.pi * stiff * AMPLITUDE / LENGTH)))
+    np.testing.assert_allclose(table.contact_area, exact, atol=2 / 256)
+    assert table["material.prony_g"][1] == [1e6, 2e6]
+    assert table["grid.boundary"].tolist() == ["periodic"] * 2
+    assert len({path.name for path in table.paths}) == 2
+    assert all(path.is_file() for path in table.paths)
+
+
+def test_measure(tmp_path):
+    def measure(run):
+        return {"peak": run.snapshots[-1].pressure.max(), "rows": run.history.rows}
+
+    table = sweep(wave(), {"phase.pressure": [0.2 * FULL, 2 * FULL]}, folder=tmp_path,
+                  measure=measure)
+    assert table.results == ("peak", "rows")
+    # Full contact: p + p_full cos(kx); in partial contact 2 p/sin(a) at the middle.
+    exact = [2 * 0.2 * FULL / np.sqrt(0.2), 2 * FULL + FULL]
+    np.testing.assert_allclose(table.peak, exact, rtol=2e-3)
+    assert table.rows == 2 and table["rows"].tolist() == [1, 1]
+
+    def broken(run):
+        raise RuntimeError("in the callable")
+
+    with pytest.raises(RuntimeError, match="in the callable"):
+        sweep(wave(), {"phase.pressure": [0.1 * FULL, 0.2 * FULL]}, folder=tmp_path, measure=broken)
+    assert len(list(tmp_path.glob("*.h5"))) == 3
+
+
+def test_finished_results_are_kept(tmp_path, capsys):
+    case = wave()
+    first = asperity.sweep(case, {"phase.pressure": [1e3, 2e3]}, folder=tmp_path)
+    told = capsys.readouterr()
+    assert told.out == "" and len(told.err.splitlines()) == 2
+    assert "2 of 2 done: phase.pressure=2000.0: done in" in told.err.splitlines()[1]
+    stamps = [path.stat().st_mtime_ns for path in first.paths]
+    more = asperity.sweep(case, {"phase.pressure": [1e3, 2e3, 3e3]}, folder=tmp_path)
+    assert capsys.readouterr().err.startswith("sweep: 2 of 3 results are there already\n")
+    assert [path.stat().st_mtime_ns for path in more.paths[:2]] == stamps
+    np.testing.assert_array_equal(more.contact_area[:2], first.contact_area)
+    # Another input of the same name is run anew, and so is everything on request.
+    case.grid.nx = 128
+    other = sweep(case, {"phase.pressure": [1e3]}, folder=tmp_path)
+    assert other.runs[0].grid.nx == 128
+    stamp = other.paths[0].stat().st_mtime_ns
+    sweep(case, {"phase.pressure": [1e3]}, folder=tmp_path, resume=False)
+    assert other.paths[0].stat().st_mtime_ns != stamp
+    assert sorted(json.loads((tmp_path / "sweep.json").read_text())) == [
+        f"phase.pressure={load}.h5" for load in (1000.0, 2000.0, 3000.0)]
+
+
+def test_a_failing_case_does_not_lose_the_others(tmp_path):
+    case = wave(solver=dict(max_iterations=3, tolerance=1e-9))
+    parameters = {"phase.pressure": [0.1 * FULL, 5 * FULL]}
+    with pytest.raises(asperity.SweepError, match=r"1 of 2 cases failed.*\n.*did not converge"
+                       ) as caught:
+        sweep(case, parameters, folder=tmp_path, jobs=2)
+    table = caught.value.result
+    assert np.isnan(table.contact_area[0]) and table.contact_area[1] == 1.0
+    (failure,) = table.failed
+    assert isinstance(failure, Failure)
+    assert (failure.index, failure.status) == (0, 4)
+    assert failure.parameters == {"phase.pressure": 0.1 * FULL}
+    assert "1 failed" in repr(table)
+    kept = sweep(case, parameters, folder=tmp_path, errors="keep")
+    assert len(kept.failed) == 1 and kept.contact_area[1] == 1.0
+
+
+def test_wrong_inputs_are_told_before_anything_runs(tmp_path):
+    parameters = {"phase.pressure": [1e3, -1e3], "grid.nx": [64]}
+    with pytest.raises(ValueError, match=r"phase.pressure = -1000.0, grid.nx = 64: .*adhesion"):
+        sweep(wave(), parameters, folder=tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+    table = sweep(wave(), parameters, folder=tmp_path, errors="keep")
+    assert table.contact_area[0] > 0 and np.isnan(table.contact_area[1])
+    assert table.failed[0].status == 2
+    for options, told in [(dict(jobs=0), "jobs = 0"), (dict(threads=0), "threads = 0"),
+                          (dict(threads=4096), "at most the"), (dict(errors="x"), "errors")]:
+        with pytest.raises(ValueError, match=told):
+            sweep(wave(), {"grid.nx": [8]}, folder=tmp_path, **options)
+
+
+def test_maps_and_default_folders(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "base").mkdir()
+    import h5py
+    x = np.arange(64) / 64
+    with h5py.File(tmp_path / "base" / "map.h5", "w") as file:
+        file["surface"] = np.cos(2 * np.pi * x)[None, :]
+    case = wave()
+    case.grid.nx = 64
+    case.surface[0] = dict(shape="file", file="base/map.h5", scale=AMPLITUDE)
+    case.output.file = "elsewhere.h5"
+    path = case.write("base/road.nml")
+    assert case.surface[0].file == "map.h5"
+    table = sweep("base/road.nml", {"phase.pressure": [5 * FULL]})
+    assert table.paths[0].parent == path.with_name("road_sweep")
+    assert table.contact_area[0] == 1.0
+    assert not (tmp_path / "base" / "elsewhere.h5").exists()
+    text = sweep(str(wave()), {"phase.pressure": [5 * FULL]})
+    assert text.paths[0].parent.name == "sweep" and text.contact_area[0] == 1.0
+    # What is written beside a result runs by itself.
+    alone = asperity.run(table.paths[0].with_suffix(".nml"), output="alone.h5")
+    assert alone.history["contact_area"][-1] == 1.0
+
+
+def test_warnings_of_the_program_are_passed_on(tmp_path):
+    case = wave(grid=dict(nx=32))
+    case.surface[0].wavelength = 5e-5  # below the Nyquist wavelength
+    with pytest.warns(UserWarning, match="Nyquist"):
+        sweep(case, {"phase.pressure": [1e3, 2e3]}, folder=tmp_path)
+
+
+SCRIPT = """
+import sys, asperity
+case = asperity.Case(grid=dict(nx=128, ny=128, lx=1e-3),
+    surface=dict(shape="sine", amplitude=2e-6, wavelength=1e-3),
+    material=dict(shear_modulus=1e6, prony_g=[1e6], prony_tau=[1e-3]),
+    phase=[dict(pressure=1e3, relaxed=True), dict(duration=1.0, steps=2000, velocity_x=1e-3)])
+asperity.sweep(case, {"phase[1].pressure": [1e3, 2e3, 3e3]}, jobs=2, folder=sys.argv[1], quiet=True)
+"""
+
+
+def rows_of(path):
+    """Return how many rows a growing result holds."""
+    try:
+        return asperity.open(path).history.rows
+    except OSError:
+        return 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_stop_is_clean_and_is_taken_up(tmp_path, number):
+    process = subprocess.Popen([sys.executable, "-c", SCRIPT, str(tmp_path)],
+                               stderr=subprocess.PIPE, start_new_session=True)
+    first = tmp_path / "phase1.pressure=1000.0.h5"
+    end = time.monotonic() + 30
+    while rows_of(first) < 3 and time.monotonic() < end:
+        assert process.poll() is None, process.stderr.read()
+        time.sleep(0.02)
+    process.send_signal(number)
+    _, told = process.communicate(timeout=30)
+    assert process.returncode in (-signal.SIGINT, 128 + signal.SIGTERM, 130), told
+    # No child goes on, and each has left a checkpoint.
+    assert subprocess.run(["pgrep", "-f", str(first.name)], check=False).returncode == 1 or \
+        shutil.which("pgrep") is None
+    stopped = asperity.open(first)
+    assert not stopped.finished and 3 <= stopped.history.rows < 2001
+    assert not (tmp_path / "phase1.pressure=3000.0.h5").exists()
+    before = stopped.history["contact_area"]
+    case = asperity.Case.read(stopped.input)
+    case.phase[1].duration = None
+    with pytest.raises(subprocess.CalledProcessError):  # the checkpoint is of the whole case
+        case.write(tmp_path / "other.nml")
+        subprocess.run([asperity.sweeps.program(), "run", "other.nml", "--output", first.name,
+                        "--restart", "--quiet"], cwd=tmp_path, check=True, capture_output=True)
+    assert rows_of(first) == len(before)
+
+
+def test_a_stopped_case_goes_on_from_its_checkpoint(tmp_path, program):
+    case = sliding()
+    whole = sweep(case, {"phase[1].pressure": [1e3]}, folder=tmp_path / "whole")
+    case.phase[2].steps = 600
+    case.phase[2].duration = 0.6
+    parameters = {"phase[1].pressure": [1e3]}
+    job = tmp_path / "parts" / whole.paths[0].name
+    job.parent.mkdir()
+    written = case.copy()
+    written.write(job.with_suffix(".nml"))
+    process = subprocess.Popen([program, "run", job.with_suffix(".nml").name, "--quiet"],
+                               cwd=job.parent, stderr=subprocess.DEVNULL)
+    while rows_of(job) < 5:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    process.wait(30)
+    stopped = asperity.open(job)
+    assert not stopped.finished
+    done = stopped.history.rows
+    seconds = stopped.history["seconds"]
+    table = sweep(case, parameters, folder=job.parent)
+    run = table.runs[0]
+    assert run.finished and run.history.rows == 605 > done
+    # The rows that were there are the same ones: their times to the last digit.
+    np.testing.assert_array_equal(run.history["seconds"][:done], seconds)
