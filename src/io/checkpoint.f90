@@ -1,4 +1,4 @@
-!> Checkpoints: the state of a run from which it can go on, in a file of its own.
+!> The state of a run from which it can go on, in a file of its own: a checkpoint.
 !>
 !> The checkpoint of FILE.h5 is FILE.checkpoint.h5. It is written under another name, brought to the
 !> disk, and then takes the old one's place at once: there is always a whole one or none. It holds

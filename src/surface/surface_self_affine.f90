@@ -30,7 +30,7 @@ module surface_self_affine
 
    public :: add_self_affine, self_affine_psd
 
-   real(dp), parameter :: edge = 1.0e-9_dp   !! relative: a mode on an end of the band belongs to it
+   real(dp), parameter :: edge = 1.0e-9_dp   !! a mode this near to an end of the band, relative, belongs to it
 
 contains
 

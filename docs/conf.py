@@ -1,0 +1,119 @@
+"""The documentation as a site: settings of Sphinx, run by tools/make_docs.sh.
+
+The root of the sources is that of the repository, so that the links of the pages are the same here
+and wherever Markdown is shown. Pages are found by themselves: ORDER only says where those that it
+names stand in the contents; others follow in "More".
+"""
+
+import re
+from pathlib import Path
+
+from docutils import nodes
+from latex2mathml.converter import convert
+
+ROOT = Path(__file__).resolve().parents[1]
+
+project = "Asperity"
+author = "The Asperity developers"
+copyright = "the Asperity developers"
+release = version = (ROOT / "VERSION").read_text().strip()
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+include_patterns = ["docs/*.md", "docs/api/*", "examples/*/README.md", "CONTRIBUTING.md",
+                    "CHANGELOG.md"]
+root_doc = "docs/index"
+highlight_language = "none"
+default_role = "py:obj"
+nitpicky = False                        # the words for types in docstrings are for people
+
+myst_enable_extensions = ["dollarmath"]
+myst_heading_anchors = 3
+myst_dmath_allow_digits = False
+myst_dmath_allow_space = False
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"              # the docstrings say more: shapes and units
+napoleon_google_docstring = False
+napoleon_use_ivar = True
+napoleon_use_rtype = False
+
+html_theme = "furo"
+html_title = f"Asperity {release}"
+html_extra_path = ["../build/fortran"]  # by FORD
+html_show_sourcelink = False
+html_math_renderer = "mathml"
+
+ORDER = {
+    "Guide": ["docs/install", "docs/first_run", "docs/choosing", "docs/measured_data",
+              "docs/sweeps", "docs/results", "docs/troubleshooting", "docs/coming_from"],
+    "Reference": ["docs/input_reference", "docs/result_file", "docs/api/python",
+                  "docs/api/fortran"],
+    "Background": ["docs/theory", "docs/validation", "docs/benchmarks"],
+    "Examples": ["docs/gallery"],
+    "Development": ["docs/developer", "CONTRIBUTING", "CHANGELOG"],
+}
+
+
+def contents() -> dict[str, list[str]]:
+    """Return the pages of each part of the contents, without those that are not there."""
+    there = {path.relative_to(ROOT).with_suffix("").as_posix()
+             for pattern in include_patterns for path in ROOT.glob(pattern)
+             if path.suffix in (".md", ".rst")} - {root_doc}
+    parts = {title: [name for name in names if name in there] for title, names in ORDER.items()}
+    parts["Examples"] += sorted(name for name in there if name.startswith("examples/"))
+    named = {name for names in parts.values() for name in names}
+    parts["More"] = sorted(there - named)
+    return {title: names for title, names in parts.items() if names}
+
+
+def _add_contents(app, name, source):
+    """Append the contents to the first page, where Markdown elsewhere need not show them."""
+    if name == root_doc:
+        for title, names in contents().items():
+            source[0] += (f"\n\n```{{toctree}}\n:hidden:\n:caption: {title}\n\n"
+                          + "\n".join(f"/{page}" for page in names) + "\n```\n")
+
+
+# Modules whose public names are those of the package.
+AT_THE_TOP = ("adhesive_contact", "contact", "errors", "runner")
+
+
+def _add_modules(app, name, source):
+    """Append the public modules that the page of the Python interface does not name."""
+    if name != "docs/api/python":
+        return
+    for path in sorted((ROOT / "python" / "asperity").glob("*.py")):
+        module = f"asperity.{path.stem}"
+        if (path.stem.startswith("_") or path.stem in AT_THE_TOP
+                or f"automodule:: {module}\n" in source[0]):
+            continue
+        source[0] += f"\n{module}\n{'-' * len(module)}\n\n.. automodule:: {module}\n   :members:\n"
+
+
+def _prepare_docstring(app, what, name, thing, options, lines):
+    """Keep the bars of |x|, which are no substitutions, and list attributes one by one."""
+    text = "\n".join(line if ">>>" in line or "``" in line else line.replace("|", "\\|")
+                     for line in lines)
+
+    def split(found):
+        return "".join(f"{one} : {found[2]}" for one in found[1].split(", "))
+
+    head, title, rest = text.partition("Attributes\n----------\n")
+    if title:
+        rest = re.sub(r"(?m)^(\w+(?:, \w+)+) : (.*\n(?: +.*\n?)+)", split, rest)
+    lines[:] = (head + title + rest).split("\n")
+
+
+def _mathml(self, node):
+    """Write an equation as MathML, which browsers show without scripts."""
+    display = "block" if isinstance(node, nodes.math_block) else "inline"
+    self.body.append(convert(node.astext(), display=display))
+    raise nodes.SkipNode
+
+
+def setup(app):
+    """Register what is above with Sphinx."""
+    app.connect("source-read", _add_contents)
+    app.connect("source-read", _add_modules)
+    app.connect("autodoc-process-docstring", _prepare_docstring, priority=400)
+    app.add_html_math_renderer("mathml", (_mathml, None), (_mathml, None))

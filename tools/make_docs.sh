@@ -1,0 +1,22 @@
+#!/bin/sh
+# Build the documentation as a site in build/site. Any warning fails.
+set -eu
+cd "$(dirname "$0")/.."
+. tools/setup.sh
+. tools/install_editable.sh
+if ! [ .venv/ready_docs -nt tools/requirements_docs.txt ] || ! [ .venv/ready_docs -nt .venv/ready ]; then
+  echo "asperity: installing the tools of the documentation into .venv" >&2
+  python -m pip install -q --disable-pip-version-check -r tools/requirements_docs.txt
+  touch .venv/ready_docs
+fi
+
+rm -rf build/fortran build/site
+mkdir -p build/fortran
+ford tools/ford.md >build/ford.log 2>&1 || { cat build/ford.log >&2; exit 1; }
+if grep -i warning build/ford.log; then
+  echo "asperity: FORD warns" >&2
+  exit 1
+fi
+python -m sphinx -q -W --keep-going -j auto -c docs -d build/doctrees . build/site
+python tools/check_site.py build/site
+echo "documentation: build/site/docs/index.html"
