@@ -14,8 +14,7 @@ import asperity
 EXAMPLES = ROOT / "examples"
 
 
-@pytest.mark.parametrize(("folder", "script"), [
-    ("tabor", "tabor.py"), ("adhesive_sphere", "loop.py")])
+@pytest.mark.parametrize(("folder", "script"), [("adhesive_sphere", "loop.py")])
 def test_script_draws(folder, script, tmp_path):
     picture = tmp_path / "picture.png"
     subprocess.run([sys.executable, str(EXAMPLES / folder / script), "--quick", "-o", str(picture)],
@@ -23,23 +22,11 @@ def test_script_draws(folder, script, tmp_path):
     assert picture.stat().st_size > 10000
 
 
-@pytest.mark.parametrize("folder", ["tabor", "adhesive_sphere", "adhesive_rough"])
+@pytest.mark.parametrize("folder", ["adhesive_sphere", "adhesive_rough"])
 def test_text_names_its_picture(folder):
     text = (EXAMPLES / folder / "README.md").read_text()
     for picture in re.findall(r"!\[.+?\]\((.+?)\)", text):
         assert (EXAMPLES / folder / picture).is_file()
-
-
-def test_tabor_follows_maugis():
-    module = runpy.run_path(str(EXAMPLES / "tabor" / "tabor.py"))
-    found = module["study"]([0.1, 0.6], 96)
-    np.testing.assert_allclose(found["maugis_dugdale"], found["theory"], rtol=0.02)
-    np.testing.assert_allclose(found["exponential"], found["theory"], rtol=0.03)
-    # as the table of the text has them
-    text = (EXAMPLES / "tabor" / "README.md").read_text()
-    for tabor, value in zip(("0.1", "0.6"), found["theory"], strict=True):
-        row = re.search(rf"\| {tabor} \|.*\| ([\d.]+) \|\n", text)
-        assert float(row[1]) == pytest.approx(value, abs=1e-5)
 
 
 def test_energy_is_lost_twice():

@@ -1,48 +1,89 @@
-"""Each example runs, in a short form: on a coarse grid, with few steps."""
+"""Each study holds in its quick form, is explained, and stands in the gallery."""
 
 import re
 import subprocess
+import sys
 
 import pytest
 from conftest import ROOT
 
-import asperity
-from asperity.__main__ import main
+sys.path.insert(0, str(ROOT / "examples"))
+
+import make as gallery
 
 CASES = sorted((ROOT / "examples").glob("*/input.nml"))
+STUDIES = gallery.studies()
+COARSE = {"two_scale_road"}  # its step is longer than the shortest relaxation time, and it says so
+HEADINGS = ["What is seen", "The thesis", "Make it"]
 
 
-def shorten(text):
-    """Return an input with at most 64 cells a side, cut-offs that they hold, and few steps."""
-    grid = re.search(r"(?is)&grid(.*?)^ */|&grid(.*?)/", text)[0]
-    nx = int(re.search(r"(?i)\bnx *= *(\d+)", grid)[1])
-    factor = max(1, nx // 64)
-    text = re.sub(r"(?i)\b(n[xy]) *= *(\d+)",
-                  lambda found: f"{found[1]} = {max(1, int(found[2]) // factor)}", text)
-    text = re.sub(r"(?i)\b(wavelength_short) *= *([\d.e+-]+)",
-                  lambda found: f"{found[1]} = {float(found[2]) * factor:g}", text)
-    return re.sub(r"(?i)\bsteps *= *(\d+)", lambda found: f"steps = {min(int(found[1]), 20)}", text)
+def named(study):
+    return study.name
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.parent.name)
-def test_example(case, program, tmp_path):
-    # As it is, it must be a right input; it is run in the short form.
-    subprocess.run([program, "check", str(case)], check=True, capture_output=True)
-    short = tmp_path / "input.nml"
-    short.write_text(shorten(case.read_text()))
-    result = tmp_path / "result.h5"
-    subprocess.run([program, "run", str(short), "--output", str(result), "--quiet"], check=True)
-    run = asperity.open(result)
-    assert run.finished
-    assert (run.history["residual_normal"] < 1e-5).all()
-    assert (run.history["contact_area"] > 0).any()
-    assert main(["plot", str(result)]) == 0
-    assert result.with_suffix(".png").stat().st_size > 10000
+@pytest.mark.parametrize("study", STUDIES, ids=named)
+def test_quick_form(study, tmp_path, program):
+    gallery.common.jobs = 1
+    _, figure = gallery.make(study, tmp_path, quick=True)
+    path = tmp_path / "picture.png"
+    figure.savefig(path, dpi=60)
+    assert path.stat().st_size > 5000
+    gallery.matplotlib.pyplot.close(figure)
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.parent.name)
-def test_example_is_explained(case):
-    pictures = re.findall(r"!\[.+?\]\((.+?)\)", (case.parent / "README.md").read_text())
-    assert pictures
+def test_input_is_right_and_gives_no_warning(case, program):
+    done = subprocess.run([program, "check", str(case)], check=True, capture_output=True, text=True)
+    assert done.stderr == ""
+    assert ("warning" in done.stdout.lower()) == (case.parent.name in COARSE)
+
+
+@pytest.mark.parametrize("study", STUDIES, ids=named)
+def test_study_is_explained(study):
+    pictures = re.findall(r"!\[.+?\]\((.+?)\)", study.readme)
+    assert "picture.png" in pictures
     for picture in pictures:
-        assert (case.parent / picture).is_file()
+        assert (study.folder / picture).is_file()
+    if study.module is None:
+        return
+    assert 0 < study.minutes < 60
+    assert re.findall(r"^## (.+)$", study.readme, flags=re.MULTILINE)[:3] == HEADINGS
+    assert f"examples/make.py {study.name}" in gallery.part(study.readme, "Make it")
+    assert gallery.part(study.readme, "The thesis")
+    if study.minutes >= 10:
+        assert "min" in gallery.part(study.readme, "Make it")
+
+
+def test_the_gallery_is_that_of_the_studies():
+    page = (ROOT / "docs" / "gallery.md").read_text()
+    assert page == gallery.gallery(), "python examples/make.py --gallery writes it anew"
+
+
+def test_make_lists_and_refuses(capsys):
+    assert gallery.main(["--list"]) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in told] == [study.name for study in STUDIES]
+    with pytest.raises(SystemExit, match="there is no study tabr"):
+        gallery.main(["tabr"])
+
+
+def test_a_study_that_does_not_hold_fails(tmp_path, monkeypatch, capsys):
+    folder = tmp_path / "wrong"
+    folder.mkdir()
+    (folder / "README.md").write_text("# Wrong\n\nNothing.\n")
+    (folder / "study.py").write_text(
+        '"""Wrong."""\nMINUTES = 1\ndef compute(folder, quick):\n    return {"x": 2.0}\n'
+        'def check(data, quick):\n    assert data["x"] < 1, "x is too large"\n')
+    monkeypatch.setattr(gallery, "EXAMPLES", tmp_path)
+    assert gallery.main(["--quick", "--jobs", "1", "wrong"]) == 1
+    assert "wrong: FAILED: x is too large" in capsys.readouterr().err
+
+
+def test_numbers_that_are_kept():
+    import numpy as np
+
+    data = {"x": np.float64(1.23456789), "a": np.arange(3) / 3, "long": np.zeros(100),
+            "path": "/tmp/x.h5", "name": "gauss", "n": 3, "nan": float("nan"),
+            "nested": {"b": [1.0, 2.0]}}
+    assert gallery.numbers(data) == {"x": 1.23457, "a": [0.0, 0.333333, 0.666667], "name": "gauss",
+                                     "n": 3, "nested": {"b": [1.0, 2.0]}}

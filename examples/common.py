@@ -1,0 +1,60 @@
+"""What the studies share: paths, the model compound, short forms, a style of pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import asperity
+
+EXAMPLES = Path(__file__).resolve().parent
+
+#: Processors that a study may use; make.py sets it. For `asperity.sweep(..., jobs=common.jobs)` or
+#: `asperity.run(..., threads=common.jobs)`.
+jobs = 1
+
+#: Colours that stay apart for the colour-blind (Okabe and Ito), in the order of use.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+MARKERS = "osD^v<>"
+
+
+def subplots(columns: int = 1, rows: int = 1, *, width: float = 4.6, height: float = 3.7,
+             **options: Any) -> tuple[Any, Any]:
+    """Return a figure and its axes, each so many inches, in the colours above."""
+    from cycler import cycler
+    from matplotlib import pyplot
+
+    with pyplot.rc_context({"axes.prop_cycle": cycler(color=COLOURS), "legend.fontsize": "small",
+                            "axes.grid": True, "grid.alpha": 0.3}):
+        return pyplot.subplots(rows, columns, figsize=(width * columns, height * rows),
+                               layout="constrained", **options)
+
+
+def compound() -> asperity.material.Prony:
+    """Return the model compound of materials/sbr.txt at 25 degrees."""
+    g, tau = np.loadtxt(EXAMPLES / "materials" / "sbr.txt", unpack=True)
+    return asperity.material.Prony(g[0], g[1:], tau[1:])
+
+
+def material_group(rubber: asperity.material.Prony | None = None, **more: Any) -> dict[str, Any]:
+    """Return a rubber as the group `material` of an `asperity.Case`; the compound by default."""
+    rubber = compound() if rubber is None else rubber
+    return dict(shear_modulus=rubber.g_inf, prony_g=rubber.g, prony_tau=rubber.tau, **more)
+
+
+def shortened(case: asperity.Case, cells: int = 64, steps: int = 20) -> asperity.Case:
+    """Return a case with at most so many cells along x, cut-offs that they hold, and few steps."""
+    short = case.copy()
+    factor = max(1, case.grid.nx // cells)
+    short.grid.nx = max(2, case.grid.nx // factor)
+    short.grid.ny = max(1, case.grid.ny // factor)
+    for surface in short.surface:
+        if "wavelength_short" in surface:
+            surface.wavelength_short *= factor
+    for phase in short.phase:
+        if "steps" in phase:
+            phase.steps = min(phase.steps, steps)
+    short.solver.threads = 1
+    return short
