@@ -1,0 +1,129 @@
+"""The source archive and the wheel, built and installed in an empty environment.
+
+    python -m pytest -m slow python/tests/test_wheel.py
+
+The build takes minutes: `.ci/run` runs these tests, `./test.sh` does not.
+"""
+
+import os
+import re
+import subprocess
+import sys
+import tarfile
+import venv
+import zipfile
+
+import pytest
+from conftest import ROOT
+
+pytestmark = pytest.mark.slow
+
+VERSION = (ROOT / "VERSION").read_text().strip()
+OURS = re.compile(r"lib(fftw3f?|hdf5\w*|gfortran|gomp|quadmath|sz|aec)[-.]")
+
+
+@pytest.fixture(scope="module")
+def built():
+    """Return the folder with the archive and the wheel, made anew."""
+    if not (ROOT / ".git").exists():
+        pytest.skip("the archive is made from a git repository")
+    subprocess.run(["sh", "tools/make_wheel.sh"], cwd=ROOT, check=True, capture_output=True)
+    return ROOT / "build" / "dist"
+
+
+@pytest.fixture(scope="module")
+def empty(built, tmp_path_factory):
+    """Return an environment with nothing but the wheel and what it requires."""
+    folder = tmp_path_factory.mktemp("wheel") / "environment"
+    venv.create(folder, with_pip=True)
+    (wheel,) = built.glob("*.whl")
+    subprocess.run([folder / "bin" / "python", "-m", "pip", "install", "-q",
+                    "--disable-pip-version-check", str(wheel)], check=True)
+    return folder
+
+
+def run(empty, *words, cwd):
+    """Run a command of the empty environment, knowing nothing of this one."""
+    command = [str(empty / "bin" / words[0]), *words[1:]]
+    surroundings = {"PATH": f"{empty / 'bin'}:/usr/bin:/bin", "HOME": str(cwd),
+                    "MPLBACKEND": "Agg"}
+    done = subprocess.run(command, cwd=cwd, env=surroundings, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_the_archive_holds_the_sources_and_nothing_else(built):
+    (archive,) = built.glob("*.tar.gz")
+    assert archive.name == f"asperity-{VERSION}.tar.gz"
+    with tarfile.open(archive) as tar:
+        names = {name.split("/", 1)[1] for name in tar.getnames() if "/" in name}
+        names = {name for name in names if name in names and tar.getmember(
+            f"asperity-{VERSION}/{name}").isfile()}
+    tracked = set(subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True,
+                                 text=True).stdout.split("\n")) - {""}
+    assert names - {"PKG-INFO"} == tracked
+    assert {"LICENSE", "README.md", "CITATION.cff", "VERSION", "PKG-INFO"} <= names
+
+
+def test_the_wheel_holds_the_package_the_program_and_the_licences(built):
+    (wheel,) = built.glob("*.whl")
+    assert "manylinux" in wheel.name
+    with zipfile.ZipFile(wheel) as file:
+        names = set(file.namelist())
+        (note,) = (name for name in names if name.endswith("licenses/BUNDLED.txt"))
+        bundled = file.read(note).decode()
+        metadata = file.read(f"asperity-{VERSION}.dist-info/METADATA").decode()
+    sources = {f"asperity/{path.relative_to(ROOT / 'python' / 'asperity')}"
+               for pattern in ("**/*.py", "**/py.typed")
+               for path in (ROOT / "python" / "asperity").glob(pattern)}
+    inside = {name for name in names if name.startswith("asperity/") and not name.endswith(("/",
+              ".so"))}
+    assert inside == sources
+    assert f"asperity-{VERSION}.data/scripts/asperity" in names
+    assert any(re.match(r"asperity/_core\..*\.so$", name) for name in names)
+    libraries = {name.split("/")[1] for name in names
+                 if name.startswith("asperity.libs/") and not name.endswith("/")}
+    for start in ("libfftw3-", "libfftw3f-", "libhdf5", "libgfortran-"):
+        assert any(library.startswith(start) for library in libraries), start
+    for library in libraries:
+        assert library in bundled
+    assert "General Public License" in bundled
+    for package in re.findall(r"^  (\S+) \S+$", bundled, flags=re.MULTILINE):
+        assert any(name.endswith(f"licenses/{package}.txt") for name in names), package
+    assert any(re.search(r"dist-info/(licenses/)?LICENSE$", name) for name in names)
+    assert not any("test" in name for name in names)
+    assert "Contact of a viscoelastic solid" in metadata and "# Asperity" in metadata
+
+
+def test_libraries_come_from_inside_the_wheel(empty):
+    (core,) = empty.glob("lib/python*/site-packages/asperity/_core*.so")
+    program = core.parents[1] / "asperity.scripts" / "asperity"
+    surroundings = {name: value for name, value in os.environ.items() if name != "LD_LIBRARY_PATH"}
+    for binary in (core, program):
+        lines = subprocess.run(["ldd", str(binary)], check=True, capture_output=True, text=True,
+                               env=surroundings).stdout.splitlines()
+        assert not [line for line in lines if "not found" in line]
+        found = [line.split() for line in lines if OURS.match(line.strip())]
+        assert len(found) >= 5
+        for words in found:
+            assert str(core.parents[1] / "asperity.libs") in words[2].replace(
+                "asperity/../", "").replace("asperity.scripts/../", ""), words
+
+
+def test_versions_agree(empty, tmp_path):
+    assert run(empty, "asperity", "--version", cwd=tmp_path).split() == ["asperity", VERSION]
+    told = run(empty, "python", "-c", "import asperity; print(asperity.__version__)", cwd=tmp_path)
+    assert told.strip() == VERSION
+
+
+def test_a_case_and_its_picture(empty, tmp_path):
+    text = run(empty, "asperity", "template", "hertz", cwd=tmp_path)
+    (tmp_path / "hertz.nml").write_text(text)
+    run(empty, "asperity", "run", "hertz.nml", "--quiet", cwd=tmp_path)
+    run(empty, "python", "-m", "asperity", "plot", "hertz.h5", cwd=tmp_path)
+    assert (tmp_path / "hertz.png").stat().st_size > 10000
+    told = run(empty, "python", "-c", "import asperity; run = asperity.run('hertz.nml');"
+               " print(run.history['displacement'][-1], asperity.__file__)", cwd=tmp_path)
+    approach, path = told.split()
+    assert float(approach) == pytest.approx(1e-4, rel=1e-3)
+    assert str(empty) in path and sys.prefix not in path
