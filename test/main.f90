@@ -12,6 +12,7 @@ program main
    use test_friction_cg, only : run_friction_cg
    use test_friction_law, only : run_friction_law
    use test_hdf5_file, only : run_hdf5_file
+   use test_input_listing, only : run_input_listing
    use test_interpolation, only : run_interpolation
    use test_mixed, only : run_mixed
    use test_namelist, only : run_namelist
@@ -46,6 +47,7 @@ program main
    if (wanted('roughness')) call run_roughness()
    if (wanted('namelist')) call run_namelist()
    if (wanted('case_input')) call run_case_input()
+   if (wanted('input_listing')) call run_input_listing()
    if (wanted('interpolation')) call run_interpolation()
    if (wanted('zener')) call run_zener()
    if (wanted('viscoelastic_energy')) call run_viscoelastic_energy()

@@ -44,9 +44,10 @@ def _entry(group: str) -> _input.GroupEntry:
 class Group(MutableMapping[str, Any]):
     """One group of an input: its variables are items and attributes.
 
-    A variable that is not given has its default, or None where that is derived; iteration, ``in``
-    and ``len`` look at the given ones only. ``del`` takes a variable out again, and so does None.
-    Each value is checked when it is set: its name, its type and its range.
+    A variable that is not given has its default, or None where that is derived; iteration (in the
+    order of the reference), ``in`` and ``len`` look at the given ones only. ``del`` takes a
+    variable out again, and so does None. Each value is checked when it is set: its name, its type
+    and its range.
 
     Parameters
     ----------
@@ -67,8 +68,8 @@ class Group(MutableMapping[str, Any]):
     >>> print(grid)
     &grid
       nx = 64
-      lx = 0.001
       ny = 32
+      lx = 0.001
     /
     >>> grid.boundary, "boundary" in grid
     ('periodic', False)
@@ -137,7 +138,7 @@ class Group(MutableMapping[str, Any]):
         return name in self._values
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._values)
+        return (name for name in self._entry.variables if name in self._values)
 
     def __len__(self) -> int:
         return len(self._values)
@@ -175,7 +176,7 @@ class Group(MutableMapping[str, Any]):
 
     def __str__(self) -> str:
         lines = [f"&{self._entry.name}"]
-        for name, value in self._values.items():
+        for name, value in self.items():
             lines += _wrapped(f"  {name} = ", _input.format_value(value), isinstance(value, list))
         return "\n".join([*lines, "/"])
 
