@@ -10,7 +10,7 @@ module test_simulation_friction
    use simulation, only : new_simulation, simulation_type
    use simulation_runs, only : check_books, check_same_rows, last, nl, record_type, run_case
    use text_tools, only : exact_text
-   use stick_slip_watch, only : stick_slip_watch_type, watch_slip
+   use stick_slip_watch, only : stick_slip_watch_type, watch_from_values, watch_slip, watch_values
    implicit none
    private
 
@@ -38,6 +38,8 @@ contains
       call test_stick_and_slip()
       call test_threads()
       call test_stick_slip()
+      call test_watch_goes_on()
+      call test_before_motion()
       call test_cylinder()
    end subroutine run_simulation_friction
 
@@ -273,5 +275,59 @@ contains
       end subroutine slide
 
    end subroutine test_stick_slip
+
+   !> What the watch has seen survives as numbers: the warning comes at the same step, once, wherever
+   !> the run is interrupted.
+   subroutine test_watch_goes_on()
+      type(stick_slip_watch_type) :: watch
+      character(:), allocatable :: message
+      integer :: k, stop_at, told(0:20)
+
+      told = 0
+      do stop_at = 0, 20
+         watch = stick_slip_watch_type()
+         do k = 1, 20
+            call watch_slip(watch, merge(1.2_dp, 0.8_dp, mod(k, 2) == 0), 1.0_dp, 2, 0.0_dp, message)
+            if (len(message) > 0) told(stop_at) = told(stop_at) + 100 + k
+            if (k == stop_at) watch = watch_from_values(watch_values(watch))
+         end do
+      end do
+      call check_that(told(0) > 100 .and. told(0) < 200, 'the watch tells once')
+      call check_that(all(told == told(0)), 'and at the same step after a restart')
+   end subroutine test_watch_goes_on
+
+   !> Where friction is on, what touches sticks until the road moves; without friction it slips.
+   subroutine test_before_motion()
+      character(*), parameter :: laws(3) = [character(60) :: &
+         '&friction law = ''coulomb'', coefficient = 0.6 /', &
+         '&friction law = ''constant_shear'', shear_strength = 1e5 /', '']
+      character(*), parameter :: ends(2) = [character(80) :: &
+         '&phase velocity_x = 0.4, duration = 1e-5, steps = 1 /', '']
+      type(case_type) :: case
+      type(simulation_type) :: sim
+      type(error_type), allocatable :: error
+      integer(int8), allocatable :: contact(:, :)
+      integer :: state, k, m
+
+      do k = 1, size(laws)
+         do m = 1, size(ends)
+            state = merge(1, 2, k < 3)
+            call parse_case(block//rubber//trim(laws(k))//nl//'&phase pressure = 0.3e6 /'//nl// &
+               trim(ends(m)), 'test.nml', case, error)
+            call check_no_error(error, 'before motion: case')
+            call new_simulation(sim, case, error)
+            call check_no_error(error, 'before motion: start')
+            call sim%advance(error)
+            call check_no_error(error, 'before motion: row')
+            call sim%contact_states(contact)
+            call check_that(count(sim%pressure > 0.0_dp) > 100, 'before motion: contact')
+            call check_that(all(contact == merge(state, 0, sim%pressure > 0.0_dp)), &
+               'before motion: states')
+            call check_close(sim%row%stick_area, merge(sim%row%contact_area, 0.0_dp, k < 3), 0.0_dp, &
+               'before motion: stick area')
+            call sim%destroy()
+         end do
+      end do
+   end subroutine test_before_motion
 
 end module test_simulation_friction

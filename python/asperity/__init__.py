@@ -23,11 +23,11 @@ from .sweep_table import Sweep, SweepError
 from .sweeps import sweep
 
 if TYPE_CHECKING:
-    from . import material, theory
+    from . import dma, material, theory
 
 __all__ = ["AdhesiveNormalContact", "Case", "NormalContact", "NotConverged", "Run", "Sweep",
-           "SweepError", "__version__", "material", "open", "run", "set_threads", "solve_adhesive",
-           "solve_normal", "surface", "sweep", "theory"]
+           "SweepError", "__version__", "dma", "material", "open", "run", "set_threads",
+           "solve_adhesive", "solve_normal", "surface", "sweep", "theory"]
 
 __version__ = version()
 """The version of the Fortran library that is loaded, such as ``"0.1.0"``."""
@@ -37,7 +37,7 @@ del version
 
 def __getattr__(name: str) -> Any:
     """Load the modules that need SciPy when they are used first: it takes its time."""
-    if name in ("material", "theory"):
+    if name in ("dma", "material", "theory"):
         return importlib.import_module(f".{name}", __name__)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 

@@ -6,6 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
+from ._data_verbs import add_fit, add_import
+
 __all__ = ["main"]
 
 
@@ -41,14 +43,17 @@ def main(arguments: list[str] | None = None) -> int:
     plot.add_argument("--step", type=int, help="the snapshot's step; default: the last one")
     plot.add_argument("--x", metavar="NAME", help="column to draw --history against")
     plot.set_defaults(call=_plot)
+    add_import(verbs)
+    add_fit(verbs)
     chosen = parser.parse_args(arguments)
-    if chosen.step is not None and not chosen.field:
-        plot.error("--step goes with --field")
-    if chosen.x is not None and not chosen.history:
-        plot.error("--x goes with --history")
+    if chosen.verb == "plot":
+        if chosen.step is not None and not chosen.field:
+            plot.error("--step goes with --field")
+        if chosen.x is not None and not chosen.history:
+            plot.error("--x goes with --history")
     try:
         return chosen.call(chosen)
-    except OSError as error:
+    except (OSError, ImportError) as error:
         return _fail(error, 3)
     except (KeyError, IndexError, ValueError) as error:
         return _fail(error, 2)

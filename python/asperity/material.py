@@ -368,6 +368,7 @@ class Prony:
         arms_per_decade: float = 1.0,
         tau_range: tuple[float, float] | None = None,
         slack: float = 0.05,
+        least_plateau: float = 0.0,
     ) -> Prony:
         """Fit a series to measured storage and loss moduli.
 
@@ -390,6 +391,9 @@ class Prony:
         slack : float
             Allowed relative increase of the rms misfit, plus 1e-4, in exchange for smoothness;
             >= 0, and 0 asks for the smallest misfit alone.
+        least_plateau : float
+            g_inf is at least this share of the smallest storage modulus, 0 to 1: a solid also
+            where the data do not reach the plateau.
 
         Returns
         -------
@@ -414,6 +418,7 @@ class Prony:
         imaginary = array_of("loss", loss, low=0.0, low_open=True, ndim=1)
         density = positive("arms_per_decade", arms_per_decade)
         slack = number("slack", slack, 0.0)
+        floor = number("least_plateau", least_plateau, 0.0, 1.0)
         for name, values in (("storage", real), ("loss", imaginary)):
             if values.size != frequency.size:
                 raise ValueError(
@@ -443,6 +448,7 @@ class Prony:
             ]
         )
         target = np.ones(2 * frequency.size)
+        target -= floor * columns[:, 0]
         penalty = np.zeros((max(count - 2, 0), count + 1))
         for row in range(count - 2):
             penalty[row, row + 1 : row + 4] = 1.0, -2.0, 1.0
@@ -464,7 +470,7 @@ class Prony:
                     break
         g = best[1:] * scale
         keep = g > 0.0
-        result = cls(float(best[0] * real.min()), g[keep], tau[keep])
+        result = cls(float((floor + best[0]) * real.min()), g[keep], tau[keep])
         found = result.complex_modulus(frequency)
         e_real = found.real / real - 1.0
         e_imaginary = found.imag / imaginary - 1.0

@@ -12,8 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _library
 from ._check import choice, exactly_one, number, positive
+from .measured import MeasuredSurface, import_topography, load
 
-__all__ = ["RadialPsd", "Statistics", "psd", "psd_map", "self_affine", "shape", "statistics"]
+__all__ = ["MeasuredSurface", "RadialPsd", "Statistics", "import_topography", "load", "psd",
+           "psd_map", "self_affine", "shape", "statistics"]
 
 FloatArray = NDArray[np.float64]
 
@@ -138,6 +140,19 @@ def self_affine(
     exactly_one(rms_height=rms_height, rms_slope=rms_slope)
     rolloff = wavelength_rolloff
     longest = wavelength_long if wavelength_long is not None else lx
+    shortest = positive("wavelength_short", wavelength_short)
+    least, most = f"wavelength_short = {shortest:g}", f"wavelength_long = {longest!r}"
+    if wavelength_long is None:
+        most = f"lx = {longest!r}, the longest wavelength unless wavelength_long is given"
+    elif not number("wavelength_long", longest) >= shortest:
+        raise ValueError(f"wavelength_long = {longest!r}: must be at least {least}")
+    if not shortest <= positive("lx" if wavelength_long is None else "wavelength_long", longest):
+        raise ValueError(f"wavelength_short = {shortest:g}: must be at most {most}")
+    if rolloff is not None and not shortest <= number("wavelength_rolloff", rolloff) <= longest:
+        raise ValueError(f"wavelength_rolloff = {rolloff!r}: must be at least {least} and at most"
+                         f" {most}")
+    number("hurst", hurst, 0.0, 1.0, low_open=True)
+    choice("generator", generator, ("random_phase", "filtered_noise"))
     return _make(
         nx, nx if ny is None else ny, lx, ly, "periodic", "self_affine", hurst=hurst,
         wavelength_long=longest, wavelength_rolloff=longest if rolloff is None else rolloff,
@@ -294,7 +309,11 @@ def _make(
     centre_y = ny // 2 * ly / ny if centre_y is None else number("centre_y", centre_y)
     if not -(2**31) <= seed < 2**31:
         raise ValueError(f"seed = {seed}: must fit 32 bits")
-    _height(lx, ly, _library.flag_of_boundary(boundary), name, radius, amplitude, wavelength,
-            hurst, wavelength_long, wavelength_rolloff, wavelength_short, rms_height, rms_slope,
-            seed, generator, centre_x, centre_y, height.T)
+    try:
+        _height(lx, ly, _library.flag_of_boundary(boundary), name, radius, amplitude, wavelength,
+                hurst, wavelength_long, wavelength_rolloff, wavelength_short, rms_height,
+                rms_slope, seed, generator, centre_x, centre_y, height.T)
+    except ValueError as error:
+        # The library speaks of the input's group; its variables are the arguments here.
+        raise ValueError(str(error).replace("&surface: ", "")) from None
     return height

@@ -78,18 +78,34 @@ def test_shapes():
 
 
 @pytest.mark.parametrize(("changes", "message"), [
-    ({"hurst": 1.5}, "hurst"),
+    ({"hurst": 1.5}, r"hurst = 1.5: must be a finite number > 0 and <= 1$"),
     ({"rms_height": 1.0}, "must be exactly one of rms_height, rms_slope"),
     ({"rms_slope": -1.0}, "rms_slope = -1.0"),
     ({"nx": 0}, "nx = 0: must be a positive integer"),
-    ({"wavelength_short": 2.0}, "wavelength_short"),
-    ({"generator": "dice"}, "random_phase"),
-    ({"wavelength_short": 0.9, "wavelength_long": 0.95}, "mode"),
+    ({"wavelength_short": 2.0}, r"wavelength_short = 2: must be at most lx = 1.0, the longest"
+                                r" wavelength unless wavelength_long is given$"),
+    ({"wavelength_short": 0.0}, r"wavelength_short = 0.0: must be a finite number > 0$"),
+    ({"wavelength_long": 0.1}, r"wavelength_long = 0.1: must be at least wavelength_short = 0.2$"),
+    ({"wavelength_rolloff": 2.0}, r"wavelength_rolloff = 2.0: must be at least wavelength_short ="
+                                  r" 0.2 and at most lx = 1.0, "),
+    ({"wavelength_rolloff": 0.1, "wavelength_long": 0.9},
+     r"wavelength_rolloff = 0.1: must be at least .* and at most wavelength_long = 0.9$"),
+    ({"wavelength_long": float("inf")}, r"wavelength_long = inf: must be a finite number$"),
+    ({"generator": "dice"}, r"generator = 'dice': must be one of 'random_phase', 'filtered_noise'"),
+    ({"wavelength_short": 0.9, "wavelength_long": 0.95}, "no mode of the grid lies in the band"),
 ])
 def test_wrong_values(changes, message):
     arguments = {"nx": 16, "lx": 1.0, "wavelength_short": 0.2, "rms_slope": 0.1}
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(ValueError, match=message) as caught:
         asperity.surface.self_affine(**(arguments | changes))
+    assert "&" not in str(caught.value)  # it speaks of arguments, not of the input's groups
+
+
+def test_wrong_shapes():
+    with pytest.raises(ValueError, match=r"^radius = .*: must be a positive number$"):
+        asperity.surface.shape("sphere", 16, radius=-1.0)
+    with pytest.raises(ValueError, match=r"^wavelength = .*\namplitude = .*: must be finite$"):
+        asperity.surface.shape("sine", 16, amplitude=float("nan"))
 
 
 def test_threads():

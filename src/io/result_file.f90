@@ -5,7 +5,7 @@
 !> A snapshot appears whole (see `hdf5_file`), and then in the XDMF file beside the result.
 module result_file
    use errors, only : error_file, error_input, error_type, fail
-   use file_system, only : is_folder, name_of, remove_file, rename_file
+   use file_system, only : folder_of, is_folder, name_of, remove_file, rename_file
    use hdf5_file, only : hdf5_file_type
    use history_row, only : column_count, column_type, history_columns, history_row_type, row_values
    use precision, only : dp, int8
@@ -16,6 +16,8 @@ module result_file
    private
 
    public :: result_file_type, sibling_path
+
+   character(*), parameter :: stop_mark = 'at_stop'   !! attribute of a snapshot that a stop wrote
 
    !> What a snapshot may hold.
    type :: field_type
@@ -62,6 +64,7 @@ module result_file
       !> Write a number or numbers into /material.
       generic :: write_material => write_material_value, write_material_values
       procedure :: end_snapshot
+      procedure :: last_snapshot
       procedure :: link_checkpoint
       procedure :: unlink_checkpoint
       procedure :: finish => finish_result
@@ -114,6 +117,11 @@ contains
          call fail(error, error_file, self%path//': is a folder, not a file')
          return
       end if
+      if (.not. is_folder(folder_of(self%path))) then
+         call fail(error, error_file, self%path//': cannot be written: there is no folder "'// &
+            folder_of(self%path)//'"')
+         return
+      end if
       temporary = self%path//'.new'
       ! The group that grows is made first, in pages of its own.
       call self%file%open(temporary, 'create', error, alignment=4096)
@@ -123,6 +131,9 @@ contains
       if (.not. allocated(error)) call self%file%open(temporary, 'append', error)
       if (.not. allocated(error)) call write_frame()
       if (allocated(error)) then
+         ! The user knows the file by its own name.
+         if (index(error%message, temporary//':') == 1) &
+            error%message = self%path//error%message(len(temporary) + 1:)
          call self%file%close(closing)
          call remove_file(temporary)
          return
@@ -275,12 +286,13 @@ contains
    end subroutine append_row
 
    !> Start a snapshot.
-   subroutine begin_snapshot(self, step, time, phase, error)
+   subroutine begin_snapshot(self, step, time, phase, error, at_stop)
       class(result_file_type), intent(inout) :: self
       integer, intent(in) :: step           !! row of the history
       real(dp), intent(in) :: time          !! s
       integer, intent(in) :: phase          !! number of the phase, from 1
       type(error_type), allocatable, intent(out) :: error
+      logical, intent(in), optional :: at_stop   !! for a stop only: a restart drops it; default no
 
       self%current_path = '/snapshots/'//snapshot_name(step)
       self%current%step = step
@@ -294,6 +306,8 @@ contains
       call self%file%write_attribute(self%current_path, 'time', time, error)
       if (allocated(error)) return
       call self%file%write_attribute(self%current_path, 'phase', phase, error)
+      if (allocated(error) .or. .not. present(at_stop)) return
+      if (at_stop) call self%file%write_attribute(self%current_path, stop_mark, 1, error)
    end subroutine begin_snapshot
 
    !> Look a field's name up, and note it.
@@ -352,6 +366,15 @@ contains
       self%snapshots = [self%snapshots, self%current]
       call write_xdmf(self%xdmf_path, self%path, self%grid, self%snapshots, error)
    end subroutine end_snapshot
+
+   !> Row of the last snapshot; -1: there is none.
+   pure function last_snapshot(self) result(step)
+      class(result_file_type), intent(in) :: self
+      integer :: step
+
+      step = -1
+      if (size(self%snapshots) > 0) step = maxval(self%snapshots%step)
+   end function last_snapshot
 
    !> Let /checkpoint of the result stand for the checkpoint, a file of its own.
    subroutine link_checkpoint(self, error)
@@ -504,7 +527,7 @@ contains
          merge(boundary_periodic, boundary_free, boundary == 'periodic'))
    end subroutine read_grid
 
-   !> Note the snapshots up to a row and remove the later ones.
+   !> Note the snapshots up to a row and remove the later ones, and that of a stop.
    subroutine keep_snapshots(self, last_step, error)
       class(result_file_type), intent(inout) :: self
       integer, intent(in) :: last_step
@@ -522,7 +545,7 @@ contains
          path = '/snapshots/'//trim(names(i))
          call self%file%read_attribute(path, 'step', snapshot%step, error)
          if (allocated(error)) return
-         if (snapshot%step > last_step) then
+         if (snapshot%step > last_step .or. self%file%has_attribute(path, stop_mark)) then
             call self%file%remove(path, error)
             if (allocated(error)) return
             cycle

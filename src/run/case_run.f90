@@ -124,6 +124,7 @@ contains
       call self%result%reopen(self%path, self%sim%row%step, self%sim%case%output%compression, error)
       if (allocated(error)) return
       self%finished = self%sim%finished
+      self%last_snapshot = self%result%last_snapshot()
       associate (times => self%sim%case%output%snapshot_times)
          do while (self%next_time <= size(times))
             if (times(self%next_time) > self%sim%row%time) exit
@@ -184,15 +185,16 @@ contains
    end function snapshot_due
 
    !> Write the fields that were asked for.
-   subroutine write_snapshot(self, error)
+   subroutine write_snapshot(self, error, at_stop)
       type(run_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
+      logical, intent(in), optional :: at_stop     !! written for a stop only: a restart drops it
       real(dp), allocatable :: field(:, :)
       integer(int8), allocatable :: states(:, :)
       integer :: k
 
       associate (sim => self%sim, names => self%sim%case%output%snapshot_fields)
-         call self%result%begin_snapshot(sim%row%step, sim%row%time, sim%row%phase, error)
+         call self%result%begin_snapshot(sim%row%step, sim%row%time, sim%row%phase, error, at_stop)
          do k = 1, size(names)
             if (allocated(error)) return
             if (names(k) == 'contact') then
@@ -242,13 +244,14 @@ contains
       call system_clock(self%saved_at)
    end subroutine save_run
 
-   !> Stop between two steps: a snapshot of where the run stands, and a checkpoint.
+   !> Stop between two steps: a snapshot of where the run stands, and a checkpoint. A snapshot that
+   !> is not due is dropped by a restart: the result is that of a run that never stopped.
    subroutine interrupt_run(self, error)
       class(run_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
 
       if (self%sim%row%step > self%last_snapshot .and. self%sim%schedule%row >= 0) &
-         call write_snapshot(self, error)
+         call write_snapshot(self, error, at_stop=.true.)
       if (allocated(error)) return
       if (self%sim%schedule%row >= 0) call self%save(error)
    end subroutine interrupt_run

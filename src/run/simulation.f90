@@ -63,10 +63,10 @@ module simulation
       type(interpolation_type), private :: road
       logical :: frictional = .false.               !! there is a friction law, and the road moves
       type(tangential_state_type) :: tangential
-      type(stick_slip_watch_type), private :: watch
+      type(stick_slip_watch_type) :: watch          !! what has been seen of the mean slip
       logical, private :: slides = .false.          !! some phase moves the road
       real(dp), allocatable, private :: settled(:, :)   !! pressure of the pass before, Pa
-      integer, private :: edge = edge_clear         !! worst found at the edge of a free map
+      integer :: edge = edge_clear                  !! worst found at the edge of a free map
       type(normal_step_type), private :: side
       logical :: first = .true.                     !! no state yet
       real(dp) :: level = 0.0_dp                    !! U - H where the gap is zero, m
@@ -174,6 +174,14 @@ contains
       yes = .false.
       if (self%frictional) yes = self%tangential%moved
    end function rubs
+
+   !> Is there friction that nothing has called for yet? What touches then sticks.
+   pure function holds(self) result(yes)
+      type(simulation_type), intent(in) :: self
+      logical :: yes
+
+      yes = self%case%friction%law /= 'none' .and. .not. rubs(self)
+   end function holds
 
    !> The passes of a step with friction.
    subroutine coupled_passes(self, plan, outcome, rubbing, level)
@@ -497,6 +505,7 @@ contains
          call add_friction(self, plan, rubbing, outside, force, row)
          call watch_stick_slip(self, plan, row%sliding_speed)
       end if
+      if (holds(self)) row%stick_area = row%contact_area
       row%friction = 0.0_dp
       if (abs(row%force) > 0.0_dp .and. any(abs(self%direction) > 0.0_dp)) &
          row%friction = dot_product(force, self%direction)/row%force
@@ -588,19 +597,23 @@ contains
       end select
    end subroutine field
 
-   !> The state of each cell: 0 open, 1 stick, 2 slip. Without friction all contact slips.
+   !> The state of each cell: 0 open, 1 stick, 2 slip. Without friction all contact slips; with it
+   !> all sticks until the road moves.
    subroutine contact_states(self, states)
       class(simulation_type), intent(in) :: self
       integer(int8), allocatable, intent(out) :: states(:, :)
+      integer(int8) :: touching
       integer :: j
 
       if (rubs(self)) then
          states = self%tangential%contact
          return
       end if
+      touching = 2_int8
+      if (holds(self)) touching = 1_int8
       allocate (states(self%grid%nx, self%grid%ny))
       do j = 1, self%grid%ny
-         states(:, j) = merge(2_int8, 0_int8, touches(self, j))
+         states(:, j) = merge(touching, 0_int8, touches(self, j))
       end do
    end subroutine contact_states
 

@@ -5,6 +5,7 @@ module simulation_state
    use history_row, only : column_count, row_from_values, row_values
    use precision, only : dp, int8
    use simulation, only : simulation_type
+   use stick_slip_watch, only : watch_from_values, watch_values
    use viscoelastic_energy, only : books_from_values, books_values
    use zener, only : is_elastic
    implicit none
@@ -35,6 +36,8 @@ contains
       call writer%put('motion', [sim%direction, sim%drive_force, sim%velocity, sim%drifted, &
          real(sim%moved_cells, dp), sim%level], '1', error)
       if (allocated(error)) return
+      call writer%put('watches', [watch_values(sim%watch), real(sim%edge, dp)], '1', error)
+      if (allocated(error)) return
       call writer%put('pressure', sim%pressure, 'Pa', error)
       if (allocated(error)) return
       call writer%put('gap', sim%gap, 'm', error)
@@ -60,7 +63,7 @@ contains
       type(simulation_type), intent(inout) :: sim
       type(checkpoint_reader_type), intent(inout) :: reader
       type(error_type), allocatable, intent(out) :: error
-      real(dp) :: numbers(schedule_values), row(column_count), motion(11)
+      real(dp) :: numbers(schedule_values), row(column_count), motion(11), watches(5)
       real(dp), allocatable :: books(:)
       character(:), allocatable :: control
 
@@ -93,6 +96,10 @@ contains
       sim%drifted = motion(7:8)
       sim%moved_cells = nint(motion(9:10))
       sim%level = motion(11)
+      call reader%get('watches', watches, error)
+      if (allocated(error)) return
+      sim%watch = watch_from_values(watches(1:4))
+      sim%edge = nint(watches(5))
       sim%first = .false.
       call reader%get('pressure', sim%pressure, error)
       if (allocated(error)) return

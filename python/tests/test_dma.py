@@ -1,0 +1,386 @@
+"""DMA tables become materials: known series come back, units and mistakes are seen."""
+
+import subprocess
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from asperity.__main__ import main
+from asperity.dma import DmaTable, fit_dma, read_dma
+from asperity.material import WLF, Prony
+
+# A model rubber with a broad spectrum: 0.6 MPa at rest, about 13.5 MPa at once.
+TAU = np.logspace(-7, 2, 37)
+RUBBER = Prony(6e5, 0.8e6 * np.exp(-(((np.log10(TAU) + 4) / 2.2) ** 2)) + 2e4, TAU)
+SHIFT = WLF(8.86, 101.6, 20.0)
+TWO_PI = 2 * np.pi
+
+
+def noise(seed, size, amount):
+    """Return factors that scatter about 1."""
+    return np.exp(amount * np.random.default_rng(seed).standard_normal(size))
+
+
+def write(path, head, rows, separator=","):
+    """Write a table."""
+    lines = [head, *(separator.join(f"{value:.9g}" for value in row) for row in rows)]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def sweeps(temperatures, frequencies, amount=0.0):
+    """Return rows f (Hz), G' (MPa), G'' (MPa), T (C)."""
+    rows = []
+    for k, t in enumerate(temperatures):
+        modulus = RUBBER.shifted(t, SHIFT).complex_modulus(TWO_PI * frequencies)
+        for f, m, a, b in zip(frequencies, modulus, noise(k, frequencies.size, amount),
+                              noise(100 + k, frequencies.size, amount), strict=True):
+            rows.append((f, 1e-6 * m.real * a, 1e-6 * m.imag * b, t))
+    return rows
+
+
+# ---- the fit -------------------------------------------------------------------------------
+
+
+# Arms at distances of h = ln(10)/arms cannot do better than a ripple of 2/cosh(pi^2/h) in the loss
+# of a flat spectrum: 5.5 %, 0.08 %, 1e-5; the ends of the range are up to twice as far off.
+@pytest.mark.parametrize("arms, bound, loss_bound",
+                         [(1.0, 0.04, 0.13), (2.0, 2e-3, 6e-3), (3.0, 1e-3, 3e-3)])
+def test_known_modulus_comes_back(arms, bound, loss_bound):
+    omega = np.logspace(-1, 7, 90)
+    modulus = RUBBER.complex_modulus(omega)
+    fit = fit_dma(DmaTable(omega, modulus.real, modulus.imag), arms_per_decade=arms)
+    between = np.logspace(-1, 7, 777)
+    found, true = fit.material.complex_modulus(between), RUBBER.complex_modulus(between)
+    assert np.abs(found / true - 1.0).max() < bound
+    assert np.abs((found.imag / found.real) / (true.imag / true.real) - 1.0).max() < loss_bound
+    assert fit.material.g.min() > 0.0
+    assert fit.material.g_inf == pytest.approx(6e5, rel=0.1)
+    decades = np.log10(fit.material.tau.max() / fit.material.tau.min())
+    assert fit.material.tau.size == pytest.approx(arms * decades + 1, abs=0.5)
+    assert fit.valid_range == pytest.approx((0.1, 1e7))
+    found = fit.material.complex_modulus(omega)
+    errors = [np.log10(found.real / modulus.real), np.log10(found.imag / modulus.imag)]
+    for told, error in ((fit.error_storage, errors[0]), (fit.error_loss, errors[1]),
+                        (fit.error_tan_delta, errors[1] - errors[0])):
+        assert told == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-9)
+    assert fit.largest_error == pytest.approx(np.abs(errors).max())
+
+
+def test_noise_is_smoothed():
+    """5 % of scatter on each point: the fit is nearer to the truth than the data."""
+    omega = np.logspace(-1, 7, 120)
+    modulus = RUBBER.complex_modulus(omega)
+    for seed in range(3):
+        table = DmaTable(omega, modulus.real * noise(seed, 120, 0.05),
+                         modulus.imag * noise(seed + 50, 120, 0.05))
+        fit = fit_dma(table, arms_per_decade=2)
+        found = fit.material.complex_modulus(omega)
+        for got, true in ((found.real, modulus.real), (found.imag, modulus.imag)):
+            assert np.sqrt(np.mean((got / true - 1.0) ** 2)) < 0.03
+        assert fit.error_storage == pytest.approx(0.05 / np.log(10), rel=0.3)
+        # neighbouring arms do not jump up and down: the spectrum is smooth
+        inner = fit.material.g[2:-2]
+        assert np.abs(np.diff(np.log10(inner))).max() < 0.6
+
+
+def test_rows_in_any_order():
+    omega = np.logspace(0, 5, 40)
+    modulus = RUBBER.complex_modulus(omega)
+    order = np.random.default_rng(3).permutation(40)
+    first = fit_dma(DmaTable(omega, modulus.real, modulus.imag))
+    other = fit_dma(DmaTable(omega[order], modulus.real[order], modulus.imag[order]))
+    assert first.material == other.material
+
+
+def test_the_plateau_is_positive_where_the_data_do_not_reach_it():
+    """A Maxwell fluid within the range: the plateau is held above zero, and that is said."""
+    fluid = Prony(0.0, [1e6, 1e6], [1e-2, 1.0])
+    omega = np.logspace(-2, 3, 40)
+    modulus = fluid.complex_modulus(omega)
+    fit = fit_dma(DmaTable(omega, modulus.real, modulus.imag))
+    assert fit.material.g_inf == pytest.approx(0.01 * modulus.real.min())
+    assert fit.plateau_bounded and any("plateau" in note for note in fit.notes)
+    assert fit_dma(DmaTable(omega, modulus.real, modulus.imag),
+                   least_plateau=0.0).material.g_inf < 0.01 * modulus.real.min()
+    solid = RUBBER.complex_modulus(omega)
+    assert not fit_dma(DmaTable(omega, solid.real, solid.imag)).plateau_bounded
+
+
+# ---- temperatures --------------------------------------------------------------------------
+
+TEMPERATURES = (-20.0, -10.0, 0.0, 10.0, 20.0, 40.0, 60.0)
+FREQUENCIES = np.logspace(-1, 2, 16)
+
+
+def table_of(tmp_path, **options):
+    rows = sweeps(TEMPERATURES, FREQUENCIES, **options)
+    order = np.random.default_rng(5).permutation(len(rows))
+    return read_dma(write(tmp_path / "dma.csv", "f (Hz),G' (MPa),G'' (MPa),T (C)",
+                          [rows[k] for k in order]))
+
+
+def test_several_temperatures_with_known_constants(tmp_path):
+    fit = fit_dma(table_of(tmp_path), wlf=SHIFT, arms_per_decade=2)
+    low, high = fit.valid_range
+    shifts = SHIFT.shift_factor([60.0, -20.0])
+    assert low == pytest.approx(TWO_PI * 0.1 * shifts[0], rel=1e-9)
+    assert high == pytest.approx(TWO_PI * 100 * shifts[1], rel=1e-9)
+    omega = np.geomspace(low, high, 300)
+    ratio = fit.material.complex_modulus(omega) / RUBBER.complex_modulus(omega)
+    assert np.abs(ratio - 1.0).max() < 5e-3
+    assert (fit.reference, fit.wlf) == (20.0, SHIFT)
+    # the same constants, said at another temperature, are the same shifts
+    moved = fit_dma(table_of(tmp_path), wlf=SHIFT, reference=0.0, arms_per_decade=2)
+    assert moved.wlf.t_ref == 0.0
+    np.testing.assert_allclose(
+        moved.wlf.shift_factor([-20.0, 30.0]),
+        SHIFT.shift_factor([-20.0, 30.0]) / SHIFT.shift_factor(0.0), rtol=1e-12)
+    cold = RUBBER.shifted(0.0, SHIFT).complex_modulus(1e3)
+    assert abs(moved.material.complex_modulus(1e3) / cold - 1.0) < 5e-3
+
+
+@pytest.mark.parametrize("amount, error", [(0.0, 0.01), (0.02, 0.08)])
+def test_several_temperatures_with_shifts_from_the_overlap(tmp_path, amount, error):
+    fit = fit_dma(table_of(tmp_path, amount=amount), reference=20.0)
+    for t, shift in fit.shifts:
+        assert shift == pytest.approx(np.log10(SHIFT.shift_factor(t)), abs=error)
+    assert fit.reference == 20.0
+    # the law is known where it was measured
+    np.testing.assert_allclose(
+        np.log10(fit.wlf.shift_factor(TEMPERATURES)), np.log10(SHIFT.shift_factor(TEMPERATURES)),
+        atol=max(error, 0.02))
+    omega = np.geomspace(*fit.valid_range, 200)
+    ratio = np.abs(fit.material.complex_modulus(omega) / RUBBER.complex_modulus(omega))
+    assert np.abs(np.log10(ratio)).max() < 0.05
+
+
+def test_sweeps_that_do_not_reach_each_other_are_told():
+    rows = np.array(sweeps((-40.0, 20.0), np.logspace(0, 1, 6)))
+    fit = fit_dma(DmaTable(TWO_PI * rows[:, 0], 1e6 * rows[:, 1], 1e6 * rows[:, 2], rows[:, 3]))
+    assert any("-40 and 20 C hardly overlap" in note for note in fit.notes)
+
+
+def test_temperatures_that_scatter_belong_together(tmp_path):
+    rows = [(f, a, b, t + 0.1 * np.sin(7 * k)) for k, (f, a, b, t) in
+            enumerate(sweeps((0.0, 20.0, 40.0), FREQUENCIES))]
+    table = read_dma(write(tmp_path / "dma.csv", "f (Hz),G' (MPa),G'' (MPa),T (C)", rows))
+    fit = fit_dma(table)
+    assert [round(t) for t, _ in fit.shifts] == [0, 20, 40]
+    ramp = [(1.0, 2.0, 1.0, 0.3 * k) for k in range(40)]
+    table = read_dma(write(tmp_path / "ramp.csv", "f (Hz),G' (MPa),G'' (MPa),T (C)", ramp))
+    with pytest.raises(ValueError, match="a ramp\\?"):
+        fit_dma(table)
+
+
+def test_temperatures_that_cannot_be_brought_together(tmp_path):
+    table = table_of(tmp_path)
+    with pytest.raises(ValueError, match="reference = 25: must be one of the temperatures -20"):
+        fit_dma(table, reference=25.0)
+    with pytest.raises(ValueError, match="wlf: has 2 numbers: give its reference"):
+        fit_dma(table, wlf=(8.86, 101.6))
+    with pytest.raises(ValueError, match="must be > t_ref - c2"):
+        fit_dma(table, wlf=(8.86, 10.0, 20.0))
+    one = DmaTable(table.omega, table.storage, table.loss)
+    with pytest.raises(ValueError, match=r"temperature = 5: .*--wlf"):
+        fit_dma(one).to_namelist(temperature=5.0)
+    few = write(tmp_path / "few.csv", "f (Hz),G' (MPa),G'' (MPa),T (C)",
+                sweeps((0.0, 20.0), np.array([1.0, 2.0])))
+    with pytest.raises(ValueError, match="2 frequencies at 0 C: shifting needs at least 3"):
+        fit_dma(read_dma(few))
+
+
+# ---- the table -----------------------------------------------------------------------------
+
+ROWS = [(0.1, 1.0, 0.2), (1.0, 2.0, 0.5), (10.0, 4.0, 1.5)]
+HEADS = [
+    ("f (Hz),G' (MPa),G'' (MPa)", TWO_PI, 1e6, 1e6),
+    ("Frequency [Hz],Storage modulus [kPa],Loss modulus [Pa]", TWO_PI, 1e3, 1.0),
+    ("omega (rad/s),storage (Pa),loss (Pa)", 1.0, 1.0, 1.0),
+    ("freq_kHz,storage_MPa,loss_MPa", 1e3 * TWO_PI, 1e6, 1e6),
+    ("Angular frequency / rad/s,G' / GPa,G'' / MPa", 1.0, 1e9, 1e6),
+    ("Angular Frequency (rad s^-1),Storage Modulus (G') (MPa),Loss Modulus (G'') (MPa)",
+     1.0, 1e6, 1e6),
+    ('"f, Hz","G\', MPa","G\'\', MPa"', TWO_PI, 1e6, 1e6),
+    ("ω (rad/s),G′ (MPa),G″ (MPa)", 1.0, 1e6, 1e6),
+    ("frequency,storage,loss", TWO_PI, 1.0, 1.0),
+    ("omega,G1,G2", 1.0, 1.0, 1.0),
+    ("f (Hz),E' (MPa),E'' (MPa)", TWO_PI, 1e6 / 3, 1e6 / 3),
+    ("Frequency\nHz,MPa,kPa".replace("Frequency", "Frequency,Storage Modulus,Loss Modulus"),
+     TWO_PI, 1e6, 1e3),
+]
+
+
+@pytest.mark.parametrize("head, to_omega, to_storage, to_loss", HEADS)
+def test_columns_and_units_are_recognised(tmp_path, head, to_omega, to_storage, to_loss):
+    table = read_dma(write(tmp_path / "dma.csv", head, ROWS))
+    f, a, b = np.array(ROWS).T
+    np.testing.assert_allclose(table.omega, to_omega * f, rtol=1e-12)
+    np.testing.assert_allclose(table.storage, to_storage * a, rtol=1e-12)
+    np.testing.assert_allclose(table.loss, to_loss * b, rtol=1e-12)
+    assert table.temperature is None
+    assert any("taken as" in note for note in table.notes) == (head.split(",")[0] in
+                                                               ("frequency", "omega"))
+
+
+def test_other_orders_separators_and_commas(tmp_path):
+    f, a, b = np.array(ROWS).T
+    path = tmp_path / "dma.csv"
+    path.write_bytes("\ufeff# a remark\r\n\r\nT (K);tan delta;G' (MPa);f (Hz)\r\n"
+                     "293,15;0,2;1;0,1\r\n293,15;0,25;2,0;1,0\r\n\r\n293,15;0,375;4e0;10\r\n"
+                     .encode())
+    table = read_dma(path)
+    np.testing.assert_allclose(table.omega, TWO_PI * f, rtol=1e-12)
+    np.testing.assert_allclose(table.storage, 1e6 * a, rtol=1e-12)
+    np.testing.assert_allclose(table.loss, 1e6 * b, rtol=1e-12)
+    np.testing.assert_allclose(table.temperature, 20.0, atol=1e-12)
+    for separator in ("\t", "  "):
+        head = separator.join(("f_Hz", "G'_MPa", "G''_MPa"))
+        table = read_dma(write(path, head, ROWS, separator))
+        np.testing.assert_allclose(table.loss, 1e6 * b, rtol=1e-12)
+
+
+def test_what_is_said_in_the_call_counts(tmp_path):
+    f, a, b = np.array(ROWS).T
+    path = write(tmp_path / "dma.csv", "run,x (Hz),A,B,E' (MPa),E'' (MPa)",
+                 [(9, *row, 7 * row[1], 7 * row[2]) for row in ROWS])
+    columns = {"frequency": "x (Hz)", "storage": "A", "loss": 4}
+    table = read_dma(path, columns=columns, frequency_unit="rad/s", modulus_unit="kPa")
+    np.testing.assert_allclose(table.omega, f)
+    np.testing.assert_allclose(table.storage, 1e3 * a)
+    np.testing.assert_allclose(table.loss, 1e3 * b)
+    tensile = read_dma(path, columns={"frequency": 2}, poisson=0.4)
+    np.testing.assert_allclose(tensile.storage, 7e6 * a / 2.8)
+    shear = read_dma(path, columns={"frequency": 2}, kind="shear")
+    np.testing.assert_allclose(shear.storage, 7e6 * a)
+    bare = tmp_path / "bare.csv"
+    np.savetxt(bare, np.array(ROWS)[:, [1, 0, 2]], delimiter=",")
+    with pytest.raises(ValueError, match=r"bare\.csv: has no header: say the number of frequency"):
+        read_dma(bare)
+    table = read_dma(bare, columns={"frequency": 2, "storage": 1, "loss": "3"})
+    np.testing.assert_allclose(table.omega, TWO_PI * f)
+
+
+WRONG = [
+    ("f (Hz),G' (Pa),G'' (Pa)\n1,2,3\n2,abc,4\n3,4\n4,5,-6\n5,6,nan\n",
+     [r"line 3: storage = 'abc': must be a number > 0", "line 4: has 2 columns, must have 3",
+      "line 5: loss = '-6': must be a number > 0", "line 6: loss = 'nan'"]),
+    ("f (Hz),G' (Pa),G'' (Pa),T (C)\n1,2,3,20\n2,3,4,hot\n3,4,5,20\n",
+     [r"line 3: temperature = 'hot': must be a finite number"]),
+    ("# remark\n\nf (Hz),G' (Pa)\n1,2\n", ["line 3: the columns 'f \\(Hz\\)', \"G' \\(Pa\\)\" have"
+                                         r" no loss \(or tan_delta\)"]),
+    ("f (Hz),freq (Hz),G' (Pa),G'' (Pa)\n1,1,2,3\n", ["line 1: the columns 'f .Hz.' and 'freq"]),
+    ("f (rpm),G' (Pa),G'' (Pa)\n1,2,3\n2,3,4\n3,4,5\n", ["line 1: column frequency: has the unit"
+                                                     " 'rpm': must be one of Hz"]),
+    ("f (Hz),G' (psi),G'' (Pa)\n1,2,3\n2,3,4\n3,4,5\n", ["column storage: has the unit 'psi'"]),
+    ("f (Hz),G' (Pa),G'' (Pa)\n1,2,3\n2,3,4\n", ["has 2 rows of numbers: must have at least 3"]),
+    ("f (Hz),G' (Pa),G'' (Pa)\n", ["has a header and no numbers"]),
+    ("\n# nothing\n", ["is empty"]),
+]
+
+
+@pytest.mark.parametrize("text, words", WRONG)
+def test_wrong_tables(tmp_path, text, words):
+    path = tmp_path / "dma.csv"
+    path.write_text(text)
+    for word in words:
+        with pytest.raises(ValueError, match=r"dma\.csv: .*" + word if word in words[:1] else word):
+            read_dma(path)
+
+
+def test_many_faults_are_cut_short(tmp_path):
+    path = write(tmp_path / "dma.csv", "f (Hz),G' (Pa),G'' (Pa)", [(1.0, -1.0, 1.0)] * 30)
+    with pytest.raises(ValueError) as caught:
+        read_dma(path)
+    lines = str(caught.value).splitlines()
+    assert len(lines) == 11 and lines[-1].endswith("and 20 more")
+    with pytest.raises(OSError, match="there is no such file"):
+        read_dma(tmp_path / "none.csv")
+    for word in ("frequency_unit", "modulus_unit", "temperature_unit", "kind"):
+        with pytest.raises(ValueError, match=f"{word} = 'furlong': must be one of"):
+            read_dma(path, **{word: "furlong"})
+    with pytest.raises(ValueError, match="columns = 'mass': must be one of"):
+        read_dma(path, columns={"mass": 1})
+
+
+# ---- the command ----------------------------------------------------------------------------
+
+
+class Done(NamedTuple):
+    """How a command ended."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+@pytest.fixture
+def command(monkeypatch, capsys, tmp_path):
+    """Return a call of ``python -m asperity fit`` in the test's folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words):
+        status = main(["fit", *map(str, words)])
+        return Done(status, *capsys.readouterr())
+
+    return call
+
+
+REST = """
+&grid nx = 16, ny = 12, lx = 1e-3 /
+&surface shape = 'sine', amplitude = 1e-6, wavelength = 1e-3 /
+&phase pressure = 1e4, duration = 1e-3, steps = 2 /
+"""
+
+
+def test_the_group_is_a_case_s(command, tmp_path, program):
+    """`asperity check` takes what `fit` writes; the numbers are those of the fit."""
+    write(tmp_path / "dma.csv", "f (Hz),G' (MPa),G'' (MPa),T (C)",
+          sweeps(TEMPERATURES, FREQUENCIES))
+    done = command("dma.csv", "-o", "rubber.nml", "--plot", "fit.png", "--reference", 20,
+                   "--temperature", 30)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    for word in ("error (rms of log10 fit/data): storage 0.0", "valid range: ", "WLF: c1 = ",
+                 "wrote rubber.nml", "wrote fit.png"):
+        assert word in done.stdout, done.stdout
+    assert (tmp_path / "fit.png").read_bytes()[:4] == b"\x89PNG"
+    assert (tmp_path / "fit.png").stat().st_size > 30000
+    group = (tmp_path / "rubber.nml").read_text()
+    (tmp_path / "case.nml").write_text(group + REST)
+    checked = subprocess.run([program, "check", "case.nml"], cwd=tmp_path, text=True,
+                             capture_output=True, check=False)
+    assert (checked.returncode, checked.stderr) == (0, ""), checked.stderr
+    assert "temperature = 30" in group
+    table = read_dma(tmp_path / "dma.csv")
+    fit = fit_dma(table, reference=20.0)
+    assert f"shear_modulus = {fit.material.g_inf!r}" in group
+    assert group.strip().splitlines()[-1] == "/"
+    # without -o the group alone is on the standard output
+    piped = command("dma.csv", "--reference", 20, "--temperature", 30)
+    assert piped.stdout == group
+    assert "! valid range: " in piped.stdout
+    assert piped.stderr == ""
+
+
+def test_the_command_s_options(command, tmp_path):
+    f = np.logspace(-1, 5, 40)
+    modulus = RUBBER.complex_modulus(TWO_PI * f)
+    write(tmp_path / "dma.csv", "a,b,c", np.column_stack([f, modulus.real, modulus.imag]))
+    done = command("dma.csv")
+    assert done.returncode == 2
+    assert done.stderr.startswith("asperity: dma.csv: line 1: the columns 'a', 'b', 'c' have no"
+                                  " frequency, storage, loss (or tan_delta)")
+    columns = ("--column", "frequency=a", "--column", "storage=2", "--column", "loss=c")
+    counts = []
+    for arms in (1, 2):
+        done = command("dma.csv", *columns, "--arms-per-decade", arms, "--wlf", 8.86, 101.6, -20)
+        assert done.returncode == 0, done.stderr
+        assert "reference_temperature = -20.0" in done.stdout
+        counts.append(int(done.stdout.split("arms: ")[1].split(",")[0]))
+    assert counts[1] >= 1.8 * counts[0]
+    assert command("none.csv").returncode == 3
+    assert command("dma.csv", "--column", "loss").returncode == 2
+    done = command("dma.csv", *columns, "-o", "none/m.nml")
+    assert done.returncode == 3 and "none" in done.stderr

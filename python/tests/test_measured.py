@@ -1,0 +1,434 @@
+"""Measured topographies: what an instrument wrote is what the program gets, in metres."""
+
+import hashlib
+import json
+import re
+import struct
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+
+import asperity
+from asperity.__main__ import main
+from asperity.measured import channels
+from asperity.surface import import_topography, load
+
+SurfaceTopography = pytest.importorskip("SurfaceTopography")
+
+NX, NY = 23, 14
+LX, LY = 46.0, 21.0  # um: cells of 2 um x 1.5 um
+
+
+def sample(nx=NX, ny=NY):
+    """Return an uneven map (ny, nx), um, that no turn or mirror brings to itself."""
+    j, i = np.mgrid[0:ny, 0:nx]
+    return 0.3 * np.sin(0.7 * i) + 0.05 * j**1.5 + 0.01 * i * j + 0.2 * (i == 3) * (j == 10)
+
+
+def topography(height, sizes=(LX, LY), unit="um", missing=None, **options):
+    """Return SurfaceTopography's object: its arrays have x first."""
+    array = height.T
+    if missing is not None:
+        array = np.ma.masked_array(array, missing.T)
+    return SurfaceTopography.Topography(array, sizes, unit=unit, **options)
+
+
+def write_sdf(path, height):
+    """Write an ISO 25178-71 text file: profiles along x, one after the other, in m."""
+    text = ["aISO-1.0", "ManufacID = tests", "CreateDate = 010120261200",
+            "ModDate = 010120261200", f"NumPoints = {NX}", f"NumProfiles = {NY}",
+            f"Xscale = {LX / NX * 1e-6!r}", f"Yscale = {LY / NY * 1e-6!r}", "Zscale = 1e-9",
+            "Zresolution = -1", "Compression = 0", "DataType = 7", "CheckType = 0", "*"]
+    text += [" ".join("BAD" if np.isnan(z) else repr(float(1e3 * z)) for z in row)
+             for row in height]
+    path.write_text("\n".join([*text, "*"]) + "\n")
+
+
+def write_bcr(path, height):
+    """Write a BCR-STM file: a text header of 2048 bytes, then 16-bit numbers of 0.01 nm."""
+    step = 0.5  # nm a bit
+    head = (f"fileformat = bcrstm\nheadersize = 2048\nxpixels = {NX}\nypixels = {NY}\n"
+            f"xlength = {LX * 1e3}\nylength = {LY * 1e3}\nxunit = nm\nyunit = nm\nzunit = nm\n"
+            f"bit2nm = {step}\nintelmode = 1\n")
+    counts = np.round(1e3 * height / step).astype("<i2")
+    path.write_bytes(head.encode().ljust(2048, b"\n") + counts.tobytes())
+
+
+def write_xyz(path, height):
+    """Write coordinates and heights in columns, with the unit in a comment."""
+    y, x = np.mgrid[0:NY, 0:NX]
+    rows = np.column_stack([x.ravel() * LX / NX, y.ravel() * LY / NY, height.ravel()])
+    np.savetxt(path, rows)
+
+
+WRITERS = {
+    "map.nc": lambda path, h: topography(h).to_netcdf(str(path)),
+    "map.x3p": lambda path, h: topography(h).to_x3p(str(path)),
+    "map.gwy": lambda path, h: topography(h).to_gwy(str(path)),
+    "map.asc": lambda path, h: topography(h).to_matrix(str(path)),
+    "map.npy": lambda path, h: np.save(path, h.T),
+    "map.sdf": write_sdf,
+    "map.bcr": write_bcr,
+    "map.xyz": write_xyz,
+}
+EXTRA = {"map.npy": {"unit": "um", "size": (LX, LY)}, "map.xyz": {"unit": "um"}}
+EXACT = {"map.bcr": 0.26e-9}  # m: half a bit
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_formats_bring_heights_lengths_and_orientation(tmp_path, name):
+    """Row j of the file's map is row j of the dataset: a transpose or a mirror would show."""
+    height = sample()
+    WRITERS[name](tmp_path / name, height)
+    surface = import_topography(tmp_path / name, tmp_path / "s.h5", level="none",
+                                **EXTRA.get(name, {}))
+    with h5py.File(tmp_path / "s.h5") as file:
+        data = file["surface/height"]
+        assert data.shape == (NY, NX)
+        assert data.attrs["units"] == "m"
+        np.testing.assert_allclose(data[:], 1e-6 * height, rtol=0, atol=EXACT.get(name, 1e-15))
+        for group in (data, file["grid"]):
+            assert group.attrs["lx"] == pytest.approx(LX * 1e-6, rel=1e-12)
+            assert group.attrs["ly"] == pytest.approx(LY * 1e-6, rel=1e-12)
+        assert (file["grid"].attrs["nx"], file["grid"].attrs["ny"]) == (NX, NY)
+        raw = (tmp_path / name).read_bytes()
+        assert file.attrs["source_name"] == name
+        assert file.attrs["source_bytes"] == len(raw)
+        assert file.attrs["source_sha256"] == hashlib.sha256(raw).hexdigest()
+        assert file.attrs["source_format"] == name.split(".")[1]
+        assert json.loads(file.attrs["steps"]) == surface.steps
+        json.loads(file["source/metadata"][()])
+    assert not (tmp_path / "s.h5.new").exists()
+
+
+def test_what_the_instrument_said_is_kept(tmp_path):
+    topography(sample()).to_x3p(str(tmp_path / "map.x3p"), manufacturer="Zeta and Sons")
+    import_topography(tmp_path / "map.x3p", tmp_path / "s.h5")
+    with h5py.File(tmp_path / "s.h5") as file:
+        assert "Zeta and Sons" in file["source/metadata"][()].decode()
+
+
+@pytest.mark.parametrize("unit, metres", [("m", 1.0), ("mm", 1e-3), ("um", 1e-6), ("µm", 1e-6),
+                                          ("nm", 1e-9), ("pm", 1e-12)])
+def test_units(tmp_path, unit, metres):
+    topography(sample(), unit=unit).to_netcdf(str(tmp_path / "map.nc"))
+    surface = load(tmp_path / "map.nc", level="none")
+    np.testing.assert_allclose(surface.height, metres * sample(), rtol=1e-15)
+    assert surface.lx == pytest.approx(LX * metres, rel=1e-15)
+    assert surface.ly == pytest.approx(LY * metres, rel=1e-15)
+    assert surface.unit == unit.replace("µ", "u")
+
+
+def test_unit_and_size_that_a_file_lacks(tmp_path):
+    path = tmp_path / "map.npy"
+    np.save(path, sample().T)
+    with pytest.raises(ValueError, match=r"map\.npy: names no unit of length: give one.*--unit"):
+        load(path)
+    with pytest.raises(ValueError, match=r"map\.npy: gives no lengths: give them.*--size"):
+        load(path, unit="nm")
+    with pytest.raises(ValueError, match="size: has 1 lengths, must have 2"):
+        load(path, unit="nm", size=3.0)
+    with pytest.raises(ValueError, match="unit = 'furlong': must be one of"):
+        load(path, unit="furlong", size=(1, 1))
+    assert load(path, unit="nm", size=(LX, LY)).lx == LX * 1e-9
+    topography(sample()).to_netcdf(str(tmp_path / "map.nc"))
+    with pytest.raises(ValueError, match=r"unit = 'nm': .*map\.nc has its own unit, 'um'"):
+        load(tmp_path / "map.nc", unit="nm")
+    with pytest.raises(ValueError, match=r"size: .*map\.nc has its own, 46 x 21 um"):
+        load(tmp_path / "map.nc", size=(1.0, 1.0))
+    assert load(tmp_path / "map.nc", unit="µm").lx == pytest.approx(LX * 1e-6)
+
+
+def test_transpose_takes_arrays_as_images_have_them(tmp_path):
+    np.save(tmp_path / "map.npy", sample())  # (ny, nx)
+    surface = load(tmp_path / "map.npy", unit="um", size=(LX, LY), transpose=True, level="none")
+    np.testing.assert_allclose(surface.height, 1e-6 * sample(), rtol=1e-14)
+    assert (surface.lx, surface.ly) == (LX * 1e-6, LY * 1e-6)
+    topography(sample()).to_netcdf(str(tmp_path / "map.nc"))
+    turned = load(tmp_path / "map.nc", transpose=True, level="none")
+    np.testing.assert_allclose(turned.height, 1e-6 * sample().T, rtol=1e-14)
+    assert (turned.lx, turned.ly) == pytest.approx((LY * 1e-6, LX * 1e-6))
+
+
+def test_levelling(tmp_path):
+    """An exact plane is taken off to round-off, a paraboloid by 'curvature' only."""
+    j, i = np.mgrid[0:NY, 0:NX]
+    plane = 3.0 + 0.5 * i - 0.25 * j
+    bowl = plane + 0.01 * i**2 - 0.02 * i * j + 0.03 * j**2
+    topography(plane).to_netcdf(str(tmp_path / "plane.nc"))
+    topography(bowl).to_netcdf(str(tmp_path / "bowl.nc"))
+    assert np.abs(load(tmp_path / "plane.nc", level="tilt").height).max() < 1e-13 * 1e-6 * 20
+    assert np.abs(load(tmp_path / "bowl.nc", level="curvature").height).max() < 1e-13 * 1e-6 * 50
+    assert load(tmp_path / "bowl.nc", level="tilt").rms_height > 1e-7
+    mean = load(tmp_path / "plane.nc")
+    np.testing.assert_allclose(mean.height, 1e-6 * (plane - plane.mean()), atol=1e-19)
+    np.testing.assert_allclose(load(tmp_path / "plane.nc", level="none").height, 1e-6 * plane,
+                               rtol=1e-15)
+    assert any("tilt" in note for note in mean.notes)
+    assert not any("tilt" in note for note in load(tmp_path / "plane.nc", level="tilt").notes)
+
+
+def test_levelling_does_not_see_missing_points(tmp_path):
+    """The plane is that of the valid points, wherever the others are."""
+    j, i = np.mgrid[0:NY, 0:NX]
+    plane = 1.0 + 0.5 * i - 0.25 * j
+    missing = (i < 4) & (j < 5)
+    topography(plane, missing=missing).to_x3p(str(tmp_path / "map.x3p"))
+    surface = load(tmp_path / "map.x3p", level="tilt")
+    assert np.abs(surface.height).max() < 1e-18
+
+
+def test_missing_points_are_filled_and_counted(tmp_path):
+    """Holes in a plane come back on the plane; the share has a bound."""
+    j, i = np.mgrid[0:NY, 0:NX]
+    plane = 0.5 * i - 0.25 * j
+    hole = plane.copy()
+    hole[5:8, 9:12] = np.nan
+    hole[11, 3] = np.nan
+    write_sdf(tmp_path / "map.sdf", hole)
+    surface = load(tmp_path / "map.sdf", level="none")
+    np.testing.assert_allclose(surface.height, 1e-6 * plane, atol=1e-19)
+    (step,) = [step for step in surface.steps if step["step"] == "fill"]
+    assert (step["missing"], step["points"]) == (10, NX * NY)
+    assert f"filled 10 of {NX * NY} points" in surface.summary()
+    hole[:5] = np.nan
+    write_sdf(tmp_path / "map.sdf", hole)
+    with pytest.raises(ValueError, match=r"125 of 322 points are missing \(38\.8 %\): more than"
+                                         r" the 10 %.*--max-missing"):
+        load(tmp_path / "map.sdf")
+    assert np.isfinite(load(tmp_path / "map.sdf", max_missing=0.5).height).all()
+    hole[:] = np.nan
+    write_sdf(tmp_path / "map.sdf", hole)
+    with pytest.raises(ValueError, match="no valid point"):
+        load(tmp_path / "map.sdf", max_missing=1.0)
+
+
+def test_crop_keeps_whole_cells(tmp_path):
+    topography(sample()).to_netcdf(str(tmp_path / "map.nc"))
+    surface = load(tmp_path / "map.nc", level="none", crop=(8.0, 30.0, 3.0, 12.0))
+    np.testing.assert_allclose(surface.height, 1e-6 * sample()[2:8, 4:15], rtol=1e-14)
+    assert (surface.lx, surface.ly) == pytest.approx((22e-6, 9e-6))
+    for crop, words in (((30.0, 8.0, 3.0, 12.0), "along x: must rise"),
+                        ((0.0, 8.0, 3.0, 22.0), "along y: must rise, within 0 to 21"),
+                        ((0.0, 1.0, 3.0, 12.0), "too few"), ((0.0, 1.0), "must have 4")):
+        with pytest.raises(ValueError, match=words):
+            load(tmp_path / "map.nc", crop=crop)
+
+
+def test_resampling(tmp_path):
+    """Fewer cells: means over them. More: a smooth wave stays what it is."""
+    nx, ny = 48, 36
+    x, y = (np.arange(nx) + 0.5) / nx, (np.arange(ny) + 0.5) / ny
+
+    def wave(x, y):
+        return np.sin(2 * np.pi * x) + 0.5 * np.cos(4 * np.pi * y)[:, None]
+
+    topography(wave(x, y), periodic=True).to_netcdf(str(tmp_path / "map.nc"))
+    half = load(tmp_path / "map.nc", level="none", resample=(24, 12))
+    np.testing.assert_allclose(
+        half.height, 1e-6 * wave(x, y).reshape(12, 3, 24, 2).mean(axis=(1, 3)), atol=1e-20)
+    odd = load(tmp_path / "map.nc", level="none", resample=(31, 17))
+    assert odd.height.shape == (17, 31)
+    assert odd.height.mean() == pytest.approx(1e-6 * wave(x, y).mean(), abs=1e-20)
+    fine = load(tmp_path / "map.nc", level="none", resample=(100, 90))
+    exact = wave((np.arange(100) + 0.5) / 100, (np.arange(90) + 0.5) / 90)
+    # cubic splines: (2 pi/18)^4/384 of a wave of 18 cells, and as much again
+    np.testing.assert_allclose(fine.height, 1e-6 * exact, atol=1e-10)
+    assert (fine.lx, fine.ly) == (LX * 1e-6, LY * 1e-6)
+    plane = np.arange(nx) + 2.0 * np.arange(ny)[:, None]
+    topography(plane).to_netcdf(str(tmp_path / "plane.nc"))
+    finer = load(tmp_path / "plane.nc", level="none", resample=(96, 72))
+    np.testing.assert_allclose(np.diff(finer.height, axis=1), 0.5e-6, rtol=1e-9)
+    with pytest.raises(ValueError, match=r"resample = \(24,\): must be \(nx, ny\)"):
+        load(tmp_path / "map.nc", resample=(24,))
+
+
+def test_window_brings_the_edges_to_the_mean(tmp_path):
+    topography(sample()).to_netcdf(str(tmp_path / "map.nc"))
+    plain = load(tmp_path / "map.nc")
+    assert not plain.periodic
+    tukey = load(tmp_path / "map.nc", periodic="tukey", taper=0.4)
+    assert tukey.periodic
+    inside = (slice(3, 11), slice(5, 18))  # beyond a fifth of each length from the edges
+    np.testing.assert_allclose(tukey.height[inside], plain.height[inside], rtol=1e-12)
+    hann = load(tmp_path / "map.nc", periodic="hann")
+    for height in (tukey.height, hann.height):
+        # the steps across the edges are like those inside
+        across = max(np.abs(height[0] - height[-1]).max(),
+                     np.abs(height[:, 0] - height[:, -1]).max())
+        assert across < 0.15 * np.abs(plain.height).max()
+    x, y = (np.arange(NX) + 0.5) / NX, (np.arange(NY) + 0.5) / NY
+    window = np.sin(np.pi * x) ** 2 * np.sin(np.pi * y)[:, None] ** 2
+    np.testing.assert_allclose(hann.height, window * plain.height, atol=1e-20)
+    restored = load(tmp_path / "map.nc", periodic="hann", restore_rms=True)
+    assert restored.rms_height == pytest.approx(plain.rms_height, rel=1e-12)
+    assert hann.rms_height < 0.6 * plain.rms_height
+    (step,) = [step for step in hann.steps if step["step"] == "window"]
+    assert step["rms_height_before"] == pytest.approx(1e6 * plain.rms_height)
+    assert step["rms_height_after"] == pytest.approx(1e6 * hann.rms_height)
+
+
+def test_invert_and_scale(tmp_path):
+    topography(sample()).to_netcdf(str(tmp_path / "map.nc"))
+    plain = load(tmp_path / "map.nc")
+    turned = load(tmp_path / "map.nc", invert=True, scale=2.0)
+    np.testing.assert_allclose(turned.height, -2.0 * plain.height, rtol=1e-12, atol=1e-20)
+    assert [step["step"] for step in turned.steps] == ["level", "invert", "scale", "unit"]
+    for word, value in (("scale", 0.0), ("scale", np.nan), ("level", "flat"), ("taper", 0.0),
+                        ("max_missing", 2.0), ("periodic", "box"), ("restore_rms", True)):
+        with pytest.raises(ValueError, match=word):
+            load(tmp_path / "map.nc", **{word: value})
+
+
+def test_line_scans(tmp_path):
+    """Even ones become profiles; uneven ones are refused."""
+    line = np.sin(np.arange(30.0))
+    SurfaceTopography.UniformLineScan(line, 15.0, unit="nm").to_netcdf(str(tmp_path / "line.nc"))
+    surface = load(tmp_path / "line.nc", level="none", periodic=None)
+    np.testing.assert_allclose(surface.height, 1e-9 * line[None, :], rtol=1e-14)
+    assert surface.lx == pytest.approx(15e-9) and surface.ly == pytest.approx(0.5e-9)
+    part = load(tmp_path / "line.nc", crop=(5.0, 10.0), resample=[20], periodic="hann")
+    assert part.height.shape == (1, 20)
+    assert part.ly == pytest.approx(5e-9 / 20)
+    uneven = SurfaceTopography.NonuniformLineScan(np.arange(30.0) ** 1.5, line, unit="nm")
+    uneven.to_netcdf(str(tmp_path / "uneven.nc"))
+    with pytest.raises(ValueError, match="line scan with points at uneven distances"):
+        load(tmp_path / "uneven.nc")
+
+
+def gwy_with_channels(path, first, second):
+    """Write a Gwyddion file of a phase image and two maps of heights."""
+    def name(text):
+        return text.encode() + b"\0"
+
+    def thing(kind, items):
+        body = b"".join(items)
+        return name(kind) + struct.pack("<I", len(body)) + body
+
+    def unit(text):
+        return thing("GwySIUnit", [name("unitstr") + b"s" + name(text)])
+
+    def field(values, z_unit):
+        return thing("GwyDataField", [
+            name("xres") + b"i" + struct.pack("<i", NX),
+            name("yres") + b"i" + struct.pack("<i", NY),
+            name("xreal") + b"d" + struct.pack("<d", LX * 1e-6),
+            name("yreal") + b"d" + struct.pack("<d", LY * 1e-6),
+            name("si_unit_xy") + b"o" + unit("m"), name("si_unit_z") + b"o" + unit(z_unit),
+            name("data") + b"D" + struct.pack("<I", values.size) + values.astype("<f8").tobytes()])
+
+    body = thing("GwyContainer", [
+        name("/0/data") + b"o" + field(first, "deg"), name("/0/data/title") + b"s" + name("Phase"),
+        name("/1/data") + b"o" + field(first, "m"), name("/1/data/title") + b"s" + name("Trace"),
+        name("/2/data") + b"o" + field(second, "m"), name("/2/data/title") + b"s" + name("Back")])
+    path.write_bytes(b"GWYP" + body)
+
+
+def test_channels(tmp_path):
+    path = tmp_path / "scan.gwy"
+    gwy_with_channels(path, 2e-6 * sample(), 1e-6 * sample())
+    lines = channels(path)
+    assert [line.split(":")[0] for line in lines] == ["'Trace'", "'Back'"]  # no phase
+    assert "map of heights, 23 x 14 points, unit m" in lines[1]
+    for channel, name, factor in ((None, "Trace", 2e-6), (0, "Trace", 2e-6), ("0", "Trace", 2e-6),
+                                  ("Back", "Back", 1e-6), (1, "Back", 1e-6), ("1", "Back", 1e-6)):
+        surface = load(path, channel=channel, level="none")
+        np.testing.assert_allclose(surface.height, factor * sample(), rtol=1e-14)
+        assert surface.source["channel"] == name
+    with pytest.raises(ValueError, match=r"channel = 'Phase': .*'Trace'.*'Back'"):
+        load(path, channel="Phase")
+    for number in (2, -1):
+        with pytest.raises(ValueError, match=rf"channel = {number}: .*has the channels 0 to 1"):
+            load(path, channel=number)
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    with pytest.raises(OSError, match=r"none\.x3p: there is no such file"):
+        load(tmp_path / "none.x3p")
+    with pytest.raises(OSError, match="is a folder"):
+        load(tmp_path)
+    (tmp_path / "text.x3p").write_text("To whom it may concern,\nno heights here.\n")
+    with pytest.raises(OSError, match=r"text\.x3p: "):
+        load(tmp_path / "text.x3p")
+    topography(sample()).to_x3p(str(tmp_path / "whole.x3p"))
+    data = (tmp_path / "whole.x3p").read_bytes()
+    (tmp_path / "half.x3p").write_bytes(data[: len(data) // 2])
+    with pytest.raises(OSError, match=r"half\.x3p: "):
+        load(tmp_path / "half.x3p")
+    missing = tmp_path / "missing" / "s.h5"
+    with pytest.raises(OSError, match=r"s\.h5: cannot be written: there is no folder '.*missing'"):
+        import_topography(tmp_path / "whole.x3p", missing)
+    with pytest.raises(ValueError, match="is the topography itself"):
+        import_topography(tmp_path / "whole.x3p", tmp_path / "whole.x3p")
+    assert (tmp_path / "whole.x3p").read_bytes() == data
+
+
+def command(*words, folder=None):
+    """Run ``python -m asperity``."""
+    return subprocess.run([sys.executable, "-m", "asperity", *map(str, words)], cwd=folder,
+                          capture_output=True, text=True, timeout=60, check=False)
+
+
+def test_from_the_instrument_s_file_to_a_run(tmp_path, program):
+    """The lines that `import` prints are a case's, and its road is the measured one."""
+    topography(0.1 * sample()).to_x3p(str(tmp_path / "plate.x3p"))
+    done = command("import", "plate.x3p", "-o", "surface.h5", "--level", "tilt", "--periodic",
+                   "--resample", 20, 12, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    lines = [line for line in done.stdout.splitlines() if line.startswith("&")]
+    assert re.match(r"&grid nx = 20, ny = 12, lx = 4\.6\d*e-05, ly = 2\.10*\d?e-05,"
+                    r" boundary = 'periodic' /$", lines[0])
+    (tmp_path / "case.nml").write_text("\n".join(
+        [*lines, "&material shear_modulus = 1e6 /", "&phase pressure = 1e4 /"]) + "\n")
+    ran = subprocess.run([program, "run", "case.nml", "--quiet"], cwd=tmp_path, text=True,
+                         capture_output=True, check=False)
+    assert ran.returncode == 0, ran.stderr
+    with h5py.File(tmp_path / "surface.h5") as file:
+        road = file["surface/height"][:]
+        slope = file["surface/height"].attrs["rms_slope"]
+    run = asperity.open(tmp_path / "case.h5")
+    with h5py.File(tmp_path / "case.h5") as file:
+        np.testing.assert_array_equal(file["surface/height"][:], road)
+    assert run.history["pressure"][-1] == pytest.approx(1e4, rel=1e-5)
+    touching = run.snapshots[-1].pressure > 0
+    assert 0 < touching.sum() < touching.size
+    assert road[touching].mean() > road[~touching].mean()
+    told = {line[:12].strip(): line[12:] for line in done.stdout.splitlines()}
+    assert told["nx, ny"] == "20, 12"
+    assert float(told["rms slope"]) == pytest.approx(slope, rel=1e-5)
+    assert float(told["rms height"].split()[0]) == pytest.approx(road.std(), rel=1e-5)
+
+
+def test_every_option_of_the_command_arrives(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    np.save("map.npy", sample())
+    assert main(["import", "map.npy", "-o", "a.h5", "--unit", "um", "--size", "46", "21",
+                 "--transpose", "--crop", "8", "30", "3", "12", "--level", "curvature",
+                 "--invert", "--scale", "3", "--resample", "8", "5", "--periodic", "tukey",
+                 "--taper", "0.3", "--restore-rms", "--max-missing", "0"]) == 0
+    wanted = load("map.npy", unit="um", size=(46, 21), transpose=True, crop=(8, 30, 3, 12),
+                  level="curvature", invert=True, scale=3.0, resample=(8, 5), periodic="tukey",
+                  taper=0.3, restore_rms=True, max_missing=0.0)
+    with h5py.File("a.h5") as file:
+        np.testing.assert_array_equal(file["surface/height"][:], wanted.height)
+        assert [step["step"] for step in json.loads(file.attrs["steps"])] == [
+            "transpose", "crop", "level", "invert", "scale", "resample", "window", "unit"]
+        assert len(file.attrs["steps_text"].splitlines()) == 8
+        assert file["grid"].attrs["boundary"] == "periodic"
+
+
+def test_the_command_s_errors(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    np.save("map.npy", sample().T)
+    assert main(["import", "map.npy"]) == 2
+    assert capsys.readouterr().err.startswith("asperity: map.npy: names no unit of length")
+    assert not (tmp_path / "surface.h5").exists()
+    assert main(["import", "none.nc"]) == 3
+    with pytest.raises(SystemExit):
+        main(["import", "--level", "flat", "map.npy"])
+    assert main(["import", "map.npy", "--list"]) == 0
+    assert "23 x 14 points" in capsys.readouterr().out

@@ -1,0 +1,124 @@
+"""A run with stops leaves the snapshots and warnings of one that went through."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import viscoelastic_case as vc
+
+import asperity
+from asperity import runner
+
+
+def go(case: Path, rows: int | None = None, *, restart: bool = False) -> list[str]:
+    """Do so many rows and stop as a signal does, or go to the end; return the warnings."""
+    handle, _, _, _, told = runner._open(os.fsencode(case), b"", 1, int(restart))
+    lines = [told]
+    finished, done = False, 0
+    while not finished and done != rows:
+        finished, *_, told = runner._step(handle)
+        lines.append(told)
+        done += 1
+    if not finished:
+        runner._interrupt(handle)
+    runner._close(handle)
+    return [line for text in lines for line in text.decode().strip().splitlines()]
+
+
+def snapshots(case: Path) -> list[str]:
+    """Return the names of a result's snapshots; the XDMF file has the same."""
+    with h5py.File(case.with_suffix(".h5")) as file:
+        names = sorted(file["snapshots"])
+    told = case.with_suffix(".xdmf").read_text()
+    assert [name for name in names if f"/snapshots/{name}/" in told] == names
+    assert told.count("<Time ") == len(names)
+    return names
+
+
+OUTPUTS = ["snapshot_every = 5", "snapshot_times = 0, 0.011, 0.06, 0.15", ""]
+
+
+@pytest.mark.parametrize("output", OUTPUTS)
+def test_snapshots_after_stops(tmp_path: Path, output: str) -> None:
+    """The snapshot of a stop is there to look at, and gone when the run goes on."""
+    whole, parts = tmp_path / "whole.nml", tmp_path / "parts.nml"
+    for case in (whole, parts):
+        case.write_text(vc.text(steps=8, size=24, output=output or "compression = 0"))
+    go(whole)
+    row = 0
+    for rows in (3, 3, 0, 5, 0, 0, 1, 4):  # rows 5 and 10 among the stops; twice without a row
+        go(parts, rows, restart=row > 0)
+        row += rows
+        names = snapshots(parts)
+        assert names[-1] == f"{row - 1:06d}"
+        due = [name for name in snapshots(whole) if int(name) < row]
+        assert [name for name in names if name != names[-1] or name in due] == due
+        with h5py.File(parts.with_suffix(".h5")) as file:
+            for name, snapshot in file["snapshots"].items():
+                assert ("at_stop" in snapshot.attrs) == (name not in due)
+    go(parts, restart=True)
+    assert snapshots(parts) == snapshots(whole)
+    vc.assert_same(parts.with_suffix(".h5"), whole.with_suffix(".h5"))
+
+
+SWINGING = """
+&grid nx = 48, ny = 1, lx = 1e-3, ly = 1e-3 /
+&surface shape = 'sine', amplitude = 3e-5, wavelength = 0.5e-3 /
+&material poisson = 0.5, shear_modulus = 1e6, thickness = 2e-2 /
+&friction law = 'coulomb', coefficient = 0.5 /
+&phase pressure = 0.15e6 /
+&phase velocity_x = 1, duration = 3e-3, steps = 60 /
+&solver passes = 1 /
+"""
+
+OVER_THE_EDGE = """
+&grid nx = 24, ny = 24, lx = 0.3e-3, boundary = 'free' /
+&surface shape = 'paraboloid', radius = 1e-3 /
+&material shear_modulus = 1e6, prony_g = 1e6, prony_tau = 1e-3 /
+&phase force = 1e-3, duration = 1e-3, steps = 4 /
+&phase velocity_x = 0.02, duration = 6e-3, steps = 10 /
+"""
+
+
+@pytest.mark.parametrize("text, word", [(SWINGING, "numerical stick-slip"),
+                                        (OVER_THE_EDGE, "edge")])
+def test_warnings_after_stops(tmp_path: Path, text: str, word: str) -> None:
+    """What a run has seen so far is in the checkpoint: no warning is lost or told twice."""
+    whole, parts = tmp_path / "whole.nml", tmp_path / "parts.nml"
+    for case in (whole, parts):
+        case.write_text(text)
+    wanted = [line for line in go(whole) if word in line]
+    assert len(wanted) in (1, 2), wanted
+    found = go(parts, 2)
+    while not asperity.open(parts.with_suffix(".h5")).finished:
+        found += go(parts, 2, restart=True)
+    assert [line for line in found if word in line] == wanted
+    vc.assert_same(parts.with_suffix(".h5"), whole.with_suffix(".h5"))
+
+
+def test_a_checkpoint_without_these_notes_is_refused(tmp_path: Path) -> None:
+    """One that an older program wrote: the message names the file and what it lacks."""
+    case = tmp_path / "case.nml"
+    case.write_text(vc.text(steps=4, size=24))
+    go(case, 3)
+    with h5py.File(tmp_path / "case.checkpoint.h5", "a") as file:
+        del file["watches"]
+    with pytest.raises(OSError, match=r"case\.checkpoint\.h5.*watches"):
+        asperity.run(case, restart=True)
+
+
+def test_contact_before_the_road_moves(tmp_path: Path) -> None:
+    """With friction all contact sticks until the road moves; without, all slips."""
+    case = tmp_path / "case.nml"
+    for law, state in (("&friction law = 'coulomb', coefficient = 0.5 /", 1), ("", 2)):
+        case.write_text(SWINGING.replace("&friction law = 'coulomb', coefficient = 0.5 /", law)
+                        .replace("steps = 60", "steps = 2") + "&output snapshot_every = 1 /\n")
+        go(case)
+        run = asperity.open(case.with_suffix(".h5"))
+        first = run.snapshots[0]
+        np.testing.assert_array_equal(first.contact, np.where(first.pressure > 0, state, 0))
+        assert (run.history["stick_area"][0] == run.history["contact_area"][0]) == (state == 1)
