@@ -1,0 +1,173 @@
+"""Friction and contact area against speed: the bell curve of Persson's theory, and runs beside it.
+
+First the theory alone for a road with waves from 1 mm to 0.1 um; then a road of three octaves of
+waves, for which the theory and runs of the program are set side by side.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from sbr_road import Road, active, compound, run
+
+from asperity import theory
+from asperity.plot import COLOURS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MINUTES = 1
+
+PRESSURE = 0.1e6                          # Pa, 1 bar as in the thesis
+GAMMA = 0.45                              # Yang and Persson's factor as the thesis takes it
+#: The wide road: longest wave, shortest waves that are looked at, m; rms slope of the whole.
+LONG, SHORT, WIDE_SLOPE = 1e-3, (1e-7, 1e-6, 1e-5, 1e-4), 0.5
+HURST = 0.8
+SIDE, WAVES, SLOPE = 1e-3, (4, 32), 0.2   # the road of the runs: eight cells in its shortest wave
+
+
+def _theory(spectrum: tuple[np.ndarray, np.ndarray], speed: np.ndarray,
+            gamma: float) -> theory.PerssonContact:
+    return theory.persson(*spectrum, compound(), PRESSURE, speed, gamma=gamma)
+
+
+def _cut(spectrum: tuple[np.ndarray, np.ndarray], short: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the spectrum without the waves below `short`."""
+    k, psd = np.log(spectrum[0]), np.log(spectrum[1])
+    end = math.log(2 * math.pi / short)
+    return (np.exp(np.append(k[k < end - 1e-9], end)),
+            np.exp(np.append(psd[k < end - 1e-9], np.interp(end, k, psd))))
+
+
+def _steady(folder: Path, road: Road, speed: float, seed: int, pressure: float = PRESSURE,
+            travel: float = 0.375) -> tuple[float, float]:
+    """Return mean friction and area of a slide, without its first third.
+
+    The run starts unrelaxed: the slow arms are then as they are on average while sliding, and
+    steady state comes within a fraction of a wave.
+    """
+    duration = travel * road.side / speed
+    arms = active(compound(), duration, road.short / (2 * math.pi * speed))
+    history = run(folder, f"{road.cells}_{speed:g}_{seed}", road.case(arms, f"""
+&phase pressure = {pressure!r} /
+&phase velocity_x = {speed!r}, duration = {duration!r} /""", seed)).history
+    late = slice(1 + (history.rows - 1) // 3, None)
+    return float(history["friction"][late].mean()), float(history["contact_area"][late].mean())
+
+
+def compute(folder: Path, quick: bool) -> dict[str, Any]:
+    """Evaluate the theory and run the slides."""
+    wide = theory.self_affine_psd(HURST, LONG, LONG, SHORT[0], rms_slope=WIDE_SLOPE)
+    line = np.geomspace(1e-6, 1e4, 41)
+    data: dict[str, Any] = {"line": line, "wide": {
+        "uncorrected": _theory(wide, line, 1.0).friction,
+        "cuts": [_theory(_cut(wide, short), line, GAMMA).friction for short in SHORT],
+        "areas": [_theory(_cut(wide, short), line, GAMMA).contact_area for short in SHORT]}}
+
+    road = Road(128, SIDE, HURST, (4, 16), SLOPE) if quick else Road(256, SIDE, HURST, WAVES, SLOPE)
+    speed = np.array([1e-2, 10.0, 1e3]) if quick else np.geomspace(1e-3, 1e3, 13)
+    seeds = 1 if quick else 4
+    found = np.array([[_steady(folder, road, v, seed) for seed in range(1, seeds + 1)]
+                      for v in speed.tolist()])
+    exact = {gamma: _theory(road.spectrum, speed, gamma) for gamma in (GAMMA, 1.0)}
+    curve = {gamma: _theory(road.spectrum, line, gamma) for gamma in (GAMMA, 1.0)}
+    data |= {
+        "speed": speed, "friction": found[:, :, 0], "area": found[:, :, 1],
+        "theory_friction": {gamma: item.friction for gamma, item in exact.items()},
+        "theory_area": exact[1.0].contact_area,
+        "curve_friction": {gamma: item.friction for gamma, item in curve.items()},
+        "curve_area": curve[1.0].contact_area}
+    # full contact, where the theory is exact for the spectrum of the very map
+    smooth = Road(64, SIDE, HURST, (4, 8), SLOPE)
+    high = 200e6
+    spectrum = theory.surface_psd(smooth.map(1), SIDE)
+    expected = theory.persson(*spectrum, compound(), high, 10.0, gamma=GAMMA)
+    data["full"] = {"found": _steady(folder, smooth, 10.0, 1, pressure=high, travel=0.5),
+                    "theory": (float(expected.friction), float(expected.contact_area))}
+    data["fine"] = None
+    if not quick:
+        fine, few = Road(512, SIDE, HURST, WAVES, SLOPE), np.array([1e-2, 1.0, 100.0])
+        data["fine"] = {"speed": few, "found": np.array([_steady(folder, fine, v, 1, travel=0.1875)
+                                                         for v in few.tolist()]),
+                        "coarse": np.array([_steady(folder, road, v, 1, travel=0.1875)
+                                            for v in few.tolist()])}
+    return data
+
+
+def check(data: dict[str, Any], quick: bool) -> None:
+    """Hold the curves against limits, and the runs against the theory."""
+    wide = data["wide"]
+    for number, (friction, area) in enumerate(zip(wide["cuts"], wide["areas"], strict=True)):
+        peak = int(friction.argmax())
+        assert 0 < peak < friction.size - 1, "no bell"
+        # Without the short waves the fast end lies in the glass only beyond 1e4 m/s.
+        assert friction[0] < 0.1 * friction[peak], "no bell: the slow end is high"
+        assert friction[-1] < (0.3 + 0.1 * number) * friction[peak], "the fast end is high"
+        assert (np.diff(area) < 0).all(), "the area does not fall with speed"
+        if number:
+            assert (friction < wide["cuts"][number - 1]).all(), "more scales, less friction"
+            assert (area > wide["areas"][number - 1]).all(), "more scales, more contact"
+    assert (wide["uncorrected"] > wide["cuts"][0]).all(), "the factor S is not below 1"
+    # The steady theory is exact in full contact. Eight cells in the shortest wave cost 1.3 % of the
+    # friction, 16 cells 0.6 %, 32 cells 0.4 %; the rest are the few directions of the waves.
+    found, expected = data["full"]["found"], data["full"]["theory"]
+    assert found[1] == 1.0, f"contact {found[1]}, not full"
+    assert abs(found[0] / expected[0] - 1) < 0.02, f"full contact: {found[0]} for {expected[0]}"
+    # Partial contact: the theory is an estimate. At low load its slope is sqrt(8/pi), that of
+    # asperities that do not interact sqrt(2 pi), 57 % more: runs lie between. Eight cells in the
+    # shortest wave add 5 % (docs/choosing.md), more where a spot is but a few cells.
+    ratio = data["area"].mean(axis=1) / data["theory_area"]
+    wide_contact = data["theory_area"] > 0.02
+    assert (ratio > 1.0).all() and (ratio < 1.57 * 1.15).all(), f"area/theory {ratio}"
+    assert (ratio[wide_contact] < 1.57).all(), f"area/theory {ratio}"
+    friction = data["friction"].mean(axis=1)
+    low, high = data["theory_friction"][GAMMA], data["theory_friction"][1.0]
+    # The thesis finds friction within 30 % of gamma = 0.45, mostly above; the four roads scatter by
+    # 5 % (many spots) to 25 % (few).
+    assert (friction > 0.8 * low).all(), f"friction {friction} far below gamma = 0.45, {low}"
+    assert (friction < 1.0 * high).all(), f"friction {friction} above gamma = 1, {high}"
+    assert (np.diff(data["area"].mean(axis=1)) < 0).all(), "the area does not fall with speed"
+    assert 0 < int(friction.argmax()) < friction.size - 1, "the runs show no bell"
+    if not quick:
+        # Half the width of the cells, the same road: what the mesh costs.
+        change = data["fine"]["found"] / data["fine"]["coarse"] - 1
+        assert np.abs(change).max() < 0.08, f"finer cells change friction, area by {change}"
+        peak = data["speed"][friction.argmax()] / data["line"][data["curve_friction"][1.0].argmax()]
+        assert 0.1 < peak < 10, f"the peaks lie a factor {peak} apart"
+
+
+def picture(data: dict[str, Any]) -> Figure:
+    """Draw friction and area against speed, theory and runs."""
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(2, 2, figsize=(11, 7.4), sharex=True, layout="constrained")
+    names = ("0.1 µm", "1 µm", "10 µm", "0.1 mm")
+    line = data["line"]
+    top, bottom = axes[:, 0]
+    top.semilogx(line, data["wide"]["uncorrected"], "k:", label="0.1 µm, without correction")
+    for number, name in enumerate(names):
+        style = {"color": COLOURS[number], "ls": ("-", "--", "-.", (0, (1, 1)))[number]}
+        top.semilogx(line, data["wide"]["cuts"][number], label=name, **style)
+        bottom.loglog(line, data["wide"]["areas"][number], label=name, **style)
+    top.set(title="theory: waves from 1 mm down to", ylabel="friction coefficient", ylim=(0, None))
+    bottom.set(xlabel="speed, m/s", ylabel="contact area, fraction")
+    top.legend(fontsize="small")
+
+    top, bottom = axes[:, 1]
+    for gamma, style in ((1.0, ":"), (GAMMA, "-")):
+        top.semilogx(line, data["curve_friction"][gamma], ls=style, label=f"theory, γ = {gamma:g}",
+                     color=COLOURS[6 if gamma == 1.0 else 0])
+    bottom.loglog(line, data["curve_area"], color=COLOURS[0], label="theory")
+    for panel, values in ((top, data["friction"]), (bottom, data["area"])):
+        panel.errorbar(data["speed"], values.mean(axis=1), values.std(axis=1, ddof=1)
+                       if values.shape[1] > 1 else None, fmt="o", ms=5, capsize=3,
+                       color=COLOURS[1], label=f"runs, {values.shape[1]} roads")
+    top.set(title="road of three octaves, rms slope 0.2", ylim=(0, None))
+    bottom.set(xlabel="speed, m/s", ylim=(5e-4, 0.5))
+    top.legend(fontsize="small")
+    for panel in axes.flat:
+        panel.grid(alpha=0.3)
+    return figure

@@ -1,0 +1,244 @@
+"""Jump of the sliding speed and drop of the load on a rough road, beside Persson's theory.
+
+Rubber slides at 10 mm/s, then faster: area and friction in time, their values over the speed and
+the load, the energies, all as means over several roads. And what a drop of the load does at rest,
+which is known exactly.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from sbr_road import Road, active, compound, run
+
+import asperity
+from asperity import theory
+from asperity.plot import COLOURS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MINUTES = 3
+
+SIDE, HURST, SLOPE = 1e-3, 0.9, 0.02      # thesis, section 4.3
+BEFORE, AFTER, PRESSURE = 0.01, 3.0, 0.1e6
+SPEED_OF_LOADS = 0.3                      # m/s, speed after the jump in the sweep of the load
+GAMMA = 0.45
+#: Lengths of the slides before and after the jump, over the side of the cell.
+TRAVEL = (0.1875, 0.5)
+HIGH, LOW = 0.1e6, 0.02e6                 # Pa, the loads of the drop at rest
+
+
+def _jump(folder: Path, road: Road, after: float, pressure: float, seed: int) -> dict[str, Any]:
+    """Return what follows a jump of the speed; row 0 is the last before it.
+
+    The run starts unrelaxed: the slow arms are then as they are on average while sliding.
+    """
+    slow, fast = (part * road.side / v for part, v in zip(TRAVEL, (BEFORE, after), strict=True))
+    arms = active(compound(), slow + fast, road.short / (2 * math.pi * after))
+    history = run(folder, f"jump_{after:g}_{pressure:g}_{seed}", road.case(arms, f"""
+&phase pressure = {pressure!r} /
+&phase velocity_x = {BEFORE!r}, duration = {slow!r} /
+&phase velocity_x = {after!r}, duration = {fast!r} /""", seed)).history
+    rows = np.flatnonzero(history["phase"] == 3)
+    rows = np.append(rows[0] - 1, rows)
+    steady = np.flatnonzero(history["phase"] == 2)
+    steady = steady[len(steady) // 2:]
+    scale = pressure * road.side**2 * road.side / road.cells
+    found = {name: history[name][rows] for name in ("friction", "contact_area")}
+    found["energies"] = {
+        name: sign * np.diff(history[column][rows]) / scale for name, column, sign in (
+            ("drive", "work_drive", 1.0), ("load", "work_load", -1.0),
+            ("elastic", "energy_elastic", 1.0), ("loss", "dissipated_viscous", 1.0))}
+    books = history["work_normal"] + history["work_tangential"]
+    found["open"] = float(np.ptp(books - history["energy_elastic"]
+                                 - history["dissipated_viscous"]) / books.max())
+    found["before"] = (float(history["friction"][steady].mean()),
+                       float(history["contact_area"][steady].mean()))
+    late = found["friction"].size // 4
+    found["max"] = float(found["friction"].max())
+    found["dyn"] = float(found["friction"][late:].mean())
+    found["area"] = float(found["contact_area"][late:].mean())
+    return found
+
+
+def _means(folder: Path, road: Road, after: float, pressure: float, seeds: int,
+           points: int) -> dict[str, Any]:
+    """Return the means over the roads and the theory beside them."""
+    runs = [_jump(folder, road, after, pressure, seed) for seed in range(1, seeds + 1)]
+    time = np.arange(runs[0]["friction"].size) * road.side / road.cells / after
+    fine = np.concatenate([[0.0], np.geomspace(0.02 * time[1], time[-1], points)])
+    expected = {gamma: theory.persson_speed_step(*road.spectrum, compound(), pressure, BEFORE,
+                                                 after, fine, gamma=gamma)
+                for gamma in (GAMMA, 1.0)}
+    return {
+        "travel": time * after, "fine": fine * after, "open": max(item["open"] for item in runs),
+        "friction": np.array([item["friction"] for item in runs]),
+        "area": np.array([item["contact_area"] for item in runs]),
+        "energies": {name: np.mean([item["energies"][name] for item in runs], axis=0)
+                     for name in runs[0]["energies"]},
+        "before": np.mean([item["before"] for item in runs], axis=0),
+        "max": np.array([item["max"] for item in runs]),
+        "dyn": np.array([item["dyn"] for item in runs]),
+        "late_area": np.array([item["area"] for item in runs]),
+        "theory": {gamma: {"friction": item.friction, "area": item.contact_area,
+                           "max": float(item.friction.max()), "dyn": float(item.friction[-1])}
+                   for gamma, item in expected.items()}}
+
+
+def _drop(folder: Path, road: Road, name: str, first: str) -> dict[str, Any]:
+    """Return the area in time after the load has dropped at rest."""
+    hold = "\n".join(f"&phase duration = {2e-7 * 4.0**k!r}, steps = 4 /" for k in range(11))
+    history = run(folder, name, road.case(compound(), f"""{first}
+&phase pressure = {LOW!r}, duration = 1e-7, steps = 2 /
+{hold}""", 1).replace("tolerance = 1e-5", "tolerance = 1e-8")).history
+    rows = np.flatnonzero(np.isclose(history["pressure"], LOW, rtol=1e-3))
+    return {"time": history["time"][rows] - history["time"][rows[0]],
+            "area": history["contact_area"][rows],
+            "before": float(history["contact_area"][rows[0] - 1])}
+
+
+def compute(folder: Path, quick: bool) -> dict[str, Any]:
+    """Run the jumps and the drops."""
+    road = (Road(64, SIDE, HURST, (4, 8), SLOPE) if quick
+            else Road(256, SIDE, HURST, (4, 32), SLOPE))
+    seeds = 2 if quick else 4
+    points = 8 if quick else 40
+    speeds = [AFTER] if quick else [0.03, 0.1, 0.3, 1.0, AFTER, 10.0, 30.0, 100.0]
+    loads = [] if quick else [0.02e6, 0.05e6, 0.1e6, 0.2e6, 0.4e6, 1e6]
+    by_speed = [_means(folder, road, v, PRESSURE, seeds, points) for v in speeds]
+    by_load = [_means(folder, road, SPEED_OF_LOADS, p, seeds, points) if p != PRESSURE
+               else by_speed[speeds.index(SPEED_OF_LOADS)] for p in loads]
+    modulus = 4 * compound().equilibrium_modulus
+    high, low = (asperity.solve_normal(road.map(1), SIDE, SIDE, modulus, pressure=p,
+                                       tolerance=1e-8).contact_area for p in (HIGH, LOW))
+    return {
+        "speeds": np.array(speeds), "by_speed": by_speed, "loads": np.array(loads),
+        "by_load": by_load, "jump": by_speed[speeds.index(AFTER)],
+        "drops": {
+            "relaxed": _drop(folder, road, "relaxed", f"&phase pressure = {HIGH!r}, "
+                             "relaxed = .true. /"),
+            "1 ms": _drop(folder, road, "early", f"&phase pressure = {HIGH!r}, "
+                          "duration = 1e-3, steps = 20 /"),
+            "10 µs": _drop(folder, road, "earlier", f"&phase pressure = {HIGH!r}, "
+                           "duration = 1e-5, steps = 20 /")},
+        "elastic": (high, low), "cell": 1.0 / road.cells**2}
+
+
+def check(data: dict[str, Any], quick: bool) -> None:
+    """Hold the runs against the theory, the books against each other, the drop against proof."""
+    for number, found in enumerate(data["by_speed"] + data["by_load"]):
+        # The sum of energies stored and lost is the work, to round-off.
+        assert found["open"] < 1e-9, f"case {number}: books open by {found['open']}"
+    jump = data["jump"]
+    for mean, expected in ((jump["before"][1], jump["theory"][1.0]["area"][0]),
+                           (jump["late_area"].mean(), jump["theory"][1.0]["area"][-1])):
+        # thesis, fig. 4.3: the theory has up to 15 % less area; few cells have 5 % more
+        assert 0.97 < mean / expected < 1.25, f"area {mean}, theory {expected}"
+    friction = jump["friction"].mean(axis=0)
+    peak = int(friction.argmax())
+    dyn = jump["dyn"].mean()
+    assert jump["travel"][peak] < 0.25 * SIDE / 4, "the maximum comes late"
+    assert friction[peak] > 1.1 * dyn > 1.1 * jump["before"][0], "no maximum"
+    low, high = jump["theory"][GAMMA], jump["theory"][1.0]
+    for name, value in (("max", jump["max"].mean()), ("dyn", dyn)):
+        # thesis: 30 % from gamma = 0.45 in steady state, 50 % at the maximum, and the theory below
+        assert 0.9 * low[name] < value < 1.1 * high[name], \
+            f"{name} {value}, theory {low[name]} to {high[name]}"
+    # What the drive does above the loss is stored, or lifts the load: as seen from outside, within
+    # the error of the steps, a cell each.
+    energy = {name: values.sum() for name, values in jump["energies"].items()}
+    balance = energy["drive"] - energy["load"] - energy["elastic"] - energy["loss"]
+    assert abs(balance) < 0.03 * energy["drive"], f"balance open by {balance / energy['drive']:.3f}"
+    first = {name: values[:peak + 1].sum() for name, values in jump["energies"].items()}
+    assert first["load"] > first["elastic"] > 0, "the maximum does not lift the load"
+    # The drop of the load at rest: the relaxed rubber has at once the area of the smaller load, and
+    # keeps it; else the area grows to it and never falls. One cell may flicker within 1e-8.
+    exact = data["elastic"][1]
+    for name, drop in data["drops"].items():
+        assert np.diff(drop["area"]).min() >= -2 * data["cell"], f"{name}: the area falls"
+        assert drop["area"][0] < drop["before"], f"{name}: no drop"
+        assert drop["area"].max() <= exact + 2 * data["cell"], f"{name}: above the relaxed area"
+    relaxed = data["drops"]["relaxed"]
+    assert abs(relaxed["before"] - data["elastic"][0]) < 2 * data["cell"], "not relaxed"
+    assert np.abs(relaxed["area"] - exact).max() < 2 * data["cell"], "not that of the load"
+    assert np.ptp(data["drops"]["10 µs"]["area"]) > 0.02, "the area does not grow"
+    if quick:
+        return
+    speeds = data["by_speed"]
+    peaks = [item["max"].mean() for item in speeds]
+    dyns = [item["dyn"].mean() for item in speeds]
+    assert (np.diff(peaks) > 0).all(), "the maximum does not grow with speed"
+    assert 0 < int(np.argmax(dyns)) < len(dyns) - 1, "steady friction has no maximum"
+    full = data["by_load"][-1]
+    # full contact: the theory is exact; 1.3 % for eight cells in the shortest wave
+    assert full["late_area"].min() > 0.999, "no full contact at 1 MPa"
+    for name in ("max", "dyn"):
+        error = full[name].mean() / full["theory"][GAMMA][name] - 1
+        assert abs(error) < 0.04, f"full contact: {name} off by {error:+.3f}"
+
+
+def picture(data: dict[str, Any]) -> Figure:
+    """Draw the jump, its values over speed and load, the energies and the drop."""
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(2, 3, figsize=(13.5, 7.6), layout="constrained")
+    jump = data["jump"]
+    for panel, column, label in ((axes[0, 0], "friction", "friction coefficient"),
+                                 (axes[0, 1], "area", "contact area, fraction")):
+        for gamma, style in ((GAMMA, "-"), (1.0, ":")):
+            if gamma == 1.0 and column == "area":
+                continue
+            panel.plot(jump["fine"] * 1e6, jump["theory"][gamma][column], ls=style,
+                       color=COLOURS[0], label="theory" + (f", γ = {gamma:g}"
+                                                          if column == "friction" else ""))
+        values = jump[column]
+        panel.fill_between(jump["travel"] * 1e6, values.min(axis=0), values.max(axis=0),
+                           color=COLOURS[1], alpha=0.2, lw=0)
+        panel.plot(jump["travel"] * 1e6, values.mean(axis=0), color=COLOURS[1],
+                   label=f"mean and range of {len(values)} roads")
+        panel.set(xlabel="travel since the jump, µm", ylabel=label, ylim=(0, None))
+        panel.legend(fontsize="small")
+    axes[0, 0].set_title("10 mm/s to 3 m/s at 0.1 MPa")
+
+    panel = axes[0, 2]
+    for number, (name, label) in enumerate((("drive", "drive (friction)"), ("load", "load, lifted"),
+                                            ("elastic", "elastic energy"), ("loss", "loss"))):
+        values = jump["energies"][name]
+        panel.plot(jump["travel"][1:] * 1e6, values, color=COLOURS[number], label=label,
+                   ls=("-", "--", "-.", (0, (1, 1)))[number])
+    panel.set(xlabel="travel since the jump, µm", ylabel="energy a step / (p L² dx)",
+              title="energies", xlim=(0, 200))
+    panel.legend(fontsize="small")
+
+    for panel, x, cases, label in (
+            (axes[1, 0], data["speeds"], data["by_speed"], "speed after the jump, m/s"),
+            (axes[1, 1], data["loads"] / 1e6, data["by_load"], "pressure, MPa")):
+        for name, colour, mark, meaning in (("max", COLOURS[1], "o", "largest"),
+                                            ("dyn", COLOURS[2], "s", "steady")):
+            values = np.array([item[name] for item in cases])
+            if values.size:
+                panel.errorbar(x, values.mean(axis=1), values.std(axis=1, ddof=1), fmt=mark,
+                               color=colour, capsize=3, label=f"{meaning}, runs")
+            for gamma, style in ((GAMMA, "-"), (1.0, ":")):
+                panel.plot(x, [item["theory"][gamma][name] for item in cases], color=colour,
+                           ls=style, label=f"{meaning}, γ = {gamma:g}")
+        panel.set(xscale="log", xlabel=label, ylabel="friction coefficient", ylim=(0, None))
+        panel.legend(fontsize="x-small")
+    axes[1, 1].set_title("to 0.3 m/s")
+
+    panel = axes[1, 2]
+    for number, (name, drop) in enumerate(data["drops"].items()):
+        panel.semilogx(drop["time"][1:], drop["area"][1:], color=COLOURS[number],
+                       marker="osD"[number], ms=3, ls="-",
+                       label="relaxed before" if number == 0 else f"pressed for {name} before")
+    panel.axhline(data["elastic"][1], color="k", ls=":", label="relaxed at the smaller load")
+    panel.set(xlabel="time since the drop, s", ylabel="contact area, fraction", ylim=(0, None),
+              title="load dropped from 0.1 to 0.02 MPa, at rest")
+    panel.legend(fontsize="x-small")
+    for panel in axes.flat:
+        panel.grid(alpha=0.3)
+    return figure

@@ -1,0 +1,159 @@
+"""Friction against temperature, scale of the road and thickness of the block.
+
+A pressed block is set in motion on a wavy road of two scales. A change of temperature is a change
+of all times, a smaller road under a thinner block is a faster one: both hold exactly.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from sbr_road import WLF_SBR, compound, run
+
+from asperity.plot import COLOURS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MINUTES = 2
+
+WAVE, PRESSURE, SPEED, LOADING = 500e-6, 0.4e6, 1.0, 1e-3    # m, Pa, m/s, s
+THICKNESS, TRAVEL = 1e-3, 1e-3                               # m, of the default case
+TEMPERATURES = (-10.0, 0.0, 10.0, 25.0, 40.0, 60.0, 80.0)    # C
+SCALES = (1 / 16, 1 / 4, 1.0, 4.0, 16.0)
+THICKNESSES = (0.25e-3, 0.5e-3, 1e-3, 2e-3, 4e-3)
+
+
+def _case(cells: int, *, temperature: float = 25.0, speed: float = SPEED,
+          loading: float = LOADING, scale: float = 1.0, thickness: float = THICKNESS,
+          travel: float = TRAVEL) -> str:
+    """Return the input; road, block and travel are multiplied by `scale`."""
+    wave, second = WAVE * scale, WAVE * scale * 16 / cells    # 16 cells in the second wave
+    material = compound().to_namelist(temperature=temperature, wlf=WLF_SBR).rstrip().rstrip("/")
+    return f"""&grid nx = {cells}, ny = {cells * 37 // 64}, lx = {wave!r},
+  ly = {wave / math.sqrt(3)!r} /
+&surface shape = 'hexagonal_wave', wavelength = {wave!r}, amplitude = {wave / 50!r} /
+&surface shape = 'hexagonal_wave', wavelength = {second!r}, amplitude = {second / 50!r} /
+{material}  thickness = {thickness * scale!r} /
+&friction law = 'coulomb', coefficient = 1 /
+&phase pressure = {PRESSURE!r}, duration = {loading!r}, steps = 20 /
+&phase velocity_x = {speed!r}, duration = {travel * scale / speed!r} /
+&solver tolerance = 1e-5, threads = 1 /
+&output snapshot_every = 0 /
+"""
+
+
+def _run(folder: Path, name: str, cells: int, **change: float) -> dict[str, Any]:
+    """Return friction over the travel of the drive (of scale 1), its top and its end."""
+    history = run(folder, name, _case(cells, **change)).history
+    sliding = history["phase"] == 2
+    friction = history["friction"][sliding]
+    top = int(friction.argmax())
+    late = max(top, friction.size - cells)       # the last period, or what follows the top
+    return {"friction": friction, "area": history["contact_area"][sliding],
+            "travel": history["road_x"][sliding] / change.get("scale", 1.0),
+            "max": float(friction[top]), "dyn": float(friction[late:].mean()),
+            "slips": float(history["stick_area"][sliding][-1]) == 0.0}
+
+
+def compute(folder: Path, quick: bool) -> dict[str, Any]:
+    """Run the cases, each temperature and scale also as a change of times alone."""
+    cells = 32 if quick else 64
+    temperatures = (0.0, 60.0) if quick else TEMPERATURES
+    scales = (1 / 4,) if quick else SCALES
+    thicknesses = (0.25e-3, 1e-3) if quick else THICKNESSES
+    shift = [float(WLF_SBR.shift_factor(t)) for t in temperatures]
+    return {
+        "temperatures": np.array(temperatures), "scales": np.array(scales),
+        "thicknesses": np.array(thicknesses), "shift": np.array(shift),
+        "temperature": [_run(folder, f"t{t:g}", cells, temperature=t) for t in temperatures],
+        "shifted": [_run(folder, f"a{a:g}", cells, speed=SPEED * a, loading=LOADING / a)
+                    for a in shift],
+        "scale": [_run(folder, f"s{s:g}", cells, scale=s) for s in scales],
+        "faster": [_run(folder, f"v{s:g}", cells, speed=SPEED / s) for s in scales],
+        "same_block": _run(folder, "block", cells, scale=0.25, thickness=4 * THICKNESS,
+                           travel=2 * TRAVEL),
+        "thickness": [_run(folder, f"h{h:g}", cells, thickness=h, travel=0.6e-3 + 0.4 * h)
+                      for h in thicknesses]}
+
+
+def _change(one: dict[str, Any], other: dict[str, Any]) -> float:
+    """Return the largest difference of friction and contact area at any time."""
+    return max(float(np.abs(one[name] - other[name]).max()) for name in ("friction", "area"))
+
+
+def check(data: dict[str, Any], quick: bool) -> None:
+    """Hold each temperature and scale against the change of times that it is."""
+    # The same numbers but for rounding, which the iterations magnify to less than the tolerance
+    # of the solver, 1e-5. Cells of contact are whole: none may differ.
+    for kind, other in (("temperature", "shifted"), ("scale", "faster")):
+        for number, pair in enumerate(zip(data[kind], data[other], strict=True)):
+            assert _change(*pair) < 1e-6, f"{kind} {number}: differs by {_change(*pair):.2e}"
+    for scale, pair in zip(data["scales"], zip(data["scale"], data["faster"], strict=True),
+                           strict=True):
+        # powers of two change exponents only: no rounding at all
+        assert _change(*pair) == 0.0, f"scale {scale}: differs by {_change(*pair):.2e}"
+    # warmer and larger are slower: less friction
+    for kind in ("temperature", "scale"):
+        steady = [item["dyn"] for item in data[kind]]
+        assert (np.diff(steady) < 0).all(), f"{kind}: steady friction does not fall, {steady}"
+    # a thicker block only takes longer to shear
+    steady = np.array([item["dyn"] for item in data["thickness"]])
+    assert np.ptp(steady) < 0.005, f"steady friction changes with thickness: {steady}"
+    top = [item["travel"][item["friction"].argmax()] for item in data["thickness"]]
+    assert top[-1] > 1.5 * top[0], "a thicker block does not shear longer"
+    small = data["scale"][int(np.argmin(np.abs(data["scales"] - 0.25)))]
+    assert abs(data["same_block"]["dyn"] - small["dyn"]) < 0.005, "the thickness matters"
+    for item in data["temperature"] + data["scale"] + data["thickness"]:
+        assert item["slips"], "a case still sticks at its end"
+        assert item["max"] >= item["dyn"] > 1.0, "friction is not above Coulomb's"
+
+
+def picture(data: dict[str, Any]) -> Figure:
+    """Draw friction over travel, temperature, scale and thickness."""
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(2, 2, figsize=(11, 7.6), layout="constrained")
+    panel = axes[0, 0]
+    picked = range(0, len(data["temperature"]), 2)
+    for number, case in enumerate(picked):
+        item = data["temperature"][case]
+        panel.plot(item["travel"] * 1e3, item["friction"], color=COLOURS[number],
+                   ls=("-", "--", "-.", (0, (1, 1)))[number],
+                   label=f"{data['temperatures'][case]:g} °C")
+    panel.set(xlabel="travel of the drive, mm", ylabel="friction coefficient", ylim=(0.8, None),
+              title="block set in motion at 1 m/s")
+    panel.legend(fontsize="small")
+
+    def both(panel: Any, x: np.ndarray, cases: list[dict[str, Any]], **style: Any) -> None:
+        label = style.pop("label")
+        panel.plot(x, [item["max"] for item in cases], color=COLOURS[1],
+                   label=f"largest, {label}", **style)
+        panel.plot(x, [item["dyn"] for item in cases], color=COLOURS[0],
+                   label=f"steady, {label}", **style)
+
+    both(axes[0, 1], data["temperatures"], data["temperature"], marker="o", ls="-",
+         label="at this temperature")
+    both(axes[0, 1], data["temperatures"], data["shifted"], marker="x", ls="", ms=10,
+         label="25 °C, times over $a_T$")
+    axes[0, 1].set(xlabel="temperature, °C")
+    both(axes[1, 0], data["scales"], data["scale"], marker="o", ls="-", label="this scale")
+    both(axes[1, 0], data["scales"], data["faster"], marker="x", ls="", ms=10,
+         label="scale 1, speed over scale")
+    axes[1, 0].plot(0.25, data["same_block"]["max"], "s", ms=11, mfc="none", color=COLOURS[1])
+    axes[1, 0].plot(0.25, data["same_block"]["dyn"], "s", ms=11, mfc="none", color=COLOURS[0],
+                    label="the block not scaled")
+    axes[1, 0].set(xscale="log", xlabel="scale of road and block", ylabel="friction coefficient")
+    both(axes[1, 1], data["thicknesses"] * 1e3, data["thickness"], marker="o", ls="-",
+         label="in the run")
+    axes[1, 1].set(xscale="log", xlabel="thickness of the block, mm")
+    for panel in axes.flat[1:]:
+        panel.legend(fontsize="small")
+        panel.set_ylim(1.0, None)
+    axes[1, 1].set_ylim(1.0, 1.2)
+    for panel in axes.flat:
+        panel.grid(alpha=0.3)
+    return figure
