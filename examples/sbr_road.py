@@ -3,37 +3,21 @@
 from __future__ import annotations
 
 import warnings
-from pathlib import Path
+from typing import Any
 
+import common
 import numpy as np
 
 import asperity
 from asperity import theory
-from asperity.material import WLF, Prony
+from asperity.material import WLF
 
 #: Constants of the time-temperature shift of the compound, see materials/README.md.
 WLF_SBR = WLF(4.57, 113.6, 25.0)
 
 
-def compound() -> Prony:
-    """Return the model compound of examples/materials at 25 C."""
-    g, tau = np.loadtxt(Path(__file__).parent / "materials" / "sbr.txt", unpack=True)
-    return Prony(g[0], g[1:], tau[1:])
-
-
-def active(rubber: Prony, slowest: float, fastest: float) -> Prony:
-    """Return the material without the arms that do nothing between two times (s).
-
-    Arms 1e4 times slower than `slowest` join the spring, which a run that starts unrelaxed
-    cannot tell from them; arms 1e6 times faster than `fastest` are left out.
-    """
-    slow = rubber.tau > 1e4 * slowest
-    kept = ~slow & (rubber.tau > 1e-6 * fastest)
-    return Prony(rubber.g_inf + float(rubber.g[slow].sum()), rubber.g[kept], rubber.tau[kept])
-
-
 class Road:
-    """A self-affine road of `cells` x `cells`, periodic, with the spectrum of eq. 1.6."""
+    """A periodic self-affine road of `cells` x `cells` with the spectrum of eq. 1.6."""
 
     def __init__(self, cells: int, side: float, hurst: float, waves: tuple[float, float],
                  rms_slope: float) -> None:
@@ -53,23 +37,19 @@ class Road:
             self.cells, lx=self.side, hurst=self.hurst, wavelength_long=self.long,
             wavelength_short=self.short, rms_slope=self.rms_slope, seed=seed)
 
-    def case(self, material: Prony, phases: str, seed: int) -> str:
-        """Return the namelists of a case."""
-        return f"""&grid nx = {self.cells}, ny = {self.cells}, lx = {self.side!r} /
-&surface shape = 'self_affine', hurst = {self.hurst!r}, wavelength_long = {self.long!r},
-  wavelength_short = {self.short!r}, rms_slope = {self.rms_slope!r}, seed = {seed} /
-{material.to_namelist()}
-{phases}
-&solver tolerance = 1e-5, threads = 1 /
-&output snapshot_every = 0 /
-"""
+    def case(self, *phases: dict[str, Any], tolerance: float = 1e-5) -> asperity.Case:
+        """Return a case of the compound on the map of seed 1."""
+        return asperity.Case(
+            grid=dict(nx=self.cells, ny=self.cells, lx=self.side),
+            surface=dict(shape="self_affine", hurst=self.hurst, wavelength_long=self.long,
+                         wavelength_short=self.short, rms_slope=self.rms_slope, seed=1),
+            material=common.material_group(), phase=list(phases),
+            solver=dict(tolerance=tolerance, threads=1), output=dict(snapshot_every=0))
 
 
-def run(folder: Path, name: str, text: str) -> asperity.Run:
-    """Run a case in `folder` and return the result."""
-    case = folder / f"{name}.nml"
-    case.write_text(text)
+def sweep(case: asperity.Case, parameters: dict[Any, Any], folder: Any) -> asperity.Sweep:
+    """Run a case with other values; results that are there are kept."""
     with warnings.catch_warnings():
-        # at rest the steps grow with the time that has passed, arm after arm falls still
+        # at rest the steps grow with the time that has passed, and arm after arm falls still
         warnings.filterwarnings("ignore", ".*longer than the shortest active relaxation time")
-        return asperity.run(case, output=folder / f"{name}.h5")
+        return asperity.sweep(case, parameters, folder=folder, jobs=common.jobs, quiet=True)

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from sbr_road import Road, active, compound, run
+from common import COLOURS, compound
+from sbr_road import Road, sweep
 
 from asperity import theory
-from asperity.plot import COLOURS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,20 +42,23 @@ def _cut(spectrum: tuple[np.ndarray, np.ndarray], short: float) -> tuple[np.ndar
             np.exp(np.append(psd[k < end - 1e-9], np.interp(end, k, psd))))
 
 
-def _steady(folder: Path, road: Road, speed: float, seed: int, pressure: float = PRESSURE,
-            travel: float = 0.375) -> tuple[float, float]:
-    """Return mean friction and area of a slide, without its first third.
+def _steady(folder: Path, road: Road, speeds: list[float], seeds: int = 1,
+            pressure: float = PRESSURE, travel: float = 0.375) -> np.ndarray:
+    """Return mean friction and area of slides without their first third, (speeds, seeds, 2).
 
-    The run starts unrelaxed: the slow arms are then as they are on average while sliding, and
+    The runs start unrelaxed: the slow arms are then as they are on average while sliding, and
     steady state comes within a fraction of a wave.
     """
-    duration = travel * road.side / speed
-    arms = active(compound(), duration, road.short / (2 * math.pi * speed))
-    history = run(folder, f"{road.cells}_{speed:g}_{seed}", road.case(arms, f"""
-&phase pressure = {pressure!r} /
-&phase velocity_x = {speed!r}, duration = {duration!r} /""", seed)).history
-    late = slice(1 + (history.rows - 1) // 3, None)
-    return float(history["friction"][late].mean()), float(history["contact_area"][late].mean())
+    table = sweep(
+        road.case(dict(pressure=pressure), dict(velocity_x=1.0, duration=1.0)),
+        {("phase[2].velocity_x", "phase[2].duration"): [(v, travel * road.side / v)
+                                                        for v in speeds],
+         "surface.seed": list(range(1, seeds + 1))}, folder)
+    found = []
+    for run in table.runs:
+        late = slice(1 + (run.history.rows - 1) // 3, None)
+        found.append([run.history[name][late].mean() for name in ("friction", "contact_area")])
+    return np.array(found).reshape(len(speeds), seeds, 2)
 
 
 def compute(folder: Path, quick: bool) -> dict[str, Any]:
@@ -70,8 +73,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
     road = Road(128, SIDE, HURST, (4, 16), SLOPE) if quick else Road(256, SIDE, HURST, WAVES, SLOPE)
     speed = np.array([1e-2, 10.0, 1e3]) if quick else np.geomspace(1e-3, 1e3, 13)
     seeds = 1 if quick else 4
-    found = np.array([[_steady(folder, road, v, seed) for seed in range(1, seeds + 1)]
-                      for v in speed.tolist()])
+    found = _steady(folder / "roads", road, speed.tolist(), seeds)
     exact = {gamma: _theory(road.spectrum, speed, gamma) for gamma in (GAMMA, 1.0)}
     curve = {gamma: _theory(road.spectrum, line, gamma) for gamma in (GAMMA, 1.0)}
     data |= {
@@ -85,15 +87,15 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
     high = 200e6
     spectrum = theory.surface_psd(smooth.map(1), SIDE)
     expected = theory.persson(*spectrum, compound(), high, 10.0, gamma=GAMMA)
-    data["full"] = {"found": _steady(folder, smooth, 10.0, 1, pressure=high, travel=0.5),
-                    "theory": (float(expected.friction), float(expected.contact_area))}
+    data["full"] = {
+        "found": _steady(folder / "full", smooth, [10.0], pressure=high, travel=0.5)[0, 0],
+        "theory": (float(expected.friction), float(expected.contact_area))}
     data["fine"] = None
     if not quick:
-        fine, few = Road(512, SIDE, HURST, WAVES, SLOPE), np.array([1e-2, 1.0, 100.0])
-        data["fine"] = {"speed": few, "found": np.array([_steady(folder, fine, v, 1, travel=0.1875)
-                                                         for v in few.tolist()]),
-                        "coarse": np.array([_steady(folder, road, v, 1, travel=0.1875)
-                                            for v in few.tolist()])}
+        fine, few = Road(512, SIDE, HURST, WAVES, SLOPE), [1e-2, 1.0, 100.0]
+        data["fine"] = {"speed": few,
+                        "found": _steady(folder / "fine", fine, few, travel=0.1875)[:, 0],
+                        "coarse": _steady(folder / "coarse", road, few, travel=0.1875)[:, 0]}
     return data
 
 

@@ -7,16 +7,15 @@ which is known exactly.
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from sbr_road import Road, active, compound, run
+from common import COLOURS, compound
+from sbr_road import Road, sweep
 
 import asperity
 from asperity import theory
-from asperity.plot import COLOURS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,22 +31,14 @@ TRAVEL = (0.1875, 0.5)
 HIGH, LOW = 0.1e6, 0.02e6                 # Pa, the loads of the drop at rest
 
 
-def _jump(folder: Path, road: Road, after: float, pressure: float, seed: int) -> dict[str, Any]:
-    """Return what follows a jump of the speed; row 0 is the last before it.
-
-    The run starts unrelaxed: the slow arms are then as they are on average while sliding.
-    """
-    slow, fast = (part * road.side / v for part, v in zip(TRAVEL, (BEFORE, after), strict=True))
-    arms = active(compound(), slow + fast, road.short / (2 * math.pi * after))
-    history = run(folder, f"jump_{after:g}_{pressure:g}_{seed}", road.case(arms, f"""
-&phase pressure = {pressure!r} /
-&phase velocity_x = {BEFORE!r}, duration = {slow!r} /
-&phase velocity_x = {after!r}, duration = {fast!r} /""", seed)).history
+def _jump(run: asperity.Run, pressure: float) -> dict[str, Any]:
+    """Return what follows the jump of the speed in a run; row 0 is the last before it."""
+    history, side = run.history, run.grid.lx
     rows = np.flatnonzero(history["phase"] == 3)
     rows = np.append(rows[0] - 1, rows)
     steady = np.flatnonzero(history["phase"] == 2)
     steady = steady[len(steady) // 2:]
-    scale = pressure * road.side**2 * road.side / road.cells
+    scale = pressure * side**2 * run.grid.dx
     found = {name: history[name][rows] for name in ("friction", "contact_area")}
     found["energies"] = {
         name: sign * np.diff(history[column][rows]) / scale for name, column, sign in (
@@ -67,8 +58,17 @@ def _jump(folder: Path, road: Road, after: float, pressure: float, seed: int) ->
 
 def _means(folder: Path, road: Road, after: float, pressure: float, seeds: int,
            points: int) -> dict[str, Any]:
-    """Return the means over the roads and the theory beside them."""
-    runs = [_jump(folder, road, after, pressure, seed) for seed in range(1, seeds + 1)]
+    """Return the means over the roads and the theory beside them.
+
+    The runs start unrelaxed: the slow arms are then as they are on average while sliding.
+    """
+    slow, fast = (part * road.side / v for part, v in zip(TRAVEL, (BEFORE, after), strict=True))
+    table = sweep(
+        road.case(dict(pressure=1.0), dict(velocity_x=BEFORE, duration=slow),
+                  dict(velocity_x=1.0, duration=1.0)),
+        {("phase[1].pressure", "phase[3].velocity_x", "phase[3].duration"):
+         [(pressure, after, fast)], "surface.seed": list(range(1, seeds + 1))}, folder)
+    runs = [_jump(run, pressure) for run in table.runs]
     time = np.arange(runs[0]["friction"].size) * road.side / road.cells / after
     fine = np.concatenate([[0.0], np.geomspace(0.02 * time[1], time[-1], points)])
     expected = {gamma: theory.persson_speed_step(*road.spectrum, compound(), pressure, BEFORE,
@@ -89,16 +89,21 @@ def _means(folder: Path, road: Road, after: float, pressure: float, seeds: int,
                    for gamma, item in expected.items()}}
 
 
-def _drop(folder: Path, road: Road, name: str, first: str) -> dict[str, Any]:
-    """Return the area in time after the load has dropped at rest."""
-    hold = "\n".join(f"&phase duration = {2e-7 * 4.0**k!r}, steps = 4 /" for k in range(11))
-    history = run(folder, name, road.case(compound(), f"""{first}
-&phase pressure = {LOW!r}, duration = 1e-7, steps = 2 /
-{hold}""", 1).replace("tolerance = 1e-5", "tolerance = 1e-8")).history
-    rows = np.flatnonzero(np.isclose(history["pressure"], LOW, rtol=1e-3))
-    return {"time": history["time"][rows] - history["time"][rows[0]],
-            "area": history["contact_area"][rows],
-            "before": float(history["contact_area"][rows[0] - 1])}
+def _drops(folder: Path, road: Road, first: list[tuple[Any, ...]]) -> list[dict[str, Any]]:
+    """Return the area in time after the load has dropped at rest, for each start."""
+    hold = [dict(duration=2e-7 * 4.0**k, steps=4) for k in range(11)]
+    table = sweep(
+        road.case(dict(pressure=HIGH), dict(pressure=LOW, duration=1e-7, steps=2), *hold,
+                  tolerance=1e-8),
+        {("phase[1].relaxed", "phase[1].duration", "phase[1].steps"): first}, folder)
+    found = []
+    for run in table.runs:
+        history = run.history
+        rows = np.flatnonzero(np.isclose(history["pressure"], LOW, rtol=1e-3))
+        found.append({"time": history["time"][rows] - history["time"][rows[0]],
+                      "area": history["contact_area"][rows],
+                      "before": float(history["contact_area"][rows[0] - 1])})
+    return found
 
 
 def compute(folder: Path, quick: bool) -> dict[str, Any]:
@@ -109,8 +114,8 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
     points = 8 if quick else 40
     speeds = [AFTER] if quick else [0.03, 0.1, 0.3, 1.0, AFTER, 10.0, 30.0, 100.0]
     loads = [] if quick else [0.02e6, 0.05e6, 0.1e6, 0.2e6, 0.4e6, 1e6]
-    by_speed = [_means(folder, road, v, PRESSURE, seeds, points) for v in speeds]
-    by_load = [_means(folder, road, SPEED_OF_LOADS, p, seeds, points) if p != PRESSURE
+    by_speed = [_means(folder / "jumps", road, v, PRESSURE, seeds, points) for v in speeds]
+    by_load = [_means(folder / "jumps", road, SPEED_OF_LOADS, p, seeds, points) if p != PRESSURE
                else by_speed[speeds.index(SPEED_OF_LOADS)] for p in loads]
     modulus = 4 * compound().equilibrium_modulus
     high, low = (asperity.solve_normal(road.map(1), SIDE, SIDE, modulus, pressure=p,
@@ -118,13 +123,9 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
     return {
         "speeds": np.array(speeds), "by_speed": by_speed, "loads": np.array(loads),
         "by_load": by_load, "jump": by_speed[speeds.index(AFTER)],
-        "drops": {
-            "relaxed": _drop(folder, road, "relaxed", f"&phase pressure = {HIGH!r}, "
-                             "relaxed = .true. /"),
-            "1 ms": _drop(folder, road, "early", f"&phase pressure = {HIGH!r}, "
-                          "duration = 1e-3, steps = 20 /"),
-            "10 µs": _drop(folder, road, "earlier", f"&phase pressure = {HIGH!r}, "
-                           "duration = 1e-5, steps = 20 /")},
+        "drops": dict(zip(("relaxed", "1 ms", "10 µs"), _drops(
+            folder / "drops", road, [(True, None, None), (None, 1e-3, 20), (None, 1e-5, 20)]),
+            strict=True)),
         "elastic": (high, low), "cell": 1.0 / road.cells**2}
 
 

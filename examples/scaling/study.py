@@ -10,15 +10,17 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import common
 import numpy as np
-from sbr_road import WLF_SBR, compound, run
+from common import COLOURS
+from sbr_road import WLF_SBR, sweep
 
-from asperity.plot import COLOURS
+import asperity
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MINUTES = 2
+MINUTES = 1
 
 WAVE, PRESSURE, SPEED, LOADING = 500e-6, 0.4e6, 1.0, 1e-3    # m, Pa, m/s, s
 THICKNESS, TRAVEL = 1e-3, 1e-3                               # m, of the default case
@@ -27,36 +29,49 @@ SCALES = (1 / 16, 1 / 4, 1.0, 4.0, 16.0)
 THICKNESSES = (0.25e-3, 0.5e-3, 1e-3, 2e-3, 4e-3)
 
 
-def _case(cells: int, *, temperature: float = 25.0, speed: float = SPEED,
-          loading: float = LOADING, scale: float = 1.0, thickness: float = THICKNESS,
-          travel: float = TRAVEL) -> str:
-    """Return the input; road, block and travel are multiplied by `scale`."""
+#: What a case is made of.
+Values = tuple[float, ...]
+NAMES = ("grid.lx", "grid.ly", "surface[1].wavelength", "surface[1].amplitude",
+         "surface[2].wavelength", "surface[2].amplitude", "material.thickness",
+         "material.density", "material.temperature", "phase[1].duration", "phase[2].velocity_x",
+         "phase[2].duration")
+
+
+def _values(cells: int, *, temperature: float = 25.0, speed: float = SPEED,
+            loading: float = LOADING, scale: float = 1.0, thickness: float = THICKNESS,
+            travel: float = TRAVEL, density: float = 0.0) -> Values:
+    """Return the values of NAMES; road, block and travel are multiplied by `scale`."""
     wave, second = WAVE * scale, WAVE * scale * 16 / cells    # 16 cells in the second wave
-    material = compound().to_namelist(temperature=temperature, wlf=WLF_SBR).rstrip().rstrip("/")
-    return f"""&grid nx = {cells}, ny = {cells * 37 // 64}, lx = {wave!r},
-  ly = {wave / math.sqrt(3)!r} /
-&surface shape = 'hexagonal_wave', wavelength = {wave!r}, amplitude = {wave / 50!r} /
-&surface shape = 'hexagonal_wave', wavelength = {second!r}, amplitude = {second / 50!r} /
-{material}  thickness = {thickness * scale!r} /
-&friction law = 'coulomb', coefficient = 1 /
-&phase pressure = {PRESSURE!r}, duration = {loading!r}, steps = 20 /
-&phase velocity_x = {speed!r}, duration = {travel * scale / speed!r} /
-&solver tolerance = 1e-5, threads = 1 /
-&output snapshot_every = 0 /
-"""
+    return (wave, wave / math.sqrt(3), wave, wave / 50, second, second / 50, thickness * scale,
+            density, temperature, loading, speed, travel * scale / speed)
 
 
-def _run(folder: Path, name: str, cells: int, **change: float) -> dict[str, Any]:
+def _runs(folder: Path, cells: int, cases: list[dict[str, float]]) -> list[dict[str, Any]]:
     """Return friction over the travel of the drive (of scale 1), its top and its end."""
-    history = run(folder, name, _case(cells, **change)).history
-    sliding = history["phase"] == 2
-    friction = history["friction"][sliding]
-    top = int(friction.argmax())
-    late = max(top, friction.size - cells)       # the last period, or what follows the top
-    return {"friction": friction, "area": history["contact_area"][sliding],
-            "travel": history["road_x"][sliding] / change.get("scale", 1.0),
+    wave = dict(shape="hexagonal_wave", wavelength=1.0, amplitude=1.0)
+    case = asperity.Case(
+        grid=dict(nx=cells, ny=-(-cells * 37 // 64), lx=1.0, ly=1.0), surface=[wave, wave],
+        material=common.material_group(thickness=1.0, density=0.0, temperature=25.0,
+                                       reference_temperature=WLF_SBR.t_ref, wlf_c1=WLF_SBR.c1,
+                                       wlf_c2=WLF_SBR.c2),
+        friction=dict(law="coulomb", coefficient=1.0),
+        phase=[dict(pressure=PRESSURE, duration=1.0, steps=20),
+               dict(velocity_x=1.0, duration=1.0)],
+        solver=dict(tolerance=1e-5, threads=1), output=dict(snapshot_every=0))
+    table = sweep(case, {NAMES: [_values(cells, **one) for one in cases]}, folder)
+    found = []
+    for run, one in zip(table.runs, cases, strict=True):
+        history = run.history
+        sliding = history["phase"] == 2
+        friction = history["friction"][sliding]
+        top = int(friction.argmax())
+        late = max(top, friction.size - cells)   # the last period, or what follows the top
+        found.append({
+            "friction": friction, "area": history["contact_area"][sliding],
+            "travel": history["road_x"][sliding] / one.get("scale", 1.0),
             "max": float(friction[top]), "dyn": float(friction[late:].mean()),
-            "slips": float(history["stick_area"][sliding][-1]) == 0.0}
+            "slips": float(history["stick_area"][sliding][-1]) == 0.0})
+    return found
 
 
 def compute(folder: Path, quick: bool) -> dict[str, Any]:
@@ -66,18 +81,20 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
     scales = (1 / 4,) if quick else SCALES
     thicknesses = (0.25e-3, 1e-3) if quick else THICKNESSES
     shift = [float(WLF_SBR.shift_factor(t)) for t in temperatures]
-    return {
-        "temperatures": np.array(temperatures), "scales": np.array(scales),
-        "thicknesses": np.array(thicknesses), "shift": np.array(shift),
-        "temperature": [_run(folder, f"t{t:g}", cells, temperature=t) for t in temperatures],
-        "shifted": [_run(folder, f"a{a:g}", cells, speed=SPEED * a, loading=LOADING / a)
-                    for a in shift],
-        "scale": [_run(folder, f"s{s:g}", cells, scale=s) for s in scales],
-        "faster": [_run(folder, f"v{s:g}", cells, speed=SPEED / s) for s in scales],
-        "same_block": _run(folder, "block", cells, scale=0.25, thickness=4 * THICKNESS,
-                           travel=2 * TRAVEL),
-        "thickness": [_run(folder, f"h{h:g}", cells, thickness=h, travel=0.6e-3 + 0.4 * h)
+    cases = {
+        "temperature": [dict(temperature=t) for t in temperatures],
+        "shifted": [dict(speed=SPEED * a, loading=LOADING / a) for a in shift],
+        "scale": [dict(scale=s) for s in scales],
+        "faster": [dict(speed=SPEED / s) for s in scales],
+        # some mass: without, or with the 20 kg/m3 of the thesis, a block of 4 mm sticks and slips
+        # numerically at steps of one cell
+        "same_block": [dict(scale=0.25, thickness=4 * THICKNESS, travel=2 * TRAVEL, density=200.0)],
+        "thickness": [dict(thickness=h, travel=0.6e-3 + 0.4 * h, density=200.0)
                       for h in thicknesses]}
+    data: dict[str, Any] = {
+        "temperatures": np.array(temperatures), "scales": np.array(scales),
+        "thicknesses": np.array(thicknesses), "shift": np.array(shift)}
+    return data | {name: _runs(folder / name, cells, some) for name, some in cases.items()}
 
 
 def _change(one: dict[str, Any], other: dict[str, Any]) -> float:
@@ -96,9 +113,9 @@ def check(data: dict[str, Any], quick: bool) -> None:
                            strict=True):
         # powers of two change exponents only: no rounding at all
         assert _change(*pair) == 0.0, f"scale {scale}: differs by {_change(*pair):.2e}"
-    # warmer and larger are slower: less friction
-    for kind in ("temperature", "scale"):
-        steady = [item["dyn"] for item in data[kind]]
+    # warmer and larger are slower: less friction, on the slow side of the bell
+    for kind, least in (("temperature", 0.0), ("scale", 0.25)):
+        steady = np.array([item["dyn"] for item in data[kind]])[data[f"{kind}s"] >= least]
         assert (np.diff(steady) < 0).all(), f"{kind}: steady friction does not fall, {steady}"
     # a thicker block only takes longer to shear
     steady = np.array([item["dyn"] for item in data["thickness"]])
@@ -106,7 +123,7 @@ def check(data: dict[str, Any], quick: bool) -> None:
     top = [item["travel"][item["friction"].argmax()] for item in data["thickness"]]
     assert top[-1] > 1.5 * top[0], "a thicker block does not shear longer"
     small = data["scale"][int(np.argmin(np.abs(data["scales"] - 0.25)))]
-    assert abs(data["same_block"]["dyn"] - small["dyn"]) < 0.005, "the thickness matters"
+    assert abs(data["same_block"][0]["dyn"] - small["dyn"]) < 0.005, "the thickness matters"
     for item in data["temperature"] + data["scale"] + data["thickness"]:
         assert item["slips"], "a case still sticks at its end"
         assert item["max"] >= item["dyn"] > 1.0, "friction is not above Coulomb's"
@@ -143,13 +160,16 @@ def picture(data: dict[str, Any]) -> Figure:
     both(axes[1, 0], data["scales"], data["scale"], marker="o", ls="-", label="this scale")
     both(axes[1, 0], data["scales"], data["faster"], marker="x", ls="", ms=10,
          label="scale 1, speed over scale")
-    axes[1, 0].plot(0.25, data["same_block"]["max"], "s", ms=11, mfc="none", color=COLOURS[1])
-    axes[1, 0].plot(0.25, data["same_block"]["dyn"], "s", ms=11, mfc="none", color=COLOURS[0],
+    axes[1, 0].plot(0.25, data["same_block"][0]["max"], "s", ms=11, mfc="none", color=COLOURS[1])
+    axes[1, 0].plot(0.25, data["same_block"][0]["dyn"], "s", ms=11, mfc="none", color=COLOURS[0],
                     label="the block not scaled")
     axes[1, 0].set(xscale="log", xlabel="scale of road and block", ylabel="friction coefficient")
     both(axes[1, 1], data["thicknesses"] * 1e3, data["thickness"], marker="o", ls="-",
-         label="in the run")
-    axes[1, 1].set(xscale="log", xlabel="thickness of the block, mm")
+         label="25 °C, 1 m/s")
+    axes[1, 1].set_xscale("log", base=2)
+    axes[1, 1].set_xticks(data["thicknesses"] * 1e3,
+                          [f"{h * 1e3:g}" for h in data["thicknesses"]])
+    axes[1, 1].set(xlabel="thickness of the block, mm")
     for panel in axes.flat[1:]:
         panel.legend(fontsize="small")
         panel.set_ylim(1.0, None)
