@@ -21,7 +21,7 @@ import asperity
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MINUTES = 2
+MINUTES = 1
 
 LONG, SHORT, CELL = 31.25e-6, 7.8125e-6, 31.25e-6 / 64     # m; the waves' amplitudes are 1/50
 PRESSURE, LOADING, THICKNESS = 0.4e6, 1e-3, 50e-6          # Pa, s, m
@@ -117,10 +117,11 @@ def check(data: dict[str, Any], quick: bool) -> None:
         # contact is lost when sliding sets in: the maximum of static friction
         assert one["dyn_area"] < one["loaded"], "no contact is lost"
     assert data["adhesive"][0]["loaded"] > data["bare"][0]["loaded"] + 0.1, "no adhesion at rest"
-    # The first criterion compares forces: at high speed, where the second is small, adhesion adds
-    # about C1 times the coefficient 1, within a factor of two.
+    # The first criterion compares forces: at high speed, where the second is small, each summit of
+    # radius R that touches is pulled by 1.5 pi (JKR) to 2 pi (DMT) times energy R; C1 has 3 pi and
+    # all summits, so that friction with the coefficient 1 gains less than 2/3 C1.
     assert data["c2"][-1] < 0.1, "the second criterion is not small at the highest speed"
-    assert 0.5 < gain[-1] / data["c1"] < 2.0, f"gain {gain[-1]}, C1 = {data['c1']}"
+    assert 0.2 < gain[-1] / data["c1"] < 0.7, f"gain {gain[-1]}, C1 = {data['c1']}"
     if quick:
         return
     steady = [item["dyn"] for item in data["by_energy"]]
@@ -158,14 +159,14 @@ def picture(data: dict[str, Any]) -> Figure:
         for value, mark, what in (("max", "^", "largest"), ("dyn", "o", "steady")):
             panel.semilogx(speed, [item[value] for item in data[kind]], marker=mark, color=colour,
                            ls="--" if value == "max" else "-", label=f"{what}, {name}")
-    panel.set(xlabel="speed, m/s", ylabel="friction coefficient", ylim=(1.0, None))
+    panel.set(xlabel="speed, m/s", ylabel="friction coefficient", ylim=(1.0, 2.5))
     twin = panel.twinx()
     twin.loglog(data["line"], data["c2_line"], color=COLOURS[2], ls=":", label="C₂ (right)")
     twin.axhline(data["c1"], color=COLOURS[2], ls="-.", lw=1, label="C₁ (right)")
-    twin.set(ylabel="criteria of adhesion", ylim=(0.02, 20))
+    twin.set(ylabel="criteria of adhesion", ylim=(0.02, 200))
     lines = panel.get_legend_handles_labels(), twin.get_legend_handles_labels()
     panel.legend(lines[0][0] + lines[1][0], lines[0][1] + lines[1][1], fontsize="x-small",
-                 ncols=2)
+                 ncols=2, loc="upper center")
 
     panel = axes[1, 1]
     energy = data["energies"] * 1e3
