@@ -117,13 +117,14 @@ def check(data: dict[str, Any], quick: bool) -> None:
         # contact is lost when sliding sets in: the maximum of static friction
         assert one["dyn_area"] < one["loaded"], "no contact is lost"
     assert data["adhesive"][0]["loaded"] > data["bare"][0]["loaded"] + 0.1, "no adhesion at rest"
-    # The first criterion compares forces: at high speed, where the second is small, each summit of
-    # radius R that touches is pulled by 1.5 pi (JKR) to 2 pi (DMT) times energy R; C1 has 3 pi and
-    # all summits, so that friction with the coefficient 1 gains less than 2/3 C1.
-    assert data["c2"][-1] < 0.1, "the second criterion is not small at the highest speed"
-    assert 0.2 < gain[-1] / data["c1"] < 0.7, f"gain {gain[-1]}, C1 = {data['c1']}"
     if quick:
         return
+    # The first criterion compares forces: at high speed, where the second is small, each summit of
+    # radius R that touches is pulled by 1.5 pi (JKR) to 2 pi (DMT) times energy R; C1 has 3 pi and
+    # all summits, so that friction with the coefficient 1 gains less than 2/3 C1. (The quick
+    # road is so low that its valleys feel the range, too.)
+    assert data["c2"][-1] < 0.1, "the second criterion is not small at the highest speed"
+    assert 0.2 < gain[-1] / data["c1"] < 0.7, f"gain {gain[-1]}, C1 = {data['c1']}"
     steady = [item["dyn"] for item in data["by_energy"]]
     assert (np.diff(steady) > 0).all(), "more energy, less friction"
     area = [item["dyn_area"] for item in data["by_energy"]]
