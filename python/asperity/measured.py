@@ -306,7 +306,8 @@ def load(
     if unit != "m":
         work.note("unit", unit=unit, metres=UNITS[unit])
     height = np.ascontiguousarray(_to_metres(work.height, unit))
-    lx, ly = (float(_to_metres(length, unit)) for length in work.sizes)
+    # cell by cell, as some files have them, lengths gather rounding: twelve digits are theirs
+    lx, ly = (float(f"{_to_metres(length, unit):.12g}") for length in work.sizes)
     return MeasuredSurface(height, lx, ly, work.periodic, unit, work.steps, source,
                            _advice(work, level))
 
