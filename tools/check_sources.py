@@ -22,6 +22,7 @@ lists = {
     "program = files": present("app/*.f90"),
     "flat = files": present("python/src/*.f90"),
     "package = files": present("python/asperity/*.py", "python/asperity/py.typed"),
+    "page = files": present("python/asperity/page/*"),
     "theory = files": present("python/asperity/theory/*.py"),
 }
 text = build.read_text()

@@ -1,10 +1,11 @@
-"""``python -m asperity plot RESULT.h5``: pictures of results from the command line."""
+"""``python -m asperity VERB``: pictures, a page and a live view of results."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from pathlib import Path
+from typing import Any
 
 from ._data_verbs import add_fit, add_import
 
@@ -21,7 +22,7 @@ def main(arguments: list[str] | None = None) -> int:
     """
     parser = argparse.ArgumentParser(
         prog="python -m asperity",
-        description="Pictures of results. Runs are made by the command `asperity`.")
+        description="Looking at results. Runs are made by the command `asperity`.")
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
     plot = verbs.add_parser(
         "plot", help="draw a result",
@@ -45,6 +46,8 @@ def main(arguments: list[str] | None = None) -> int:
     plot.set_defaults(call=_plot)
     add_import(verbs)
     add_fit(verbs)
+    _add_report(verbs)
+    _add_watch(verbs)
     chosen = parser.parse_args(arguments)
     if chosen.verb == "plot":
         if chosen.step is not None and not chosen.field:
@@ -57,6 +60,53 @@ def main(arguments: list[str] | None = None) -> int:
         return _fail(error, 3)
     except (KeyError, IndexError, ValueError) as error:
         return _fail(error, 2)
+
+
+def _add_report(verbs: Any) -> None:
+    """Add the verb `report`."""
+    report = verbs.add_parser(
+        "report", help="write a page about a result",
+        description="Write one HTML file about a result, for any browser, with nothing to fetch:"
+                    " friction and contact area in time, maps with a slider, spectra, energies,"
+                    " convergence, the case and how it was made. Of a run that is still going it"
+                    " shows what there is.")
+    report.add_argument("result", metavar="RESULT.h5", help="result of `asperity run`")
+    report.add_argument("-o", "--output", metavar="HTML", type=Path,
+                        help="page to write; default: RESULT.html beside the result")
+    report.set_defaults(call=_report)
+
+
+def _add_watch(verbs: Any) -> None:
+    """Add the verb `watch`."""
+    watch = verbs.add_parser(
+        "watch", help="follow a run in the terminal",
+        description="Follow a run until it is finished: friction and contact area as lines of"
+                    " text, the last row, the time left. Ctrl-C ends the view, not the run. Where"
+                    " the output is no terminal, a plain line tells each change.")
+    watch.add_argument("result", metavar="RESULT.h5", help="result of `asperity run`")
+    watch.add_argument("--every", metavar="SECONDS", type=float, default=1.0,
+                       help="look so often; default: 1")
+    watch.add_argument("--once", action="store_true", help="show what there is and end")
+    watch.set_defaults(call=_watch)
+
+
+def _report(chosen: argparse.Namespace) -> int:
+    """Write the page."""
+    from .report import write_report
+    from .result import open_result
+
+    path = write_report(open_result(chosen.result), chosen.output)
+    print(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB)")
+    return 0
+
+
+def _watch(chosen: argparse.Namespace) -> int:
+    """Follow a run."""
+    from .watch import watch
+
+    if not 0.05 <= chosen.every <= 3600.0:
+        raise ValueError(f"--every {chosen.every:g}: must be 0.05 to 3600 seconds")
+    return watch(chosen.result, every=chosen.every, once=chosen.once)
 
 
 def _plot(chosen: argparse.Namespace) -> int:

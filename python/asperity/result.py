@@ -426,6 +426,18 @@ class Run:
 
         return plot_overview(self)
 
+    def report(self, path: str | os.PathLike[str] | None = None) -> Path:
+        """Write a page about the run, one HTML file for any browser; return its path.
+
+        Parameters
+        ----------
+        path : str or path, optional
+            The file to write; RESULT.html beside the result if left out.
+        """
+        from .report import write_report
+
+        return write_report(self, path)
+
     def __repr__(self) -> str:
         state = "finished" if self.finished else "not finished"
         lines = [f"{self.title or 'untitled run'} ({self.path})",

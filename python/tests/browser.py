@@ -1,0 +1,125 @@
+"""A headless Chromium, driven through chromedriver by the WebDriver protocol (W3C)."""
+
+import base64
+import json
+import os
+import shutil
+import socket
+import subprocess
+import time
+import urllib.error
+import urllib.request
+from contextlib import suppress
+
+DRIVER = shutil.which("chromedriver")
+BROWSER = shutil.which("chromium")
+
+
+class Browser:
+    """A browser of one window; use it in a `with` statement."""
+
+    def __init__(self, folder):
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port = free.getsockname()[1]
+        self.root = f"http://127.0.0.1:{port}"
+        self.driver = subprocess.Popen(
+            [DRIVER, f"--port={port}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            env={**os.environ, "HOME": str(folder)})
+        try:
+            self._wait()
+            options = {"binary": BROWSER, "args": [
+                "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
+                "--hide-scrollbars", "--no-first-run", "--disable-extensions",
+                "--disable-background-networking", f"--user-data-dir={folder}/profile"]}
+            answer = self._send("POST", "/session", {"capabilities": {"alwaysMatch": {
+                "browserName": "chrome", "goog:chromeOptions": options,
+                "goog:loggingPrefs": {"browser": "ALL"}}}})
+            self.session = f"/session/{answer['sessionId']}"
+        except BaseException:
+            self.driver.kill()
+            raise
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        with suppress(OSError):
+            self._send("DELETE", self.session)
+        self.driver.terminate()
+        self.driver.wait(10)
+
+    def _wait(self):
+        for _ in range(200):
+            with suppress(OSError):
+                if self._send("GET", "/status")["ready"]:
+                    return
+            time.sleep(0.05)
+        raise TimeoutError("chromedriver does not answer")
+
+    def _send(self, method, path, body=None):
+        request = urllib.request.Request(
+            self.root + path, method=method,
+            data=None if body is None else json.dumps(body).encode(),
+            headers={"Content-Type": "application/json"})
+        try:
+            with urllib.request.urlopen(request, timeout=60) as answer:
+                return json.load(answer)["value"]
+        except urllib.error.HTTPError as error:
+            raise RuntimeError(error.read().decode()) from None
+
+    def call(self, method, path, body=None):
+        """Send a command of the session."""
+        return self._send(method, self.session + path, body)
+
+    def chrome(self, command, **parameters):
+        """Send a command of the Chrome DevTools protocol."""
+        return self.call("POST", "/goog/cdp/execute", {"cmd": command, "params": parameters})
+
+    def window(self, width, height, dark=False, touch=False):
+        """Set the size of the window and the theme of the system."""
+        self.chrome("Emulation.setDeviceMetricsOverride", width=width, height=height,
+                    deviceScaleFactor=1, mobile=touch)
+        self.chrome("Emulation.setTouchEmulationEnabled", enabled=touch)
+        self.chrome("Emulation.setEmulatedMedia", features=[
+            {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}])
+
+    def open(self, path):
+        """Open a file."""
+        self.call("POST", "/url", {"url": path.resolve().as_uri()})
+
+    def run(self, script, *arguments):
+        """Run a script, return what it returns."""
+        return self.call("POST", "/execute/sync", {"script": script, "args": list(arguments)})
+
+    def actions(self, *sources):
+        """Perform pointer or key actions."""
+        self.call("POST", "/actions", {"actions": list(sources)})
+        self.call("DELETE", "/actions")
+
+    def press(self, *keys):
+        """Press keys one after the other where the focus is."""
+        self.actions({"type": "key", "id": "keys", "actions": [
+            {"type": kind, "value": key} for key in keys for kind in ("keyDown", "keyUp")]})
+
+    def drag(self, start, end, kind="mouse"):
+        """Press a pointer at a point of the window, move and release it."""
+        self.actions({"type": "pointer", "id": "pointer", "parameters": {"pointerType": kind},
+                      "actions": [
+            {"type": "pointerMove", "duration": 0, "x": round(start[0]), "y": round(start[1])},
+            {"type": "pointerDown", "button": 0},
+            {"type": "pointerMove", "duration": 60, "x": round(end[0]), "y": round(end[1])},
+            {"type": "pointerUp", "button": 0}]})
+
+    def console(self):
+        """Return the messages of the console since the last call."""
+        return [entry["message"] for entry in
+                self.call("POST", "/se/log", {"type": "browser"})
+                if entry["level"] in ("WARNING", "SEVERE")]
+
+    def picture(self, path):
+        """Write a picture of the whole page."""
+        size = self.chrome("Page.getLayoutMetrics")["cssContentSize"]
+        data = self.chrome("Page.captureScreenshot", captureBeyondViewport=True, clip={
+            "x": 0, "y": 0, "width": size["width"], "height": size["height"], "scale": 1})
+        path.write_bytes(base64.b64decode(data["data"]))
