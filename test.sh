@@ -3,6 +3,7 @@
 set -eu
 cd "$(dirname "$0")"
 . tools/setup.sh
+. tools/setup_browser.sh
 
 # A fault of style is reported first and fails the whole, but only after the tests.
 status=0

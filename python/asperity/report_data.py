@@ -111,7 +111,8 @@ def _axes(run: Run, columns: dict[str, FloatArray]) -> list[dict[str, str]]:
         order.insert(0, "travel")
     found = []
     for name in dict.fromkeys(order):
-        if name in columns and (name == "step" or np.ptp(columns[name]) > 0.0):
+        if name in columns and run.history.rows and (
+                name == "step" or np.ptp(columns[name]) > 0.0):
             found.append({"name": name, "label": named[name][0], "unit": named[name][1]})
     return found
 
