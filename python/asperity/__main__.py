@@ -1,4 +1,4 @@
-"""``python -m asperity VERB``: pictures, a page and a live view of results."""
+"""``python -m asperity VERB``: results looked at, measurements made into inputs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ def main(arguments: list[str] | None = None) -> int:
     """
     parser = argparse.ArgumentParser(
         prog="python -m asperity",
-        description="Looking at results. Runs are made by the command `asperity`.")
+        description="Measured roads and rubbers into inputs, results into pictures and pages."
+                    " Runs are made by the command `asperity`.")
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
     plot = verbs.add_parser(
         "plot", help="draw a result",
