@@ -44,6 +44,15 @@ def material_group(rubber: asperity.material.Prony | None = None, **more: Any) -
     return dict(shear_modulus=rubber.g_inf, prony_g=rubber.g, prony_tau=rubber.tau, **more)
 
 
+def run(case: asperity.Case, path: Path) -> asperity.Run:
+    """Return the result of a case; a finished one of the same input is taken as it is."""
+    if path.exists():
+        found = asperity.open(path)
+        if found.finished and found.input == str(case):
+            return found
+    return asperity.run(case, output=path, threads=jobs)
+
+
 def shortened(case: asperity.Case, cells: int = 64, steps: int = 20) -> asperity.Case:
     """Return a case with at most so many cells along x, cut-offs that they hold, and few steps."""
     short = case.copy()

@@ -24,6 +24,7 @@ import shutil
 import sys
 import tempfile
 import time
+import traceback
 import warnings
 from pathlib import Path
 from types import ModuleType
@@ -86,7 +87,7 @@ class Study:
         case = asperity.Case.read(self.folder / "input.nml")
         if quick:
             case = common.shortened(case)
-        run = _run(case, folder / "result.h5")
+        run = common.run(case, folder / "result.h5")
         return {"result": str(run.path), **{name: run.history[name] for name in
                 ("time", "contact_area", "friction", "residual_normal")}}
 
@@ -110,15 +111,6 @@ class Study:
         text = part(self.readme, "The thesis") or self.readme
         found = re.search(r"(?:[Ff]igures?|[Ss]ections?|[Tt]ables?)\s+(\d)\.(\d+)", text)
         return (float(found[1]), float(found[2])) if found else (9.0, 0.0)
-
-
-def _run(case: asperity.Case, path: Path) -> asperity.Run:
-    """Return the result of a case; a finished one of the same input is taken as it is."""
-    if path.exists():
-        run = asperity.open(path)
-        if run.finished and run.input == str(case):
-            return run
-    return asperity.run(case, output=path, threads=common.jobs)
 
 
 def studies(names: list[str] | None = None) -> list[Study]:
@@ -169,8 +161,8 @@ def _plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_plain(one) for one in value] if len(value) <= LONGEST else None
     if isinstance(value, dict):
-        return {str(name): _plain(one) for name, one in value.items()
-                if _plain(one) is not None}
+        kept = {str(name): _plain(one) for name, one in value.items()}
+        return {name: one for name, one in kept.items() if one is not None} or None
     return None
 
 
@@ -258,6 +250,9 @@ def _make_one(study: Study, chosen: argparse.Namespace) -> bool:
             data, figure = make(study, folder, chosen.quick)
         except (AssertionError, Warning) as error:
             print(f"{study.name}: FAILED: {error}", file=sys.stderr)
+            return False
+        except Exception:
+            print(f"{study.name}: FAILED:\n{traceback.format_exc()}", file=sys.stderr)
             return False
         if not chosen.quick:
             figure.savefig(study.folder / "picture.png", dpi=110)

@@ -1,0 +1,75 @@
+"""Adhesive rough contact: pressed and released.
+
+input.nml, and the same map without adhesion.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import common
+import numpy as np
+
+import asperity
+
+MINUTES = 1.0
+
+HERE = Path(__file__).parent
+MODULUS = 25e6  # Pa, E*
+
+
+def compute(folder: Path, quick: bool) -> dict[str, Any]:
+    """Return loads (Pa), areas, gaps (m) with and without adhesion, and the last pressure (Pa)."""
+    case = asperity.Case.read(HERE / "input.nml")
+    if quick:  # a part of the area, on the same cells, and every second load
+        case.grid.update(nx=96, ny=96, lx=144e-9)
+        case.surface[0].wavelength_long = 72e-9
+        case.phase = case.phase[1::2]
+    run = common.run(case, folder / "result.h5")
+    load, area, gap = (np.array(run.history[name]) for name in
+                       ("pressure", "contact_area", "mean_gap"))
+    contact, bare_area, bare_gap = None, [], []
+    for value in load[:load.argmax() + 1]:
+        contact = asperity.solve_normal(run.height, run.grid.lx, run.grid.ly, MODULUS,
+                                        pressure=value, start=contact)
+        bare_area.append(contact.contact_area)
+        bare_gap.append(contact.gap.mean())
+    return {"load": load, "area": area, "gap": gap, "bare_area": np.array(bare_area),
+            "bare_gap": np.array(bare_gap), "pressure": run.snapshots[-1].pressure,
+            "lx": run.grid.lx, "ly": run.grid.ly}
+
+
+def check(data: dict[str, Any], quick: bool) -> None:
+    """Hold the loop against what must be: monotone, with hysteresis, above the bare contact."""
+    area, gap, load = data["area"], data["gap"], data["load"]
+    turn = int(load.argmax())
+    np.testing.assert_allclose(load[turn::-1], load[turn:], rtol=1e-9)
+    assert (np.diff(area[:turn + 1]) > 0).all() and (np.diff(area[turn:]) < 0).all()
+    assert (np.diff(gap[:turn + 1]) < 0).all() and (np.diff(gap[turn:]) > 0).all()
+    # Each summit that has snapped in must be pulled off: more contact on the way back.
+    assert (area[turn + 1:] > area[turn - 1::-1]).all()
+    assert (gap[turn + 1:] < gap[turn - 1::-1]).all()
+    assert (area[:turn + 1] > data["bare_area"]).all()
+    assert (gap[:turn + 1] < data["bare_gap"]).all()
+    # After the release the summits are pressed by what pulls around them.
+    assert data["pressure"].min() < 0 < data["pressure"].max()
+
+
+def picture(data: dict[str, Any]) -> Any:
+    """Draw area and gap over the load, and the pressure after the release."""
+    figure, (left, middle, right) = common.subplots(3, width=4.3, height=3.8)
+    load, turn = data["load"] / 1e6, int(data["load"].argmax()) + 1
+    for axes, name, factor, label in ((left, "area", 1, "contact area, fraction"),
+                                      (middle, "gap", 1e9, "mean gap, nm")):
+        axes.plot(load[:turn], factor * data[name][:turn], "o-", label="pressed")
+        axes.plot(load[turn - 1:], factor * data[name][turn - 1:], "s--", label="released")
+        axes.plot(load[:turn], factor * data[f"bare_{name}"], "k:", label="without adhesion")
+        axes.set(xscale="log", xlabel="mean pressure, MPa", ylabel=label, ylim=(0, None))
+        axes.legend()
+    image = right.imshow(data["pressure"] / 1e6, origin="lower", cmap="RdBu_r", vmin=-50, vmax=50,
+                         extent=(0, data["lx"] * 1e6, 0, data["ly"] * 1e6))
+    right.grid(visible=False)
+    right.set(title="pressure after release", xlabel="x, µm", ylabel="y, µm")
+    figure.colorbar(image, label="MPa")
+    return figure

@@ -1,0 +1,70 @@
+"""A viscoelastic adhesive sphere, pushed and pulled.
+
+input.nml with and without its &adhesion.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import common
+import numpy as np
+
+import asperity
+
+MINUTES = 0.3
+
+HERE = Path(__file__).parent
+COLUMNS = ("displacement", "force", "work_load", "energy_elastic", "energy_adhesive",
+           "dissipated_viscous", "contact_area", "time")
+NAMES = {"adhesive": "with adhesion", "bare": "without"}
+
+
+def compute(folder: Path, quick: bool) -> dict[str, Any]:
+    """Return the histories with and without adhesion, and what is lost."""
+    case = asperity.Case.read(HERE / "input.nml")
+    if quick:
+        case.grid.update(nx=48, ny=48)
+        case.phase[1].steps, case.phase[2].steps = 12, 30
+    bare = case.copy()
+    bare.adhesion = None
+    loops = {}
+    for name, one in (("adhesive", case), ("bare", bare)):
+        history = common.run(one, folder / f"{name}.h5").history
+        loops[name] = {column: np.array(history[column]) for column in COLUMNS}
+    return {"loops": loops,
+            "elastic_pull": 1.5 * np.pi * case.adhesion.energy * case.surface[0].radius,
+            "largest_pull": -loops["adhesive"]["force"].min(),
+            "lost_adhesive": loops["adhesive"]["dissipated_viscous"][-1],
+            "lost_bare": loops["bare"]["dissipated_viscous"][-1]}
+
+
+def check(data: dict[str, Any], quick: bool) -> None:
+    """Hold the loops against the books and what adhesion must do."""
+    for name, loop in data["loops"].items():
+        # What the load did is stored or lost; the load's work is a sum over the steps, of second
+        # order in them.
+        left = loop["energy_elastic"][-1] + loop["energy_adhesive"][-1]
+        lost = loop["dissipated_viscous"][-1]
+        error = abs(loop["work_load"][-1] - left - lost) / lost
+        assert error < (0.05 if quick else 0.02), f"{name}: the books are {error:.1%} open"
+        assert loop["contact_area"][-1] == 0, f"{name}: the sphere has not come off"
+    assert data["loops"]["bare"]["force"].min() > -1e-9, "without adhesion nothing pulls"
+    # Adhesion is conservative, yet more is lost: the edge is peeled faster than the solid relaxes.
+    assert data["lost_adhesive"] > 1.3 * data["lost_bare"] > 0
+    assert data["largest_pull"] > 2 * data["elastic_pull"]
+
+
+def picture(data: dict[str, Any]) -> Any:
+    """Draw force over displacement, and what is lost over time."""
+    figure, (left, right) = common.subplots(2, width=5.0, height=4.0)
+    for (name, loop), style in zip(data["loops"].items(), ("-", "--"), strict=True):
+        left.plot(loop["displacement"] * 1e6, loop["force"] * 1e6, style, label=NAMES[name])
+        right.plot(loop["time"], loop["dissipated_viscous"] * 1e12, style, label=NAMES[name])
+    left.axhline(0, color="grey", linewidth=0.5)
+    left.set(xlabel="displacement, µm", ylabel="force, µN")
+    right.set(xlabel="time, s", ylabel="energy lost in the solid, pJ")
+    left.legend()
+    right.legend()
+    return figure
