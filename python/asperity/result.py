@@ -21,6 +21,7 @@ from ._names import NamedValues, UnknownNameError, unknown_name
 
 if TYPE_CHECKING:
     import pandas
+    import xarray
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -29,6 +30,8 @@ __all__ = ["Grid", "History", "Run", "Snapshot", "Snapshots", "open_result"]
 T = TypeVar("T")
 FloatArray = NDArray[np.float64]
 
+_NORMAL = ("pressure", "gap", "displacement_z", "contact")
+_TANGENTIAL = ("traction_x", "traction_y", "displacement_x", "displacement_y", "slip_x", "slip_y")
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
@@ -109,6 +112,11 @@ class History(NamedValues):
             raise ImportError("to_pandas needs pandas: python -m pip install pandas") from error
         return pandas.DataFrame(self._values)
 
+    def _repr_html_(self) -> str:
+        from ._html import history_html
+
+        return history_html(self)
+
     def __repr__(self) -> str:
         lines = [f"history of {self.rows} row{'' if self.rows == 1 else 's'}"]
         for name, column in self._values.items():
@@ -164,16 +172,30 @@ class Snapshot:
         return self._run
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        if name not in self._meanings:
-            raise UnknownNameError(unknown_name("field of the snapshot", name, self._meanings))
+        self._check(name)
         return _read(self._run.path, lambda file: file["snapshots"][self._key][name][()])
 
     def __getattr__(self, name: str) -> NDArray[Any]:
         if name.startswith("_"):
             raise AttributeError(name)
-        if name not in self._meanings:
-            raise AttributeError(unknown_name("field of the snapshot", name, self._meanings))
-        return self[name]
+        try:
+            return self[name]
+        except UnknownNameError as error:
+            raise AttributeError(str(error)) from None
+
+    def _check(self, name: str) -> None:
+        """Raise a message that helps on if there is no such field."""
+        if name in self._meanings:
+            return
+        text = unknown_name("field of the snapshot", name, self._meanings)
+        if name in _TANGENTIAL:
+            text = (f"the snapshot holds no {name}: there are {', '.join(self._meanings)};"
+                    " tangential fields are stored with `&friction`, unless `&output"
+                    " snapshot_fields` leaves them out")
+        elif name in _NORMAL:
+            text = (f"the snapshot holds no {name}: there are {', '.join(self._meanings)};"
+                    " `&output snapshot_fields` chooses what is stored")
+        raise UnknownNameError(text)
 
     def __contains__(self, name: object) -> bool:
         return name in self._meanings
@@ -189,14 +211,12 @@ class Snapshot:
 
     def units(self, name: str) -> str:
         """Return the units of a field, '1' for a pure number."""
-        if name not in self._meanings:
-            raise UnknownNameError(unknown_name("field of the snapshot", name, self._meanings))
+        self._check(name)
         return self._meanings[name][0]
 
     def long_name(self, name: str) -> str:
         """Return the meaning of a field."""
-        if name not in self._meanings:
-            raise UnknownNameError(unknown_name("field of the snapshot", name, self._meanings))
+        self._check(name)
         return self._meanings[name][1]
 
     def plot(self, name: str = "pressure", ax: Axes | None = None,
@@ -222,6 +242,40 @@ class Snapshot:
 
         return plot_field(self, name, ax, arrows)
 
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the fields as a data set of xarray, which must be installed.
+
+        Returns
+        -------
+        xarray.Dataset
+            Dimensions (y, x) with coordinates in m; units and meanings are attributes.
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed.
+        """
+        from .export import to_xarray
+
+        return to_xarray(self)
+
+    def to_vtk(self, path: str | os.PathLike[str]) -> Path:
+        """Write the fields as VTK image data, which ParaView opens; return the path.
+
+        Parameters
+        ----------
+        path : str or path
+            The file, NAME.vti.
+        """
+        from .export import to_vtk
+
+        return to_vtk(self, path)
+
+    def _repr_html_(self) -> str:
+        from ._html import snapshot_html
+
+        return snapshot_html(self)
+
     def __repr__(self) -> str:
         return (f"snapshot of step {self.step}, t = {self.time:g} s, phase {self.phase}:"
                 f" {', '.join(self.fields)}")
@@ -243,7 +297,8 @@ class Snapshots(Sequence[Snapshot]):
         """Return the snapshot of a step."""
         if step not in self.steps:
             raise UnknownNameError(f"no snapshot of step {step}: there are those of"
-                                   f" {', '.join(map(str, self.steps)) or 'no step'}")
+                                   f" {', '.join(map(str, self.steps)) or 'no step'};"
+                                   " `&output snapshot_every` and `snapshot_times` choose them")
         return self[self.steps.index(step)]
 
     @overload
@@ -258,15 +313,19 @@ class Snapshots(Sequence[Snapshot]):
         try:
             key = self._keys[index]
         except IndexError:
-            raise IndexError(f"snapshot {index} of {self._run.path}: there"
-                             f" {'is' if len(self) == 1 else 'are'} {len(self)}") from None
+            there = (f"there {'is' if len(self) == 1 else 'are'} {len(self)}" if len(self) else
+                     "it holds none; the last row of a finished run has one, `&output"
+                     " snapshot_every` and `snapshot_times` ask for more")
+            raise IndexError(f"snapshot {index} of {self._run.path}: {there}") from None
         return Snapshot(self._run, key)
 
     def __len__(self) -> int:
         return len(self._keys)
 
     def __repr__(self) -> str:
-        steps = ", ".join(map(str, self.steps)) or "none"
+        known = self.steps
+        shown = known if len(known) <= 12 else (*known[:5], "...", *known[-3:])
+        steps = ", ".join(map(str, shown)) or "none"
         return f"{len(self)} snapshot{'' if len(self) == 1 else 's'} (steps {steps})"
 
 
@@ -437,6 +496,11 @@ class Run:
         from .report import write_report
 
         return write_report(self, path)
+
+    def _repr_html_(self) -> str:
+        from ._html import run_html
+
+        return run_html(self)
 
     def __repr__(self) -> str:
         state = "finished" if self.finished else "not finished"
