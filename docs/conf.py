@@ -75,7 +75,7 @@ def _add_contents(app, name, source):
 
 
 # Modules whose public names are those of the package.
-AT_THE_TOP = ("adhesive_contact", "contact", "errors", "runner")
+AT_THE_TOP = ("adhesive_contact", "case", "contact", "errors", "runner", "sweep_table", "sweeps")
 
 
 def _add_modules(app, name, source):
