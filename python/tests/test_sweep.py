@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 
+import h5py
 import numpy as np
 import pytest
 
@@ -218,7 +219,6 @@ def test_wrong_inputs_are_told_before_anything_runs(tmp_path):
 def test_maps_and_default_folders(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "base").mkdir()
-    import h5py
     x = np.arange(64) / 64
     with h5py.File(tmp_path / "base" / "map.h5", "w") as file:
         file["surface"] = np.cos(2 * np.pi * x)[None, :]
@@ -317,3 +317,35 @@ def test_a_stopped_case_goes_on_from_its_checkpoint(tmp_path, program):
     assert run.finished and run.history.rows == 605 > done
     # The rows that were there are the same ones: their times to the last digit.
     np.testing.assert_array_equal(run.history["seconds"][:done], seconds)
+
+
+def test_broken_results_are_run_anew(tmp_path):
+    parameters = {"phase.pressure": [1e3, 2e3, 3e3]}
+    whole = sweep(wave(), parameters, folder=tmp_path)
+    with h5py.File(whole.paths[0], "r+") as file:  # as after a kill before the first checkpoint
+        file.attrs["finished"] = np.int32(0)
+    whole.paths[1].write_bytes(b"no result")
+    with h5py.File(whole.paths[2], "r+") as file:  # of an older version
+        file.attrs["version"] = "0.0.1"
+    again = sweep(wave(), parameters, folder=tmp_path)
+    np.testing.assert_array_equal(again.contact_area, whole.contact_area)
+    assert all(run.finished and run.version == asperity.__version__ for run in again.runs)
+
+
+def test_a_program_that_is_missing_or_dies(tmp_path, monkeypatch):
+    monkeypatch.setenv("ASPERITY_PROGRAM", str(tmp_path / "none"))
+    asperity._program.program.cache_clear()
+    try:
+        with pytest.raises(OSError, match="none"):
+            sweep(wave(), {"phase.pressure": [1e3]}, folder=tmp_path / "a")
+        dies = tmp_path / "dies"
+        dies.write_text("#!/bin/sh\nkill -9 $$\n")
+        dies.chmod(0o755)
+        monkeypatch.setenv("ASPERITY_PROGRAM", str(dies))
+        asperity._program.program.cache_clear()
+        table = sweep(wave(), {"phase.pressure": [1e3]}, folder=tmp_path / "b", errors="keep")
+        assert table.failed[0].message == "killed by signal 9"
+        assert table.rows == 1 and table.results == ()
+    finally:
+        monkeypatch.undo()
+        asperity._program.program.cache_clear()
