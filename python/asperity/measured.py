@@ -446,8 +446,7 @@ def _read(
         if told is None:
             arguments["unit"] = given
         try:
-            topography = chosen.topography(**arguments)
-            heights = topography.heights()
+            heights, lengths, periodic, metadata = _heights(path, reader, chosen, arguments)
         except Exception as error:
             raise OSError(f"{path}: cannot be read: {_reason(error)}") from None
         source = {
@@ -456,19 +455,30 @@ def _read(
             "channel": str(chosen.channel_id),
             "bytes": path.stat().st_size,
             "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
-            "metadata": dict(topography.info or {}),
+            "metadata": metadata,
         }
     array = np.ma.filled(np.ma.asarray(heights, dtype=float), np.nan)
     array = np.where(np.isfinite(array), array, np.nan)
-    lengths = [float(length) for length in topography.physical_sizes]
     if array.ndim == 1:
-        return (array[None, :], [lengths[0], lengths[0] / array.size],
-                bool(topography.is_periodic), told or str(given), source)
+        return (array[None, :], [lengths[0], lengths[0] / array.size], periodic,
+                told or str(given), source)
     if transpose:
         lengths.reverse()
     else:
         array = array.T
-    return array, lengths, bool(topography.is_periodic), told or str(given), source
+    return array, lengths, periodic, told or str(given), source
+
+
+def _heights(
+    path: Path, reader: Any, channel: Any, arguments: dict[str, Any]
+) -> tuple[Any, list[float], bool, dict[str, Any]]:
+    """Return a channel's heights with x first, lengths, periodicity and what the file tells."""
+    if reader.format() == "npy":  # NumPy reads at once what takes the reader a minute
+        heights = np.load(path, allow_pickle=False)
+        return heights, [float(length) for length in arguments["physical_sizes"]], False, {}
+    topography = channel.topography(**arguments)
+    lengths = [float(length) for length in topography.physical_sizes]
+    return topography.heights(), lengths, bool(topography.is_periodic), dict(topography.info or {})
 
 
 def _size_of(path: Path, dim: int, size: Any, transpose: bool) -> tuple[float, ...]:
