@@ -12,7 +12,7 @@ fi
 
 rm -rf build/dist build/plain
 python -m build --no-isolation -o build/plain .
-auditwheel -q repair -w build/plain/repaired build/plain/*.whl
+auditwheel repair -w build/plain/repaired build/plain/*.whl
 python tools/add_licences.py build/plain/repaired/*.whl
 mkdir -p build/dist
 mv build/plain/repaired/*.whl build/plain/*.tar.gz build/dist

@@ -1,6 +1,7 @@
 """The package as it is installed."""
 
 import json
+import re
 import subprocess
 import sys
 from importlib.metadata import distribution, version
@@ -14,6 +15,17 @@ def test_versions_agree(program, root):
     assert version("asperity") == written
     printed = subprocess.run([program, "--version"], capture_output=True, text=True, check=True)
     assert printed.stdout.split() == ["asperity", written]
+
+
+def test_the_version_is_written_once(root):
+    written = (root / "VERSION").read_text().strip()
+    assert re.fullmatch(r"\d+\.\d+\.\d+", written)
+    assert '\nversion = "VERSION"\n' in (root / "fpm.toml").read_text()
+    assert "version: files('VERSION')" in (root / "meson.build").read_text()
+    assert 'dynamic = ["version"]' in (root / "pyproject.toml").read_text()
+    assert f"\nversion: {written}\n" in (root / "CITATION.cff").read_text()
+    changes = (root / "CHANGELOG.md").read_text()
+    assert "## Unreleased" in changes or f"## {written}" in changes
 
 
 def test_what_an_installation_holds(root):
