@@ -152,11 +152,27 @@ def test_run_sh_runs_the_main_example():
     assert f"]({main.replace('input.nml', 'picture.png')})" in README
 
 
-def test_the_advice_on_the_mesh_is_measured(capsys):
-    runpy.run_path(str(ROOT / "tools" / "choosing.py"))["mesh"]()
-    measured = rows(capsys.readouterr().out)[1:]
-    told = rows((ROOT / "docs" / "choosing.md").read_text())[1:len(measured) + 1]
+def test_the_advice_on_the_mesh_is_measured():
+    text, _ = runpy.run_path(str(ROOT / "tools" / "choosing.py"))["mesh"]()
+    page = (ROOT / "docs" / "choosing.md").read_text()
+    kept = page.split("<!-- mesh: begin -->")[1].split("<!-- mesh: end -->")[0]
+    measured, told = rows(text)[1:], rows(kept)[1:]
     assert len(measured) == 5
-    for row, text in zip(measured, told, strict=True):
-        assert [float(cell) for cell in text] == pytest.approx([float(cell) for cell in row],
+    for row, line in zip(measured, told, strict=True):
+        assert [float(cell) for cell in line] == pytest.approx([float(cell) for cell in row],
                                                               abs=2e-4)
+
+
+def test_the_foretold_memory_is_what_runs_take():
+    page = (ROOT / "docs" / "choosing.md").read_text()
+    kept = rows(page.split("<!-- cost: begin -->")[1].split("<!-- cost: end -->")[0])[1:]
+    assert len(kept) == 6
+    for _, told, taken, *_ in kept:
+        assert float(told) == pytest.approx(float(taken), rel=0.1)
+
+
+def test_pull_off_of_the_guide_shows_the_limit_of_the_grid():
+    page = (ROOT / "docs" / "choosing.md").read_text()
+    kept = rows(page.split("<!-- adhesion: begin -->")[1].split("<!-- adhesion: end -->")[0])[1:]
+    for _, cells, _, error in kept:
+        assert (abs(float(error.split()[0])) < 1.5) == (float(cells) < 0.72)
