@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     import pandas
 
 __all__ = ["Failure", "Sweep", "SweepError", "column"]
+
+_ROWS, _CELL = 30, 26   # that are shown: rows, characters of a cell
 
 
 class SweepError(RuntimeError):
@@ -125,21 +128,35 @@ class Sweep(Mapping[str, NDArray[Any]]):
     def _ipython_key_completions_(self) -> list[str]:
         return list(self._columns)
 
-    def __repr__(self) -> str:
+    def _cells(self) -> tuple[str, list[list[str]], str]:
+        """Return a head, the cells of a short table, and what it leaves out."""
         shown = [*self.parameters, *(name for name in ("contact_area", "friction", "mean_gap")
                                      if name in self.results)]
         if len(shown) == len(self.parameters):
             shown += self.results[:3]
-        cells = [shown] + [[_short(self._columns[name][row]) for name in shown]
-                           for row in range(self.rows)]
-        widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-        lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))
-                 for row in cells]
+        cells = [[_short(self._columns[name][row]) for name in shown]
+                 for row in range(min(self.rows, _ROWS))]
         head = f"sweep of {self.rows} case{'' if self.rows == 1 else 's'}"
         if self.failed:
             head += f", {len(self.failed)} failed"
-        more = len(self._columns) - len(shown)
-        return "\n".join([head, *lines] + [f"and {more} more columns"] * (more > 0))
+        more = [f"{number} more {what}" for number, what in
+                ((self.rows - len(cells), "rows"), (len(self._columns) - len(shown), "columns"))
+                if number > 0]
+        return head, [shown, *cells], f"and {' and '.join(more)}" if more else ""
+
+    def __repr__(self) -> str:
+        head, cells, more = self._cells()
+        widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+        lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))
+                 for row in cells]
+        return "\n".join([head, *lines] + [more] * bool(more))
+
+    def _repr_html_(self) -> str:
+        from ._html import table_html
+
+        head, (names, *rows), more = self._cells()
+        return table_html(tuple(map(escape, names)),
+                          [tuple(map(escape, row)) for row in rows], f"{head} {more}".rstrip())
 
 
 class _Runs(Sequence[Run]):
@@ -161,8 +178,15 @@ class _Runs(Sequence[Run]):
 
 
 def _short(value: Any) -> str:
-    """Return a value for a table."""
-    return f"{value:.6g}" if isinstance(value, float | np.floating) else str(value)
+    """Return a value for a table.
+
+    Examples
+    --------
+    >>> _short(0.123456789), _short([1] * 50)
+    ('0.123457', '[1, 1, 1, 1, 1, 1, 1, 1...')
+    """
+    text = f"{value:.6g}" if isinstance(value, float | np.floating) else str(value)
+    return text if len(text) <= _CELL else f"{text[:_CELL - 3]}..."
 
 
 def column(values: list[Any]) -> NDArray[Any]:

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -66,6 +67,7 @@ def test_areas_are_those_of_westergaard(tmp_path):
     assert index[table.paths[1].name] == {"phase.pressure": loads[0],
                                           "material.shear_modulus": 2e6}
     assert "phase.pressure" in repr(table) and "sweep of 6 cases" in repr(table)
+    assert table._repr_html_().count("<tr>") == 7 and "sweep of 6 cases" in table._repr_html_()
     assert table.row(1)["pressure"] == table.pressure[1]
     with pytest.raises(KeyError, match="did you mean 'friction'"):
         table["fricton"]
@@ -349,3 +351,12 @@ def test_a_program_that_is_missing_or_dies(tmp_path, monkeypatch):
     finally:
         monkeypatch.undo()
         asperity._program.program.cache_clear()
+
+
+def test_a_long_table_is_cut():
+    table = asperity.Sweep({"phase.pressure": np.arange(40.0), "friction": np.ones(40)},
+                           ["phase.pressure"], (40,), [Path("x.h5")] * 40, [])
+    lines = repr(table).splitlines()
+    assert len(lines) == 33 and lines[-1] == "and 10 more rows"
+    assert lines[2].split() == ["0", "1"]
+    assert table._repr_html_().count("<td") == 60
