@@ -140,7 +140,8 @@ def check(data: dict[str, Any], quick: bool) -> None:
         assert size[-1] < 0.5 * size.max() and size[0] < 0.1 * size.max(), "no bell"
         if series["dt"] < 0.2:
             worst = series["time"][size.argmax()]
-            assert 0.25 < worst < 0.5, f"largest error at {worst} tau'"
+            # the top is flat: 1 % lower 0.1 away, as much as the mesh of the short form
+            assert 0.2 < worst < 0.6, f"largest error at {worst} tau'"
     mesh = data["mesh"]
     cells = [m["cell"] for m in mesh]
     radius, approach = [m["radius"] for m in mesh], [m["approach"] for m in mesh]
