@@ -16,7 +16,7 @@ function digits(value, count = 4) {
   if (value === null || !Number.isFinite(value)) return "–";
   if (value === 0) return "0";
   const size = Math.abs(value);
-  const text = size >= 1e5 || size < 1e-3 ? value.toExponential(count - 1)
+  const text = size >= 1e5 || size < 1e-3 ? value.toExponential(count - 1).replace(/\.?0+e/, "e")
     : String(Number(value.toPrecision(count)));
   return text.replace("e+", "e").replace("-", "−").replace("e-", "e−");
 }
