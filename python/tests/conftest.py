@@ -1,7 +1,9 @@
 """Fixtures of the Python tests."""
 
 import os
+import re
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -43,6 +45,20 @@ def program() -> str:
         if candidate and Path(candidate).is_file():
             return str(candidate)
     pytest.fail("the program is not built: run ./test.sh")
+
+
+@pytest.fixture(scope="session")
+def road(program, tmp_path_factory):
+    """Return a folder with the README's case, road.nml, and its result, road.h5."""
+    folder = tmp_path_factory.mktemp("road")
+    text = (ROOT / "README.md").read_text()
+    (case,) = re.findall(r"```fortran\n(.*?)```", text, flags=re.DOTALL)
+    (folder / "road.nml").write_text(case)
+    checked = subprocess.run([program, "check", "road.nml"], cwd=folder, check=True,
+                             capture_output=True, text=True)
+    assert checked.stderr == ""
+    subprocess.run([program, "run", "road.nml", "--quiet"], cwd=folder, check=True)
+    return folder
 
 
 def write_result(path, *, nx=24, ny=16, lx=2.4e-3, ly=1.6e-3, rows=6, moving=False,

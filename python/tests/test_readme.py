@@ -25,17 +25,10 @@ def rows(text):
             for line in text.splitlines() if line.startswith("|") and "---" not in line]
 
 
-@pytest.fixture(scope="module")
-def folder(program, tmp_path_factory):
+@pytest.fixture
+def folder(road):
     """Return a folder with the README's input and its result."""
-    folder = tmp_path_factory.mktemp("readme")
-    (case,) = blocks(README, "fortran")
-    (folder / "road.nml").write_text(case)
-    checked = subprocess.run([program, "check", "road.nml"], cwd=folder, check=True,
-                             capture_output=True, text=True)
-    assert checked.stderr == ""
-    subprocess.run([program, "run", "road.nml", "--quiet"], cwd=folder, check=True)
-    return folder
+    return road
 
 
 def test_namelist_of_the_readme_is_ten_lines(folder):
