@@ -1,5 +1,6 @@
 """Each study holds in its quick form, is explained, and stands in the gallery."""
 
+import json
 import re
 import subprocess
 import sys
@@ -87,3 +88,35 @@ def test_numbers_that_are_kept():
             "nested": {"b": [1.0, 2.0]}}
     assert gallery.numbers(data) == {"x": 1.23457, "a": [0.0, 0.333333, 0.666667], "name": "gauss",
                                      "n": 3, "nested": {"b": [1.0, 2.0]}}
+
+
+def table_of(name):
+    """Return the rows of the first table of a README, and the kept numbers of the study."""
+    folder = ROOT / "examples" / name
+    rows = [[cell.strip() for cell in line.strip("|").split("|")]
+            for line in (folder / "README.md").read_text().splitlines()
+            if line.startswith("|") and "---" not in line]
+    return rows[1:], json.loads((folder / "numbers.json").read_text())
+
+
+def test_tables_hold_the_kept_numbers():
+    rows, data = table_of("tabor")
+    assert len(rows) == len(data["tabor"])
+    for k, row in enumerate(rows):
+        columns = ("tabor", "exponential", "maugis_dugdale", "theory")
+        assert [float(cell) for cell in row] == [round(data[name][k], 5) for name in columns]
+    rows, data = table_of("rough_contact")
+    scaled = [load / data["modulus"] / data["rms_slope"] for load in data["load"]]
+    for row in rows:
+        k = min(range(len(scaled)), key=lambda one, row=row: abs(scaled[one] - float(row[0])))
+        assert float(row[0]) == pytest.approx(scaled[k])
+        assert [float(cell) for cell in row[1:]] == [
+            round(data[name][k], 4) for name in ("area", "persson", "bush_gibson_thomas")]
+    rows, data = table_of("speed_jump")
+    for head, *cells in rows:
+        one = data["slow" if "10 mm/s" in head else "fast"]
+        what = "friction" if "friction" in head else "area"
+        for cell, name in zip(cells, (what, f"{what}_persson_1", f"{what}_persson_0.45"),
+                              strict=True):
+            digits = len(cell.split(".")[1])
+            assert float(cell) == round(one[name], digits), head
