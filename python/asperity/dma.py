@@ -36,13 +36,14 @@ TEMPERATURE_UNITS = {"C": 0.0, "K": -273.15}
 ROLES = ("frequency", "storage", "loss", "temperature", "tan_delta")
 KINDS = ("shear", "tension")
 
-_ANGULAR = {"omega", "w", "ω", "angular", "angularfrequency", "angfreq", "angularfreq", "radfreq"}
+_ANGULAR = {"omega", "w", "ω", "angular", "angularfrequency", "angfreq", "angularfreq",
+            "angfrequency", "radfreq", "radianfrequency"}
 _NAMES = {
     "frequency": {"f", "freq", "frequency", "frequenz", "nu", "reducedfrequency", *_ANGULAR},
-    "storage": {"storage", "storagemodulus", "g'", "g1", "gp", "gprime", "gstorage", "e'", "e1",
-                "ep", "eprime", "estorage", "storageg", "storagee", "storagemodulusg'",
-                "storagemoduluse'", "g'storage", "e'storage", "storagemod", "shearstoragemodulus",
-                "tensilestoragemodulus"},
+    "storage": {"storage", "storagemodulus", "g'", "g1", "gp", "gprime", "gstorage", "gstor", "e'",
+                "e1", "ep", "eprime", "estorage", "estor", "storageg", "storagee",
+                "storagemodulusg'", "storagemoduluse'", "g'storage", "e'storage", "storagemod",
+                "shearstoragemodulus", "tensilestoragemodulus"},
     "loss": {"loss", "lossmodulus", "g''", "g2", "gpp", "gdoubleprime", "gloss", "e''", "e2",
              "epp", "edoubleprime", "eloss", "lossg", "losse", "lossmodulusg''",
              "lossmoduluse''", "g''loss", "e''loss", "lossmod", "shearlossmodulus",
@@ -51,9 +52,10 @@ _NAMES = {
     "tan_delta": {"tandelta", "tand", "tanδ", "tan", "lossfactor", "dampingfactor", "tan(δ)"},
 }
 _UNIT_SPELLINGS = {
-    "hz": "Hz", "khz": "kHz", "mhz": "mHz", "1/s": "Hz", "s-1": "Hz", "s^-1": "Hz",
+    "hz": "Hz", "khz": "kHz", "mhz": "mHz", "1/s": "1/s", "s-1": "1/s", "s^-1": "1/s",
     "rad/s": "rad/s", "rads-1": "rad/s", "rads^-1": "rad/s", "rad/sec": "rad/s", "rads": "rad/s",
-    "rad.s-1": "rad/s", "rad·s-1": "rad/s", "radps": "rad/s", "krad/s": "krad/s",
+    "rad.s-1": "rad/s", "rad·s-1": "rad/s", "radps": "rad/s", "rad/per/s": "rad/s",
+    "krad/s": "krad/s",
     "pa": "Pa", "kpa": "kPa", "mpa": "MPa", "gpa": "GPa", "n/mm2": "MPa", "n/mm^2": "MPa",
     "n/m2": "Pa", "c": "C", "°c": "C", "ºc": "C", "degc": "C", "celsius": "C", "k": "K",
     "kelvin": "K", "-": "", "1": "",
@@ -262,7 +264,7 @@ def _split_header(
 
 def _unit(text: str) -> str | None:
     """Return the unit that a text names, '' for a pure number, None if it names none."""
-    plain = re.sub(r"[\s\[\]()*]", "", text)
+    plain = re.sub(r"[\s\[\]()*]", "", text).replace("_", "/")
     if plain == "mPa":
         return "mPa"  # no modulus of a rubber: refused later
     if plain in ("MHz", "MHZ"):
@@ -294,12 +296,13 @@ def _name_and_unit(text: str) -> tuple[str, str | None]:
         if symbol and any(_plain(symbol.group(1)) in names for names in _NAMES.values()):
             text = text[: symbol.start()]  # as in "storage modulus (G') (MPa)"
     else:
-        for pattern in (r"^(.*?)\s*/\s*(.+)$", r"^(.+?)\s*,\s*(.+)$", r"^(.+)_(.+)$",
-                        r"^(.+)\s(.+)$", r"^(.+?)_(.+)$"):
-            split = re.match(pattern, text)
-            if split and _unit(split.group(2)) is not None and _plain(split.group(1)):
-                text, unit = split.group(1), _unit(split.group(2))
+        for gap in re.finditer(r"\s*[/,_]\s*|\s+", text):
+            unit = _unit(text[gap.end() :])
+            if unit is not None and _plain(text[: gap.start()]):
+                text = text[: gap.start()]
                 break
+        else:
+            unit = None
     return _plain(text), unit
 
 
@@ -360,6 +363,8 @@ def _find_columns(
                 unit = units[at]
         found[role] = unit or None
     at = places["frequency"]
+    if found["frequency"] == "1/s":  # of an angular frequency radians, else turns
+        found["frequency"] = "rad/s" if at < len(parts) and parts[at][0] in _ANGULAR else "Hz"
     found["angular"] = "yes" if at < len(parts) and parts[at][0] in _ANGULAR else None
     kind = None
     if places["storage"] < len(parts):

@@ -156,7 +156,7 @@ contains
       end if
       self%converged = outcome%converged .and. rubbing%converged
       self%reason = outcome%reason
-      if (outcome%converged) self%reason = 'friction: '//rubbing%reason
+      if (outcome%converged) self%reason = 'friction: '//trim(rubbing%reason)
 
       call commit_step(self, level)
       call system_clock(now)
