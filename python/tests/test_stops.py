@@ -93,9 +93,9 @@ def test_warnings_after_stops(tmp_path: Path, text: str, word: str) -> None:
         case.write_text(text)
     wanted = [line for line in go(whole) if word in line]
     assert len(wanted) in (1, 2), wanted
-    found = go(parts, 2)
+    found = go(parts, 4)
     while not asperity.open(parts.with_suffix(".h5")).finished:
-        found += go(parts, 2, restart=True)
+        found += go(parts, 4, restart=True)
     assert [line for line in found if word in line] == wanted
     vc.assert_same(parts.with_suffix(".h5"), whole.with_suffix(".h5"))
 
