@@ -18,7 +18,8 @@ __all__ = ["COLOURS", "DOUBLE_COLUMN", "LABELS", "NO_CONTACT", "PRINT", "SINGLE_
 # Okabe and Ito's palette: blue, vermilion, green, purple, orange, sky blue, black.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 NO_CONTACT, STICK, SLIP = "#e8e8e8", "#0072B2", "#E69F00"
-PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+PREFIXES = {-18: "a", -15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M",
+            9: "G", 12: "T"}
 
 # Widths of the columns of a journal, inches (89 and 183 mm), and the letters that go with them.
 SINGLE_COLUMN, DOUBLE_COLUMN = 3.5, 7.2
@@ -100,6 +101,8 @@ def si_scale(values: ArrayLike, units: str) -> tuple[float, str]:
     (1e-06, 'MPa')
     >>> si_scale(0.02, "m/s")
     (1000.0, 'mm/s')
+    >>> si_scale(7300.0, "s")
+    (1.0, 's')
     >>> si_scale(0.2, "1")
     (1.0, '')
     """
@@ -112,8 +115,10 @@ def si_scale(values: ArrayLike, units: str) -> tuple[float, str]:
         return 1.0, units
     # A value that rounds up to 1000 of a prefix takes the next one.
     exponent = 3 * int(np.floor(np.log10(largest * (1.0 + 1e-9)) / 3.0))
-    exponent = min(max(exponent, min(PREFIXES)), max(PREFIXES))
-    if not re.fullmatch(r"[A-Za-z]+(/s)?", units) or units == "kg":
+    exponent = min(exponent, 0 if units == "s" else max(PREFIXES))
+    # What is smaller than all prefixes is round-off mostly.
+    if (not re.fullmatch(r"[A-Za-z]+(/s)?", units) or units == "kg"
+            or exponent < min(PREFIXES)):
         return 1.0, units
     return float(f"1e{-exponent}"), PREFIXES[exponent] + units
 

@@ -18,6 +18,7 @@ from ._derived import closure, energy_terms, has_friction, solver_setting
 from ._library import version
 from ._style import si_scale
 from .report_data import now, page_data, phase_names
+from .watch import duration
 
 if TYPE_CHECKING:
     from .result import Run
@@ -337,7 +338,9 @@ def _convergence(run: Run) -> str:
     if "ffts" in history:
         rows.append(("transforms", f"{int(history['ffts'].sum())}"))
     if "seconds" in history:
-        rows.append(("time of the solvers", _number(float(history["seconds"].sum()), "s")))
+        seconds = float(history["seconds"].sum())
+        rows.append(("time of the solvers",
+                     _number(seconds, "s") if seconds < 60.0 else duration(seconds)))
     return f'<div class="charts" id="charts-convergence"></div>\n{_table("All rows", rows)}'
 
 

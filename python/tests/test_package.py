@@ -37,7 +37,7 @@ def test_what_an_installation_holds(root):
         files = {entry["destination"].replace("{bindir}", "bin")
                  for part in plan.values() for entry in part.values()}
     ends = ["bin/asperity", "asperity/__init__.py", "asperity/result.py", "asperity/py.typed",
-            "asperity/theory/__init__.py"]
+            "asperity/theory/__init__.py", "asperity/page/report.html", "asperity/page/page.js"]
     for end in ends:
         assert any(name.endswith(end) for name in files), end
     assert any("asperity/_core." in name for name in files)

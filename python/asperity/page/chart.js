@@ -1,13 +1,15 @@
 // Numbers with units, ticks, and line charts that zoom: SVG, by mouse, touch and keyboard.
 
-const PREFIXES = {"-12": "p", "-9": "n", "-6": "µ", "-3": "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"};
+const PREFIXES = {"-18": "a", "-15": "f", "-12": "p", "-9": "n", "-6": "µ", "-3": "m", 0: "", 3: "k", 6: "M",
+  9: "G", 12: "T"};
 
 /** The factor and prefixed unit in which values up to `largest` have up to three digits. */
 function siScale(largest, unit) {
   if (!unit || unit === "1") return [1, ""];
   if (!(largest > 0) || !/^[A-Za-z]+(\/s)?$/.test(unit) || unit === "kg") return [1, unit];
   let power = 3 * Math.floor(Math.log10(largest * (1 + 1e-9)) / 3);
-  power = Math.min(Math.max(power, -12), 12);
+  power = Math.min(power, unit === "s" ? 0 : 12);
+  if (power < -18) return [1, unit];
   return [Number(`1e${-power}`), PREFIXES[power] + unit];
 }
 
