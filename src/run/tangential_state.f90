@@ -207,16 +207,18 @@ contains
    end function means
 
    !> Solve for the traction under a pressure: T, the trial displacement, the slip.
-   subroutine solve(self, pressure, gap, slope_x, slope_y, tolerance, outcome)
+   subroutine solve(self, pressure, gap, slope_x, slope_y, tolerance, settle, outcome)
       class(tangential_state_type), intent(inout) :: self
       real(dp), intent(in), contiguous, target :: pressure(:, :)
       real(dp), intent(in) :: gap(:, :)
       real(dp), intent(in), contiguous, target :: slope_x(:, :), slope_y(:, :)
       real(dp), intent(in) :: tolerance
+      logical, intent(in) :: settle                   !! T has to settle too, not only the displacements
       type(solver_result_type), intent(out) :: outcome
       integer :: j, c
 
       self%solver%tolerance = tolerance
+      self%solver%settle = settle
       call mark_contact(self, pressure, gap)
       call self%solver%solve(self%operator, self%law, pressure, slope_x, slope_y, self%drive(:, :, 1), &
          self%drive(:, :, 2), self%contact, self%traction(:, :, 1), self%traction(:, :, 2), &

@@ -69,6 +69,9 @@ module friction_cg
       !> smaller than the displacements, as in a small step of a long slide. 0: by the
       !> displacements.
       real(dp) :: slip_scale = 0.0_dp
+      !> T has to settle too, |T' - T|/|T'| <= tolerance. Without it the displacements are good to the
+      !> tolerance, T is less so.
+      logical :: settle = .true.
       logical :: near = .false.                  !! T starts near the solution, as in a step like the last
       type(convolution_type), private :: preconditioner
       logical, private :: periodic = .true.
@@ -195,6 +198,7 @@ contains
       problem%threads = operator%threads
       problem%compliance = self%compliance
       problem%slip_scale = self%slip_scale
+      problem%settle = self%settle
       problem%near = self%near .and. law%law /= law_constant_shear
       problem%p => p
       problem%hx => slope_x
@@ -227,9 +231,10 @@ contains
       else
          call problem%start_from_rest()
       end if
+      write (77, '(a,es9.2,a,es9.2,3i8)') 'T start', problem%residual, ' tol', self%tolerance, problem%cells, problem%slipping
       do
          if (problem%residual > self%tolerance) call iterate(self, problem, operator, result%iterations)
-         converged = problem%residual <= self%tolerance .and. problem%change <= self%tolerance
+         converged = problem%solved(self%tolerance)
          if (problem%fresh .or. .not. converged) exit
          call problem%transform_tractions(operator)       ! the residual of a recurrence proves nothing
          call problem%update_slip(operator)
@@ -251,6 +256,7 @@ contains
          result%reason = 'no direction of descent'
       end if
       result%seconds = omp_get_wtime() - start_time
+      write (77, '(a,i4,a,f7.0,a,es9.2,a,es9.2,i8)') 'T end it', result%iterations, ' ffts', real(result%ffts), ' res', problem%residual, ' change', problem%change, problem%slipping
    end subroutine solve
 
    !> Run the method that was asked for, and its fallback.
@@ -275,11 +281,11 @@ contains
          do while (iterations < limit)
             call iterate_fast(problem, operator, self%preconditioner, self%tolerance, limit, &
                self%zx, self%zy, self%dx, self%dy, iterations)
-            if (problem%residual <= self%tolerance .and. problem%change <= self%tolerance) return
+            if (problem%solved(self%tolerance)) return
             if (.not. ieee_is_finite(problem%residual)) return
             call iterate_gradient(problem, operator, self%tolerance, 0.1_dp, &
                min(limit, iterations + gradient_steps), self%zx, self%zy, self%dx, self%dy, iterations)
-            if (problem%residual <= self%tolerance .and. problem%change <= self%tolerance) return
+            if (problem%solved(self%tolerance)) return
          end do
       end select
    end subroutine iterate

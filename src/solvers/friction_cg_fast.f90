@@ -90,26 +90,19 @@ contains
          call operator%columns(merge(columns_form, columns_apply, slipping), form)
          if (.not. (slope > 0.0_dp .and. form + curvature > 0.0_dp)) return
          alpha = slope/(form + curvature)
-         call problem%move(operator, alpha, dx, dy, slipping, returned)
-         if (slipping) then
-            call problem%update_slip(operator)
-         else if (returned > 0) then
-            call problem%transform_tractions(operator)
-            call problem%update_slip(operator)
-         else
-            call problem%advance_slip(operator, alpha)
-         end if
+         call take_step(problem, operator, alpha, dx, dy, slipping, .false., returned)
          restart = .false.
          gain = alpha*slope
          do trial = 1, trials
             if (problem%gain_left >= -excess*gain) exit
             fraction = max(0.1_dp, gain/(gain - problem%gain_left))
-            call problem%step_back(operator, fraction)
-            call problem%update_slip(operator)
+            alpha = fraction*alpha
+            call take_step(problem, operator, alpha, dx, dy, .true., .true., returned)
             gain = fraction*gain
             restart = .true.
          end do
-         if (problem%residual <= tolerance .and. problem%change <= tolerance) return
+         write (77, '(a,i4,2es10.2,a,i6,a,i6,a,i6,a,i2,a,f8.4,es9.2)') '   ', iterations, problem%residual, problem%change, ' slip', problem%slipping, ' ret', returned, ' rel', problem%released, ' trial', trial-1, ' beta', beta, alpha
+         if (problem%solved(tolerance)) return
          restart = restart .or. 10*problem%released > problem%cells
          rho_old = rho
          if (iterations - first == patience) then
@@ -119,6 +112,30 @@ contains
          end if
       end do
    end subroutine iterate_fast
+
+   !> T' = T + step d, put back, and what it leaves.
+   subroutine take_step(problem, operator, step, dx, dy, fresh, again, returned)
+      type(friction_problem_type), intent(inout) :: problem
+      type(convolution_type), intent(inout) :: operator
+      real(dp), intent(in) :: step
+      real(dp), intent(in) :: dx(:, :), dy(:, :)
+      logical, intent(in) :: fresh                 !! not by recurrence, even if nothing is put back
+      logical, intent(in) :: again                 !! instead of the last step
+      integer, intent(out) :: returned
+
+      if (problem%mean_compliance > 0.0_dp) then
+         call problem%move_total(operator, step, dx, dy, returned, again)
+         if (fresh .or. returned > 0) call problem%transform_tractions(operator)
+      else
+         call problem%move(operator, step, dx, dy, fresh, returned, again)
+         if (returned > 0 .and. .not. fresh) call problem%transform_tractions(operator)
+      end if
+      if (fresh .or. returned > 0) then
+         call problem%update_slip(operator)
+      else
+         call problem%advance_slip(operator, step)
+      end if
+   end subroutine take_step
 
    !> z from the residual; g.z and, unless at a start, g.z_old.
    subroutine precondition(problem, preconditioner, restart, zx, zy, shift, cross, rho)

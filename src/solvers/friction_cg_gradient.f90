@@ -36,9 +36,9 @@ contains
       do while (iterations < limit)
          iterations = iterations + 1
          call form_step(problem, alpha, rx, ry, sx, sy)
-         call problem%move(operator, 1.0_dp, sx, sy, .true., returned)
+         call problem%move(operator, 1.0_dp, sx, sy, .true., returned, .false.)
          call problem%update_slip(operator)
-         if (problem%residual <= tolerance .and. problem%change <= tolerance) return
+         if (problem%solved(tolerance)) return
          if (problem%residual <= fall*first) return
          call step_products(problem, rx, ry, sx, sy)
          sums = problem%totals(3)

@@ -51,9 +51,9 @@ contains
          if (.not. (form > 0.0_dp .and. abs(ascent) > 0.0_dp)) return
          ! The bound bends towards the solution or away: keep the step positive and finite.
          alpha = ascent/max(form - bend, 0.1_dp*form)
-         call problem%move(operator, alpha, dx, dy, .true., returned)
+         call problem%move(operator, alpha, dx, dy, .true., returned, .false.)
          call problem%update_slip(operator)
-         if (problem%residual <= tolerance .and. problem%change <= tolerance) return
+         if (problem%solved(tolerance)) return
          call direction_products(problem, gx, gy, tx, ty)
          sums = problem%totals(4)
          beta = 0.0_dp

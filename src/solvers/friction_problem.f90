@@ -16,7 +16,8 @@ module friction_problem
    use fft_conv, only : columns_apply, convolution_type
    use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type, &
       law_constant_shear, law_coulomb_orowan
-   use friction_rows, only : bound_row, measured_row, measures, moved_row, row_constants_type
+   use friction_rows, only : bound_row, measured_row, measures, moved_row, moves, &
+      row_constants_type
    use parallel, only : global_max, global_sum
    use precision, only : dp, int8
    implicit none
@@ -27,6 +28,10 @@ module friction_problem
    real(dp), parameter :: on_bound = 1.0_dp + 1.0e-9_dp   !! a point with s below it is on its bound
    real(dp), parameter :: outermost = 4.0_dp              !! no point is moved out by more than this
    real(dp), parameter :: stiffest = 1.0e15_dp            !! curvature of a bound, in units of a_0
+
+   integer, parameter :: corrections = 4        !! of a total, at most
+   !> What of a total may be missed: the slip that it makes over the largest residual.
+   real(dp), parameter :: negligible = 0.1_dp
 
    !> The fields of one solve (the caller's, by pointers) and its measures.
    type :: friction_problem_type
@@ -54,6 +59,7 @@ module friction_problem
       integer(int8), pointer, contiguous :: contact(:, :) => null()
       real(dp), allocatable :: row_sums(:, :)
       logical :: near = .false.              !! T starts near the solution
+      logical :: settle = .true.             !! T has to settle for the problem to be solved
       integer :: cells = 0                   !! in contact
       integer :: slipping = 0                !! on the bound
       integer :: released = 0                !! left the bound since the last move
@@ -62,7 +68,8 @@ module friction_problem
       real(dp) :: weighted_tangent(2, 2) = 0.0_dp     !! E = sum of w Z
       real(dp) :: curved_tangent(2, 2) = 0.0_dp       !! sum of lam w^2 Z
       real(dp) :: gain_left = 0.0_dp         !! g'.(T' - T) of the last move, with g' after it
-      real(dp) :: residual = 0.0_dp          !! largest |g| over the scale of displacement
+      real(dp) :: scale = 0.0_dp             !! of the displacements, m
+      real(dp) :: residual = 0.0_dp          !! largest |g| over that scale
       real(dp) :: change = 0.0_dp            !! |T' - T|/|T'| of the last move (thesis, eq. 3.15)
    contains
       procedure :: start
@@ -73,8 +80,9 @@ module friction_problem
       procedure :: advance_slip
       procedure :: start_from_rest
       procedure :: move
-      procedure :: step_back
+      procedure :: move_total
       procedure :: transform_tractions
+      procedure :: solved
       procedure :: totals
    end type friction_problem_type
 
@@ -304,89 +312,102 @@ contains
       if (self%slip_scale > 0.0_dp) scale = min(scale, max(self%slip_scale, 1.0e-6_dp*scale))
       self%residual = sqrt(global_max(largest))
       if (scale > 0.0_dp) self%residual = self%residual/scale
+      self%scale = merge(scale, 1.0_dp, scale > 0.0_dp)
    end subroutine finish_measure
 
    !> T' = T + step d, put back; the rows of T' are transformed if asked for.
-   subroutine move(self, operator, step, dx, dy, transform, returned)
+   subroutine move(self, operator, step, dx, dy, transform, returned, again)
       class(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
       real(dp), intent(in) :: step
       real(dp), intent(in) :: dx(:, :), dy(:, :)    !! [nx, ny] direction d, Pa
       logical, intent(in) :: transform
       integer, intent(out) :: returned              !! points that were put back
-      real(dp) :: sums(3)
-      integer :: j
+      logical, intent(in) :: again                  !! anew from the T before the last move
+      real(dp) :: sums(moves)
 
-      !$omp parallel do default(none) shared(self, operator, step, dx, dy, transform) &
-      !$omp private(j) num_threads(self%threads)
-      do j = 1, self%ny
-         call move_row(self, step, dx(:, j), dy(:, j), j)
-         if (transform) call transform_row(self, operator, j)
-      end do
-      sums = self%totals(3)
+      call move_rows(self, operator, step, [0.0_dp, 0.0_dp], dx, dy, again, transform, sums)
       returned = nint(sums(1))
-      self%change = sqrt(sums(2)/max(sums(3), tiny(1.0_dp)))
    end subroutine move
 
-   !> A row of T' = T + step d, put back.
-   subroutine move_row(self, step, dx, dy, j)
+   !> The same with the total that T + step d has, where the bounds leave one: a uniform traction
+   !> makes good for what the points put back miss. A stiff mean mode would throw all the contact for
+   !> less.
+   subroutine move_total(self, operator, step, dx, dy, returned, again)
       class(friction_problem_type), intent(inout) :: self
+      type(convolution_type), intent(inout) :: operator
       real(dp), intent(in) :: step
+      real(dp), intent(in) :: dx(:, :), dy(:, :)    !! [nx, ny] direction d, Pa
+      integer, intent(out) :: returned              !! points that were put back
+      logical, intent(in) :: again                  !! anew from the T before the last move
+      real(dp) :: sums(moves), c(2), better(2), missed, k(2, 2), determinant
+      integer :: trial
+
+      call move_rows(self, operator, step, [0.0_dp, 0.0_dp], dx, dy, again, .false., sums)
+      c = 0.0_dp
+      better = 0.0_dp
+      missed = norm2(sums(4:5))
+      do trial = 1, corrections
+         if (missed*self%mean_compliance <= negligible*self%residual*self%scale) exit
+         k = reshape([sums(6), sums(7), sums(7), sums(8)], [2, 2])
+         determinant = k(1, 1)*k(2, 2) - k(1, 2)**2
+         if (determinant <= 1.0e-6_dp*(k(1, 1) + k(2, 2))**2) exit
+         c = c - matmul(reshape([k(2, 2), -k(1, 2), -k(1, 2), k(1, 1)], [2, 2]), sums(4:5))/determinant
+         call move_rows(self, operator, step, c, dx, dy, .true., .false., sums)
+         if (norm2(sums(4:5)) >= missed) then
+            call move_rows(self, operator, step, better, dx, dy, .true., .false., sums)
+            exit
+         end if
+         missed = norm2(sums(4:5))
+         better = c
+      end do
+      returned = nint(sums(1))
+   end subroutine move_total
+
+   !> The rows of both.
+   subroutine move_rows(self, operator, step, c, dx, dy, again, transform, sums)
+      class(friction_problem_type), intent(inout) :: self
+      type(convolution_type), intent(inout) :: operator
+      real(dp), intent(in) :: step
+      real(dp), intent(in) :: c(2)
+      real(dp), intent(in) :: dx(:, :), dy(:, :)
+      logical, intent(in) :: again, transform
+      real(dp), intent(out) :: sums(moves)
+      integer :: j
+
+      !$omp parallel do default(none) shared(self, operator, step, c, dx, dy, again, transform) &
+      !$omp private(j) num_threads(self%threads)
+      do j = 1, self%ny
+         call move_row(self, step, c, dx(:, j), dy(:, j), again, j)
+         if (transform) call transform_row(self, operator, j)
+      end do
+      sums = self%totals(moves)
+      self%change = sqrt(sums(2)/max(sums(3), tiny(1.0_dp)))
+   end subroutine move_rows
+
+   !> A row of T' = T + step d, put back.
+   subroutine move_row(self, step, c, dx, dy, again, j)
+      class(friction_problem_type), intent(inout) :: self
+      real(dp), intent(in) :: step, c(2)
       real(dp), intent(in) :: dx(:), dy(:)
+      logical, intent(in) :: again
       integer, intent(in) :: j
       real(dp) :: state(self%nx)
 
       state = self%contact(:, j)
       if (self%law%slope) then
-         call moved_row(self%nx, self%constants, step, self%p(:, j), self%hx(:, j), self%hy(:, j), &
-            self%force(:, j), self%nz(:, j), dx, dy, self%tx(:, j), self%ty(:, j), &
-            self%old_x(:, j), self%old_y(:, j), state, self%row_sums(1:3, j))
+         call moved_row(self%nx, self%constants, again, step, c, self%p(:, j), self%hx(:, j), &
+            self%hy(:, j), self%force(:, j), self%nz(:, j), dx, dy, self%vx(:, j), self%vy(:, j), &
+            self%weight(:, j), self%tx(:, j), self%ty(:, j), self%old_x(:, j), self%old_y(:, j), state, &
+            self%row_sums(1:moves, j))
       else
-         call moved_row(self%nx, self%constants, step, self%p(:, j), self%level_row, self%level_row, &
-            self%force(:, j), self%nz(:, j), dx, dy, self%tx(:, j), self%ty(:, j), &
-            self%old_x(:, j), self%old_y(:, j), state, self%row_sums(1:3, j))
+         call moved_row(self%nx, self%constants, again, step, c, self%p(:, j), self%level_row, &
+            self%level_row, self%force(:, j), self%nz(:, j), dx, dy, self%vx(:, j), self%vy(:, j), &
+            self%weight(:, j), self%tx(:, j), self%ty(:, j), self%old_x(:, j), self%old_y(:, j), state, &
+            self%row_sums(1:moves, j))
       end if
       self%contact(:, j) = int(state, int8)
    end subroutine move_row
-
-   !> Undo a part of the last move: T' = T_old + fraction (T - T_old), put back; its rows are
-   !> transformed.
-   subroutine step_back(self, operator, fraction)
-      class(friction_problem_type), intent(inout) :: self
-      type(convolution_type), intent(inout) :: operator
-      real(dp), intent(in) :: fraction             !! 0 to 1
-      real(dp) :: t(2), old(2), slope(2), d(2), sums(3)
-      integer(int8) :: state
-      logical :: moved
-      integer :: i, j
-
-      !$omp parallel do default(none) shared(self, operator, fraction) &
-      !$omp private(i, j, t, old, slope, d, state, moved) num_threads(self%threads)
-      do j = 1, self%ny
-         self%row_sums(2:3, j) = 0.0_dp
-         do i = 1, self%nx
-            if (self%contact(i, j) == contact_open) cycle
-            old = [self%old_x(i, j), self%old_y(i, j)]
-            t = old + fraction*([self%tx(i, j), self%ty(i, j)] - old)
-            ! Points that only came to the bound by the move leave it again.
-            state = contact_stick
-            if (self%contact(i, j) == contact_slip) then
-               slope = self%slope_at(i, j)
-               d = old - self%law%normal_traction(self%p(i, j), slope)
-               if (self%law%bound_ratio(self%p(i, j), slope, d) <= on_bound) state = contact_slip
-            end if
-            call self%put_back(i, j, t, state, moved)
-            self%contact(i, j) = state
-            self%row_sums(2, j) = self%row_sums(2, j) + sum((t - old)**2)
-            self%row_sums(3, j) = self%row_sums(3, j) + sum(t**2)
-            self%tx(i, j) = t(1)
-            self%ty(i, j) = t(2)
-         end do
-         call transform_row(self, operator, j)
-      end do
-      sums = self%totals(3)
-      self%change = sqrt(sums(2)/max(sums(3), tiny(1.0_dp)))
-   end subroutine step_back
 
    !> Transform a row of T, or of T + T_h.
    subroutine transform_row(self, operator, j)
@@ -414,6 +435,15 @@ contains
          call transform_row(self, operator, j)
       end do
    end subroutine transform_tractions
+
+   !> Do residual and, where it counts, change of T meet a tolerance?
+   pure function solved(self, tolerance) result(yes)
+      class(friction_problem_type), intent(in) :: self
+      real(dp), intent(in) :: tolerance
+      logical :: yes
+
+      yes = self%residual <= tolerance .and. (self%change <= tolerance .or. .not. self%settle)
+   end function solved
 
    !> The first n sums over all rows, in order.
    function totals(self, n) result(sums)

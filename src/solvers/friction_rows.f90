@@ -19,6 +19,7 @@ module friction_rows
 
    real(dp), parameter :: unbounded = huge(1.0_dp)
    integer, parameter, public :: measures = 14    !! sums of `measured_row`
+   integer, parameter, public :: moves = 8        !! sums of `moved_row`
 
    !> The constants of the bound and of the measures.
    type, public :: row_constants_type
@@ -53,50 +54,78 @@ contains
       end do
    end subroutine bound_row
 
-   !> T' = T + step d, put back: slip points on their bound from both sides, others only from
-   !> outside. T_old is the T before.
-   pure subroutine moved_row(n, c, step, p, hx, hy, force, nz, dx, dy, tx, ty, old_x, &
-      old_y, state, sums)
+   !> T' = T + step d + w Z c, put back: slip points on their bound from both sides, others only from
+   !> outside. T_old is the T before; the move is done anew from there if wanted.
+   pure subroutine moved_row(n, k, again, step, c, p, hx, hy, force, nz, dx, dy, vx, vy, w, tx, ty, &
+      old_x, old_y, state, sums)
       integer, intent(in) :: n
-      type(row_constants_type), intent(in) :: c
+      type(row_constants_type), intent(in) :: k
+      logical, intent(in) :: again                   !! from T_old and the states before the move
       real(dp), intent(in) :: step
+      real(dp), intent(in) :: c(2)                   !! Pa
       real(dp), intent(in) :: p(n), hx(n), hy(n), force(n), nz(n)
       real(dp), intent(in) :: dx(n), dy(n)           !! d, Pa
+      real(dp), intent(in) :: vx(n), vy(n), w(n)     !! measure before the move
       real(dp), intent(inout) :: tx(n), ty(n)
-      real(dp), intent(out) :: old_x(n), old_y(n)
+      real(dp), intent(inout) :: old_x(n), old_y(n)
       real(dp), intent(inout) :: state(n)
-      real(dp), intent(out) :: sums(3)               !! points put back, |T' - T|^2, |T'|^2
-      real(dp) :: mu, ex, ey, nd, m, s, limit, moved, changed, size, put
-      logical :: out
+      !> Points put back, |T' - T|^2, |T'|^2, T' - T - step d (2), what of c arrives (xx, xy, yy).
+      real(dp), intent(out) :: sums(moves)
+      real(dp) :: mu, ex, ey, nd, m, s, limit, moved, changed, size, put, cv, arrived, missed_x
+      real(dp) :: missed_y, xx, xy, yy, axis_x, axis_y, wanted_x, wanted_y
+      logical :: out, slip
       integer :: i
 
-      mu = c%coefficient
+      mu = k%coefficient
       moved = 0.0_dp
       changed = 0.0_dp
       size = 0.0_dp
-      !$omp simd private(ex, ey, nd, m, s, limit, put, out) reduction(+: moved, changed, size)
+      missed_x = 0.0_dp
+      missed_y = 0.0_dp
+      xx = 0.0_dp
+      xy = 0.0_dp
+      yy = 0.0_dp
+      !$omp simd private(ex, ey, nd, m, s, limit, put, out, slip, cv, arrived, axis_x, axis_y) &
+      !$omp private(wanted_x, wanted_y) &
+      !$omp reduction(+: moved, changed, size, missed_x, missed_y, xx, xy, yy)
       do i = 1, n
-         old_x(i) = tx(i)
-         old_y(i) = ty(i)
-         ex = tx(i) + step*dx(i) + p(i)*hx(i)
-         ey = ty(i) + step*dy(i) + p(i)*hy(i)
+         old_x(i) = merge(old_x(i), tx(i), again)
+         old_y(i) = merge(old_y(i), ty(i), again)
+         slip = merge(w(i) <= 0.0_dp .or. vx(i)**2 + vy(i)**2 > 0.5_dp, state(i) > 1.5_dp, again)
+         cv = c(1)*vx(i) + c(2)*vy(i)
+         wanted_x = old_x(i) + step*dx(i)
+         wanted_y = old_y(i) + step*dy(i)
+         ex = wanted_x + w(i)*(c(1) - cv*vx(i)) + p(i)*hx(i)
+         ey = wanted_y + w(i)*(c(2) - cv*vy(i)) + p(i)*hy(i)
          nd = -nz(i)*(hx(i)*ex + hy(i)*ey)
          m = sqrt(max(ex**2 + ey**2 - nd**2, 0.0_dp))
          s = ratio(force(i), m - mu*nd)
-         s = merge(min(s, ratio(c%strength, m)), s, c%strength >= 0.0_dp)
-         limit = merge(c%outermost, 1.0_dp, state(i) > 1.5_dp)
+         s = merge(min(s, ratio(k%strength, m)), s, k%strength >= 0.0_dp)
+         limit = merge(k%outermost, 1.0_dp, slip)
          out = s < limit .and. state(i) > 0.5_dp
          put = merge(s, 1.0_dp, out)
-         ex = put*ex - p(i)*hx(i)
-         ey = put*ey - p(i)*hy(i)
+         ex = put*ex
+         ey = put*ey
+         ! A point that came to the bound still moves along it.
+         arrived = merge(0.0_dp, 1.0_dp/sqrt(max(ex**2 + ey**2, tiny(1.0_dp))), slip .or. .not. out)
+         axis_x = merge(vx(i), arrived*ex, slip)
+         axis_y = merge(vy(i), arrived*ey, slip)
+         arrived = merge(w(i)*min(put, 1.0_dp), 0.0_dp, state(i) > 0.5_dp)
+         xx = xx + arrived*(1.0_dp - axis_x**2)
+         xy = xy - arrived*axis_x*axis_y
+         yy = yy + arrived*(1.0_dp - axis_y**2)
+         ex = ex - p(i)*hx(i)
+         ey = ey - p(i)*hy(i)
          tx(i) = merge(ex, 0.0_dp, state(i) > 0.5_dp)
          ty(i) = merge(ey, 0.0_dp, state(i) > 0.5_dp)
-         state(i) = merge(merge(2.0_dp, 1.0_dp, out .or. s <= c%on_bound), 0.0_dp, state(i) > 0.5_dp)
+         missed_x = missed_x + merge(ex - wanted_x, 0.0_dp, state(i) > 0.5_dp)
+         missed_y = missed_y + merge(ey - wanted_y, 0.0_dp, state(i) > 0.5_dp)
+         state(i) = merge(merge(2.0_dp, 1.0_dp, out .or. s <= k%on_bound), 0.0_dp, state(i) > 0.5_dp)
          moved = moved + merge(1.0_dp, 0.0_dp, out)
          changed = changed + (tx(i) - old_x(i))**2 + (ty(i) - old_y(i))**2
          size = size + tx(i)**2 + ty(i)**2
       end do
-      sums = [moved, changed, size]
+      sums = [moved, changed, size, missed_x, missed_y, xx, xy, yy]
    end subroutine moved_row
 
    !> force/reach; 1 where both vanish, unbounded where only the reach does or it is negative.
