@@ -208,7 +208,6 @@ contains
          self%settled(:, :) = self%pressure
          call solve_normal(self, plan, part, level)
          call add_result(outcome, part)
-         write (77, '(a,i3,a,f7.0,a,es9.2)') 'N it', part%iterations, ' ffts', real(part%ffts), ' unsettled', unsettled(self)
          if (.not. part%converged) exit
          change = unsettled(self)
          call swap(self%slope_x, self%new_slope_x)

@@ -38,7 +38,7 @@ module friction_cg
    use friction_cg_fast, only : iterate_fast
    use friction_cg_gradient, only : iterate_gradient
    use friction_cg_thesis, only : iterate_thesis
-   use friction_law, only : friction_law_type, law_constant_shear
+   use friction_law, only : friction_law_type
    use friction_problem, only : friction_problem_type
    use influence, only : tangential_symbol
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
@@ -199,7 +199,7 @@ contains
       problem%compliance = self%compliance
       problem%slip_scale = self%slip_scale
       problem%settle = self%settle
-      problem%near = self%near .and. law%law /= law_constant_shear
+      problem%near = self%near
       problem%p => p
       problem%hx => slope_x
       problem%hy => slope_y
@@ -231,7 +231,6 @@ contains
       else
          call problem%start_from_rest()
       end if
-      write (77, '(a,es9.2,a,es9.2,3i8)') 'T start', problem%residual, ' tol', self%tolerance, problem%cells, problem%slipping
       do
          if (problem%residual > self%tolerance) call iterate(self, problem, operator, result%iterations)
          converged = problem%solved(self%tolerance)
@@ -256,7 +255,6 @@ contains
          result%reason = 'no direction of descent'
       end if
       result%seconds = omp_get_wtime() - start_time
-      write (77, '(a,i4,a,f7.0,a,es9.2,a,es9.2,i8)') 'T end it', result%iterations, ' ffts', real(result%ffts), ' res', problem%residual, ' change', problem%change, problem%slipping
    end subroutine solve
 
    !> Run the method that was asked for, and its fallback.

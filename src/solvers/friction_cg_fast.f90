@@ -25,8 +25,12 @@
 !>     z = z0 + e (c - K^-1 (H e).z0)
 !>
 !> Points that are put back in great number change the total traction, and a stiff mean mode then
-!> throws the slip to the other side: the part of the move after which g'.(T' - T) vanishes is taken
-!> instead where that has become less than -alpha g.d/2 (from a good start -2 alpha g.d). This needs no
+!> throws the slip to the other side. The total of T + alpha d is therefore kept: w Z c is added before
+!> the points are put back, c from one to four Newton steps without a transform. Without that the set
+!> of slipping points can go back and forth for ever.
+!>
+!> Where a move has overshot still, g'.(T' - T) < -alpha g.d/2 (from a good start -2 alpha g.d), a
+!> shorter one along the same path is taken, to where a secant sees g'.(T' - T) vanish. This needs no
 !> energy, which does not exist where the slope counts.
 !>
 !> An iteration costs two operator products, of which the first needs no inverse transform where
@@ -47,8 +51,7 @@ module friction_cg_fast
    integer, parameter :: patience = 30      !! iterations in which the residual has to fall tenfold
    integer, parameter :: trials = 2         !! of a shorter step
    !> A move is shortened where it leaves less than -overshoot*alpha*g.d: in the first iterations of a
-   !> step that goes on from another seldom, for that costs more than it gains (163 for 207
-   !> transforms a step of a two-scale road). Not with constant shear, where that was seen to fail.
+   !> step that goes on from another seldom, for that costs more than it gains.
    real(dp), parameter :: overshoot = 0.5_dp, overshoot_near = 2.0_dp
    integer, parameter :: near_steps = 15
 
@@ -101,7 +104,6 @@ contains
             gain = fraction*gain
             restart = .true.
          end do
-         write (77, '(a,i4,2es10.2,a,i6,a,i6,a,i6,a,i2,a,f8.4,es9.2)') '   ', iterations, problem%residual, problem%change, ' slip', problem%slipping, ' ret', returned, ' rel', problem%released, ' trial', trial-1, ' beta', beta, alpha
          if (problem%solved(tolerance)) return
          restart = restart .or. 10*problem%released > problem%cells
          rho_old = rho

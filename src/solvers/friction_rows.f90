@@ -72,7 +72,7 @@ contains
       !> Points put back, |T' - T|^2, |T'|^2, T' - T - step d (2), what of c arrives (xx, xy, yy).
       real(dp), intent(out) :: sums(moves)
       real(dp) :: mu, ex, ey, nd, m, s, limit, moved, changed, size, put, cv, arrived, missed_x
-      real(dp) :: missed_y, xx, xy, yy, axis_x, axis_y, wanted_x, wanted_y
+      real(dp) :: missed_y, xx, xy, yy, axis_x, axis_y, wanted_x, wanted_y, inverse
       logical :: out, slip
       integer :: i
 
@@ -86,7 +86,7 @@ contains
       xy = 0.0_dp
       yy = 0.0_dp
       !$omp simd private(ex, ey, nd, m, s, limit, put, out, slip, cv, arrived, axis_x, axis_y) &
-      !$omp private(wanted_x, wanted_y) &
+      !$omp private(wanted_x, wanted_y, inverse) &
       !$omp reduction(+: moved, changed, size, missed_x, missed_y, xx, xy, yy)
       do i = 1, n
          old_x(i) = merge(old_x(i), tx(i), again)
@@ -99,23 +99,22 @@ contains
          ey = wanted_y + w(i)*(c(2) - cv*vy(i)) + p(i)*hy(i)
          nd = -nz(i)*(hx(i)*ex + hy(i)*ey)
          m = sqrt(max(ex**2 + ey**2 - nd**2, 0.0_dp))
+         inverse = 1.0_dp/max(m, tiny(1.0_dp))
          s = ratio(force(i), m - mu*nd)
-         s = merge(min(s, ratio(k%strength, m)), s, k%strength >= 0.0_dp)
+         s = merge(min(s, k%strength*inverse), s, k%strength >= 0.0_dp .and. m > 0.0_dp)
          limit = merge(k%outermost, 1.0_dp, slip)
          out = s < limit .and. state(i) > 0.5_dp
          put = merge(s, 1.0_dp, out)
-         ex = put*ex
-         ey = put*ey
          ! A point that came to the bound still moves along it.
-         arrived = merge(0.0_dp, 1.0_dp/sqrt(max(ex**2 + ey**2, tiny(1.0_dp))), slip .or. .not. out)
+         arrived = merge(inverse, 0.0_dp, out)
          axis_x = merge(vx(i), arrived*ex, slip)
          axis_y = merge(vy(i), arrived*ey, slip)
          arrived = merge(w(i)*min(put, 1.0_dp), 0.0_dp, state(i) > 0.5_dp)
          xx = xx + arrived*(1.0_dp - axis_x**2)
          xy = xy - arrived*axis_x*axis_y
          yy = yy + arrived*(1.0_dp - axis_y**2)
-         ex = ex - p(i)*hx(i)
-         ey = ey - p(i)*hy(i)
+         ex = put*ex - p(i)*hx(i)
+         ey = put*ey - p(i)*hy(i)
          tx(i) = merge(ex, 0.0_dp, state(i) > 0.5_dp)
          ty(i) = merge(ey, 0.0_dp, state(i) > 0.5_dp)
          missed_x = missed_x + merge(ex - wanted_x, 0.0_dp, state(i) > 0.5_dp)
@@ -262,7 +261,7 @@ contains
       real(dp), intent(in) :: rx(n), ry(n), vx(n), vy(n), w(n)
       real(dp), intent(inout) :: zx(n), zy(n)        !! in: the preconditioned field
       real(dp), intent(out) :: sums(5)
-      real(dp) :: rv, gx, gy, bent, over, rz, sx, sy, bx, by
+      real(dp) :: rv, rx_z, ry_z, gx, gy, bent, over, rz, sx, sy, bx, by
       integer :: i
 
       rz = 0.0_dp
@@ -270,19 +269,22 @@ contains
       sy = 0.0_dp
       bx = 0.0_dp
       by = 0.0_dp
-      !$omp simd private(rv, gx, gy, bent, over) reduction(+: rz, sx, sy, bx, by)
+      !$omp simd private(rv, rx_z, ry_z, gx, gy, bent, over) reduction(+: rz, sx, sy, bx, by)
       do i = 1, n
          over = (1.0_dp - w(i))/compliance
          bent = compliance*(1.0_dp - w(i))
-         gx = zx(i) + over*(rx(i) - mean(1) - bent*c(1))
-         gy = zy(i) + over*(ry(i) - mean(2) - bent*c(2))
+         ! The part of r along v goes first: beside a long slip, g is otherwise lost in its round-off.
+         rv = rx(i)*vx(i) + ry(i)*vy(i)
+         rx_z = rx(i) - rv*vx(i)
+         ry_z = ry(i) - rv*vy(i)
+         gx = zx(i) + over*(rx_z - mean(1) - bent*c(1))
+         gy = zy(i) + over*(ry_z - mean(2) - bent*c(2))
          rv = gx*vx(i) + gy*vy(i)
          gx = w(i)*(gx - rv*vx(i))
          gy = w(i)*(gy - rv*vy(i))
          zx(i) = gx
          zy(i) = gy
-         ! z has no part along v: r.z = g.z
-         rz = rz + rx(i)*gx + ry(i)*gy
+         rz = rz + rx_z*gx + ry_z*gy
          sx = sx + gx
          sy = sy + gy
          bx = bx + bent*gx
@@ -313,7 +315,8 @@ contains
          av = dx(i)*vx(i) + dy(i)*vy(i)
          ax = zx(i) + merge(beta*(dx(i) - av*vx(i)), 0.0_dp, w(i) > 0.0_dp)
          ay = zy(i) + merge(beta*(dy(i) - av*vy(i)), 0.0_dp, w(i) > 0.0_dp)
-         slope = slope + rx(i)*ax + ry(i)*ay
+         av = rx(i)*vx(i) + ry(i)*vy(i)
+         slope = slope + (rx(i) - av*vx(i))*ax + (ry(i) - av*vy(i))*ay
          curvature = curvature + compliance*(1.0_dp/merge(w(i), 1.0_dp, w(i) > 0.0_dp) - 1.0_dp) &
             *(ax**2 + ay**2)
          dx(i) = ax
