@@ -442,7 +442,7 @@ class Chart {
     });
     root.addEventListener("dblclick", () => this.setRange(null));
     root.addEventListener("wheel", (event) => {
-      if (!event.ctrlKey && !event.metaKey && document.activeElement !== root) return;
+      if (!event.ctrlKey && !event.metaKey) return;  // the page scrolls
       event.preventDefault();
       this.zoom(event.deltaY > 0 ? 1.25 : 0.8, value(at(event)));
     }, {passive: false});
