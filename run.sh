@@ -1,6 +1,6 @@
 #!/bin/sh
 # Run a case and draw its result: ./run.sh [CASE.nml [options of `asperity run`]]
-# Sets up and builds what is missing first. Without a case: the main example.
+# Sets up and builds what is missing first. Without a case: the main example, some minutes.
 set -eu
 caller=$PWD
 cd "$(dirname "$0")"
@@ -10,7 +10,7 @@ root=$PWD
 cd "$caller"
 
 case ${1:--} in
-  -*) input=$root/examples/speed_jump/input.nml ;;
+  -*) input=$root/examples/two_scale_road/input.nml ;;
   *) input=$1; shift ;;
 esac
 program=$root/.venv/python/asperity

@@ -1,4 +1,4 @@
-"""Make the model compound of the examples: sbr.txt and its frequency sweep, picture.png.
+"""Make the model compounds of the examples: sbr.txt and tread.txt, and their frequency sweeps.
 
     python examples/materials/make_sbr.py
 
@@ -7,30 +7,47 @@ tail for the filler; a Prony series of one arm a decade is then fitted to it.
 """
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from asperity.material import WLF, Prony
 
 HERE = Path(__file__).resolve().parent
-RUBBERY, GLASSY = 1.0e6, 400e6             # Pa, long-term and instantaneous shear modulus
-BROAD, STEEP = 0.66, 0.42                  # exponents: G'' ~ w^BROAD, then w^-(BROAD STEEP)
-TRANSITION = 2.5e-8                        # s, time of the glass transition at the reference
-FILLER, FILLER_EXPONENT, FILLER_TIME = 1.0e6, 0.18, 1.0e-3   # Pa, -, s: the slow tail
+
+
+class Law(NamedTuple):
+    """Constants of a master curve at the reference temperature."""
+
+    about: str               # what the compound is, in a few words
+    transition: float        # s, time of the glass transition
+    broad: float             # exponents: G'' ~ w^broad, then w^-(broad steep)
+    filler: float            # Pa, what the slow tail adds to the modulus in the end
+    filler_exponent: float   # its exponent
+    steep: float = 0.42
+    filler_time: float = 1.0e-3   # s
+    rubbery: float = 1.0e6        # Pa, long-term shear modulus
+    glassy: float = 400e6         # Pa, instantaneous shear modulus, without the filler
+
+
+SBR = Law("a cross-linked, filled styrene-butadiene rubber", 2.5e-8, 0.66, 1.0e6, 0.18)
+#: Stiffened by much filler to the moduli at 1 and 32 kHz that the thesis's numbers imply.
+TREAD = Law("a tyre tread with much filler, after numbers of the thesis", 7.2e-8, 0.71, 7.6e6, 0.25)
 WLF_SBR = WLF(4.57, 113.6, 25.0)           # Ferry (1980), table 11-II, cross-linked SBR, 298 K
 
 
-def master_curve(omega):
+def master_curve(omega, law=SBR):
     """Return G* at the reference temperature, Pa; omega in rad/s."""
-    transition = 1.0 - (1.0 + (1j * omega * TRANSITION) ** BROAD) ** -STEEP
-    tail = (1j * omega * FILLER_TIME) ** FILLER_EXPONENT
-    return RUBBERY + (GLASSY - RUBBERY) * transition + FILLER * tail / (1.0 + tail)
+    transition = 1.0 - (1.0 + (1j * omega * law.transition) ** law.broad) ** -law.steep
+    tail = (1j * omega * law.filler_time) ** law.filler_exponent
+    return (law.rubbery + (law.glassy - law.rubbery) * transition
+            + law.filler * tail / (1.0 + tail))
 
 
-def compound():
+def compound(law=SBR):
     """Return the Prony series, one arm a decade, with moduli of three digits."""
     omega = np.geomspace(1e-2, 1e12, 141)
-    modulus = master_curve(omega)
+    modulus = master_curve(omega, law)
     fit = Prony.fit(omega, modulus.real, modulus.imag, arms_per_decade=1.0, tau_range=(1e-13, 1e3))
     return Prony(float(f"{fit.g_inf:.3g}"), [float(f"{g:.3g}") for g in fit.g],
                  [float(f"{tau:.3g}") for tau in fit.tau])
@@ -42,13 +59,13 @@ def read(path):
     return Prony(g[0], g[1:], tau[1:])
 
 
-def table(rubber):
-    """Return the text of sbr.txt."""
+def table(rubber, law=SBR):
+    """Return the text of sbr.txt or tread.txt."""
     omega = np.geomspace(1e0, 1e10, 2001)
-    exact = master_curve(omega)
+    exact = master_curve(omega, law)
     peak = np.argmax(exact.imag / exact.real)
     lines = [
-        "Model of a cross-linked, filled styrene-butadiene rubber: a synthetic compound, not a",
+        f"Model of {law.about}: a synthetic compound, not a",
         "measured one. Shear relaxation modulus G(t) = G_inf + sum g exp(-t/tau) at 25 C.",
         f"G(0) = {rubber.instantaneous_modulus / 1e6:.0f} MPa; the loss factor of the master curve"
         f" is largest, {exact[peak].imag / exact[peak].real:.2f},",
@@ -90,9 +107,36 @@ def draw(rubber, path):
     plt.close(figure)
 
 
+def draw_tread(tread, sbr, path):
+    """Draw the storage modulus and loss factor of both compounds against frequency."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    frequency = np.geomspace(1e-1, 1e10, 400)
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.4), layout="constrained")
+    for rubber, name, style in ((tread, "tread", {"color": "#0072B2"}),
+                                (sbr, "sbr", {"color": "#E69F00", "linestyle": "--"})):
+        modulus = rubber.complex_modulus(2.0 * np.pi * frequency)
+        left.loglog(frequency, modulus.real / 1e6, label=f"{name}, G'", **style)
+        right.semilogx(frequency, modulus.imag / modulus.real, label=name, **style)
+    left.plot([1e3, 32e3], [6.0, 10.9], "ko", markerfacecolor="none",
+              label="implied by the thesis, section 4.5.1")
+    left.set(xlabel="frequency (Hz)", ylabel="storage modulus (MPa)")
+    right.set(xlabel="frequency (Hz)", ylabel="loss factor (-)", ylim=(0.0, None))
+    for axes in (left, right):
+        axes.grid(alpha=0.3)
+        axes.legend(frameon=False)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
 if __name__ == "__main__":
-    rubber = compound()
-    (HERE / "sbr.txt").write_text(table(rubber))
-    draw(read(HERE / "sbr.txt"), HERE / "picture.png")
-    print((HERE / "sbr.txt").read_text())
+    for law, name in ((SBR, "sbr.txt"), (TREAD, "tread.txt")):
+        (HERE / name).write_text(table(compound(law), law))
+        print((HERE / name).read_text())
+    rubber, tread = read(HERE / "sbr.txt"), read(HERE / "tread.txt")
+    draw(rubber, HERE / "picture.png")
+    draw_tread(tread, rubber, HERE / "tread.png")
     print(rubber.to_namelist(temperature=25.0, wlf=WLF_SBR))
