@@ -1,6 +1,6 @@
-"""Make the model compounds of the examples: sbr.txt and tread.txt, and their frequency sweeps.
+"""Make the model compounds of the examples: sbr.txt and tread.txt. study.py draws them.
 
-    python examples/materials/make_sbr.py
+    python examples/materials/make_sbr.py    # prints the &material group of sbr.txt, too
 
 The master curve is the empirical law of Havriliak and Negami, written for the modulus, and a slow
 tail for the filler; a Prony series of one arm a decade is then fitted to it.
@@ -80,63 +80,9 @@ def table(rubber, law=SBR):
     return "".join(f"# {line}\n" for line in lines) + "\n".join(rows) + "\n"
 
 
-def draw(rubber, path):
-    """Draw the sweep of the series at two temperatures beside the master curve."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    omega = np.geomspace(1e-2, 1e12, 400)
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.4), layout="constrained")
-    rubber.plot(left, omega)
-    exact = master_curve(omega)
-    for number, temperature in enumerate((60.0, 25.0, 0.0, -20.0)):
-        warm = rubber.shifted(temperature, WLF_SBR)
-        right.semilogx(omega, warm.tan_delta(omega), color=f"C{number}",
-                       label=f"{temperature:g} °C")
-    right.semilogx(omega, exact.imag / exact.real, "k:", label="25 °C, master curve")
-    right.set_xlabel(r"angular frequency $\omega$ (rad/s)")
-    right.set_ylabel(r"loss factor $\tan\delta$ (-)")
-    right.set_xlim(omega[0], omega[-1])
-    right.set_ylim(bottom=0.0)
-    right.grid(alpha=0.3)
-    right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=5, frameon=False,
-                 columnspacing=1.0, handlelength=1.4, fontsize="small")
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
-
-
-def draw_tread(tread, sbr, path):
-    """Draw the storage modulus and loss factor of both compounds against frequency."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    frequency = np.geomspace(1e-1, 1e10, 400)
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.4), layout="constrained")
-    for rubber, name, style in ((tread, "tread", {"color": "#0072B2"}),
-                                (sbr, "sbr", {"color": "#E69F00", "linestyle": "--"})):
-        modulus = rubber.complex_modulus(2.0 * np.pi * frequency)
-        left.loglog(frequency, modulus.real / 1e6, label=f"{name}, G'", **style)
-        right.semilogx(frequency, modulus.imag / modulus.real, label=name, **style)
-    left.plot([1e3, 32e3], [6.0, 10.9], "ko", markerfacecolor="none",
-              label="implied by the thesis, section 4.5.1")
-    left.set(xlabel="frequency (Hz)", ylabel="storage modulus (MPa)")
-    right.set(xlabel="frequency (Hz)", ylabel="loss factor (-)", ylim=(0.0, None))
-    for axes in (left, right):
-        axes.grid(alpha=0.3)
-        axes.legend(frameon=False)
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
-
-
 if __name__ == "__main__":
     for law, name in ((SBR, "sbr.txt"), (TREAD, "tread.txt")):
         (HERE / name).write_text(table(compound(law), law))
         print((HERE / name).read_text())
-    rubber, tread = read(HERE / "sbr.txt"), read(HERE / "tread.txt")
-    draw(rubber, HERE / "picture.png")
-    draw_tread(tread, rubber, HERE / "tread.png")
+    rubber = read(HERE / "sbr.txt")
     print(rubber.to_namelist(temperature=25.0, wlf=WLF_SBR))
