@@ -1,0 +1,194 @@
+"""Every block of README.md and docs runs: commands, Python, inputs, Fortran programs.
+
+The blocks of a page run in its order, in an empty folder; comments before a block say where it is
+written to, or where else its commands are run (docs/developer.md lists them).
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from conftest import ROOT
+
+import asperity
+
+# Pages whose blocks have tests of their own, with their outcome.
+ELSEWHERE = {"docs/measured_data.md": "test_measured_page.py",
+             "docs/results.md": "test_results_page.py",
+             "docs/sweeps.md": "test_sweeps_page.py"}
+
+COMMAND = re.compile(r"(?:\./\w|\.ci/run|\. tools|asperity (?!:)|python -|fpm |pip |conda |brew )")
+
+
+@dataclass
+class Block:
+    """A fenced block of a page."""
+
+    language: str
+    text: str
+    mark: str          # the comment before it
+    line: int
+
+
+def pages():
+    """Return the pages, by their paths from the root."""
+    found = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md"),
+             *(ROOT / "docs" / "api").glob("*.md")]
+    return sorted(path.relative_to(ROOT).as_posix() for path in found)
+
+
+def blocks(page):
+    """Return the fenced blocks of a page."""
+    lines = (ROOT / page).read_text().splitlines()
+    found, start = [], None
+    for number, line in enumerate(lines):
+        if not line.startswith("```"):
+            continue
+        if start is None:
+            start = number
+        else:
+            mark = re.fullmatch(r"<!-- (.+) -->", lines[start - 1]) if start else None
+            found.append(Block(lines[start][3:].strip(), "\n".join(lines[start + 1:number]) + "\n",
+                               mark[1] if mark else "", start + 1))
+            start = None
+    assert start is None, f"{page}: a block is not closed"
+    return found
+
+
+def commands(text):
+    """Return the commands of a block, without comments."""
+    lines = re.sub(r"\\\n\s*", "", text).splitlines()
+    return [found for found in (re.sub(r"(^|\s)#.*", "", line).strip() for line in lines) if found]
+
+
+PAGES = [page for page in pages() if page not in ELSEWHERE and blocks(page)]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_blocks_run(page, program, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PATH", os.pathsep.join([
+        str(Path(program).parent), str(Path(sys.executable).parent), os.environ["PATH"]]))
+    names = {}
+    for block in blocks(page):
+        where = f"{page}, line {block.line}"
+        kind, _, rest = block.mark.partition(": ")
+        if block.mark.startswith("not run: installs"):
+            assert block.language == "sh" and "install" in block.text, where
+        elif kind == "elsewhere":
+            there = "\n".join((ROOT / name).read_text() for name in rest.split())
+            for command in commands(block.text):
+                assert " ".join(command.split()[:3]) in there, f"{where}: {command}"
+        elif block.language == "sh":
+            done = subprocess.run(["sh", "-eu", "-c", block.text], capture_output=True, text=True)
+            assert done.returncode == 0, f"{where}: {done.stderr}"
+            assert "warning" not in done.stderr, f"{where}: {done.stderr}"
+        elif block.language == "python":
+            exec(compile(block.text, where, "exec"), names)
+        elif block.language == "fortran" and kind == "file":
+            Path(rest).write_text(block.text)
+            if rest.endswith(".f90"):
+                run_fortran(Path(rest), Path(program).parent)
+        else:
+            assert block.language in ("text", "toml"), f"{where}: a block that no test runs"
+    check = OUTCOMES.get(page)
+    if check:
+        check(tmp_path, capsys.readouterr().out)
+
+
+def run_fortran(path, build):
+    """Compile a program with the library as the build left it, and run it."""
+    modules, library = build / "libasperity.a.p", build / "libasperity.a"
+    compiler = os.environ.get("FC") or shutil.which("gfortran")
+    if not library.is_file() or compiler is None:
+        pytest.skip("needs the library of an installation in place, and a compiler")
+    flags = subprocess.run(["pkg-config", "--libs", "hdf5"], check=True, capture_output=True,
+                           text=True).stdout.replace("-lhdf5", "-lhdf5_fortran -lhdf5").split()
+    subprocess.run([compiler, "-Wall", "-Werror", "-fopenmp", f"-I{modules}", str(path),
+                    str(library), *flags, "-lfftw3_omp", "-lfftw3", "-lfftw3f_omp", "-lfftw3f",
+                    "-o", "program"], check=True)
+    done = subprocess.run(["./program"], check=True, capture_output=True, text=True)
+    print(done.stdout)
+
+
+def check_readme(folder, out):
+    run = asperity.open(folder / "road.h5")
+    assert run.finished and run.history["friction"][-1] > 0.5    # friction, loss in the rubber
+    friction, area, computed, theory = map(float, out.split())
+    assert friction > 0.5 and 0.0 < area < 1.0
+    assert 0.8 * theory < computed < 2.0 * theory
+    for name in ("friction.png", "pressure.png", "road.png", "road.html", "road.xdmf"):
+        assert (folder / name).stat().st_size > 1000
+
+
+def check_first_run(folder, out):
+    (approach, exact), (peak, exact_peak) = (
+        map(float, line.split()) for line in out.splitlines()[-2:])
+    assert approach == pytest.approx(exact, rel=1e-3)
+    assert exact == pytest.approx(1e-4, rel=1e-3)
+    assert peak == pytest.approx(exact_peak, rel=5e-3)
+    assert (folder / "pressure.png").stat().st_size > 10000
+
+
+def check_coming_from(folder, out):
+    # The numbers that the page prints, and says others print, too.
+    page = (ROOT / "docs" / "coming_from.md").read_text()
+    for number in out.split():
+        assert f"{float(number):.6f}" in page
+
+
+def check_fortran(folder, out):
+    converged, peak, hertz = out.split()
+    assert converged == "T"
+    assert float(peak) == pytest.approx(float(hertz), rel=1e-3)
+
+
+OUTCOMES = {"README.md": check_readme, "docs/first_run.md": check_first_run,
+            "docs/coming_from.md": check_coming_from, "docs/api/fortran.md": check_fortran}
+
+
+def test_no_page_is_left_out():
+    for page, test in ELSEWHERE.items():
+        assert Path(page).name in (Path(__file__).parent / test).read_text()
+    assert {"README.md", "docs/install.md", "docs/first_run.md", "docs/developer.md"} <= set(PAGES)
+
+
+@pytest.mark.parametrize("page", [page for page in pages() if page not in ELSEWHERE])
+def test_commands_stand_in_blocks(page):
+    """A command in an indented block would run nowhere."""
+    text = re.sub(r"(?s)^```.*?^```", "", (ROOT / page).read_text(), flags=re.MULTILINE)
+    for line in text.splitlines():
+        assert not re.match(r"    " + COMMAND.pattern, line), line
+
+
+def test_namelist_of_the_readme_is_ten_lines():
+    (case,) = (block for block in blocks("README.md") if block.language == "fortran")
+    (script,) = (block for block in blocks("README.md") if block.language == "python")
+    assert case.text.count("\n") <= 10 and script.text.count("\n") <= 11
+
+
+def test_messages_of_the_troubleshooting_page_exist():
+    sources = "\n".join(path.read_text() for folder in ("src", "app", "python/asperity")
+                        for path in (ROOT / folder).rglob("*.[fp]*") if path.suffix != ".pyc")
+    sources = re.sub(r"'\s*//\s*&?\s*'", "", sources)            # strings over several lines
+    page = (ROOT / "docs" / "troubleshooting.md").read_text()
+    quoted = [text for line in page.splitlines() if line.startswith(("**`", "| `", "| iteration"))
+              for text in re.findall(r"`([^`]+)`", line.split("** ")[0].split(" | ")[0])]
+    assert len(quoted) > 15
+    for text in quoted:
+        for part in text.split("..."):
+            if part.strip() and not re.fullmatch(r"\w+", part.strip()):
+                assert part.strip() in sources, part
+
+
+def test_python_interface_is_documented_whole():
+    """The names of the package, and its modules; docs/conf.py appends modules that are new."""
+    page = (ROOT / "docs" / "api" / "python.rst").read_text()
+    assert ".. automodule:: asperity\n   :members:\n   :imported-members:\n" in page
+    for name in ("surface", "theory", "material", "result"):
+        assert f"automodule:: asperity.{name}\n" in page
