@@ -19,8 +19,8 @@ copyright = "the Asperity developers"
 release = version = (ROOT / "VERSION").read_text().strip()
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
-include_patterns = ["docs/*.md", "docs/api/*", "examples/*/README.md", "CONTRIBUTING.md",
-                    "CHANGELOG.md"]
+include_patterns = ["docs/*.md", "docs/api/*", "examples/*/README.md", "README.md",
+                    "CONTRIBUTING.md", "CHANGELOG.md"]
 root_doc = "docs/index"
 highlight_language = "none"
 default_role = "py:obj"
@@ -44,7 +44,7 @@ html_show_sourcelink = False
 html_math_renderer = "mathml"
 
 ORDER = {
-    "Guide": ["docs/install", "docs/first_run", "docs/choosing", "docs/measured_data",
+    "Guide": ["README", "docs/install", "docs/first_run", "docs/choosing", "docs/measured_data",
               "docs/sweeps", "docs/results", "docs/troubleshooting", "docs/coming_from"],
     "Reference": ["docs/input_reference", "docs/result_file", "docs/api/python",
                   "docs/api/fortran"],
