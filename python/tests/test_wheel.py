@@ -72,9 +72,9 @@ def test_the_wheel_holds_the_package_the_program_and_the_licences(built):
         bundled = file.read(note).decode()
         plain = " ".join(bundled.split())
         metadata = file.read(f"asperity-{VERSION}.dist-info/METADATA").decode()
-    sources = {f"asperity/{path.relative_to(ROOT / 'python' / 'asperity')}"
-               for pattern in ("**/*.py", "**/py.typed")
-               for path in (ROOT / "python" / "asperity").glob(pattern)}
+    package = ROOT / "python" / "asperity"
+    sources = {f"asperity/{path.relative_to(package)}" for path in package.rglob("*")
+               if path.is_file() and path.suffix not in (".pyc", ".so")}
     inside = {name for name in names if name.startswith("asperity/") and not name.endswith(("/",
               ".so"))}
     assert inside == sources
