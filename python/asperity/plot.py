@@ -91,7 +91,7 @@ def plot_history(run: Run, name: str = "contact_area", x: str | None = None,
         _draw(run, name, along, axes, style)
         axes.set_xlabel(axis_text(label_of(x, history), unit))
         if run.title and ax is None:
-            axes.set_title(run.title)
+            axes.set_title(run.title, parse_math=False)
     return axes
 
 
@@ -247,7 +247,8 @@ def _headline(run: Run, figure: Figure) -> None:
     told = [f"{run.title or run.path.name}"]
     if len(run.snapshots):
         told.append(when(run.snapshots[-1]))
-    figure.suptitle(": ".join(told) + ("" if run.finished else " (run not finished)"))
+    figure.suptitle(": ".join(told) + ("" if run.finished else " (run not finished)"),
+                    parse_math=False)
 
 
 def _load_panel(run: Run, axes: Axes) -> None:

@@ -138,6 +138,8 @@ def _map(grid: Grid, field: NDArray[Any], name: str, label: str, units: str, axe
         shown = np.ma.masked_less_equal(shown, 0.0)
     else:
         style = {"cmap": "cividis"}
+        if np.ptp(shown) == 0.0:  # as the gap of full contact
+            style |= {"vmin": min(0.0, shown.flat[0]), "vmax": max(0.0, shown.flat[0]) or 1.0}
     _, length_unit, edges = _frame(grid)
     image = axes.imshow(shown, origin="lower", extent=edges, aspect="equal", **style)
     ratio = float(np.clip(grid.ly / grid.lx, 0.25, 2.5))
@@ -168,6 +170,10 @@ def _contact_map(snapshot: Snapshot, contact: NDArray[Any], axes: Axes) -> None:
     _, unit, edges = _frame(snapshot.run.grid)
     axes.imshow(contact, origin="lower", extent=edges, aspect="equal", cmap=cmap,
                 norm=BoundaryNorm([-0.5, 0.5, 1.5, 2.5], 3), interpolation="nearest")
+    length, _, _ = _frame(snapshot.run.grid)
+    left, right, low, high = (length * end for end in window(snapshot))
+    axes.set_xlim(left, right)
+    axes.set_ylim(low, high)
     axes.set_xlabel(f"x ({unit})")
     axes.set_ylabel(f"y ({unit})")
     _state_legend(axes, colours, names)
@@ -185,11 +191,39 @@ def _state_legend(axes: Axes, colours: list[str], names: list[str]) -> None:
                 handleheight=1.0, columnspacing=1.2, borderaxespad=0.0)
 
 
-def traction_samples(snapshot: Snapshot, most: int = ARROWS) -> tuple[NDArray[Any], ...]:
+def window(snapshot: Snapshot) -> tuple[float, float, float, float]:
+    """Return the part of the map that is worth to be shown: left, right, lower and upper edge, m.
+
+    It is the whole, but of a contact that takes less than half of a free map, as of a sphere,
+    what lies about it.
+    """
+    grid = snapshot.run.grid
+    whole = (-0.5 * grid.dx, grid.lx - 0.5 * grid.dx, -0.5 * grid.dy, grid.ly - 0.5 * grid.dy)
+    if grid.boundary != "free" or "contact" not in snapshot:
+        return whole
+    j, i = np.nonzero(snapshot["contact"])
+    if not len(i):
+        return whole
+    ends = ((i.min() - 0.5) * grid.dx, (i.max() + 0.5) * grid.dx,
+            (j.min() - 0.5) * grid.dy, (j.max() + 0.5) * grid.dy)
+    side = 1.5 * max(ends[1] - ends[0], ends[3] - ends[2])
+    if side > 0.5 * min(grid.lx, grid.ly):
+        return whole
+    middle_x, middle_y = 0.5 * (ends[0] + ends[1]), 0.5 * (ends[2] + ends[3])
+    return (middle_x - side / 2, middle_x + side / 2, middle_y - side / 2, middle_y + side / 2)
+
+
+def traction_samples(snapshot: Snapshot, side: float | None = None) -> tuple[NDArray[Any], ...]:
     """Return cells in contact spread over the map and the tractions there.
 
-    The map is cut into squares, `most` along its longer side; each gives its cell in contact that
-    lies nearest to the middle.
+    The map is cut into squares; each gives its cell in contact that lies nearest to the middle.
+
+    Parameters
+    ----------
+    snapshot : Snapshot
+        With tractions.
+    side : float, optional
+        Side of the squares, m; the longer side of the map over `ARROWS` if left out.
 
     Returns
     -------
@@ -199,12 +233,13 @@ def traction_samples(snapshot: Snapshot, most: int = ARROWS) -> tuple[NDArray[An
     grid = snapshot.run.grid
     in_contact = (snapshot["contact"] > 0 if "contact" in snapshot
                   else snapshot["pressure"] > 0.0)
-    side = max(grid.lx, grid.ly) / most
+    side = max(grid.lx, grid.ly) / ARROWS if side is None else side
     j, i = np.nonzero(in_contact)
     x, y = (i + 0.5) * grid.dx / side, (j + 0.5) * grid.dy / side
     distance = np.hypot(x % 1.0 - 0.5, y % 1.0 - 0.5)
     order = np.argsort(distance, kind="stable")
-    squares = np.floor(y[order]).astype(int) * (most + 1) + np.floor(x[order]).astype(int)
+    columns = int(grid.lx / side) + 2
+    squares = np.floor(y[order]).astype(int) * columns + np.floor(x[order]).astype(int)
     chosen = order[np.unique(squares, return_index=True)[1]]
     i, j = i[chosen], j[chosen]
     return i, j, snapshot["traction_x"][j, i], snapshot["traction_y"][j, i]
@@ -213,13 +248,16 @@ def traction_samples(snapshot: Snapshot, most: int = ARROWS) -> tuple[NDArray[An
 def _arrows(snapshot: Snapshot, axes: Axes) -> bool:
     """Draw arrows of the traction on the rubber, with a key; whether there were any."""
     grid = snapshot.run.grid
-    i, j, along_x, along_y = traction_samples(snapshot)
+    length, _, _ = _frame(grid)
+    # What is seen: all of the map, or the part about a small contact.
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    seen = max(right - left, high - low) / length
+    i, j, along_x, along_y = traction_samples(snapshot, seen / ARROWS)
     sizes = np.hypot(along_x, along_y)
     if not np.any(sizes):
         return False
     largest = scale_limit(sizes)
-    length, _, _ = _frame(grid)
-    longest = 1.5 * length * max(grid.lx, grid.ly) / ARROWS
+    longest = 1.5 * length * max(seen / ARROWS, grid.dx, grid.dy)
     arrows = axes.quiver(grid.x[i] * length, grid.y[j] * length, along_x, along_y, angles="xy",
                          scale_units="xy", scale=largest / longest, width=0.0045, headwidth=3.6,
                          headlength=4.2, headaxislength=3.8, minlength=0.6, color="black",
@@ -227,7 +265,12 @@ def _arrows(snapshot: Snapshot, axes: Axes) -> bool:
     shown = 10.0 ** np.floor(np.log10(largest))
     shown *= max(step for step in (1.0, 2.0, 5.0) if step * shown <= largest * (1.0 + 1e-12))
     factor, unit = si_scale(shown, "Pa")
-    axes.quiverkey(arrows, 1.0, 1.035, shown, f"traction {shown * factor:.3g} {unit}",
+    # A tenth of an inch above the map, which takes the width or the height of its place.
+    place, figure = axes.get_position(), axes.figure
+    tall = min(place.height * figure.bbox.height,
+               place.width * figure.bbox.width * (high - low) / (right - left)) / figure.dpi
+    axes.quiverkey(arrows, 1.0, 1.0 + 0.09 / max(tall, 0.1), shown,
+                   f"traction {shown * factor:.3g} {unit}",
                    labelpos="W", coordinates="axes", labelsep=0.05,
                    fontproperties={"size": plt.rcParams["legend.fontsize"]})
     return True

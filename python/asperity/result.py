@@ -586,8 +586,13 @@ def _check_file(path: Path) -> None:
 def _text(value: Any) -> str:
     """Return a text attribute, of whatever string type it is."""
     value = _scalar(value)
+    if isinstance(value, str):
+        value = value.encode("utf-8", errors="surrogateescape")  # h5py's way with other bytes
     if isinstance(value, bytes):
-        value = value.decode("utf-8", errors="replace")
+        try:
+            value = value.decode("utf-8")
+        except UnicodeDecodeError:
+            value = value.decode("latin-1")  # of an input that is not UTF-8
     return str(value).rstrip(" \0")
 
 

@@ -103,7 +103,8 @@ def test_traction_arrows_stand_in_contact(frictional):
     assert np.hypot(arrows.U, arrows.V).max() >= key.U
     assert key.text.get_text() == "traction 50 kPa"
     # The longest arrow is somewhat longer than the squares that the map is cut into.
-    assert np.hypot(arrows.U, arrows.V).max() / arrows.scale == pytest.approx(1.5 * 2.4 / 22)
+    longest = np.hypot(arrows.U, arrows.V).max() / arrows.scale
+    assert longest == pytest.approx(1.5 * 2.4 / 22)
     assert not any(isinstance(item, Quiver)
                    for item in snapshot.plot("contact", arrows=False).collections)
     assert any(isinstance(item, Quiver)
@@ -321,3 +322,40 @@ def test_a_jump_of_speed_is_drawn_over_the_travel(tmp_path):
     panel = asperity.open(path).overview().axes[2]
     assert panel.get_xlabel() == "Travel of the road (µm)"
     assert panel.lines[0].get_xdata()[-1] == pytest.approx(500.0)
+
+
+def test_titles_are_no_formulas(result, tmp_path):
+    with h5py.File(result, "a") as file:
+        file.attrs["title"] = "5 $ and $_ more"
+    run = asperity.open(result)
+    run.plot().savefig(tmp_path / "overview.png")
+    run.plot("contact_area").figure.savefig(tmp_path / "area.png")
+    assert is_picture(tmp_path / "overview.png")
+
+
+def test_a_small_contact_of_a_free_map_is_seen_from_near(tmp_path):
+    path = frictional_result(tmp_path / "sphere.h5", nx=64, ny=48, ly=1.8e-3, boundary="free")
+    with h5py.File(path, "a") as file:
+        contact = np.zeros((48, 64), np.int8)
+        contact[20:24, 30:38] = 2
+        file["snapshots/000005/contact"][...] = contact
+    snapshot = asperity.open(path).snapshots[-1]
+    axes = snapshot.plot("contact")
+    # Cells of 37.5e-3 mm: half as wide again as the contact of eight.
+    np.testing.assert_allclose(axes.get_xlim(), np.array([33.5 - 6, 33.5 + 6]) * 37.5e-3)
+    np.testing.assert_allclose(axes.get_ylim(), np.array([21.5 - 6, 21.5 + 6]) * 37.5e-3)
+    assert len(axes.figure.axes) == 1
+    (arrows,) = (item for item in axes.collections if isinstance(item, Quiver))
+    assert arrows.N == 32  # each of its cells
+    with h5py.File(path, "a") as file:
+        file["snapshots/000005/contact"][...] = 1
+    axes = snapshot.plot("contact")
+    np.testing.assert_allclose(axes.get_xlim(), [-0.5 * 37.5e-3, 63.5 * 37.5e-3])
+
+
+def test_key_of_the_arrows_stands_above_a_flat_map(tmp_path):
+    path = frictional_result(tmp_path / "flat.h5", nx=96, ny=6, ly=0.15e-3)
+    axes = asperity.open(path).snapshots[-1].plot("contact")
+    axes.figure.canvas.draw()
+    (key,) = (item for item in axes.get_children() if isinstance(item, QuiverKey))
+    assert key.text.get_window_extent().y0 > axes.get_window_extent().y1

@@ -127,3 +127,14 @@ def test_to_pandas(result):
     table = asperity.open(result).history.to_pandas()
     assert isinstance(table, pandas.DataFrame)
     assert table["pressure"].iloc[-1] == 5e4
+
+
+def test_text_that_is_not_utf_8(result):
+    with h5py.File(result, "a") as file:
+        file.attrs["title"] = np.bytes_("Gummi für 5 µm".encode("latin-1"))
+        file.attrs.create("input", "&case title = 'ü' /".encode("latin-1"),
+                          dtype=h5py.string_dtype("ascii"))
+    run = asperity.open(result)
+    assert run.title == "Gummi für 5 µm"
+    assert run.input == "&case title = 'ü' /"
+    assert run.report().read_text(encoding="utf-8").count("Gummi für 5 µm") == 3
