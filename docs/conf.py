@@ -116,4 +116,5 @@ def setup(app):
     app.connect("source-read", _add_contents)
     app.connect("source-read", _add_modules)
     app.connect("autodoc-process-docstring", _prepare_docstring, priority=400)
+    app.add_css_file(None, body="math { overflow: visible; margin: 0.8em 0 }")
     app.add_html_math_renderer("mathml", (_mathml, None), (_mathml, None))

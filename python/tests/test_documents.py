@@ -162,6 +162,7 @@ def test_no_page_is_left_out():
 def test_commands_stand_in_blocks(page):
     """A command in an indented block would run nowhere."""
     text = re.sub(r"(?s)^```.*?^```", "", (ROOT / page).read_text(), flags=re.MULTILINE)
+    assert not re.search(r"^(<{7}|>{7}) ", text, flags=re.MULTILINE), "a merge was left half done"
     for line in text.splitlines():
         assert not re.match(r"    " + COMMAND.pattern, line), line
 
