@@ -39,6 +39,7 @@ napoleon_use_rtype = False
 
 html_theme = "furo"
 html_title = f"Asperity {release}"
+html_static_path = ["site.css"]
 html_extra_path = ["../build/fortran"]  # by FORD
 html_show_sourcelink = False
 html_math_renderer = "mathml"
@@ -116,5 +117,5 @@ def setup(app):
     app.connect("source-read", _add_contents)
     app.connect("source-read", _add_modules)
     app.connect("autodoc-process-docstring", _prepare_docstring, priority=400)
-    app.add_css_file(None, body="math { overflow: visible; margin: 0.8em 0 }")
+    app.add_css_file("site.css")
     app.add_html_math_renderer("mathml", (_mathml, None), (_mathml, None))
