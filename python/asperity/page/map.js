@@ -132,8 +132,11 @@ class FieldMap {
     }
     root.append(svg("text", {x: left + width / 2, y: top + height + 31, "text-anchor": "middle",
       class: "axis"}, `x (${unit})`));
-    root.append(svg("text", {x: 0, y: 0, "text-anchor": "middle", class: "axis",
-      transform: `translate(11 ${top + height / 2}) rotate(-90)`}, `y (${unit})`));
+    // Beside a flat map there is no room for it; the unit is that of x.
+    if (height >= 48) {
+      root.append(svg("text", {x: 0, y: 0, "text-anchor": "middle", class: "axis",
+        transform: `translate(11 ${top + height / 2}) rotate(-90)`}, `y (${unit})`));
+    }
     if (this.arrows) this.drawArrows(px, py, Math.max(width, height));
   }
 
@@ -172,6 +175,7 @@ class FieldMap {
 
 /** The elements of a colour bar. */
 function colourBar(table, low, high, unit, open) {
+  if (!(high > low)) return [html("div", {class: "key"}, `${shown(low, unit)} everywhere`)];
   const [factor, name] = siScale(Math.max(Math.abs(low), Math.abs(high)), unit);
   const scale = html("div", {class: "scale"});
   scale.style.background = `linear-gradient(to right, ${table.join(",")})`;

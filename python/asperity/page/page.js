@@ -81,14 +81,14 @@ function areaMaps(parent, same) {
       const values = unpack(field);
       const attracted = same() ? Math.min(...data.snapshots.filter((each) => name in each.fields)
         .map((each) => each.fields[name].low)) < 0 : field.low < 0;
-      const top = (same() ? overAll(name, (each) => each.top) : field.top) || 1;
+      const top = same() ? overAll(name, (each) => each.top) : field.top;
       const low = name === "pressure" && attracted ? -top : Math.min(0, field.low);
       const table = data.colours[name === "pressure" ? (attracted ? "both" : "pressure") : "gap"];
       const colours = [...Array(256).keys()].map((i) => colourAt(table, i / 255));
       const masked = name === "pressure" && !attracted;
       maps[name].show(
         (i) => masked && values[i] <= 0 ? OPEN
-          : colours[Math.min(Math.max(Math.round((values[i] - low) / (top - low) * 255), 0), 255)],
+          : colours[Math.min(Math.max(Math.round((values[i] - low) / (top - low || 1) * 255), 0), 255)],
         (i) => shown(values[i], field.units), colourBar(table, low, top, field.units, masked),
         null);
     }
