@@ -231,12 +231,6 @@ class Snapshot:
             Where to draw; a new figure, one column wide, if left out.
         arrows : bool, optional
             Whether to draw the tractions as arrows; by default on 'contact' only.
-
-        Examples
-        --------
-        >>> import asperity
-        >>> run = asperity.open("road.h5")                                  # doctest: +SKIP
-        >>> run.snapshots[-1].plot("contact").figure.savefig("contact.pdf")  # doctest: +SKIP
         """
         from .plot import plot_field
 
