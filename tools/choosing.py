@@ -251,7 +251,17 @@ def friction():
     right.legend()
     thick = table(["`density`, kg/m³", "period, steps", "mean change of the slip speed a step, m/s",
                    "steps that turn it round"], rows)
-    return {"passes": thin, "mass": thick}, figure
+
+    rows = []
+    for density, passes in ((0, 2), (0, 8), (30, 2)):
+        values = []
+        for steps in (60, 120, 240, 480):
+            history = block(2e-2, density, passes, steps)
+            speed = history["sliding_speed"][history["time"] > 1.5e-3]
+            values.append(np.abs(np.diff(speed)).mean())
+        rows.append([str(density), str(passes), *(f"{value:.2f}" for value in values)])
+    steps = table(["`density`, kg/m³", "`passes`", "60 steps", "120", "240", "480"], rows)
+    return {"passes": thin, "mass": thick, "swing": steps}, figure
 
 
 def program():
