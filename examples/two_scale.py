@@ -65,11 +65,12 @@ def waves(short: float | None = SHORT) -> str:
 
 def case(nx: int, road: str, *, speed: float = SPEED, pressure: float = PRESSURE,
          loading: float = LOADING, distance: float = 1.25 * LONG, shear_steps: int = 40,
+         fine: float = 1.0, density: float = 20.0,
          rubber: Prony | None = None) -> asperity.Case:
     """Return the case of a block that is pressed for a time and then driven over a road.
 
     The drive first shears the sticking block in `shear_steps` steps; then come steps of half a
-    cell about the first full slip, and steps of one cell.
+    cell about the first full slip, and steps of `fine` cells.
 
     Parameters
     ----------
@@ -83,6 +84,10 @@ def case(nx: int, road: str, *, speed: float = SPEED, pressure: float = PRESSURE
         Travel of the drive from first full slip on, m.
     shear_steps : int
         Steps until then.
+    fine : float
+        Cells that the drive moves in a step after the first full slip.
+    density : float
+        Density of the block, kg/m3; it only damps.
     rubber : Prony, optional
         The compound; that of table 4.1 by default.
     """
@@ -91,12 +96,12 @@ def case(nx: int, road: str, *, speed: float = SPEED, pressure: float = PRESSURE
     made = asperity.Case.read(road + "&grid nx = 2 /\n&material shear_modulus = 1 /\n&phase /")
     made.grid.update(nx=nx, ny=2 * round(nx / math.sqrt(12.0)), lx=LONG, ly=LONG / math.sqrt(3.0))
     made.material.update(common.material_group(rubber or compound(), thickness=THICKNESS,
-                                               density=20.0))
+                                               density=density))
     made.friction.update(law="coulomb", coefficient=1.0)
     made.phase[0].update(name="press", pressure=pressure, duration=loading, steps=40)
     for name, way, steps in (("shear", 0.9 * travel, {"steps": shear_steps}),
                              ("onset", 0.1 * travel + WIDER, {"dt": 0.5 * cell / speed}),
-                             ("slide", distance - WIDER, {"dt": cell / speed})):
+                             ("slide", distance - WIDER, {"dt": fine * cell / speed})):
         made.phase.append(name=name, velocity_x=speed, duration=way / speed, **steps)
     # Two passes, the default, leave stick-slip from step to step where contact is nearly full;
     # linear interpolation of so coarse a road makes the ripples of the short wave lower.
