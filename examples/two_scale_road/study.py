@@ -78,7 +78,7 @@ def picture(data: dict[str, Any]) -> Figure:
     for column in axes.T:
         column[0].plot(time, data["friction"], color=road.BLUE, label="friction")
         column[0].plot(time, 1.0 + 0.0 * time, color="grey", linestyle=":",
-                       label="Coulomb coefficient of the interface")
+                       label="interface alone")
         column[0].plot(time[peak], data["friction"][peak], "o", color=road.RED,
                        label=f"maximum {found['maximum']:.3f}")
         column[1].plot(time, data["contact_area"], color="black", label="contact area")
@@ -88,10 +88,11 @@ def picture(data: dict[str, Any]) -> Figure:
         column[1].set_xlabel("time (ms)")
         for panel in column:
             panel.grid(alpha=0.3)
-    axes[0, 0].set(ylabel="friction coefficient", title="The whole")
+    axes[0, 0].set(ylabel="friction coefficient", title="The whole", ylim=(-0.05, 1.2))
     axes[0, 1].set(ylim=(0.96, found["maximum"] + 0.01), title="Full slip and after")
-    axes[1, 0].set(ylabel="fraction of the grid, of the drive", xlim=(0.0, time[-1]))
+    axes[1, 0].set(ylabel="fraction of the grid, of the drive", xlim=(0.0, time[-1]),
+                   ylim=(0.0, 1.05))
     axes[1, 1].set(xlim=(1.2, time[-1]))
     axes[0, 0].legend(loc="center left")
-    axes[1, 0].legend(loc="center left")
+    axes[1, 0].legend(loc="upper left")
     return figure
