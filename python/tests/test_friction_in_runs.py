@@ -1,0 +1,127 @@
+"""The bound and the law of slip, computed anew from what a run has written.
+
+Nothing of the program is used: the slope of the road under each point is read from the map by the
+rule of the manual (bilinear between central differences), the bound follows from the law in three
+dimensions: |F_t| <= mu (F_n + p_a N_z) with F the force of the road on an area of its own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import asperity
+
+MU = 0.45
+STRENGTH = 1.5e5
+INPUT = """&grid nx = 40, ny = 25, lx = 1.0e-3, ly = 0.7e-3 /
+&surface shape = 'self_affine', hurst = 0.8, wavelength_long = 0.5e-3,
+   wavelength_short = 0.12e-3, rms_slope = 0.15, seed = {seed} /
+&material shear_modulus = 0.5e6, prony_g = 1e6, 0.5e6, prony_tau = 1e-3, 1e-2, thickness = 1e-3 /
+&friction law = '{law}', coefficient = {mu}, shear_strength = {strength},
+   slope_effect = {slope} /
+&phase pressure = 4e4 /
+&phase velocity_x = 4e-3, velocity_y = -2.6e-3, duration = 4e-3, steps = 16 /
+&phase velocity_x = -2e-3, velocity_y = -3.6e-3, duration = 3e-3, steps = 12 /
+&solver threads = 1, tolerance = 1e-8, passes = 30, slip_law = '{slip_law}', max_iterations = 3000 /
+&output file = '{file}', snapshot_every = 1 /
+"""
+
+
+def read_map(field: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Read a periodic map of shape (ny, nx) at places in cells, bilinearly."""
+    i, j = np.floor(x).astype(int), np.floor(y).astype(int)
+    u, v = x - i, y - j
+    ny, nx = field.shape
+
+    def at(di: int, dj: int) -> np.ndarray:
+        return field[(j + dj) % ny, (i + di) % nx]
+
+    return ((1 - u) * (1 - v) * at(0, 0) + u * (1 - v) * at(1, 0)
+            + (1 - u) * v * at(0, 1) + u * v * at(1, 1))
+
+
+def slopes_under(run: asperity.Run, snapshot) -> tuple[np.ndarray, np.ndarray]:
+    """Return both slopes of the road where each point of the rubber is."""
+    height = run.height
+    ny, nx = height.shape
+    dx, dy = 1.0e-3 / nx, 0.7e-3 / ny
+    row = int(np.flatnonzero(run.history["step"] == snapshot.step)[0])
+    i, j = np.meshgrid(np.arange(nx), np.arange(ny))
+    x = i + (snapshot.displacement_x - run.history["road_x"][row]) / dx
+    y = j + (snapshot.displacement_y - run.history["road_y"][row]) / dy
+    along_x = (np.roll(height, -1, 1) - np.roll(height, 1, 1)) / (2 * dx)
+    along_y = (np.roll(height, -1, 0) - np.roll(height, 1, 0)) / (2 * dy)
+    return read_map(along_x, x, y), read_map(along_y, x, y)
+
+
+@pytest.mark.parametrize(("law", "slope", "slip_law", "seed"), [
+    ("coulomb", True, "physical", 3), ("coulomb", True, "thesis", 4),
+    ("coulomb", False, "physical", 5), ("constant_shear", False, "physical", 6),
+    ("coulomb_orowan", True, "physical", 7)])
+def test_law_in_three_dimensions(tmp_path, law, slope, slip_law, seed):
+    """The force of the road lies in the cone of its normal, and slip is along its tangential part.
+
+    Passes enough that slopes, pressure and traction belong together. Constant shear is taken on
+    the level only: a cell at the edge that comes and goes brings all of sigma_max with it, and the
+    passes need not settle.
+    """
+    case = tmp_path / "case.nml"
+    mu = MU if law != "constant_shear" else 0.0
+    strength = STRENGTH if law != "coulomb" else 0.0
+    text = INPUT.format(law=law, mu=mu, strength=strength, slope=f".{str(slope).lower()}.",
+                        slip_law=slip_law, seed=seed, file=tmp_path / "case.h5")
+    if law == "constant_shear":
+        text = text.replace("coefficient = 0.0, ", "")
+    if law == "coulomb":
+        text = text.replace(" shear_strength = 0.0,", "")
+    case.write_text(text)
+    run = asperity.run(case, quiet=True)
+    seen = np.zeros(3, dtype=int)
+    assert len(run.snapshots) == 29
+    for snapshot in run.snapshots[1:]:
+        touching = snapshot.pressure > 0
+        state = np.asarray(snapshot.contact)
+        assert ((state > 0) == touching).all()
+        seen += np.bincount(state.ravel(), minlength=3)
+        hx, hy = slopes_under(run, snapshot) if slope else (np.zeros_like(snapshot.pressure),) * 2
+        nz = 1 / np.sqrt(1 + hx**2 + hy**2)
+        normal = np.stack([-hx, -hy, np.ones_like(hx)]) * nz
+        # The force on the rubber an area of the grid.
+        force = np.stack([snapshot.traction_x, snapshot.traction_y, snapshot.pressure])
+        push = (force * normal).sum(0)
+        tangential = force - push * normal
+        size = np.sqrt((tangential**2).sum(0))
+        limits = []
+        if law != "constant_shear":
+            limits.append(MU * push)
+        if law != "coulomb":
+            limits.append(np.full_like(push, STRENGTH))
+        limit = np.min(limits, axis=0)
+        top = limit[touching].max()
+        assert (snapshot.traction_x[~touching] == 0).all()
+        assert (snapshot.traction_y[~touching] == 0).all()
+        assert (size - limit)[touching].max() < 1e-5 * top, "outside the bound"
+        stick, slips = state == 1, state == 2
+        slip = np.stack([snapshot.slip_x, snapshot.slip_y])
+        far = np.hypot(*slip).max()
+        # The tolerance, 1e-8, is one of displacements.
+        reach = np.hypot(snapshot.displacement_x, snapshot.displacement_y).max()
+        assert np.hypot(*slip)[stick].max(initial=0) < 2e-8 * reach, "a sticking point slips"
+        if not slips.any():
+            continue
+        assert np.abs(size - limit)[slips].max() < 1e-5 * top, "slip inside the bound"
+        # The slip in space: along the road, so its height is slope times its plane components.
+        space = np.stack([slip[0], slip[1], hx * slip[0] + hy * slip[1]])
+        if slip_law == "thesis":
+            space[2] = 0
+            tangential = force + 0
+            tangential[0] += snapshot.pressure * hx
+            tangential[1] += snapshot.pressure * hy
+            tangential[2] = 0
+        along = (space * tangential).sum(0)
+        across = np.sqrt((np.cross(space, tangential, axis=0)**2).sum(0))
+        sized = np.sqrt((tangential**2).sum(0))
+        assert (along[slips] > -1e-6 * far * sized[slips]).all(), "slip against friction"
+        assert (across / np.maximum(sized, 1e-9 * top))[slips].max() < 1e-5 * far, "slip across"
+    assert (seen > 50).all(), seen
