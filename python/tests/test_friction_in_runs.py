@@ -125,3 +125,60 @@ def test_law_in_three_dimensions(tmp_path, law, slope, slip_law, seed):
         assert (along[slips] > -1e-6 * far * sized[slips]).all(), "slip against friction"
         assert (across / np.maximum(sized, 1e-9 * top))[slips].max() < 1e-5 * far, "slip across"
     assert (seen > 50).all(), seen
+
+
+CYCLE = """&phase velocity_x = 1e-3, velocity_y = -0.6e-3, duration = {time}, steps = 8 /
+&phase velocity_x = -1e-3, velocity_y = 0.6e-3, duration = {time}, steps = 8 /
+"""
+ELASTIC = """&grid nx = 36, ny = 25, lx = 1.0e-3, ly = 0.7e-3 /
+&surface shape = 'self_affine', hurst = 0.8, wavelength_long = 0.5e-3,
+   wavelength_short = 0.2e-3, rms_slope = 0.1, seed = 8 /
+&material shear_modulus = 1e6, poisson = 0.42, thickness = 1e-3 /
+&friction law = 'coulomb', coefficient = {mu}, slope_effect = {slope} /
+&phase pressure = 6e4 /
+{cycles}&solver threads = 1, tolerance = 1e-8, passes = 20, max_iterations = 3000 /
+&output file = '{file}', snapshot_every = 16 /
+"""
+
+
+def cyclic_run(tmp_path, *, mu: float, slope: str, time: float, cycles: int) -> asperity.Run:
+    """Run a rough elastic contact to and fro."""
+    case = tmp_path / "cycle.nml"
+    case.write_text(ELASTIC.format(mu=mu, slope=slope, cycles=CYCLE.format(time=time) * cycles,
+                                   file=tmp_path / "cycle.h5"))
+    return asperity.run(case, quiet=True)
+
+
+@pytest.mark.filterwarnings("ignore:&surface")
+def test_stick_returns_to_nothing(tmp_path):
+    """An elastic contact that sticks is as it was when the road is back where it began."""
+    run = cyclic_run(tmp_path, mu=30.0, slope=".false.", time=1e-3, cycles=1)
+    out, back = run.snapshots[1].pressure, run.snapshots[-1]
+    history = run.history
+    assert history["road_x"][-1] == pytest.approx(0, abs=1e-20)
+    top = np.abs(history["traction_x"]).max()
+    assert top > 10
+    assert abs(history["traction_x"][-1]) < 1e-5 * top
+    assert history["dissipated_friction"][-1] < 1e-5 * history["work_tangential"].max()
+    assert np.abs(back.pressure - run.snapshots[0].pressure).max() < 1e-5 * out.max()
+    # and halfway back it passes where it was
+    np.testing.assert_allclose(history["traction_x"][1:9][::-1][1:], history["traction_x"][9:16],
+                               atol=1e-4 * top)
+
+
+@pytest.mark.filterwarnings("ignore:&surface")
+def test_cycles_repeat(tmp_path):
+    """A rough elastic contact driven to and fro with slip goes through the same loop each time."""
+    run = cyclic_run(tmp_path, mu=0.3, slope=".true.", time=8e-3, cycles=3)
+    history = run.history
+    second, third = slice(17, 33), slice(33, 49)
+    for name in ("traction_x", "traction_y", "contact_area", "friction"):
+        scale = np.abs(history[name]).max()
+        np.testing.assert_allclose(history[name][third], history[name][second], atol=2e-3 * scale,
+                                   err_msg=name)
+    # a count of cells, of which some are on the verge
+    assert np.abs(history["stick_area"][third] - history["stick_area"][second]).max() < 0.02
+    lost = np.diff(history["dissipated_friction"][[16, 32, 48]])
+    assert lost[0] > 0
+    assert lost[1] == pytest.approx(lost[0], rel=1e-3)
+    assert history["stick_area"].min() < 0.8 * history["contact_area"].min()
