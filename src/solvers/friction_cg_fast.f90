@@ -25,9 +25,9 @@
 !>     z = z0 + e (c - K^-1 (H e).z0)
 !>
 !> Points that are put back in great number change the total traction, and a stiff mean mode then
-!> throws the slip to the other side. The total of T + alpha d is therefore kept: w Z c is added before
-!> the points are put back, c from one to four Newton steps without a transform. Without that the set
-!> of slipping points can go back and forth for ever.
+!> throws the slip to the other side. The points that stuck therefore keep their total of T + alpha d:
+!> a uniform c is added to it before they are put back, found without a transform. Else the set of
+!> slipping points can go back and forth for ever.
 !>
 !> Where a move has overshot still, g'.(T' - T) < -alpha g.d/2 (from a good start -2 alpha g.d), a
 !> shorter one along the same path is taken, to where a secant sees g'.(T' - T) vanish. This needs no
@@ -40,7 +40,7 @@
 !> There is no proof that it converges: `friction_cg` falls back on spectral projected gradients.
 module friction_cg_fast
    use fft_conv, only : columns_apply, columns_form, convolution_type
-   use friction_problem, only : friction_problem_type
+   use friction_problem, only : friction_problem_type, pseudo_inverse
    use friction_rows, only : turned_row, scaled_row, unscaled_row
    use precision, only : dp
    implicit none
@@ -177,19 +177,14 @@ contains
       type(friction_problem_type), intent(in) :: problem
       real(dp), intent(out) :: inverse(2, 2)
       real(dp), intent(out) :: coupling(2, 2)
-      real(dp) :: k(2, 2), determinant
+      real(dp) :: k(2, 2)
 
       inverse = 0.0_dp
       coupling = 0.0_dp
       if (problem%mean_compliance <= 0.0_dp) return
       coupling = problem%mean_compliance*problem%weighted_tangent
       k = matmul(problem%weighted_tangent, coupling) + problem%curved_tangent
-      determinant = k(1, 1)*k(2, 2) - k(1, 2)**2
-      if (determinant <= 1.0e-6_dp*(k(1, 1) + k(2, 2))**2) then
-         coupling = 0.0_dp
-      else
-         inverse = reshape([k(2, 2), -k(1, 2), -k(1, 2), k(1, 1)], [2, 2])/determinant
-      end if
+      inverse = pseudo_inverse(k(1, 1), 0.5_dp*(k(1, 2) + k(2, 1)), k(2, 2), 1.0e-12_dp)
    end subroutine mean_mode
 
    !> Transform a row of w Z (g - H e c).

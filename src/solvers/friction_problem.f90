@@ -23,13 +23,14 @@ module friction_problem
    implicit none
    private
 
-   public :: friction_problem_type
+   public :: friction_problem_type, pseudo_inverse
 
    real(dp), parameter :: on_bound = 1.0_dp + 1.0e-9_dp   !! a point with s below it is on its bound
    real(dp), parameter :: outermost = 4.0_dp              !! no point is moved out by more than this
    real(dp), parameter :: stiffest = 1.0e15_dp            !! curvature of a bound, in units of a_0
 
-   integer, parameter :: corrections = 4        !! of a total, at most
+   real(dp), parameter :: few = 1.0e-6_dp      !! points that cannot make good for all others
+   integer, parameter :: corrections = 12       !! of a total, at most
    !> What of a total may be missed: the slip that it makes over the largest residual.
    real(dp), parameter :: negligible = 0.1_dp
 
@@ -330,9 +331,11 @@ contains
       returned = nint(sums(1))
    end subroutine move
 
-   !> The same with the total that T + step d has, where the bounds leave one: a uniform traction
-   !> makes good for what the points put back miss. A stiff mean mode would throw all the contact for
-   !> less.
+   !> The same, and the points that stuck keep the total of T + step d, where their bounds leave it: a
+   !> uniform traction c makes good for what those put back miss. A stiff mean mode would throw all
+   !> the contact for less. (What points that slip miss by turning is of second order.) What is missed,
+   !> m(c), is monotone: Newton's steps, and where one goes too far, the place on its way where
+   !> m.s = 0 (regula falsi, Illinois).
    subroutine move_total(self, operator, step, dx, dy, returned, again)
       class(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
@@ -340,29 +343,75 @@ contains
       real(dp), intent(in) :: dx(:, :), dy(:, :)    !! [nx, ny] direction d, Pa
       integer, intent(out) :: returned              !! points that were put back
       logical, intent(in) :: again                  !! anew from the T before the last move
-      real(dp) :: sums(moves), c(2), better(2), missed, k(2, 2), determinant
-      integer :: trial
+      real(dp) :: sums(moves), c(2), s(2), missed(2), allowed
+      real(dp) :: near, far, at_near, at_far, t, at_t
+      integer :: trial, side
 
       call move_rows(self, operator, step, [0.0_dp, 0.0_dp], dx, dy, again, .false., sums)
       c = 0.0_dp
-      better = 0.0_dp
-      missed = norm2(sums(4:5))
-      do trial = 1, corrections
-         if (missed*self%mean_compliance <= negligible*self%residual*self%scale) exit
-         k = reshape([sums(6), sums(7), sums(7), sums(8)], [2, 2])
-         determinant = k(1, 1)*k(2, 2) - k(1, 2)**2
-         if (determinant <= 1.0e-6_dp*(k(1, 1) + k(2, 2))**2) exit
-         c = c - matmul(reshape([k(2, 2), -k(1, 2), -k(1, 2), k(1, 1)], [2, 2]), sums(4:5))/determinant
-         call move_rows(self, operator, step, c, dx, dy, .true., .false., sums)
-         if (norm2(sums(4:5)) >= missed) then
-            call move_rows(self, operator, step, better, dx, dy, .true., .false., sums)
-            exit
-         end if
-         missed = norm2(sums(4:5))
-         better = c
+      allowed = negligible*self%residual*self%scale/self%mean_compliance
+      trial = 0
+      do while (trial < corrections .and. norm2(sums(4:5)) > allowed)
+         missed = sums(4:5)
+         s = -matmul(pseudo_inverse(sums(6), sums(7), sums(8), few), missed)
+         if (.not. norm2(s) > 0.0_dp) exit
+         near = 0.0_dp
+         at_near = dot_product(missed, s)
+         far = 1.0_dp
+         call move_rows(self, operator, step, c + s, dx, dy, .true., .false., sums)
+         trial = trial + 1
+         at_far = dot_product(sums(4:5), s)
+         t = 1.0_dp
+         side = 0
+         do while (at_far > 0.0_dp .and. norm2(sums(4:5)) > allowed .and. trial < corrections)
+            t = near + (far - near)*at_near/(at_near - at_far)
+            call move_rows(self, operator, step, c + t*s, dx, dy, .true., .false., sums)
+            trial = trial + 1
+            at_t = dot_product(sums(4:5), s)
+            if (at_t > 0.0_dp) then
+               far = t
+               at_far = at_t
+               if (side == 1) at_near = 0.5_dp*at_near
+               side = 1
+            else
+               near = t
+               at_near = at_t
+               if (side == -1) at_far = 0.5_dp*at_far
+               side = -1
+               if (abs(at_t) < 0.1_dp*norm2(sums(4:5))*norm2(s)) exit
+            end if
+         end do
+         c = c + t*s
+         if (norm2(sums(4:5)) > 0.9_dp*norm2(missed)) exit
       end do
       returned = nint(sums(1))
    end subroutine move_total
+
+   !> Inverse of the symmetric matrix (xx, xy; xy, yy), semidefinite, on the axes that it does not
+   !> leave out; 0 for 0.
+   pure function pseudo_inverse(xx, xy, yy, left_out) result(inverse)
+      real(dp), intent(in) :: xx, xy, yy
+      real(dp), intent(in) :: left_out               !! of the larger eigenvalue
+      real(dp) :: inverse(2, 2)
+      real(dp) :: larger, smaller, axis(2)
+
+      inverse = 0.0_dp
+      larger = 0.5_dp*(xx + yy + hypot(xx - yy, 2.0_dp*xy))
+      if (.not. larger > 0.0_dp) return
+      smaller = (xx*yy - xy**2)/larger
+      if (xx >= yy) then
+         axis = [larger - yy, xy]
+      else
+         axis = [xy, larger - xx]
+      end if
+      if (smaller > left_out*larger) then
+         inverse = reshape([yy, -xy, -xy, xx], [2, 2])/(xx*yy - xy**2)
+      else if (norm2(axis) > 0.0_dp) then
+         axis = axis/norm2(axis)
+         inverse(:, 1) = axis(1)*axis/larger
+         inverse(:, 2) = axis(2)*axis/larger
+      end if
+   end function pseudo_inverse
 
    !> The rows of both.
    subroutine move_rows(self, operator, step, c, dx, dy, again, transform, sums)

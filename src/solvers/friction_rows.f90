@@ -54,8 +54,8 @@ contains
       end do
    end subroutine bound_row
 
-   !> T' = T + step d + w Z c, put back: slip points on their bound from both sides, others only from
-   !> outside. T_old is the T before; the move is done anew from there if wanted.
+   !> T' = T + step d, sticking points with c beside: put back, slip points on their bound from both
+   !> sides, others only from outside. T_old is the T before; the move is done anew from there if wanted.
    pure subroutine moved_row(n, k, again, step, c, p, hx, hy, force, nz, dx, dy, vx, vy, w, tx, ty, &
       old_x, old_y, state, sums)
       integer, intent(in) :: n
@@ -69,9 +69,10 @@ contains
       real(dp), intent(inout) :: tx(n), ty(n)
       real(dp), intent(inout) :: old_x(n), old_y(n)
       real(dp), intent(inout) :: state(n)
-      !> Points put back, |T' - T|^2, |T'|^2, T' - T - step d (2), what of c arrives (xx, xy, yy).
+      !> Points put back, |T' - T|^2, |T'|^2; of the points that stuck: T' - T - step d (2), what of c
+      !> arrives (xx, xy, yy).
       real(dp), intent(out) :: sums(moves)
-      real(dp) :: mu, ex, ey, nd, m, s, limit, moved, changed, size, put, cv, arrived, missed_x
+      real(dp) :: mu, ex, ey, nd, m, s, limit, moved, changed, size, put, free, arrived, missed_x
       real(dp) :: missed_y, xx, xy, yy, axis_x, axis_y, wanted_x, wanted_y, inverse
       logical :: out, slip
       integer :: i
@@ -85,18 +86,18 @@ contains
       xx = 0.0_dp
       xy = 0.0_dp
       yy = 0.0_dp
-      !$omp simd private(ex, ey, nd, m, s, limit, put, out, slip, cv, arrived, axis_x, axis_y) &
+      !$omp simd private(ex, ey, nd, m, s, limit, put, out, slip, free, arrived, axis_x, axis_y) &
       !$omp private(wanted_x, wanted_y, inverse) &
       !$omp reduction(+: moved, changed, size, missed_x, missed_y, xx, xy, yy)
       do i = 1, n
          old_x(i) = merge(old_x(i), tx(i), again)
          old_y(i) = merge(old_y(i), ty(i), again)
          slip = merge(w(i) <= 0.0_dp .or. vx(i)**2 + vy(i)**2 > 0.5_dp, state(i) > 1.5_dp, again)
-         cv = c(1)*vx(i) + c(2)*vy(i)
+         free = merge(1.0_dp, 0.0_dp, state(i) > 0.5_dp .and. .not. slip)
          wanted_x = old_x(i) + step*dx(i)
          wanted_y = old_y(i) + step*dy(i)
-         ex = wanted_x + w(i)*(c(1) - cv*vx(i)) + p(i)*hx(i)
-         ey = wanted_y + w(i)*(c(2) - cv*vy(i)) + p(i)*hy(i)
+         ex = wanted_x + free*c(1) + p(i)*hx(i)
+         ey = wanted_y + free*c(2) + p(i)*hy(i)
          nd = -nz(i)*(hx(i)*ex + hy(i)*ey)
          m = sqrt(max(ex**2 + ey**2 - nd**2, 0.0_dp))
          inverse = 1.0_dp/max(m, tiny(1.0_dp))
@@ -106,19 +107,19 @@ contains
          out = s < limit .and. state(i) > 0.5_dp
          put = merge(s, 1.0_dp, out)
          ! A point that came to the bound still moves along it.
-         arrived = merge(inverse, 0.0_dp, out)
-         axis_x = merge(vx(i), arrived*ex, slip)
-         axis_y = merge(vy(i), arrived*ey, slip)
-         arrived = merge(w(i)*min(put, 1.0_dp), 0.0_dp, state(i) > 0.5_dp)
-         xx = xx + arrived*(1.0_dp - axis_x**2)
+         inverse = merge(inverse, 0.0_dp, out)
+         axis_x = inverse*ex
+         axis_y = inverse*ey
+         arrived = free*min(put, 1.0_dp)
+         xx = xx + arrived*max(1.0_dp - axis_x**2, 0.0_dp)
          xy = xy - arrived*axis_x*axis_y
-         yy = yy + arrived*(1.0_dp - axis_y**2)
+         yy = yy + arrived*max(1.0_dp - axis_y**2, 0.0_dp)
          ex = put*ex - p(i)*hx(i)
          ey = put*ey - p(i)*hy(i)
          tx(i) = merge(ex, 0.0_dp, state(i) > 0.5_dp)
          ty(i) = merge(ey, 0.0_dp, state(i) > 0.5_dp)
-         missed_x = missed_x + merge(ex - wanted_x, 0.0_dp, state(i) > 0.5_dp)
-         missed_y = missed_y + merge(ey - wanted_y, 0.0_dp, state(i) > 0.5_dp)
+         missed_x = missed_x + free*(ex - wanted_x)
+         missed_y = missed_y + free*(ey - wanted_y)
          state(i) = merge(merge(2.0_dp, 1.0_dp, out .or. s <= k%on_bound), 0.0_dp, state(i) > 0.5_dp)
          moved = moved + merge(1.0_dp, 0.0_dp, out)
          changed = changed + (tx(i) - old_x(i))**2 + (ty(i) - old_y(i))**2
