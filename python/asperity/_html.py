@@ -102,8 +102,7 @@ def run_html(run: Run) -> str:
               f"{shown(history[name][-1], history.units(name))} {curve(history[name])}")
              for name in ("time", "pressure", "contact_area", "friction")
              if name in history and history.rows]
-    if str(run.attributes.get("warnings", "")).strip():
-        rows.append(("warnings", "<br>".join(map(escape,
-                                                 str(run.attributes["warnings"]).splitlines()))))
+    if run.warnings:
+        rows.append(("warnings", "<br>".join(map(escape, run.warnings))))
     return table_html((), rows, f"<b>{escape(run.title or 'untitled run')}</b>"
                                 f" <code>{escape(str(run.path))}</code>")

@@ -127,11 +127,13 @@ def _notes(run: Run) -> str:
     rows, expected = run.history.rows, int(run.attributes.get("expected_rows", 0) or 0)
     if not run.finished:
         of = f" of {expected}" if expected else ""
+        state = ("It is still going, or was killed" if run.outcome == "running"
+                 else f"It ended so: {escape(run.outcome)}")
         parts.append(f"<p><strong>This run is not finished.</strong> {rows}{of} rows were written"
-                     f" when this page was made. It is still going, was stopped, or did not"
-                     f" converge; <code>asperity run CASE.nml --restart</code> goes on from the"
+                     f" when this page was made. {state};"
+                     f" <code>asperity run CASE.nml --restart</code> goes on from the"
                      f" last checkpoint. Make the page again to see more.</p>")
-    told = [line for line in str(run.attributes.get("warnings", "")).splitlines() if line.strip()]
+    told = run.warnings
     tolerance = solver_setting(run, "tolerance")
     if tolerance is not None:
         for name in ("normal", "tangential"):

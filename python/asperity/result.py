@@ -425,6 +425,17 @@ class Run:
         return bool(int(self.attributes.get("finished", 0)))
 
     @property
+    def outcome(self) -> str:
+        """How the run ended: 'running' (or killed), 'finished', 'stopped after ...', or why not."""
+        return str(self.attributes.get("outcome", "finished" if self.finished else "running"))
+
+    @property
+    def warnings(self) -> list[str]:
+        """The warnings of the input, then those of the run (once it has ended or stopped)."""
+        return [line for name in ("warnings", "run_warnings")
+                for line in str(self.attributes.get(name, "")).splitlines() if line.strip()]
+
+    @property
     def height(self) -> FloatArray:
         """Height of the road before any sliding, m, shape (ny, nx)."""
         def read(file: h5py.File) -> FloatArray:

@@ -167,7 +167,7 @@ def picture(run: Run, pace: Pace, width: int, unicode: bool = True) -> list[str]
             lines.append(f"{label:>12}  "
                          f"{sparkline(values, room, BARS if unicode else '_.-=oO#@')}{ends}")
     lines.append(last_row(run))
-    for line in str(run.attributes.get("warnings", "")).splitlines():
+    for line in run.warnings:
         lines.append(f"warning: {line}")
     return [part for line in lines for part in
             ([line] if len(line) <= width else textwrap.wrap(line, width))]

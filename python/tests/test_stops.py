@@ -122,3 +122,35 @@ def test_contact_before_the_road_moves(tmp_path: Path) -> None:
         first = run.snapshots[0]
         np.testing.assert_array_equal(first.contact, np.where(first.pressure > 0, state, 0))
         assert (run.history["stick_area"][0] == run.history["contact_area"][0]) == (state == 1)
+
+
+def test_outcome_and_warnings_stay(tmp_path: Path) -> None:
+    """The result says how the run ended and what it warned of, the same with a stop on the way."""
+    whole, parts = tmp_path / "whole.nml", tmp_path / "parts.nml"
+    for case in (whole, parts):
+        case.write_text(SWINGING)
+    go(whole)
+    run = asperity.open(whole.with_suffix(".h5"))
+    assert run.outcome == "finished"
+    swings = [line for line in run.warnings if "numerical stick-slip" in line]
+    assert len(swings) == 1
+    step = int(swings[0].removeprefix("step ").split(",")[0])
+    go(parts, step + 3)
+    stopped = asperity.open(parts.with_suffix(".h5"))
+    assert stopped.outcome == f"stopped after step {step + 2}"
+    assert stopped.warnings == run.warnings
+    go(parts, 4, restart=True)
+    go(parts, restart=True)
+    assert asperity.open(parts.with_suffix(".h5")).warnings == run.warnings
+    assert asperity.open(parts.with_suffix(".h5")).outcome == "finished"
+
+
+def test_outcome_of_a_failure(tmp_path: Path) -> None:
+    """A run that does not converge says at which step and why."""
+    case = tmp_path / "case.nml"
+    case.write_text(SWINGING.replace("passes = 1", "passes = 1, max_iterations = 6"))
+    with pytest.raises(asperity.NotConverged, match="did not converge"):
+        asperity.run(case, quiet=True)
+    outcome = asperity.open(case.with_suffix(".h5")).outcome
+    assert outcome.startswith("step ")
+    assert "the solver did not converge" in outcome

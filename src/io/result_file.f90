@@ -55,6 +55,7 @@ module result_file
       procedure :: create => create_result
       procedure :: reopen => reopen_result
       procedure :: write_text
+      procedure :: read_text
       procedure :: append_row
       procedure :: begin_snapshot
       procedure, private :: write_real_field, write_state_field, write_material_value, &
@@ -225,6 +226,17 @@ contains
 
       call self%file%write_attribute('/', name, value, error)
    end subroutine write_text
+
+   !> A text attribute of the result; empty where there is none.
+   subroutine read_text(self, name, value, error)
+      class(result_file_type), intent(inout) :: self
+      character(*), intent(in) :: name
+      character(:), allocatable, intent(out) :: value
+      type(error_type), allocatable, intent(out) :: error
+
+      value = ''
+      if (self%file%has_attribute('/', name)) call self%file%read_attribute('/', name, value, error)
+   end subroutine read_text
 
    !> Write a number of the material; before the first row.
    subroutine write_material_value(self, name, value, units, long_name, error)

@@ -26,6 +26,7 @@ module case_run
       integer :: rows = 0                          !! rows of the whole run
       logical :: finished = .false.
       character(:), allocatable :: warnings        !! new ones, a line each; the caller clears them
+      character(:), allocatable, private :: told   !! all of them
       type(result_file_type), private :: result
       character(:), allocatable, private :: path   !! of the result
       integer, private :: next_time = 1            !! next of the times for snapshots
@@ -51,6 +52,7 @@ contains
       call set_threads(case%solver%threads)
       self%path = trim(case%output%file)
       self%warnings = ''
+      self%told = ''
       self%rows = count_rows(case%phases)
       self%finished = .false.
       self%next_time = 1
@@ -82,6 +84,8 @@ contains
          call write_material(self, error)
          if (allocated(error)) return
          call self%result%write_text('warnings', case%warnings, error)
+         if (allocated(error)) return
+         call self%result%write_text('outcome', 'running', error)
       end associate
    end subroutine create_result
 
@@ -123,6 +127,10 @@ contains
       if (allocated(error)) return
       call self%result%reopen(self%path, self%sim%row%step, self%sim%case%output%compression, error)
       if (allocated(error)) return
+      call self%result%write_text('outcome', 'running', error)
+      if (allocated(error)) return
+      call take_up_warnings(self, error)
+      if (allocated(error)) return
       self%finished = self%sim%finished
       self%last_snapshot = self%result%last_snapshot()
       associate (times => self%sim%case%output%snapshot_times)
@@ -133,10 +141,43 @@ contains
       end associate
    end subroutine take_up
 
+   !> The warnings that the run had left, but for those of rows that are done again.
+   subroutine take_up_warnings(self, error)
+      type(run_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: left, line
+      integer :: at, next, step, status
+
+      call self%result%read_text('run_warnings', left, error)
+      if (allocated(error)) return
+      at = 1
+      do while (at <= len(left))
+         next = index(left(at:), new_line('a'))
+         if (next == 0) next = len(left) - at + 2
+         line = left(at:at + next - 2)
+         at = at + next
+         read (line(min(6, len(line)):max(5, index(line, ',') - 1)), *, iostat=status) step
+         if (status == 0 .and. step > self%sim%row%step) cycle
+         if (len(self%told) > 0) self%told = self%told//new_line('a')
+         self%told = self%told//line
+      end do
+   end subroutine take_up_warnings
+
+   !> Leave in the result how the run ended, and what it warned of.
+   subroutine leave_word(self, outcome, error)
+      type(run_type), intent(inout) :: self
+      character(*), intent(in) :: outcome
+      type(error_type), allocatable, intent(out) :: error
+
+      if (len(self%told) > 0) call self%result%write_text('run_warnings', self%told, error)
+      if (.not. allocated(error)) call self%result%write_text('outcome', outcome, error)
+   end subroutine leave_word
+
    !> Do a row, and write what is due. With status error_convergence the row is kept all the same.
    subroutine step_run(self, error)
       class(run_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: outcome
 
       call self%sim%advance(error)
       if (allocated(error)) return
@@ -147,17 +188,22 @@ contains
       if (snapshot_due(self)) call write_snapshot(self, error)
       if (allocated(error)) return
       if (.not. self%sim%converged) then
-         call fail(error, error_convergence, self%path//': step '//to_text(self%sim%row%step)// &
-            ' of phase '//to_text(self%sim%row%phase)//', t = '//to_text(self%sim%row%time)// &
-            ' s: the solver did not converge: '//trim(self%sim%reason)//'; residual '// &
-            to_text(self%sim%row%residual_normal)//', allowed '// &
-            to_text(self%sim%case%solver%tolerance)//'; all steps up to this one are kept')
+         outcome = 'step '//to_text(self%sim%row%step)//' of phase '//to_text(self%sim%row%phase)// &
+            ', t = '//to_text(self%sim%row%time)//' s: the solver did not converge: '// &
+            trim(self%sim%reason)//'; residual '//to_text(self%sim%residual)//', allowed '// &
+            to_text(self%sim%case%solver%tolerance)
+         call leave_word(self, outcome, error)
+         if (allocated(error)) return
+         call fail(error, error_convergence, self%path//': '//outcome// &
+            '; all steps up to this one are kept')
          return
       end if
       if (self%finished) then
          call self%result%unlink_checkpoint(error)
          if (allocated(error)) return
          call remove_checkpoint(self%path)
+         call leave_word(self, 'finished', error)
+         if (allocated(error)) return
          call self%result%finish(.true., error)
       else if (checkpoint_due(self)) then
          call self%save(error)
@@ -253,6 +299,8 @@ contains
       if (self%sim%row%step > self%last_snapshot .and. self%sim%schedule%row >= 0) &
          call write_snapshot(self, error, at_stop=.true.)
       if (allocated(error)) return
+      call leave_word(self, 'stopped after step '//to_text(self%sim%row%step), error)
+      if (allocated(error)) return
       if (self%sim%schedule%row >= 0) call self%save(error)
    end subroutine interrupt_run
 
@@ -273,6 +321,8 @@ contains
       if (len(self%sim%warnings) == 0) return
       if (len(self%warnings) > 0) self%warnings = self%warnings//new_line('a')
       self%warnings = self%warnings//self%sim%warnings
+      if (len(self%told) > 0) self%told = self%told//new_line('a')
+      self%told = self%told//self%sim%warnings
       self%sim%warnings = ''
    end subroutine collect_warnings
 

@@ -1,7 +1,7 @@
 !> What a result holds, in words.
 !>
-!> Besides what every result holds, the root's text attribute `outcome` is told where a run has left
-!> one: why it ended, if not at its end.
+!> Of a run that is not finished the root's text attribute `outcome` says why it ended; the warnings
+!> of the input and of the run follow.
 module result_summary
    use case_input, only : parse_case
    use case_settings, only : case_type
@@ -68,10 +68,36 @@ contains
       else
          text = text//'finished    no'//nl
       end if
-      if (.not. file%has_attribute('/', 'outcome')) return
-      call file%read_attribute('/', 'outcome', outcome, error)
-      if (.not. allocated(error)) text = text//'outcome     '//ordinary(outcome, 400)//nl
+      if (finished == 0 .and. file%has_attribute('/', 'outcome')) then
+         call file%read_attribute('/', 'outcome', outcome, error)
+         if (allocated(error)) return
+         if (outcome == 'running') outcome = 'going on, or killed'
+         text = text//'outcome     '//ordinary(outcome, 400)//nl
+      end if
+      call add_warnings(file, 'warnings', text, error)
+      if (.not. allocated(error)) call add_warnings(file, 'run_warnings', text, error)
    end subroutine describe
+
+   !> The lines of an attribute with warnings, where there is one.
+   subroutine add_warnings(file, name, text, error)
+      type(hdf5_file_type), intent(inout) :: file
+      character(*), intent(in) :: name
+      character(:), allocatable, intent(inout) :: text
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: lines
+      integer :: at, next
+
+      if (.not. file%has_attribute('/', name)) return
+      call file%read_attribute('/', name, lines, error)
+      if (allocated(error)) return
+      at = 1
+      do while (at <= len(lines))
+         next = index(lines(at:), nl)
+         if (next == 0) next = len(lines) - at + 2
+         if (next > 1) text = text//'warning     '//ordinary(lines(at:at + next - 2), 400)//nl
+         at = at + next
+      end do
+   end subroutine add_warnings
 
    !> The phases of the input that the result keeps.
    function phases_text(input) result(text)

@@ -46,6 +46,7 @@ module simulation
       logical :: converged = .true.                 !! the last row's solvers met the tolerance
       logical :: finished = .false.                 !! no row is left
       character(64) :: reason = ''                  !! why not converged
+      real(dp) :: residual = 0.0_dp                 !! of the solver that did not, or of the normal one
       character(:), allocatable :: warnings         !! new ones, a line each; the caller clears them
       real(dp), allocatable :: height(:, :)         !! H under the rubber now, m
       real(dp), allocatable :: pressure(:, :)       !! P, Pa
@@ -156,7 +157,13 @@ contains
       end if
       self%converged = outcome%converged .and. rubbing%converged
       self%reason = outcome%reason
-      if (outcome%converged) self%reason = 'friction: '//trim(rubbing%reason)
+      self%residual = outcome%residual
+      if (outcome%converged .and. .not. rubbing%converged) then
+         self%reason = 'friction: '//trim(rubbing%reason)
+         self%residual = rubbing%residual
+         if (rubbing%residual <= self%case%solver%tolerance) &
+            self%reason = trim(self%reason)//' before the tractions settled'
+      end if
 
       call commit_step(self, level)
       call system_clock(now)
@@ -293,7 +300,8 @@ contains
       real(dp), intent(in) :: slip_speed
       character(:), allocatable :: message
 
-      if (.not. plan%dt > 0.0_dp) return
+      ! A block that comes to rest behind its road is no stick-slip.
+      if (.not. plan%dt*hypot(plan%velocity_x, plan%velocity_y) > 0.0_dp) return
       call watch_slip(self%watch, slip_speed, hypot(plan%velocity_x, plan%velocity_y), &
          self%case%solver%passes, self%case%material%density, message)
       call add_warning(self, plan, message)
