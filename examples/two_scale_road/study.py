@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 import asperity
 
 #: Minutes of the full form on two cores.
-MINUTES = 5.0
+MINUTES = 4
 HERE = Path(__file__).resolve().parent
 
 
