@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["array_of", "choice", "exactly_one", "number", "poisson_ratio", "positive"]
+__all__ = ["array_of", "choice", "exactly_one", "number", "poisson_ratio", "positive", "whole"]
 
 
 def number(
@@ -65,6 +65,26 @@ def number(
 def positive(name: str, value: float) -> float:
     """Return `value` as a finite float above zero."""
     return number(name, value, 0.0, low_open=True)
+
+
+def whole(name: str, value: float) -> int:
+    """Return `value` as an int above zero.
+
+    Examples
+    --------
+    >>> whole("nx", 4.0)
+    4
+    >>> whole("nx", 2.5)
+    Traceback (most recent call last):
+    ...
+    ValueError: nx = 2.5: must be a positive integer
+    """
+    if isinstance(value, np.generic):
+        value = value.item()
+    good = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    if not good or value < 1 or int(value) != value:
+        raise ValueError(f"{name} = {value!r}: must be a positive integer")
+    return int(value)
 
 
 def poisson_ratio(value: float) -> float:

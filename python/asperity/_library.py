@@ -20,7 +20,8 @@ from asperity._core import asperity_flat
 from ._check import choice, positive
 from .errors import raise_for_status
 
-__all__ = ["bare", "call", "flag_of_boundary", "height_map", "lengths", "set_threads", "version"]
+__all__ = ["bare", "call", "check_depth", "contact_map", "flag_of_boundary", "height_map",
+           "lengths", "set_threads", "version"]
 
 _lock = threading.Lock()
 
@@ -111,3 +112,24 @@ def lengths(shape: tuple[int, int], lx: float, ly: float | None) -> tuple[float,
 def flag_of_boundary(boundary: str) -> int:
     """Return 1 for 'free', 0 for 'periodic'."""
     return int(choice("boundary", boundary, ("periodic", "free")) == "free")
+
+
+def contact_map(height: ArrayLike, lx: float, ly: float | None, boundary: str
+                ) -> tuple[NDArray[np.float64], float, float, int]:
+    """Return the map, its lengths and the flag of its boundary, fit for a normal contact."""
+    array = height_map(height)
+    lx, ly = lengths(array.shape, lx, ly)
+    free = flag_of_boundary(boundary)
+    if free and array.shape[0] == 1:
+        raise ValueError("boundary = 'free': a line contact has no finite displacement in free"
+                         " space: must be 'periodic'")
+    return array, lx, ly, free
+
+
+def check_depth(displacement: float, array: NDArray[np.float64]) -> None:
+    """Refuse a displacement that brings a periodic map into full contact."""
+    deepest = float(array.max()) - float(array.mean())
+    if displacement >= deepest:
+        raise ValueError(
+            f"displacement = {displacement}: must be below {deepest:g} m, the mean gap at first"
+            " touch: beyond it the pressure of a periodic contact is not determined")

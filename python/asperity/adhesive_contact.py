@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _library
-from ._check import choice, exactly_one, number, positive
+from ._check import choice, exactly_one, number, positive, whole
 from .contact import FloatArray, NormalContact
 from .errors import NotConverged
 
@@ -116,20 +116,14 @@ def solve_adhesive(
     >>> contact.force < 0 < contact.contact_area
     True
     """
-    array = _library.height_map(height)
+    array, lx, ly, free = _library.contact_map(height, lx, ly, boundary)
     shape = np.shape(height)
-    lx, ly = _library.lengths(array.shape, lx, ly)
-    free = _library.flag_of_boundary(boundary)
-    if free and array.shape[0] == 1:
-        raise ValueError("boundary = 'free': a line contact has no finite displacement in free"
-                         " space: must be 'periodic'")
     modulus = positive("modulus", modulus)
     choice("potential", potential, POTENTIALS)
     energy = number("energy", energy, 0.0)
     range = positive("range", range)
     tolerance = positive("tolerance", tolerance)
-    if int(max_iterations) != max_iterations or max_iterations < 1:
-        raise ValueError(f"max_iterations = {max_iterations}: must be a positive integer")
+    steps = whole("max_iterations", max_iterations)
     thesis = choice("method", method, ("fast", "thesis")) == "thesis"
     if thesis and free:
         raise ValueError("method = 'thesis': needs boundary = 'periodic'; 'fast' serves both")
@@ -137,11 +131,8 @@ def solve_adhesive(
     control = exactly_one(pressure=pressure, force=force, displacement=displacement)
     load = number(control, {"pressure": pressure, "force": force,
                             "displacement": displacement}[control])  # type: ignore[arg-type]
-    if control == "displacement" and not free and load >= top - float(array.mean()):
-        raise ValueError(
-            f"displacement = {displacement}: must be below {top - float(array.mean()):g} m, the"
-            " mean gap at first touch: beyond it the pressure of a periodic contact is not"
-            " determined")
+    if control == "displacement" and not free:
+        _library.check_depth(load, array)
     if control == "force":
         load /= lx * ly
 
@@ -161,8 +152,7 @@ def solve_adhesive(
                          f"{', '.join(map(repr, STARTS))} or an AdhesiveNormalContact")
     level, stuck, iterations, ffts, residual, seconds, converged, reason = _solve(
         array.T, traction.T, gap.T, attraction.T, lx, ly, free, modulus, potential, energy, range,
-        int(control == "displacement"), load, origin, int(thesis), tolerance, int(max_iterations),
-        level)
+        int(control == "displacement"), load, origin, int(thesis), tolerance, steps, level)
     mean = float(traction.mean())
     displaced = gap + array + level
     result = AdhesiveNormalContact(

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _library
-from ._check import choice, exactly_one, positive
+from ._check import choice, exactly_one, positive, whole
 from .errors import NotConverged
 
 __all__ = ["NormalContact", "solve_normal"]
@@ -125,26 +125,17 @@ def solve_normal(
     >>> abs(contact.displacement - 2e-5) < 2e-7      # Hertz
     True
     """
-    array = _library.height_map(height)
+    array, lx, ly, free = _library.contact_map(height, lx, ly, boundary)
     shape = np.shape(height)
-    lx, ly = _library.lengths(array.shape, lx, ly)
-    free = _library.flag_of_boundary(boundary)
-    if free and array.shape[0] == 1:
-        raise ValueError("boundary = 'free': a line contact has no finite displacement in free"
-                         " space: must be 'periodic'")
     modulus = positive("modulus", modulus)
     tolerance = positive("tolerance", tolerance)
-    if int(max_iterations) != max_iterations or max_iterations < 1:
-        raise ValueError(f"max_iterations = {max_iterations}: must be a positive integer")
+    steps = whole("max_iterations", max_iterations)
     control = exactly_one(pressure=pressure, force=force, displacement=displacement)
     top = float(array.max())
     if control == "displacement":
         target = positive("displacement", displacement) - top
-        deepest = top - float(array.mean())
-        if not free and target + top >= deepest:
-            raise ValueError(
-                f"displacement = {displacement}: must be below {deepest:g} m, the mean gap at first"
-                " touch: beyond it the pressure of a periodic contact is not determined")
+        if not free:
+            _library.check_depth(displacement, array)
     elif control == "force":
         target = positive("force", force) / (lx * ly)
     else:
@@ -163,7 +154,7 @@ def solve_normal(
     level, iterations, ffts, residual, seconds, converged, reason = _solve(
         array.T, traction.T, gap.T, lx, ly, free, modulus, int(control == "displacement"), target,
         int(start is not None), int(choice("method", method, ("fast", "thesis")) == "thesis"),
-        tolerance, int(max_iterations))
+        tolerance, steps)
     mean = float(traction.mean())
     result = NormalContact(
         traction.reshape(shape), gap.reshape(shape), (gap + array + level).reshape(shape), mean,

@@ -7,6 +7,7 @@ import sys
 import warnings
 
 from . import _input, _library
+from ._check import whole
 from .case import Case
 from .errors import NotConverged
 from .result import Run
@@ -69,8 +70,8 @@ def run(
     ...
     OSError: nowhere.nml: there is no such file
     """
-    if threads is not None and (int(threads) != threads or threads < 1):
-        raise ValueError(f"threads = {threads}: must be a positive integer")
+    if threads is not None:
+        threads = whole("threads", threads)
     target = b"" if output is None else os.fsencode(output)
     if output is not None and not 0 < len(target) <= 1024:
         raise ValueError(f"output: has {len(target)} characters: must have 1 to 1024")

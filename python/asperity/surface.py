@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _library
-from ._check import choice, exactly_one, number, positive
+from ._check import choice, exactly_one, number, positive, whole
 from .measured import MeasuredSurface, import_topography, load
 
 __all__ = ["MeasuredSurface", "RadialPsd", "Statistics", "import_topography", "load", "psd",
@@ -300,11 +300,9 @@ def _make(
     centre_y: float | None = None,
 ) -> FloatArray:
     """Make a map of one term."""
-    for word, count in (("nx", nx), ("ny", ny)):
-        if int(count) != count or count < 1:
-            raise ValueError(f"{word} = {count}: must be a positive integer")
+    nx, ny = whole("nx", nx), whole("ny", ny)
     lx, ly = _library.lengths((ny, nx), lx, ly)
-    height = np.zeros((int(ny), int(nx)))
+    height = np.zeros((ny, nx))
     centre_x = nx // 2 * lx / nx if centre_x is None else number("centre_x", centre_x)
     centre_y = ny // 2 * ly / ny if centre_y is None else number("centre_y", centre_y)
     if not -(2**31) <= seed < 2**31:

@@ -23,7 +23,7 @@ from typing import IO, Any
 import numpy as np
 
 from . import _input
-from ._check import choice
+from ._check import choice, whole
 from ._library import version
 from ._program import program
 from ._sweep_progress import Progress
@@ -140,11 +140,9 @@ def sweep(
     """
     choice("errors", errors, ("raise", "keep"))
     cores = _processors()
-    for name, number in (("jobs", jobs), ("threads", threads)):
-        if number is None and name == "jobs":
-            continue
-        if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < 1:
-            raise ValueError(f"{name} = {number!r}: must be a positive integer")
+    if jobs is not None:
+        jobs = whole("jobs", jobs)
+    threads = whole("threads", threads)
     if threads > cores:
         raise ValueError(f"threads = {threads}: must be at most the {cores} processors")
     side_by_side = min(jobs or cores, max(1, cores // threads))

@@ -222,12 +222,7 @@ contains
          end if
          call solver%destroy()
       end if
-      iterations = outcome%iterations
-      ffts = real(outcome%ffts, dp)
-      residual = outcome%residual
-      seconds = outcome%seconds
-      converged = merge(1, 0, outcome%converged)
-      reason = outcome%reason
+      call tell(outcome, iterations, ffts, residual, seconds, converged, reason)
       call report(error, status, message)
    end subroutine contact_normal
 
@@ -303,12 +298,7 @@ contains
          end do
          call side%destroy()
       end if
-      iterations = outcome%iterations
-      ffts = real(outcome%ffts, dp)
-      residual = outcome%residual
-      seconds = outcome%seconds
-      converged = merge(1, 0, outcome%converged)
-      reason = outcome%reason
+      call tell(outcome, iterations, ffts, residual, seconds, converged, reason)
       call report(error, status, message)
    end subroutine contact_adhesive
 
@@ -544,6 +534,24 @@ contains
 
       grid = new_grid(int(nx), int(ny), lx, ly, merge(boundary_free, boundary_periodic, is_free == 1))
    end function grid_of
+
+   !> What a solve was, in the arguments of a call.
+   subroutine tell(outcome, iterations, ffts, residual, seconds, converged, reason)
+      use precision, only : dp
+      use solver_result, only : solver_result_type
+      type(solver_result_type), intent(in) :: outcome
+      integer(c_int), intent(out) :: iterations
+      real(c_double), intent(out) :: ffts, residual, seconds
+      integer(c_int), intent(out) :: converged             !! 1 or 0
+      character(len=64), intent(out) :: reason
+
+      iterations = outcome%iterations
+      ffts = real(outcome%ffts, dp)
+      residual = outcome%residual
+      seconds = outcome%seconds
+      converged = merge(1, 0, outcome%converged)
+      reason = outcome%reason
+   end subroutine tell
 
    !> Turn an error into a status and a message.
    subroutine report(error, status, message)

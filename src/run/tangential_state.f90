@@ -65,7 +65,6 @@ module tangential_state
       procedure :: extrapolate
       procedure :: solve
       procedure :: return_to_bound
-      procedure :: trim => trim_traction
       procedure :: commit
       procedure :: kinetic
       procedure :: sums
@@ -253,17 +252,6 @@ contains
          end do
       end do
    end subroutine mark_contact
-
-   !> Return T to the bound of a pressure that differs by less than the tolerance from its own.
-   subroutine trim_traction(self, pressure, gap, slope_x, slope_y)
-      class(tangential_state_type), intent(inout) :: self
-      real(dp), intent(in) :: pressure(:, :), gap(:, :)
-      real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)
-
-      call mark_contact(self, pressure, gap)
-      call return_tractions(self%law, pressure, slope_x, slope_y, self%contact, &
-         self%traction(:, :, 1), self%traction(:, :, 2))
-   end subroutine trim_traction
 
    !> An instantaneous row: T stays as it is but for the bound of the new pressure, and the rubber
    !> answers at once. A mass does not move in no time.
