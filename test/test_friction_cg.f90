@@ -676,7 +676,6 @@ contains
       call set_rough(self, 6, 0.1_dp, -0.3_dp)
       self%law = new_friction_law('coulomb', mu, 0.0_dp, 0.0_dp, .false., .true.)
       self%solver%tolerance = 1e-8_dp
-      self%solver%slip_scale = step
       iterations = 0
       do k = 1, 60
          self%p = cshift(self%p, -1, 1)

@@ -68,7 +68,7 @@ def positive(name: str, value: float) -> float:
 
 
 def whole(name: str, value: float) -> int:
-    """Return `value` as an int above zero.
+    """Return `value` as an int above zero that the library can take.
 
     Examples
     --------
@@ -82,7 +82,7 @@ def whole(name: str, value: float) -> int:
     if isinstance(value, np.generic):
         value = value.item()
     good = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-    if not good or value < 1 or int(value) != value:
+    if not good or not 1 <= value < 2**31 or int(value) != value:
         raise ValueError(f"{name} = {value!r}: must be a positive integer")
     return int(value)
 

@@ -43,7 +43,7 @@ def add_import(verbs: Any) -> None:
                         help="other numbers of cells; a line scan has NX only")
     parser.add_argument("--periodic", nargs="?", const="tukey", choices=("tukey", "hann"),
                         help="bring the edges to the mean height by a window (default: tukey)")
-    parser.add_argument("--taper", type=float, default=0.2, metavar="SHARE",
+    parser.add_argument("--taper", type=float, metavar="SHARE",
                         help="share of each length that the Tukey window tapers (default: 0.2)")
     parser.add_argument("--restore-rms", action="store_true",
                         help="scale the windowed heights to the rms height before")
@@ -118,6 +118,13 @@ def _fit(chosen: argparse.Namespace) -> int:
         if not equals or not name.strip():
             raise ValueError(f"--column {given}: must be ROLE=NAME or ROLE=NUMBER")
         columns[role.strip()] = name.strip()
+    output = chosen.output
+    if output is not None:
+        if not output.parent.is_dir():
+            raise OSError(f"{output}: cannot be written: there is no folder"
+                          f" {str(output.parent)!r}")
+        if output.exists() and chosen.table.exists() and output.samefile(chosen.table):
+            raise ValueError(f"--output {output}: is the table itself")
     table = read_dma(
         chosen.table, columns=columns, frequency_unit=chosen.frequency_unit,
         modulus_unit=chosen.modulus_unit, temperature_unit=chosen.temperature_unit,
@@ -128,16 +135,13 @@ def _fit(chosen: argparse.Namespace) -> int:
         least_plateau=chosen.least_plateau)
     group = fit.to_namelist(poisson=chosen.poisson, temperature=chosen.temperature)
     told = sys.stdout
-    if chosen.output is None:
+    if output is None:
         print(group)
         told = sys.stderr  # the group alone, its comments say all, can be redirected
     else:
-        if not chosen.output.parent.is_dir():
-            raise OSError(f"{chosen.output}: cannot be written: there is no folder"
-                          f" {str(chosen.output.parent)!r}")
-        chosen.output.write_text(group + "\n", encoding="utf-8")
+        output.write_text(group + "\n", encoding="utf-8")
         print(fit.summary())
-        print(f"wrote {chosen.output}")
+        print(f"wrote {output}")
     if chosen.plot is not None:
         import matplotlib
 

@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from .result import Grid, Run, Snapshot
 
 __all__ = ["closure", "energy_terms", "friction_outside", "has_adhesion", "has_friction",
-           "has_rough_road", "is_elastic", "moved_slopes", "rms_slope", "setting", "solver_setting",
-           "travel"]
+           "has_rough_road", "is_elastic", "moved_slopes", "rms_slope", "road_slopes", "road_speed",
+           "setting", "solver_setting", "travel"]
 
 FloatArray = NDArray[np.float64]
 
@@ -136,6 +136,15 @@ def closure(run: Run) -> FloatArray | None:
     return np.divide(missing, largest, out=np.zeros_like(missing), where=largest > 0.0)
 
 
+def road_speed(run: Run) -> FloatArray:
+    """Return the speed of the road in each step, m/s; 0 where no time passes."""
+    history = run.history
+    passed = np.diff(history["time"])
+    moved = np.hypot(np.diff(history["road_x"]), np.diff(history["road_y"]))
+    speed = np.divide(moved, passed, out=np.zeros_like(moved), where=passed > 0.0)
+    return np.concatenate([[0.0], speed])
+
+
 def direction(run: Run, row: int) -> tuple[float, float] | None:
     """Return the unit vector of the road's way up to a row: of its last move; None before."""
     history = run.history
@@ -148,7 +157,22 @@ def direction(run: Run, row: int) -> tuple[float, float] | None:
     return None
 
 
-def moved_slopes(snapshot: Snapshot, road: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+def road_slopes(run: Run) -> list[FloatArray]:
+    """Return dH/dx and dH/dy of the road at its cells, by central differences."""
+    grid, height = run.grid, run.height
+    slopes = []
+    for axis, spacing in ((1, grid.dx), (0, grid.dy)):
+        if height.shape[axis] < 2:
+            slopes.append(np.zeros_like(height))
+        elif grid.boundary == "periodic":
+            slopes.append((np.roll(height, -1, axis) - np.roll(height, 1, axis)) / (2 * spacing))
+        else:
+            slopes.append(np.gradient(height, spacing, axis=axis))
+    return slopes
+
+
+def moved_slopes(snapshot: Snapshot, road: tuple[float, float],
+                 slopes: list[FloatArray] | None = None) -> tuple[FloatArray, FloatArray]:
     """Return the slopes of the road under the points of the rubber, as the program takes them.
 
     Central differences of the height, interpolated between cells where the road has moved to,
@@ -160,6 +184,8 @@ def moved_slopes(snapshot: Snapshot, road: tuple[float, float]) -> tuple[FloatAr
         Its displacements along x and y are used where it has them.
     road : tuple of float
         How far the road has moved along x and y, m.
+    slopes : list of ndarray, optional
+        Those of `road_slopes`, where many snapshots are looked at.
 
     Returns
     -------
@@ -168,23 +194,15 @@ def moved_slopes(snapshot: Snapshot, road: tuple[float, float]) -> tuple[FloatAr
     """
     from scipy.ndimage import map_coordinates
 
-    grid, height = snapshot.run.grid, snapshot.run.height
-    periodic = grid.boundary == "periodic"
-    slopes = []
-    for axis, spacing in ((1, grid.dx), (0, grid.dy)):
-        if height.shape[axis] < 2:
-            slopes.append(np.zeros_like(height))
-        elif periodic:
-            slopes.append((np.roll(height, -1, axis) - np.roll(height, 1, axis)) / (2 * spacing))
-        else:
-            slopes.append(np.gradient(height, spacing, axis=axis))
-    at = list(np.indices(height.shape).astype(float))
+    grid = snapshot.run.grid
+    slopes = road_slopes(snapshot.run) if slopes is None else slopes
+    at = list(np.indices(slopes[0].shape).astype(float))
     for axis, (name, spacing, moved) in enumerate((("displacement_y", grid.dy, road[1]),
                                                    ("displacement_x", grid.dx, road[0]))):
         at[axis] -= moved / spacing
         if name in snapshot:
             at[axis] += snapshot[name] / spacing
-    mode = "grid-wrap" if periodic else "constant"
+    mode = "grid-wrap" if grid.boundary == "periodic" else "constant"
     along_x, along_y = (map_coordinates(slope, at, order=1, mode=mode) for slope in slopes)
     return along_x, along_y
 
@@ -208,6 +226,7 @@ def friction_outside(run: Run) -> tuple[FloatArray, FloatArray]:
         The coefficients.
     """
     rows, values = [], []
+    slopes = None
     steps = list(run.history["step"]) if "step" in run.history else []
     for snapshot in run.snapshots:
         if ("pressure" not in snapshot or "contact" not in snapshot
@@ -218,8 +237,9 @@ def friction_outside(run: Run) -> tuple[FloatArray, FloatArray]:
         pressure = snapshot["pressure"]
         if along is None or pressure.mean() == 0.0:
             continue
+        slopes = road_slopes(run) if slopes is None else slopes
         slope_x, slope_y = moved_slopes(snapshot, (float(run.history["road_x"][row]),
-                                                   float(run.history["road_y"][row])))
+                                                   float(run.history["road_y"][row])), slopes)
         slope = along[0] * slope_x + along[1] * slope_y
         open_cells = snapshot["contact"] == 0
         rows.append(row)

@@ -171,6 +171,8 @@ def read_dma(
 
     angular = found_units.get("angular") == "yes"
     to_omega = unit("frequency", frequency_unit, FREQUENCY_UNITS, "rad/s" if angular else "Hz")
+    if found_units.get("storage") is None and "loss" in places:  # one unit counts for both
+        found_units["storage"] = found_units.get("loss")
     to_pascal = unit("storage", modulus_unit, MODULUS_UNITS, "Pa")
     to_celsius = 0.0
     if "temperature" in places:
@@ -183,7 +185,8 @@ def read_dma(
             to_loss = unit("loss", None, MODULUS_UNITS, "Pa")
         loss = to_loss * values["loss"]
     else:
-        loss = storage * values["tan_delta"]
+        percent = found_units.get("tan_delta") == "%"
+        loss = storage * values["tan_delta"] * (0.01 if percent else 1.0)
     if kind == "tension" or (kind is None and found_kind == "tension"):
         factor = 0.5 / (1.0 + poisson)
         storage, loss = factor * storage, factor * loss
@@ -230,6 +233,10 @@ def _lines(path: Path) -> list[tuple[int, list[str]]]:
 def _separator(lines: Sequence[str]) -> str | None:
     """Return what separates columns; None for blanks."""
     last = lines[-1]  # the header may have commas in its words
+    cells = last.split()
+    if len(cells) > 1 and ";" not in last and "\t" not in last and all(
+            re.fullmatch(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?", cell) for cell in cells):
+        return None  # decimal commas
     for separator in ("\t", ";", ","):
         if separator in last:
             return separator
@@ -345,7 +352,8 @@ def _find_columns(
                              f" {role}: say which (columns, --column {role}=NAME)")
         places[role] = match[0]
     if "loss" in places:
-        places.pop("tan_delta", None)
+        asked = "tan_delta" in given and "loss" not in given
+        places.pop("loss" if asked else "tan_delta", None)
     missing = [role for role in ("frequency", "storage") if role not in places]
     if "loss" not in places and "tan_delta" not in places:
         missing.append("loss (or tan_delta)")

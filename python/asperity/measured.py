@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._check import choice, number, positive
+from ._check import choice, number, positive, whole
 from ._library import version
 
 __all__ = ["MeasuredSurface", "channels", "import_topography", "load"]
@@ -213,7 +213,7 @@ def load(
     scale: float = 1.0,
     resample: Sequence[int] | None = None,
     periodic: str | None = None,
-    taper: float = 0.2,
+    taper: float | None = None,
     restore_rms: bool = False,
 ) -> MeasuredSurface:
     """Read a measured topography of any format that SurfaceTopography knows.
@@ -248,8 +248,9 @@ def load(
         fewer, cubic splines where there are more. nx alone of a line.
     periodic : str, optional
         Window that brings the edges to the mean height, 'hann' or 'tukey'.
-    taper : float
-        Share of each length that a 'tukey' window tapers, half of it at each edge; 0 to 1.
+    taper : float, optional
+        Share of each length that a 'tukey' window tapers, half of it at each edge; 0 to 1; 0.2 by
+        default.
     restore_rms : bool
         Scale the windowed heights to the rms height before. Slopes inside grow with it: off by
         default, as heights inside are then the measured ones.
@@ -279,15 +280,18 @@ def load(
     number("scale", scale)
     if scale == 0.0:
         raise ValueError("scale = 0: must not be 0")
-    number("taper", taper, 0.0, 1.0, low_open=True)
+    if taper is not None:
+        number("taper", taper, 0.0, 1.0, low_open=True)
     if periodic is not None:
         choice("periodic", periodic, WINDOWS)
     elif restore_rms:
         raise ValueError("restore_rms: goes with periodic")
+    if taper is not None and periodic != "tukey":
+        raise ValueError("taper: goes with periodic = 'tukey'")
     path = Path(path)
     height, sizes, told_periodic, unit, source = _read(path, channel, unit, size, transpose)
     work = _Work(height, sizes, told_periodic)
-    if transpose:
+    if transpose and height.shape[0] > 1:
         work.note("transpose")
     if crop is not None:
         work.crop(crop)
@@ -302,7 +306,8 @@ def load(
     if resample is not None:
         work.resample(resample)
     if periodic is not None:
-        work.window(periodic, 1.0 if periodic == "hann" else float(taper), restore_rms)
+        share = 0.2 if taper is None else float(taper)
+        work.window(periodic, 1.0 if periodic == "hann" else share, restore_rms)
     if unit != "m":
         work.note("unit", unit=unit, metres=UNITS[unit])
     height = np.ascontiguousarray(_to_metres(work.height, unit))
@@ -567,7 +572,8 @@ class _Work:
     def resample(self, wanted: Sequence[int]) -> None:
         """Change the numbers of cells."""
         ny, nx = self.height.shape
-        counts = [int(value) for value in np.atleast_1d(np.asarray(wanted))]
+        counts = [whole("resample", one)
+                  for one in np.atleast_1d(np.asarray(wanted, dtype=object))]
         if ny == 1 and len(counts) == 1:
             counts.append(1)
         if len(counts) != 2 or counts[0] < 2 or counts[1] < (1 if ny == 1 else 2):

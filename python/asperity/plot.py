@@ -22,6 +22,7 @@ from ._derived import (
     has_rough_road,
     is_elastic,
     rms_slope,
+    road_speed,
     travel,
 )
 from ._names import UnknownNameError, unknown_name
@@ -194,7 +195,7 @@ def _draw(run: Run, name: str, along: NDArray[Any], axes: Axes, style: dict[str,
         parts = [("sticking", history["stick_area"], COLOURS[4], "--")]
     elif name == "sliding_speed" and "road_x" in history and has_friction(run):
         label = "mean of the interface"
-        speed = _road_speed(run)
+        speed = road_speed(run)
         factor, unit = si_scale([values.max(initial=0.0), speed.max(initial=0.0)],
                                 history.units(name))
         parts = [("road against the block's top", speed, COLOURS[6], ":")]
@@ -231,15 +232,6 @@ def _draw_energy(run: Run, along: NDArray[Any], axes: Axes, style: dict[str, Any
     note = None if missing is None else f"books close to {missing.max(initial=0.0):.1g}"
     axes.legend(frameon=True, framealpha=0.8, edgecolor="none", title=note,
                 title_fontsize=plt.rcParams["legend.fontsize"])
-
-
-def _road_speed(run: Run) -> NDArray[np.float64]:
-    """Return the speed of the road in each step, m/s; nan where no time passes."""
-    history = run.history
-    passed = np.diff(history["time"])
-    moved = np.hypot(np.diff(history["road_x"]), np.diff(history["road_y"]))
-    speed = np.divide(moved, passed, out=np.zeros_like(moved), where=passed > 0.0)
-    return np.concatenate([[0.0], speed])
 
 
 def _headline(run: Run, figure: Figure) -> None:

@@ -20,6 +20,7 @@ from ._derived import (
     friction_outside,
     has_adhesion,
     has_friction,
+    road_speed,
     solver_setting,
     travel,
 )
@@ -166,10 +167,8 @@ def _charts(run: Run) -> tuple[dict[str, FloatArray], list[dict[str, Any]]]:
     if rubbing:
         lines = series("sliding_speed", "mean of the interface", 0)
         if "road_x" in history:
-            passed = np.diff(history["time"])
-            speed = np.divide(moved, passed, out=np.zeros_like(moved), where=passed > 0.0)
             lines += series("road_speed", "road against the block's top", 6, "2 3",
-                            np.concatenate([[0.0], speed]))
+                            road_speed(run))
         chart("time", "sliding_speed", "Sliding speed", "Speed", "m/s", lines)
     if "pressure" in history and np.ptp(history["pressure"]) > 1e-6 * np.abs(
             history["pressure"]).max():

@@ -392,3 +392,39 @@ def test_the_command_s_options(command, tmp_path):
     assert command("dma.csv", "--column", "loss").returncode == 2
     done = command("dma.csv", *columns, "-o", "none/m.nml")
     assert done.returncode == 3 and "none" in done.stderr
+
+
+# ---- what is easily misread --------------------------------------------
+
+def test_one_unit_counts_for_both_moduli(tmp_path):
+    for head in ("f (Hz),G',G'' (MPa)", "f (Hz),G' (MPa),G''"):
+        table = read_dma(write(tmp_path / "a.csv", head, [(1, 2, 0.5), (10, 3, 0.6), (100, 4, 0.8)]))
+        np.testing.assert_allclose(table.storage, [2e6, 3e6, 4e6])
+        np.testing.assert_allclose(table.loss, [5e5, 6e5, 8e5])
+
+
+def test_a_column_that_is_asked_for_is_taken(tmp_path):
+    path = write(tmp_path / "a.csv", "f (Hz),G' (Pa),G'' (Pa),x",
+                 [(1, 2e6, 1.0, 0.3), (10, 3e6, 1.0, 0.2), (100, 4e6, 1.0, 0.1)])
+    np.testing.assert_allclose(read_dma(path, columns={"tan_delta": "x"}).loss, [6e5, 6e5, 4e5])
+
+
+def test_tan_delta_in_percent(tmp_path):
+    path = write(tmp_path / "a.csv", "f (Hz),G' (Pa),tan delta (%)",
+                 [(1, 2e6, 30), (10, 3e6, 20), (100, 4e6, 10)])
+    np.testing.assert_allclose(read_dma(path).loss, [6e5, 6e5, 4e5])
+
+
+def test_decimal_commas_between_blanks(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("f G' G''\n1,0 2,5 0,5\n10,0 3,5 0,6\n100,0 4,5 0,7\n")
+    np.testing.assert_allclose(read_dma(path).storage, [2.5, 3.5, 4.5])
+
+
+def test_the_table_is_not_written_over(tmp_path, capsys):
+    path = write(tmp_path / "a.csv", "f (Hz),G' (Pa),G'' (Pa),T (C)",
+                 sweeps([20.0], np.logspace(-1, 2, 9)))
+    before = path.read_text()
+    assert main(["fit", str(path), "-o", str(path)]) == 2
+    assert "is the table itself" in capsys.readouterr().err
+    assert path.read_text() == before

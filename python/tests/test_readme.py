@@ -115,5 +115,6 @@ def test_the_foretold_memory_is_what_runs_take():
 def test_pull_off_of_the_guide_shows_the_limit_of_the_grid():
     page = (ROOT / "docs" / "choosing.md").read_text()
     kept = rows(page.split("<!-- adhesion: begin -->")[1].split("<!-- adhesion: end -->")[0])[1:]
+    assert kept
     for _, cells, _, error in kept:
         assert (abs(float(error.split()[0])) < 1.5) == (float(cells) < 0.72)

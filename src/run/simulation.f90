@@ -5,13 +5,14 @@
 !> files or fills arrays. The state can be saved and taken up again (module simulation_state).
 !>
 !> A step with friction is made of passes (thesis, 3.5): tangential solve, heights and slopes where
-!> the rubber then is, normal solve; until the pressure settles or `passes` are done. A last tangential
-!> solve under the last pressure hands out a traction that belongs to it,
-!> unless the pressure has settled.
+!> the rubber then is, normal solve; until the pressure settles or `passes` are done. These ask for
+!> displacements only, to ten times the tolerance until the pressure has nearly settled. A last
+!> tangential solve under the last pressure settles the traction, so that it belongs to it.
 !>
 !> Fields of doubles beside those of the normal solver: H, P, gap, U; with sliding the original map and
 !> the two slopes; with Prony arms the history (S, S - S_old and one field an arm) and its traction; with
-!> friction those of module tangential_state and the pressure of the pass before.
+!> friction those of module tangential_state, the pressure of the pass before and two slopes of the
+!> pass in hand.
 module simulation
    use case_settings, only : case_type
    use errors, only : error_type

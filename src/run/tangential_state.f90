@@ -24,7 +24,7 @@ module tangential_state
    use regular_grid, only : boundary_periodic, grid_type
    use solver_result, only : solver_result_type
    use viscoelastic_energy, only : book_step, energy_books_type, new_books
-   use zener, only : commit_history, destroy_history, history_field, history_type, is_elastic, &
+   use zener, only : commit_history, destroy_history, history_field, history_type, &
       new_history, new_products, products_type, zener_type
    implicit none
    private
@@ -142,8 +142,6 @@ contains
       else
          call set_thickness(self, self%thickness)
       end if
-      ! Slips far below the road's motion in the step are no slips.
-      self%solver%slip_scale = 0.0_dp
    end subroutine begin
 
    !> Start the step's traction from the change of the last step going on. To be called when the road

@@ -13,22 +13,13 @@
 !> (the fallback alone) and 'thesis' (`friction_cg_thesis`). Converged means both the criterion of
 !> the thesis, |T' - T|/|T'| <= tolerance (eq. 3.15), and the residual of all points: the largest
 !> slip of a sticking point, part of the slip across its traction, or slip against it, over the RMS
-!> of DX or of A T in the contact, whichever is larger, or over `slip_scale`.
+!> of DX or of A T in the contact, whichever is larger.
 !>
 !> Memory beside the caller's fields: eleven fields, the two of the operator's spectrum and the two
 !> of the preconditioner's with its symbols (3/4 of a field).
 !>
-!> Measured, a sphere at half of full slip (free, nu = 0.42), iterations / products of the operator
-!> (transforms of the operator over 4) to both criteria:
-!>
-!>                n = 64        128         256
-!>     fast,      1e-5  14 / 21   14 / 21    17 / 26
-!>                1e-8  19 / 29   21 / 32    24 / 36
-!>     thesis,    1e-5  50 / 75   93 / 139  218 / 327
-!>                1e-8  89 / 133 157 / 235  405 / 607
-!>     gradient,  1e-5  40 / 40   60 / 60    86 / 86
-!>                1e-8  83 / 83  124 / 124  168 / 168
-!>
+!> Iterations against the mesh: examples/friction_iterations and docs/benchmarks.md. An iteration of
+!> 'fast' takes one and a half products of the operator where points slip.
 !> The preconditioner of 'fast' takes one product of its own, without padding, an iteration.
 !> There is no proof of convergence where the slope counts. Cones steeper than 1/mu have no bound
 !> uphill; where many points jam so, a solution may not be found, or not be there.
@@ -57,7 +48,7 @@ module friction_cg
 
    integer, parameter :: gradient_steps = 100    !! at a time, when the fast method stalls
    !> Mean compliance over the length of the cell from where the fast method treats it apart. Below,
-   !> that costs iterations (20 for 14 at 0.02), above it saves them (19 for 26 at 0.4).
+   !> that costs iterations, above it saves them.
    real(dp), parameter :: thick = 0.2_dp
 
    !> Work space and preconditioner for one operator.
@@ -65,10 +56,6 @@ module friction_cg
       integer :: method = friction_fast
       real(dp) :: tolerance = 1.0e-6_dp
       integer :: max_iterations = 1000
-      !> A slip that counts (of r, so times Q), m: the residual is measured by it where it is
-      !> smaller than the displacements, as in a small step of a long slide. 0: by the
-      !> displacements.
-      real(dp) :: slip_scale = 0.0_dp
       !> T has to settle too, |T' - T|/|T'| <= tolerance. Without it the displacements are good to the
       !> tolerance, T is less so.
       logical :: settle = .true.
@@ -197,7 +184,6 @@ contains
       problem%ny = operator%ny
       problem%threads = operator%threads
       problem%compliance = self%compliance
-      problem%slip_scale = self%slip_scale
       problem%settle = self%settle
       problem%near = self%near
       problem%p => p

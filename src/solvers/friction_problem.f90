@@ -41,7 +41,6 @@ module friction_problem
       integer :: threads = 1
       real(dp) :: compliance = 0.0_dp        !! a_0: displacement of a cell under its own unit traction
       real(dp) :: mean_compliance = 0.0_dp   !! of the mean mode where it is stiff, by cells; else 0
-      real(dp) :: slip_scale = 0.0_dp        !! the slip that the residual is measured by; 0: by U
       real(dp), pointer, contiguous :: p(:, :) => null()
       real(dp), pointer, contiguous :: hx(:, :) => null(), hy(:, :) => null()
       real(dp), pointer, contiguous :: drive_x(:, :) => null(), drive_y(:, :) => null()
@@ -310,7 +309,6 @@ contains
       self%curved_tangent = reshape([sums(10), sums(11), sums(11), sums(12)], [2, 2])
       self%gain_left = sums(13)
       scale = sqrt(max(sums(3), sums(4))/max(self%cells, 1))
-      if (self%slip_scale > 0.0_dp) scale = min(scale, max(self%slip_scale, 1.0e-6_dp*scale))
       self%residual = sqrt(global_max(largest))
       if (scale > 0.0_dp) self%residual = self%residual/scale
       self%scale = merge(scale, 1.0_dp, scale > 0.0_dp)
