@@ -37,9 +37,9 @@ def check(data: dict[str, Any], quick: bool) -> None:
     """Hold that the maximum grows with speed, and how the plateau does."""
     # "mu_max keeps increasing with speed just as G' does with the frequency."
     assert (np.diff(data["maximum"]) > 0.0).all(), "the maximum does not grow with speed"
-    assert (data["maximum"] > data["plateau"]).all()
+    assert (data["maximum"] - data["plateau"] > 2e-3).all()
     # The plateau rises up to 30 m/s at least; above it flattens or falls.
-    slow = data["driven"] <= 10.0
+    slow = data["driven"] <= 30.0
     assert (np.diff(data["plateau"][slow]) > 0.0).all(), "the plateau does not rise"
     # Rubber stiffens: less contact, larger gap, and both differ more from those under load.
     assert (np.diff(data["area"]) < 0.0).all()

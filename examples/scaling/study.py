@@ -119,14 +119,16 @@ def check(data: dict[str, Any], quick: bool) -> None:
         assert (np.diff(steady) < 0).all(), f"{kind}: steady friction does not fall, {steady}"
     # a thicker block only takes longer to shear
     steady = np.array([item["dyn"] for item in data["thickness"]])
-    assert np.ptp(steady) < 0.005, f"steady friction changes with thickness: {steady}"
+    allowed = 0.005 if quick else 0.001
+    assert np.ptp(steady) < allowed, f"steady friction changes with thickness: {steady}"
     top = [item["travel"][item["friction"].argmax()] for item in data["thickness"]]
     assert top[-1] > 1.5 * top[0], "a thicker block does not shear longer"
     small = data["scale"][int(np.argmin(np.abs(data["scales"] - 0.25)))]
-    assert abs(data["same_block"][0]["dyn"] - small["dyn"]) < 0.005, "the thickness matters"
+    change = abs(data["same_block"][0]["dyn"] - small["dyn"])
+    assert change < (0.005 if quick else 2e-4), f"the thickness matters: {change}"
     for item in data["temperature"] + data["scale"] + data["thickness"]:
         assert item["slips"], "a case still sticks at its end"
-        assert item["max"] >= item["dyn"] > 1.0, "friction is not above Coulomb's"
+        assert item["dyn"] > 1.0, "friction is not above Coulomb's"
 
 
 def picture(data: dict[str, Any]) -> Figure:

@@ -398,7 +398,8 @@ def test_the_command_s_options(command, tmp_path):
 
 def test_one_unit_counts_for_both_moduli(tmp_path):
     for head in ("f (Hz),G',G'' (MPa)", "f (Hz),G' (MPa),G''"):
-        table = read_dma(write(tmp_path / "a.csv", head, [(1, 2, 0.5), (10, 3, 0.6), (100, 4, 0.8)]))
+        rows = [(1, 2, 0.5), (10, 3, 0.6), (100, 4, 0.8)]
+        table = read_dma(write(tmp_path / "a.csv", head, rows))
         np.testing.assert_allclose(table.storage, [2e6, 3e6, 4e6])
         np.testing.assert_allclose(table.loss, [5e5, 6e5, 8e5])
 
