@@ -34,6 +34,7 @@ from .sweep_table import Failure, Sweep, SweepError, column
 __all__ = ["sweep"]
 
 _POLL = 0.02            # s between two looks at the processes
+_ECHO = 0.3             # s within which a signal to us and to our group is one
 _PATIENCE = 60.0        # s that a stopped process may take for its checkpoint
 _LONGEST_NAME = 120     # characters of a file's name
 
@@ -379,10 +380,10 @@ def _run_all(waiting: list[_Job], total: int, command: str, side_by_side: int, t
     progress = Progress(total, len(waiting), quiet)
     queue = list(reversed(waiting))
     running: list[_Job] = []
-    try:
-        with _termination():
-            while queue or running:
-                while queue and len(running) < side_by_side:
+    with _Stops() as stops:
+        try:
+            while (queue or running) and not stops.asked:
+                while queue and len(running) < side_by_side and not stops.asked:
                     job = queue.pop()
                     running.append(job)
                     _start(job, command, threads, restart=resume and _found(job) is not None)
@@ -398,28 +399,48 @@ def _run_all(waiting: list[_Job], total: int, command: str, side_by_side: int, t
                         progress.done(job.name, job.message if job.status else None,
                                       time.monotonic() - job.started, len(running))
                 time.sleep(_POLL if running else 0.0)
-    except BaseException:
-        progress.end()
-        _stop(running)
-        raise
-    progress.end()
+        finally:
+            progress.end()
+            _stop(running, stops)
 
 
-@contextlib.contextmanager
-def _termination() -> Iterator[None]:
-    """Turn SIGTERM into an exception, so that the runs are stopped with this process."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
+class _Stops:
+    """SIGINT and SIGTERM as a number to look at, so that none of them cuts a call in two.
 
-    def leave(number: int, frame: FrameType | None) -> None:
-        raise SystemExit(128 + number)
+    An exception out of a handler may come between any two instructions: within the start of a
+    process, which then goes on unknown to us, or while subprocess holds its lock, which then stays
+    held. So the signals are counted here; at the end they are what they were before: SIGINT
+    KeyboardInterrupt, or what another handler makes of it, SIGTERM the end with status 143.
+    """
 
-    before = signal.signal(signal.SIGTERM, leave)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
+    def __init__(self) -> None:
+        self.asked: list[int] = []
+        self._last = 0.0
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> _Stops:
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGINT, signal.SIGTERM):
+                # Who started us with a signal ignored, as a shell does in the background, keeps it.
+                if signal.getsignal(number) != signal.SIG_IGN:
+                    self._before[number] = signal.signal(number, self._note)
+        return self
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        now = time.monotonic()
+        if not self.asked or now - self._last > _ECHO:
+            self.asked.append(number)
+        self._last = now
+
+    def __exit__(self, *error: object) -> None:
+        for number, handler in self._before.items():
+            # None: not set by Python, and not to be set by it.
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
+        if not self.asked:
+            return
+        if self.asked[0] == signal.SIGTERM and self._before[signal.SIGTERM] == signal.SIG_DFL:
+            raise SystemExit(128 + signal.SIGTERM)
+        signal.raise_signal(self.asked[0])
 
 
 def _start(job: _Job, command: str, threads: int, restart: bool) -> None:
@@ -455,21 +476,19 @@ def _finish(job: _Job) -> bool:
     return False
 
 
-def _stop(running: list[_Job]) -> None:
+def _stop(running: list[_Job], stops: _Stops) -> None:
     """Let processes finish the step in hand and write a checkpoint; at a second Ctrl-C, kill."""
     processes = [job.process for job in running if job.process is not None]
     for process in processes:
         process.send_signal(signal.SIGINT)
     end = time.monotonic() + _PATIENCE
-    try:
-        for process in processes:
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                process.wait(max(0.0, end - time.monotonic()))
-    finally:
-        for process in processes:
-            if process.poll() is None:
-                process.kill()
-                process.wait()
+    while (any(process.poll() is None for process in processes)
+           and len(stops.asked) < 2 and time.monotonic() < end):
+        time.sleep(_POLL)
+    for process in processes:
+        if process.poll() is None:
+            process.kill()
+            process.wait()
 
 
 def _table(work: list[_Job], shape: tuple[int, ...],

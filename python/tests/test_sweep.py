@@ -258,6 +258,52 @@ asperity.sweep(case, {"phase[1].pressure": [1e3, 2e3, 3e3]}, jobs=2, folder=sys.
 """
 
 
+def hear_ctrl_c():
+    """Take Ctrl-C as in the foreground: a shell starts background jobs with it ignored."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+@pytest.mark.parametrize("moment", ["start", "poll"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_cuts_no_call_in_two(tmp_path, monkeypatch, number, moment):
+    """A signal while a process is being started, or looked at, stops that one, too."""
+    started = []
+
+    class Process(subprocess.Popen):
+        def __init__(self, *arguments, **keywords):
+            super().__init__(*arguments, **keywords)
+            started.append(self)
+            if moment == "start":
+                signal.raise_signal(number)
+
+        def poll(self):
+            if moment == "poll" and self is started[-1]:
+                monkeypatch.setattr(Process, "poll", subprocess.Popen.poll)
+                signal.raise_signal(number)
+            return super().poll()
+
+    case = wave()
+    case.phase.append(duration=1.0, steps=100000, velocity_x=1e-3)
+    program = asperity.sweeps.program()
+    monkeypatch.setattr(asperity.sweeps, "program", lambda: program)
+    monkeypatch.setattr(asperity.sweeps.subprocess, "Popen", Process)
+    before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    try:
+        with pytest.raises(KeyboardInterrupt if number == signal.SIGINT else SystemExit) as ended:
+            sweep(case, {"phase[1].pressure": [1e3, 2e3]}, jobs=2, folder=tmp_path,
+                  quiet=True)
+        assert number == signal.SIGINT or ended.value.code == 143
+        assert signal.getsignal(signal.SIGINT) == signal.default_int_handler
+        assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
+    assert started
+    assert all(process.returncode is not None for process in started)
+
+
 def rows_of(path):
     """Return how many rows a growing result holds."""
     try:
@@ -269,7 +315,8 @@ def rows_of(path):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_stop_is_clean_and_is_taken_up(tmp_path, number):
     process = subprocess.Popen([sys.executable, "-c", SCRIPT, str(tmp_path)],
-                               stderr=subprocess.PIPE, start_new_session=True)
+                               stderr=subprocess.PIPE, start_new_session=True,
+                               preexec_fn=hear_ctrl_c)
     first = tmp_path / "phase1.pressure=1000.0.h5"
     end = time.monotonic() + 30
     while rows_of(first) < 3 and time.monotonic() < end:

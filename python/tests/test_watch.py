@@ -122,6 +122,8 @@ def test_follows_a_run_on_a_terminal_until_interrupted(program, tmp_path):
     with subprocess.Popen(
             [sys.executable, "-m", "asperity", "watch", "live.h5", "--every", "0.05"],
             cwd=tmp_path, stdin=theirs, stdout=theirs, stderr=subprocess.PIPE,
+            # A shell starts background jobs with Ctrl-C ignored.
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
             env={**os.environ, "TERM": "xterm", "COLUMNS": "90", "LINES": "24",
                  "PYTHONIOENCODING": "utf-8"}) as view:
         os.close(theirs)
