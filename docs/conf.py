@@ -6,6 +6,7 @@ names stand in the contents; others follow in "More".
 """
 
 import re
+from importlib.util import find_spec
 from pathlib import Path
 
 from docutils import nodes
@@ -23,6 +24,7 @@ include_patterns = ["docs/*.md", "docs/api/*", "examples/*/README.md", "README.m
                     "CONTRIBUTING.md", "CHANGELOG.md"]
 root_doc = "docs/index"
 highlight_language = "none"
+smartquotes = False                     # 'none' is a value of the input, quotes included
 default_role = "py:obj"
 nitpicky = False                        # the words for types in docstrings are for people
 
@@ -39,19 +41,23 @@ napoleon_use_rtype = False
 
 html_theme = "furo"
 html_title = f"Asperity {release}"
-html_static_path = ["site.css"]
+# The font of the equations, for browsers on machines without one of their own. Its licence, the SIL
+# Open Font License, is in the file.
+MATH_FONT = Path(find_spec("ziamath").origin).parent / "fonts" / "STIXTwoMath-Regular.ttf"
+html_static_path = ["site.css", str(MATH_FONT)]
 html_extra_path = ["../build/fortran"]  # by FORD
 html_show_sourcelink = False
 html_math_renderer = "mathml"
 
 ORDER = {
-    "Guide": ["README", "docs/install", "docs/first_run", "docs/choosing", "docs/measured_data",
-              "docs/sweeps", "docs/results", "docs/troubleshooting", "docs/coming_from"],
+    "Start": ["docs/install", "docs/first_run", "docs/model"],
+    "Guide": ["docs/choosing", "docs/measured_data", "docs/sweeps", "docs/long_runs",
+              "docs/results", "docs/troubleshooting", "docs/coming_from"],
     "Reference": ["docs/input_reference", "docs/result_file", "docs/api/python",
-                  "docs/api/fortran"],
+                  "docs/api/fortran", "docs/glossary"],
     "Background": ["docs/theory", "docs/validation", "docs/benchmarks"],
     "Examples": ["docs/gallery"],
-    "Development": ["docs/developer", "CONTRIBUTING", "CHANGELOG"],
+    "Development": ["docs/developer", "CONTRIBUTING", "CHANGELOG", "README"],
 }
 
 
@@ -93,8 +99,11 @@ def _add_modules(app, name, source):
 
 def _prepare_docstring(app, what, name, thing, options, lines):
     """Keep the bars of |x|, which are no substitutions, and list attributes one by one."""
-    text = "\n".join(line if ">>>" in line or "``" in line else line.replace("|", "\\|")
-                     for line in lines)
+    kept, example = [], False
+    for line in lines:
+        example = line.lstrip().startswith(">>>") or (example and line.strip() != "")
+        kept.append(line if example or "``" in line else line.replace("|", "\\|"))
+    text = "\n".join(kept)
 
     def split(found):
         return "".join(f"{one} : {found[2]}" for one in found[1].split(", "))
@@ -107,8 +116,13 @@ def _prepare_docstring(app, what, name, thing, options, lines):
 
 def _mathml(self, node):
     """Write an equation as MathML, which browsers show without scripts."""
-    display = "block" if isinstance(node, nodes.math_block) else "inline"
-    self.body.append(convert(node.astext(), display=display))
+    block = isinstance(node, nodes.math_block)
+    math = convert(node.astext(), display="block" if block else "inline")
+    math = math.replace("<mo>&#x0002A;</mo>", "<mo>&#x02217;</mo>")         # the star of E*
+    math = math.replace("<mi>&#x02032;</mi>", '<mo class="prime">&#x02032;</mo>')
+    if block:
+        math = f'<div class="math" tabindex="0">{math}</div>'               # long ones scroll
+    self.body.append(math)
     raise nodes.SkipNode
 
 

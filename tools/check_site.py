@@ -1,8 +1,9 @@
-"""Check that every link, picture and anchor of a built site leads somewhere.
+"""Check that every link, picture and anchor of a built site leads somewhere, without a network.
 
     python tools/check_site.py build/site
 
-Exit status 1 and one line a fault where something is missing. Addresses elsewhere are not followed.
+Exit status 1 and one line a fault where something is missing, or a page fetches a script, a style
+or a picture from elsewhere. Links to elsewhere are not followed.
 FORD misses anchors of its own for generic interfaces: of its pages only the files are checked.
 """
 
@@ -14,11 +15,11 @@ from urllib.parse import unquote, urlsplit
 
 
 class _Page(HTMLParser):
-    """The anchors and links of a page."""
+    """The anchors and links of a page, and what it fetches from elsewhere."""
 
     def __init__(self):
         super().__init__()
-        self.anchors, self.links = set(), []
+        self.anchors, self.links, self.fetched = set(), [], []
 
     def handle_starttag(self, tag, attributes):
         values = dict(attributes)
@@ -28,6 +29,8 @@ class _Page(HTMLParser):
         for name in ("href", "src"):
             if values.get(name):
                 self.links.append(values[name])
+                if tag in ("script", "link", "img", "iframe") and urlsplit(values[name]).netloc:
+                    self.fetched.append(values[name])
 
 
 @cache
@@ -41,6 +44,7 @@ def broken_links(folder):
     """Return the broken links of all pages below a folder, a text each."""
     found = []
     for path in sorted(folder.rglob("*.html")):
+        found += [f"{path.relative_to(folder)}: fetches {link}" for link in _read(path).fetched]
         for link in _read(path).links:
             target = urlsplit(link)
             if target.scheme or target.netloc:

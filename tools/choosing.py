@@ -1,6 +1,6 @@
-"""Measure what mesh, time step, tolerance, passes and mass bring and cost: docs/choosing.md.
+"""Measure what mesh, time step, arms, tolerance, passes and mass bring and cost: docs/choosing.md.
 
-    python tools/choosing.py [NAME ...]      # mesh, step, tolerance, adhesion, friction, cost
+    python tools/choosing.py [NAME ...]      # mesh, step, arms, tolerance, adhesion, ...
 
 Prints the tables, writes them into the page between its marks, and draws the figures
 docs/figures/choosing_*.png.
@@ -8,6 +8,7 @@ All together take about two minutes on one processor.
 """
 
 import re
+import runpy
 import subprocess
 import sys
 import tempfile
@@ -20,7 +21,7 @@ import numpy as np
 
 import asperity
 from asperity.material import Prony
-from asperity.theory import hunter
+from asperity.theory import hunter, persson, self_affine_psd
 
 matplotlib.use("Agg")
 from matplotlib import pyplot
@@ -264,6 +265,54 @@ def friction():
     return {"passes": thin, "mass": thick, "swing": steps}, figure
 
 
+def arms():
+    """Fit a compound with few and many arms, and leave arms out: loss modulus and friction."""
+    curve = runpy.run_path(str(ROOT / "examples/materials/make_sbr.py"))["master_curve"]
+    omega, inside = np.geomspace(1e-2, 1e12, 281), np.geomspace(1e1, 1e9, 801)
+    longest, shortest, speeds = 1e-3, 8e-6, np.geomspace(1e-3, 10.0, 41)
+    spectrum = self_affine_psd(0.8, longest, longest, shortest, rms_slope=0.5)
+
+    def friction_of(rubber, speed):
+        return persson(*spectrum, rubber, 0.2e6, speed, gamma=0.45).friction
+
+    fits = {count: Prony.fit(omega, curve(omega).real, curve(omega).imag, arms_per_decade=count,
+                             tau_range=(1e-13, 1e3)) for count in (0.5, 1, 2, 4)}
+    best, exact = friction_of(fits[4], speeds), curve(inside)
+    number = []
+    figure, (left, right) = axes(2)
+    for count, colour, line in zip((0.5, 1, 2), (RED, BLUE, GREEN), ("--", "-", ":"), strict=True):
+        loss, mu = fits[count].complex_modulus(inside).imag, friction_of(fits[count], speeds)
+        number.append([f"{count:g}", str(len(fits[count].g)),
+                       f"{100 * np.abs(loss / exact.imag - 1).max():.2g} %",
+                       f"{100 * np.abs(mu / best - 1).max():.2g} %"])
+        left.semilogx(inside / (2 * np.pi), loss / exact.imag, line, color=colour,
+                      label=f"{count:g} a decade")
+        right.semilogx(speeds, mu, line, color=colour, label=f"{count:g} a decade")
+    left.set(xlabel="Frequency, Hz", ylabel="Loss modulus / that of the compound")
+    right.set(xlabel="Speed, m/s", ylabel="Friction, Persson's theory")
+    left.legend()
+
+    rubber, cut = fits[1], []
+
+    def change(other, speed):
+        return f"{100 * (friction_of(other, speed) / friction_of(rubber, speed) - 1):+.1f} %"
+
+    for decades in (0, 1, 2, 3):
+        row = [str(decades)]
+        for speed in (0.01, 0.1, 1.0):
+            fast = rubber.tau < 10.0**-decades * shortest / (2 * np.pi * speed)
+            left_out = Prony(rubber.g_inf, rubber.g[~fast], rubber.tau[~fast])
+            row.append(change(left_out, speed))
+        slow = rubber.tau > 10.0**decades * longest / (2 * np.pi * 0.01)
+        spring = rubber.g_inf + rubber.g[slow].sum()
+        row.append(change(Prony(spring, rubber.g[~slow], rubber.tau[~slow]), 0.01))
+        cut.append(row)
+    return {"arms": table(["arms a decade", "arms", "loss modulus, largest error",
+                           "friction, largest error"], number),
+            "cut": table(["decades beyond", "fast left out, 0.01 m/s", "0.1 m/s", "1 m/s",
+                          "slow as a spring, 0.01 m/s"], cut)}, figure
+
+
 def program():
     """Return the path of the program."""
     built = ROOT / ".venv" / "python" / "asperity"
@@ -330,7 +379,7 @@ def cost():
 
 
 PARTS = {"mesh": mesh, "step": step, "tolerance": tolerance, "adhesion": adhesion,
-         "friction": friction, "cost": cost}
+         "arms": arms, "friction": friction, "cost": cost}
 
 
 def main():

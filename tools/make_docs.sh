@@ -12,11 +12,12 @@ fi
 
 rm -rf build/fortran build/site
 mkdir -p build/fortran
-ford tools/ford.md >build/ford.log 2>&1 || { cat build/ford.log >&2; exit 1; }
+PYTHONPATH=tools ford tools/ford.md >build/ford.log 2>&1 || { cat build/ford.log >&2; exit 1; }
 if grep -i warning build/ford.log; then
   echo "asperity: FORD warns" >&2
   exit 1
 fi
+python tools/localize_ford.py build/fortran/fortran
 python -m sphinx -q -W --keep-going -j auto -c docs -d build/doctrees . build/site
 python tools/check_site.py build/site
 echo "documentation: build/site/docs/index.html"

@@ -18,7 +18,8 @@ from conftest import ROOT
 import asperity
 
 # Pages whose blocks have tests of their own, with their outcome.
-ELSEWHERE = {"docs/measured_data.md": "test_measured_page.py",
+ELSEWHERE = {"docs/long_runs.md": "test_long_runs_page.py",
+             "docs/measured_data.md": "test_measured_page.py",
              "docs/results.md": "test_results_page.py",
              "docs/sweeps.md": "test_sweeps_page.py"}
 

@@ -191,12 +191,34 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       if (.not. file_exists(checkpoint_path(result_path))) then
-         call fail(error, error_file, checkpoint_path(result_path)// &
-            ': there is no such file: '//trim(result_path)//' has no checkpoint to go on from')
+         if (is_complete(result_path)) then
+            call fail(error, error_file, trim(result_path)//': the run is complete: there is '// &
+               'nothing to go on with')
+         else
+            call fail(error, error_file, checkpoint_path(result_path)// &
+               ': there is no such file: '//trim(result_path)//' has no checkpoint to go on from')
+         end if
          return
       end if
       call self%file%open(checkpoint_path(result_path), 'read', error)
    end subroutine open_checkpoint
+
+   !> Is there a result of a run that came to its end?
+   function is_complete(result_path) result(complete)
+      character(*), intent(in) :: result_path
+      logical :: complete
+      type(hdf5_file_type) :: file
+      type(error_type), allocatable :: error
+      integer :: finished
+
+      complete = .false.
+      if (.not. file_exists(trim(result_path))) return
+      call file%open(trim(result_path), 'read', error)
+      if (allocated(error)) return
+      call file%read_attribute('/', 'finished', finished, error)
+      if (.not. allocated(error)) complete = finished == 1
+      call file%close(error)
+   end function is_complete
 
    !> See that the checkpoint belongs to a case: every setting that differs is a fault.
    subroutine compare(self, settings, error)

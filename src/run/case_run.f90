@@ -331,13 +331,15 @@ contains
    function identity(sim) result(pairs)
       type(simulation_type), intent(in) :: sim
       type(pair_type), allocatable :: pairs(:)
-      character(:), allocatable :: text, line, group
-      integer :: at, next, equals, note, groups
+      character(:), allocatable :: text, line, group, name
+      integer :: at, next, equals, note, surfaces, phases
 
       text = resolved_input(sim%case)
       allocate (pairs(0))
       group = ''
-      groups = 0
+      name = ''
+      surfaces = 0
+      phases = 0
       at = 1
       do while (at <= len(text))
          next = index(text(at:), new_line('a'))
@@ -346,8 +348,15 @@ contains
          at = at + next
          if (len(line) == 0) cycle
          if (line(1:1) == '&') then
-            groups = groups + 1
             group = line
+            name = line
+            if (line == '&surface') then
+               surfaces = surfaces + 1
+               name = line//' '//to_text(surfaces)
+            else if (line == '&phase') then
+               phases = phases + 1
+               name = line//' '//to_text(phases)
+            end if
          end if
          equals = index(line, '=')
          if (equals == 0) cycle
@@ -355,7 +364,7 @@ contains
          if (group == '&solver' .and. index(line, 'threads') == 1) cycle
          note = index(line, ' ! ')
          if (note == 0) note = len(line) + 1
-         call add_pair(pairs, group//' ('//to_text(groups)//') '//trim(line(:equals - 1)), &
+         call add_pair(pairs, name//': '//trim(line(:equals - 1)), &
             trim(adjustl(line(equals + 1:note - 1))))
       end do
       call add_pair(pairs, 'height map: rms height', exact_text(sim%rms_height))
