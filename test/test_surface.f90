@@ -429,7 +429,13 @@ contains
       call check_close(maxval(abs(h - map)), 0.0_dp, 0.0_dp, 'the map from ''surface/height''')
       term%file = 'build/no_such_file.h5'
       call new_height(grid, [term], h, error)
-      call check_error(error, 'no_such_file.h5', 'a missing file')
+      call check_error(error, '&surface: file = ''build/no_such_file.h5'': there is no such file', &
+         'a missing file')
+      term%place = 'wet road.nml: &surface'
+      term%line = 7
+      call new_height(grid, [term], h, error)
+      call check_that(error%message == 'wet road.nml: &surface: file = ''build/no_such_file.h5'':'// &
+         ' there is no such file (line 7)', 'a missing file is told with its place in the input')
       call check_that(error%status == error_file, 'a missing file: status')
       open (newunit=unit, file=path, status='replace', action='write')
       write (unit, '(a)') 'not HDF5'

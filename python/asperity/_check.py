@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["array_of", "choice", "exactly_one", "number", "poisson_ratio", "positive", "whole"]
+__all__ = ["array_of", "choice", "exactly_one", "no_masked", "number", "poisson_ratio",
+           "positive", "whole"]
 
 
 def number(
@@ -53,6 +54,8 @@ def number(
     if isinstance(value, np.generic):
         value = value.item()
     try:
+        if isinstance(value, str | bytes | bool):
+            raise TypeError
         result = float(value)
     except (TypeError, ValueError):
         raise ValueError(f"{name} = {value!r}: must be {allowed}") from None
@@ -115,7 +118,10 @@ def array_of(
     ...
     ValueError: tau[1] = 0.0: must be finite and > 0
     """
+    no_masked(name, values)
     try:
+        if np.iscomplexobj(values):
+            raise TypeError
         result = np.array(values, dtype=float)
     except (TypeError, ValueError):
         raise ValueError(f"{name} = {values!r}: must be real numbers") from None
@@ -136,6 +142,27 @@ def array_of(
             f" {float(result[i - 1])!r}"
         )
     return result
+
+
+def no_masked(name: str, values: object) -> None:
+    """Refuse an array with masked points: what lies below a mask is no value.
+
+    Raises
+    ------
+    ValueError
+        With the number of masked points.
+
+    Examples
+    --------
+    >>> no_masked("height", np.ma.masked_array([1.0, 2.0], [True, False]))
+    Traceback (most recent call last):
+    ...
+    ValueError: height: has 1 of 2 points masked: fill them first, or leave them out
+    """
+    if np.ma.is_masked(values):
+        count, size = int(np.ma.getmaskarray(values).sum()), int(np.size(values))
+        raise ValueError(f"{name}: has {count} of {size} points masked: fill them first, or leave"
+                         " them out")
 
 
 def choice(name: str, value: str, allowed: Sequence[str]) -> str:

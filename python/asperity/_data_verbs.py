@@ -146,7 +146,10 @@ def _fit(chosen: argparse.Namespace) -> int:
         import matplotlib
 
         matplotlib.use("Agg")
+        import matplotlib.pyplot
+
         figure = fit.plot()
         figure.savefig(chosen.plot, dpi=150)
+        matplotlib.pyplot.close(figure)
         print(f"wrote {chosen.plot}", file=told)
     return 0

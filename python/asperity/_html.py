@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ._standing import note_of, rows_of
 from ._style import si_scale
 
 if TYPE_CHECKING:
@@ -89,15 +90,15 @@ def snapshot_html(snapshot: Snapshot) -> str:
 def run_html(run: Run) -> str:
     """Return the run as a table: state, grid, snapshots and the last row."""
     grid, history = run.grid, run.history
-    expected = int(run.attributes.get("expected_rows", 0) or 0)
-    state = "finished" if run.finished else "not finished"
-    of = f" of {expected}" if expected and not run.finished else ""
     steps = run.snapshots.steps
     told = ", ".join(map(str, steps if len(steps) <= 12 else (*steps[:5], "…", *steps[-3:])))
-    rows = [("state", f"{state}, {history.rows}{of} rows"),
+    state = "finished" if run.finished else "not finished"
+    rows = [("state", f"{state}, {rows_of(run)}"),
             ("grid", f"{grid.nx} × {grid.ny} cells, {shown(grid.lx, 'm')} ×"
                      f" {shown(grid.ly, 'm')}, {escape(grid.boundary)}"),
             ("snapshots", f"{len(steps)}{f' (steps {told})' if steps else ''}")]
+    if note_of(run):
+        rows.insert(1, ("", escape(note_of(run))))
     rows += [(escape(name.replace("_", " ")),
               f"{shown(history[name][-1], history.units(name))} {curve(history[name])}")
              for name in ("time", "pressure", "contact_area", "friction")

@@ -17,7 +17,7 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 from asperity._core import asperity_flat
 
-from ._check import choice, positive
+from ._check import choice, no_masked, positive
 from .errors import raise_for_status
 
 __all__ = ["bare", "call", "check_depth", "contact_map", "flag_of_boundary", "height_map",
@@ -87,6 +87,7 @@ def set_threads(number: int = 0) -> int:
 
 def height_map(height: ArrayLike, name: str = "height") -> NDArray[np.float64]:
     """Return a map as a C-ordered array of doubles of shape (ny, nx); a profile has ny = 1."""
+    no_masked(name, height)
     if np.iscomplexobj(height):
         raise ValueError(f"{name}: must be an array of real numbers")
     try:

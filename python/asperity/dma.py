@@ -7,8 +7,6 @@ superposition: with WLF constants that are given, or with shifts found from the 
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -20,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._check import choice, number, poisson_ratio, positive
+from ._tables import Rows, cells_of, decimals, is_number, text_lines
 from .material import WLF, MasterCurve, Prony, master_curve
 
 if TYPE_CHECKING:
@@ -37,19 +36,24 @@ ROLES = ("frequency", "storage", "loss", "temperature", "tan_delta")
 KINDS = ("shear", "tension")
 
 _ANGULAR = {"omega", "w", "ω", "angular", "angularfrequency", "angfreq", "angularfreq",
-            "angfrequency", "radfreq", "radianfrequency"}
+            "angfrequency", "radfreq", "radianfrequency", "kreisfrequenz"}
 _NAMES = {
-    "frequency": {"f", "freq", "frequency", "frequenz", "nu", "reducedfrequency", *_ANGULAR},
+    "frequency": {"f", "freq", "frequency", "frequenz", "frequence", "fréquence", "nu",
+                  "reducedfrequency", "messfrequenz", *_ANGULAR},
     "storage": {"storage", "storagemodulus", "g'", "g1", "gp", "gprime", "gstorage", "gstor", "e'",
                 "e1", "ep", "eprime", "estorage", "estor", "storageg", "storagee",
                 "storagemodulusg'", "storagemoduluse'", "g'storage", "e'storage", "storagemod",
-                "shearstoragemodulus", "tensilestoragemodulus"},
+                "shearstoragemodulus", "tensilestoragemodulus", "speichermodul",
+                "speichermodulg'", "speichermodule'", "moduledeconservation"},
     "loss": {"loss", "lossmodulus", "g''", "g2", "gpp", "gdoubleprime", "gloss", "e''", "e2",
              "epp", "edoubleprime", "eloss", "lossg", "losse", "lossmodulusg''",
              "lossmoduluse''", "g''loss", "e''loss", "lossmod", "shearlossmodulus",
-             "tensilelossmodulus"},
-    "temperature": {"t", "temp", "temperature", "temperatur"},
-    "tan_delta": {"tandelta", "tand", "tanδ", "tan", "lossfactor", "dampingfactor", "tan(δ)"},
+             "tensilelossmodulus", "verlustmodul", "verlustmodulg''", "verlustmodule''",
+             "moduledeperte"},
+    "temperature": {"t", "temp", "temperature", "temperatur", "température", "sampletemperature",
+                    "probentemperatur"},
+    "tan_delta": {"tandelta", "tand", "tanδ", "tan", "lossfactor", "dampingfactor", "verlustfaktor",
+                  "tan(δ)", "tan(delta)", "tan(d)"},
 }
 _UNIT_SPELLINGS = {
     "hz": "Hz", "khz": "kHz", "mhz": "mHz", "1/s": "1/s", "s-1": "1/s", "s^-1": "1/s",
@@ -61,6 +65,7 @@ _UNIT_SPELLINGS = {
     "kelvin": "K", "-": "", "1": "",
 }
 _MOST_FAULTS = 10
+_MOST_PREAMBLE = 200  # lines above the header
 
 
 @dataclass(frozen=True)
@@ -102,7 +107,8 @@ def read_dma(
     r"""Read a table of storage and loss moduli.
 
     Columns are separated by commas, semicolons, tabs or blanks; decimal commas are read where
-    commas do not separate. Lines that start with ``#`` and empty ones are skipped. Units stand in
+    commas do not separate (with decimal points elsewhere they stand between thousands). Lines that
+    start with ``#``, empty ones and those above the header are skipped. Units stand in
     the header, such as ``f (Hz)``, ``G' [MPa]``, ``T_C``, or in a line of their own below it.
     Without any, frequencies are in Hz (in rad/s where the column is named omega), moduli in Pa and
     temperatures in C, and `notes` says so.
@@ -155,8 +161,7 @@ def read_dma(
             choice(word, value, tuple(allowed))
     if kind is not None:
         choice("kind", kind, KINDS)
-    lines = _lines(path)
-    header, units, body = _split_header(path, lines)
+    header, units, body = _split_header(path, cells_of(text_lines(path)), columns or {})
     places, found_units, found_kind = _find_columns(path, header, units, columns or {})
     notes: list[str] = []
 
@@ -200,73 +205,56 @@ def read_dma(
 # ---- the file ------------------------------------------------------------------------------
 
 
-def _lines(path: Path) -> list[tuple[int, list[str]]]:
-    """Return the cells of each line with its number, from 1."""
-    if not path.exists():
-        raise OSError(f"{path}: there is no such file")
-    if path.is_dir():
-        raise OSError(f"{path}: is a folder, not a file")
-    data = path.read_bytes()
-    try:
-        text = data.decode("utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
-    except UnicodeDecodeError:
-        text = data.decode("latin-1")
-    if "\0" in text:
-        raise ValueError(f"{path}: is not a text file")
-    kept = [(at, line) for at, line in enumerate(text.splitlines(), 1)
-            if line.strip() and not line.lstrip().startswith("#")]
-    if not kept:
-        raise ValueError(f"{path}: is empty")
-    separator = _separator([line for _, line in kept])
-    rows = []
-    for at, line in kept:
-        cells = line.split() if separator is None else next(
-            csv.reader(io.StringIO(line), delimiter=separator, skipinitialspace=True))
-        cells = [cell.strip() for cell in cells]
-        if separator in (";", "\t", None):
-            cells = [re.sub(r"^([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)$", r"\1.\2", cell)
-                     for cell in cells]
-        rows.append((at, cells))
-    return rows
-
-
-def _separator(lines: Sequence[str]) -> str | None:
-    """Return what separates columns; None for blanks."""
-    last = lines[-1]  # the header may have commas in its words
-    cells = last.split()
-    if len(cells) > 1 and ";" not in last and "\t" not in last and all(
-            re.fullmatch(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?", cell) for cell in cells):
-        return None  # decimal commas
-    for separator in ("\t", ";", ","):
-        if separator in last:
-            return separator
-    return "," if len(lines) == 1 and "," in lines[0] else None
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
-
-
 def _split_header(
-    path: Path, lines: list[tuple[int, list[str]]]
-) -> tuple[tuple[int, list[str]], list[str], list[tuple[int, list[str]]]]:
-    """Return the header with its line, the units' line, and the rest."""
-    first = lines[0]
-    if any(_is_number(cell) for cell in first[1]):
-        return (0, []), [], lines
+    path: Path, lines: Rows, given: Mapping[str, str | int]
+) -> tuple[tuple[int, list[str]], list[str], Rows]:
+    """Return the header with its line, the units' line, and the rows of numbers.
+
+    What an instrument says of the sample may stand above the header; where several sweeps follow
+    each other, the header may be repeated.
+    """
+    at = next((i for i, (_, cells) in enumerate(lines[:_MOST_PREAMBLE])
+               if _is_header(cells, given)), None)
+    if at is None:
+        if any(is_number(cell) for cell in lines[0][1]):
+            return (0, []), [], decimals(lines)
+        first_numbers = next((i for i, (_, cells) in enumerate(lines)
+                              if sum(map(is_number, cells)) > 1), len(lines))
+        at = max(range(max(first_numbers, 1)), key=lambda i: (len(lines[i][1]), -i))
+    first, body = lines[at], lines[at + 1 :]
     units: list[str] = []
-    body = lines[1:]
-    if body and not any(_is_number(cell) for cell in body[0][1]):
+    if body and not any(is_number(cell) for cell in body[0][1]):
         known = [_unit(cell) for cell in body[0][1]]
         if any(unit is not None for unit in known):
             units, body = body[0][1], body[1:]
+    body = _without_headings(body, first[1], units)
     if not body:
         raise ValueError(f"{path}: has a header and no numbers")
-    return first, units, body
+    return first, units, decimals(body)
+
+
+def _without_headings(body: Rows, header: list[str], units: list[str]) -> Rows:
+    """Return the rows without repeated headers and what stands above those."""
+    kept: Rows = []
+    for row in body:
+        if row[1] == header:
+            while kept and sum(map(is_number, kept[-1][1])) < 2:
+                kept.pop()
+        elif row[1] != units:
+            kept.append(row)
+    return kept
+
+
+def _is_header(cells: list[str], given: Mapping[str, str | int]) -> bool:
+    """Whether a line names the frequency and a modulus, or the columns that were asked for."""
+    if any(is_number(cell) for cell in cells):
+        return False
+    names = [_name_and_unit(cell)[0] for cell in cells]
+    asked = [wanted for wanted in given.values()
+             if isinstance(wanted, str) and not wanted.isdigit()]
+    if asked and all(wanted.strip() in cells or _plain(wanted) in names for wanted in asked):
+        return True
+    return all(any(name in _NAMES[role] for name in names) for role in ("frequency", "storage"))
 
 
 def _unit(text: str) -> str | None:
@@ -620,8 +608,19 @@ def fit_dma(
     reduced = table.omega * 10.0**shift
     order = np.argsort(reduced, kind="stable")
     omega, storage, loss = reduced[order], table.storage[order], table.loss[order]
+    decades = math.log10(float(omega[-1] / omega[0]))
+    if decades < 1e-3:
+        raise ValueError(f"{table.name}: all {omega.size} points are at one frequency,"
+                         f" {omega[0]:.4g} rad/s: a series needs a range of them, or several"
+                         " temperatures with WLF constants (wlf, --wlf C1 C2)")
+    if decades < 1.0:
+        notes.append(f"the data cover {decades:.2g} decades of frequency: beyond them the series is"
+                     " a guess")
     material = Prony.fit(omega, storage, loss, arms_per_decade=arms_per_decade, slack=slack,
                          least_plateau=least_plateau)
+    if omega.size < material.g.size:
+        notes.append(f"{omega.size} points for {material.g.size} arms: the series between them is a"
+                     " guess")
     floor = least_plateau * float(storage.min())
     bounded = material.g_inf <= floor * (1.0 + 1e-9)
     if bounded:
@@ -686,7 +685,8 @@ def _enough(table: DmaTable, sweeps: list[tuple[float, NDArray[np.intp]]]) -> No
     """See that every sweep can be laid over its neighbour."""
     for t, rows in sweeps:
         if np.unique(table.omega[rows]).size < 3:
-            raise ValueError(f"{table.name}: {np.unique(table.omega[rows]).size} frequencies at"
+            count = int(np.unique(table.omega[rows]).size)
+            raise ValueError(f"{table.name}: {count} frequenc{'y' if count == 1 else 'ies'} at"
                              f" {t:g} C: shifting needs at least 3, or WLF constants (wlf,"
                              " --wlf C1 C2)")
 

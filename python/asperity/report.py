@@ -16,9 +16,9 @@ import numpy as np
 
 from ._derived import closure, energy_terms, has_friction, solver_setting
 from ._library import version
+from ._standing import duration, rows_of, seems_dead, short_time, silence, time_of_row
 from ._style import si_scale
-from .report_data import now, page_data, phase_names
-from .watch import duration
+from .report_data import faulty, now, page_data, phase_names
 
 if TYPE_CHECKING:
     from .result import Run
@@ -106,7 +106,7 @@ def _colours() -> dict[str, list[str]]:
 
 def _number(value: float, units: str) -> str:
     """Return a value in four digits with its prefixed unit."""
-    factor, unit = si_scale(value, units)
+    factor, unit = si_scale(float(f"{value:.4g}"), units)
     return escape(f"{value * factor:.4g}{' ' + unit if unit else ''}".replace("-", "−"))
 
 
@@ -124,16 +124,11 @@ def _subtitle(run: Run) -> str:
 def _notes(run: Run) -> str:
     """Return the warnings: of the run's state, of the input, of the solvers."""
     parts = []
-    rows, expected = run.history.rows, int(run.attributes.get("expected_rows", 0) or 0)
+    rows = run.history.rows
     if not run.finished:
-        of = f" of {expected}" if expected else ""
-        state = ("It is still going, or was killed" if run.outcome == "running"
-                 else f"It ended so: {escape(run.outcome)}")
-        parts.append(f"<p><strong>This run is not finished.</strong> {rows}{of} rows were written"
-                     f" when this page was made. {state};"
-                     f" <code>asperity run CASE.nml --restart</code> goes on from the"
-                     f" last checkpoint. Make the page again to see more.</p>")
-    told = run.warnings
+        parts.append(f"<p><strong>This run is not finished.</strong> {escape(rows_of(run))} were"
+                     f" written when this page was made. {_unfinished(run)}</p>")
+    told = run.warnings + faulty(run)
     tolerance = solver_setting(run, "tolerance")
     if tolerance is not None:
         for name in ("normal", "tangential"):
@@ -143,13 +138,26 @@ def _notes(run: Run) -> str:
                 if above:
                     told.append(f"the {name} residual of {above} of {rows} rows is above the"
                                 f" tolerance of {tolerance:g}; the largest is"
-                                f" {run.history[column].max():.3g}")
+                                f" {np.nanmax(run.history[column]):.3g}")
     if not len(run.snapshots):
         told.append("the result holds no snapshots: there are no maps")
     if told:
         lines = "".join(f"<li>{escape(line)}</li>" for line in told)
         parts.append(f"<p><strong>Warnings</strong></p><ul>{lines}</ul>")
     return "\n".join(f'<div class="note">{part}</div>' for part in parts)
+
+
+def _unfinished(run: Run) -> str:
+    """Return why a run is not finished, as far as the file tells, and what to do."""
+    again = ("<code>asperity run CASE.nml --restart</code> goes on from the last checkpoint.")
+    if run.outcome != "running":
+        return f"It ended so: {escape(run.outcome)}; {again}"
+    quiet = silence(run)
+    last = "" if quiet is None else f"The file was last written {short_time(quiet)} before"
+    if seems_dead(run):
+        return (f"{last}, where a row takes up to {short_time(time_of_row(run) or 0.0)}: the run"
+                f" was perhaps killed. If so, {again}")
+    return f"{last}{'. ' if last else ''}Make the page again to see more; if it was killed, {again}"
 
 
 def _tiles(run: Run) -> str:

@@ -243,7 +243,8 @@ def _snapshot(snapshot: Snapshot, block: int) -> dict[str, Any]:
         row = int(rows[0])
         for name in ("pressure", "displacement", "contact_area", "friction"):
             if name in run.history:
-                found[name] = float(run.history[name][row])
+                value = float(run.history[name][row])
+                found[name] = value if np.isfinite(value) else None
         if "road_x" in run.history and "road_y" in run.history:
             moved = np.hypot(np.diff(run.history["road_x"][:row + 1]),
                              np.diff(run.history["road_y"][:row + 1]))
@@ -258,7 +259,7 @@ def _snapshot(snapshot: Snapshot, block: int) -> dict[str, Any]:
                 continue
             found["fields"][name] = {
                 "label": label_of(name, snapshot), "units": snapshot.units(name),
-                **packed(blocks(field, block)), "exact": [float(field.min()), float(field.max())]}
+                **packed(blocks(field, block)), "exact": extremes(field)}
     if "contact" in snapshot:
         contact = snapshot["contact"]
         found["contact"] = _encoded(states(contact, block))
@@ -270,6 +271,30 @@ def _snapshot(snapshot: Snapshot, block: int) -> dict[str, Any]:
     if "displacement_z" in snapshot:
         found["spectrum"] = _spectrum(run, snapshot["displacement_z"])
     return found
+
+
+def extremes(field: NDArray[Any]) -> list[float]:
+    """Return the least and the largest of the values that are finite; 0 where none is."""
+    good = field[np.isfinite(field)]
+    return [float(good.min()), float(good.max())] if good.size else [0.0, 0.0]
+
+
+def faulty(run: Run) -> list[str]:
+    """Return which columns of the history and which fields hold what is no number."""
+    told = []
+    for name, column in run.history.items():
+        count = int(np.sum(~np.isfinite(column)))
+        if count:
+            told.append(f"{name} is not finite in {count} of {len(column)} rows")
+    if len(run.snapshots):
+        snapshot = run.snapshots[-1]
+        for name in ("pressure", "gap"):
+            if name not in snapshot:
+                continue
+            count = int(np.sum(~np.isfinite(snapshot[name])))
+            if count:
+                told.append(f"{name} of the last snapshot is not finite in {count} cells")
+    return told
 
 
 def blocks(field: NDArray[Any], block: int) -> FloatArray:
@@ -303,7 +328,13 @@ def _sums(field: FloatArray, block: int) -> FloatArray:
 
 
 def packed(field: FloatArray) -> dict[str, Any]:
-    """Return a field as 16-bit integers between its extremes, in base 64."""
+    """Return a field as 16-bit integers between its extremes, in base 64.
+
+    Cells that are not finite are given the least value; `faulty` tells of them.
+    """
+    finite = np.isfinite(field)
+    if not finite.all():
+        field = np.where(finite, field, field[finite].min() if finite.any() else 0.0)
     low, high = float(field.min()), float(field.max())
     step = (high - low) / 65535.0
     whole = np.zeros(field.shape) if step == 0.0 else np.rint((field - low) / step)

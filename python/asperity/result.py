@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._names import NamedValues, UnknownNameError, unknown_name
+from ._standing import note_of, rows_of, standing
 
 if TYPE_CHECKING:
     import pandas
@@ -430,6 +431,15 @@ class Run:
         return str(self.attributes.get("outcome", "finished" if self.finished else "running"))
 
     @property
+    def state(self) -> str:
+        """How the run stands, in words.
+
+        'finished', or 'not finished' with why it ended, or else with the time since the file was
+        last written: where that is much longer than a row takes, the run was perhaps killed.
+        """
+        return standing(self)
+
+    @property
     def warnings(self) -> list[str]:
         """The warnings of the input, then those of the run (once it has ended or stopped)."""
         return [line for name in ("warnings", "run_warnings")
@@ -510,9 +520,12 @@ class Run:
     def __repr__(self) -> str:
         state = "finished" if self.finished else "not finished"
         lines = [f"{self.title or 'untitled run'} ({self.path})",
-                 f"  {state}, {self.history.rows} rows, {self.snapshots!r}",
+                 f"  {state}, {rows_of(self)}, {self.snapshots!r}",
                  f"  grid {self.grid.nx} x {self.grid.ny}, {self.grid.lx:g} m x"
                  f" {self.grid.ly:g} m, {self.grid.boundary}"]
+        note = note_of(self)
+        if note:
+            lines.insert(2, f"  {note}")
         if self.history.rows:
             shown = [(name, self.history[name][-1], self.history.units(name))
                      for name in ("time", "pressure", "contact_area", "friction")

@@ -505,8 +505,8 @@ def _table(work: list[_Job], shape: tuple[int, ...],
         for line in job.message.splitlines():
             told.setdefault(line.removeprefix(f"{job.path.stem}.nml: "), job.name)
         run = open_result(job.path)
-        found.append(dict(measure(run)) if measure is not None else
-                     {name: column[-1] for name, column in run.history.items()})
+        found.append({name: column[-1] for name, column in run.history.items()}
+                     if measure is None else _measured(measure, run))
     for line, name in told.items():
         warnings.warn(f"{name}: {line}", UserWarning, stacklevel=3)
     parameters = list(work[0].values)
@@ -516,3 +516,12 @@ def _table(work: list[_Job], shape: tuple[int, ...],
             raise ValueError(f"measure: {name} is the name of a parameter")
         columns[name] = column([None if row is None else row.get(name) for row in found])
     return Sweep(columns, parameters, shape, [job.path for job in work], failed)
+
+
+def _measured(measure: Callable[[Run], Mapping[str, Any]], run: Run) -> dict[str, Any]:
+    """Return what is asked of a run, by names."""
+    values = measure(run)
+    if not isinstance(values, Mapping) or not all(isinstance(name, str) for name in values):
+        raise ValueError(f"measure: returned {values!r} for {run.path.name}: must return a dict"
+                         " with a value for each name, such as {'friction': 0.5}")
+    return dict(values)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 
+from ._standing import duration, rows_of, seems_dead, short_time, silence, time_of_row
 from ._style import si_scale
 from .result import Run
 
@@ -101,36 +102,28 @@ class Pace:
         return (rows - start) / (last - first) if last > first and rows > start else None
 
 
-def duration(seconds: float) -> str:
-    """Return a time in words.
-
-    Examples
-    --------
-    >>> duration(8), duration(75), duration(7300), duration(200000)
-    ('8 s', '1 min 15 s', '2 h 1 min', '2 d 7 h')
-    """
-    whole = round(seconds)
-    for size, unit, part, name in ((86400, "d", 3600, "h"), (3600, "h", 60, "min"),
-                                   (60, "min", 1, "s")):
-        if whole >= size:
-            return f"{whole // size} {unit} {whole % size // part} {name}"
-    return f"{whole} s"
-
-
 def state_of(run: Run, pace: Pace) -> str:
     """Return how far a run is, in words."""
     rows, expected = run.history.rows, int(run.attributes.get("expected_rows", 0) or 0)
     of = f" of {expected}" if expected else ""
-    told = [f"{'finished, ' if run.finished else ''}{rows}{of} rows"]
-    if expected and not run.finished:
+    told = [f"finished, {rows}{of} rows" if run.finished else rows_of(run)]
+    if run.finished:
+        return told[0]
+    if expected:
         told[0] += f" ({100 * rows // expected} %)"
+    if run.outcome != "running":
+        return f"{told[0]}, {run.outcome}"
     rate = pace.rate
-    if rate and not run.finished:
+    if rate:
         told.append(f"{rate:.3g} rows/s")
         if expected > rows:
             told.append(f"{duration((expected - rows) / rate)} left")
-    if pace.still >= 10.0 and not run.finished:
-        told.append(f"no new row for {duration(pace.still)}")
+    quiet = max(pace.still, silence(run) or 0.0)
+    if quiet >= 10.0:
+        told.append(f"no new row for {duration(quiet)}")
+    if seems_dead(run):
+        told[-1] += (f" where a row takes up to {short_time(time_of_row(run) or 0.0)}: perhaps no"
+                     " longer running (--restart goes on from the last checkpoint)")
     return ", ".join(told)
 
 
@@ -175,7 +168,7 @@ def picture(run: Run, pace: Pace, width: int, unicode: bool = True) -> list[str]
 
 def watch(path: str | os.PathLike[str], *, every: float = 1.0, once: bool = False,
           stream: TextIO | None = None) -> int:
-    """Follow a run until it is finished.
+    """Follow a run until it has ended: is finished, was stopped, or did not converge.
 
     Parameters
     ----------
@@ -192,7 +185,7 @@ def watch(path: str | os.PathLike[str], *, every: float = 1.0, once: bool = Fals
     Returns
     -------
     int
-        0 when the run is finished, or was shown once; 130 after Ctrl-C.
+        0 when the run has ended, or was shown once; 130 after Ctrl-C.
 
     Raises
     ------
@@ -218,11 +211,11 @@ def watch(path: str | os.PathLike[str], *, every: float = 1.0, once: bool = Fals
                 else:
                     out.write("\n".join(lines) + "\n")
                 drawn = lines
-            elif (run.history.rows, run.finished) != told:
+            elif (now := _news(run)) != told:
                 out.write(f"{state_of(run, pace)}: {last_row(run)}\n")
-            told = (run.history.rows, run.finished)
+                told = now
             out.flush()
-            if run.finished or once:
+            if run.finished or once or run.outcome != "running":
                 return 0
             time.sleep(every)
             run.refresh()
@@ -236,6 +229,11 @@ def watch(path: str | os.PathLike[str], *, every: float = 1.0, once: bool = Fals
         if stream is None:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+
+
+def _news(run: Run) -> tuple[Any, ...]:
+    """Return what a plain line tells: another one is due when it changes."""
+    return run.history.rows, run.finished, run.outcome, seems_dead(run)
 
 
 def _over(out: TextIO, before: list[str], lines: list[str]) -> None:

@@ -205,6 +205,37 @@ def test_check_reads_height_maps(program, folder):
     assert call(program, "check", folder / "case.nml").returncode == 2  # from another folder
 
 
+def test_a_missing_height_map_is_told_with_its_place(program, tmp_path):
+    """Input, group, variable and line are named; several maps are told at once."""
+    text = GOOD.replace("shape = 'sphere', radius = 0.01 /",
+                        "shape = 'file', file = 'nowhere.h5' /\n"
+                        "&surface shape = 'file', file = 'case.nml' /")
+    (tmp_path / "case.nml").write_text(text)
+    done = call(program, "check", "case.nml", cwd=tmp_path)
+    assert done.returncode == 3
+    first, second = done.err.splitlines()
+    assert first == ("case.nml: &surface: file = 'nowhere.h5': there is no such file (line 2)")
+    assert second == "case.nml: &surface: file = 'case.nml': is not an HDF5 file (line 3)"
+    done = call(program, "run", "case.nml", cwd=tmp_path)
+    assert done.returncode == 3
+    assert done.err.splitlines()[-1] == first
+    assert not (tmp_path / "case.h5").exists()
+
+
+def test_info_of_a_killed_run_says_how_long_a_row_takes(program, tmp_path):
+    (tmp_path / "case.nml").write_text(GOOD)
+    assert call(program, "run", "case.nml", "--quiet", cwd=tmp_path).returncode == 0
+    with h5py.File(tmp_path / "case.h5", "a") as file:
+        file.attrs["finished"] = np.int32(0)
+        file.attrs["expected_rows"] = np.int32(7)
+        del file.attrs["outcome"]
+        file.attrs["outcome"] = np.bytes_("running")
+        file["history/seconds"][-1] = 2.25
+    done = call(program, "info", "case.h5", cwd=tmp_path)
+    assert re.search(r"(?m)^rows +1 of 7$", done.out)
+    assert "going on, or killed: the last row took 2.25 s; see whether rows are added" in done.out
+
+
 def test_info(program, folder):
     path = folder / "result.h5"
     with h5py.File(path, "w") as file:

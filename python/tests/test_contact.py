@@ -171,3 +171,16 @@ def test_wrong_values(changes, message):
     arguments = {"height": rough(), "lx": 1e-3, "ly": None, "modulus": 1e6, "pressure": 1e4}
     with pytest.raises(ValueError, match=message):
         asperity.solve_normal(**(arguments | changes))
+
+
+def test_masked_points_are_refused():
+    """What lies below a mask is no height."""
+    height = np.ma.masked_array(np.ones((4, 6)), False)
+    height[1, 2] = np.ma.masked
+    for call in (lambda: asperity.solve_normal(height, 1.0, 1.0, 1e6, pressure=1.0),
+                 lambda: asperity.surface.psd(height, 1.0),
+                 lambda: asperity.surface.statistics(height, 1.0)):
+        with pytest.raises(ValueError, match="height: has 1 of 24 points masked: fill them"):
+            call()
+    with pytest.raises(ValueError, match="pressure = '1e4': must be a finite number > 0"):
+        asperity.solve_normal(np.eye(4), 1.0, 1.0, 1e6, pressure="1e4")

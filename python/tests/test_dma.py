@@ -1,5 +1,6 @@
 """DMA tables become materials: known series come back, units and mistakes are seen."""
 
+import re
 import subprocess
 from typing import NamedTuple
 
@@ -310,6 +311,52 @@ def test_many_faults_are_cut_short(tmp_path):
             read_dma(path, **{word: "furlong"})
     with pytest.raises(ValueError, match="columns = 'mass': must be one of"):
         read_dma(path, columns={"mass": 1})
+
+
+def test_exports_as_instruments_write_them(tmp_path):
+    """Lines above the header, units below it, German words and commas, a block a sweep."""
+    path = tmp_path / "dma.csv"
+    blocks = [f"Schritt {k}\nTemperatur;{t};C\n\nFrequenz;Speichermodul;Verlustmodul;Temperatur\n"
+              f"Hz;MPa;MPa;°C\n" + "".join(f"{f},5;1,{f}25;0,{f};{t},0\n" for f in (1, 2, 3))
+              for k, t in enumerate((10, 20))]
+    path.write_text("Probe: Lauffläche A\nDatum; 12.3.2026\nDicke; 2,5\n" + "".join(blocks))
+    table = read_dma(path)
+    np.testing.assert_allclose(table.omega, 2 * np.pi * np.array([1.5, 2.5, 3.5] * 2))
+    np.testing.assert_allclose(table.storage, 1e6 * np.array([1.125, 1.225, 1.325] * 2))
+    np.testing.assert_allclose(table.loss, 1e6 * np.array([0.1, 0.2, 0.3] * 2))
+    np.testing.assert_allclose(table.temperature, [10.0] * 3 + [20.0] * 3)
+    assert table.notes == []
+    path.write_text(path.read_text().replace("2,5;1,225;0,2", "2,5;;0,2"))
+    with pytest.raises(ValueError, match="line 10: storage = '': must be a number > 0"):
+        read_dma(path)
+
+
+def test_commas_between_thousands(tmp_path):
+    """A comma beside decimal points is none of its own."""
+    path = tmp_path / "dma.csv"
+    path.write_text("f (Hz);G' (Pa);G'' (Pa)\n0.10;943,120;81,000\n1.00;1,043,120;91,000\n"
+                    "10.0;1,143,120.5;101,000\n")
+    table = read_dma(path)
+    np.testing.assert_allclose(table.storage, [943120.0, 1043120.0, 1143120.5])
+    np.testing.assert_allclose(table.loss, [81e3, 91e3, 101e3])
+    path.write_text("f (Hz);G' (Pa);G'' (Pa)\n0.10;1,5;0.1\n1.00;2,5;0.1\n10.0;3,5;0.1\n")
+    with pytest.raises(ValueError, match="line 2: storage = '1,5': must be a number > 0"):
+        read_dma(path)
+
+
+def test_data_that_say_little_are_named(tmp_path):
+    """One frequency is refused; a narrow band and fewer points than arms are told."""
+    head = "f (Hz),G' (Pa),G'' (Pa)"
+    one = read_dma(write(tmp_path / "one.csv", head, [(10.0, 2e6, 1e5)] * 4))
+    with pytest.raises(ValueError, match=r"all 4 points are at one frequency, 62.83 rad/s"):
+        fit_dma(one)
+    narrow = fit_dma(read_dma(write(tmp_path / "narrow.csv", head, [
+        (9.0, 2e6, 1e5), (10.0, 2.01e6, 1e5), (11.0, 2.02e6, 1e5)])))
+    assert any("cover 0.087 decades" in note for note in narrow.notes)
+    few = fit_dma(read_dma(write(tmp_path / "few.csv", head, [
+        (0.1, 1e6, 3e5), (3.0, 2.0e6, 7e5), (100.0, 4e6, 1.4e6)])))
+    assert any(re.match(r"3 points for [4-6] arms", note) for note in few.notes)
+    assert few.material.g_inf > 0
 
 
 # ---- the command ----------------------------------------------------------------------------

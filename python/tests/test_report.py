@@ -2,6 +2,7 @@
 
 import base64
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -198,6 +199,39 @@ def test_a_killed_run_and_one_without_rows(tmp_path):
     assert check_page(text).data["charts"] == []
     assert "The history has no rows yet" in text
     assert "holds no snapshots" in text
+
+
+def test_the_page_says_whether_a_run_seems_dead(tmp_path):
+    path = frictional_result(tmp_path / "killed.h5", finished=0)
+    text = report_page(asperity.open(path))
+    assert "Make the page again to see more; if it was killed" in text
+    os.utime(path, (time.time() - 60.0,) * 2)
+    text = report_page(asperity.open(path))
+    check_page(text)
+    assert ("The file was last written 1 min 0 s before, where a row takes up to 0.25 s: the run"
+            " was perhaps killed." in text)
+    with h5py.File(path, "a") as file:
+        file.attrs["outcome"] = "stopped after step 5"
+    text = report_page(asperity.open(path))
+    assert "It ended so: stopped after step 5;" in text and "perhaps killed" not in text
+
+
+def test_what_is_no_number_is_told(tmp_path):
+    """Damaged values are named; the page is whole without them."""
+    path = frictional_result(tmp_path / "holes.h5")
+    with h5py.File(path, "a") as file:
+        for name in ("friction", "seconds", "residual_normal"):
+            file["history"][name][-1] = np.nan
+        file["snapshots/000005/pressure"][3, 4] = np.nan
+        file["snapshots/000005/gap"][:] = np.inf
+    text = report_page(asperity.open(path))
+    fields = check_page(text).data["snapshots"][-1]["fields"]
+    assert "friction is not finite in 1 of 6 rows" in text
+    assert "pressure of the last snapshot is not finite in 1 cells" in text
+    assert "gap of the last snapshot is not finite in 384 cells" in text
+    exact = asperity.open(path).snapshots[-1].pressure
+    assert fields["pressure"]["exact"] == [np.nanmin(exact), np.nanmax(exact)]
+    assert fields["gap"]["high"] == 0.0
 
 
 def test_residuals_above_the_tolerance_are_told(frictional):

@@ -1,9 +1,13 @@
 """Reading results."""
 
+import os
+import re
+import time
+
 import h5py
 import numpy as np
 import pytest
-from conftest import write_result
+from conftest import frictional_result, write_result
 
 import asperity
 
@@ -79,10 +83,38 @@ def test_reprs_say_what_is_there(result):
     run = asperity.open(result)
     assert "Sample" in repr(run)
     assert "24 x 16" in repr(run)
-    assert "finished, 6 rows, 2 snapshots (steps 0, 5)" in repr(run)
+    assert "finished, 6 rows, 2 snapshots (steps 0, 5)\n" in repr(run)
     assert "pressure" in repr(run.history)
     assert "step 5" in repr(run.snapshots[-1])
     assert "poisson: 0.5" in repr(run.material)
+
+
+def unfinished(path, *, ago, seconds=0.25, outcome="running"):
+    """Return a run without an end that was last written `ago` seconds before."""
+    frictional_result(path, finished=0)
+    with h5py.File(path, "a") as file:
+        file.attrs["outcome"] = outcome
+        file.attrs["expected_rows"] = np.int32(40)
+        file["history/seconds"][:] = seconds
+    written = time.time() - ago
+    os.utime(path, (written, written))
+    return asperity.open(path)
+
+
+def test_a_killed_run_is_told_from_one_that_goes_on(tmp_path):
+    """What counts is how long nothing was written against the time a row takes."""
+    dead = unfinished(tmp_path / "dead.h5", ago=190)
+    assert dead.state == ("not finished, last written 3 min 10 s ago, and a row takes up to 0.25 s:"
+                          " perhaps no longer running")
+    assert "perhaps no longer running" in repr(dead) and "6 of 40 rows" in repr(dead)
+    assert "perhaps no longer running" in dead._repr_html_()
+    alive = unfinished(tmp_path / "alive.h5", ago=2)
+    assert re.fullmatch(r"not finished, last written 2(\.\d)? s ago", alive.state)
+    slow = unfinished(tmp_path / "slow.h5", ago=190, seconds=60.0)
+    assert slow.state == "not finished, last written 3 min 10 s ago"
+    ended = unfinished(tmp_path / "ended.h5", ago=190, outcome="stopped after step 5")
+    assert ended.state == "not finished, stopped after step 5"
+    assert asperity.open(frictional_result(tmp_path / "whole.h5")).state == "finished"
 
 
 def test_missing_file(tmp_path):

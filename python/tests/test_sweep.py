@@ -163,6 +163,9 @@ def test_measure(tmp_path):
     with pytest.raises(RuntimeError, match="in the callable"):
         sweep(wave(), {"phase.pressure": [0.1 * FULL, 0.2 * FULL]}, folder=tmp_path, measure=broken)
     assert len(list(tmp_path.glob("*.h5"))) == 3
+    with pytest.raises(ValueError, match=r"measure: returned 1 for phase.*: must return a dict"):
+        sweep(wave(), {"phase.pressure": [0.2 * FULL]}, folder=tmp_path,
+              measure=lambda run: run.history.rows)
 
 
 def test_finished_results_are_kept(tmp_path, capsys):

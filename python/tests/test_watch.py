@@ -89,6 +89,29 @@ def test_plain_lines_where_there_is_no_terminal(tmp_path, monkeypatch):
     assert looks == [0.2] * 3
 
 
+def test_a_run_that_was_killed_or_stopped(tmp_path, monkeypatch):
+    """A silent run is told once that it is perhaps dead; the view of a stopped one ends."""
+    path = frictional_result(tmp_path / "silent.h5", finished=0)
+    looks = []
+
+    def wait(seconds):
+        looks.append(seconds)
+        if len(looks) == 2:
+            os.utime(path, (time.time() - 60.0,) * 2)
+        if len(looks) == 4:
+            with h5py.File(path, "a") as file:
+                file.attrs["outcome"] = "stopped after step 5"
+
+    monkeypatch.setattr(time, "sleep", wait)
+    out = io.StringIO()
+    assert watch(path, stream=out) == 0
+    first, silent, stopped = out.getvalue().splitlines()
+    assert "no new row" not in first
+    assert ("no new row for 1 min 0 s where a row takes up to 0.25 s: perhaps no longer running"
+            in silent)
+    assert "stopped after step 5" in stopped and len(looks) == 4
+
+
 def test_command(result, tmp_path, capsys):
     assert main(["watch", str(result)]) == 0
     assert capsys.readouterr().out.startswith("finished, 6 rows: step 5")
@@ -118,6 +141,7 @@ def test_follows_a_run_on_a_terminal_until_interrupted(program, tmp_path):
                    check=True)
     with h5py.File(tmp_path / "live.h5", "a") as file:
         file.attrs["finished"] = np.int32(0)
+        file.attrs["outcome"] = "running"
     ours, theirs = pty.openpty()
     with subprocess.Popen(
             [sys.executable, "-m", "asperity", "watch", "live.h5", "--every", "0.05"],

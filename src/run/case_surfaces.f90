@@ -63,6 +63,8 @@ contains
       term%centre_x = group%real_value('centre_x', (grid%nx/2)*grid%dx)
       term%centre_y = group%real_value('centre_y', (grid%ny/2)*grid%dy)
       term%file = ''
+      term%place = path//': &surface'
+      term%line = group%line
 
       call group%demand('shape', faults)
       belongs = ' shape '

@@ -71,12 +71,27 @@ contains
       if (finished == 0 .and. file%has_attribute('/', 'outcome')) then
          call file%read_attribute('/', 'outcome', outcome, error)
          if (allocated(error)) return
-         if (outcome == 'running') outcome = 'going on, or killed'
+         if (outcome == 'running') outcome = 'going on, or killed'//row_note(file)
          text = text//'outcome     '//ordinary(outcome, 400)//nl
       end if
       call add_warnings(file, 'warnings', text, error)
       if (.not. allocated(error)) call add_warnings(file, 'run_warnings', text, error)
    end subroutine describe
+
+   !> How long the last row took, for a look at whether rows are added; '' where it is not known.
+   function row_note(file) result(note)
+      type(hdf5_file_type), intent(inout) :: file
+      character(:), allocatable :: note
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: seconds(:)
+
+      note = ''
+      call file%read('/history/seconds', seconds, error)
+      if (allocated(error)) return
+      if (size(seconds) == 0) return
+      note = ': the last row took '//to_text(real(nint(1e3_dp*seconds(size(seconds))), dp)*1e-3_dp)// &
+         ' s; see whether rows are added'
+   end function row_note
 
    !> The lines of an attribute with warnings, where there is one.
    subroutine add_warnings(file, name, text, error)
@@ -133,7 +148,7 @@ contains
       character(*), parameter :: units(7) = [character(3) :: '', '', ' s', ' Pa', ' m', '', '']
       real(dp), allocatable :: column(:)
       real(dp) :: last(size(names)), worst
-      integer :: i, rows
+      integer :: expected, i, rows
 
       rows = huge(1)
       worst = 0.0_dp
@@ -153,7 +168,13 @@ contains
          last(i) = column(rows)
          if (names(i) == 'residual_normal') worst = maxval(column(:rows))
       end do
-      text = text//'rows        '//to_text(rows)//nl//'last row'//nl
+      text = text//'rows        '//to_text(rows)
+      if (file%has_attribute('/', 'expected_rows')) then
+         call file%read_attribute('/', 'expected_rows', expected, error)
+         if (allocated(error)) return
+         if (expected /= rows) text = text//' of '//to_text(expected)
+      end if
+      text = text//nl//'last row'//nl
       do i = 1, size(names)
          text = text//'  '//names(i)//to_text(last(i))//trim(units(i))//nl
       end do

@@ -196,18 +196,20 @@ contains
       end do
    end subroutine add_file
 
-   !> Read the maps of all terms that are files, only to see that they can be used.
+   !> Read the maps of all terms that are files, only to see that they can be used; all faults are
+   !> reported at once.
    subroutine check_files(grid, terms, error)
       type(grid_type), intent(in) :: grid
       type(surface_settings_type), intent(in) :: terms(:)
       type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable :: fault
       real(dp), allocatable :: map(:, :)
       integer :: n
 
       do n = 1, size(terms)
          if (terms(n)%shape /= 'file') cycle
-         call read_map(grid, terms(n), map, error)
-         if (allocated(error)) return
+         call read_map(grid, terms(n), map, fault)
+         if (allocated(fault)) call add_fault(error, fault%status, fault%message)
       end do
    end subroutine check_files
 
@@ -221,11 +223,14 @@ contains
       integer :: faulty, i, j
 
       call read_field(trim(term%file), trim(term%dataset), map, error)
-      if (allocated(error)) return
+      if (allocated(error)) then
+         error%message = map_fault(term, error%message)
+         return
+      end if
       if (size(map, 1) /= grid%nx .or. size(map, 2) /= grid%ny) then
-         write (text, '(4(a, i0), a)') ': the height map has the shape (', size(map, 2), ', ', &
+         write (text, '(4(a, i0), a)') 'the height map has the shape (', size(map, 2), ', ', &
             size(map, 1), '): must be (ny, nx) = (', grid%ny, ', ', grid%nx, ')'
-         call fail(error, error_input, '&surface: file = '''//trim(term%file)//''''//trim(text))
+         call fail(error, error_input, map_fault(term, trim(text)))
          return
       end if
       faulty = 0
@@ -236,11 +241,28 @@ contains
          end do
       end do
       if (faulty > 0) then
-         write (text, '(a, i0, a)') ': the height map has ', faulty, &
+         write (text, '(a, i0, a)') 'the height map has ', faulty, &
             ' values that are not finite (NaN or infinite): all must be numbers, in m'
-         call fail(error, error_input, '&surface: file = '''//trim(term%file)//''''//trim(text))
+         call fail(error, error_input, map_fault(term, trim(text)))
       end if
    end subroutine read_map
+
+   !> What is wrong with a map, after the place in the input that names its file.
+   pure function map_fault(term, message) result(fault)
+      type(surface_settings_type), intent(in) :: term
+      character(*), intent(in) :: message                     !! may start with the file's name
+      character(:), allocatable :: fault
+      character(16) :: line
+      integer :: first
+
+      first = 1
+      if (index(message, trim(term%file)//': ') == 1) first = len_trim(term%file) + 3
+      fault = trim(term%place)//': file = '''//trim(term%file)//''': '//message(first:)
+      if (term%line > 0) then
+         write (line, '(a, i0, a)') ' (line ', term%line, ')'
+         fault = fault//trim(line)
+      end if
+   end function map_fault
 
    !> Add an analytic shape.
    subroutine add_analytic(grid, term, height)

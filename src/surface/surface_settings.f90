@@ -28,6 +28,8 @@ module surface_settings
       character(path_length) :: dataset             !! '' tries 'surface/height', then 'surface'
       real(dp) :: scale
       real(dp) :: centre_x, centre_y                !! m
+      character(path_length) :: place = '&surface'  !! for messages: 'road.nml: &surface'
+      integer :: line = 0                           !! of the group in the input; 0: not of a file
    end type surface_settings_type
 
 contains

@@ -1,0 +1,120 @@
+"""Tables of numbers as instruments and spreadsheets write them: text, separators, decimal signs."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+__all__ = ["cells_of", "decimals", "is_number", "text_lines"]
+
+Rows = list[tuple[int, list[str]]]
+
+_COMMA = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
+_THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:,\d{3})+(?:\.\d*)?(?:[eE][-+]?\d+)?")
+_THOUSANDS_BY_POINT = re.compile(r"[-+]?\d{1,3}(?:\.\d{3})+,\d+(?:[eE][-+]?\d+)?")
+_POINT = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
+
+
+def text_lines(path: Path) -> list[tuple[int, str]]:
+    """Return the lines of a text file with their numbers, from 1, without empty ones and comments.
+
+    UTF-8, UTF-16 with its mark, or Latin-1; comments start with ``#``.
+
+    Raises
+    ------
+    OSError
+        If the file is missing or a folder.
+    ValueError
+        If it is no text, or holds nothing.
+    """
+    if not path.exists():
+        raise OSError(f"{path}: there is no such file")
+    if path.is_dir():
+        raise OSError(f"{path}: is a folder, not a file")
+    data = path.read_bytes()
+    try:
+        text = data.decode("utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    if "\0" in text:
+        raise ValueError(f"{path}: is not a text file")
+    kept = [(at, line) for at, line in enumerate(text.splitlines(), 1)
+            if line.strip() and not line.lstrip().startswith("#")]
+    if not kept:
+        raise ValueError(f"{path}: is empty")
+    return kept
+
+
+def cells_of(lines: Sequence[tuple[int, str]]) -> Rows:
+    """Return the cells of each line; what separates them is seen in the last line."""
+    separator = _separator([line for _, line in lines])
+    rows = []
+    for at, line in lines:
+        cells = line.split() if separator is None else next(
+            csv.reader(io.StringIO(line), delimiter=separator, skipinitialspace=True))
+        rows.append((at, [cell.strip() for cell in cells]))
+    return rows
+
+
+def _separator(lines: Sequence[str]) -> str | None:
+    """Return what separates columns; None for blanks."""
+    # the header may have commas in its words, and a last line may end the table in words
+    last = next((line for line in reversed(lines) if re.match(r"\W*\d", line)), lines[-1])
+    cells = last.split()
+    if len(cells) > 1 and ";" not in last and "\t" not in last and all(
+            re.fullmatch(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?", cell) for cell in cells):
+        return None  # decimal commas
+    for separator in ("\t", ";", ","):
+        if separator in last:
+            return separator
+    return "," if len(lines) == 1 and "," in lines[0] else None
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell is a number, with a decimal point or comma.
+
+    Examples
+    --------
+    >>> is_number("1.5e3"), is_number("1,5"), is_number("12.3.2026"), is_number("")
+    (True, True, False, False)
+    """
+    try:
+        float(cell)
+    except ValueError:
+        return bool(_COMMA.fullmatch(cell) or _THOUSANDS.fullmatch(cell))
+    return True
+
+
+def decimals(rows: Rows) -> Rows:
+    """Return the cells with decimal points, and without signs between thousands.
+
+    A comma is the decimal sign unless other cells have decimal points: then it stands between
+    thousands.
+
+    Examples
+    --------
+    >>> decimals([(1, ["0,5", "943,120"])])
+    [(1, ['0.5', '943.120'])]
+    >>> decimals([(1, ["0.5", "943,120"])])
+    [(1, ['0.5', '943120'])]
+    >>> decimals([(1, ["0,5", "1.943,5"])])
+    [(1, ['0.5', '1943.5'])]
+    """
+    points = any(_POINT.fullmatch(cell) or (_THOUSANDS.fullmatch(cell) and "." in cell)
+                 for _, cells in rows for cell in cells)
+
+    def plain(cell: str) -> str:
+        if "," not in cell:
+            return cell
+        if points:
+            if _THOUSANDS_BY_POINT.fullmatch(cell) or not _THOUSANDS.fullmatch(cell):
+                return cell
+            return cell.replace(",", "")
+        if _THOUSANDS_BY_POINT.fullmatch(cell):
+            return cell.replace(".", "").replace(",", ".")
+        return cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell
+
+    return [(at, [plain(cell) for cell in cells]) for at, cells in rows]
