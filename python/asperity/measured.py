@@ -7,11 +7,14 @@ checksum and what the instrument said.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
+import io
 import json
 import math
+import re
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
@@ -22,6 +25,7 @@ from numpy.typing import NDArray
 
 from ._check import choice, number, positive, whole
 from ._library import version
+from ._map_files import own_map, text_map
 
 __all__ = ["MeasuredSurface", "channels", "import_topography", "load"]
 
@@ -195,7 +199,7 @@ def channels(path: str | Path) -> list[str]:
     ImportError
         If SurfaceTopography is not installed.
     """
-    with _open(Path(path)) as reader:
+    with _quiet(), _open(Path(path)) as reader:
         return [_channel_line(channel) for channel in reader.channels]
 
 
@@ -361,12 +365,56 @@ def _open(path: Path) -> Any:
         raise OSError(f"{path}: there is no such file")
     if path.is_dir():
         raise OSError(f"{path}: is a folder, not a file")
+    if not path.stat().st_size:
+        raise OSError(f"{path}: is empty")
+    if (own := own_map(path)) is not None:
+        return own
     try:
-        return open_topography(str(path))
+        with _quiet():
+            reader = open_topography(str(path))
     except Exception as error:  # readers of damaged files raise what they meet
-        if type(error).__name__ == "CannotDetectFileFormat":
-            raise OSError(f"{path}: is of no format that SurfaceTopography knows") from None
-        raise OSError(f"{path}: cannot be read as a topography: {_reason(error)}") from None
+        if type(error).__name__ != "CannotDetectFileFormat":
+            raise OSError(f"{path}: cannot be read as a topography: {_reason(error)}") from None
+        try:
+            return text_map(path)
+        except ValueError as fault:
+            if re.search("is not a text file|no table of numbers", str(fault)):
+                raise OSError(f"{path}: is of no format that SurfaceTopography knows") from None
+            raise
+    if _is_doubtful(reader, path):
+        try:
+            found = text_map(path)
+        except ValueError as fault:
+            if reader.format() != "hgt":
+                raise
+            raise OSError(f"{path}: is of no known format: {_reason(fault)}") from None
+        finally:
+            reader.close()
+        return found
+    return reader
+
+
+def _is_doubtful(reader: Any, path: Path) -> bool:
+    """Whether a table is the better reading of a file.
+
+    The format HGT has no mark: any file of 2 n^2 bytes passes for it. And points whose grid has
+    holes are taken for a matrix of two or three columns.
+    """
+    if reader.format() == "hgt":
+        return path.suffix.lower() != ".hgt"
+    return (reader.format() in ("asc", "matrix") and len(reader.channels) == 1
+            and reader.channels[0].physical_sizes is None
+            and reader.channels[0].dim == 2 and reader.channels[0].nb_grid_pts[0] in (2, 3))
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep what readers print or warn of while they try a file off the terminal."""
+    nowhere = io.StringIO()
+    with (contextlib.redirect_stdout(nowhere), contextlib.redirect_stderr(nowhere),
+          warnings.catch_warnings()):
+        warnings.simplefilter("ignore")
+        yield
 
 
 def _reason(error: Exception) -> str:
@@ -425,9 +473,7 @@ def _read(
     given = _unit_of(unit)
     if given is not None:
         choice("unit", given, tuple(UNITS))
-    with warnings.catch_warnings(), _open(path) as reader:
-        # NetCDF files are mapped into memory and closed later
-        warnings.filterwarnings("ignore", message="Cannot close a netcdf_file")
+    with _quiet(), _open(path) as reader:
         chosen = _choose(reader, path, channel)
         if not chosen.is_uniform:
             raise ValueError(

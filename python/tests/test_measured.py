@@ -10,6 +10,7 @@ import sys
 import h5py
 import numpy as np
 import pytest
+from conftest import write_result
 
 import asperity
 from asperity.__main__ import main
@@ -102,6 +103,111 @@ def test_formats_bring_heights_lengths_and_orientation(tmp_path, name):
         assert json.loads(file.attrs["steps"]) == surface.steps
         json.loads(file["source/metadata"][()])
     assert not (tmp_path / "s.h5.new").exists()
+
+
+def matrix(height, separator=";", decimal=","):
+    """Return heights as a spreadsheet writes them, a row of the file a row along x."""
+    return "\n".join(separator.join("" if np.isnan(z) else f"{z:.9f}".replace(".", decimal)
+                                    for z in row) for row in height) + "\n"
+
+
+@pytest.mark.parametrize("separator, decimal, encoding, head", [
+    (";", ",", "utf-8", ""), (",", ".", "utf-8", "Probe 7\nDatum, 12.3.2026\n"),
+    (" ", ",", "utf-8", ""), (";", ".", "utf-16", "Instrument;A\nUnit;um\n")])
+def test_matrices_of_spreadsheets(tmp_path, separator, decimal, encoding, head):
+    """Separators, decimal commas, lines above the numbers, missing cells."""
+    height = sample()
+    (tmp_path / "map.csv").write_text(head + matrix(height, separator, decimal), encoding=encoding)
+    given = {"unit": "um", "size": (LX, LY), "level": "none"}
+    surface = load(tmp_path / "map.csv", **given)
+    np.testing.assert_allclose(surface.height, 1e-6 * height, atol=1e-15)
+    assert (surface.lx, surface.ly, surface.source["format"]) == (LX * 1e-6, LY * 1e-6, "text")
+    if separator == ";":
+        height[4, 5] = np.nan
+        text = head + matrix(height, separator, decimal).replace("\n", ";\n")
+        (tmp_path / "map.csv").write_text(text, encoding=encoding)
+        assert load(tmp_path / "map.csv", **given).steps[0]["missing"] == 1
+    (tmp_path / "map.csv").write_text(matrix(height, ";") + "1;2\n")
+    with pytest.raises(ValueError, match="line 15: has 2 columns, must have 23 as line 1"):
+        load(tmp_path / "map.csv", **given)
+    worse = matrix(height, ";") + matrix(height[:1], ";").replace("0", "o")
+    (tmp_path / "map.csv").write_text(worse)
+    with pytest.raises(ValueError, match=r"line 15: column \d+ = .*: must be a number"):
+        load(tmp_path / "map.csv", **given)
+
+
+def test_a_text_of_any_length_is_no_binary_map(tmp_path):
+    """A format without a mark takes any file of 2 n^2 bytes for its own: 36 x 36 here."""
+    text = matrix(sample()[:, :18])
+    path = tmp_path / "map.csv"
+    path.write_text(text + "#" * (2 * 72**2 - len(text)))
+    assert path.stat().st_size == 2 * 72**2
+    assert load(path, unit="um", size=(LX, LY)).height.shape == (NY, 18)
+    path.write_bytes(bytes(range(256)) * 2)  # 16 x 16
+    with pytest.raises(OSError, match=r"map\.csv: is of no known format"):
+        load(path, unit="um", size=(LX, LY))
+    path.write_bytes(b"")
+    with pytest.raises(OSError, match=r"map\.csv: is empty"):
+        load(path)
+
+
+def test_points_on_a_grid_with_holes(tmp_path):
+    """Points that were not measured are left out of a list: their places are found and filled."""
+    y, x = np.mgrid[0:NY, 0:NX]
+    plane = 0.5 * x - 0.25 * y
+    rows = np.column_stack([x.ravel() * LX / NX, y.ravel() * LY / NY, plane.ravel()])
+    kept = np.delete(rows, [40, 41, 200], axis=0)
+    np.random.default_rng(1).shuffle(kept)
+    np.savetxt(tmp_path / "points.xyz", kept, fmt="%.4f")
+    surface = load(tmp_path / "points.xyz", unit="um", level="none")
+    np.testing.assert_allclose(surface.height, 1e-6 * plane, atol=1e-18)
+    assert (surface.lx, surface.ly) == pytest.approx((LX * 1e-6, LY * 1e-6), rel=1e-5)
+    assert surface.steps[0] == {"step": "fill", "missing": 3, "points": NX * NY,
+                                "share": 3 / (NX * NY)}
+    (tmp_path / "points.csv").write_text("x (mm);y (mm);z (µm)\n" + "\n".join(
+        f"{a * 1e-3:.5f};{b * 1e-3:.5f};{c:.4f}".replace(".", ",") for a, b, c in kept))
+    units = load(tmp_path / "points.csv", level="none")
+    np.testing.assert_allclose(units.height, 1e-6 * plane, atol=1e-18)
+    assert units.lx == pytest.approx(LX * 1e-6, rel=1e-4) and units.unit == "um"
+    np.savetxt(tmp_path / "points.xyz", np.vstack([kept, kept[:2]]))
+    with pytest.raises(ValueError, match="2 points of the grid stand there more than once"):
+        load(tmp_path / "points.xyz", unit="um")
+    np.savetxt(tmp_path / "points.xyz", np.random.default_rng(1).random((300, 3)))
+    with pytest.raises(ValueError, match="the points lie on no regular grid: interpolate"):
+        load(tmp_path / "points.xyz", unit="um")
+
+
+def test_own_files_come_back_as_they_are(tmp_path):
+    """What `import` has written, and the road of a result, have rows along x and know all."""
+    topography(sample()).to_netcdf(str(tmp_path / "map.nc"))
+    first = import_topography(tmp_path / "map.nc", tmp_path / "s.h5", level="tilt")
+    again = load(tmp_path / "s.h5", level="none")
+    np.testing.assert_array_equal(again.height, first.height)
+    assert (again.lx, again.ly, again.unit, again.periodic) == (first.lx, first.ly, "m", False)
+    assert again.source["metadata"]["source_name"] == "map.nc"
+    assert "levelled (tilt)" in again.source["metadata"]["steps_text"]
+    assert channels(tmp_path / "s.h5") == [
+        "'surface/height': map of heights, 23 x 14 points, unit m"]
+    result = load(write_result(tmp_path / "run.h5"), level="none")
+    np.testing.assert_array_equal(result.height, asperity.open(tmp_path / "run.h5").height)
+    assert result.periodic and (result.lx, result.ly) == (2.4e-3, 1.6e-3)
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["z"] = sample().T
+    other = load(tmp_path / "other.h5", unit="um", size=(LX, LY), level="none")
+    np.testing.assert_allclose(other.height, 1e-6 * sample(), rtol=1e-14)
+
+
+def test_readers_that_try_a_file_are_not_heard(tmp_path, capfd):
+    """What a reader prints before it gives up says nothing to the user."""
+    (tmp_path / "any.bin").write_bytes(bytes(range(256)) * 4 + b"1")
+    topography(sample()).to_netcdf(str(tmp_path / "map.nc"))
+    assert main(["import", str(tmp_path / "any.bin")]) == 3
+    told = capfd.readouterr()
+    assert told.out == ""
+    assert told.err == (f"asperity: {tmp_path / 'any.bin'}: is of no format that SurfaceTopography"
+                        " knows\n")
+    assert main(["import", str(tmp_path / "map.nc"), "--list"]) == 0
+    assert capfd.readouterr().err == ""
 
 
 def test_what_the_instrument_said_is_kept(tmp_path):
