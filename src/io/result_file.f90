@@ -284,7 +284,7 @@ contains
          if (allocated(error)) return
       end if
       do i = 1, column_count
-         call self%file%append_value('/history/'//trim(columns(i)%name), self%rows, values(i), &
+         call self%file%append('/history/'//trim(columns(i)%name), self%rows, values(i:i), &
             error)
          if (allocated(error)) return
       end do
@@ -511,7 +511,7 @@ contains
       call create_columns(self, error)
       do i = 1, column_count
          if (allocated(error)) return
-         call self%file%append_values('/history/'//trim(columns(i)%name), 0, values(:, i), error)
+         call self%file%append('/history/'//trim(columns(i)%name), 0, values(:, i), error)
       end do
       if (allocated(error)) return
       call self%file%flush(error)
