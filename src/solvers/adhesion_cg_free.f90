@@ -16,11 +16,12 @@
 !> the work fields gradient, residual, direction, old residual, psi; the spectrum of B, a quarter for
 !> each symbol; on the patch H, g, P. The transforms counted are of the doubled grid.
 module adhesion_cg_free
-   use adhesion_potential, only : adhesive_slope, adhesive_terms, potential_gauss
+   use adhesion_potential, only : adhesive_slope, potential_gauss
    use adhesion_preconditioner, only : adhesion_preconditioner_type, new_adhesion_preconditioner
-   use adhesion_state, only : adhesion_problem_type, choose_step, clipped_step, control_approach, &
-      control_pressure, diagonal_scaling, reason_converged, reason_detached, reason_limit, &
-      reason_stalled, row_total, step_sums_type, stepped_gap, traction_scale
+   use adhesion_state, only : adhesion_problem_type, choose_step, clipped_step, collect_step, &
+      control_approach, control_pressure, diagonal_scaling, form_step_row, reason_converged, &
+      reason_detached, reason_limit, reason_stalled, row_total, step_sums_type, stepped_gap, &
+      traction_scale
    use errors, only : error_input, error_type, fail
    use fft_conv, only : columns_apply, convolution_type, new_normal_operator, new_symbol_operator
    use influence, only : normal_symbol
@@ -57,6 +58,8 @@ module adhesion_cg_free
       real(dp), allocatable, private :: rows(:, :)         !! partial sums of each row
       real(dp), private :: psi_form = 0.0_dp               !! psi.B psi
       real(dp), private :: scaling = 0.0_dp                !! of the Gauss potential; 0: none
+      real(dp), private :: old_rz = 0.0_dp                 !! r.z of the iteration before; 0: start anew
+      real(dp), private :: kappa = 1.0_dp                  !! last form of a step over its estimate
    contains
       procedure :: solve
       procedure :: destroy
@@ -134,12 +137,10 @@ contains
       real(dp), intent(inout) :: level                 !! U - H where the gap is zero, m: a start
       type(solver_result_type), intent(out) :: outcome
       real(dp), intent(in), optional :: history(:, :)  !! P_h, Pa
-      type(step_sums_type) :: known
       real(dp) :: force, missing, missing_old, scale, length, least, attraction, residual, limit
-      real(dp) :: old_rz, rz, rz_old, rd, squares, beta, alpha, t, kappa, estimate, zd, dd, psi_r
-      real(dp) :: transforms_before
+      real(dp) :: alpha, t, dd, psi_r, transforms_before
       integer(int64) :: before
-      integer :: age, failures, pass
+      integer :: age, failures
       logical :: fresh, loaded
 
       outcome%seconds = omp_get_wtime()
@@ -162,8 +163,8 @@ contains
       fresh = .true.
       age = 0
       failures = 0
-      kappa = 1.0_dp
-      old_rz = 0.0_dp
+      self%kappa = 1.0_dp
+      self%old_rz = 0.0_dp
       dd = 0.0_dp
       missing = 0.0_dp
       scale = traction_scale(problem%potential, max(maxval(abs(self%traction)), &
@@ -198,42 +199,7 @@ contains
          if (outcome%iterations >= problem%max_iterations) exit
          outcome%iterations = outcome%iterations + 1
 
-         call self%preconditioner%transform()
-         zd = 0.0_dp
-         if (loaded) zd = (missing + psi_r)/(problem%modulus*self%psi_form)
-         call precondition(self, problem, zd, rz, rz_old)
-         rz = rz + missing*zd
-         rz_old = rz_old + missing_old*zd
-         beta = 0.0_dp
-         if (old_rz > 0.0_dp) beta = max(0.0_dp, (rz - rz_old)/old_rz)
-         old_rz = rz
-         call new_direction(self, beta, zd, dd, rd, squares)
-         rd = rd + missing*dd
-         if (rd <= 0.0_dp .and. beta > 0.0_dp) then
-            dd = 0.0_dp
-            call new_direction(self, 0.0_dp, zd, dd, rd, squares)
-            rd = rd + missing*dd
-         end if
-         t = 0.0_dp
-         if (rd > 0.0_dp) then
-            estimate = problem%modulus*kappa*self%preconditioner%estimate(squares)
-            alpha = clipped_step(problem, self%state(1:self%nx, 1:self%ny), &
-               self%direction(1:self%nx, 1:self%ny), -rd, estimate, self%rows, &
-               self%stiffness%threads)
-            do pass = 1, 40
-               call form_step(self, problem, alpha, dd, known, squares)
-               known%slope = known%slope - missing*alpha*dd
-               if (known%slope <= -descent*alpha*rd) exit
-               alpha = 0.25_dp*alpha
-            end do
-            call self%stiffness%columns(columns_apply, known%form)
-            estimate = self%preconditioner%estimate(squares)
-            if (estimate > 0.0_dp) kappa = known%form/estimate
-            known%form = problem%modulus*known%form
-            t = choose_step(known, problem, self%state(1:self%nx, 1:self%ny), &
-               self%direction(1:self%nx, 1:self%ny), alpha, 0.0_dp, self%rows, &
-               self%stiffness%threads)
-         end if
+         call search(self, problem, missing, missing_old, psi_r, alpha, dd, t)
          if (t > 0.0_dp) then
             call take_step(self, problem, alpha, t)
             level = level + t*alpha*dd
@@ -242,7 +208,7 @@ contains
             age = age + 1
          else
             failures = failures + 1
-            old_rz = 0.0_dp
+            self%old_rz = 0.0_dp
             if (failures > 3) then
                outcome%reason = reason_stalled
                exit
@@ -269,6 +235,60 @@ contains
          + nint(self%preconditioner%transforms() - transforms_before, int64)
       outcome%seconds = omp_get_wtime() - outcome%seconds
    end subroutine solve
+
+   !> The direction d from the residual, the clipped step along it, and how far to go along that step.
+   subroutine search(self, problem, missing, missing_old, psi_r, alpha, dd, t)
+      type(adhesion_free_type), intent(inout) :: self
+      type(adhesion_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: missing                  !! force not yet carried, now
+      real(dp), intent(in) :: missing_old              !! and in the iteration before, Pa
+      real(dp), intent(in) :: psi_r                    !! psi.r of the padding
+      real(dp), intent(out) :: alpha                   !! the step: stepped_gap(g, d, alpha, 0) - g
+      real(dp), intent(inout) :: dd                    !! d of the level; 0 where it is prescribed
+      real(dp), intent(out) :: t                       !! part of the step that is taken; 0: none
+      type(step_sums_type) :: known
+      real(dp) :: rz, rz_old, rd, squares, beta, estimate, zd
+      integer :: pass
+
+      alpha = 0.0_dp
+      t = 0.0_dp
+      call self%preconditioner%transform()
+      zd = 0.0_dp
+      if (problem%control == control_pressure) zd = (missing + psi_r)/(problem%modulus*self%psi_form)
+      call precondition(self, problem, zd, rz, rz_old)
+      rz = rz + missing*zd
+      rz_old = rz_old + missing_old*zd
+      beta = 0.0_dp
+      if (self%old_rz > 0.0_dp) beta = max(0.0_dp, (rz - rz_old)/self%old_rz)
+      self%old_rz = rz
+      call new_direction(self, beta, zd, dd, rd, squares)
+      rd = rd + missing*dd
+      if (rd <= 0.0_dp .and. beta > 0.0_dp) then
+         dd = 0.0_dp
+         call new_direction(self, 0.0_dp, zd, dd, rd, squares)
+         rd = rd + missing*dd
+      end if
+      if (.not. rd > 0.0_dp) return
+
+      estimate = problem%modulus*self%kappa*self%preconditioner%estimate(squares)
+      associate (gap => self%state(1:self%nx, 1:self%ny), &
+         direction => self%direction(1:self%nx, 1:self%ny))
+         alpha = clipped_step(problem, gap, direction, -rd, estimate, self%rows, &
+            self%stiffness%threads)
+         do pass = 1, 40
+            call form_step(self, problem, alpha, dd, known, squares)
+            known%slope = known%slope - missing*alpha*dd
+            if (known%slope <= -descent*alpha*rd) exit
+            alpha = 0.25_dp*alpha
+         end do
+         call self%stiffness%columns(columns_apply, known%form)
+         estimate = self%preconditioner%estimate(squares)
+         if (estimate > 0.0_dp) self%kappa = known%form/estimate
+         known%form = problem%modulus*known%form
+         t = choose_step(known, problem, gap, direction, alpha, 0.0_dp, self%rows, &
+            self%stiffness%threads)
+      end associate
+   end subroutine search
 
    !> The start: from the pressure and the level handed in, or from full contact. The gap of a pressure
    !> is not sharp: a contact that is handed in stays one.
@@ -495,53 +515,29 @@ contains
       type(step_sums_type), intent(out) :: known       !! slope without the level's part
       real(dp), intent(out) :: squares                 !! of the change of u
       real(dp), allocatable :: change(:)
-      real(dp) :: s, slope, adhesive, curvature, energy, longest, e, e1, e2
-      integer :: i, j, inner, clipped
+      integer :: i, j, inner
 
       !$omp parallel default(none) shared(self, problem, alpha, dd) private(i, j, inner, change) &
-      !$omp private(s, slope, adhesive, curvature, energy, longest, e, e1, e2, clipped) &
       !$omp num_threads(self%stiffness%threads)
       allocate (change(self%mx))
       !$omp do
       do j = 1, self%my
          inner = merge(self%nx, 0, j <= self%ny)
-         slope = 0.0_dp
-         adhesive = 0.0_dp
-         curvature = 0.0_dp
-         energy = 0.0_dp
-         longest = huge(1.0_dp)
-         clipped = 0
-         do i = 1, inner
-            s = stepped_gap(self%state(i, j), self%direction(i, j), alpha, 0.0_dp) - self%state(i, j)
-            call adhesive_terms(problem%potential, self%state(i, j), e, e1, e2)
-            slope = slope - self%residual(i, j)*s
-            adhesive = adhesive + s*e1
-            curvature = curvature + s**2*e2
-            energy = energy + e
-            if (s < 0.0_dp) then
-               longest = min(longest, self%state(i, j)/(-s))
-               if (s == -self%state(i, j)) clipped = 1
-            end if
-            change(i) = s + alpha*dd
-         end do
+         call form_step_row(problem, self%state(1:inner, j), self%direction(1:inner, j), &
+            self%residual(1:inner, j), alpha, 0.0_dp, change(1:inner), self%rows(1:6, j))
+         change(1:inner) = change(1:inner) + alpha*dd
          do i = inner + 1, self%mx
             change(i) = alpha*self%direction(i, j)
-            slope = slope - self%residual(i, j)*change(i)
+            self%rows(1, j) = self%rows(1, j) - self%residual(i, j)*change(i)
          end do
-         self%rows(1:7, j) = [slope, adhesive, curvature, energy, sum(change**2), longest, &
-            real(clipped, dp)]
+         self%rows(7, j) = sum(change**2)
          call self%stiffness%forward_row(1, j, change)
          call self%preconditioner%put_estimate_row(j, change)
       end do
       !$omp end do
       !$omp end parallel
-      known%slope = row_total(self%rows, 1)
-      known%adhesive_slope = row_total(self%rows, 2)
-      known%curvature = row_total(self%rows, 3)
-      known%energy = row_total(self%rows, 4)
-      squares = row_total(self%rows, 5)
-      known%longest = global_min(minval(self%rows(6, :)))
-      known%clipped = global_max(maxval(self%rows(7, :))) > 0.0_dp
+      call collect_step(self%rows, known)
+      squares = row_total(self%rows, 7)
    end subroutine form_step
 
    !> g = g + t s, u in the padding, and the traction with them.

@@ -19,13 +19,14 @@
 !> Fields of doubles: H, g, P, and the work fields gradient, residual, direction, old residual; the
 !> spectrum of B and with 'full' of M.
 module adhesion_cg_periodic
-   use adhesion_potential, only : adhesive_slope, adhesive_terms, potential_gauss
-   use adhesion_periodic_state, only : evaluate_traction, field_sum, finish, residual_units, &
-      start_gap
+   use adhesion_potential, only : potential_gauss
+   use adhesion_periodic_state, only : evaluate_load, evaluate_traction, field_sum, finish, &
+      is_detached, residual_units, start_gap
    use adhesion_preconditioner, only : adhesion_preconditioner_type, new_adhesion_preconditioner
-   use adhesion_state, only : adhesion_problem_type, choose_step, clipped_step, control_approach, &
-      control_pressure, diagonal_scaling, reason_closed, reason_converged, reason_detached, &
-      reason_limit, reason_stalled, row_total, step_sums_type, stepped_gap, sum_shift
+   use adhesion_state, only : adhesion_problem_type, choose_step, clipped_step, collect_step, &
+      control_approach, control_pressure, diagonal_scaling, form_step_row, reason_closed, &
+      reason_converged, reason_detached, reason_limit, reason_stalled, row_total, step_sums_type, &
+      stepped_gap, sum_shift
    use errors, only : error_input, error_type, fail
    use fft_conv, only : columns_apply, convolution_type, new_symbol_operator
    use omp_lib, only : omp_get_wtime
@@ -55,6 +56,8 @@ module adhesion_cg_periodic
       real(dp), allocatable, private :: rows(:, :)         !! partial sums of each row
       logical, private :: scaled = .false.                 !! Gauss: M scaled by e''
       real(dp), private :: scaling = 0.0_dp                !! k of that scaling, Pa/m
+      real(dp), private :: old_rz = 0.0_dp                 !! r.z of the iteration before; 0: start anew
+      real(dp), private :: kappa = 1.0_dp                  !! last form of a step over its estimate
    contains
       procedure :: solve
       procedure :: destroy
@@ -100,7 +103,7 @@ contains
       if (allocated(error)) return
       allocate (self%gradient(grid%nx, grid%ny), self%residual(grid%nx, grid%ny), &
          self%direction(grid%nx, grid%ny), self%old(grid%nx, grid%ny), source=0.0_dp)
-      allocate (self%rows(9, grid%ny))
+      allocate (self%rows(7, grid%ny))
    end subroutine new_adhesion_periodic
 
    !> Solve an adhesive contact problem.
@@ -115,12 +118,10 @@ contains
       real(dp), intent(out) :: level                   !! U - H where the gap is zero, m
       type(solver_result_type), intent(out) :: outcome
       real(dp), intent(in), optional :: history(:, :)  !! P_h, Pa; its mean does not matter
-      type(step_sums_type) :: known
-      real(dp) :: load, total, mean_height, scale, length, least, old_rz, rz, rz_old, rd, squares
-      real(dp) :: kappa, alpha, shift, t, estimate, estimate_after, cells
-      real(dp) :: transforms_before, beta
+      real(dp) :: load, total, mean_height, scale, length, least, alpha, shift, t, cells
+      real(dp) :: transforms_before
       integer(int64) :: before
-      integer :: age, failures, pass
+      integer :: age, failures
       logical :: fresh
 
       outcome%seconds = omp_get_wtime()
@@ -149,8 +150,8 @@ contains
       fresh = .true.
       age = 0
       failures = 0
-      kappa = 1.0_dp
-      old_rz = 0.0_dp
+      self%kappa = 1.0_dp
+      self%old_rz = 0.0_dp
       call residual_units(self%stiffness, self%rows, problem, height, pressure, load, self%longest, &
          length, scale)
       do
@@ -168,44 +169,14 @@ contains
             age = 0
             cycle
          end if
-         if (problem%control == control_pressure .and. load < 0.0_dp .and. &
-            least > 3.0_dp*problem%potential%range) then
-            if (adhesive_slope(problem%potential, least) < -load) then
-               outcome%reason = reason_detached
-               exit
-            end if
+         if (is_detached(problem, load, least)) then
+            outcome%reason = reason_detached
+            exit
          end if
          if (outcome%iterations >= problem%max_iterations) exit
          outcome%iterations = outcome%iterations + 1
 
-         call self%preconditioner%transform()
-         call precondition(self, problem, gap, rz, rz_old)
-         beta = 0.0_dp
-         if (old_rz > 0.0_dp) beta = max(0.0_dp, (rz - rz_old)/old_rz)
-         old_rz = rz
-         call new_direction(self, gap, beta, rd, squares)
-         if (rd <= 0.0_dp .and. beta > 0.0_dp) call new_direction(self, gap, 0.0_dp, rd, squares)
-         if (rd > 0.0_dp) then
-            estimate = problem%modulus*kappa*self%preconditioner%estimate(squares)
-            alpha = clipped_step(problem, gap, self%direction, -rd, estimate, self%rows, &
-               self%stiffness%threads)
-            do pass = 1, 40
-               shift = 0.0_dp
-               if (problem%control == control_approach) shift = sum_shift(gap, self%direction, &
-                  alpha, total, self%rows, self%stiffness%threads)
-               call form_step(self, problem, gap, alpha, shift, known, squares)
-               if (known%slope <= -descent*alpha*rd) exit
-               alpha = 0.25_dp*alpha
-            end do
-            call self%stiffness%columns(columns_apply, known%form)
-            estimate_after = self%preconditioner%estimate(squares)
-            if (estimate_after > 0.0_dp) kappa = known%form/estimate_after
-            known%form = problem%modulus*known%form
-            t = choose_step(known, problem, gap, self%direction, alpha, shift, self%rows, &
-               self%stiffness%threads)
-         else
-            t = 0.0_dp
-         end if
+         call search(self, problem, gap, total, alpha, shift, t)
          if (t > 0.0_dp) then
             call take_step(self, problem, alpha, shift, t, gap, pressure)
             failures = 0
@@ -213,7 +184,7 @@ contains
             age = age + 1
          else
             failures = failures + 1
-            old_rz = 0.0_dp
+            self%old_rz = 0.0_dp
             if (failures > 3) then
                outcome%reason = reason_stalled
                exit
@@ -243,6 +214,48 @@ contains
       outcome%seconds = omp_get_wtime() - outcome%seconds
    end subroutine solve
 
+   !> The direction d from the residual, the clipped step along it, and how far to go along that step.
+   subroutine search(self, problem, gap, total, alpha, shift, t)
+      type(adhesion_periodic_type), intent(inout) :: self
+      type(adhesion_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: gap(:, :)
+      real(dp), intent(in) :: total                    !! prescribed sum of the gap, m
+      real(dp), intent(out) :: alpha, shift            !! the step: stepped_gap(g, d, alpha, shift) - g
+      real(dp), intent(out) :: t                       !! part of it that is taken; 0: none
+      type(step_sums_type) :: known
+      real(dp) :: rz, rz_old, rd, squares, estimate, estimate_after, beta
+      integer :: pass
+
+      alpha = 0.0_dp
+      shift = 0.0_dp
+      t = 0.0_dp
+      call self%preconditioner%transform()
+      call precondition(self, problem, gap, rz, rz_old)
+      beta = 0.0_dp
+      if (self%old_rz > 0.0_dp) beta = max(0.0_dp, (rz - rz_old)/self%old_rz)
+      self%old_rz = rz
+      call new_direction(self, gap, beta, rd, squares)
+      if (rd <= 0.0_dp .and. beta > 0.0_dp) call new_direction(self, gap, 0.0_dp, rd, squares)
+      if (.not. rd > 0.0_dp) return
+
+      estimate = problem%modulus*self%kappa*self%preconditioner%estimate(squares)
+      alpha = clipped_step(problem, gap, self%direction, -rd, estimate, self%rows, &
+         self%stiffness%threads)
+      do pass = 1, 40
+         if (problem%control == control_approach) shift = sum_shift(gap, self%direction, alpha, &
+            total, self%rows, self%stiffness%threads)
+         call form_step(self, problem, gap, alpha, shift, known, squares)
+         if (known%slope <= -descent*alpha*rd) exit
+         alpha = 0.25_dp*alpha
+      end do
+      call self%stiffness%columns(columns_apply, known%form)
+      estimate_after = self%preconditioner%estimate(squares)
+      if (estimate_after > 0.0_dp) self%kappa = known%form/estimate_after
+      known%form = problem%modulus*known%form
+      t = choose_step(known, problem, gap, self%direction, alpha, shift, self%rows, &
+         self%stiffness%threads)
+   end subroutine search
+
    !> The gradient less the load, the load (multiplier) where the approach is prescribed, the natural
    !> residual, and the residual r = -G on the free cells, handed to the preconditioner.
    subroutine evaluate_gradient(self, problem, gap, traction, length, scale, load, natural, least)
@@ -253,26 +266,11 @@ contains
       real(dp), intent(inout) :: load                  !! p, Pa
       real(dp), intent(out) :: natural                 !! max|min(g/length, G/scale)|
       real(dp), intent(out) :: least                   !! least gap, m
-      real(dp) :: s1, g, r, worst, lowest
-      integer :: i, j, n
+      real(dp) :: g, r, worst, lowest
+      integer :: i, j
 
-      !$omp parallel do default(none) shared(self, problem, gap, traction) private(i, j, s1, n) &
-      !$omp num_threads(self%stiffness%threads)
-      do j = 1, size(gap, 2)
-         s1 = 0.0_dp
-         n = 0
-         do i = 1, size(gap, 1)
-            self%gradient(i, j) = traction(i, j) + adhesive_slope(problem%potential, gap(i, j))
-            if (gap(i, j) > 0.0_dp) then
-               s1 = s1 + self%gradient(i, j)
-               n = n + 1
-            end if
-         end do
-         self%rows(1, j) = s1
-         self%rows(2, j) = real(n, dp)
-      end do
-      if (problem%control == control_approach) &
-         load = -row_total(self%rows, 1)/row_total(self%rows, 2)
+      call evaluate_load(self%stiffness%threads, self%rows, problem, gap, traction, self%gradient, &
+         load)
 
       !$omp parallel do default(none) shared(self, problem, gap, length, scale, load) &
       !$omp private(i, j, g, r, worst, lowest) num_threads(self%stiffness%threads)
@@ -407,49 +405,23 @@ contains
       type(step_sums_type), intent(out) :: known
       real(dp), intent(out) :: squares                 !! s.s
       real(dp), allocatable :: s(:)
-      real(dp) :: slope, adhesive, curvature, energy, square, longest, e, e1, e2
-      integer :: i, j, clipped
+      integer :: j
 
-      !$omp parallel default(none) shared(self, problem, gap, alpha, shift) private(i, j, s, slope) &
-      !$omp private(adhesive, curvature, energy, square, longest, e, e1, e2, clipped) &
+      !$omp parallel default(none) shared(self, problem, gap, alpha, shift) private(j, s) &
       !$omp num_threads(self%stiffness%threads)
       allocate (s(size(gap, 1)))
       !$omp do
       do j = 1, size(gap, 2)
-         slope = 0.0_dp
-         adhesive = 0.0_dp
-         curvature = 0.0_dp
-         energy = 0.0_dp
-         square = 0.0_dp
-         longest = huge(1.0_dp)
-         clipped = 0
-         do i = 1, size(gap, 1)
-            s(i) = stepped_gap(gap(i, j), self%direction(i, j), alpha, shift) - gap(i, j)
-            call adhesive_terms(problem%potential, gap(i, j), e, e1, e2)
-            slope = slope - self%residual(i, j)*s(i)
-            adhesive = adhesive + s(i)*e1
-            curvature = curvature + s(i)**2*e2
-            energy = energy + e
-            square = square + s(i)**2
-            if (s(i) < 0.0_dp) then
-               longest = min(longest, gap(i, j)/(-s(i)))
-               if (s(i) == -gap(i, j)) clipped = 1
-            end if
-         end do
-         self%rows(:, j) = [slope, adhesive, curvature, energy, square, longest, &
-            real(clipped, dp), 0.0_dp, 0.0_dp]
+         call form_step_row(problem, gap(:, j), self%direction(:, j), self%residual(:, j), alpha, &
+            shift, s, self%rows(1:6, j))
+         self%rows(7, j) = sum(s**2)
          call self%stiffness%forward_row(1, j, s)
          call self%preconditioner%put_estimate_row(j, s)
       end do
       !$omp end do
       !$omp end parallel
-      known%slope = row_total(self%rows, 1)
-      known%adhesive_slope = row_total(self%rows, 2)
-      known%curvature = row_total(self%rows, 3)
-      known%energy = row_total(self%rows, 4)
-      squares = row_total(self%rows, 5)
-      known%longest = global_min(minval(self%rows(6, :)))
-      known%clipped = global_max(maxval(self%rows(7, :))) > 0.0_dp
+      call collect_step(self%rows, known)
+      squares = row_total(self%rows, 7)
    end subroutine form_step
 
    !> g = g + t s, and the traction with it.

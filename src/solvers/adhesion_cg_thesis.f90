@@ -11,9 +11,9 @@
 !> Fields of doubles: H, g, P, and the work fields residual, direction, product B d, trial gap, trial
 !> traction; the spectrum of B.
 module adhesion_cg_thesis
-   use adhesion_periodic_state, only : evaluate_traction, field_sum, finish, residual_units, &
-      start_gap
-   use adhesion_potential, only : adhesive_energy, adhesive_slope, adhesive_terms
+   use adhesion_periodic_state, only : evaluate_load, evaluate_traction, field_sum, finish, &
+      is_detached, residual_units, start_gap
+   use adhesion_potential, only : adhesive_energy, adhesive_terms
    use adhesion_state, only : adhesion_problem_type, control_approach, control_pressure, &
       reason_closed, reason_converged, reason_detached, reason_limit, reason_stalled, row_total, &
       stepped_gap, sum_shift
@@ -124,12 +124,9 @@ contains
             outcome%reason = reason_converged
             exit
          end if
-         if (problem%control == control_pressure .and. load < 0.0_dp .and. &
-            least > 3.0_dp*problem%potential%range) then
-            if (adhesive_slope(problem%potential, least) < -load) then
-               outcome%reason = reason_detached
-               exit
-            end if
+         if (is_detached(problem, load, least)) then
+            outcome%reason = reason_detached
+            exit
          end if
          if (outcome%iterations >= problem%max_iterations) exit
          outcome%iterations = outcome%iterations + 1
@@ -178,26 +175,11 @@ contains
       real(dp), intent(in) :: length, scale
       real(dp), intent(inout) :: load                  !! p, Pa; found where the level is prescribed
       real(dp), intent(out) :: natural, least
-      real(dp) :: s1, g, worst, lowest
-      integer :: i, j, n
+      real(dp) :: g, worst, lowest
+      integer :: i, j
 
-      !$omp parallel do default(none) shared(self, problem, gap, traction) private(i, j, s1, n) &
-      !$omp num_threads(self%stiffness%threads)
-      do j = 1, size(gap, 2)
-         s1 = 0.0_dp
-         n = 0
-         do i = 1, size(gap, 1)
-            self%residual(i, j) = traction(i, j) + adhesive_slope(problem%potential, gap(i, j))
-            if (gap(i, j) > 0.0_dp) then
-               s1 = s1 + self%residual(i, j)
-               n = n + 1
-            end if
-         end do
-         self%rows(1, j) = s1
-         self%rows(2, j) = real(n, dp)
-      end do
-      if (problem%control == control_approach) &
-         load = -row_total(self%rows, 1)/row_total(self%rows, 2)
+      call evaluate_load(self%stiffness%threads, self%rows, problem, gap, traction, self%residual, &
+         load)
       !$omp parallel do default(none) shared(self, gap, length, scale, load) &
       !$omp private(i, j, g, worst, lowest) num_threads(self%stiffness%threads)
       do j = 1, size(gap, 2)

@@ -1,7 +1,8 @@
 !> What the two methods for adhesive contact in periodic mode share: start, traction, end, measures.
 module adhesion_periodic_state
-   use adhesion_state, only : adhesion_problem_type, control_approach, row_total, stepped_gap, &
-      sum_shift, traction_scale
+   use adhesion_potential, only : adhesive_slope
+   use adhesion_state, only : adhesion_problem_type, control_approach, control_pressure, row_total, &
+      stepped_gap, sum_shift, traction_scale
    use fft_conv, only : columns_apply, convolution_type
    use parallel, only : global_max
    use precision, only : dp
@@ -9,7 +10,8 @@ module adhesion_periodic_state
    implicit none
    private
 
-   public :: evaluate_traction, field_sum, finish, largest, residual_units, start_gap
+   public :: evaluate_load, evaluate_traction, field_sum, finish, is_detached, residual_units, &
+      start_gap
 
 contains
 
@@ -69,6 +71,48 @@ contains
          if (remembers) traction(:, j) = traction(:, j) - (history(:, j) - mean)
       end do
    end subroutine evaluate_traction
+
+   !> The gradient less the load p; and p, the mean multiplier over the open cells, where the approach
+   !> is prescribed.
+   subroutine evaluate_load(threads, rows, problem, gap, traction, gradient, load)
+      integer, intent(in) :: threads
+      real(dp), intent(inout) :: rows(:, :)            !! work, at least [2, ny]
+      type(adhesion_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: gap(:, :), traction(:, :)
+      real(dp), intent(inout) :: gradient(:, :)        !! out: traction + e'(g), Pa
+      real(dp), intent(inout) :: load                  !! p, Pa
+      real(dp) :: s1
+      integer :: i, j, n
+
+      !$omp parallel do default(none) shared(rows, problem, gap, traction, gradient) &
+      !$omp private(i, j, s1, n) num_threads(threads)
+      do j = 1, size(gap, 2)
+         s1 = 0.0_dp
+         n = 0
+         do i = 1, size(gap, 1)
+            gradient(i, j) = traction(i, j) + adhesive_slope(problem%potential, gap(i, j))
+            if (gap(i, j) > 0.0_dp) then
+               s1 = s1 + gradient(i, j)
+               n = n + 1
+            end if
+         end do
+         rows(1, j) = s1
+         rows(2, j) = real(n, dp)
+      end do
+      if (problem%control == control_approach) load = -row_total(rows, 1)/row_total(rows, 2)
+   end subroutine evaluate_load
+
+   !> Are all gaps so wide that the attraction no longer balances the pull anywhere?
+   pure function is_detached(problem, load, least) result(detached)
+      type(adhesion_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: load                     !! p, Pa
+      real(dp), intent(in) :: least                    !! least gap, m
+      logical :: detached
+
+      detached = problem%control == control_pressure .and. load < 0.0_dp .and. &
+         least > 3.0_dp*problem%potential%range
+      if (detached) detached = adhesive_slope(problem%potential, least) < -load
+   end function is_detached
 
    !> P = p + traction, and the error of the load or of the mean gap.
    subroutine finish(stiffness, rows, problem, load, total, gap, pressure, outcome)

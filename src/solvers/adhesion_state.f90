@@ -11,13 +11,13 @@ module adhesion_state
    use adhesion_potential, only : adhesion_potential_type, adhesive_curvature, adhesive_terms, &
       potential_maugis_dugdale, potential_none
    use normal_state, only : control_approach, control_pressure
-   use parallel, only : global_sum
+   use parallel, only : global_max, global_min, global_sum
    use precision, only : dp
    implicit none
    private
 
-   public :: adhesion_problem_type, choose_step, clipped_step, control_approach, control_pressure, &
-      diagonal_scaling, row_total, step_sums_type, stepped_gap, sum_shift, traction_scale
+   public :: adhesion_problem_type, choose_step, clipped_step, collect_step, control_approach, &
+      control_pressure, diagonal_scaling, form_step_row, row_total, step_sums_type, stepped_gap, sum_shift, traction_scale
 
    character(*), parameter, public :: reason_converged = 'converged'
    character(*), parameter, public :: reason_detached = 'detached'
@@ -132,8 +132,7 @@ contains
             high_value = value
          end if
          if (upper < huge(1.0_dp)) then
-            alpha = lower - low_value*(upper - lower)/(high_value - low_value)
-            alpha = min(max(alpha, lower + 0.1_dp*(upper - lower)), upper - 0.1_dp*(upper - lower))
+            alpha = chord_root(lower, low_value, upper, high_value, 0.1_dp)
          else if (form + stiffness > 0.25_dp*form) then
             alpha = alpha - value/(form + stiffness)
          else
@@ -217,8 +216,7 @@ contains
             low_value = value
          end if
          if (upper < huge(1.0_dp)) then
-            t = lower - low_value*(upper - lower)/(high_value - low_value)
-            t = min(max(t, lower + 0.05_dp*(upper - lower)), upper - 0.05_dp*(upper - lower))
+            t = chord_root(lower, low_value, upper, high_value, 0.05_dp)
          else
             t = min(longest, 4.0_dp*t, merge(t*known%slope/(known%slope - value), 4.0_dp*t, &
                value > 0.9_dp*known%slope))
@@ -271,6 +269,63 @@ contains
       end subroutine segment
 
    end function choose_step
+
+   !> Where the chord between two ends of different sign is zero, kept off both ends.
+   pure function chord_root(lower, low_value, upper, high_value, margin) result(root)
+      real(dp), intent(in) :: lower, low_value     !! one end and the value there
+      real(dp), intent(in) :: upper, high_value    !! the other
+      real(dp), intent(in) :: margin               !! least distance from an end, over their distance
+      real(dp) :: root
+
+      root = lower - low_value*(upper - lower)/(high_value - low_value)
+      root = min(max(root, lower + margin*(upper - lower)), upper - margin*(upper - lower))
+   end function chord_root
+
+   !> The clipped step s of a row of cells, and its part of what is known without B s.
+   subroutine form_step_row(problem, gap, direction, residual, alpha, shift, s, sums)
+      type(adhesion_problem_type), intent(in) :: problem
+      real(dp), intent(in), contiguous :: gap(:)       !! g, m
+      real(dp), intent(in), contiguous :: direction(:) !! d
+      real(dp), intent(in), contiguous :: residual(:)  !! r, Pa
+      real(dp), intent(in) :: alpha, shift
+      real(dp), intent(out) :: s(:)                    !! m
+      real(dp), intent(out) :: sums(6)                 !! for `collect_step`
+      real(dp) :: slope, adhesive, curvature, energy, longest, e, e1, e2
+      integer :: i, clipped
+
+      slope = 0.0_dp
+      adhesive = 0.0_dp
+      curvature = 0.0_dp
+      energy = 0.0_dp
+      longest = huge(1.0_dp)
+      clipped = 0
+      do i = 1, size(gap)
+         s(i) = stepped_gap(gap(i), direction(i), alpha, shift) - gap(i)
+         call adhesive_terms(problem%potential, gap(i), e, e1, e2)
+         slope = slope - residual(i)*s(i)
+         adhesive = adhesive + s(i)*e1
+         curvature = curvature + s(i)**2*e2
+         energy = energy + e
+         if (s(i) < 0.0_dp) then
+            longest = min(longest, gap(i)/(-s(i)))
+            if (s(i) == -gap(i)) clipped = 1
+         end if
+      end do
+      sums = [slope, adhesive, curvature, energy, longest, real(clipped, dp)]
+   end subroutine form_step_row
+
+   !> What is known of a step, from the sums of its rows.
+   subroutine collect_step(rows, known)
+      real(dp), intent(in) :: rows(:, :)               !! (1:6, j): the sums of row j
+      type(step_sums_type), intent(out) :: known
+
+      known%slope = row_total(rows, 1)
+      known%adhesive_slope = row_total(rows, 2)
+      known%curvature = row_total(rows, 3)
+      known%energy = row_total(rows, 4)
+      known%longest = global_min(minval(rows(5, :)))
+      known%clipped = global_max(maxval(rows(6, :))) > 0.0_dp
+   end subroutine collect_step
 
    !> The gap after a step along d, closed where it would be negative, less a shift that keeps its sum.
    elemental function stepped_gap(gap, direction, alpha, shift) result(value)
