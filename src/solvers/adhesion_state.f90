@@ -17,7 +17,8 @@ module adhesion_state
    private
 
    public :: adhesion_problem_type, choose_step, clipped_step, collect_step, control_approach, &
-      control_pressure, diagonal_scaling, form_step_row, row_total, step_sums_type, stepped_gap, sum_shift, traction_scale
+      control_pressure, diagonal_scaling, form_step_row, row_total, step_sums_type, stepped_gap, &
+      sum_shift, traction_scale
 
    character(*), parameter, public :: reason_converged = 'converged'
    character(*), parameter, public :: reason_detached = 'detached'

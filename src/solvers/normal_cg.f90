@@ -27,6 +27,7 @@
 !> and a quarter for its symbol, a tenth for blocks and the coarse level: 7.4, measured 7.7 at n = 4096
 !> with all else the process holds. In free mode spectrum and symbol take three.
 module normal_cg
+   use active_blocks, only : active_blocks_type, new_active_blocks
    use coarse_level, only : coarse_level_type, new_coarse_level, stencil_c0
    use errors, only : error_type
    use fft_conv, only : columns_apply, convolution_type, new_normal_operator
@@ -45,7 +46,6 @@ module normal_cg
 
    public :: new_normal_solver, normal_solver_type
 
-   integer, parameter :: width = 16            !! cells of an active block
    integer, parameter :: longest_age = 40      !! iterations between fresh products A P
    real(dp), parameter :: often_bent = 1e3_dp  !! kappa after some steps that did not descend
    integer, parameter :: mixed_age = 20        !! the same in mixed precision
@@ -64,14 +64,14 @@ module normal_cg
       real(dp), allocatable, private :: residual(:, :)    !! with a rim: (0:nx+1, 0:ny+1)
       real(dp), allocatable, private :: direction(:, :)
       real(dp), allocatable :: step(:, :)                 !! work field, free between solves
-      real(dp), allocatable, private :: least(:, :)       !! least gap of each block
-      logical, allocatable, private :: loaded(:, :)       !! blocks that hold P > 0
-      logical, allocatable, private :: live(:, :)         !! active blocks
-      integer, allocatable, private :: first(:, :)        !! first cells of a row's active runs
-      integer, allocatable, private :: last(:, :)         !! their last cells
-      integer, allocatable, private :: runs(:)            !! number of a row's active runs
+      type(active_blocks_type), private :: active         !! where residual, direction, step are not 0
       real(dp), allocatable, private :: rows(:, :)        !! partial sums of each row
       real(dp), allocatable, private :: surveyed(:, :)    !! the same for the measure of error
+      ! What an iteration leaves to the next:
+      real(dp), private :: old = 0.0_dp                   !! r.z; 0: the direction is not kept
+      real(dp), private :: offset = 0.0_dp                !! to be taken off the direction
+      real(dp), private :: kappa = 1.0_dp                 !! the form of the step over its prediction
+      logical, private :: restart = .true.                !! the direction is not kept
    contains
       procedure :: solve
       procedure :: destroy
@@ -86,7 +86,6 @@ contains
       real(dp), intent(in) :: poisson                  !! -1 < nu <= 0.5
       type(error_type), allocatable, intent(out) :: error
       logical, intent(in), optional :: mixed           !! in mixed precision
-      integer :: nb
 
       self%grid = grid
       call new_normal_operator(self%operator, grid, poisson, error)
@@ -96,12 +95,9 @@ contains
       if (allocated(error)) return
       call new_coarse_level(self%coarse, grid, poisson, error)
       if (allocated(error)) return
-      nb = (grid%nx + width - 1)/width
       allocate (self%residual(0:grid%nx + 1, 0:grid%ny + 1), source=0.0_dp)
       allocate (self%direction(grid%nx, grid%ny), self%step(grid%nx, grid%ny), source=0.0_dp)
-      allocate (self%least(nb, grid%ny), self%loaded(nb, grid%ny))
-      allocate (self%live(nb, grid%ny), source=.false.)
-      allocate (self%first(nb, grid%ny), self%last(nb, grid%ny), self%runs(grid%ny))
+      call new_active_blocks(self%active, grid%nx, grid%ny, self%operator%threads)
       allocate (self%rows(5, grid%ny), self%surveyed(6, grid%ny))
    end subroutine new_normal_solver
 
@@ -119,9 +115,8 @@ contains
       real(dp), intent(in), optional :: history(:, :)  !! P_h, Pa
       type(normal_problem_type) :: task
       type(gap_measure_type) :: measure
-      real(dp) :: scale, old, rz, rd, kappa, squares, alpha, form, trial
-      real(dp) :: cells, offset, beta, began, coarse_before, error_before, expected
-      logical :: fresh, restart, clipped, determined
+      real(dp) :: scale, rd, squares, alpha, trial, cells, began, coarse_before, error_before, expected
+      logical :: fresh, clipped, determined
       integer :: age, oldest
       integer(int64) :: before
 
@@ -130,16 +125,16 @@ contains
       coarse_before = self%coarse%transforms()
       cells = global_sum(real(size(gap), dp))
       scale = 1.0_dp/problem%modulus
-      kappa = 1.0_dp
-      old = 0.0_dp
-      offset = 0.0_dp
-      restart = .true.
+      self%kappa = 1.0_dp
+      self%old = 0.0_dp
+      self%offset = 0.0_dp
+      self%restart = .true.
       error_before = huge(1.0_dp)
       expected = huge(1.0_dp)
       self%swift = self%mixed
       oldest = longest_age
       if (self%mixed) oldest = merge(careful_age, mixed_age, problem%tolerance < careful)
-      call clear(self)
+      call self%active%clear(self%residual, self%direction, self%step)
       call prepare_problem(problem, self%grid, self%operator%threads, height, task, determined)
       if (self%mixed) then
          call first_pressure(task, self%grid, self%quick, height, pressure, history)
@@ -166,7 +161,7 @@ contains
             ! Of residuals that have drifted, old and new ones do not make a direction; and where the drift
             ! outweighs what was gained since the last look, single precision is at its end.
             if (measure%error > 2.0_dp*expected) then
-               restart = .true.
+               self%restart = .true.
                self%swift = measure%error <= 0.5_dp*error_before
             end if
             error_before = measure%error
@@ -175,57 +170,29 @@ contains
          if (outcome%iterations == problem%max_iterations) exit
          outcome%iterations = outcome%iterations + 1
 
-         call activate(self, measure%level)
-         call form_residual(self, measure%level, pressure, gap, rz)
-         beta = 0.0_dp
-         if (.not. restart .and. old > 0.0_dp) beta = rz/old
-         call new_direction(self, task, .true., beta, pressure, offset, rd, squares)
-         if (rd <= 0.0_dp) &
-            call new_direction(self, task, .true., 0.0_dp, pressure, offset, rd, squares)
-         old = rz
-         if (rd <= 0.0_dp .or. kappa > often_bent) then
-            ! M r may point uphill once the load is kept, or once clipped; r itself never does.
-            call new_direction(self, task, .false., 0.0_dp, pressure, offset, rd, squares)
-            old = 0.0_dp
-         end if
-         restart = .false.
+         call self%active%list_runs(measure%level, self%residual, self%direction, self%step)
+         call choose_direction(self, task, measure%level, pressure, gap, rd, squares)
          if (rd <= 0.0_dp) then
             outcome%reason = 'no direction of descent is left'
             exit
          end if
          trial = scale*self%coarse%predict_form(squares)
-         alpha = rd/max(kappa*trial, tiny(1.0_dp))
-         call clipped_step(self, task, alpha, offset, pressure, gap, measure%level, clipped, rd, &
-            squares)
+         alpha = rd/max(self%kappa*trial, tiny(1.0_dp))
+         call clipped_step(self, task, alpha, pressure, gap, measure%level, clipped, rd, squares)
          if (rd <= 0.0_dp) then
             ! The projection bent the step too far: once more from the steepest descent.
-            if (kappa > 1e9_dp) then
+            if (self%kappa > 1e9_dp) then
                outcome%reason = 'no step lowers the energy'
                exit
             end if
-            kappa = 4.0_dp*kappa
-            restart = .true.
+            self%kappa = 4.0_dp*self%kappa
+            self%restart = .true.
             cycle
          end if
-         if (self%swift) then
-            call self%quick%columns(columns_apply, form)
-         else
-            call self%operator%columns(columns_apply, form)
-         end if
-         form = scale*form
-         if (form <= 0.0_dp) then
+         call choose_length(self, scale, pressure, clipped, rd, squares, alpha)
+         if (alpha <= 0.0_dp) then
             outcome%reason = 'no direction of descent is left'
             exit
-         end if
-         trial = scale*self%coarse%predict_form(squares)
-         kappa = min(max(form/max(trial, tiny(1.0_dp)), 0.1_dp), 10.0_dp)
-         alpha = rd/form
-         ! A direction that points out of what is allowed only grows: leave it.
-         restart = clipped .and. alpha < useless
-         if (clipped .and. alpha > 0.55_dp) then
-            alpha = 1.0_dp
-         else if (alpha > 1.0_dp) then
-            alpha = min(alpha, longest_multiple(self, pressure))
          end if
          age = age + 1
          call update(self, task, scale*alpha, alpha, pressure, gap)
@@ -259,26 +226,6 @@ contains
 
    end subroutine solve
 
-   !> Zero the work fields: the step, which others use between solves, wholly.
-   subroutine clear(self)
-      type(normal_solver_type), intent(inout) :: self
-      integer :: b, j, first, last
-
-      !$omp parallel do default(none) shared(self) private(b, j, first, last) &
-      !$omp num_threads(self%operator%threads)
-      do j = 1, self%grid%ny
-         self%step(:, j) = 0.0_dp
-         do b = 1, size(self%live, 1)
-            if (.not. self%live(b, j)) cycle
-            first = (b - 1)*width + 1
-            last = min(b*width, self%grid%nx)
-            self%residual(first:last, j) = 0.0_dp
-            self%direction(first:last, j) = 0.0_dp
-            self%live(b, j) = .false.
-         end do
-      end do
-   end subroutine clear
-
    !> Which blocks hold pressure, the least gap of each, and the measures of the rows.
    subroutine survey(self, problem, pressure, gap)
       type(normal_solver_type), intent(inout) :: self
@@ -290,77 +237,9 @@ contains
       !$omp num_threads(self%operator%threads)
       do j = 1, self%grid%ny
          self%surveyed(1:5, j) = row_measure(pressure(:, j), gap(:, j), problem%target)
-         call survey_blocks(self, .true., j, pressure(:, j), gap(:, j))
+         call self%active%survey_row(.true., j, pressure(:, j), gap(:, j), self%surveyed(6, j))
       end do
    end subroutine survey
-
-   !> Which blocks of a row hold pressure, and the least gap of each.
-   subroutine survey_blocks(self, everywhere, j, pressure, gap)
-      type(normal_solver_type), intent(inout) :: self
-      logical, intent(in) :: everywhere        !! look for pressure off the active blocks, too
-      integer, intent(in) :: j
-      real(dp), intent(in) :: pressure(self%grid%nx), gap(self%grid%nx)
-      integer :: b, first, last, i
-      real(dp) :: least, most, lowest
-
-      lowest = huge(1.0_dp)
-      do b = 1, size(self%least, 1)
-         first = (b - 1)*width + 1
-         last = min(b*width, self%grid%nx)
-         least = gap(first)
-         !$omp simd reduction(min:least)
-         do i = first + 1, last
-            least = min(least, gap(i))
-         end do
-         self%least(b, j) = least
-         lowest = min(lowest, least)
-         ! Where the solver did not act, there is no pressure.
-         most = 0.0_dp
-         if (everywhere .or. self%live(b, j)) then
-            !$omp simd reduction(max:most)
-            do i = first, last
-               most = max(most, pressure(i))
-            end do
-         end if
-         self%loaded(b, j) = most > 0.0_dp
-      end do
-      self%surveyed(6, j) = lowest
-   end subroutine survey_blocks
-
-   !> List the runs of blocks that hold a cell with P > 0 or a gap below the level; clear those that
-   !> left.
-   subroutine activate(self, level)
-      type(normal_solver_type), intent(inout) :: self
-      real(dp), intent(in) :: level
-      integer :: b, j, first, last, n
-      logical :: now, before
-
-      !$omp parallel do default(none) shared(self, level) private(b, j, first, last, n, now, before) &
-      !$omp num_threads(self%operator%threads)
-      do j = 1, self%grid%ny
-         n = 0
-         before = .false.
-         do b = 1, size(self%least, 1)
-            now = self%loaded(b, j) .or. self%least(b, j) < level
-            first = (b - 1)*width + 1
-            last = min(b*width, self%grid%nx)
-            if (now) then
-               if (.not. before) then
-                  n = n + 1
-                  self%first(n, j) = first
-               end if
-               self%last(n, j) = last
-            else if (self%live(b, j)) then
-               self%residual(first:last, j) = 0.0_dp
-               self%direction(first:last, j) = 0.0_dp
-               self%step(first:last, j) = 0.0_dp
-            end if
-            self%live(b, j) = now
-            before = now
-         end do
-         self%runs(j) = n
-      end do
-   end subroutine activate
 
    !> The residual level - gap on S = {P > 0 or gap < level}, its rim and block means; the coarse
    !> correction; and the product r.z with z = M r = stencil and correction.
@@ -388,9 +267,9 @@ contains
          do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
             square = 0.0_dp
             coupling = 0.0_dp
-            do k = 1, self%runs(j)
-               associate (first => self%first(k, j))
-                  n = self%last(k, j) - first + 1
+            do k = 1, self%active%runs(j)
+               associate (first => self%active%first(k, j))
+                  n = self%active%last(k, j) - first + 1
                   call residual_cells(n, level, pressure(first, j), gap(first, j), &
                      self%residual(first, j), column(first), square)
                end associate
@@ -426,24 +305,79 @@ contains
       real(dp), intent(inout) :: coupling
       integer :: k
 
-      do k = 1, self%runs(j)
-         associate (first => self%first(k, j))
-            call coupling_cells(self%last(k, j) - first + 1, wx, wy, self%residual(first - 1, j), &
+      do k = 1, self%active%runs(j)
+         associate (first => self%active%first(k, j))
+            call coupling_cells(self%active%last(k, j) - first + 1, wx, wy, self%residual(first - 1, j), &
                self%residual(first, j - 1), coupling)
          end associate
       end do
    end subroutine couple_row
 
+   !> The direction of an iteration: from the preconditioned residual and the direction before, or what of
+   !> that leads downhill.
+   subroutine choose_direction(self, problem, level, pressure, gap, rd, squares)
+      type(normal_solver_type), intent(inout) :: self
+      type(normal_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: level
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny), gap(self%grid%nx, self%grid%ny)
+      real(dp), intent(out) :: rd                      !! r.d; 0 or less: there is none
+      real(dp), intent(out) :: squares                 !! d.d
+      real(dp) :: rz, beta
+
+      call form_residual(self, level, pressure, gap, rz)
+      beta = 0.0_dp
+      if (.not. self%restart .and. self%old > 0.0_dp) beta = rz/self%old
+      call new_direction(self, problem, .true., beta, pressure, rd, squares)
+      if (rd <= 0.0_dp) call new_direction(self, problem, .true., 0.0_dp, pressure, rd, squares)
+      self%old = rz
+      if (rd <= 0.0_dp .or. self%kappa > often_bent) then
+         ! M r may point uphill once the load is kept, or once clipped; r itself never does.
+         call new_direction(self, problem, .false., 0.0_dp, pressure, rd, squares)
+         self%old = 0.0_dp
+      end if
+      self%restart = .false.
+   end subroutine choose_direction
+
+   !> How much of the clipped step is taken, by the product of the operator with it.
+   subroutine choose_length(self, scale, pressure, clipped, slope, squares, alpha)
+      type(normal_solver_type), intent(inout) :: self
+      real(dp), intent(in) :: scale                    !! 1/modulus, 1/Pa
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny)
+      logical, intent(in) :: clipped
+      real(dp), intent(in) :: slope                    !! of the energy along the step, its sign turned
+      real(dp), intent(in) :: squares                  !! of the step
+      real(dp), intent(out) :: alpha                   !! 0: the energy has no minimum along it
+      real(dp) :: form, trial
+
+      if (self%swift) then
+         call self%quick%columns(columns_apply, form)
+      else
+         call self%operator%columns(columns_apply, form)
+      end if
+      form = scale*form
+      alpha = 0.0_dp
+      if (form <= 0.0_dp) return
+      trial = scale*self%coarse%predict_form(squares)
+      self%kappa = min(max(form/max(trial, tiny(1.0_dp)), 0.1_dp), 10.0_dp)
+      alpha = slope/form
+      ! A direction that points out of what is allowed only grows: leave it.
+      self%restart = clipped .and. alpha < useless
+      if (clipped .and. alpha > 0.55_dp) then
+         alpha = 1.0_dp
+      else if (alpha > 1.0_dp) then
+         alpha = min(alpha, longest_multiple(self, pressure))
+      end if
+   end subroutine choose_length
+
    !> direction = z + beta direction where it acts: on S, but for empty cells that z would empty
-   !> further. What must be taken off it to keep the load stays apart, as `offset` (the old one
-   !> comes in). Of the direction with it: the product with the residual, the square, the block means.
-   subroutine new_direction(self, problem, preconditioned, beta, pressure, offset, rd, squares)
+   !> further. What must be taken off it to keep the load stays apart, as `offset`. Of the direction
+   !> with it: the product with the residual, the square, the block means.
+   subroutine new_direction(self, problem, preconditioned, beta, pressure, rd, squares)
       type(normal_solver_type), intent(inout) :: self
       type(normal_problem_type), intent(in) :: problem
       logical, intent(in) :: preconditioned          !! z = M r, else z = r
       real(dp), intent(in) :: beta
       real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny)
-      real(dp), intent(inout) :: offset
       real(dp), intent(out) :: rd, squares
       real(dp), allocatable :: correction(:), column(:), shares(:)
       real(dp) :: wx, wy, centre, sums(5), total
@@ -452,7 +386,7 @@ contains
       wx = merge(self%coarse%wx, 0.0_dp, preconditioned)
       wy = merge(self%coarse%wy, 0.0_dp, preconditioned)
       centre = merge(stencil_c0, 1.0_dp, preconditioned) + 2.0_dp*(wx + wy)
-      !$omp parallel default(none) shared(self, preconditioned, wx, wy, centre, beta, offset, pressure) &
+      !$omp parallel default(none) shared(self, preconditioned, wx, wy, centre, beta, pressure) &
       !$omp private(j, k, jb, n, sums, correction, column, shares) &
       !$omp num_threads(self%operator%threads)
       allocate (correction(self%grid%nx), column(self%grid%nx), shares(self%grid%nx))
@@ -464,12 +398,12 @@ contains
          shares(:) = 0.0_dp
          do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
             sums = 0.0_dp
-            do k = 1, self%runs(j)
-               associate (first => self%first(k, j))
-                  n = self%last(k, j) - first + 1
+            do k = 1, self%active%runs(j)
+               associate (first => self%active%first(k, j))
+                  n = self%active%last(k, j) - first + 1
                   call direction_cells(n, wx, wy, centre, self%residual(first, j - 1), &
                      self%residual(first - 1, j), self%residual(first, j + 1), correction(first), &
-                     beta, offset, pressure(first, j), self%direction(first, j), &
+                     beta, self%offset, pressure(first, j), self%direction(first, j), &
                      column(first), shares(first), sums)
                end associate
             end do
@@ -479,24 +413,23 @@ contains
          call self%coarse%set_shares(jb, shares)
       end do
       !$omp end parallel
-      offset = 0.0_dp
+      self%offset = 0.0_dp
       rd = row_sum(self, 3)
       squares = row_sum(self, 5)
       if (problem%control /= control_pressure) return
       total = row_sum(self, 1)
-      offset = total/max(row_sum(self, 2), 1.0_dp)
-      rd = rd - offset*row_sum(self, 4)
-      squares = squares - offset*total
-      self%coarse%mean(:, :) = self%coarse%mean - offset*self%coarse%share
+      self%offset = total/max(row_sum(self, 2), 1.0_dp)
+      rd = rd - self%offset*row_sum(self, 4)
+      squares = squares - self%offset*total
+      self%coarse%mean(:, :) = self%coarse%mean - self%offset*self%coarse%share
    end subroutine new_direction
 
    !> step = (P + alpha direction, put back on what is allowed) - P; whether anything was clipped, the
    !> slope of the energy along it, its square and block means. Its rows are transformed at once.
-   subroutine clipped_step(self, problem, alpha, offset, pressure, gap, level, clipped, slope, squares)
+   subroutine clipped_step(self, problem, alpha, pressure, gap, level, clipped, slope, squares)
       type(normal_solver_type), intent(inout) :: self
       type(normal_problem_type), intent(in) :: problem
       real(dp), intent(in) :: alpha
-      real(dp), intent(in) :: offset                 !! to be taken off the direction
       real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny), gap(self%grid%nx, self%grid%ny)
       real(dp), intent(in) :: level
       logical, intent(out) :: clipped
@@ -505,15 +438,15 @@ contains
       real(dp) :: shift, sums(2), least
       integer :: j, k, jb, n
 
-      !$omp parallel do default(none) shared(self, pressure, alpha, offset) &
+      !$omp parallel do default(none) shared(self, pressure, alpha) &
       !$omp private(j, k, n, sums, least) schedule(dynamic, 8) num_threads(self%operator%threads)
       do j = 1, self%grid%ny
          sums = 0.0_dp
          least = 0.0_dp
-         do k = 1, self%runs(j)
-            associate (first => self%first(k, j))
-               n = self%last(k, j) - first + 1
-               call trial_cells(n, alpha, offset, pressure(first, j), self%direction(first, j), &
+         do k = 1, self%active%runs(j)
+            associate (first => self%active%first(k, j))
+               n = self%active%last(k, j) - first + 1
+               call trial_cells(n, alpha, self%offset, pressure(first, j), self%direction(first, j), &
                   self%step(first, j), sums, least)
             end associate
          end do
@@ -531,19 +464,19 @@ contains
          column(:) = 0.0_dp
          do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
             sums = 0.0_dp
-            do k = 1, self%runs(j)
-               associate (first => self%first(k, j))
-                  n = self%last(k, j) - first + 1
+            do k = 1, self%active%runs(j)
+               associate (first => self%active%first(k, j))
+                  n = self%active%last(k, j) - first + 1
                   call clip_cells(n, shift, level, pressure(first, j), gap(first, j), &
                      self%step(first, j), column(first), sums)
                end associate
             end do
             self%rows(1:2, j) = sums
-            if (self%swift .and. self%runs(j) == 0) then
+            if (self%swift .and. self%active%runs(j) == 0) then
                call self%quick%forward_zero_row(1, j)
             else if (self%swift) then
                call self%quick%forward_row(1, j, self%step(:, j))
-            else if (self%runs(j) == 0) then
+            else if (self%active%runs(j) == 0) then
                call self%operator%forward_zero_row(1, j)
             else
                call self%operator%forward_row(1, j, self%step(:, j))
@@ -576,9 +509,9 @@ contains
          !$omp schedule(dynamic, 8) num_threads(self%operator%threads)
          do j = 1, self%grid%ny
             sums = 0.0_dp
-            do k = 1, self%runs(j)
-               n = self%last(k, j) - self%first(k, j) + 1
-               call above_cells(n, shift, self%step(self%first(k, j), j), sums)
+            do k = 1, self%active%runs(j)
+               n = self%active%last(k, j) - self%active%first(k, j) + 1
+               call above_cells(n, shift, self%step(self%active%first(k, j), j), sums)
             end do
             self%rows(1:2, j) = sums
          end do
@@ -594,9 +527,9 @@ contains
 
       longest = huge(1.0_dp)
       do j = 1, self%grid%ny
-         do k = 1, self%runs(j)
-            call longest_cells(self%last(k, j) - self%first(k, j) + 1, &
-               pressure(self%first(k, j), j), self%step(self%first(k, j), j), longest)
+         do k = 1, self%active%runs(j)
+            call longest_cells(self%active%last(k, j) - self%active%first(k, j) + 1, &
+               pressure(self%active%first(k, j), j), self%step(self%active%first(k, j), j), longest)
          end do
       end do
       longest = global_min(longest)
@@ -621,15 +554,15 @@ contains
             call self%operator%add_backward_row(1, j, factor, gap(:, j))
          end if
          sums = 0.0_dp
-         do k = 1, self%runs(j)
-            associate (first => self%first(k, j))
-               n = self%last(k, j) - first + 1
+         do k = 1, self%active%runs(j)
+            associate (first => self%active%first(k, j))
+               n = self%active%last(k, j) - first + 1
                call load_cells(n, alpha, problem%target, gap(first, j), self%step(first, j), &
                   pressure(first, j), sums)
             end associate
          end do
          self%surveyed(1:5, j) = sums
-         call survey_blocks(self, .false., j, pressure(:, j), gap(:, j))
+         call self%active%survey_row(.false., j, pressure(:, j), gap(:, j), self%surveyed(6, j))
       end do
    end subroutine update
 
