@@ -3,13 +3,16 @@
 import base64
 import json
 import os
+import re
 import shutil
-import socket
 import subprocess
 import time
 import urllib.error
 import urllib.request
 from contextlib import suppress
+from pathlib import Path
+
+from conftest import PATIENCE
 
 DRIVER = shutil.which("chromedriver")
 BROWSER = shutil.which("chromium")
@@ -19,13 +22,11 @@ class Browser:
     """A browser of one window; use it in a `with` statement."""
 
     def __init__(self, folder):
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            port = free.getsockname()[1]
-        self.root = f"http://127.0.0.1:{port}"
-        self.driver = subprocess.Popen(
-            [DRIVER, f"--port={port}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-            env={**os.environ, "HOME": str(folder)})
+        self.told = Path(folder, "driver.log")
+        with self.told.open("w") as told:
+            self.driver = subprocess.Popen(
+                [DRIVER, "--port=0"], stdout=told, stderr=subprocess.DEVNULL,
+                env={**os.environ, "HOME": str(folder)})
         try:
             self._wait()
             options = {"binary": BROWSER, "args": [
@@ -47,13 +48,16 @@ class Browser:
         with suppress(OSError):
             self._send("DELETE", self.session)
         self.driver.terminate()
-        self.driver.wait(10)
+        self.driver.wait(PATIENCE)
 
     def _wait(self):
-        for _ in range(200):
-            with suppress(OSError):
-                if self._send("GET", "/status")["ready"]:
-                    return
+        until = time.monotonic() + PATIENCE
+        while time.monotonic() < until:
+            if port := re.search(r"on port (\d+)", self.told.read_text()):
+                self.root = f"http://127.0.0.1:{port[1]}"
+                with suppress(OSError):
+                    if self._send("GET", "/status")["ready"]:
+                        return
             time.sleep(0.05)
         raise TimeoutError("chromedriver does not answer")
 
@@ -63,7 +67,7 @@ class Browser:
             data=None if body is None else json.dumps(body).encode(),
             headers={"Content-Type": "application/json"})
         try:
-            with urllib.request.urlopen(request, timeout=60) as answer:
+            with urllib.request.urlopen(request, timeout=PATIENCE) as answer:
                 return json.load(answer)["value"]
         except urllib.error.HTTPError as error:
             raise RuntimeError(error.read().decode()) from None

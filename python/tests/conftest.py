@@ -20,6 +20,8 @@ settings.register_profile("repeatable", derandomize=True)
 settings.load_profile("repeatable")
 
 ROOT = Path(__file__).resolve().parents[2]
+# Seconds after which a test gives up waiting: a busy machine may be a hundred times slower.
+PATIENCE = 300
 
 
 @pytest.fixture(scope="session")

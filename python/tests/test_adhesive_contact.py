@@ -6,6 +6,7 @@ import subprocess
 import numpy as np
 import pytest
 import viscoelastic_case as vc
+from conftest import PATIENCE
 
 import asperity
 from asperity.theory import dmt, jkr, maugis
@@ -214,9 +215,8 @@ def test_restart_gives_the_same_numbers(program, tmp_path, boundary, velocity):
         case.write_text(RESTARTED.format(boundary=boundary, velocity=velocity))
     assert vc.run(program, whole).returncode == 0
     process = vc.start(program, parts)
-    vc.wait_for_rows(process, parts.with_suffix(".h5"), 20)
-    process.send_signal(signal.SIGTERM)
-    process.communicate(timeout=60)
+    vc.wait_for_rows(process, parts.with_suffix(".h5"), 20, signal.SIGTERM)
+    process.communicate(timeout=PATIENCE)
     assert process.returncode == 128 + signal.SIGTERM
     stopped = len(asperity.open(parts.with_suffix(".h5")).history["step"])
     assert 20 <= stopped < 121

@@ -7,6 +7,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from conftest import PATIENCE
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -20,7 +21,8 @@ VERBS = ["run", "check", "template", "info"]
 
 def call(program, *arguments, cwd=None):
     """Run the program; whatever happens, it must not crash."""
-    done = subprocess.run([program, *map(str, arguments)], capture_output=True, cwd=cwd, timeout=60)
+    done = subprocess.run([program, *map(str, arguments)], capture_output=True, cwd=cwd,
+                          timeout=PATIENCE)
     done.out = done.stdout.decode(errors="replace")
     done.err = done.stderr.decode(errors="replace")
     assert done.returncode in (0, 2, 3, 4), (done.returncode, done.err)

@@ -15,6 +15,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from viscoelastic_case import wait_for_rows
 
 ROOT = Path(__file__).resolve().parents[2]
 ENDINGS = (".h5", ".checkpoint.h5", ".xdmf")
@@ -143,10 +144,8 @@ def test_killed(tmp_path: Path, writer: str) -> None:
     rows = []
     for _ in range(8):
         run = subprocess.Popen([writer, "writer", str(result), "400", "0"])
-        deadline = time.monotonic() + 10
-        while not result.exists() and time.monotonic() < deadline:
-            time.sleep(0.001)
-        time.sleep(random.uniform(0, 0.05))
+        wait_for_rows(run, result, int(random.integers(0, 60)))
+        time.sleep(random.uniform(0, 0.005))
         reading = inspect_live(result)
         run.send_signal(signal.SIGKILL)
         run.wait()

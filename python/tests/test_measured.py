@@ -10,7 +10,7 @@ import sys
 import h5py
 import numpy as np
 import pytest
-from conftest import write_result
+from conftest import PATIENCE, write_result
 
 import asperity
 from asperity.__main__ import main
@@ -475,7 +475,7 @@ def test_files_that_cannot_be_read(tmp_path):
 def command(*words, folder=None):
     """Run ``python -m asperity``."""
     return subprocess.run([sys.executable, "-m", "asperity", *map(str, words)], cwd=folder,
-                          capture_output=True, text=True, timeout=60, check=False)
+                          capture_output=True, text=True, timeout=PATIENCE, check=False)
 
 
 def test_from_the_instrument_s_file_to_a_run(tmp_path, program):

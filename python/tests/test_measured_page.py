@@ -9,7 +9,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import PATIENCE, ROOT
 
 import asperity
 
@@ -36,7 +36,7 @@ def test_from_measurements_to_friction(program, tmp_path, monkeypatch, capsys):
         if commands is to_run:
             Path("slide.nml").write_text(case)
         done = subprocess.run(["sh", "-ec", commands], capture_output=True, text=True, check=False,
-                              timeout=120)
+                              timeout=PATIENCE)
         assert done.returncode == 0, done.stderr
         told += done.stdout
     assert lines in told  # the page shows what the command prints

@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 import pytest
 from browser import BROWSER, DRIVER, Browser
-from conftest import frictional_result, write_result
+from conftest import PATIENCE, frictional_result, write_result
 
 import asperity
 from asperity.__main__ import main
@@ -319,7 +319,7 @@ def browser(tmp_path_factory):
 
 def wait_for(browser, script, *arguments):
     """Wait until a script returns something true; return it."""
-    until = time.monotonic() + 20
+    until = time.monotonic() + PATIENCE
     while time.monotonic() < until:
         found = browser.run(script, *arguments)
         if found:

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
-from conftest import ROOT
+from conftest import PATIENCE, ROOT
 
 PAGE = (ROOT / "docs" / "results.md").read_text()
 
@@ -24,7 +24,7 @@ def test_commands_of_the_page(road):
     told = ""
     for block in commands:
         done = subprocess.run(["sh", "-ec", block], cwd=road, capture_output=True, text=True,
-                              check=False, timeout=120, env={**os.environ, "PATH": path})
+                              check=False, timeout=PATIENCE, env={**os.environ, "PATH": path})
         assert done.returncode == 0, done.stderr
         told += done.stdout
     for name in ("road.png", "friction.pdf", "contact.png", "report.html"):

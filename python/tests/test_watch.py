@@ -12,7 +12,7 @@ import time
 import h5py
 import numpy as np
 import pytest
-from conftest import frictional_result, write_result
+from conftest import PATIENCE, frictional_result, write_result
 
 import asperity
 from asperity.__main__ import main
@@ -152,13 +152,13 @@ def test_follows_a_run_on_a_terminal_until_interrupted(program, tmp_path):
                  "PYTHONIOENCODING": "utf-8"}) as view:
         os.close(theirs)
         seen = b""
-        until = time.monotonic() + 60
+        until = time.monotonic() + PATIENCE
         while seen.count(b"\x1b[J") < 3 and time.monotonic() < until:
             if select.select([ours], [], [], 0.2)[0]:
                 seen += os.read(ours, 65536)
         view.send_signal(signal.SIGINT)
         errors = view.stderr.read()
-        status = view.wait(30)
+        status = view.wait(PATIENCE)
     os.close(ours)
     assert status == 130
     assert b"Traceback" not in errors

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import time
 from pathlib import Path
 
 import h5py
 import numpy as np
+from conftest import PATIENCE
 
 # Columns that say how long a run took, not what came out.
 TIMES = {"seconds"}
@@ -43,7 +45,7 @@ def start(program: str, case: Path, *arguments: str, **keywords) -> subprocess.P
 def run(program: str, case: Path, *arguments: str, **keywords) -> subprocess.CompletedProcess:
     """Run to the end."""
     return subprocess.run([program, "run", str(case), "--quiet", *arguments], text=True,
-                          capture_output=True, timeout=120, check=False, **keywords)
+                          capture_output=True, timeout=PATIENCE, check=False, **keywords)
 
 
 def count(path: Path) -> int:
@@ -55,12 +57,24 @@ def count(path: Path) -> int:
         return -1
 
 
-def wait_for_rows(process: subprocess.Popen, path: Path, wanted: int) -> None:
-    """Wait until a run has written so many rows."""
-    end = time.monotonic() + 60.0
-    while count(path) < wanted:
+def wait_for_rows(process: subprocess.Popen, path: Path, wanted: int,
+                  number: signal.Signals | None = None) -> None:
+    """Wait until a run has written so many rows; then send it a signal, if one is named.
+
+    The run stands still while its file is looked at: however slow the look, it is not late.
+    """
+    end = time.monotonic() + PATIENCE
+    there = False
+    while not there:
         assert process.poll() is None, process.communicate()[1]
         assert time.monotonic() < end, "the run writes no rows"
+        process.send_signal(signal.SIGSTOP)
+        try:
+            there = count(path) >= wanted
+            if there and number is not None:
+                process.send_signal(number)
+        finally:
+            process.send_signal(signal.SIGCONT)
         time.sleep(0.002)
 
 
