@@ -47,6 +47,7 @@ MATH_FONT = Path(find_spec("ziamath").origin).parent / "fonts" / "STIXTwoMath-Re
 html_static_path = ["site.css", str(MATH_FONT)]
 html_extra_path = ["../build/fortran"]  # by FORD
 html_show_sourcelink = False
+html_show_search_summary = False        # browsers fetch no pages where the site is opened as files
 html_math_renderer = "mathml"
 
 ORDER = {

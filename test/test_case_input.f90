@@ -394,7 +394,7 @@ contains
       call refuse(no_material//'&material shear_modulus=1, prony_g=1.0,,2.0, prony_tau=1.0/', &
          'has an empty value')
       call refuse(no_material//'&material shear_modulus=1, prony_g=1.0,2.0, prony_tau=1.0/', &
-         'prony_tau = 1.0: has 1 values, but prony_g has 2')
+         'prony_tau = 1.0: must have as many values as prony_g: 1 here, 2 there')
       call refuse(no_material//'&material shear_modulus=1, prony_g=1.0 /', 'prony_tau: is missing')
       call refuse(no_material//'&material shear_modulus=1, prony_g=1.0, prony_tau=0.0/', &
          'prony_tau = 0.0: every value must be a positive number')

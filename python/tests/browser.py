@@ -15,7 +15,24 @@ from pathlib import Path
 from conftest import PATIENCE
 
 DRIVER = shutil.which("chromedriver")
-BROWSER = shutil.which("chromium")
+
+
+def _browser():
+    """Return the browser of the driver's version: a machine may have several."""
+    if DRIVER is None:
+        return None
+    found = [path for name in ("chromium", "google-chrome", "chromium-browser")
+             if (path := shutil.which(name))]
+    if len(found) < 2:
+        return found[0] if found else None
+    versions = [re.search(r" (\d+)\.", subprocess.run([path, "--version"], capture_output=True,
+                                                      text=True).stdout)
+                for path in (DRIVER, *found)]
+    return next((path for path, version in zip(found, versions[1:], strict=True)
+                 if version and versions[0] and version[1] == versions[0][1]), None)
+
+
+BROWSER = _browser()
 
 
 class Browser:

@@ -44,6 +44,22 @@ def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("case")
 
 
+@pytest.mark.parametrize(("old", "new", "told"), [
+    ("/\n&p", "/\n&friction law = 'coulomb', coefficient = 0.5, shear_strength = 3e5 /\n&p",
+     "&friction: shear_strength = 300000 has no effect"),
+    ("/\n&p", "/\n&friction law = 'constant_shear', coefficient = 0.5, shear_strength = 1 /\n&p",
+     "&friction: coefficient = 0.5 has no effect"),
+    ("1e6 /", "1e6, temperature = 50 /", "&material: temperature = 50 has no effect"),
+    ("1e6 /", "1e6, temperature = 50, wlf_c1 = 5, wlf_c2 = 100 /", ""),
+    ("1e6 /", "1e6, temperature = 20 /", ""),
+])
+def test_values_without_effect_are_told(program, folder, old, new, told):
+    done = check(program, folder, GOOD.replace(old, new, 1))
+    assert done.returncode == 0
+    assert done.out.count("has no effect") == (1 if told else 0)
+    assert f"! warning: {told}" in done.out or not told
+
+
 def test_version(program, root):
     done = call(program, "--version")
     assert done.returncode == 0

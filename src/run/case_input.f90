@@ -127,6 +127,7 @@ contains
       call resolve_output(group, case, faults)
 
       if (.not. allocated(faults%error)) then
+         call note_unused(groups, case)
          call add_warnings(case)
       end if
       if (allocated(faults%error)) call move_alloc(faults%error, error)
@@ -140,22 +141,42 @@ contains
 
       call find_warnings(case%grid, case%surfaces, found)
       do i = 1, size(found)
-         call add(trim(found(i)))
+         call add_warning(case, trim(found(i)))
       end do
-      call add(adhesion_warning(case))
-
-   contains
-
-      !> One more line, if there is one.
-      subroutine add(line)
-         character(*), intent(in) :: line
-
-         if (line == '') return
-         if (case%warnings /= '') case%warnings = case%warnings//new_line('a')
-         case%warnings = case%warnings//line
-      end subroutine add
-
+      call add_warning(case, adhesion_warning(case))
    end subroutine add_warnings
+
+   !> Values that are given and have no effect.
+   subroutine note_unused(groups, case)
+      type(group_values_type), intent(in) :: groups(:)
+      type(case_type), intent(inout) :: case
+      type(group_values_type) :: group
+
+      call pick(groups, 'friction', group)
+      if (case%friction%law == 'coulomb' .and. group%given('shear_strength')) call add_warning(case, &
+         '&friction: shear_strength = '//to_text(case%friction%shear_strength)// &
+         ' has no effect: law = ''coulomb'' does not use it')
+      if (case%friction%law == 'constant_shear' .and. group%given('coefficient')) call add_warning(case, &
+         '&friction: coefficient = '//to_text(case%friction%coefficient)// &
+         ' has no effect: law = ''constant_shear'' does not use it')
+      call pick(groups, 'material', group)
+      if (group%given('temperature') .and. .not. group%given('wlf_c1')) then
+         if (abs(group%real_value('temperature') - group%real_value('reference_temperature')) > 0.0_dp) &
+            call add_warning(case, '&material: temperature = '// &
+            to_text(group%real_value('temperature'))//' has no effect: relaxation times shift with '// &
+            'wlf_c1 and wlf_c2 only')
+      end if
+   end subroutine note_unused
+
+   !> One more line, if there is one.
+   subroutine add_warning(case, line)
+      type(case_type), intent(inout) :: case
+      character(*), intent(in) :: line
+
+      if (line == '') return
+      if (case%warnings /= '') case%warnings = case%warnings//new_line('a')
+      case%warnings = case%warnings//line
+   end subroutine add_warning
 
    !> Report groups that are missing.
    subroutine check_presence(groups, faults)

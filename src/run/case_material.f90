@@ -99,8 +99,9 @@ contains
 
          if (.not. (group%usable(name) .and. group%usable(other))) return
          if (size(group%reals_value(name)) == size(group%reals_value(other))) return
-         call group%fault(name, 'has '//to_text(size(group%reals_value(name)))//' values, but '// &
-            other//' has '//to_text(size(group%reals_value(other))), faults)
+         call group%fault(name, 'must have as many values as '//other//': '// &
+            to_text(size(group%reals_value(name)))//' here, '// &
+            to_text(size(group%reals_value(other)))//' there', faults)
       end subroutine same_size
 
       !> Are two lists there, and of one size?

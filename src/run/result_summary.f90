@@ -143,15 +143,15 @@ contains
       type(hdf5_file_type), intent(inout) :: file
       character(:), allocatable, intent(inout) :: text
       type(error_type), allocatable, intent(out) :: error
-      character(*), parameter :: names(7) = [character(20) :: 'step', 'phase', 'time', 'pressure', &
-         'displacement', 'contact_area', 'residual_normal']
-      character(*), parameter :: units(7) = [character(3) :: '', '', ' s', ' Pa', ' m', '', '']
+      character(*), parameter :: names(10) = [character(20) :: 'step', 'phase', 'time', 'pressure', &
+         'displacement', 'contact_area', 'stick_area', 'friction', 'residual_normal', &
+         'residual_tangential']
+      character(*), parameter :: units(10) = [character(3) :: '', '', ' s', ' Pa', ' m', '', '', '', '', '']
       real(dp), allocatable :: column(:)
-      real(dp) :: last(size(names)), worst
+      real(dp) :: last(size(names)), largest(size(names))
       integer :: expected, i, rows
 
       rows = huge(1)
-      worst = 0.0_dp
       do i = 1, size(names)
          call file%read('/history/'//trim(names(i)), column, error)
          if (allocated(error)) return
@@ -166,7 +166,7 @@ contains
          if (allocated(error)) return
          rows = min(rows, size(column))
          last(i) = column(rows)
-         if (names(i) == 'residual_normal') worst = maxval(column(:rows))
+         largest(i) = maxval(abs(column(:rows)))
       end do
       text = text//'rows        '//to_text(rows)
       if (file%has_attribute('/', 'expected_rows')) then
@@ -176,9 +176,22 @@ contains
       end if
       text = text//nl//'last row'//nl
       do i = 1, size(names)
+         if (is_of_friction(names(i)) .and. largest(i) <= 0.0_dp) cycle      ! there is none
          text = text//'  '//names(i)//to_text(last(i))//trim(units(i))//nl
       end do
-      text = text//'largest residual_normal of all rows: '//to_text(worst)//nl
+      do i = 1, size(names)
+         if (index(names(i), 'residual') == 0) cycle
+         if (is_of_friction(names(i)) .and. largest(i) <= 0.0_dp) cycle
+         text = text//'largest '//trim(names(i))//' of all rows: '//to_text(largest(i))//nl
+      end do
    end subroutine history_text
+
+   !> Is a column zero throughout where nothing slides?
+   pure function is_of_friction(name) result(of_friction)
+      character(*), intent(in) :: name
+      logical :: of_friction
+
+      of_friction = any(name == [character(20) :: 'stick_area', 'friction', 'residual_tangential'])
+   end function is_of_friction
 
 end module result_summary
