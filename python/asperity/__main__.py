@@ -118,8 +118,10 @@ def _plot(chosen: argparse.Namespace) -> int:
         matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
+    from ._style import check_picture
     from .result import open_result
 
+    check_picture(chosen.output)
     run = open_result(chosen.result)
     if chosen.field:
         if not len(run.snapshots):

@@ -110,6 +110,7 @@ def add_fit(verbs: Any) -> None:
 
 def _fit(chosen: argparse.Namespace) -> int:
     """Read, fit, write, tell."""
+    from ._style import check_picture
     from .dma import fit_dma, read_dma
 
     columns = {}
@@ -118,6 +119,7 @@ def _fit(chosen: argparse.Namespace) -> int:
         if not equals or not name.strip():
             raise ValueError(f"--column {given}: must be ROLE=NAME or ROLE=NUMBER")
         columns[role.strip()] = name.strip()
+    check_picture(chosen.plot)
     output = chosen.output
     if output is not None:
         if not output.parent.is_dir():

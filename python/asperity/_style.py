@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,8 +13,8 @@ if TYPE_CHECKING:
     from .result import Snapshot
 
 __all__ = ["COLOURS", "DOUBLE_COLUMN", "LABELS", "NO_CONTACT", "PRINT", "SINGLE_COLUMN", "SLIP",
-           "STICK", "axis_text", "label_of", "print_style", "scale_limit", "sentence", "si_scale",
-           "typical_value", "when"]
+           "STICK", "axis_text", "check_picture", "label_of", "print_style", "scale_limit",
+           "sentence", "si_scale", "typical_value", "when"]
 
 # Okabe and Ito's palette: blue, vermilion, green, purple, orange, sky blue, black.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -74,6 +75,15 @@ LABELS = {
     "ffts": "Transforms",
     "seconds": "Solver time",
 }
+
+
+def check_picture(path: Path | None) -> None:
+    """Raise ValueError unless matplotlib can write a picture of this ending; None is fine."""
+    from matplotlib.backend_bases import FigureCanvasBase
+
+    if path and path.suffix[1:].lower() not in FigureCanvasBase.get_supported_filetypes():
+        raise ValueError(f"{path}: the ending must be .png, .pdf, .svg or another that matplotlib"
+                         " writes")
 
 
 def si_scale(values: ArrayLike, units: str) -> tuple[float, str]:

@@ -289,6 +289,13 @@ def test_info(program, folder):
         "finished    yes",
     ):
         assert piece in done.out
+    assert "friction" not in done.out
+    with h5py.File(path, "a") as file:
+        for name, value in (("friction", 0.25), ("stick_area", 0.0), ("residual_tangential", 2e-9)):
+            file[f"history/{name}"] = np.array([value])
+    told = call(program, "info", path).out
+    assert "  friction            0.25\n" in told and "stick_area" not in told
+    assert "largest residual_tangential of all rows: 2e-9" in told
     with h5py.File(path, "a") as file:
         del file.attrs["title"]
     assert call(program, "info", path).returncode == 3

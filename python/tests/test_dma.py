@@ -475,4 +475,7 @@ def test_the_table_is_not_written_over(tmp_path, capsys):
     before = path.read_text()
     assert main(["fit", str(path), "-o", str(path)]) == 2
     assert "is the table itself" in capsys.readouterr().err
-    assert path.read_text() == before
+    group = tmp_path / "a.nml"
+    assert main(["fit", str(path), "-o", str(group), "--plot", "fit.xyz"]) == 2
+    assert "fit.xyz: the ending must be .png" in capsys.readouterr().err
+    assert path.read_text() == before and not group.exists()

@@ -287,7 +287,8 @@ def test_command(result, capsys):
     (["--field", "presure"], 2, "did you mean 'pressure'"),
     (["--field", "gap", "--step", "3"], 2, "there are those of 0, 5"),
     (["-o", "/nowhere/at/all.png"], 3, "all.png"),
-    (["-o", "picture.xyz"], 2, "xyz"),
+    (["-o", "picture.xyz"], 2, "picture.xyz: the ending must be .png"),
+    (["-o", "picture"], 2, "picture: the ending must be .png"),
 ])
 def test_command_errors(result, capsys, words, status, message):
     assert main(["plot", str(result), *words]) == status
