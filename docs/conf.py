@@ -115,12 +115,21 @@ def _prepare_docstring(app, what, name, thing, options, lines):
     lines[:] = (head + title + rest).split("\n")
 
 
+# A prime is high by itself: it stands beside its letter, not above it once more.
+PRIME = "<mi>&#x02032;</mi>"
+BESIDE = r'<mrow>\1<mo lspace="0" rspace="0">&#x02032;</mo></mrow>'
+PRIMES = ((rf"<msup>(<mi>[^<]*</mi>){PRIME}</msup>", BESIDE),
+          (rf"<msubsup>(<mi>[^<]*</mi>)(<mi>[^<]*</mi>|<mrow>(?:(?!</mrow>).)*</mrow>){PRIME}"
+           "</msubsup>", rf"<msub>{BESIDE}\2</msub>"))
+
+
 def _mathml(self, node):
     """Write an equation as MathML, which browsers show without scripts."""
     block = isinstance(node, nodes.math_block)
     math = convert(node.astext(), display="block" if block else "inline")
     math = math.replace("<mo>&#x0002A;</mo>", "<mo>&#x02217;</mo>")         # the star of E*
-    math = math.replace("<mi>&#x02032;</mi>", '<mo class="prime">&#x02032;</mo>')
+    for pattern, text in PRIMES:
+        math = re.sub(pattern, text, math)
     if block:
         math = f'<div class="math" tabindex="0">{math}</div>'               # long ones scroll
     self.body.append(math)
