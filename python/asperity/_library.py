@@ -73,6 +73,11 @@ def set_threads(number: int = 0) -> int:
     int
         The number in use.
 
+    Raises
+    ------
+    ValueError
+        If the number is negative.
+
     Examples
     --------
     >>> import asperity

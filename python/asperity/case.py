@@ -437,6 +437,16 @@ class Case:
 
         The result lies where ``case.output.file`` says, by default beside the input's file with
         the ending .h5; a case without a file counts as ``case.nml`` in the current folder.
+
+        Returns
+        -------
+        Run
+            The opened result.
+
+        Raises
+        ------
+        ValueError, OSError, NotConverged
+            As `asperity.run`.
         """
         from .runner import run
 

@@ -221,22 +221,71 @@ class Prony:
         return storage + 1j * loss
 
     def storage_modulus(self, omega: ArrayLike) -> FloatArray:
-        """Return G'(omega), Pa."""
+        """Return G'(omega), Pa.
+
+        Parameters
+        ----------
+        omega : array_like
+            Angular frequencies, rad/s, any shape.
+
+        Returns
+        -------
+        ndarray
+            Pa, shape of `omega`.
+        """
         return self.complex_modulus(omega).real
 
     def loss_modulus(self, omega: ArrayLike) -> FloatArray:
-        """Return G''(omega), Pa."""
+        """Return G''(omega), Pa.
+
+        Parameters
+        ----------
+        omega : array_like
+            Angular frequencies, rad/s, any shape.
+
+        Returns
+        -------
+        ndarray
+            Pa, shape of `omega`.
+        """
         return self.complex_modulus(omega).imag
 
     def tan_delta(self, omega: ArrayLike) -> FloatArray:
-        """Return the loss factor G''/G'."""
+        """Return the loss factor G''/G'.
+
+        Parameters
+        ----------
+        omega : array_like
+            Angular frequencies, rad/s, any shape.
+
+        Returns
+        -------
+        ndarray
+            Pure numbers, shape of `omega`.
+        """
         modulus = self.complex_modulus(omega)
         return modulus.imag / modulus.real
 
     # ---- time ------------------------------------------------------------------------------
 
     def relaxation_modulus(self, t: ArrayLike) -> FloatArray:
-        """Return G(t), Pa, at times t >= 0 (s), shape of `t`."""
+        """Return G(t), Pa, at times t >= 0 (s), shape of `t`.
+
+        Parameters
+        ----------
+        t : array_like
+            Times, s, >= 0, any shape.
+
+        Returns
+        -------
+        ndarray
+            G, Pa, shape of `t`.
+
+        Raises
+        ------
+        ValueError
+            If a time is negative or no finite number.
+        """
         times = array_of("t", t, low=0.0)
         return self._g_inf + np.sum(self._g * np.exp(-times[..., None] / self._tau), axis=-1)
 
@@ -313,6 +362,11 @@ class Prony:
         -------
         Prony
 
+        Raises
+        ------
+        ValueError
+            If a modulus or viscosity is out of range, or the lists differ in length.
+
         Examples
         --------
         >>> round(Prony.from_zener(0.0, [1e6], [1e5], [1e5]).equilibrium_modulus, 3)
@@ -345,6 +399,11 @@ class Prony:
         Returns
         -------
         Prony
+
+        Raises
+        ------
+        ValueError
+            If the constants are not three numbers, or the temperature is not above t_ref - c2.
 
         Examples
         --------
@@ -506,6 +565,12 @@ class Prony:
         -------
         str
             Numbers are written so that they are read back exactly.
+
+        Raises
+        ------
+        ValueError
+            If the temperature is given without `wlf` or the other way round, or a value is out of
+            range.
 
         Examples
         --------

@@ -106,7 +106,18 @@ class History(NamedValues):
         return self._long_names.get(name, name.replace("_", " "))
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return the history as a table of pandas, which must be installed."""
+        """Return the history as a table of pandas, which must be installed.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A column a quantity, a line a row of the history, in SI units.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+        """
         try:
             import pandas
         except ImportError as error:
@@ -232,6 +243,15 @@ class Snapshot:
             Where to draw; a new figure, one column wide, if left out.
         arrows : bool, optional
             Whether to draw the tractions as arrows; by default on 'contact' only.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        KeyError
+            If the snapshot holds no such field; the message names the nearest.
         """
         from .plot import plot_field
 
@@ -261,6 +281,15 @@ class Snapshot:
         ----------
         path : str or path
             The file, NAME.vti.
+
+        Returns
+        -------
+        Path
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written.
         """
         from .export import to_vtk
 
@@ -289,7 +318,22 @@ class Snapshots(Sequence[Snapshot]):
         return tuple(int(key) for key in self._keys)
 
     def at_step(self, step: int) -> Snapshot:
-        """Return the snapshot of a step."""
+        """Return the snapshot of a step.
+
+        Parameters
+        ----------
+        step : int
+            A step that has a snapshot, one of `steps`.
+
+        Returns
+        -------
+        Snapshot
+
+        Raises
+        ------
+        KeyError
+            If there is none of that step; the message names those there are.
+        """
         if step not in self.steps:
             raise UnknownNameError(f"no snapshot of step {step}: there are those of"
                                    f" {', '.join(map(str, self.steps)) or 'no step'};"
@@ -366,7 +410,17 @@ class Run:
         self.refresh()
 
     def refresh(self) -> Run:
-        """Read again what a run that is still going has written since; return the run itself."""
+        """Read again what a run that is still going has written since; return the run itself.
+
+        Returns
+        -------
+        Run
+
+        Raises
+        ------
+        OSError
+            If the file is gone, or cannot be read.
+        """
         def read(file: h5py.File) -> None:
             for group in ("grid", "history"):
                 if group not in file:
@@ -495,7 +549,12 @@ class Run:
         return plot_history(self, name, x, ax, **style)
 
     def overview(self) -> Figure:
-        """Draw what tells most of the run, as `plot` does without a name."""
+        """Draw what tells most of the run, as `plot` does without a name.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
         from .plot import plot_overview
 
         return plot_overview(self)
@@ -507,6 +566,17 @@ class Run:
         ----------
         path : str or path, optional
             The file to write; RESULT.html beside the result if left out.
+
+        Returns
+        -------
+        Path
+
+        Raises
+        ------
+        OSError
+            If the page cannot be written.
+        ValueError
+            If it would overwrite a result.
         """
         from .report import write_report
 

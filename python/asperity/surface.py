@@ -199,6 +199,11 @@ def shape(
     ndarray
         Height, m, shape (ny, nx).
 
+    Raises
+    ------
+    ValueError
+        If a name, a number of cells or a length is wrong, or the shape lacks what it needs.
+
     Examples
     --------
     >>> import asperity
@@ -223,6 +228,16 @@ def psd(height: ArrayLike, lx: float, ly: float | None = None) -> RadialPsd:
         Height, m, shape (ny, nx), taken as periodic.
     lx, ly : float
         Lengths, m; `ly` defaults to square cells.
+
+    Returns
+    -------
+    RadialPsd
+        Wave numbers (rad/m), densities (m4; m3 of a profile) and numbers of modes of the rings.
+
+    Raises
+    ------
+    ValueError
+        If the map is no array (ny, nx) of finite numbers, has masked points, or a length is wrong.
 
     Examples
     --------
@@ -256,6 +271,11 @@ def psd_map(height: ArrayLike, lx: float, ly: float | None = None) -> FloatArray
     -------
     ndarray
         Density, m4 (m3 of a profile), shape (ny, nx).
+
+    Raises
+    ------
+    ValueError
+        If the map is no array (ny, nx) of finite numbers, has masked points, or a length is wrong.
     """
     array = _library.height_map(height)
     lx, ly = _library.lengths(array.shape, lx, ly)
@@ -277,6 +297,16 @@ def statistics(
         Lengths, m; `ly` defaults to square cells.
     boundary : str
         'periodic' or 'free': whether differences reach across the edges.
+
+    Returns
+    -------
+    Statistics
+        Heights in m, slopes as pure numbers, the curvature in 1/m.
+
+    Raises
+    ------
+    ValueError
+        If the map is no array (ny, nx) of finite numbers, has masked points, or a length is wrong.
 
     Examples
     --------

@@ -88,11 +88,37 @@ class Sweep(Mapping[str, NDArray[Any]]):
         return len(self.paths)
 
     def row(self, index: int) -> dict[str, Any]:
-        """Return a row: parameters and results of one case."""
+        """Return a row: parameters and results of one case.
+
+        Parameters
+        ----------
+        index : int
+            Number of the case, from 0; negative from the end.
+
+        Returns
+        -------
+        dict
+            Values by the names of the columns.
+
+        Raises
+        ------
+        IndexError
+            If there are not so many cases.
+        """
         return {name: column[index] for name, column in self._columns.items()}
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return the table as one of pandas, which must be installed."""
+        """Return the table as one of pandas, which must be installed.
+
+        Returns
+        -------
+        pandas.DataFrame
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+        """
         try:
             import pandas
         except ImportError as error:

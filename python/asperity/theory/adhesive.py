@@ -104,6 +104,21 @@ class AdhesiveContact:
         """Return the normal stress at distances r >= 0 (m), Pa, pressure positive.
 
         JKR is infinite (minus) at the edge. DMT's stress outside the contact is not resolved: 0.
+
+        Parameters
+        ----------
+        r : array_like
+            Distances from the axis, m, >= 0, any shape.
+
+        Returns
+        -------
+        ndarray
+            Pa, shape of `r`.
+
+        Raises
+        ------
+        ValueError
+            If a distance is negative or no finite number.
         """
         distance = array_of("r", r, low=0.0)
         a, e = self.contact_radius, self.modulus

@@ -45,13 +45,44 @@ class HertzContact:
     peak_pressure: float
 
     def pressure(self, r: ArrayLike) -> FloatArray:
-        """Return p(r), Pa, at distances r >= 0 (m) from the axis; 0 outside the contact."""
+        """Return p(r), Pa, at distances r >= 0 (m) from the axis; 0 outside the contact.
+
+        Parameters
+        ----------
+        r : array_like
+            Distances from the axis, m, >= 0, any shape.
+
+        Returns
+        -------
+        ndarray
+            Pa, shape of `r`.
+
+        Raises
+        ------
+        ValueError
+            If a distance is negative or no finite number.
+        """
         return self.peak_pressure * _dome(array_of("r", r, low=0.0), self.contact_radius)
 
     def displacement(self, r: ArrayLike) -> FloatArray:
         """Return the normal displacement u_z(r), m, inside and outside the contact.
 
         Johnson (1985), eq. 3.41a and 3.42a.
+
+        Parameters
+        ----------
+        r : array_like
+            Distances from the axis, m, >= 0, any shape.
+
+        Returns
+        -------
+        ndarray
+            m, shape of `r`.
+
+        Raises
+        ------
+        ValueError
+            If a distance is negative or no finite number.
         """
         return hertz_displacement(array_of("r", r, low=0.0), self.contact_radius, self.radius)
 
@@ -155,15 +186,63 @@ class HertzLine:
     peak_pressure: float
 
     def pressure(self, x: ArrayLike) -> FloatArray:
-        """Return p(x), Pa, at positions x (m) across the line; 0 outside the contact."""
+        """Return p(x), Pa, at positions x (m) across the line; 0 outside the contact.
+
+        Parameters
+        ----------
+        x : array_like
+            Positions, m, any shape.
+
+        Returns
+        -------
+        ndarray
+            Pa, shape of `x`.
+
+        Raises
+        ------
+        ValueError
+            If a position is no finite number.
+        """
         return self.peak_pressure * _dome(np.abs(array_of("x", x)), self.half_width)
 
     def displacement(self, x: ArrayLike) -> FloatArray:
-        """Return u_z(x) - u_z(0), m (a line load has no absolute displacement)."""
+        """Return u_z(x) - u_z(0), m (a line load has no absolute displacement).
+
+        Parameters
+        ----------
+        x : array_like
+            Positions, m, any shape.
+
+        Returns
+        -------
+        ndarray
+            m, shape of `x`.
+
+        Raises
+        ------
+        ValueError
+            If a position is no finite number.
+        """
         return self.gap(x) - 0.5 * array_of("x", x) ** 2 / self.radius
 
     def gap(self, x: ArrayLike) -> FloatArray:
-        """Return the gap between cylinder and half-space, m; 0 within the contact."""
+        """Return the gap between cylinder and half-space, m; 0 within the contact.
+
+        Parameters
+        ----------
+        x : array_like
+            Positions, m, any shape.
+
+        Returns
+        -------
+        ndarray
+            m, shape of `x`.
+
+        Raises
+        ------
+        ValueError
+            If a position is no finite number.
+        """
         t = np.maximum(np.abs(array_of("x", x)) / self.half_width, 1.0)
         root = np.sqrt((t - 1.0) * (t + 1.0))
         return self.half_width**2 / (2.0 * self.radius) * (t * root - np.arccosh(t))

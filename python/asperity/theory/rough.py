@@ -165,7 +165,23 @@ def self_affine_psd(
 
 
 def psd_moments(wavenumber: ArrayLike, psd: ArrayLike) -> tuple[float, float]:
-    """Return rms height (m) and rms slope of an isotropic PSD (m^4) at wavenumbers (rad/m)."""
+    """Return rms height (m) and rms slope of an isotropic PSD (m^4) at wavenumbers (rad/m).
+
+    Parameters
+    ----------
+    wavenumber, psd : array_like, shape (m,)
+        Knots, rad/m, ascending, and the density there, m^4; see `persson`.
+
+    Returns
+    -------
+    (float, float)
+        Rms height, m, and rms slope.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of range.
+    """
     s = _spectrum(wavenumber, psd)
     return (
         math.sqrt(s.total(s.psd * s.k) / (2.0 * math.pi)),
@@ -308,6 +324,25 @@ def bush_gibson_thomas(pressure: ArrayLike, modulus: float, rms_slope: float) ->
 
     Asperities that do not interact: an asymptote, not bounded by 1. Persson's slope is
     sqrt(8/pi); arguments, errors as for `persson_area`.
+
+    Parameters
+    ----------
+    pressure : array_like
+        Mean pressure p, Pa, >= 0, any shape.
+    modulus : float
+        E*, Pa, > 0.
+    rms_slope : float
+        Root mean square of the gradient, > 0.
+
+    Returns
+    -------
+    ndarray
+        Real over apparent area, shape of `pressure`.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of range.
 
     References
     ----------

@@ -48,6 +48,21 @@ class MindlinContact:
 
         Positive along the positive tangential force. A sum of Coulomb-Hertz tractions, one for
         each reversal that is still remembered.
+
+        Parameters
+        ----------
+        r : array_like
+            Distances from the axis, m, >= 0, any shape.
+
+        Returns
+        -------
+        ndarray
+            Pa, shape of `r`.
+
+        Raises
+        ------
+        ValueError
+            If a distance is negative or no finite number.
         """
         distance = array_of("r", r, low=0.0)
         a, p0 = self.normal.contact_radius, self.normal.peak_pressure

@@ -68,6 +68,23 @@ class LeeRadokContact:
 
         p = 4/(pi R (1 - nu)) int G(t - s) d/ds sqrt(a(s)^2 - r^2) ds, by Gauss quadrature graded
         to both ends (1e-9 of the peak).
+
+        Parameters
+        ----------
+        r : array_like
+            Distances from the axis, m, >= 0, any shape.
+        t : float
+            Time, s, from 0 to the last of `times`.
+
+        Returns
+        -------
+        ndarray
+            Pa, shape of `r`.
+
+        Raises
+        ------
+        ValueError
+            If a distance is negative or the time out of range.
         """
         distance = array_of("r", r, low=0.0)
         time = number("t", t, 0.0, float(self.times[-1]))
@@ -264,6 +281,21 @@ class HunterContact:
 
         p = (1/l) int_x^end exp((x - s)/l) P(s) ds with l = V tau and the closed form of
         P = p - l dp/dx; Gauss quadrature, about 1e-12 of the peak.
+
+        Parameters
+        ----------
+        x : array_like
+            Positions, m, any shape.
+
+        Returns
+        -------
+        ndarray
+            Pa, shape of `x`.
+
+        Raises
+        ------
+        ValueError
+            If a position is no finite number.
         """
         position = array_of("x", x)
         xi = (position - self.centre) / self.half_width

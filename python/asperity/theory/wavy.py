@@ -50,7 +50,23 @@ class WestergaardContact:
         return np.sin(psi), min(1.0, math.sqrt(self.mean_pressure / self.full_pressure))
 
     def pressure(self, x: ArrayLike) -> FloatArray:
-        """Return p(x), Pa; x in m from a summit."""
+        """Return p(x), Pa; x in m from a summit.
+
+        Parameters
+        ----------
+        x : array_like
+            Positions, m, any shape.
+
+        Returns
+        -------
+        ndarray
+            Pa, shape of `x`.
+
+        Raises
+        ------
+        ValueError
+            If a position is no finite number.
+        """
         s, s_a = self._sines(x)
         if s_a >= 1.0:
             return self.mean_pressure + self.full_pressure * (1.0 - 2.0 * s * s)
@@ -58,7 +74,23 @@ class WestergaardContact:
         return 2.0 * self.full_pressure * np.sqrt(1.0 - s * s) * root
 
     def gap(self, x: ArrayLike) -> FloatArray:
-        """Return the gap, m; x in m from a summit."""
+        """Return the gap, m; x in m from a summit.
+
+        Parameters
+        ----------
+        x : array_like
+            Positions, m, any shape.
+
+        Returns
+        -------
+        ndarray
+            m, shape of `x`.
+
+        Raises
+        ------
+        ValueError
+            If a position is no finite number.
+        """
         s, s_a = self._sines(x)
         s = np.maximum(np.abs(s), s_a)
         if s_a == 0.0:
