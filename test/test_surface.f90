@@ -33,6 +33,7 @@ contains
       call test_faults()
       call test_file()
       call test_warnings()
+      call test_map_warnings()
    end subroutine run_surface
 
    !> The generator is SplitMix64: the first outputs from state 0 and 1234567 are known.
@@ -499,5 +500,46 @@ contains
       call check_that(size(warnings) == 1 .and. index(warnings(1), 'ly') > 0, &
          'a hexagonal wave on a square')
    end subroutine test_warnings
+
+   !> A map that says of itself that it is of another size, unit or boundary.
+   subroutine test_map_warnings()
+      character(*), parameter :: path = 'build/told_map.h5'
+      type(grid_type) :: grid
+      type(hdf5_file_type) :: file
+      type(surface_settings_type) :: term
+      type(error_type), allocatable :: error
+      character(warning_length), allocatable :: warnings(:)
+      real(dp) :: map(5, 3)
+      integer :: unit
+
+      map = 0.0_dp
+      grid = new_grid(5, 3, 0.5_dp, 0.6_dp, boundary_periodic)
+      term = default_surface(grid)
+      term%shape = 'file'
+      term%file = path
+      call file%open(path, 'create', error)
+      call file%create_group('surface', error)
+      call file%write('surface/height', map, 'um', 'height', error)
+      call file%write_attribute('surface/height', 'lx', 0.25_dp, error)
+      call file%create_group('grid', error)
+      call file%write_attribute('/grid', 'ly', 0.6_dp*(1.0_dp + 1.0e-9_dp), error)
+      call file%write_attribute('/grid', 'boundary', 'free', error)
+      call check_no_error(error, 'a map that tells')
+      call file%close(error)
+      call find_warnings(grid, [term], warnings)
+      call check_that(size(warnings) == 3, 'size, unit and edges are doubted')
+      call check_that(index(warnings(1), '&surface: file = ''told_map.h5'': the map says that it is '// &
+         '2.5000E-01 m by 6.0000E-01 m, the grid is 5.0000E-01 m by') == 1, 'another length')
+      call check_that(index(warnings(2), 'its unit is um') > 0, 'another unit')
+      call check_that(index(warnings(3), 'not periodic') > 0, 'edges that do not fit')
+      term%scale = 1.0e-6_dp
+      grid = new_grid(5, 3, 0.25_dp, 0.6_dp, boundary_free)
+      call find_warnings(grid, [term], warnings)
+      call check_that(size(warnings) == 0, 'the same size, a scale, a free boundary: no warning')
+      open (newunit=unit, file=path, status='old')
+      close (unit, status='delete')
+      call find_warnings(grid, [term], warnings)
+      call check_that(size(warnings) == 0, 'a missing file is an error elsewhere')
+   end subroutine test_map_warnings
 
 end module test_surface

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ._data_verbs import add_fit, add_import
+from ._library import version
 
 __all__ = ["main"]
 
@@ -24,6 +25,7 @@ def main(arguments: list[str] | None = None) -> int:
         prog="python -m asperity",
         description="Measured roads and rubbers into inputs, results into pictures and pages."
                     " Runs are made by the command `asperity`.")
+    parser.add_argument("--version", action="version", version=f"asperity {version()}")
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
     plot = verbs.add_parser(
         "plot", help="draw a result",
@@ -137,6 +139,10 @@ def _plot(chosen: argparse.Namespace) -> int:
         plt.show()
         return 0
     output = chosen.output or run.path.with_suffix(".png")
+    if output.is_dir():
+        raise IsADirectoryError(f"{output}: is a folder: name a picture in it")
+    if not output.suffix:
+        output = output.with_name(output.name + ".png")
     figure.savefig(output, dpi=300)
     plt.close(figure)
     print(f"wrote {output}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -108,6 +109,15 @@ def add_fit(verbs: Any) -> None:
     parser.set_defaults(call=_fit)
 
 
+def _other_groups(path: Path) -> str:
+    """Return the groups of an input that are no materials, '' where there are none."""
+    if not path.is_file():
+        return ""
+    text = path.read_text(encoding="utf-8", errors="replace")
+    found = dict.fromkeys(re.findall(r"(?im)^\s*(&[a-z]\w*)", text))
+    return ", ".join(name for name in found if name.lower() != "&material")
+
+
 def _fit(chosen: argparse.Namespace) -> int:
     """Read, fit, write, tell."""
     from ._style import check_picture
@@ -127,6 +137,13 @@ def _fit(chosen: argparse.Namespace) -> int:
                           f" {str(output.parent)!r}")
         if output.exists() and chosen.table.exists() and output.samefile(chosen.table):
             raise ValueError(f"--output {output}: is the table itself")
+        other = _other_groups(output)
+        if other:
+            raise ValueError(f"--output {output}: holds {other}, too, and would be replaced: name"
+                             " another file, and add the group from there")
+    if chosen.plot is not None and not chosen.plot.parent.is_dir():
+        raise OSError(f"{chosen.plot}: cannot be written: there is no folder"
+                      f" {str(chosen.plot.parent)!r}")
     table = read_dma(
         chosen.table, columns=columns, frequency_unit=chosen.frequency_unit,
         modulus_unit=chosen.modulus_unit, temperature_unit=chosen.temperature_unit,

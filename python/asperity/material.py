@@ -32,6 +32,8 @@ _LEGEND_ABOVE = {
     "columnspacing": 1.2, "handlelength": 1.6,
 }
 
+MOST_ARMS = 200  # of a fit: two a decade leave a ripple of 0.1 %, more than ten tell nothing new
+
 
 class WLF(NamedTuple):
     """Constants of the Williams-Landel-Ferry shift, log10 a_T = -c1 (T - T_ref)/(c2 + T - T_ref).
@@ -491,6 +493,9 @@ class Prony:
         shortest = positive("tau_range[0]", tau_range[0])
         longest = number("tau_range[1]", tau_range[1], shortest)
         count = max(1, round(density * math.log10(longest / shortest)) + 1)
+        if count > MOST_ARMS:
+            raise ValueError(f"arms_per_decade = {density:g}: gives {count} relaxation times from"
+                             f" {shortest:.3g} to {longest:.3g} s: must be at most {MOST_ARMS}")
         tau = np.geomspace(shortest, longest, count) if count > 1 else np.array([shortest])
 
         order = np.argsort(frequency)

@@ -141,12 +141,18 @@ class MeasuredSurface:
         ------
         OSError
             If it cannot be written.
+        ValueError
+            If it is there and the result of a run.
         """
         import h5py
 
         path = Path(path)
         if not path.parent.is_dir():
             raise OSError(f"{path}: cannot be written: there is no folder {str(path.parent)!r}")
+        if path.is_dir():
+            raise OSError(f"{path}: is a folder, not a file")
+        if _is_result(path):
+            raise ValueError(f"{path}: is the result of a run: name another file")
         ny, nx = self.height.shape
         temporary = path.with_name(path.name + ".new")
         try:
@@ -182,6 +188,16 @@ class MeasuredSurface:
             temporary.unlink(missing_ok=True)
             raise OSError(f"{path}: cannot be written: {error}") from None
         return path
+
+
+def _is_result(path: Path) -> bool:
+    """Whether a file is the result of a run, which is not to be replaced by a map."""
+    import h5py
+
+    if not path.is_file() or path.stat().st_size < 8 or not h5py.is_hdf5(path):
+        return False
+    with h5py.File(path, "r", locking=False) as file:
+        return "history" in file
 
 
 def channels(path: str | Path) -> list[str]:

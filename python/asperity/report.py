@@ -43,10 +43,14 @@ def write_report(run: Run, path: str | os.PathLike[str] | None = None) -> Path:
     ------
     OSError
         If the result cannot be read or the page cannot be written.
+    ValueError
+        If the name does not end in .html.
     """
     target = run.path.with_suffix(".html") if path is None else Path(path)
-    if target.suffix in (".h5", ".hdf5"):
+    if target.suffix.lower() in (".h5", ".hdf5"):
         raise ValueError(f"{target}: the page would overwrite a result: name a file .html")
+    if target.suffix.lower() not in (".html", ".htm") and not target.is_dir():
+        raise ValueError(f"{target}: is no name of a page: must end in .html")
     text = report_page(run)
     target.write_text(text, encoding="utf-8", newline="\n")
     return target

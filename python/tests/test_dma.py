@@ -469,6 +469,30 @@ def test_decimal_commas_between_blanks(tmp_path):
     np.testing.assert_allclose(read_dma(path).storage, [2.5, 3.5, 4.5])
 
 
+def test_a_case_is_not_written_over(tmp_path, capsys):
+    """A file with other groups is a case; one with a material alone is an earlier fit."""
+    table = write(tmp_path / "a.csv", "f (Hz),G' (Pa),G'' (Pa),T (C)",
+                  sweeps([20.0], np.logspace(-1, 2, 9)))
+    case = tmp_path / "case.nml"
+    case.write_text("&grid nx = 4 /\n &material shear_modulus = 1e6 /\n&phase /\n")
+    assert main(["fit", str(table), "-o", str(case)]) == 2
+    assert "case.nml: holds &grid, &phase, too, and would be replaced" in capsys.readouterr().err
+    assert case.read_text().startswith("&grid")
+    case.write_text("! of last week\n&material shear_modulus = 1e6 /\n")
+    assert main(["fit", str(table), "-o", str(case)]) == 0
+    assert "prony_g" in case.read_text()
+    assert main(["fit", str(table), "--plot", str(tmp_path / "none" / "a.png")]) == 3
+    assert "a.png: cannot be written: there is no folder" in capsys.readouterr().err
+
+
+def test_the_number_of_arms_has_a_bound(tmp_path):
+    table = read_dma(write(tmp_path / "a.csv", "f (Hz),G' (Pa),G'' (Pa),T (C)",
+                           sweeps([20.0], np.logspace(-1, 2, 9))))
+    with pytest.raises(ValueError, match=r"arms_per_decade = 1000: gives 5001 relaxation times from"
+                                         r" .*: must be at most 200"):
+        fit_dma(table, arms_per_decade=1000)
+
+
 def test_the_table_is_not_written_over(tmp_path, capsys):
     path = write(tmp_path / "a.csv", "f (Hz),G' (Pa),G'' (Pa),T (C)",
                  sweeps([20.0], np.logspace(-1, 2, 9)))

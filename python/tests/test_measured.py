@@ -470,6 +470,10 @@ def test_files_that_cannot_be_read(tmp_path):
     with pytest.raises(ValueError, match="is the topography itself"):
         import_topography(tmp_path / "whole.x3p", tmp_path / "whole.x3p")
     assert (tmp_path / "whole.x3p").read_bytes() == data
+    result = write_result(tmp_path / "run.h5")
+    with pytest.raises(ValueError, match=r"run\.h5: is the result of a run: name another file"):
+        import_topography(tmp_path / "whole.x3p", result)
+    assert asperity.open(result).history.rows == 6
 
 
 def command(*words, folder=None):

@@ -15,6 +15,9 @@ def test_versions_agree(program, root):
     assert version("asperity") == written
     printed = subprocess.run([program, "--version"], capture_output=True, text=True, check=True)
     assert printed.stdout.split() == ["asperity", written]
+    module = subprocess.run([sys.executable, "-m", "asperity", "--version"], capture_output=True,
+                            text=True, check=True)
+    assert module.stdout.split() == ["asperity", written]
 
 
 def test_the_version_is_written_once(root):

@@ -303,6 +303,11 @@ def test_command(result, tmp_path, capsys):
     assert main(["report", str(tmp_path / "none.h5")]) == 3
     assert main(["report", str(result), "-o", str(result)]) == 2
     assert "would overwrite a result" in capsys.readouterr().err
+    case = tmp_path / "case.nml"
+    case.write_text("&grid /")
+    assert main(["report", str(result), "-o", str(case)]) == 2
+    assert "case.nml: is no name of a page: must end in .html" in capsys.readouterr().err
+    assert case.read_text() == "&grid /"
     assert asperity.open(result).finished
 
 

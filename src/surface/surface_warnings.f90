@@ -1,6 +1,9 @@
 !> What is doubtful in a surface, though not wrong: cut-offs of a random surface that its grid does
-!> not hold (thesis, 4.1), waves that do not close on a period, waves of few cells.
+!> not hold (thesis, 4.1), waves that do not close on a period, waves of few cells, height maps that
+!> say of themselves that they are of another size or unit.
 module surface_warnings
+   use errors, only : error_type
+   use hdf5_file, only : hdf5_file_type
    use precision, only : dp
    use regular_grid, only : boundary_periodic, grid_type
    use surface_settings, only : surface_settings_type
@@ -9,7 +12,7 @@ module surface_warnings
 
    public :: find_warnings
 
-   integer, parameter, public :: warning_length = 240
+   integer, parameter, public :: warning_length = 400
    real(dp), parameter :: cells_a_wave = 8.0_dp        !! enough for contact areas of some percent
    real(dp), parameter :: round_off = 1.0e-9_dp
 
@@ -39,11 +42,96 @@ contains
                terms(n)%wavelength/sqrt(3.0_dp), grid, warnings)
             call check_short_waves(grid, 'wavelength', terms(n)%wavelength, 2.0_dp, .false., &
                warnings)
+         case ('file')
+            call check_map(grid, terms(n), warnings)
          case default
             continue                     ! the other shapes leave nothing to doubt
          end select
       end do
    end subroutine find_warnings
+
+   !> What a map's file says of its lengths, unit and edges must agree with the input. A file that
+   !> cannot be read, or says nothing, leaves nothing to doubt here.
+   subroutine check_map(grid, term, warnings)
+      type(grid_type), intent(in) :: grid
+      type(surface_settings_type), intent(in) :: term
+      character(warning_length), allocatable, intent(inout) :: warnings(:)
+      type(hdf5_file_type) :: file
+      type(error_type), allocatable :: error
+      character(:), allocatable :: boundary, map, start, units
+      character(warning_length) :: text
+      real(dp) :: lx, ly
+
+      call file%open(trim(term%file), 'read', error)
+      if (allocated(error)) return
+      map = trim(term%dataset)
+      if (map == '') map = 'surface/height'
+      start = '&surface: file = '''//last_of(term%file)//''': '
+      lx = length_of(file, map, 'lx')
+      ly = length_of(file, map, 'ly')
+      if (grid%ny == 1) ly = 0.0_dp
+      if (differs(lx, grid%lx) .or. differs(ly, grid%ly)) then
+         write (text, '(4(a, es10.4), a)') start//'the map says that it is ', lx, ' m by ', &
+            merge(ly, grid%ly, ly > 0.0_dp), ' m, the grid is ', grid%lx, ' m by ', grid%ly, &
+            ' m: its slopes change with that'
+         call append(warnings, text)
+      end if
+      if (file%has_attribute(map, 'units') .and. abs(term%scale - 1.0_dp) <= 0.0_dp) then
+         call file%read_attribute(map, 'units', units, error)
+         if (.not. allocated(error)) then
+            if (all(trim(units) /= [character(5) :: 'm', '1', '', 'metre', 'meter'])) then
+               text = start//'the map says that its unit is '//trim(units)// &
+                  ': its heights are taken as metres; scale changes that'
+               call append(warnings, text)
+            end if
+         end if
+      end if
+      if (term%dataset == '' .and. file%has_attribute('/grid', 'boundary') .and. &
+         grid%boundary == boundary_periodic .and. grid%ny > 1) then
+         call file%read_attribute('/grid', 'boundary', boundary, error)
+         if (.not. allocated(error)) then
+            if (boundary == 'free') then
+               text = start//'the map says that it is not periodic: where opposite edges do not '// &
+                  'fit, the periodic surface has a step'
+               call append(warnings, text)
+            end if
+         end if
+      end if
+      call file%close(error)
+   end subroutine check_map
+
+   !> A length that a map or its file's grid says of itself; 0 where they say none.
+   function length_of(file, map, name) result(length)
+      type(hdf5_file_type), intent(inout) :: file
+      character(*), intent(in) :: map             !! the dataset
+      character(*), intent(in) :: name            !! 'lx' or 'ly'
+      real(dp) :: length                          !! m
+      type(error_type), allocatable :: error
+
+      length = 0.0_dp
+      if (file%has_attribute(map, name)) then
+         call file%read_attribute(map, name, length, error)
+      else if (map == 'surface/height' .and. file%has_attribute('/grid', name)) then
+         call file%read_attribute('/grid', name, length, error)
+      end if
+      if (allocated(error)) length = 0.0_dp
+   end function length_of
+
+   !> Is a length that is known another one than the grid's?
+   pure logical function differs(length, side)
+      real(dp), intent(in) :: length              !! m; 0: not known
+      real(dp), intent(in) :: side                !! m
+
+      differs = length > 0.0_dp .and. abs(length - side) > 1.0e-6_dp*side
+   end function differs
+
+   !> The name of a file without its folders.
+   pure function last_of(path) result(name)
+      character(*), intent(in) :: path
+      character(:), allocatable :: name
+
+      name = trim(path(index(path, '/', back=.true.) + 1:))
+   end function last_of
 
    !> The longest waves must be short against the side.
    subroutine check_long_waves(grid, term, warnings)
