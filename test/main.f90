@@ -17,6 +17,7 @@ program main
    use test_mixed, only : run_mixed
    use test_namelist, only : run_namelist
    use test_progress, only : run_progress
+   use test_pass_place, only : run_pass_place
    use test_prony, only : run_prony
    use test_result_file, only : run_result_file
    use test_roughness, only : run_roughness
@@ -42,6 +43,7 @@ program main
    if (wanted('base')) call run_base()
    if (wanted('fft_conv')) call run_fft_conv()
    if (wanted('hdf5_file')) call run_hdf5_file()
+   if (wanted('pass_place')) call run_pass_place()
    if (wanted('prony')) call run_prony()
    if (wanted('surface')) call run_surface()
    if (wanted('roughness')) call run_roughness()

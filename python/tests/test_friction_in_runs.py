@@ -182,3 +182,32 @@ def test_cycles_repeat(tmp_path):
     assert lost[0] > 0
     assert lost[1] == pytest.approx(lost[0], rel=1e-3)
     assert history["stick_area"].min() < 0.8 * history["contact_area"].min()
+
+
+@pytest.mark.filterwarnings("ignore:&surface")
+def test_road_goes_with_the_rubber_at_a_jump(tmp_path):
+    """Where half the load is taken away friction lets go at once: the road under each point counts.
+
+    The height that the normal contact has seen, U_z - gap - level, is that of the map where the
+    rubber then is, in the row of the jump as in the steps.
+    """
+    case = tmp_path / "jump.nml"
+    cycles = ("&phase velocity_x = 1e-3, velocity_y = -0.6e-3, duration = 2e-3, steps = 4 /\n"
+              "&phase pressure = 3e4, velocity_x = 1e-3, duration = 1e-3, steps = 2 /\n")
+    case.write_text(ELASTIC.format(mu=0.6, slope=".true.", cycles=cycles,
+                                   file=tmp_path / "jump.h5").replace("every = 16", "every = 1"))
+    run = asperity.run(case, quiet=True)
+    history, height = run.history, run.height
+    ny, nx = height.shape
+    i, j = np.meshgrid(np.arange(nx), np.arange(ny))
+    jump = np.flatnonzero(np.diff(history["time"]) == 0)[-1] + 1
+    assert history["pressure"][jump] == pytest.approx(3e4)
+    moved = run.snapshots[jump].displacement_x - run.snapshots[jump - 1].displacement_x
+    assert np.ptp(moved) > 1e-3 * np.ptp(height), "nothing lets go"
+    for row in (jump - 1, jump, jump + 1):
+        snapshot = run.snapshots[row]
+        x = i + (snapshot.displacement_x - history["road_x"][row]) / (1.0e-3 / nx)
+        y = j + (snapshot.displacement_y - history["road_y"][row]) / (0.7e-3 / ny)
+        level = history["displacement"][row] - height.max()
+        seen = snapshot.displacement_z - snapshot.gap - level
+        assert np.abs(seen - read_map(height, x, y)).max() < 1e-5 * np.ptp(height), row

@@ -7,7 +7,8 @@
 !> A step with friction is made of passes (thesis, 3.5): tangential solve, heights and slopes where
 !> the rubber then is, normal solve; until the pressure settles or `passes` are done. These ask for
 !> displacements only, to ten times the tolerance until the pressure has nearly settled. A last
-!> tangential solve under the last pressure settles the traction, so that it belongs to it.
+!> tangential solve under the last pressure settles the traction, so that it belongs to it. Where a
+!> pass reads the road: module `pass_place`. A jump of the load has passes, too.
 !>
 !> Fields of doubles beside those of the normal solver: H, P, gap, U; with sliding the original map and
 !> the two slopes; with Prony arms the history (S, S - S_old and one field an arm) and its traction; with
@@ -16,11 +17,14 @@
 module simulation
    use case_settings, only : case_type
    use errors, only : error_type
+   use friction_law, only : law_constant_shear
    use history_row, only : history_row_type
    use interpolation, only : displaced, interpolation_type, new_interpolation, shifted
    use map_edge, only : edge_clear, look_at_edge
    use normal_step, only : new_normal_step, normal_step_type
    use parallel, only : global_sum
+   use pass_place, only : carry, pass_secant_type
+   use pass_watch, only : pass_watch_type, watch_passes
    use precision, only : dp, int64, int8
    use regular_grid, only : boundary_free, grid_type
    use schedule, only : next_row, planned_row_type, schedule_type
@@ -60,12 +64,14 @@ module simulation
       real(dp) :: direction(2) = 0.0_dp             !! of the road's last motion
       real(dp) :: drive_force(2) = 0.0_dp           !! horizontal force on the rubber, N
       real(dp) :: velocity(2) = 0.0_dp              !! of the road in the last step, m/s
+      real(dp) :: drift(2) = 0.0_dp                 !! expected motion of the surface in the step, m
       real(dp) :: drifted(2) = 0.0_dp               !! sum of the expected motions of the surface, m
       integer :: moved_cells(2) = 0                 !! by which P has been shifted so far
       type(interpolation_type), private :: road
       logical :: frictional = .false.               !! there is a friction law, and the road moves
       type(tangential_state_type) :: tangential
       type(stick_slip_watch_type) :: watch          !! what has been seen of the mean slip
+      type(pass_watch_type) :: pass_watch           !! what has been seen of passes that do not settle
       logical, private :: slides = .false.          !! some phase moves the road
       real(dp), allocatable, private :: settled(:, :)   !! pressure of the pass before, Pa
       integer :: edge = edge_clear                  !! worst found at the edge of a free map
@@ -151,8 +157,7 @@ contains
       if (.not. rubs(self)) then
          call solve_normal(self, plan, outcome, level)
       else if (plan%instantaneous) then
-         call solve_normal(self, plan, outcome, level)
-         call self%tangential%return_to_bound(self%pressure, self%gap, self%slope_x, self%slope_y)
+         call jump_passes(self, plan, outcome, level)
       else
          call coupled_passes(self, plan, outcome, rubbing, level)
       end if
@@ -199,33 +204,115 @@ contains
       type(solver_result_type), intent(out) :: rubbing   !! of the tangential solves together
       real(dp), intent(out) :: level
       type(solver_result_type) :: part
-      real(dp) :: tolerance, change
+      type(pass_secant_type) :: secant
+      character(:), allocatable :: message
+      real(dp), allocatable :: changes(:)
+      real(dp) :: tolerance, place(2)
       integer :: pass
 
-      change = huge(1.0_dp)
+      allocate (changes(self%case%solver%passes), source=huge(1.0_dp))
       call self%tangential%extrapolate(.not. plan%new_speed)
+      place = contact_mean(self, self%tangential%displacement) + self%drift
       do pass = 1, self%case%solver%passes
          ! What follows needs the displacements only, and needs them no better than the passes settle.
          tolerance = self%case%solver%tolerance
-         if (change > 10.0_dp*tolerance) tolerance = 10.0_dp*tolerance
+         if (changes(max(pass - 1, 1)) > 10.0_dp*tolerance) tolerance = 10.0_dp*tolerance
          call self%tangential%solve(self%pressure, self%gap, self%slope_x, self%slope_y, tolerance, &
             .false., part)
          call add_result(rubbing, part)
-         call displaced(self%road, plan%road_x, plan%road_y, self%tangential%trial(:, :, 1), &
-            self%tangential%trial(:, :, 2), self%height, self%new_slope_x, self%new_slope_y)
+         call follow_rubber(self, plan, secant, place)
          self%settled(:, :) = self%pressure
          call solve_normal(self, plan, part, level)
          call add_result(outcome, part)
+         place = place + contact_mean(self, self%tangential%slip)
+         changes(pass) = unsettled(self)
          if (.not. part%converged) exit
-         change = unsettled(self)
          call swap(self%slope_x, self%new_slope_x)
          call swap(self%slope_y, self%new_slope_y)
-         if (tolerance <= self%case%solver%tolerance .and. change <= tolerance) exit
+         if (tolerance <= self%case%solver%tolerance .and. changes(pass) <= tolerance) exit
       end do
       call self%tangential%solve(self%pressure, self%gap, self%slope_x, self%slope_y, &
          self%case%solver%tolerance, .true., part)
       call add_result(rubbing, part)
+      call watch_passes(self%pass_watch, self%case%solver%passes, changes(:min(pass, size(changes))), &
+         self%case%solver%tolerance, self%tangential%law%law == law_constant_shear, message)
+      call add_warning(self, plan, message)
    end subroutine coupled_passes
+
+   !> The passes of a jump of the load: the road goes with the rubber, which gives way where the new
+   !> pressure holds less friction.
+   subroutine jump_passes(self, plan, outcome, level)
+      type(simulation_type), intent(inout) :: self
+      type(planned_row_type), intent(in) :: plan
+      type(solver_result_type), intent(out) :: outcome   !! of the normal solves together
+      real(dp), intent(out) :: level
+      type(solver_result_type) :: part
+      type(pass_secant_type) :: secant
+      real(dp), allocatable :: traction(:, :, :)
+      integer(int8), allocatable :: contact(:, :)
+      real(dp) :: place(2)
+      integer :: pass
+
+      allocate (traction, source=self%tangential%traction)
+      allocate (contact, source=self%tangential%contact)
+      place = contact_mean(self, self%tangential%displacement)
+      do pass = 1, self%case%solver%passes
+         self%settled(:, :) = self%pressure
+         call solve_normal(self, plan, part, level)
+         call add_result(outcome, part)
+         self%tangential%traction(:, :, :) = traction
+         self%tangential%contact(:, :) = contact
+         call self%tangential%return_to_bound(self%pressure, self%gap, self%slope_x, self%slope_y)
+         if (pass == self%case%solver%passes .or. .not. part%converged) exit
+         if (unsettled(self) <= self%case%solver%tolerance) exit
+         call follow_rubber(self, plan, secant, place)
+         place = place + contact_mean(self, self%tangential%slip)
+         call swap(self%slope_x, self%new_slope_x)
+         call swap(self%slope_y, self%new_slope_y)
+      end do
+   end subroutine jump_passes
+
+   !> Read the road under the surface that a pass has found, into the height and the new slopes.
+   subroutine follow_rubber(self, plan, secant, place)
+      type(simulation_type), intent(inout) :: self
+      type(planned_row_type), intent(in) :: plan
+      type(pass_secant_type), intent(inout) :: secant
+      !> In: mean over the contact of the displacement with which the road was read before, m. Out:
+      !> what the displacement left in the field of the slip lacks, the same everywhere.
+      real(dp), intent(inout) :: place(2)
+      real(dp) :: residual(2)
+      integer :: c
+
+      residual = contact_mean(self, self%tangential%trial) - place
+      call secant%next(residual, place)
+      do c = 1, 2
+         call carry(self%tangential%trial(:, :, c), residual + place, [self%grid%dx, self%grid%dy], &
+            self%grid%boundary /= boundary_free, self%tangential%slip(:, :, c))
+      end do
+      call displaced(self%road, plan%road_x - place(1), plan%road_y - place(2), &
+         self%tangential%slip(:, :, 1), self%tangential%slip(:, :, 2), self%height, &
+         self%new_slope_x, self%new_slope_y)
+   end subroutine follow_rubber
+
+   !> Mean of a vector field over the contact.
+   function contact_mean(self, field) result(mean)
+      type(simulation_type), intent(in) :: self
+      real(dp), intent(in) :: field(:, :, :)        !! [nx, ny, 2]
+      real(dp) :: mean(2)
+      real(dp), allocatable :: rows(:, :)
+      logical, allocatable :: touching(:)
+      integer :: j
+
+      allocate (rows(3, self%grid%ny))
+      !$omp parallel do default(none) shared(self, field, rows) private(j, touching)
+      do j = 1, self%grid%ny
+         touching = touches(self, j)
+         rows(1, j) = sum(field(:, j, 1), touching)
+         rows(2, j) = sum(field(:, j, 2), touching)
+         rows(3, j) = count(touching)
+      end do
+      mean = global_sum([sum(rows(1, :)), sum(rows(2, :))])/max(global_sum(sum(rows(3, :))), 1.0_dp)
+   end function contact_mean
 
    !> Exchange two fields.
    subroutine swap(a, b)
@@ -354,6 +441,7 @@ contains
             drift = [plan%velocity_x, plan%velocity_y]*plan%dt
       end if
       self%velocity = [plan%velocity_x, plan%velocity_y]
+      self%drift = drift
       self%drifted = self%drifted + drift
       seen = [plan%road_x, plan%road_y] - self%drifted
       cells = nint(seen/[self%grid%dx, self%grid%dy])

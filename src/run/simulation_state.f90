@@ -3,6 +3,7 @@ module simulation_state
    use checkpoint, only : checkpoint_reader_type, checkpoint_writer_type
    use errors, only : error_type
    use history_row, only : column_count, row_from_values, row_values
+   use pass_watch, only : pass_watch_from_values, pass_watch_values
    use precision, only : dp, int8
    use simulation, only : simulation_type
    use stick_slip_watch, only : watch_from_values, watch_values
@@ -36,7 +37,8 @@ contains
       call writer%put('motion', [sim%direction, sim%drive_force, sim%velocity, sim%drifted, &
          real(sim%moved_cells, dp), sim%level], '1', error)
       if (allocated(error)) return
-      call writer%put('watches', [watch_values(sim%watch), real(sim%edge, dp)], '1', error)
+      call writer%put('watches', [watch_values(sim%watch), real(sim%edge, dp), &
+         pass_watch_values(sim%pass_watch)], '1', error)
       if (allocated(error)) return
       call writer%put('pressure', sim%pressure, 'Pa', error)
       if (allocated(error)) return
@@ -63,7 +65,7 @@ contains
       type(simulation_type), intent(inout) :: sim
       type(checkpoint_reader_type), intent(inout) :: reader
       type(error_type), allocatable, intent(out) :: error
-      real(dp) :: numbers(schedule_values), row(column_count), motion(11), watches(5)
+      real(dp) :: numbers(schedule_values), row(column_count), motion(11), watches(7)
       real(dp), allocatable :: books(:)
       character(:), allocatable :: control
 
@@ -100,6 +102,7 @@ contains
       if (allocated(error)) return
       sim%watch = watch_from_values(watches(1:4))
       sim%edge = nint(watches(5))
+      sim%pass_watch = pass_watch_from_values(watches(6:7))
       sim%first = .false.
       call reader%get('pressure', sim%pressure, error)
       if (allocated(error)) return
