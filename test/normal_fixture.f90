@@ -1,11 +1,12 @@
 !> What the tests of normal contact share: problems solved in one call, and errors recomputed.
 module normal_fixture
-   use check, only : check_no_error
+   use check, only : check_no_error, check_that
    use errors, only : error_type
    use fft_conv, only : convolution_type, new_normal_operator
    use normal_cg, only : new_normal_solver, normal_solver_type
    use normal_cg_thesis, only : solve_normal_thesis
    use normal_state, only : control_pressure, normal_problem_type
+   use parallel, only : set_threads, thread_count
    use precision, only : dp, pi
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
@@ -14,7 +15,8 @@ module normal_fixture
    implicit none
    private
 
-   public :: distance, duality_gap, rms, rough_height, run_problem, solution_type
+   public :: check_threads, distance, duality_gap, rms, rough_height, rough_problem, run_problem, &
+      solution_type
 
    real(dp), parameter, public :: poisson = 0.3_dp
    !> Shear modulus for which E* = 2G/(1 - nu) = 1 Pa.
@@ -66,6 +68,41 @@ contains
       end if
       call solver%destroy()
    end subroutine run_problem
+
+   !> A rough surface under a mean pressure, E* = 1.
+   subroutine rough_problem(grid, finest, pressure, problem, height)
+      type(grid_type), intent(in) :: grid
+      real(dp), intent(in) :: finest                   !! shortest wave, cells
+      real(dp), intent(in) :: pressure                 !! in units of E*
+      type(normal_problem_type), intent(out) :: problem
+      real(dp), allocatable, intent(out) :: height(:, :)
+
+      call rough_height(grid, finest, height)
+      problem%modulus = unit_modulus
+      problem%control = control_pressure
+      problem%target = pressure
+   end subroutine rough_problem
+
+   !> One thread and two: the same bits.
+   subroutine check_threads(grid, problem, height, thesis, mixed)
+      type(grid_type), intent(in) :: grid
+      type(normal_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: height(:, :)
+      logical, intent(in) :: thesis, mixed
+      type(solution_type) :: s, t
+      integer :: threads
+
+      threads = thread_count()
+      call set_threads(1)
+      call run_problem(grid, problem, height, s, thesis, mixed=mixed)
+      call set_threads(2)
+      call run_problem(grid, problem, height, t, thesis, mixed=mixed)
+      call set_threads(threads)
+      call check_that(s%outcome%converged, 'threads: '//s%outcome%reason)
+      call check_that(all(abs(s%pressure - t%pressure) <= 0.0_dp), 'threads: the same pressure')
+      call check_that(all(abs(s%gap - t%gap) <= 0.0_dp), 'threads: the same gap')
+      call check_that(s%outcome%iterations == t%outcome%iterations, 'threads: iterations')
+   end subroutine check_threads
 
    !> A self-affine surface from a quarter of the shorter side down to `finest` cells.
    subroutine rough_height(grid, finest, height)

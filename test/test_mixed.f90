@@ -1,10 +1,9 @@
 !> Tests of normal contact in mixed precision, against double precision.
 module test_mixed
    use check, only : begin_suite, check_close, check_that
-   use normal_fixture, only : distance, duality_gap, rough_height, run_problem, solution_type, &
-      unit_modulus
-   use normal_state, only : control_approach, control_pressure, normal_problem_type
-   use parallel, only : set_threads, thread_count
+   use normal_fixture, only : check_threads, distance, duality_gap, rough_problem, run_problem, &
+      solution_type, unit_modulus
+   use normal_state, only : control_approach, normal_problem_type
    use precision, only : dp
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use simulation_runs, only : check_same_rows, last, nl, record_type, run_case
@@ -39,13 +38,10 @@ contains
       character(:), allocatable :: what
 
       grid = new_grid(nx, ny, 1.0_dp, 0.8_dp, boundary)
-      call rough_height(grid, 6.0_dp, h)
+      call rough_problem(grid, 6.0_dp, 0.01_dp, problem, h)
       do k = 1, 2
          do power = 4, 10, 2
-            problem%modulus = unit_modulus
             problem%tolerance = 10.0_dp**(-power)
-            problem%control = control_pressure
-            problem%target = 0.01_dp
             if (k == 2) then
                problem%control = control_approach
                problem%target = -0.3_dp*maxval(h)
@@ -79,10 +75,8 @@ contains
       integer :: k
 
       grid = new_grid(72, 90, 1.0_dp, 1.2_dp, boundary_periodic)
-      call rough_height(grid, 6.0_dp, h)
-      problem%modulus = unit_modulus
+      call rough_problem(grid, 6.0_dp, 0.01_dp, problem, h)
       problem%tolerance = 1e-8_dp
-      problem%target = 0.01_dp
       call run_problem(grid, problem, h, s, mixed=.true.)
       do k = -120, 120, 240
          ! Lengths in another unit, and the modulus in one far from it.
@@ -105,23 +99,12 @@ contains
       integer, intent(in) :: boundary
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
-      type(solution_type) :: s, t
       real(dp), allocatable :: h(:, :)
-      integer :: threads
 
-      threads = thread_count()
       grid = new_grid(180, 131, 1.0_dp, 0.9_dp, boundary)
-      call rough_height(grid, 6.0_dp, h)
-      problem%modulus = unit_modulus
-      problem%target = 0.02_dp
+      call rough_problem(grid, 6.0_dp, 0.02_dp, problem, h)
       problem%tolerance = 1e-7_dp
-      call set_threads(1)
-      call run_problem(grid, problem, h, s, mixed=.true.)
-      call set_threads(2)
-      call run_problem(grid, problem, h, t, mixed=.true.)
-      call set_threads(threads)
-      call check_that(all(abs(s%pressure - t%pressure) <= 0.0_dp), 'threads: the same pressure')
-      call check_that(all(abs(s%gap - t%gap) <= 0.0_dp), 'threads: the same gap')
+      call check_threads(grid, problem, h, thesis=.false., mixed=.true.)
    end subroutine test_threads
 
    !> A tolerance near the round-off of double precision.
@@ -133,9 +116,7 @@ contains
       real(dp) :: e1
 
       grid = new_grid(60, 48, 1.0_dp, 1.0_dp, boundary_periodic)
-      call rough_height(grid, 6.0_dp, h)
-      problem%modulus = unit_modulus
-      problem%target = 0.02_dp
+      call rough_problem(grid, 6.0_dp, 0.02_dp, problem, h)
       problem%tolerance = 1e-13_dp
       problem%max_iterations = 200
       call run_problem(grid, problem, h, s)

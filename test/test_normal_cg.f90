@@ -3,8 +3,8 @@ module test_normal_cg
    use check, only : begin_suite, check_close, check_no_error, check_that
    use errors, only : error_type
    use fft_conv, only : convolution_type, new_normal_operator
-   use normal_fixture, only : duality_gap, poisson, rms, rough_height, run_problem, &
-      solution_type, unit_modulus
+   use normal_fixture, only : duality_gap, poisson, rms, rough_height, rough_problem, &
+      run_problem, solution_type, unit_modulus
    use normal_state, only : control_approach, control_pressure, normal_problem_type
    use precision, only : dp, pi
    use projection, only : project_simplex
@@ -328,9 +328,7 @@ contains
       integer :: k
 
       grid = new_grid(nx, ny, 1.0_dp, 1.1_dp, boundary)
-      call rough_height(grid, 6.0_dp, h)
-      problem%modulus = unit_modulus
-      problem%target = 0.01_dp
+      call rough_problem(grid, 6.0_dp, 0.01_dp, problem, h)
       do k = 4, 10
          problem%tolerance = 10.0_dp**(-k)
          call run_problem(grid, problem, h, s)
@@ -363,8 +361,7 @@ contains
       integer :: k
 
       grid = new_grid(240, 256, 0.9375_dp, 1.0_dp, boundary_periodic)
-      call rough_height(grid, 16.0_dp, h)
-      problem%modulus = unit_modulus
+      call rough_problem(grid, 16.0_dp, 0.0_dp, problem, h)
       do k = 1, 2
          problem%target = merge(0.02_dp, 0.05_dp, k == 1)*0.1_dp
          call run_problem(grid, problem, h, s)

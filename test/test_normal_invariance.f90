@@ -3,10 +3,9 @@ module test_normal_invariance
    use check, only : begin_suite, check_close, check_no_error, check_that
    use errors, only : error_type
    use fft_conv, only : convolution_type, new_normal_operator
-   use normal_fixture, only : distance, poisson, rms, rough_height, run_problem, solution_type, &
-      unit_modulus
-   use normal_state, only : control_approach, control_pressure, normal_problem_type
-   use parallel, only : set_threads, thread_count
+   use normal_fixture, only : check_threads, distance, poisson, rms, rough_problem, run_problem, &
+      solution_type, unit_modulus
+   use normal_state, only : control_approach, normal_problem_type
    use precision, only : dp
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    implicit none
@@ -42,9 +41,7 @@ contains
       real(dp), allocatable, intent(out) :: h(:, :)
 
       grid = new_grid(nx, ny, 1.0_dp, 0.8_dp, boundary)
-      call rough_height(grid, 6.0_dp, h)
-      problem%modulus = unit_modulus
-      problem%target = 0.005_dp
+      call rough_problem(grid, 6.0_dp, 0.005_dp, problem, h)
       problem%tolerance = tolerance
       problem%rms_height = rms(h)
    end subroutine set_problem
@@ -113,26 +110,14 @@ contains
       integer, intent(in) :: boundary
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
-      type(solution_type) :: s, t
       real(dp), allocatable :: h(:, :)
-      integer :: threads, k
-      logical :: thesis
+      integer :: k
 
-      threads = thread_count()
       call set_problem(boundary, 150, 131, grid, problem, h)
       do k = 1, 2
-         thesis = k == 2
          problem%tolerance = merge(1e-9_dp, 1e-4_dp, k == 1)
-         call set_threads(1)
-         call run_problem(grid, problem, h, s, thesis)
-         call set_threads(2)
-         call run_problem(grid, problem, h, t, thesis)
-         call check_that(s%outcome%converged, s%outcome%reason)
-         call check_that(all(abs(s%pressure - t%pressure) <= 0.0_dp), 'threads: the same pressure')
-         call check_that(all(abs(s%gap - t%gap) <= 0.0_dp), 'threads: the same gap')
-         call check_that(s%outcome%iterations == t%outcome%iterations, 'threads: iterations')
+         call check_threads(grid, problem, h, thesis=k == 2, mixed=.false.)
       end do
-      call set_threads(threads)
    end subroutine test_threads
 
    !> 'fast' against 'thesis', from few to many contacts.

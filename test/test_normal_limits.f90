@@ -4,8 +4,8 @@ module test_normal_limits
    use errors, only : error_type
    use fft_conv, only : convolution_type, new_normal_operator
    use normal_cg, only : new_normal_solver, normal_solver_type
-   use normal_fixture, only : duality_gap, poisson, rms, rough_height, run_problem, solution_type, &
-      unit_modulus
+   use normal_fixture, only : duality_gap, poisson, rms, rough_height, rough_problem, run_problem, &
+      solution_type, unit_modulus
    use normal_state, only : control_approach, control_pressure, normal_problem_type
    use precision, only : dp, pi
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
@@ -146,9 +146,7 @@ contains
 
       do k = 1, 2
          grid = new_grid(20, 33, 1.0_dp, 1.0_dp, merge(boundary_periodic, boundary_free, k == 1))
-         call rough_height(grid, 4.0_dp, h)
-         problem%modulus = unit_modulus
-         problem%target = 0.0_dp
+         call rough_problem(grid, 4.0_dp, 0.0_dp, problem, h)
          call run_problem(grid, problem, h, s, thesis)
          call check_that(s%outcome%converged, 'no load: '//s%outcome%reason)
          call check_that(all(abs(s%pressure) <= 0.0_dp), 'no load: no pressure')
@@ -168,8 +166,7 @@ contains
 
       do k = 1, 2
          grid = new_grid(20, 33, 1.0_dp, 1.0_dp, merge(boundary_periodic, boundary_free, k == 1))
-         call rough_height(grid, 4.0_dp, h)
-         problem%modulus = unit_modulus
+         call rough_problem(grid, 4.0_dp, 0.0_dp, problem, h)
          problem%control = control_approach
          problem%target = -maxval(h) - 0.01_dp
          call run_problem(grid, problem, h, s, thesis)
@@ -188,8 +185,7 @@ contains
       real(dp), allocatable :: h(:, :)
 
       grid = new_grid(24, 33, 1.0_dp, 1.0_dp, boundary_periodic)
-      call rough_height(grid, 4.0_dp, h)
-      problem%modulus = unit_modulus
+      call rough_problem(grid, 4.0_dp, 0.0_dp, problem, h)
       problem%control = control_approach
       problem%target = -sum(h)/size(h) + 1e-3_dp*rms(h)
       call run_problem(grid, problem, h, s, thesis)
@@ -215,9 +211,7 @@ contains
       real(dp) :: e1
 
       grid = new_grid(64, 48, 1.0_dp, 1.0_dp, boundary_periodic)
-      call rough_height(grid, 6.0_dp, h)
-      problem%modulus = unit_modulus
-      problem%target = 0.005_dp
+      call rough_problem(grid, 6.0_dp, 0.005_dp, problem, h)
       problem%max_iterations = 2
       problem%tolerance = 1e-10_dp
       call run_problem(grid, problem, h, s, thesis)
@@ -249,8 +243,7 @@ contains
 
       do boundary = boundary_periodic, boundary_free
          grid = new_grid(50, 36, 1.0_dp, 1.0_dp, boundary)
-         call rough_height(grid, 6.0_dp, h)
-         problem%modulus = unit_modulus
+         call rough_problem(grid, 6.0_dp, 0.0_dp, problem, h)
          do k = 4, 40, 6
             problem%target = 10.0_dp**(-k)
             call run_problem(grid, problem, h, s)
@@ -274,9 +267,7 @@ contains
 
       do boundary = boundary_periodic, boundary_free
          grid = new_grid(40, 36, 1.0_dp, 1.0_dp, boundary)
-         call rough_height(grid, 6.0_dp, h)
-         problem%modulus = unit_modulus
-         problem%target = 0.003_dp
+         call rough_problem(grid, 6.0_dp, 0.003_dp, problem, h)
          problem%tolerance = 1e-9_dp
          call run_problem(grid, problem, h, s)
          h = h - 1e3_dp
