@@ -153,13 +153,7 @@ def _frictional_overview(run: Run) -> Figure:
                         layout="constrained")
     parts = figure.subfigures(1, 2, width_ratios=(1.0, 1.0)) if maps else [figure]
     panels = parts[0].subplots(len(columns), 1, sharex=True, squeeze=False)[:, 0]
-    way = travel(run)
-    if way is None:
-        factor, unit = si_scale(run.history["time"], "s")
-        along, head = run.history["time"] * factor, axis_text("Time", unit)
-    else:
-        factor, unit = si_scale(way, "m")
-        along, head = way * factor, axis_text("Travel of the road", unit)
+    along, head = _time_or_travel(run)
     for name, panel in zip(columns, panels, strict=True):
         _draw(run, name, along, panel, {})
     panels[-1].set_xlabel(head)
@@ -270,18 +264,21 @@ def _load_panel(run: Run, axes: Axes) -> None:
     axes.legend(frameon=False, loc="best")
 
 
+def _time_or_travel(run: Run) -> tuple[np.ndarray, str]:
+    """Return the travel of the road, or the time where it rests, scaled, and the axis's text."""
+    way = travel(run)
+    values, what, unit = ((run.history["time"], "Time", "s") if way is None
+                          else (way, "Travel of the road", "m"))
+    factor, unit = si_scale(values, unit)
+    return values * factor, axis_text(what, unit)
+
+
 def _time_panel(run: Run, axes: Axes) -> None:
     """Contact area, and friction where the road moves, against time or the road's travel."""
     names = ["contact_area", *(["friction"] if np.any(run.history["friction"]) else [])]
-    way = travel(run)
+    along, head = _time_or_travel(run)
     for number, (name, panel) in enumerate(zip(names, (axes, None), strict=False)):
         panel = panel or axes.twinx()
-        if way is None:
-            factor, unit = si_scale(run.history["time"], "s")
-            along, head = run.history["time"] * factor, axis_text("Time", unit)
-        else:
-            factor, unit = si_scale(way, "m")
-            along, head = way * factor, axis_text("Travel of the road", unit)
         panel.plot(along, run.history[name], color=COLOURS[number], linestyle=("-", "--")[number])
         panel.set_xlabel(head)
         panel.set_ylabel(LABELS[name])

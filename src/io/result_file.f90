@@ -2,7 +2,7 @@
 !>
 !> A file is built under the name FILE.new and takes its place with everything but the history's
 !> rows in it. A row counts when all columns have it: readers take the shortest column.
-!> A snapshot appears whole (see `hdf5_file`), and then in the XDMF file beside the result.
+!> A snapshot appears whole (see `hdf5_tree`), and then in the XDMF file beside the result.
 module result_file
    use errors, only : error_file, error_input, error_type, fail
    use file_system, only : folder_of, is_folder, name_of, remove_file, rename_file
@@ -10,6 +10,7 @@ module result_file
    use history_row, only : column_count, column_type, history_columns, history_row_type, row_values
    use precision, only : dp, int8
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
+   use utc_clock, only : utc_time
    use version, only : asperity_version
    use xdmf, only : snapshot_name, snapshot_type, write_xdmf
    implicit none
@@ -130,7 +131,7 @@ contains
          expected_snapshots)
       if (.not. allocated(error)) call self%file%close(error)
       if (.not. allocated(error)) call self%file%open(temporary, 'append', error)
-      if (.not. allocated(error)) call write_frame()
+      if (.not. allocated(error)) call write_frame(self, title, input, settings, height, error)
       if (allocated(error)) then
          ! The user knows the file by its own name.
          if (index(error%message, temporary//':') == 1) &
@@ -144,29 +145,64 @@ contains
       call rename_file(temporary, self%path, error)
       if (allocated(error)) return
       self%file%path = self%path
+   end subroutine create_result
 
-   contains
+   !> Everything that is known before the first row, but for the material's numbers.
+   subroutine write_frame(self, title, input, settings, height, error)
+      class(result_file_type), intent(inout) :: self
+      character(*), intent(in) :: title, input, settings
+      real(dp), intent(in), contiguous :: height(:, :)
+      type(error_type), allocatable, intent(out) :: error
 
-      !> Everything that is known before the first row.
-      subroutine write_frame()
-         integer :: i
+      call write_origin(self, title, input, settings, error)
+      if (allocated(error)) return
+      call write_grid(self, error)
+      if (allocated(error)) return
+      call self%file%write('/surface/height', height, 'm', 'height of the road', error, &
+         self%compression)
+      if (allocated(error)) return
+      call self%file%create_group('/material', error)
+      if (allocated(error)) return
+      call self%file%create_group('/history', error, column_count)
+      if (allocated(error)) return
+      call create_columns(self, error)
+      if (allocated(error)) return
+      ! Made and removed: the root group keeps the room for this name.
+      call self%link_checkpoint(error)
+      if (allocated(error)) return
+      call self%unlink_checkpoint(error)
+   end subroutine write_frame
 
-         call self%file%write_attribute('/', 'title', title, error)
-         if (allocated(error)) return
-         call self%file%write_attribute('/', 'program', 'asperity', error)
-         if (allocated(error)) return
-         call self%file%write_attribute('/', 'version', asperity_version, error)
-         if (allocated(error)) return
-         call self%file%write_attribute('/', 'created', utc_time(), error)
-         if (allocated(error)) return
-         call self%file%write_attribute('/', 'input', input, error)
-         if (allocated(error)) return
-         call self%file%write_attribute('/', 'settings', settings, error)
-         if (allocated(error)) return
-         call self%file%write_attribute('/', 'finished', 0, error)
-         if (allocated(error)) return
-         call self%file%write_attribute('/', 'expected_rows', expected_rows, error)
-         if (allocated(error)) return
+   !> Where the result comes from.
+   subroutine write_origin(self, title, input, settings, error)
+      class(result_file_type), intent(inout) :: self
+      character(*), intent(in) :: title, input, settings
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%file%write_attribute('/', 'title', title, error)
+      if (allocated(error)) return
+      call self%file%write_attribute('/', 'program', 'asperity', error)
+      if (allocated(error)) return
+      call self%file%write_attribute('/', 'version', asperity_version, error)
+      if (allocated(error)) return
+      call self%file%write_attribute('/', 'created', utc_time(), error)
+      if (allocated(error)) return
+      call self%file%write_attribute('/', 'input', input, error)
+      if (allocated(error)) return
+      call self%file%write_attribute('/', 'settings', settings, error)
+      if (allocated(error)) return
+      call self%file%write_attribute('/', 'finished', 0, error)
+      if (allocated(error)) return
+      call self%file%write_attribute('/', 'expected_rows', self%expected_rows, error)
+   end subroutine write_origin
+
+   !> Write the grid.
+   subroutine write_grid(self, error)
+      class(result_file_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      integer :: i
+
+      associate (grid => self%grid)
          call self%file%write('/grid/x', [(i*grid%dx, i=0, grid%nx - 1)], 'm', &
             'centres of the cells along x', error)
          if (allocated(error)) return
@@ -183,23 +219,30 @@ contains
          if (allocated(error)) return
          call self%file%write_attribute('/grid', 'boundary', &
             trim(merge('periodic', 'free    ', grid%boundary == boundary_periodic)), error)
-         if (allocated(error)) return
-         call self%file%write('/surface/height', height, 'm', 'height of the road', error, &
-            self%compression)
-         if (allocated(error)) return
-         call self%file%create_group('/material', error)
-         if (allocated(error)) return
-         call self%file%create_group('/history', error, column_count)
-         if (allocated(error)) return
-         call create_columns(self, error)
-         if (allocated(error)) return
-         ! Made and removed: the root group keeps the room for this name.
-         call self%link_checkpoint(error)
-         if (allocated(error)) return
-         call self%unlink_checkpoint(error)
-      end subroutine write_frame
+      end associate
+   end subroutine write_grid
 
-   end subroutine create_result
+   !> Read the grid of a result.
+   subroutine read_grid(self, error)
+      class(result_file_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      integer :: nx, ny
+      real(dp) :: lx, ly
+      character(:), allocatable :: boundary
+
+      call self%file%read_attribute('/grid', 'nx', nx, error)
+      if (allocated(error)) return
+      call self%file%read_attribute('/grid', 'ny', ny, error)
+      if (allocated(error)) return
+      call self%file%read_attribute('/grid', 'lx', lx, error)
+      if (allocated(error)) return
+      call self%file%read_attribute('/grid', 'ly', ly, error)
+      if (allocated(error)) return
+      call self%file%read_attribute('/grid', 'boundary', boundary, error)
+      if (allocated(error)) return
+      self%grid = new_grid(nx, ny, lx, ly, &
+         merge(boundary_periodic, boundary_free, boundary == 'periodic'))
+   end subroutine read_grid
 
    !> Make the columns of the history. `step` is the last in the file, so that it grows last.
    subroutine create_columns(self, error)
@@ -517,28 +560,6 @@ contains
       call self%file%flush(error)
    end subroutine shorten_history
 
-   !> Read the grid of a result.
-   subroutine read_grid(self, error)
-      class(result_file_type), intent(inout) :: self
-      type(error_type), allocatable, intent(out) :: error
-      integer :: nx, ny
-      real(dp) :: lx, ly
-      character(:), allocatable :: boundary
-
-      call self%file%read_attribute('/grid', 'nx', nx, error)
-      if (allocated(error)) return
-      call self%file%read_attribute('/grid', 'ny', ny, error)
-      if (allocated(error)) return
-      call self%file%read_attribute('/grid', 'lx', lx, error)
-      if (allocated(error)) return
-      call self%file%read_attribute('/grid', 'ly', ly, error)
-      if (allocated(error)) return
-      call self%file%read_attribute('/grid', 'boundary', boundary, error)
-      if (allocated(error)) return
-      self%grid = new_grid(nx, ny, lx, ly, &
-         merge(boundary_periodic, boundary_free, boundary == 'periodic'))
-   end subroutine read_grid
-
    !> Note the snapshots up to a row and remove the later ones, and that of a stop.
    subroutine keep_snapshots(self, last_step, error)
       class(result_file_type), intent(inout) :: self
@@ -574,52 +595,5 @@ contains
          self%snapshots = [self%snapshots, snapshot]
       end do
    end subroutine keep_snapshots
-
-   !> Now, as ISO 8601 in UTC.
-   function utc_time() result(text)
-      character(20) :: text
-      integer :: values(8), days, minutes, year, month, day, length
-      integer, parameter :: month_days(12) = [31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31]
-
-      call date_and_time(values=values)
-      year = values(1)
-      month = values(2)
-      day = values(3)
-      minutes = 60*values(5) + values(6) - values(4)
-      days = 0
-      if (minutes < 0) days = -1
-      if (minutes >= 1440) days = 1
-      minutes = minutes - 1440*days
-      day = day + days
-      if (day < 1) then
-         month = month - 1
-         if (month < 1) then
-            month = 12
-            year = year - 1
-         end if
-         day = last_day()
-      end if
-      length = last_day()
-      if (day > length) then
-         day = 1
-         month = month + 1
-         if (month > 12) then
-            month = 1
-            year = year + 1
-         end if
-      end if
-      write (text, '(i4.4, "-", i2.2, "-", i2.2, "T", i2.2, ":", i2.2, ":", i2.2, "Z")') &
-         year, month, day, minutes/60, mod(minutes, 60), values(7)
-
-   contains
-
-      !> Number of days of the month.
-      integer function last_day()
-         last_day = month_days(month)
-         if (month /= 2) return
-         if (mod(year, 4) == 0 .and. (mod(year, 100) /= 0 .or. mod(year, 400) == 0)) last_day = 29
-      end function last_day
-
-   end function utc_time
 
 end module result_file
