@@ -277,7 +277,7 @@ contains
       type(simulation_type), intent(inout) :: self
       type(planned_row_type), intent(in) :: plan
       type(pass_secant_type), intent(inout) :: secant
-      !> In: mean over the contact of the displacement with which the road was read before, m. Out:
+      !> Mean over the contact of the displacement with which the road was read before, m; on return
       !> what the displacement left in the field of the slip lacks, the same everywhere.
       real(dp), intent(inout) :: place(2)
       real(dp) :: residual(2)
