@@ -55,7 +55,8 @@ ORDER = {
     "Guide": ["docs/choosing", "docs/measured_data", "docs/sweeps", "docs/long_runs",
               "docs/results", "docs/troubleshooting", "docs/coming_from"],
     "Reference": ["docs/input_reference", "docs/result_file", "docs/api/python",
-                  "docs/api/fortran", "docs/glossary"],
+                  "docs/api/python_models", "docs/api/python_tools", "docs/api/fortran",
+                  "docs/glossary"],
     "Background": ["docs/theory", "docs/validation", "docs/benchmarks"],
     "Examples": ["docs/gallery"],
     "Development": ["docs/developer", "CONTRIBUTING", "CHANGELOG", "README"],
@@ -87,13 +88,14 @@ AT_THE_TOP = ("adhesive_contact", "case", "contact", "errors", "runner", "sweep_
 
 
 def _add_modules(app, name, source):
-    """Append the public modules that the page of the Python interface does not name."""
-    if name != "docs/api/python":
+    """Append the public modules that no page of the Python interface names."""
+    if name != "docs/api/python_tools":
         return
+    named = "".join(path.read_text() for path in (ROOT / "docs" / "api").glob("*.rst"))
     for path in sorted((ROOT / "python" / "asperity").glob("*.py")):
         module = f"asperity.{path.stem}"
         if (path.stem.startswith("_") or path.stem in AT_THE_TOP
-                or f"automodule:: {module}\n" in source[0]):
+                or f"automodule:: {module}\n" in named):
             continue
         source[0] += f"\n{module}\n{'-' * len(module)}\n\n.. automodule:: {module}\n   :members:\n"
 

@@ -276,6 +276,34 @@ def friction():
     return {"passes": thin, "mass": thick, "swing": steps}, figure
 
 
+def merge():
+    """Slide on a rough road with arms below the time step, these merged, and without them."""
+    n, side, speed = 128, 1e-3, 0.1
+    step = side / n / speed
+    tau = step * np.array([10.0, 1.0, 1 / 15, 1 / 150, 1 / 1500])
+    g = np.array([1e6, 2e6, 1e7, 5e7, 2e8])
+    fast = tau < 0.1 * step
+    longest = tau[fast].max()
+    cases = {"all five": (g, tau),
+             "the fast three merged": (np.append(g[~fast], (g * tau)[fast].sum() / longest),
+                                       np.append(tau[~fast], longest)),
+             "the fast three left out": (g[~fast], tau[~fast])}
+    rows = []
+    for name, (moduli, times) in cases.items():
+        history = run(f"""
+            &grid nx = {n}, ny = {n}, lx = {side} /
+            &surface shape = 'self_affine', hurst = 0.8, rms_slope = 0.2,
+                     wavelength_long = {side / 4}, wavelength_short = {side / 16} /
+            &material shear_modulus = 1e6, prony_g = {', '.join(map(str, moduli))},
+                      prony_tau = {', '.join(map(str, times))} /
+            &phase pressure = 0.2e6, relaxed = .true. /
+            &phase velocity_x = {speed}, duration = {64 * step} /
+            """, f"merge_{len(rows)}")
+        rows.append([name, f"{history['friction'][-20:].mean():.4f}",
+                     f"{history['contact_area'][-20:].mean():.4f}"])
+    return table(["arms", "friction", "contact area"], rows), None
+
+
 def arms():
     """Fit a compound with few and many arms, and leave arms out: loss modulus and friction."""
     curve = runpy.run_path(str(ROOT / "examples/materials/make_sbr.py"))["master_curve"]
@@ -390,7 +418,7 @@ def cost():
 
 
 PARTS = {"mesh": mesh, "step": step, "tolerance": tolerance, "adhesion": adhesion,
-         "arms": arms, "friction": friction, "cost": cost}
+         "arms": arms, "merge": merge, "friction": friction, "cost": cost}
 
 
 def main():

@@ -19,10 +19,11 @@ def rows(text):
             for line in text.splitlines() if line.startswith("|") and "---" not in line]
 
 
-def test_values_of_the_readme_are_those_of_the_validation():
-    def number(cell):
-        return float(cell.split()[0])
+def number(cell):
+    return float(cell.split()[0])
 
+
+def test_values_of_the_readme_are_those_of_the_validation():
     chapters = {}
     for chapter in (ROOT / "docs" / "validation.md").read_text().split("\n## ")[1:]:
         title = re.split(r"\W", chapter)[0].lower()
@@ -102,6 +103,18 @@ def test_the_advice_on_the_mesh_is_measured():
     for row, line in zip(measured, told, strict=True):
         assert [float(cell) for cell in line] == pytest.approx([float(cell) for cell in row],
                                                               abs=2e-4)
+
+
+def test_the_advice_on_arms_is_measured():
+    tables, _ = runpy.run_path(str(ROOT / "tools" / "choosing.py"))["arms"]()
+    page = (ROOT / "docs" / "choosing.md").read_text()
+    for mark, text in tables.items():
+        kept = page.split(f"<!-- {mark}: begin -->")[1].split(f"<!-- {mark}: end -->")[0]
+        for row, line in zip(rows(text)[1:], rows(kept)[1:], strict=True):
+            assert [number(cell) for cell in line] == pytest.approx(
+                [number(cell) for cell in row], rel=0.05, abs=0.15)
+    kept = rows(page.split("<!-- cut: begin -->")[1].split("<!-- cut: end -->")[0])[1:]
+    assert max(abs(number(cell)) for cell in kept[3][1:]) < 5 < abs(number(kept[1][1]))
 
 
 def test_the_foretold_memory_is_what_runs_take():
