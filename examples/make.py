@@ -125,11 +125,12 @@ def studies(names: list[str] | None = None) -> list[Study]:
 
 
 def make(study: Study, folder: Path, quick: bool) -> tuple[dict[str, Any], Figure]:
-    """Compute, check and draw a study; a warning while drawing is an error."""
+    """Compute, check and draw a study; a warning that it does not expect is an error."""
     folder.mkdir(parents=True, exist_ok=True)
-    data = study.compute(folder, quick)
-    study.check(data, quick)
     with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        data = study.compute(folder, quick)
+        study.check(data, quick)
         warnings.simplefilter("error")
         figure = study.picture(data)
         figure.canvas.draw()
@@ -157,12 +158,13 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float):
         return float(f"{value:.6g}") if np.isfinite(value) else None
     if isinstance(value, str):
-        return None if os.sep in value else value
+        return None if Path(value).is_absolute() else value
     if isinstance(value, list | tuple):
-        return [_plain(one) for one in value] if len(value) <= LONGEST else None
+        kept = [_plain(one) for one in value] if len(value) <= LONGEST else []
+        return kept if any(one is not None for one in kept) else None
     if isinstance(value, dict):
-        kept = {str(name): _plain(one) for name, one in value.items()}
-        return {name: one for name, one in kept.items() if one is not None} or None
+        named = {str(name): _plain(one) for name, one in value.items()}
+        return {name: one for name, one in named.items() if one is not None} or None
     return None
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import common
@@ -49,7 +48,6 @@ class Road:
 
 def sweep(case: asperity.Case, parameters: dict[Any, Any], folder: Any) -> asperity.Sweep:
     """Run a case with other values; results that are there are kept."""
-    with warnings.catch_warnings():
-        # at rest the steps grow with the time that has passed, and arm after arm falls still
-        warnings.filterwarnings("ignore", ".*longer than the shortest active relaxation time")
+    # At rest the steps grow with the time that has passed, and arm after arm falls still.
+    with common.expected(common.LONG_STEPS):
         return asperity.sweep(case, parameters, folder=folder, jobs=common.jobs, quiet=True)

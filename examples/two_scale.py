@@ -6,7 +6,6 @@ The studies are two_scale_road, fast_road, road_speed, road_load, road_loading_t
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -56,16 +55,16 @@ def drive_to_slip(pressure: float, speed: float) -> float:
                           pressure * THICKNESS / (speed * rubber.g_inf), rtol=1e-6)
 
 
-def waves(short: float | None = SHORT) -> str:
+def waves(short: float | None = SHORT, steepness: float = STEEPNESS) -> str:
     """Return the &surface groups of the road with a shorter wave of that length, m, or without."""
     return "".join(
-        f"&surface shape = 'hexagonal_wave', amplitude = {STEEPNESS * length!r},"
+        f"&surface shape = 'hexagonal_wave', amplitude = {steepness * length!r},"
         f" wavelength = {length!r} /\n" for length in (LONG, short) if length)
 
 
 def case(nx: int, road: str, *, speed: float = SPEED, pressure: float = PRESSURE,
          loading: float = LOADING, distance: float = 1.25 * LONG, shear_steps: int = 40,
-         fine: float = 1.0, density: float = 20.0,
+         fine: float = 1.0, density: float | None = None, grip: float = 1.0,
          rubber: Prony | None = None) -> asperity.Case:
     """Return the case of a block that is pressed for a time and then driven over a road.
 
@@ -87,12 +86,18 @@ def case(nx: int, road: str, *, speed: float = SPEED, pressure: float = PRESSURE
     fine : float
         Cells that the drive moves in a step after the first full slip.
     density : float
-        Density of the block, kg/m3; it only damps.
+        Density of the block, kg/m3; it only damps. By default that of the thesis, 20, and below
+        1 m/s more: 20 times 1 over the speed squared, which has the same share in the forces.
+        Without it a slow drive comes loose in stick-slip from step to step.
+    grip : float
+        Traction over pressure at which all is expected to slip.
     rubber : Prony, optional
         The compound; that of table 4.1 by default.
     """
     cell = LONG / nx
-    travel = drive_to_slip(pressure, speed)
+    if density is None:
+        density = 20.0 * max(1.0, (SPEED / speed) ** 2)
+    travel = drive_to_slip(grip * pressure, speed)
     made = asperity.Case.read(road + "&grid nx = 2 /\n&material shear_modulus = 1 /\n&phase /")
     made.grid.update(nx=nx, ny=2 * round(nx / math.sqrt(12.0)), lx=LONG, ly=LONG / math.sqrt(3.0))
     made.material.update(common.material_group(rubber or compound(), thickness=THICKNESS,
@@ -109,11 +114,16 @@ def case(nx: int, road: str, *, speed: float = SPEED, pressure: float = PRESSURE
     return made
 
 
-def histories(folder: Path, cases: Sequence[asperity.Case]) -> list[dict[str, np.ndarray]]:
-    """Run cases that differ in values, side by side, and return what each did in time."""
+def histories(folder: Path, cases: Sequence[asperity.Case],
+              *said: str) -> list[dict[str, np.ndarray]]:
+    """Run cases that differ in values, side by side, and return what each did in time.
+
+    `said` are warnings that are expected beside those of all these cases.
+    """
     def values(one: asperity.Case) -> dict[str, Any]:
         flat = {f"{group}.{name}": value for group in ("grid", "material")
                 for name, value in one[group].items()}
+        flat |= {f"adhesion.{name}": value for name, value in one["adhesion"].items()}
         for group in ("surface", "phase"):
             for number, entry in enumerate(one[group], 1):
                 flat |= {f"{group}[{number}].{name}": value for name, value in entry.items()}
@@ -121,10 +131,9 @@ def histories(folder: Path, cases: Sequence[asperity.Case]) -> list[dict[str, np
 
     flat = [values(one) for one in cases]
     names = tuple(name for name in flat[0] if any(one[name] != flat[0][name] for one in flat))
-    with warnings.catch_warnings():
-        # Of long steps while the rubber creeps and sticks, which are meant, and of stick-slip from
-        # step to step where a slow drive comes loose: it ends within 30 um, before the maximum.
-        warnings.simplefilter("ignore", UserWarning)
+    # Long steps are meant while the rubber creeps (phase 1) and sticks (phase 2).
+    with common.expected(common.FEW_CELLS, common.LONG_STEPS, f"&phase 2: {common.LONG_WAYS}",
+                         *said):
         table = asperity.sweep(cases[0], {names: [[one[name] for name in names] for one in flat]},
                                folder=folder, jobs=common.jobs, quiet=True)
     return [columns(run) for run in table.runs]
@@ -175,6 +184,25 @@ def oscillation(data: dict[str, np.ndarray], periods: int) -> tuple[np.ndarray, 
     y -= np.polyval(np.polyfit(x - start, y, 1), x - start)
     amplitude = np.abs(np.fft.rfft(y))[1:] * 2.0 / y.size
     return periods * LONG / np.arange(1, amplitude.size + 1), amplitude
+
+
+def viscous_in_full_contact(speed: float, pressure: float, waves: Sequence[float]) -> float:
+    """Return -mean(P dH/dx)/mean(P) in steady sliding where contact is full (coefficient 1).
+
+    A wave is three plane waves of a quarter of its amplitude D, of wave number q, twice its own,
+    one along x, two at 60 degrees to it. Each loses q_x q D^2 G''(q_x V), a stress. And each point
+    is dragged along x by its traction, P: against the mean by A_xx/A_zz = 2 - (q_x/q)^2 times what
+    it is pressed in, D, so that the pressure p meets more of the leading flanks: of
+    p q_x^2 D^2 (2 - (q_x/q)^2)/2.
+    """
+    stress = 0.0
+    for wave in waves:
+        q, amplitude = 4.0 * math.pi / wave, STEEPNESS * wave / 4.0
+        for part in (1.0, 0.5, 0.5):
+            lost = compound().complex_modulus(np.array([part * q * speed])).imag[0]
+            stress += part * (q * amplitude) ** 2 * (
+                lost + pressure * part * (2.0 - part**2) / 2.0)
+    return stress / pressure
 
 
 def check_slope(found: dict[str, np.ndarray | float], scales: int = 2) -> None:

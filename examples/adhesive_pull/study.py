@@ -7,7 +7,6 @@ those of the relaxed and the glassy elastic solid; and a sphere that has rested 
 from __future__ import annotations
 
 import math
-import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -87,9 +86,8 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
     # the fast limit of a pull after a rest: static solves, which respond with the glassy modulus
     sudden = base(cells, [dict(displacement=DEEP, relaxed=True)] + [
         dict(displacement=float(d)) for d in np.linspace(DEEP, HIGH, round(2.5 * steps) + 1)[1:]])
-    with warnings.catch_warnings():
-        # The slow loops take steps much longer than the relaxation: the solid is relaxed, then.
-        warnings.filterwarnings("ignore", ".*longer than the shortest active relaxation time")
+    # The slow loops take steps much longer than the relaxation: the solid is relaxed, then.
+    with common.expected(common.LONG_STEPS):
         for name, found in (
                 ("loop", asperity.sweep(case, loops, folder=folder / "loops", **options)),
                 ("bare", asperity.sweep(bare, loops, folder=folder / "bare", **options)),
@@ -158,13 +156,16 @@ def picture(data: dict[str, Any]) -> Figure:
     """Draw loops, pull-off forces and losses."""
     figure, (left, middle, right) = common.subplots(3)
     rate = data["rate"]
-    for curve, style, name in zip(data["elastic"]["curves"], ("k--", "k:"),
-                                  ("relaxed, elastic", "glassy, elastic"), strict=True):
-        left.plot(curve[0] * 1e6, curve[1] / UNIT, style, lw=1, label=name)
-    for wanted, colour in zip((1e-2, 0.5, 5.0, 100.0), common.COLOURS, strict=False):
+    for number, wanted in enumerate((1e-2, 0.5, 5.0, 100.0)):
         i = int(np.abs(np.log(rate / wanted)).argmin())
         curve = data["loop"]["curves"][i]
-        left.plot(curve[0] * 1e6, curve[1] / UNIT, color=colour, label=f"{rate[i]:g}")
+        # the fast loop lies on the glassy curve: broad below it
+        left.plot(curve[0] * 1e6, curve[1] / UNIT, color=common.COLOURS[number],
+                  lw=4 if number == 3 else 1.5, alpha=0.6 if number == 3 else 1.0,
+                  label=f"{rate[i]:g}")
+    for curve, style, name in zip(data["elastic"]["curves"], ("k--", "k:"),
+                                  ("relaxed, elastic", "glassy, elastic"), strict=True):
+        left.plot(curve[0] * 1e6, curve[1] / UNIT, style, lw=1.2, label=name)
     left.axhline(0, color="grey", lw=0.5)
     left.set(xlabel="displacement, µm", ylabel="force/(π w R)", ylim=(-8, 12))
     left.legend(title="speed of the push V τ/(2 µm)", title_fontsize="small")

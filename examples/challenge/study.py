@@ -160,17 +160,20 @@ def check(data: dict[str, Any], quick: bool) -> None:
 def picture(data: dict[str, Any]) -> Figure:
     """Draw the map, a section, curves of load, distributions."""
     from matplotlib.colors import ListedColormap
+    from matplotlib.patches import Patch
 
-    figure, axes = common.subplots(3, 2)
-    where, section, areas, pressures, gaps, sizes = axes.flat
+    figure, axes = common.subplots(2, 4, width=5.4, height=3.9)
+    where, section, areas, means, pressures, gaps, sizes, ranges = axes.flat
     blue, red = common.COLOURS[:2]
     side = data["side"] * 1e6
     where.grid(False)
     where.imshow(data["touch"].astype(int) + data["bare_touch"], origin="lower", vmin=0, vmax=2,
                  extent=(0, side, 0, side), interpolation="nearest",
                  cmap=ListedColormap(["#f0f0f0", common.COLOURS[5], "#000000"]))
-    where.set(title="contact at 0.25 MPa; black: without adhesion, too", xlabel="x, µm",
-              ylabel="y, µm")
+    where.set(title="contact at 0.25 MPa", xlabel="x, µm", ylabel="y, µm")
+    where.legend(handles=[Patch(color=common.COLOURS[5], label="with adhesion"),
+                          Patch(color="#000000", label="without, too")],
+                 loc="upper left", bbox_to_anchor=(1.02, 1.0))
     line = data["line"]
     x, nano = line["x"] * 1e6, 1e9
     section.fill_between(x, line["road"] * nano, line["road"].min() * nano - 20, color="#bbbbbb",
@@ -180,17 +183,16 @@ def picture(data: dict[str, Any]) -> Figure:
                 ylim=(line["road"].min() * nano - 20, line["road"].max() * nano + 60))
     section.legend()
     load = data["load"] / 1e6
-    areas.loglog(load, data["adhesive"]["area"], "o-", color=blue, label="area, adhesive")
-    areas.loglog(load, data["bare"]["area"], "s-", color=red, label="area, without adhesion")
+    areas.loglog(load, data["adhesive"]["area"], "o-", color=blue, label="adhesive")
+    areas.loglog(load, data["bare"]["area"], "s-", color=red, label="without adhesion")
     areas.loglog(load, theory.persson_area(data["load"], MODULUS, SLOPE), "k:",
                  label="Persson, without adhesion")
     unit = data["rms_height"]
-    areas.loglog(load, data["adhesive"]["gap"] / unit, "o--", color=blue, mfc="none",
-                 label="mean gap/rms height")
-    areas.loglog(load, data["bare"]["gap"] / unit, "s--", color=red, mfc="none")
-    areas.set(xlabel="mean pressure, MPa", ylabel="fraction of contact; gap/rms height",
-              ylim=(2e-3, 600))
-    areas.legend(loc="upper left")
+    means.semilogx(load, data["adhesive"]["gap"] * nano, "o-", color=blue, label="adhesive")
+    means.semilogx(load, data["bare"]["gap"] * nano, "s-", color=red, label="without adhesion")
+    means.axhline(unit * nano, color="k", ls=":", lw=1, label="rms height of the map")
+    areas.set(xlabel="mean pressure, MPa", ylabel="fraction in contact", title="contact area")
+    means.set(xlabel="mean pressure, MPa", ylabel="mean gap, nm", ylim=(0, None), title="mean gap")
     for kind, colour, name in (("adhesive", blue, "adhesive"), ("bare", red, "without adhesion")):
         found = data[f"{kind}_reference"]
         middle = (data["pressure_edges"][1:] + data["pressure_edges"][:-1]) / 2e6
@@ -207,6 +209,17 @@ def picture(data: dict[str, Any]) -> Figure:
     gaps.axvline(data["range"] * nano, color="k", ls=":", lw=1, label="range")
     gaps.set(xlabel="gap, nm", ylabel="density, 1/nm")
     sizes.set(xlabel="area of a patch, µm²", ylabel="number of patches of this area or more")
-    for one in (pressures, gaps, sizes):
+    pressures.set_title("pressure at 0.25 MPa")
+    gaps.set_title("gap at 0.25 MPa")
+    sizes.set_title("patches of contact at 0.25 MPa")
+    reach = data["ranges"]["range"] * nano
+    ranges.plot(reach, 100 * data["ranges"]["area"], "o-", color=blue, label="area, %")
+    ranges.plot(reach, data["ranges"]["gap"] * nano, "o--", color=blue, mfc="none",
+                label="mean gap, nm")
+    ranges.axhline(100 * float(data["bare"]["area"][data["load"] == REFERENCE][0]), color=red,
+                   ls="-", lw=1, label="area without adhesion, %")
+    ranges.set(xlabel="range of adhesion, nm (same energy)", ylabel="area, %; gap, nm",
+               ylim=(0, None), title="other ranges at 0.25 MPa")
+    for one in (areas, means, pressures, gaps, sizes, ranges):
         one.legend()
     return figure

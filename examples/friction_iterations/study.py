@@ -105,8 +105,20 @@ def check(data: dict[str, Any], quick: bool) -> None:
     assert data["fast_iterations"].max() <= 22, f"fast: {data['fast_iterations'].max()} iterations"
     assert data["fast_ffts"].max() <= 240, f"fast: {data['fast_ffts'].max()} transforms"
     assert data["fast_exponent"].max() < 0.2, f"fast grows: {data['fast_exponent']}"
-    ratio = data["thesis_median"][0][-1] / data["fast_median"][0][-1]
-    assert ratio > 2, f"thesis's method takes only {ratio:.1f} times as many iterations"
+    # 'thesis' has no preconditioner. The operator's symbol is 1/|q|, its condition number grows as
+    # the cells on a line, N^0.5, and iterations of conjugate gradients as its root at least,
+    # N^0.25; the thesis finds N^0.4. 'fast' removes that growth.
+    for number, ratio in enumerate(data["ratios"]):
+        slow, fast = data["thesis_exponent"][number], data["fast_exponent"][number]
+        assert slow > 0.25 and slow > fast + 0.2, f"{ratio}: exponents {slow:.2f} and {fast:.2f}"
+        if not quick:
+            assert slow < 0.65, f"{ratio}: 'thesis' grows with the power {slow:.2f}"
+        # So it falls behind as the mesh grows, in transforms, too, of which 'fast' takes 10 an
+        # iteration and 'thesis' six: with 48 cells 6 and 3 times, with 256 16 and 9 times here.
+        for name, least in (("iterations", 4 if quick else 12), ("ffts", 2.5 if quick else 7)):
+            behind = np.median(data[f"thesis_{name}"][number][-1]) / np.median(
+                data[f"fast_{name}"][number][-1])
+            assert behind > least, f"{ratio}: {name} of 'thesis' only {behind:.1f} times as many"
 
 
 def picture(data: dict[str, Any]) -> Figure:

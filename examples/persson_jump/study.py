@@ -220,10 +220,10 @@ def check(data: dict[str, Any], quick: bool) -> None:
 
 
 def picture(data: dict[str, Any]) -> Figure:
-    """Draw the jump, its values over speed and load, the energies and the drop."""
+    """Draw the jump, its values over speed and load, the energies, jumps of the load, the drop."""
     from matplotlib import pyplot
 
-    figure, axes = pyplot.subplots(2, 4, figsize=(17, 7.6), layout="constrained")
+    figure, axes = pyplot.subplots(5, 2, figsize=(11, 18), layout="constrained")
     jump = data["jump"]
     for panel, column, label in ((axes[0, 0], "friction", "friction coefficient"),
                                  (axes[0, 1], "area", "contact area, fraction")):
@@ -238,23 +238,15 @@ def picture(data: dict[str, Any]) -> Figure:
                            color=COLOURS[1], alpha=0.2, lw=0)
         panel.plot(jump["travel"] * 1e6, values.mean(axis=0), color=COLOURS[1],
                    label=f"mean and range of {len(values)} roads")
-        panel.set(xlabel="travel since the jump, µm", ylabel=label, ylim=(0, None))
-        panel.legend(fontsize="small")
-    axes[0, 0].set_title("10 mm/s to 3 m/s at 0.1 MPa")
+        panel.set(xlabel="travel since the jump, µm", ylabel=label, ylim=(0, None),
+                  title="speed from 10 mm/s to 3 m/s at 0.1 MPa")
 
-    panel = axes[0, 2]
-    for number, (name, label) in enumerate((("drive", "drive (friction)"), ("load", "load, lifted"),
-                                            ("elastic", "elastic energy"), ("loss", "loss"))):
-        values = jump["energies"][name]
-        panel.plot(jump["travel"][1:] * 1e6, values, color=COLOURS[number], label=label,
-                   ls=("-", "--", "-.", (0, (1, 1)))[number])
-    panel.set(xlabel="travel since the jump, µm", ylabel="energy a step / (p L² dx)",
-              title="energies", xlim=(0, 200))
-    panel.legend(fontsize="small")
-
-    for panel, x, cases, label in (
-            (axes[1, 0], data["speeds"], data["by_speed"], "speed after the jump, m/s"),
-            (axes[1, 1], data["loads"] / 1e6, data["by_load"], "pressure, MPa")):
+    for row, x, cases, label, title in (
+            (1, data["speeds"], data["by_speed"], "speed after the jump, m/s",
+             "jump from 10 mm/s at 0.1 MPa"),
+            (2, data["loads"] / 1e6, data["by_load"], "pressure, MPa",
+             "jump from 10 mm/s to 0.3 m/s")):
+        panel, error = axes[row]
         for name, colour, mark, meaning in (("max", COLOURS[1], "o", "largest"),
                                             ("dyn", COLOURS[2], "s", "steady")):
             values = np.array([item[name] for item in cases])
@@ -262,14 +254,41 @@ def picture(data: dict[str, Any]) -> Figure:
                 panel.errorbar(x, values.mean(axis=1), values.std(axis=1, ddof=1), fmt=mark,
                                color=colour, capsize=3, label=f"{meaning}, runs")
             for gamma, style in ((GAMMA, "-"), (1.0, ":")):
-                panel.plot(x, [item["theory"][gamma][name] for item in cases], color=colour,
-                           ls=style, label=f"{meaning}, γ = {gamma:g}")
-        panel.set(xscale="log", xlabel=label, ylabel="friction coefficient", ylim=(0, None))
-        panel.legend(fontsize="x-small")
-    axes[1, 1].set_title("to 0.3 m/s")
+                expected = [item["theory"][gamma][name] for item in cases]
+                panel.plot(x, expected, color=colour, ls=style, label=f"{meaning}, γ = {gamma:g}")
+                if values.size:
+                    error.plot(x, 100 * (np.array(expected) / values.mean(axis=1) - 1), mark,
+                               ls=style, color=colour, mfc=colour if gamma == GAMMA else "none",
+                               label=f"{meaning} friction, γ = {gamma:g}")
+        if cases:
+            area = [item["theory"][1.0]["area"][-1] / item["late_area"].mean() for item in cases]
+            error.plot(x, 100 * (np.array(area) - 1), "D-", color=COLOURS[0], label="area")
+        panel.set(xscale="log", xlabel=label, ylabel="friction coefficient", ylim=(0, None),
+                  title=title)
+        error.axhline(0, color="k", lw=0.8)
+        error.set(xscale="log", xlabel=label, ylabel="theory over the runs less 1, %",
+                  title="the theory's error")
 
-    for panel, column, label in ((axes[0, 3], "area", "contact area, fraction"),
-                                 (axes[1, 3], "friction", "friction coefficient")):
+    panel = axes[3, 0]
+    for number, (name, label) in enumerate((("drive", "drive (friction)"), ("load", "load, lifted"),
+                                            ("elastic", "elastic energy"), ("loss", "loss"))):
+        values = jump["energies"][name]
+        panel.plot(jump["travel"][1:] * 1e6, values, color=COLOURS[number], label=label,
+                   ls=("-", "--", "-.", (0, (1, 1)))[number])
+    panel.set(xlabel="travel since the jump, µm", ylabel="energy a step / (p L² dx)",
+              title="energies, 10 mm/s to 3 m/s", xlim=(0, 200))
+
+    panel = axes[3, 1]
+    for number, (name, drop) in enumerate(data["drops"].items()):
+        panel.semilogx(drop["time"][1:], drop["area"][1:], color=COLOURS[number],
+                       marker="osD"[number], ms=3, ls="-",
+                       label="relaxed before" if number == 0 else f"pressed for {name} before")
+    panel.axhline(data["elastic"][1], color="k", ls=":", label="relaxed at the smaller load")
+    panel.set(xlabel="time since the drop, s", ylabel="contact area, fraction", ylim=(0, None),
+              title="load drops from 0.1 to 0.02 MPa at rest")
+
+    for panel, column, label in ((axes[4, 0], "area", "contact area, fraction"),
+                                 (axes[4, 1], "friction", "friction coefficient")):
         name = "contact_area" if column == "area" else column
         for number, item in enumerate(data["load_jumps"]):
             word = "drop" if item["after"] < item["before"] else "rise"
@@ -284,19 +303,9 @@ def picture(data: dict[str, Any]) -> Figure:
             panel.plot(item["travel"] * 1e6, item[column].mean(axis=0), color=COLOURS[number],
                        marker="os"[number], ms=3, label=f"{word}, mean of the roads")
         panel.set(xlabel="travel since the jump, µm", ylabel=label, xlim=(-3, 100),
-                  ylim=(0, None))
-        panel.legend(fontsize="x-small")
-    axes[0, 3].set_title("load between 0.1 and 0.02 MPa at 0.3 m/s")
-
-    panel = axes[1, 2]
-    for number, (name, drop) in enumerate(data["drops"].items()):
-        panel.semilogx(drop["time"][1:], drop["area"][1:], color=COLOURS[number],
-                       marker="osD"[number], ms=3, ls="-",
-                       label="relaxed before" if number == 0 else f"pressed for {name} before")
-    panel.axhline(data["elastic"][1], color="k", ls=":", label="relaxed at the smaller load")
-    panel.set(xlabel="time since the drop, s", ylabel="contact area, fraction", ylim=(0, None),
-              title="drop of the load at rest")
-    panel.legend(fontsize="x-small")
+                  ylim=(0, None), title="load between 0.1 and 0.02 MPa at 0.3 m/s")
     for panel in axes.flat:
         panel.grid(alpha=0.3)
+        if panel.get_legend_handles_labels()[0]:
+            panel.legend(fontsize="small")
     return figure

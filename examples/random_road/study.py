@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import common
 import numpy as np
 import two_scale as road
 from matplotlib.figure import Figure
@@ -53,7 +54,8 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
             cells, surface, speed=speed, pressure=load, shear_steps=15 if quick else 30,
             distance=(0.8 if quick else 1.25 if speed < 5.0 else 2.0) * road.LONG)
             for speed, load in points]
-        done = road.histories(folder / name, cases)
+        # as in the thesis the longest wave of the road is as long as its cell
+        done = road.histories(folder / name, cases, common.LONG_WAVES)
         found = {point: road.measures(case) for point, case in zip(points, done, strict=True)}
         data[f"{name}_curve"] = {key: done[0][key] for key in ("road_x", "slid", "friction")}
         for key in ("maximum", "plateau", "area", "slid_to_maximum"):

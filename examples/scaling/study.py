@@ -27,23 +27,24 @@ THICKNESS, TRAVEL = 1e-3, 1e-3                               # m, of the default
 TEMPERATURES = (-10.0, 0.0, 10.0, 25.0, 40.0, 60.0, 80.0)    # C
 SCALES = (1 / 16, 1 / 4, 1.0, 4.0, 16.0)
 THICKNESSES = (0.25e-3, 0.5e-3, 1e-3, 2e-3, 4e-3)
-
+#: What keeps a thick block from numerical stick-slip.
+HEAVY: dict[str, Any] = dict(density=100.0, passes=4)
 
 #: What a case is made of.
 Values = tuple[float, ...]
 NAMES = ("grid.lx", "grid.ly", "surface[1].wavelength", "surface[1].amplitude",
          "surface[2].wavelength", "surface[2].amplitude", "material.thickness",
          "material.density", "material.temperature", "phase[1].duration", "phase[2].velocity_x",
-         "phase[2].duration")
+         "phase[2].duration", "solver.passes")
 
 
 def _values(cells: int, *, temperature: float = 25.0, speed: float = SPEED,
             loading: float = LOADING, scale: float = 1.0, thickness: float = THICKNESS,
-            travel: float = TRAVEL, density: float = 0.0) -> Values:
+            travel: float = TRAVEL, density: float = 0.0, passes: int = 2) -> Values:
     """Return the values of NAMES; road, block and travel are multiplied by `scale`."""
     wave, second = WAVE * scale, WAVE * scale * 16 / cells    # 16 cells in the second wave
     return (wave, wave / math.sqrt(3), wave, wave / 50, second, second / 50, thickness * scale,
-            density, temperature, loading, speed, travel * scale / speed)
+            density, temperature, loading, speed, travel * scale / speed, passes)
 
 
 def _runs(folder: Path, cells: int, cases: list[dict[str, float]]) -> list[dict[str, Any]]:
@@ -86,11 +87,10 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
         "shifted": [dict(speed=SPEED * a, loading=LOADING / a) for a in shift],
         "scale": [dict(scale=s) for s in scales],
         "faster": [dict(speed=SPEED / s) for s in scales],
-        # some mass: without, or with the 20 kg/m3 of the thesis, a block of 4 mm sticks and slips
-        # numerically at steps of one cell
-        "same_block": [dict(scale=0.25, thickness=4 * THICKNESS, travel=2 * TRAVEL, density=200.0)],
-        "thickness": [dict(thickness=h, travel=0.6e-3 + 0.4 * h, density=200.0)
-                      for h in thicknesses]}
+        # some mass: with the 20 kg/m3 of the thesis a block of 4 mm sticks and slips numerically at
+        # steps of one cell, whatever the passes
+        "same_block": [dict(scale=0.25, thickness=4 * THICKNESS, travel=2 * TRAVEL, **HEAVY)],
+        "thickness": [dict(thickness=h, travel=0.6e-3 + 0.4 * h, **HEAVY) for h in thicknesses]}
     data: dict[str, Any] = {
         "temperatures": np.array(temperatures), "scales": np.array(scales),
         "thicknesses": np.array(thicknesses), "shift": np.array(shift)}
@@ -158,7 +158,7 @@ def picture(data: dict[str, Any]) -> Figure:
          label="at this temperature")
     both(axes[0, 1], data["temperatures"], data["shifted"], marker="x", ls="", ms=10,
          label="25 °C, times over $a_T$")
-    axes[0, 1].set(xlabel="temperature, °C")
+    axes[0, 1].set(xlabel="temperature, °C", ylabel="friction coefficient")
     both(axes[1, 0], data["scales"], data["scale"], marker="o", ls="-", label="this scale")
     both(axes[1, 0], data["scales"], data["faster"], marker="x", ls="", ms=10,
          label="scale 1, speed over scale")
@@ -171,11 +171,10 @@ def picture(data: dict[str, Any]) -> Figure:
     axes[1, 1].set_xscale("log", base=2)
     axes[1, 1].set_xticks(data["thicknesses"] * 1e3,
                           [f"{h * 1e3:g}" for h in data["thicknesses"]])
-    axes[1, 1].set(xlabel="thickness of the block, mm")
+    axes[1, 1].set(xlabel="thickness of the block, mm", ylabel="friction coefficient")
     for panel in axes.flat[1:]:
         panel.legend(fontsize="small")
-        panel.set_ylim(1.0, None)
-    axes[1, 1].set_ylim(1.0, 1.2)
+        panel.set_ylim(1.0, 1.2)
     for panel in axes.flat:
         panel.grid(alpha=0.3)
     return figure

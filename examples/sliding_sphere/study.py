@@ -5,7 +5,6 @@ The case of the thesis's figures 2.6 and 2.7, beside the two limits of the frict
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -58,10 +57,8 @@ def slide(folder: Path, speeds: Sequence[float], cells: float, travel: float) ->
     case = base(cells, travel)
     steps = case.phase[1].steps
     velocities = [speed * WIDTH / CREEP for speed in speeds]
-    with warnings.catch_warnings():
-        # The warning measures the gap at the edge of the map by the height of the whole map, which
-        # grows with the way. The edge is 4 a* away, and the contact never wider than 2.2 a*.
-        warnings.filterwarnings("ignore", ".*points enter or leave the free map")
+    # The edge is 4 a* away, and the contact never wider than 2.2 a*.
+    with common.expected(common.EDGE):
         return asperity.sweep(
             case, {("phase[2].velocity_x", "phase[2].duration"):
                    [(v, steps * WIDTH / cells / v) for v in velocities]},

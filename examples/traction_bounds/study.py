@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 MINUTES = 0.2
 
 SIDE, COEFFICIENT, SHEAR = 1e-3, 0.8, 0.12e6       # m, Coulomb's, Pa
-LAWS = ("coulomb", "constant_shear", "coulomb_orowan")
+TITLES = {"coulomb": "Coulomb", "constant_shear": "constant shear stress",
+          "coulomb_orowan": "Coulomb-Orowan"}
+LAWS = tuple(TITLES)
 RUNS = {law: (law, "physical") for law in LAWS} | {"thesis": ("coulomb", "thesis")}
 SLOPE = 0.2                                        # of the points that are drawn into the bound
 
@@ -189,7 +191,7 @@ def picture(data: dict[str, Any]) -> Figure:
         first.plot(*bound(1.0, (-slope, 0.0), mu=1.0), color=common.COLOURS[number],
                    label=f"slope {slope:g}")
         first.plot(slope, 0, "+", color=common.COLOURS[number])
-    first.set(title="Coulomb, µ = 1, P = 1", xlim=(-1.3, 3.2),
+    first.set(title="Coulomb, µ = 1", xlim=(-1.3, 3.2),
               ylim=(-1.6, 2.4))
     slope = (-0.5, 0.0)
     second.plot(*bound(1.0, (0.0, 0.0), mu=0.1), color=common.COLOURS[0], label="no slope")
@@ -203,16 +205,16 @@ def picture(data: dict[str, Any]) -> Figure:
         second.plot(*t, "o", ms=4, color="k", label="T, put back" if number == 0 else None)
         second.plot([0, t[0]], [0, t[1]], ":", color="0.5", lw=1,
                     label="towards 0: never inside" if number == 0 else None)
-    second.set(title="Coulomb, µ = 0.1, P = 1", xlim=(-0.2, 0.85),
+    second.set(title="Coulomb, µ = 0.1", xlim=(-0.2, 0.85),
                ylim=(-0.32, 0.62))
     for number, (name, law) in enumerate((
-            ("Coulomb, µ = 1", {"mu": 1.0}), ("shear stress 0.8", {"shear": 0.8}),
+            ("Coulomb, µ = 1", {"mu": 1.0}), ("shear stress 0.8 P", {"shear": 0.8}),
             ("Coulomb-Orowan", {"mu": 1.0, "shear": 0.8}))):
         third.plot(*bound(1.0, (-0.5, 0.0), **law), color=common.COLOURS[number], label=name,
                    ls=("-", "--", ":")[number], lw=(1.2, 1.2, 3)[number])
-    third.set(title="slope 0.5, P = 1", xlim=(-0.8, 3.2), ylim=(-1.5, 2.1))
+    third.set(title="slope 0.5", xlim=(-0.8, 3.2), ylim=(-1.5, 2.1))
     for panel in (first, second, third):
-        panel.set(xlabel="$T_x$ (downhill: +x)", ylabel="$T_y$", aspect="equal",
+        panel.set(xlabel="$T_x/P$ (downhill: +x)", ylabel="$T_y/P$", aspect="equal",
                   adjustable="box")
         panel.legend(loc="upper center", ncols=2, fontsize="x-small")
 
@@ -233,7 +235,7 @@ def picture(data: dict[str, Any]) -> Figure:
     for number, name in enumerate(LAWS):
         one = data["runs"][name][-1]
         fifth.plot(one["normal"][::5] / SHEAR, one["shear"][::5] / SHEAR, "os^"[number], ms=3,
-                   mfc="none", color=common.COLOURS[number], label=name.replace("_", " "))
+                   mfc="none", color=common.COLOURS[number], label=TITLES[name])
     fifth.set(title="runs in full slip", xlabel="normal traction / shear strength",
               ylabel="shear traction / shear strength", xlim=(0, None), ylim=(0, None))
     fifth.legend()

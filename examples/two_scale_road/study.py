@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +27,8 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
         result = folder / "two_scale_road.h5"
     run = asperity.open(result) if result.exists() else None
     if run is None or not run.finished or run.input != str(case):
-        with warnings.catch_warnings():
-            if quick:  # the program tells that the grid is coarse
-                warnings.simplefilter("ignore", UserWarning)
+        with common.expected(common.FEW_CELLS, common.LONG_STEPS,
+                             f"&phase 2: {common.LONG_WAYS}"):
             run = asperity.run(case, output=result, threads=common.jobs)
     data = road.columns(run)
     return {**data, "found": road.measures(data)}
