@@ -10,6 +10,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+import common
 import numpy as np
 import two_scale as road
 from matplotlib.figure import Figure
@@ -34,18 +35,22 @@ def _case(cells: int, short: float, steepness: float, speed: float, length: floa
     """Return the case at a speed, m/s, with adhesion of a range (m) or without."""
     made = road.case(cells, road.waves(short, steepness), speed=speed, rubber=road.compound(0.1),
                      grip=1.0 + 0.7 * ENERGY / length / road.PRESSURE if adhesive else 1.0,
-                     shear_steps=20 if cells < CELLS else 40)
+                     **({"shear_steps": 10, "distance": 0.4 * road.LONG} if cells < CELLS else {}))
     made.solver.passes = 2     # contact is far from full in sliding
+    made.solver.tolerance = 1e-4 if cells < CELLS else 1e-5
     if adhesive:
         made.adhesion.update(potential="exponential", energy=ENERGY, range=length)
     return made
 
 
-def _found(data: dict[str, np.ndarray]) -> dict[str, float]:
-    """Return maximum and mean of the friction, and the areas that belong to them."""
+def _found(data: dict[str, np.ndarray], period: float) -> dict[str, float]:
+    """Return maximum and mean of the friction, and what belongs to them.
+
+    The mean is that over the last `period`, m, of the drive.
+    """
     driven = data["road_x"] > 0.0
     friction = data["friction"]
-    late = data["road_x"] > data["road_x"][-1] - road.LONG     # a period of the drive, even steps
+    late = data["road_x"] > data["road_x"][-1] - period     # steps of one length
     return {"maximum": float(friction[driven].max()), "steady": float(friction[late].mean()),
             "swing": float(np.ptp(friction[late])),
             "area": float(data["contact_area"][late].mean()),
@@ -62,6 +67,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
     cells, short, length = (road.QUICK, road.WIDER, 3.0 * RANGE) if quick else (
         CELLS, road.SHORT, RANGE)
     speeds = [1.0, 30.0] if quick else [0.01, 0.1, 1.0, 3.0, 10.0, 30.0, 100.0]
+    period = (0.2 if quick else 1.0) * road.LONG
     line = np.geomspace(speeds[0], speeds[-1], 41)
     data: dict[str, Any] = {
         "speeds": np.array(speeds), "bound": ENERGY / length / road.PRESSURE, "line": line,
@@ -73,9 +79,10 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
     for name, adhesive in (("adhesive", True), ("bare", False)):
         cases = [_case(cells, short, road.STEEPNESS, road.SPEED, length, adhesive),
                  *(_case(cells, short, HIGH, speed, length, adhesive) for speed in speeds)]
-        default, *high = road.histories(folder / name, cases)
-        data[name] = {"curve": default, **_found(default)}
-        found = [_found(case) for case in high]
+        # Below 0.1 m/s the rubber relaxes so far that the cells are too wide: see the README.
+        default, *high = road.histories(folder / name, cases, common.WIDE_CELLS)
+        data[name] = {"curve": default, **_found(default, period)}
+        found = [_found(case, period) for case in high]
         data[f"{name}_high"] = {key: np.array([one[key] for one in found]) for key in found[0]}
     return data
 
@@ -105,7 +112,8 @@ def check(data: dict[str, Any], quick: bool) -> None:
     # friction; to the maximum it adds about the same at all speeds.
     gain = high["steady"] - high_bare["steady"]
     most = high["maximum"] - high_bare["maximum"]
-    assert (np.diff(gain) < 0.01).all() and gain[-1] < 0.5 * gain[0], f"steady gains {gain}"
+    assert (np.diff(gain) < 0.01).all() and gain[-1] < (0.75 if quick else 0.5) * gain[0], \
+        f"steady gains {gain}"
     assert (np.diff(data["c_high"]) < 0.0).all()
     assert most.min() > 0.5 * most.max() > 0.0, f"gains of the maximum {most}"
     assert (most > gain).all()

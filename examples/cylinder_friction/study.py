@@ -71,7 +71,14 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
              "with slope": steady.total_friction_force(COEFFICIENT)}
     last = np.linspace(-0.7e-3, 0.9e-3, 400)
     cases = {name: _slide(folder, name, quick) for name in CASES}
+    # pressure is a force over the undeformed area; over the area as it has been dragged it is more
+    late = cases["with slope"]["profiles"][-1]
+    stretch = np.gradient(late["x"]) / (np.ptp(late["x"]) / (late["x"].size - 1))
     return {
+        "peaks": {"with slope": late["pressure"].max(),
+                  "with slope, dragged": (late["pressure"] / stretch).max(),
+                  "no friction": cases["no friction"]["profiles"][-1]["pressure"].max(),
+                  "Hunter": steady.pressure(last).max()},
         "cases": cases, "known": known, "fine": last,
         "pressure": steady.pressure(last), "at": {name: cases[name]["at"] for name in CASES},
         "end": {name: cases[name]["end"] for name in CASES},
@@ -154,7 +161,7 @@ def picture(data: dict[str, Any]) -> Figure:
         fourth.plot(1e3 * profile["x"], profile["pressure"] / 1e3, color=common.COLOURS[number],
                     label=f"pressure, {name}")
     fourth.plot(1e3 * data["fine"], data["pressure"] / 1e3, "k:", label="pressure, Hunter (steady)")
-    fourth.set(xlim=(-0.7, 0.9), xlabel="x from the middle of the cylinder, mm", ylabel="kPa",
-               title="at 25 ms")
+    fourth.set(xlim=(-0.7, 0.9), xlabel="x from the middle of the cylinder, mm",
+               ylabel="traction, pressure, kPa", title="at 25 ms")
     fourth.legend(fontsize="x-small")
     return figure

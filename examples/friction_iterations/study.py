@@ -78,6 +78,9 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
                 [[[solve[name] for solve in at] for at in row] for row in solves])
         data[f"{method}_median"] = np.median(data[f"{method}_iterations"], axis=2)
         data[f"{method}_cells"] = np.array(cells)
+        data[f"{method}_range"] = np.stack([data[f"{method}_iterations"].min(axis=(1, 2)),
+                                            data[f"{method}_iterations"].max(axis=(1, 2))])
+        data[f"{method}_unknowns_mean"] = data[f"{method}_unknowns"][0].mean(axis=1)
         #: growth of the median of the iterations, exponent of the unknowns
         data[f"{method}_exponent"] = np.array([
             np.polyfit(np.log(unknowns.mean(axis=1)), np.log(median), 1)[0] for unknowns, median

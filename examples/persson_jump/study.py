@@ -151,7 +151,17 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
             folder / "drops", road, [(True, None, None), (None, 1e-3, 20), (None, 1e-5, 20)]),
             strict=True)),
         "load_jumps": _load_jumps(folder / "loads", road, seeds),
-        "elastic": (high, low), "cell": 1.0 / road.cells**2}
+        "elastic": (high, low), "cell": 1.0 / road.cells**2,
+        "summary": [{
+            "speed": v, "pressure": p, "cases": {name: {
+                "runs": float(item[column].mean()), "scatter": float(item[column].std(ddof=1)),
+                **{f"theory {gamma:g}": item["theory"][gamma][name] if name != "area"
+                   else float(item["theory"][gamma]["area"][-1]) for gamma in (GAMMA, 1.0)}}
+                for name, column in (("max", "max"), ("dyn", "dyn"), ("area", "late_area"))}}
+            for v, p, item in [*((v, PRESSURE, item) for v, item in zip(speeds, by_speed,
+                                                                       strict=True)),
+                               *((SPEED_OF_LOADS, p, item) for p, item in zip(loads, by_load,
+                                                                              strict=True))]]}
 
 
 def check(data: dict[str, Any], quick: bool) -> None:

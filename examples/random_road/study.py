@@ -27,17 +27,22 @@ def first_octave(height: np.ndarray) -> float:
     return float(np.sqrt((np.abs(waves[(order > 0.5) & (order < 2.01)]) ** 2).sum()))
 
 
-def rough(cells: int, short: float, seed: int) -> str:
-    """Return the &surface group of a self-affine road as high as the long wave in its octave."""
+def rough(cells: int, short: float, seed: int) -> tuple[str, float]:
+    """Return the &surface group of a self-affine road as high as the long wave in its octave.
+
+    And the mean square of its slope.
+    """
     # The three waves of the product of sines have a quarter of its amplitude each.
     wanted = road.STEEPNESS * road.LONG / 4.0 * np.sqrt(3.0 / 2.0)
     rows = 2 * round(cells / np.sqrt(12.0))
     height = asperity.surface.self_affine(
         cells, rows, lx=road.LONG, ly=road.LONG / np.sqrt(3.0), hurst=HURST,
         wavelength_long=road.LONG, wavelength_short=short, rms_height=1e-6, seed=seed)
+    factor = wanted / first_octave(height)
+    slope = asperity.surface.statistics(height, road.LONG, road.LONG / np.sqrt(3.0)).rms_slope
     return (f"&surface shape = 'self_affine', hurst = {HURST}, wavelength_long = {road.LONG!r},"
             f" wavelength_short = {short!r}, seed = {seed},"
-            f" rms_height = {float(1e-6 * wanted / first_octave(height))!r} /")
+            f" rms_height = {float(1e-6 * factor)!r} /"), float((slope * factor) ** 2)
 
 
 def compute(folder: Path, quick: bool) -> dict[str, Any]:
@@ -47,7 +52,8 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
     loads = [] if quick else [4e3, 40e3, 0.8e6]
     data: dict[str, Any] = {"speeds": np.array(sorted([road.SPEED, *speeds])),
                             "loads": np.array(sorted([road.PRESSURE, *loads]))}
-    for name, surface in (("wavy", road.waves(short)), ("random", rough(cells, short, 1))):
+    random, data["squares"] = rough(cells, short, 1)
+    for name, surface in (("wavy", road.waves(short)), ("random", random)):
         points = [(road.SPEED, road.PRESSURE), *((speed, road.PRESSURE) for speed in speeds),
                   *((road.SPEED, load) for load in loads)]
         cases = [road.case(
@@ -58,7 +64,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
         done = road.histories(folder / name, cases, common.LONG_WAVES)
         found = {point: road.measures(case) for point, case in zip(points, done, strict=True)}
         data[f"{name}_curve"] = {key: done[0][key] for key in ("road_x", "slid", "friction")}
-        for key in ("maximum", "plateau", "area", "slid_to_maximum"):
+        for key in ("maximum", "plateau", "area", "slid_to_maximum", "viscous"):
             data[f"{name}_{key}"] = found[road.SPEED, road.PRESSURE][key]
             data[f"{name}_{key}_speed"] = np.array(
                 [found[v, road.PRESSURE][key] for v in data["speeds"]])
@@ -83,6 +89,12 @@ def check(data: dict[str, Any], quick: bool) -> None:
     assert data["random_plateau"] < data["wavy_plateau"]
     assert data["random_maximum"] < data["wavy_maximum"]
     assert roughness(data["random_curve"]) < 0.7 * roughness(data["wavy_curve"])
+    # What the slopes leave above the viscous part, twice, is of their mean square: see check_slope.
+    for case in ("", "_speed", "_load"):
+        road.check_slope({name: data[f"wavy_{name}{case}"] for name in ("plateau", "viscous")})
+        rest = np.asarray(data[f"random_plateau{case}"]) - 1 - 2 * np.asarray(
+            data[f"random_viscous{case}"])
+        assert (rest > 0).all() and (rest < 2 * data["squares"]).all(), f"slopes leave {rest}"
     for name in ("wavy", "random"):
         assert data[f"{name}_plateau"] > 1.005
         assert data[f"{name}_maximum"] - data[f"{name}_plateau"] > 2e-3

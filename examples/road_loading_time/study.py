@@ -42,6 +42,7 @@ def check(data: dict[str, Any], quick: bool) -> None:
     # Contact grows with the time of rest, and the gap closes.
     assert (np.diff(data["area_loaded"]) > 0.0).all()
     assert (np.diff(data["gap_loaded"]) < 0.0).all()
+    road.check_slope(data)
     # After the shortest time the contact still grows and the gap still closes in sliding; after
     # the longest it is the other way round.
     assert data["area"][0] > data["area_loaded"][0] and data["gap"][0] < data["gap_loaded"][0]

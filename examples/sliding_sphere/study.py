@@ -107,6 +107,10 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
         data["profiles"].append({
             "speed": speed, "x": (run.grid.x - summit) / WIDTH, "pressure": pressure[row] / MEAN,
             "friction": float(run.history["friction"][-1])})
+        inside = pressure[row] > 0
+        x = data["profiles"][-1]["x"]
+        data["profiles"][-1] |= {"front": x[inside].max(), "back": x[inside].min(),
+                                 "spike": (pressure[row] / MEAN)[x > 1.0].max()}
     for name in ("friction", "area", "drift", "lost"):
         data[name] = np.array(data[name])
     return data

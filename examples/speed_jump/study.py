@@ -37,7 +37,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
                                surface.wavelength_short, rms_slope=surface.rms_slope)
     data = {"result": str(run.path), "history": history, "area_at_rest": area[0],
             "friction_peak": friction[fast].max(),
-            "rows_to_peak": int(friction[fast].argmax()) + 1}
+            "end": history["time"][-1], "rows_to_peak": int(friction[fast].argmax()) + 1}
     for name, rows, speed in (("slow", slow, 0.01), ("fast", steady, 1.0)):
         data[name] = {"area": area[rows].mean(), "friction": friction[rows].mean()}
         for gamma in (1.0, GAMMA):
@@ -74,4 +74,6 @@ def check(data: dict[str, Any], quick: bool) -> None:
 
 def picture(data: dict[str, Any]) -> Any:
     """Draw the overview of the result."""
-    return asperity.open(data["result"]).overview()
+    figure = asperity.open(data["result"]).overview()
+    figure.set_size_inches(11.5, 4.0)
+    return figure

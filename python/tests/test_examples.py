@@ -80,14 +80,73 @@ def test_a_study_that_does_not_hold_fails(tmp_path, monkeypatch, capsys):
     assert "wrong: FAILED: x is too large" in capsys.readouterr().err
 
 
+def test_a_warning_that_is_not_expected_fails(tmp_path, monkeypatch, capsys):
+    folder = tmp_path / "warns"
+    folder.mkdir()
+    (folder / "README.md").write_text("# Warns\n\nNothing.\n")
+    body = ('"""Warns."""\nimport warnings\nimport common\nfrom matplotlib.figure import Figure\n'
+            'MINUTES = 1\ndef compute(folder, quick):\n'
+            '    with common.expected("a step of (1 m)", "dull"):\n'
+            '        warnings.warn("case: {}")\n    return {{}}\n'
+            'def check(data, quick):\n    pass\ndef picture(data):\n    return Figure()\n')
+    monkeypatch.setattr(gallery, "EXAMPLES", tmp_path)
+    for said, status in (("a step of (1 m) is long", 0), ("two lines\\nof dull text", 0),
+                         ("stick-slip", 1)):
+        (folder / "study.py").write_text(body.format(said))
+        assert gallery.main(["--quick", "--jobs", "1", "warns"]) == status
+    assert "warns: FAILED: case: stick-slip" in capsys.readouterr().err
+
+
 def test_numbers_that_are_kept():
     import numpy as np
 
     data = {"x": np.float64(1.23456789), "a": np.arange(3) / 3, "long": np.zeros(100),
             "path": "/tmp/x.h5", "name": "gauss", "n": 3, "nan": float("nan"),
-            "nested": {"b": [1.0, 2.0]}}
+            "said": "give it 20 kg/m3", "nested": {"b": [1.0, 2.0]}, "none": [np.zeros(99)] * 2}
     assert gallery.numbers(data) == {"x": 1.23457, "a": [0.0, 0.333333, 0.666667], "name": "gauss",
-                                     "n": 3, "nested": {"b": [1.0, 2.0]}}
+                                     "n": 3, "said": "give it 20 kg/m3",
+                                     "nested": {"b": [1.0, 2.0]}}
+
+
+def values(kept):
+    """Return all numbers of a numbers.json."""
+    if isinstance(kept, dict | list):
+        inner = kept.values() if isinstance(kept, dict) else kept
+        return [number for one in inner for number in values(one)]
+    return [] if isinstance(kept, bool | str | None) else [abs(float(kept))]
+
+
+def told(text, known):
+    """Return whether a number as it is printed is one that is known, but for a power of ten."""
+    half = 0.5001 * 10.0 ** -len(text.partition(".")[2])
+    return any(abs(value * 10.0**power - float(text)) <= half
+               for value in known for power in range(-12, 13))
+
+
+@pytest.mark.parametrize("study", [one for one in STUDIES if one.module is not None],
+                         ids=named)
+def test_numbers_of_the_text_are_kept(study):
+    """Numbers of the tables, and those of three digits in what is seen, are those of the run."""
+    known = values(json.loads((study.folder / "numbers.json").read_text()))
+    seen = gallery.part(study.readme, "What is seen")
+    rows = [line.strip().strip("|").split("|") for line in seen.splitlines()
+            if line.strip().startswith("|")]
+    for row in rows:
+        if row[0].strip().startswith("thesis"):
+            continue
+        for cell in row:
+            number = re.fullmatch(r"[-−]?(\d+(?:\.\d+)?)(?: %)?", cell.strip())
+            assert number is None or told(number[1], known), f"{cell} is not in numbers.json"
+    # Inputs, too, may be named: what the study's sources and its first paragraph hold.
+    sources = [*study.folder.glob("*.py"), *study.folder.glob("*.nml"),
+               *(ROOT / "examples").glob("*.py")]
+    inputs = " ".join([study.readme.partition("\n## ")[0], *(path.read_text() for path in sources)])
+    known += [float(number) for number in re.findall(r"\d+(?:\.\d+)?", inputs)]
+    text = re.sub(r"`[^`]*`|\]\([^)]*\)|(?:eq\.|[Ff]igures?|[Ss]ections?) [\d., and]+|^ *\|.*$"
+                  r"|^    .*$", "", seen, flags=re.MULTILINE)
+    for number in re.findall(r"(?<![\w.,^])\d+(?:\.\d+)?(?![\w]|\.\d)", text):
+        if len(number.replace(".", "").lstrip("0")) >= 3:
+            assert told(number, known), f"{number} is not in numbers.json"
 
 
 def table_of(name):
