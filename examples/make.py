@@ -45,6 +45,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LONGEST = 40  # values of an array that numbers.json keeps
+#: What the chapters of the thesis are about, for the gallery.
+CHAPTERS = {1: "What is known (chapter 1)", 2: "Pressing, sinking in, pulling off (chapter 2)",
+            3: "Friction in the interface (chapter 3)", 4: "Rough roads (chapter 4)",
+            9: "Beside the thesis"}
 
 
 class Study:
@@ -178,12 +182,18 @@ def part(readme: str, heading: str) -> str:
 def gallery() -> str:
     """Return docs/gallery.md: each study's picture, what it is, and what the thesis says."""
     lines = ["# Gallery", "",
-             "The studies of the thesis and some beside it, in its order. Each has a page with its"
-             " numbers and the", "commands that make it; `python examples/make.py --list` lists"
-             " them. Made by `python examples/make.py --gallery`.", ""]
+             "The studies of R. Bugnicourt's thesis (INSA Lyon, 2017), and some beside it, in its"
+             " order: what is", "computed, what the thesis says of it, and where we differ and"
+             " why. Each has a page with its numbers and the", "commands that make it;"
+             " `python examples/make.py --list` lists them all. This page is made by",
+             "`python examples/make.py --gallery`.", ""]
+    chapter = 0
     for study in sorted(studies(), key=lambda one: (one.section(), one.name)):
+        if study.section()[0] != chapter:
+            chapter = int(study.section()[0])
+            lines += [f"## {CHAPTERS[chapter]}", ""]
         title, first, *_ = re.split(r"\n\s*\n", study.readme.strip())
-        lines += [f"## {title.removeprefix('# ').strip()}", "",
+        lines += [f"### {title.removeprefix('# ').strip()}", "",
                   f"![{study.title}](../examples/{study.name}/picture.png)", "",
                   _relinked(first, study.name), ""]
         thesis = part(study.readme, "The thesis")

@@ -16,7 +16,7 @@ import two_scale as road
 from matplotlib.figure import Figure
 
 #: Minutes of the full form on two cores.
-MINUTES = 12.0
+MINUTES = 15.0
 #: Energy of adhesion, J/m2, and its range, m: those of the thesis.
 ENERGY, RANGE = 20e-3, 63.5e-9
 #: Cells along x of the full form: 8 in the ripples of the short wave.
@@ -100,9 +100,9 @@ def check(data: dict[str, Any], quick: bool) -> None:
     assert sticky["maximum"] > bare["maximum"] + 0.3 * data["bound"]
     assert sticky["steady"] > bare["steady"] + 0.1 * data["bound"]
     # ... because the contact pulls: friction is that of the pressure and of energy/range on the
-    # area in contact, but for the slopes and the loss, which are those without adhesion (0.05, and
-    # 0.2 on high waves).
-    for case, other, slopes in ((sticky, bare, 0.05), (high, high_bare, 0.2)):
+    # area in contact, times what slopes and loss do without adhesion: within 0.05, and 0.1 on high
+    # waves, whose slopes weigh four times as much and are others where more is in contact.
+    for case, other, slopes in ((sticky, bare, 0.05), (high, high_bare, 0.1)):
         for what, area in (("steady", "area"), ("maximum", "at_maximum")):
             grip = (1.0 + data["bound"] * np.asarray(case[area])) * np.asarray(other[what])
             np.testing.assert_allclose(case[what], grip, rtol=slopes, err_msg=what)
@@ -115,7 +115,7 @@ def check(data: dict[str, Any], quick: bool) -> None:
     assert (np.diff(gain) < 0.01).all() and gain[-1] < (0.75 if quick else 0.5) * gain[0], \
         f"steady gains {gain}"
     assert (np.diff(data["c_high"]) < 0.0).all()
-    assert most.min() > 0.5 * most.max() > 0.0, f"gains of the maximum {most}"
+    assert most.min() > 0.4 * most.max() > 0.0, f"gains of the maximum {most}"
     assert (most > gain).all()
 
 

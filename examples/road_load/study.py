@@ -10,7 +10,7 @@ import two_scale as road
 from matplotlib.figure import Figure
 
 #: Minutes of the full form on two cores.
-MINUTES = 4.0
+MINUTES = 5.0
 LOWEST = 4e3
 
 
@@ -42,7 +42,7 @@ def check(data: dict[str, Any], quick: bool) -> None:
         # maximum before decreasing", and the mean gap tends to zero.
         top = int(found["plateau"].argmax())
         assert 0 < top < len(found["plateau"]) - 1, "no maximum against the load"
-        assert (np.diff(found["gap"]) < 0.0).all()
+        assert (np.diff(found["gap"]) < 1e-12).all()     # m: round-off where contact is full
         assert found["gap"][-1] < 0.03 * found["gap"][0]
         assert (np.diff(found["area_loaded"]) >= 0.0).all()
         # "Both the increase of viscoelastic loss and the increase in slope effect play an equally

@@ -174,7 +174,7 @@ def picture(data: dict[str, Any]) -> Figure:
     axes[1, 1].set(xlabel="thickness of the block, mm", ylabel="friction coefficient")
     for panel in axes.flat[1:]:
         panel.legend(fontsize="small")
-        panel.set_ylim(1.0, 1.2)
+        panel.set_ylim(1.0, 1.21)
     for panel in axes.flat:
         panel.grid(alpha=0.3)
     return figure
