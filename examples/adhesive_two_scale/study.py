@@ -140,7 +140,7 @@ def picture(data: dict[str, Any]) -> Figure:
                  title="default road, 1 m/s from 1 ms on")
     area.set(ylabel="fraction of the grid", xlabel="time (ms)", ylim=(0.0, 1.0))
     over.set(ylabel="friction coefficient", xlabel="speed of the drive (m/s)",
-             title="waves twice as high")
+             title="waves twice as high", ylim=(1.0, 1.8))
     high, bare = data["adhesive_high"], data["bare_high"]
     gain.loglog(data["speeds"], high["maximum"] - bare["maximum"], "s--", color=road.PURPLE,
                 label="what adhesion adds to the maximum")
@@ -152,5 +152,6 @@ def picture(data: dict[str, Any]) -> Figure:
     gain.set(xlabel="speed of the drive (m/s)", ylabel="friction coefficient, criterion")
     for axes in (friction, over, area, gain):
         axes.grid(alpha=0.3)
-        axes.legend(frameon=False, fontsize="small")
+        axes.legend(frameon=False, fontsize="small", ncols=2 if axes is over else 1,
+                    loc="upper right" if axes is over else "best")
     return figure
