@@ -95,7 +95,9 @@ def _run(folder: Path, name: str, cells: int) -> list[dict[str, Any]]:
                {"velocity_x": 0.1, "velocity_y": 0.03, "duration": 0.6e-3, "steps": 12}],
         solver={"passes": 8, "interpolation": "cubic", "tolerance": 1e-7, "slip_law": slip_law},
         output={"snapshot_every": 3})
-    run = common.run(case, folder / f"{name}.h5")
+    # Cells at the edge come and go with the whole shear strength: see the README.
+    with common.expected(*([common.UNSETTLED] if law == "constant_shear" else [])):
+        run = common.run(case, folder / f"{name}.h5")
     waves, grid = _waves(run.path), run.grid
     x0, y0 = np.meshgrid(grid.x, grid.y)
     found = []
