@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -79,7 +80,8 @@ def solve_adhesive(
     energy : float
         Work of adhesion, J/m2, >= 0.
     range : float
-        Range of the attraction, m. Cells should be smaller than 0.7 modulus range^2/energy.
+        Range of the attraction, m. Cells should be smaller than 0.7 modulus range^2/energy, or
+        the edge of the contact sticks to the grid: a warning says so.
     pressure, force, displacement : float
         The load, one of: mean pressure, Pa; force, N; approach from the first touch, m. Negative
         values pull.
@@ -135,6 +137,14 @@ def solve_adhesive(
         _library.check_depth(load, array)
     if control == "force":
         load /= lx * ly
+
+    cell = lx / array.shape[1] if array.shape[0] == 1 else max(
+        lx / array.shape[1], ly / array.shape[0])
+    if energy > 0.0 and cell > 0.7 * modulus * range**2 / energy:
+        warnings.warn(
+            f"cells of {cell:.4g} m are larger than 0.7 modulus range^2/energy ="
+            f" {0.7 * modulus * range**2 / energy:.4g} m: the edge of the contact sticks to the"
+            " grid", UserWarning, stacklevel=2)
 
     traction, gap, attraction = (np.zeros_like(array) for _ in "pga")
     level = 0.0

@@ -2,6 +2,7 @@
 
 import signal
 import subprocess
+import warnings
 
 import numpy as np
 import pytest
@@ -195,6 +196,18 @@ def test_program_tells_detachment(program, tmp_path):
 def sphere_map():
     return asperity.surface.shape("paraboloid", 48, 44, lx=40e-6, ly=38e-6, radius=RADIUS,
                                   boundary="free")
+
+
+def test_cells_too_coarse_for_the_range_are_told():
+    """In the words and by the bound of the program: 0.7 E* range^2/energy."""
+    bound = 0.7 * MODULUS * 0.1e-6**2 / ENERGY
+    n = round(SIDE / bound)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        press(n + 1, range=0.1e-6, displacement=0.0)
+    with pytest.warns(UserWarning, match=r"cells of .* m are larger than .* the edge of the contact"
+                                         " sticks to the grid"):
+        press(n - 1, range=0.1e-6, displacement=0.0)
 
 
 RESTARTED = """
