@@ -70,7 +70,7 @@ class Browser:
     def _wait(self):
         until = time.monotonic() + PATIENCE
         while time.monotonic() < until:
-            if port := re.search(r"on port (\d+)", self.told.read_text()):
+            if port := re.search(r"successfully on port (\d+)", self.told.read_text()):
                 self.root = f"http://127.0.0.1:{port[1]}"
                 with suppress(OSError):
                     if self._send("GET", "/status")["ready"]:

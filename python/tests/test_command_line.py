@@ -183,13 +183,13 @@ def test_reference(program):
     assert "| `nx` | integer |" in text
 
 
-def test_message_has_the_stated_form(program, folder):
-    done = check(program, folder, GOOD.replace("nx = 16", "nx = -4"))
+def test_message_has_the_stated_form(program, tmp_path):
+    done = check(program, tmp_path, GOOD.replace("nx = 16", "nx = -4"))
     assert done.returncode == 2
     assert done.err == "case.nml: &grid: nx = -4: must be a positive integer\n"
-    done = call(program, "run", "case.nml", cwd=folder)
+    done = call(program, "run", "case.nml", cwd=tmp_path)
     assert done.returncode == 2
-    assert not list(folder.glob("*.h5"))
+    assert not list(tmp_path.glob("*.h5"))
 
 
 def test_a_result_never_replaces_what_it_comes_from(program, tmp_path):
@@ -205,11 +205,10 @@ def test_a_result_never_replaces_what_it_comes_from(program, tmp_path):
     assert path.read_text().startswith(GOOD)
 
 
-def test_check_reads_height_maps(program, folder):
+def test_check_reads_height_maps(program, tmp_path):
     text = GOOD.replace("shape = 'sphere', radius = 0.01", "shape = 'file', file = 'map.h5'")
-    path = folder / "map.h5"
-    path.unlink(missing_ok=True)
-    assert check(program, folder, text).returncode == 3
+    path = tmp_path / "map.h5"
+    assert check(program, tmp_path, text).returncode == 3
     for values, status in (
         (np.zeros((8, 16)), 0),
         (np.zeros((16, 8)), 2),
@@ -217,10 +216,10 @@ def test_check_reads_height_maps(program, folder):
     ):
         with h5py.File(path, "w") as file:
             file["surface/height"] = values
-        done = check(program, folder, text)
+        done = check(program, tmp_path, text)
         assert done.returncode == status, done.err
         assert status == 0 or "map.h5" in done.err
-    assert call(program, "check", folder / "case.nml").returncode == 2  # from another folder
+    assert call(program, "check", tmp_path / "case.nml").returncode == 2  # from another folder
 
 
 def test_a_missing_height_map_is_told_with_its_place(program, tmp_path):
@@ -254,8 +253,8 @@ def test_info_of_a_killed_run_says_how_long_a_row_takes(program, tmp_path):
     assert "going on, or killed: the last row took 2.25 s; see whether rows are added" in done.out
 
 
-def test_info(program, folder):
-    path = folder / "result.h5"
+def test_info(program, tmp_path):
+    path = tmp_path / "result.h5"
     with h5py.File(path, "w") as file:
         file.attrs.update(
             title="A title",
