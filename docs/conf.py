@@ -24,7 +24,7 @@ include_patterns = ["docs/*.md", "docs/api/*", "examples/*/README.md", "README.m
                     "CONTRIBUTING.md", "CHANGELOG.md"]
 root_doc = "docs/index"
 highlight_language = "none"
-smartquotes = False                     # 'none' is a value of the input, quotes included
+smartquotes_action = "De"               # dashes; 'none' is a value of the input, quotes included
 default_role = "py:obj"
 nitpicky = False                        # the words for types in docstrings are for people
 
