@@ -1,6 +1,7 @@
 """Numerical stick-slip of a thick block, and its cures: more passes, or inertia.
 
-A sine road under a viscoelastic block without mass, as in the thesis's section 3.6.
+A sine road under a viscoelastic block without mass, as in the thesis's section 3.6. Then a cylinder
+whose contact sticks and slips in places only.
 """
 
 from __future__ import annotations
@@ -31,6 +32,10 @@ CASES = {
 }
 SICK = ("1 pass", "1 pass, half the step")
 CURED = ("4 passes", "8 passes", "1 kg/m³", "10 kg/m³")
+#: passes, steps a cell, friction coefficient
+LOCAL = {"1 pass": (1, 1, 1.5), "8 passes": (8, 1, 1.5), "8 passes, half the step": (8, 2, 1.5),
+         "half the friction, 1 pass": (1, 1, 0.75), "half the friction, 8 passes": (8, 1, 0.75)}
+LAST = 24                          # steps of the local cases that are looked at
 ELASTIC = "elastic, "              # the same block without the arm
 
 
@@ -64,10 +69,45 @@ def _slide(folder: Path, name: str, quick: bool) -> dict[str, Any]:
     }
 
 
+def _creep(folder: Path, name: str) -> dict[str, Any]:
+    """Return what alternates from step to step in the contact of the cylinder."""
+    passes, finer, friction = LOCAL[name]
+    case = asperity.Case.read(HERE / "local.nml")
+    case.solver.passes = passes
+    case.friction.coefficient = friction
+    case.phase[1].steps *= finer
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)          # its passes do not settle
+        run = asperity.run(case, output=folder / f"local_{list(LOCAL).index(name)}.h5",
+                           threads=common.jobs)
+    last = run.snapshots[-LAST:]
+    pressure = np.array([one.pressure[0] for one in last])
+    # moved to where the centre of the load is in the middle, the first by whole cells
+    n = pressure.shape[1]
+    wave = np.fft.fft(pressure, axis=1)
+    turn = np.unwrap(np.angle(wave[:, 1])) + np.pi
+    turn += 2 * np.pi / n * round(turn[0] * n / (2 * np.pi)) - turn[0]
+    steady = np.fft.ifft(wave * np.exp(-1j * np.outer(turn, np.fft.fftfreq(n, 1 / n))), axis=1).real
+    second = np.diff(steady, 2, axis=0)
+    signs = (-1.0) ** np.arange(len(second))
+    strain = [np.abs(np.gradient(one.displacement_x[0], run.grid.dx)).max() for one in last]
+    return {
+        "pressure": [np.roll(pressure[k], round(turn[k] * n / (2 * np.pi))) for k in (-2, -1)],
+        "x": np.array(run.grid.x),
+        "alternates": float(np.abs((signs[:, None] * second).mean(0)).max() / 4 / pressure.max()),
+        "strain": float(np.mean(strain)),
+        "sticks": float(np.mean([(one.contact == 1).sum() / (one.contact > 0).sum()
+                                 for one in last])),
+        "speed": float(np.ptp(run.history["sliding_speed"][-LAST:])),
+    }
+
+
 def compute(folder: Path, quick: bool) -> dict[str, Any]:
     """Run all cases; the quick form takes half the cells, the worst and the best of them."""
     names = ("1 pass", "1 pass, half the step", "4 passes", "10 kg/m³") if quick else tuple(CASES)
-    return {"cases": {name: _slide(folder, name, quick) for name in names}}
+    local = (*LOCAL,)[1::3] if quick else tuple(LOCAL)
+    return {"cases": {name: _slide(folder, name, quick) for name in names},
+            "local": {name: _creep(folder, name) for name in local}}
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
@@ -93,6 +133,15 @@ def check(data: dict[str, Any], quick: bool) -> None:
     # 0.8, and what the slopes and the rubber add; stick-slip gives less of it
     assert steady[0] > 0.8, f"friction {steady[0]}"
     assert cases["1 pass"]["mean_friction"] < steady[0] - 0.002, "friction is as it was"
+    for name, one in data["local"].items():
+        assert one["speed"] < 1e-6 * SPEED, f"local, {name}: the whole does not slide steadily"
+        if LOCAL[name][2] > 1:
+            # of the largest pressure, from step to step; no cure by passes or steps
+            assert one["alternates"] > 0.02, f"local, {name}: alternates {one['alternates']:.2g}"
+            assert one["sticks"] > 0, f"local, {name}: nothing sticks"
+    calm = data["local"]["half the friction, 8 passes"]
+    assert calm["alternates"] < 0.002, f"small strains: alternates {calm['alternates']:.2g}"
+    assert calm["sticks"] == 0, "small strains: some cells stick"
     if quick:
         return
     # the elastic block: the lag of the friction is enough, without one of the rubber
@@ -108,7 +157,7 @@ def check(data: dict[str, Any], quick: bool) -> None:
 
 def picture(data: dict[str, Any]) -> Figure:
     """Draw the sliding speed in time and near the end, friction, and the unrest."""
-    figure, ((first, second), (third, fourth)) = common.subplots(2, 2, width=5.6)
+    figure, ((first, second), (third, fourth), (fifth, sixth)) = common.subplots(2, 3, width=5.6)
     cases = data["cases"]
     shown = [name for name in ("1 pass", "4 passes", "10 kg/m³") if name in cases]
     for panel, column, label in ((first, "speed", "mean sliding speed, m/s"),
@@ -136,4 +185,18 @@ def picture(data: dict[str, Any]) -> Figure:
                title="orange: the program warns")
     fourth.set_yticks(range(len(names)), names)
     fourth.invert_yaxis()
+    sick = data["local"][next(iter(data["local"]))]
+    for number, label in enumerate(("a step", "the next")):
+        fifth.plot(1e3 * sick["x"], 1e-6 * np.array(sick["pressure"][number]), marker="os"[number],
+                   ms=3, lw=1, color=common.COLOURS[number], label=label)
+    loaded = np.flatnonzero(np.array(sick["pressure"][0]) > 0.01 * np.max(sick["pressure"]))
+    fifth.set(xlabel="x, moved with the road, mm", ylabel="pressure, MPa",
+              xlim=(1e3 * sick["x"][loaded[0] - 4], 1e3 * sick["x"][min(loaded[-1] + 4, 191)]),
+              title="local: a cylinder, friction 1.5, 1 pass")
+    fifth.legend()
+    names = list(data["local"])
+    sixth.barh(range(len(names)), [data["local"][name]["alternates"] for name in names])
+    sixth.set(xscale="log", xlabel="pressure that alternates, of the largest", title="local")
+    sixth.set_yticks(range(len(names)), names)
+    sixth.invert_yaxis()
     return figure

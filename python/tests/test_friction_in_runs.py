@@ -211,3 +211,30 @@ def test_road_goes_with_the_rubber_at_a_jump(tmp_path):
         level = history["displacement"][row] - height.max()
         seen = snapshot.displacement_z - snapshot.gap - level
         assert np.abs(seen - read_map(height, x, y)).max() < 1e-5 * np.ptp(height), row
+
+
+def test_road_that_returns_under_stick(tmp_path):
+    """Where the road is back nothing is left to be found, to a small tolerance, too.
+
+    The rubber has been sheared for a while: tractions of the arms remain.
+    """
+    case = tmp_path / "back.nml"
+    case.write_text(f"""&grid nx = 15, ny = 18, lx = 1e-3, ly = 1.4e-3, boundary = 'free' /
+&surface shape = 'paraboloid', radius = 2.3e-3 /
+&material poisson = 0.3, shear_modulus = 1.4e6, prony_g = 2.5e6, prony_tau = 2.3e-3 /
+&friction law = 'constant_shear', slope_effect = .false., shear_strength = 1.1e4 /
+&phase pressure = 1e4, relaxed = .true. /
+&phase duration = 7e-4, steps = 4, velocity_x = 3.6e-5, velocity_y = 1.5e-4 /
+&phase duration = 2e-4, steps = 4, velocity_x = -1.26e-4, velocity_y = -5.25e-4 /
+&solver threads = 1, tolerance = 1e-9, passes = 8, max_iterations = 300 /
+&output file = '{tmp_path / "back.h5"}', snapshot_every = 1 /
+""")
+    run = asperity.run(case, quiet=True)                  # raises where a step is not solved
+    history = run.history
+    assert abs(history["road_x"][-1]) < 1e-20
+    assert history["iterations_tangential"].max() < 60
+    assert (history["stick_area"] == history["contact_area"]).all()
+    far = max(np.abs(one.displacement_x).max() for one in run.snapshots)
+    touching = run.snapshots[-1].contact > 0
+    assert np.abs(run.snapshots[-1].displacement_x[touching]).max() < 1e-8 * far
+    assert np.abs(history["traction_x"][-1]) > 1e-3 * np.abs(history["traction_x"]).max()

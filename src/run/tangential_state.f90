@@ -121,6 +121,8 @@ contains
       self%q = material%q
       self%moved = self%moved .or. any(abs(motion) > 0.0_dp)
       if (.not. self%moved) return
+      ! A road that goes back where it began leaves displacements of round-off.
+      self%solver%least_scale = self%q*norm2(motion)
       call history_field(self%history, material, self%past)
       self%past_mean = means(self, self%past)
       do c = 1, 2

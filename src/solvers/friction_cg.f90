@@ -13,7 +13,7 @@
 !> (the fallback alone) and 'thesis' (`friction_cg_thesis`). Converged means both the criterion of
 !> the thesis, |T' - T|/|T'| <= tolerance (eq. 3.15), and the residual of all points: the largest
 !> slip of a sticking point, part of the slip across its traction, or slip against it, over the RMS
-!> of DX or of A T in the contact, whichever is larger.
+!> of DX or of A T in the contact, or over the least scale, whichever is largest.
 !>
 !> Memory beside the caller's fields: eleven fields, the two of the operator's spectrum and the two
 !> of the preconditioner's with its symbols (3/4 of a field).
@@ -59,6 +59,9 @@ module friction_cg
       !> T has to settle too, |T' - T|/|T'| <= tolerance. Without it the displacements are good to the
       !> tolerance, T is less so.
       logical :: settle = .true.
+      !> The displacements count as this large at least, in the units of DX': of the parts that make
+      !> them up, where these may cancel.
+      real(dp) :: least_scale = 0.0_dp
       logical :: near = .false.                  !! T starts near the solution, as in a step like the last
       type(convolution_type), private :: preconditioner
       logical, private :: periodic = .true.
@@ -186,6 +189,7 @@ contains
       problem%compliance = self%compliance
       problem%settle = self%settle
       problem%near = self%near
+      problem%least_scale = self%least_scale
       problem%p => p
       problem%hx => slope_x
       problem%hy => slope_y

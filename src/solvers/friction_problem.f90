@@ -68,6 +68,7 @@ module friction_problem
       real(dp) :: weighted_tangent(2, 2) = 0.0_dp     !! E = sum of w Z
       real(dp) :: curved_tangent(2, 2) = 0.0_dp       !! sum of lam w^2 Z
       real(dp) :: gain_left = 0.0_dp         !! g'.(T' - T) of the last move, with g' after it
+      real(dp) :: least_scale = 0.0_dp       !! of the displacements, m: less than this does not count
       real(dp) :: scale = 0.0_dp             !! of the displacements, m
       real(dp) :: residual = 0.0_dp          !! largest |g| over that scale
       real(dp) :: change = 0.0_dp            !! |T' - T|/|T'| of the last move (thesis, eq. 3.15)
@@ -308,7 +309,7 @@ contains
       self%weighted_tangent = reshape([sums(7), sums(8), sums(8), sums(9)], [2, 2])
       self%curved_tangent = reshape([sums(10), sums(11), sums(11), sums(12)], [2, 2])
       self%gain_left = sums(13)
-      scale = sqrt(max(sums(3), sums(4))/max(self%cells, 1))
+      scale = max(sqrt(max(sums(3), sums(4))/max(self%cells, 1)), self%least_scale)
       self%residual = sqrt(global_max(largest))
       if (scale > 0.0_dp) self%residual = self%residual/scale
       self%scale = merge(scale, 1.0_dp, scale > 0.0_dp)
