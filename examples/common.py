@@ -35,9 +35,6 @@ FEW_CELLS = "the shortest wave has"
 LONG_WAVES = "is not below the side of"
 #: Cells too wide for the range of adhesion.
 WIDE_CELLS = "the edge of the contact sticks to the grid"
-#: The warning of a free map's edge measures the gap there by the height of the whole map, which
-#: grows with the way that the road slides.
-EDGE = "points enter or leave the free map"
 #: Passes of a coupled step that swing between two states.
 UNSETTLED = "the passes of a step do not settle"
 #: Numerical stick-slip.

@@ -33,6 +33,8 @@ contains
          call test_few_iterations(thesis)
       end do
       call test_small_load()
+      call test_drowned_load()
+      call test_small_contact()
       call test_offset()
       call test_edge_of_map()
       call test_shapes()
@@ -256,6 +258,81 @@ contains
          end do
       end do
    end subroutine test_small_load
+
+   !> Loads that drown in the round-off of a step are met all the same: on strips, and after larger ones.
+   subroutine test_drowned_load()
+      real(dp), parameter :: loads(8) = [2e-2_dp, 3e-8_dp, 1e-14_dp, 2e-18_dp, 1e-5_dp, 4e-18_dp, &
+         2e-13_dp, 1e-1_dp]
+      type(grid_type) :: grid
+      type(normal_problem_type) :: problem
+      type(solution_type) :: s
+      real(dp), allocatable :: h(:, :), start(:, :)
+      integer :: i, k, n
+
+      do n = 1, 5, 2
+         grid = new_grid(128, n, 1.0_dp, n/128.0_dp, boundary_periodic)
+         if (allocated(h)) deallocate (h, start)
+         allocate (h(128, n), start(128, n))
+         do i = 1, 128
+            h(i, :) = sqrt(1.0_dp - ((i - 65)*grid%dx)**2) - 1.0_dp
+         end do
+         problem%modulus = unit_modulus
+         do k = 1, size(loads)
+            problem%target = loads(k)
+            call run_problem(grid, problem, h, s)
+            call check_that(s%outcome%converged, 'a drowned load: '//s%outcome%reason)
+            call check_close(sum(s%pressure)/(loads(k)*size(h)), 1.0_dp, 1e-6_dp, 'a drowned load is met')
+            if (k > 1) then
+               call run_problem(grid, problem, h, s, start=start)
+               call check_that(s%outcome%converged, 'a drowned load after another: '//s%outcome%reason)
+               call check_close(sum(s%pressure)/(loads(k)*size(h)), 1.0_dp, 1e-6_dp, 'it is met')
+            end if
+            start = s%pressure
+         end do
+      end do
+   end subroutine test_drowned_load
+
+   !> A small contact on a tall map is as exact as on a small map: of a paraboloid, five cells of radius.
+   subroutine test_small_contact()
+      integer, parameter :: sides(3) = [50, 160, 400]
+      type(grid_type) :: grid
+      type(normal_problem_type) :: problem
+      type(solution_type) :: s, t
+      real(dp), allocatable :: h(:, :)
+      logical :: thesis
+      integer :: boundary, i, j, k, l, n
+
+      do boundary = boundary_periodic, boundary_free
+         do k = 1, size(sides)
+            n = sides(k)
+            grid = new_grid(n, n, 1e-3_dp*n, 1.1e-3_dp*n, boundary)
+            if (allocated(h)) deallocate (h)
+            allocate (h(n, n))
+            do j = 1, n
+               do i = 1, n
+                  h(i, j) = -0.5_dp*(((i - n/2)*grid%dx)**2 + ((j - n/2)*grid%dy)**2)
+               end do
+            end do
+            problem%modulus = unit_modulus
+            problem%target = 4.0_dp*5e-3_dp**3/(3.0_dp*grid%lx*grid%ly)
+            do l = 1, 2
+               thesis = l == 2
+               problem%tolerance = 1e-10_dp
+               call run_problem(grid, problem, h, s, thesis)
+               problem%tolerance = 1e-5_dp
+               call run_problem(grid, problem, h, t, thesis)
+               call check_that(s%outcome%converged .and. t%outcome%converged, 'a small contact')
+               call check_that(count(s%pressure > 0.0_dp) > 70, 'it is resolved')
+               call check_close(maxval(abs(t%pressure - s%pressure))/maxval(s%pressure), 0.0_dp, &
+                  2e-3_dp, 'a small contact: the pressure')
+               call check_close((t%level - s%level)/25e-6_dp, 0.0_dp, 1e-4_dp, &
+                  'a small contact: the approach')
+               call check_that(t%outcome%residual <= problem%tolerance, 'a small contact: its residual')
+               call check_that(t%outcome%iterations < 20, 'a small contact: few iterations')
+            end do
+         end do
+      end do
+   end subroutine test_small_contact
 
    !> The height's zero is no matter.
    subroutine test_offset()

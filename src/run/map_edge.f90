@@ -1,7 +1,9 @@
 !> The edge of a free map: what lies beyond it is left out of the contact.
 !>
 !> Outside the given map the road is at its lowest, and what moves off the map is lost. That is
-!> right as long as the points at the edge lie well below the contact.
+!> right as long as the points at the edge lie well below the contact: by a tenth of what the rubber is
+!> displaced by under the load, and, where it adheres, by some ranges of the attraction. (A tenth of the
+!> rms height is enough, too; but that of a long map on which a summit travels says nothing.)
 module map_edge
    use parallel, only : global_min, global_sum
    use precision, only : dp
@@ -12,7 +14,8 @@ module map_edge
 
    public :: look_at_edge
 
-   real(dp), parameter :: well_below = 0.1_dp     !! least gap of a moving edge over the rms height
+   real(dp), parameter :: well_below = 0.1_dp     !! least gap of a moving edge over depth or rms height
+   real(dp), parameter :: out_of_reach = 5.0_dp   !! least gap of a moving edge over the range of adhesion
 
    integer, parameter, public :: edge_clear = 0   !! `state` of `look_at_edge`
    integer, parameter, public :: edge_near = 1
@@ -21,19 +24,24 @@ module map_edge
 contains
 
    !> Look at the cells at the edge: those that enter or leave within a step, one at least.
-   subroutine look_at_edge(grid, adhesive, pressure, gap, move_x, move_y, rms_height, state, message)
+   subroutine look_at_edge(grid, range, pressure, displacement, gap, move_x, move_y, rms_height, &
+      state, message)
       type(grid_type), intent(in) :: grid
-      logical, intent(in) :: adhesive                !! contact is where the gap is zero, not where P > 0
+      real(dp), intent(in) :: range                  !! of adhesion, m: contact is where the gap is zero
+      !                                                 then; 0: there is none, contact is where P > 0
       real(dp), intent(in) :: pressure(:, :)         !! Pa, [nx, ny]
+      real(dp), intent(in) :: displacement(:, :)     !! U_z, m, [nx, ny]
       real(dp), intent(in) :: gap(:, :)              !! m, [nx, ny]
       real(dp), intent(in) :: move_x, move_y         !! of the road in the step, m
       real(dp), intent(in) :: rms_height             !! of the road, m
       integer, intent(inout) :: state                !! what was found so far; only worse is told
       character(:), allocatable, intent(inout) :: message   !! a line is added; without the time
-      real(dp) :: least
+      real(dp) :: depth, least, near
+      logical :: adhesive
       integer :: i, j, touching, wx, wy
 
       if (grid%boundary /= boundary_free) return
+      adhesive = range > 0.0_dp
       wx = min(1 + ceiling(min(abs(move_x)/grid%dx, real(grid%nx, dp))), grid%nx)
       wy = min(1 + ceiling(min(abs(move_y)/grid%dy, real(grid%ny, dp))), grid%ny)
       touching = 0
@@ -58,10 +66,13 @@ contains
             'the map is left out: a larger map is needed')
       else if (abs(move_x) + abs(move_y) > 0.0_dp .and. least < well_below*rms_height &
          .and. state < edge_near) then
+         depth = depth_of_contact(pressure, displacement)
+         near = max(well_below*min(depth, rms_height), out_of_reach*range)
+         if (least >= near) return
          state = edge_near
          call tell('points enter or leave the free map only '//to_text(least)// &
-            ' m below the contact, with an rms height of '//to_text(rms_height)// &
-            ' m: they must lie well below it, a larger map is needed')
+            ' m below the rubber, which is displaced by '//to_text(depth)//' m under the load: less than '// &
+            to_text(near)//' m is near, a larger map is needed')
       end if
 
    contains
@@ -75,5 +86,25 @@ contains
       end subroutine tell
 
    end subroutine look_at_edge
+
+   !> Mean displacement under the load, m: weighted by the pressure where that is positive.
+   function depth_of_contact(pressure, displacement) result(depth)
+      real(dp), intent(in) :: pressure(:, :), displacement(:, :)
+      real(dp) :: depth
+      real(dp) :: load, work
+      integer :: i, j
+
+      load = 0.0_dp
+      work = 0.0_dp
+      do j = 1, size(pressure, 2)
+         do i = 1, size(pressure, 1)
+            load = load + max(pressure(i, j), 0.0_dp)
+            work = work + max(pressure(i, j), 0.0_dp)*displacement(i, j)
+         end do
+      end do
+      load = global_sum(load)
+      work = global_sum(work)
+      depth = max(work/max(load, tiny(1.0_dp)), 0.0_dp)
+   end function depth_of_contact
 
 end module map_edge

@@ -376,8 +376,9 @@ contains
       character(:), allocatable :: message
 
       message = ''
-      call look_at_edge(self%grid, self%side%adhesive, self%pressure, self%gap, &
-         plan%road_x - self%row%road_x, plan%road_y - self%row%road_y, self%rms_height, self%edge, message)
+      call look_at_edge(self%grid, merge(self%case%adhesion%range, 0.0_dp, self%side%adhesive), &
+         self%pressure, self%displacement, self%gap, plan%road_x - self%row%road_x, &
+         plan%road_y - self%row%road_y, self%rms_height, self%edge, message)
       call add_warning(self, plan, message)
    end subroutine watch_edge
 

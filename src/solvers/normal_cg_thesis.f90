@@ -7,8 +7,8 @@
 module normal_cg_thesis
    use fft_conv, only : convolution_type
    use normal_state, only : control_pressure, evaluate_gap, first_pressure, gap_measure_type, &
-      measure_gap, normal_problem_type, prepare_problem, reason_converged, reason_iterations, &
-      reason_undetermined
+      measure_gap, narrow_scale, normal_problem_type, prepare_problem, reason_converged, &
+      reason_iterations, reason_undetermined
    use omp_lib, only : omp_get_wtime
    use parallel, only : global_sum
    use precision, only : dp, int64
@@ -54,11 +54,9 @@ contains
          call evaluate_gap(task, operator, height, pressure, gap, history)
          measure = measure_gap(task, pressure, gap, operator%threads)
          if (.not. determined) exit
-         if (measure%error <= task%tolerance) then
-            outcome%converged = .true.
-            outcome%reason = reason_converged
-            exit
-         end if
+         if (measure%error <= task%tolerance) &
+            call narrow_scale(task, height, pressure, operator%threads, measure)
+         if (measure%strict <= task%tolerance) exit
          if (outcome%iterations == task%max_iterations) exit
          outcome%iterations = outcome%iterations + 1
 
@@ -80,6 +78,8 @@ contains
             exit
          end if
       end do
+      outcome%converged = determined .and. measure%error <= task%tolerance
+      if (outcome%converged) outcome%reason = reason_converged
       level = measure%weighted_level
       outcome%residual = measure%error
       outcome%load_error = measure%load_error

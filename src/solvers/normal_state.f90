@@ -9,7 +9,7 @@ module normal_state
    private
 
    public :: combine_measures, evaluate_gap, first_pressure, gap_measure_type, measure_gap, &
-      normal_problem_type, prepare_problem, row_measure, rms_about_mean
+      narrow_scale, normal_problem_type, prepare_problem, row_measure, rms_about_mean
 
    character(*), parameter, public :: reason_converged = 'converged'
    character(*), parameter, public :: reason_iterations = 'the limit of iterations was reached'
@@ -18,6 +18,8 @@ module normal_state
 
    integer, parameter, public :: control_pressure = 1   !! the mean pressure is prescribed
    integer, parameter, public :: control_approach = 2   !! U - H where the gap is zero is prescribed
+
+   real(dp), parameter :: shallow = 10.0_dp             !! longest scale over the displacement under load
 
    !> A normal contact problem but for its fields.
    type :: normal_problem_type
@@ -28,6 +30,8 @@ module normal_state
       integer :: max_iterations = 1000
       logical :: warm = .false.             !! the pressure handed in is a start
       real(dp) :: rms_height = 0.0_dp       !! of H about its mean, m; 0: not known yet
+      real(dp) :: scale = 0.0_dp            !! height that the duality gap is solved to; set here, m
+      real(dp) :: least_scale = 0.0_dp      !! the least one that round-off allows; set here, m
    end type normal_problem_type
 
    !> How far a state is from the solution.
@@ -36,7 +40,9 @@ module normal_state
       real(dp) :: weighted_level = 0.0_dp   !! mean of U - H weighted by P, or the prescribed one, m
       real(dp) :: load = 0.0_dp             !! sum of P over the cells, Pa
       real(dp) :: load_error = 0.0_dp       !! relative
-      real(dp) :: error = 0.0_dp            !! the larger of the duality gap and the load error
+      real(dp) :: duality_gap = 0.0_dp      !! mean of U - H weighted by P above its least, m
+      real(dp) :: error = 0.0_dp            !! e1: duality gap over the rms height, or the load error
+      real(dp) :: strict = 0.0_dp           !! the same, the gap over the problem's scale
    end type gap_measure_type
 
 contains
@@ -80,7 +86,37 @@ contains
          task%rms_height = max(task%rms_height, resolved/problem%tolerance)
       end if
       task%rms_height = max(task%rms_height, tiny(1.0_dp))
+      task%scale = task%rms_height
+      task%least_scale = min(task%rms_height, resolved/problem%tolerance)
+      if (highest - lowest <= resolved) task%least_scale = task%rms_height
    end subroutine prepare_problem
+
+   !> Set the height that the duality gap is solved to for a state near the solution.
+   !>
+   !> The rms height says little where the contact is small on a tall map, as of a sphere's summit: then
+   !> the mean displacement under the load does, and the scale is ten times that. On a rough contact it
+   !> is the rms height.
+   subroutine narrow_scale(task, height, pressure, threads, measure)
+      type(normal_problem_type), intent(inout) :: task
+      real(dp), intent(in) :: height(:, :), pressure(:, :)
+      integer, intent(in) :: threads
+      type(gap_measure_type), intent(inout) :: measure
+      real(dp), allocatable :: rows(:)
+      real(dp) :: displacement
+      integer :: j
+
+      if (measure%load <= 0.0_dp) return
+      allocate (rows(size(height, 2)))
+      !$omp parallel do default(none) shared(height, pressure, rows) private(j) num_threads(threads)
+      do j = 1, size(height, 2)
+         rows(j) = dot_product(height(:, j), pressure(:, j))
+      end do
+      displacement = global_sum(sum(rows))/measure%load + measure%weighted_level
+      task%scale = task%rms_height
+      if (displacement > 0.0_dp) &
+         task%scale = min(task%rms_height, max(shallow*displacement, task%least_scale))
+      measure%strict = max(measure%duality_gap/task%scale, measure%load_error)
+   end subroutine narrow_scale
 
    !> The highest, the lowest and the sum of a row.
    function row_extent(row) result(extent)
@@ -131,7 +167,7 @@ contains
       real(dp), intent(in) :: cells                !! number of cells of the whole grid
       real(dp), intent(in) :: rows(:, :)           !! [6, ny]: `row_measure` and the least gap
       type(gap_measure_type) :: measure
-      real(dp) :: sums(5), least, height
+      real(dp) :: sums(5), least
       integer :: j
 
       sums = 0.0_dp
@@ -140,25 +176,25 @@ contains
       end do
       sums = global_sum(sums)
       least = global_min(minval(rows(6, :)))
-      height = problem%rms_height
       measure%load = sums(1)
       if (problem%control == control_approach) then
          measure%level = problem%target
          measure%weighted_level = problem%target
-         measure%error = max(measure%level - least, 0.0_dp)/height
-         if (sums(1) > 0.0_dp) measure%error = max(measure%error, sums(5)/sums(1)/height)
+         measure%duality_gap = max(measure%level - least, 0.0_dp)
+         if (sums(1) > 0.0_dp) measure%duality_gap = max(measure%duality_gap, sums(5)/sums(1))
       else if (sums(1) > 0.0_dp) then
          measure%level = sums(3)/sums(4)
          measure%weighted_level = sums(2)/sums(1)
          measure%load_error = abs(sums(1)/(cells*problem%target) - 1.0_dp)
-         measure%error = max((measure%weighted_level - least)/height, measure%load_error)
+         measure%duality_gap = measure%weighted_level - least
       else
          ! No load, and none is wanted: the surfaces just touch.
          measure%level = least
          measure%weighted_level = least
          measure%load_error = merge(1.0_dp, 0.0_dp, problem%target > 0.0_dp)
-         measure%error = measure%load_error
       end if
+      measure%error = max(measure%duality_gap/problem%rms_height, measure%load_error)
+      measure%strict = max(measure%duality_gap/problem%scale, measure%load_error)
    end function combine_measures
 
    !> The measure of a state.

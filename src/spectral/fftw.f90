@@ -9,6 +9,7 @@ module fftw
 
    integer(c_int), parameter :: fftw_measure = 0
    integer(c_int), parameter :: fftw_estimate = 64
+   integer(c_int), parameter :: fftw_wisdom_only = 2097152   !! a plan that is known already, or none
    integer(c_int), parameter :: fftw_forward = -1
    integer(c_int), parameter :: fftw_backward = 1
    integer(c_int), parameter :: fftw_redft00 = 3

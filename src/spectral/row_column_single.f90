@@ -16,12 +16,12 @@ module row_column_single
       fft_plan_many_dft_r2c => fftwf_plan_many_dft_r2c
    use omp_lib, only : omp_get_thread_num
    use precision, only : dp, wp => sp
-   use wisdom, only : planning_flag, save_wisdom
+   use wisdom, only : from_measuring, from_memory, planning_flag, save_wisdom
    implicit none
    private
 
    public :: new_row_column, row_column_type
 
-   include 'row_column.inc'      ! state 71488a51, written by tools/check_sources.py --update
+   include 'row_column.inc'      ! state 0b80921c, written by tools/check_sources.py --update
 
 end module row_column_single

@@ -3,16 +3,20 @@
 !> Measured plans are faster, but two measurements may choose differently and then differ in the last
 !> bits. So plans are measured only where their wisdom can be kept: a run, its restart and its
 !> repetition use the same plans. Elsewhere the planner's estimate is used, which never varies.
+!> The files are written only where something was learnt, with what other processes have learnt since.
 !> The folder is $XDG_CACHE_HOME/asperity or $HOME/.cache/asperity.
 module wisdom
    use, intrinsic :: iso_c_binding, only : c_char, c_int, c_null_char
    use fftw, only : fftw_estimate, fftw_export_wisdom_to_filename, &
-      fftw_import_wisdom_from_filename, fftw_measure, fftwf_export_wisdom_to_filename, &
-      fftwf_import_wisdom_from_filename
+      fftw_import_wisdom_from_filename, fftw_measure, fftw_wisdom_only, &
+      fftwf_export_wisdom_to_filename, fftwf_import_wisdom_from_filename
    implicit none
    private
 
    public :: planning_flag, save_wisdom
+
+   integer, parameter, public :: from_memory = 1     !! plans that are known already, or none
+   integer, parameter, public :: from_measuring = 2  !! any plan
 
    logical :: started = .false.
    logical :: kept = .false.
@@ -45,7 +49,8 @@ contains
 
    !> The flag for FFTW's planner; reads the kept wisdom at the first call.
    !> To be called inside the critical section `fftw_planner`.
-   integer(c_int) function planning_flag() result(flag)
+   integer(c_int) function planning_flag(attempt) result(flag)
+      integer, intent(in) :: attempt           !! `from_memory` first, `from_measuring` where that fails
       integer(c_int), parameter :: writable = 2
       integer(c_int) :: status
 
@@ -54,22 +59,29 @@ contains
          call find_folder()
          kept = len(folder) > 0
          if (kept) kept = c_access(folder//c_null_char, writable) == 0
-         if (kept) then
-            status = fftw_import_wisdom_from_filename(folder//'/fftw'//c_null_char)
-            status = fftwf_import_wisdom_from_filename(folder//'/fftwf'//c_null_char)
-         end if
+         if (kept) call read_wisdom()
       end if
-      flag = merge(fftw_measure, fftw_estimate, kept)
+      flag = fftw_estimate
+      if (kept) flag = merge(ior(fftw_measure, fftw_wisdom_only), fftw_measure, attempt == from_memory)
    end function planning_flag
 
+   !> Add what the files hold to what is known.
+   subroutine read_wisdom()
+      integer(c_int) :: status
+
+      status = fftw_import_wisdom_from_filename(folder//'/fftw'//c_null_char)
+      status = fftwf_import_wisdom_from_filename(folder//'/fftwf'//c_null_char)
+   end subroutine read_wisdom
+
    !> Keep what the planner has learnt; failing to do so harms nobody.
-   !> To be called inside the critical section `fftw_planner`.
+   !> To be called inside the critical section `fftw_planner`, after plans from measuring.
    subroutine save_wisdom()
       integer(c_int) :: status
       character(16) :: process
       character(:), allocatable :: temporary
 
       if (.not. kept) return
+      call read_wisdom()
       write (process, '(i0)') c_getpid()
       temporary = folder//'/new'//trim(process)//c_null_char
       if (fftw_export_wisdom_to_filename(temporary) /= 0) then
