@@ -233,6 +233,8 @@ contains
       call check_error(error, 'there is no folder "no_such_folder"', 'missing folder')
       call file%open('/proc/asperity.h5', 'create', error)
       call check_error(error, 'cannot be written', 'folder that takes no files')
+      call file%open(repeat('x', 300)//'.h5', 'create', error)
+      call check_error(error, 'cannot be written: File name too long', 'why a file cannot be written')
       call file%open(path, 'create', error)
       call file%write('/x', [1.0_dp], 'm', 'x', error)
       call file%read('/y', x, error)

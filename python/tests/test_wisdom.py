@@ -27,7 +27,8 @@ def test_wisdom_is_kept(program: Path, tmp_path: Path) -> None:
 
     def solve(n: int, precision: str = "double") -> None:
         (tmp_path / "case.nml").write_text(CASE.format(n=n, precision=precision))
-        subprocess.run([str(program), "run", str(tmp_path / "case.nml"), "--quiet"], check=True, env=environment)
+        subprocess.run([str(program), "run", str(tmp_path / "case.nml"), "--quiet"], check=True,
+                       env=environment)
 
     (tmp_path / "cache").mkdir()
     solve(20, "mixed")

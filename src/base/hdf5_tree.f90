@@ -99,6 +99,7 @@ contains
       call check_place(self%path, mode, error)
       if (allocated(error)) return
 
+      creation = -1
       call new_access_list(access_list, status, alignment)
       if (status >= 0) then
          select case (mode)
@@ -107,7 +108,6 @@ contains
             if (status >= 0) call set_one_block(creation, 24, 24, status)
             if (status >= 0) call h5fcreate_f(self%path, H5F_ACC_TRUNC_F, self%id, status, &
                creation_prp=creation, access_prp=access_list)
-            call h5pclose_f(creation, ignored)
          case ('append')
             call h5fopen_f(self%path, H5F_ACC_RDWR_F, self%id, status, access_list)
          case default
@@ -118,6 +118,8 @@ contains
          self%id = -1
          call explain_opening(self%path, mode, error)
       end if
+      ! Not before: HDF5 forgets the reason of a failure with its next call.
+      if (creation >= 0) call h5pclose_f(creation, ignored)
       call h5pclose_f(access_list, ignored)
    end subroutine open_file
 
