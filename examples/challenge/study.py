@@ -176,7 +176,7 @@ def picture(data: dict[str, Any]) -> Figure:
     where.set(title="contact at 0.25 MPa", xlabel="x, µm", ylabel="y, µm")
     where.legend(handles=[Patch(color=common.COLOURS[5], label="with adhesion"),
                           Patch(color="#000000", label="without, too")],
-                 loc="upper left", bbox_to_anchor=(1.02, 1.0))
+                 loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
     line = data["line"]
     x, nano = line["x"] * 1e6, 1e9
     section.fill_between(x, line["road"] * nano, line["road"].min() * nano - 20, color="#bbbbbb",
