@@ -477,6 +477,15 @@ contains
          '&surface shape = ''paraboloid'', radius = 1e-3, centre_x = 0.1e-3 /'//nl// &
          '&phase displacement = 2e-6, duration = 1, steps = 25, velocity_x = 0.5e-3 /', 'long way', record)
       call check_that(index(record%warnings, 'free map') == 0, 'a long way on a free map: '//record%warnings)
+      ! The edge lies some ten micrometres below: within five ranges of one attraction, not of another.
+      call run_case(body//'&phase displacement = 2e-6, duration = 1, steps = 2, velocity_x = 5e-6 /'//nl// &
+         '&adhesion potential = ''exponential'', energy = 0.01, range = 3e-6 /', 'within reach', record)
+      call check_that(index(record%warnings, 'points enter or leave the free map') > 0, &
+         'an edge within the reach of adhesion: '//record%warnings)
+      call run_case(body//'&phase displacement = 2e-6, duration = 1, steps = 2, velocity_x = 5e-6 /'//nl// &
+         '&adhesion potential = ''exponential'', energy = 0.01, range = 0.5e-6 /', 'out of reach', record)
+      call check_that(index(record%warnings, 'free map') == 0, &
+         'an edge out of the reach of adhesion: '//record%warnings)
    end subroutine test_edge
 
 end module test_simulation_sliding

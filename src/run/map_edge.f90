@@ -36,7 +36,7 @@ contains
       real(dp), intent(in) :: rms_height             !! of the road, m
       integer, intent(inout) :: state                !! what was found so far; only worse is told
       character(:), allocatable, intent(inout) :: message   !! a line is added; without the time
-      real(dp) :: depth, least, near
+      real(dp) :: depth, least, near, reach
       logical :: adhesive
       integer :: i, j, touching, wx, wy
 
@@ -64,10 +64,11 @@ contains
          state = edge_touches
          call tell(to_text(touching)//' cells at the edge of the free map touch; what touches beyond '// &
             'the map is left out: a larger map is needed')
-      else if (abs(move_x) + abs(move_y) > 0.0_dp .and. least < well_below*rms_height &
-         .and. state < edge_near) then
+      else if (abs(move_x) + abs(move_y) > 0.0_dp .and. state < edge_near) then
+         reach = out_of_reach*range
+         if (least >= max(well_below*rms_height, reach)) return
          depth = depth_of_contact(pressure, displacement)
-         near = max(well_below*min(depth, rms_height), out_of_reach*range)
+         near = max(well_below*min(depth, rms_height), reach)
          if (least >= near) return
          state = edge_near
          call tell('points enter or leave the free map only '//to_text(least)// &
