@@ -25,7 +25,7 @@ else
   if [ -n "$missing" ]; then
     echo "asperity: not found:$missing" >&2
     echo "asperity: install gcc, gfortran, pkg-config, FFTW 3 (double and single, with OpenMP)," >&2
-    echo "asperity: HDF5 with its Fortran interface, and Python 3.10 or newer; docs/install.md" >&2
+    echo "asperity: HDF5, and Python 3.10 or newer; docs/install.md" >&2
     echo "asperity: lists the packages of conda-forge and Homebrew." >&2
     exit 1
   fi
@@ -40,11 +40,16 @@ fi
 PATH=$PWD/.venv/bin:$PATH
 export PATH
 
-# Where libhdf5-openmpi-dev is installed, hdf5.pc names the parallel library: ask for the serial one.
-if pkg-config --exists hdf5-serial 2>/dev/null; then
-  mkdir -p .venv/pkgconfig
-  printf 'Name: hdf5\nDescription: serial HDF5\nVersion: 1.10\nRequires: hdf5-serial\n' \
-    >.venv/pkgconfig/hdf5.pc
-  PKG_CONFIG_PATH=$PWD/.venv/pkgconfig${PKG_CONFIG_PATH:+:$PKG_CONFIG_PATH}
-  export PKG_CONFIG_PATH
+# fpm.toml asks the linker for Debian's name of the serial HDF5 library. Elsewhere the library is
+# called hdf5: give it the other name in a folder that the compiler searches.
+if ! pkg-config --exists hdf5-serial 2>/dev/null && pkg-config --exists hdf5 2>/dev/null; then
+  mkdir -p .venv/lib
+  for library in "$(pkg-config --variable=libdir hdf5)"/libhdf5.so \
+      "$(pkg-config --variable=libdir hdf5)"/libhdf5.dylib; do
+    if [ -e "$library" ]; then
+      ln -sf "$library" ".venv/lib/libhdf5_serial.${library##*.}"
+    fi
+  done
+  LIBRARY_PATH=$PWD/.venv/lib${LIBRARY_PATH:+:$LIBRARY_PATH}
+  export LIBRARY_PATH
 fi

@@ -1,7 +1,7 @@
 !> HDF5 files: what the groups of a file hold, and the messages where that fails.
 !>
 !> Below it lie `hdf5_tree` (files and groups), `hdf5_values` (attributes, datasets, columns) and
-!> `hdf5_errors`; no other modules call HDF5.
+!> `hdf5_errors`, which call HDF5 through `hdf5_library`; no other modules do.
 !>
 !> A column that grows by a row (`create_column`, `append`) has the space for all its rows from the
 !> first row on: a row changes values, which go straight to the file, and the column's length, a
@@ -10,7 +10,7 @@
 module hdf5_file
    use, intrinsic :: iso_c_binding, only : c_char, c_loc, c_null_char, c_null_ptr, c_ptr
    use errors, only : error_file, error_input, error_type, fail
-   use hdf5, only : h5aexists_f, h5oclose_f, h5oopen_f, hid_t
+   use hdf5_library, only : h5aexists_f, h5oclose_f, h5oopen_f, hid_t
    use hdf5_tree, only : hdf5_tree_type, most_expected, name_length
    use hdf5_values, only : get_number, get_reals, get_text, kind_int8, kind_integer, kind_real, &
       kind_text, new_column, new_dataset, put_attribute, put_rows, shape_of_dataset

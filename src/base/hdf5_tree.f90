@@ -21,15 +21,16 @@ module hdf5_tree
    use, intrinsic :: iso_c_binding, only : c_bool, c_int, c_int64_t
    use errors, only : error_file, error_type, fail
    use file_system, only : file_exists, folder_of, is_folder, lengthen_file
-   use hdf5, only : H5F_ACC_RDONLY_F, H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, H5F_CLOSE_STRONG_F, &
-      H5F_LIBVER_V18_F, H5F_SCOPE_LOCAL_F, h5fclose_f, h5fcreate_f, h5fflush_f, h5fget_filesize_f, &
-      h5fis_hdf5_f, h5fopen_f, h5gclose_f, h5gcreate_anon_f, h5gcreate_f, h5gget_obj_info_idx_f, &
-      h5gn_members_f, H5I_DATASET_F, h5iget_type_f, h5lcreate_external_f, h5ldelete_f, &
-      h5lexists_f, h5oclose_f, h5olink_f, h5oopen_f, H5P_FILE_ACCESS_F, H5P_FILE_CREATE_F, &
-      H5P_GROUP_CREATE_F, H5P_LINK_CREATE_F, h5pclose_f, h5pcreate_f, h5pset_alignment_f, &
-      h5pset_attr_phase_change_f, h5pset_create_inter_group_f, h5pset_est_link_info_f, &
-      h5pset_fclose_degree_f, h5pset_libver_bounds_f, h5pset_link_phase_change_f, &
-      h5pset_meta_block_size_f, h5pset_small_data_block_size_f, hid_t, hsize_t
+   use hdf5_library, only : H5F_ACC_RDONLY_F, H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, &
+      H5F_CLOSE_STRONG_F, H5F_LIBVER_V18_F, H5F_SCOPE_LOCAL_F, h5fclose_f, h5fcreate_f, &
+      h5fflush_f, h5fget_filesize_f, h5fis_hdf5_f, h5fopen_f, h5gclose_f, h5gcreate_anon_f, &
+      h5gcreate_f, h5gn_members_f, H5I_DATASET_F, h5iget_type_f, h5lcreate_external_f, &
+      h5ldelete_f, h5lexists_f, h5lget_name_by_idx_f, h5oclose_f, h5olink_f, h5oopen_f, &
+      H5P_FILE_ACCESS_F, H5P_FILE_CREATE_F, H5P_GROUP_CREATE_F, H5P_LINK_CREATE_F, h5pclose_f, &
+      h5pcreate_f, h5pset_alignment_f, h5pset_attr_phase_change_f, h5pset_create_inter_group_f, &
+      h5pset_est_link_info_f, h5pset_fclose_degree_f, h5pset_libver_bounds_f, &
+      h5pset_link_phase_change_f, h5pset_meta_block_size_f, h5pset_small_data_block_size_f, &
+      hid_t, hsize_t
    use hdf5_errors, only : last_reason, start_hdf5
    use precision, only : int64
    implicit none
@@ -430,7 +431,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       character(:), allocatable :: local
       integer(hid_t) :: location
-      integer :: status, count, i, kind
+      integer :: status, count, i
 
       allocate (names(0))
       call self%resolve(path, location, local)
@@ -440,7 +441,7 @@ contains
          deallocate (names)
          allocate (names(count))
          do i = 1, count
-            call h5gget_obj_info_idx_f(location, local, i - 1, names(i), kind, status)
+            call h5lget_name_by_idx_f(location, local, i - 1, names(i), status)
             if (status < 0) exit
          end do
       end if

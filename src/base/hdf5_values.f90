@@ -4,20 +4,20 @@
 module hdf5_values
    use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_loc, c_null_char, c_null_ptr, &
       c_ptr
-   use hdf5, only : H5_INTEGER_KIND, h5aclose_f, h5acreate_f, h5aexists_f, h5aget_space_f, &
+   use hdf5_library, only : h5aclose_f, h5acreate_f, h5aexists_f, h5aget_space_f, &
       h5aget_type_f, h5aopen_f, h5aread_f, h5awrite_f, H5D_FILL_TIME_NEVER_F, h5dclose_f, &
       h5dcreate_f, h5dget_space_f, h5dopen_f, h5dread_f, h5dset_extent_f, h5dvlen_reclaim_f, &
-      h5dwrite_f, h5kind_to_type, H5P_DATASET_ACCESS_F, H5P_DATASET_CREATE_F, H5P_DEFAULT_F, &
+      h5dwrite_f, H5P_DATASET_ACCESS_F, H5P_DATASET_CREATE_F, H5P_DEFAULT_F, &
       H5P_LINK_CREATE_F, h5pclose_f, h5pcreate_f, h5pset_chunk_cache_f, h5pset_chunk_f, &
       h5pset_create_inter_group_f, h5pset_deflate_f, h5pset_fill_time_f, h5pset_shuffle_f, &
       H5S_SCALAR_F, H5S_SELECT_SET_F, H5S_UNLIMITED_F, h5sclose_f, h5screate_f, &
       h5screate_simple_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, &
       h5sselect_hyperslab_f, H5T_CSET_UTF8_F, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, &
-      H5T_NATIVE_INTEGER, H5T_STD_I32LE, H5T_STD_I8LE, H5T_STR_NULLTERM_F, H5T_STRING, h5tclose_f, &
+      H5T_NATIVE_INT8, H5T_NATIVE_INTEGER, H5T_STD_I32LE, H5T_STD_I8LE, H5T_STR_NULLTERM_F, H5T_STRING, h5tclose_f, &
       h5tcopy_f, h5tget_size_f, h5tis_variable_str_f, h5tset_cset_f, h5tset_strpad_f, hid_t, &
       hsize_t, size_t
    use hdf5_errors, only : text_of
-   use precision, only : dp, int8
+   use precision, only : dp
    implicit none
    private
 
@@ -292,7 +292,7 @@ contains
          memory_type = H5T_NATIVE_INTEGER
       case (kind_int8)
          file_type = H5T_STD_I8LE
-         memory_type = h5kind_to_type(int8, H5_INTEGER_KIND)
+         memory_type = H5T_NATIVE_INT8
       case default                          ! text
          call h5tcopy_f(H5T_STRING, file_type, ignored)
          call h5tset_strpad_f(file_type, H5T_STR_NULLTERM_F, ignored)
