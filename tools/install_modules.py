@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Copy the modules of the Fortran library to where `meson install` puts headers.
 
-    install_modules.py FOLDER_OF_THE_MODULES FOLDER_BELOW_THE_PREFIX     (called by Meson)
+Meson calls it: install_modules.py FOLDER_OF_THE_MODULES FOLDER_BELOW_THE_PREFIX
 """
 
 import os
