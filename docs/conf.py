@@ -9,6 +9,7 @@ import re
 from importlib.util import find_spec
 from pathlib import Path
 
+from asperity._addresses import MODULES
 from docutils import nodes
 from latex2mathml.converter import convert
 
@@ -84,7 +85,7 @@ def _add_contents(app, name, source):
 
 
 # Modules whose public names are those of the package.
-AT_THE_TOP = ("adhesive_contact", "case", "contact", "errors", "runner", "sweep_table", "sweeps")
+AT_THE_TOP = ("adhesive_contact", "case", "errors", "runner", "sweep_table", "sweeps")
 
 
 def _add_modules(app, name, source):
@@ -92,10 +93,9 @@ def _add_modules(app, name, source):
     if name != "docs/api/python_tools":
         return
     named = "".join(path.read_text() for path in (ROOT / "docs" / "api").glob("*.rst"))
-    for path in sorted((ROOT / "python" / "asperity").glob("*.py")):
-        module = f"asperity.{path.stem}"
-        if (path.stem.startswith("_") or path.stem in AT_THE_TOP
-                or f"automodule:: {module}\n" in named):
+    for address in sorted(MODULES):
+        module = f"asperity.{address}"
+        if address in AT_THE_TOP or f"automodule:: {module}\n" in named:
             continue
         source[0] += f"\n{module}\n{'-' * len(module)}\n\n.. automodule:: {module}\n   :members:\n"
 

@@ -25,14 +25,19 @@ lists = {
     "sources = files": present("src/**/*.f90", "src/**/*.F90"),
     "program = files": present("app/*.f90"),
     "flat = files": present("python/src/*.f90"),
-    "package = files": present("python/asperity/*.py", "python/asperity/py.typed"),
-    "page = files": present("python/asperity/page/*"),
-    "theory = files": present("python/asperity/theory/*.py"),
 }
+# The Python package: one list for each of its folders, that of the place where they are installed.
+kinds = ("py", "typed", "js", "css", "html")
+folders = {path.parent for kind in kinds for path in root.glob(f"python/asperity/**/*.{kind}")}
+for folder in sorted(folders):
+    name = folder.relative_to(root / "python").as_posix()
+    lists[f"'{name}': files"] = present(*(f"python/{name}/*.{kind}" for kind in kinds))
 text = build.read_text()
 faults = []
 for head, names in lists.items():
     found = re.search(rf"( *){head}\((.*?)\)", text, flags=re.DOTALL)
+    if not found:
+        sys.exit(f"meson.build has no list {head}(...): write an empty one, then --update fills it")
     named = re.findall(r"'([^']+)'", found[2])
     faults += [f"meson.build lacks {name}" for name in names if name not in named]
     faults += [f"meson.build names {name}, which does not exist" for name in named

@@ -7,39 +7,51 @@
 
 from __future__ import annotations
 
-import importlib
+import os
 from typing import TYPE_CHECKING, Any
 
-from . import surface
-from ._library import set_threads, version
-from .adhesive_contact import AdhesiveNormalContact, solve_adhesive
-from .case import Case
-from .contact import NormalContact, solve_normal
-from .errors import NotConverged
-from .result import Run
-from .result import open_result as open
-from .runner import run
-from .sweep_table import Sweep, SweepError
-from .sweeps import sweep
+from . import _addresses
+from .base import presenters
+
+# Idle threads sleep: spinning, they slow a run tenfold where others use the machine. OpenMP reads
+# this when its library is loaded, which may be for another package: so it comes first.
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 if TYPE_CHECKING:
-    from . import dma, material, theory
+    from . import theory
+    from .base.errors import NotConverged
+    from .base.library import set_threads
+    from .contact import AdhesiveNormalContact, NormalContact, solve_adhesive, solve_normal
+    from .results import Run
+    from .results import open_result as open
+    from .roads import surface
+    from .rubber import dma, material
+    from .runs.case import Case
+    from .runs.runner import run
+    from .runs.sweep_table import Sweep, SweepError
+    from .runs.sweeps import sweep
+
+    __version__: str
 
 __all__ = ["AdhesiveNormalContact", "Case", "NormalContact", "NotConverged", "Run", "Sweep",
            "SweepError", "__version__", "dma", "material", "open", "run", "set_threads",
            "solve_adhesive", "solve_normal", "surface", "sweep", "theory"]
 
-__version__ = version()
-"""The version of the Fortran library that is loaded, such as ``"0.1.0"``."""
-
-del version
+_addresses.install(__name__)
+presenters.register({name: f"{__name__}.{module}"
+                     for name, module in _addresses.PRESENTERS.items()})
 
 
 def __getattr__(name: str) -> Any:
-    """Load the modules that need SciPy when they are used first: it takes its time."""
-    if name in ("dma", "material", "theory"):
-        return importlib.import_module(f".{name}", __name__)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    """Import what is used when it is used first: NumPy, HDF5 and SciPy take their time."""
+    if name == "__version__":  # of the Fortran library that is loaded, such as "0.1.0"
+        from .base.library import version
+
+        found: Any = version()
+    else:
+        found = _addresses.find(__name__, name)
+    globals()[name] = found
+    return found
 
 
 def __dir__() -> list[str]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 
-from ._data_verbs import add_fit, add_import
-from ._library import version
-from ._result_verbs import add_plot, add_report, add_watch
+from .base.library import version
+from .commands.data import add_fit, add_import
+from .commands.results import add_plot, add_report, add_watch
 
 __all__ = ["main"]
 

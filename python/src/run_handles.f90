@@ -10,9 +10,11 @@ module run_handles
 
    type :: slot_type
       type(run_type), pointer :: run => null()
+      integer :: handle = 0
    end type slot_type
 
    type(slot_type) :: slots(most)
+   integer :: last_handle = 0           !! handles are never used again: an old one finds no run
 
 contains
 
@@ -25,7 +27,9 @@ contains
       do i = 1, most
          if (.not. associated(slots(i)%run)) then
             allocate (slots(i)%run)
-            handle = i
+            last_handle = last_handle + 1
+            slots(i)%handle = last_handle
+            handle = last_handle
             return
          end if
       end do
@@ -36,17 +40,25 @@ contains
       integer, intent(in) :: handle
       type(run_type), pointer :: run
 
+      integer :: i
+
       run => null()
-      if (handle >= 1 .and. handle <= most) run => slots(handle)%run
+      do i = 1, most
+         if (slots(i)%handle == handle .and. associated(slots(i)%run)) run => slots(i)%run
+      end do
    end function run_of
 
    !> Forget a run that is closed.
    subroutine free_run(handle)
       integer, intent(in) :: handle
 
-      if (.not. associated(run_of(handle))) return
-      deallocate (slots(handle)%run)
-      slots(handle)%run => null()
+      integer :: i
+
+      do i = 1, most
+         if (slots(i)%handle /= handle .or. .not. associated(slots(i)%run)) cycle
+         deallocate (slots(i)%run)
+         slots(i)%run => null()
+      end do
    end subroutine free_run
 
 end module run_handles

@@ -15,8 +15,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import asperity
-from asperity import _input
 from asperity.case import Group, UnknownVariableError
+from asperity.runs import namelists
 
 INPUTS = sorted((ROOT / "examples").glob("*/input.nml"))
 
@@ -80,7 +80,7 @@ def values_of(variable):
 
 def groups_of(name):
     """Return a strategy for the values of a group."""
-    entry = _input.table()[name]
+    entry = namelists.table()[name]
     return st.fixed_dictionaries({}, optional={
         variable.name: values_of(variable) for variable in entry.variables.values()})
 
@@ -88,7 +88,7 @@ def groups_of(name):
 @st.composite
 def cases(draw):
     groups = {}
-    for name, entry in _input.table().items():
+    for name, entry in namelists.table().items():
         one = groups_of(name)
         groups[name] = draw(st.lists(one, max_size=3)) if entry.is_repeatable else draw(one)
     return groups
@@ -102,7 +102,7 @@ def test_what_is_written_reads_back_to_the_same_bits(groups):
     assert str(again) == str(case)
     for name, given_values in groups.items():
         found, kept = again[name], case[name]
-        if not _input.table()[name].is_repeatable:
+        if not namelists.table()[name].is_repeatable:
             found, kept, given_values = [found], [kept], [given_values]
         assert len(found) == len(kept) == len(given_values)
         for left, middle, right in zip(found, kept, given_values, strict=True):
@@ -121,9 +121,9 @@ def test_the_table_is_that_of_the_program(program):
     page = subprocess.run([program, "template", "--reference"], capture_output=True, text=True,
                           check=True).stdout
     chapters = page.split("\n## `&")[1:]
-    assert [chapter.split("`")[0] for chapter in chapters] == list(_input.table())
+    assert [chapter.split("`")[0] for chapter in chapters] == list(namelists.table())
     for chapter in chapters:
-        entry = _input.table()[chapter.split("`")[0]]
+        entry = namelists.table()[chapter.split("`")[0]]
         rows = [line.split(" | ") for line in chapter.splitlines() if line.startswith("| `")]
         assert [row[0].strip("| `") for row in rows] == list(entry.variables)
         for row, variable in zip(rows, entry.variables.values(), strict=True):
@@ -134,7 +134,7 @@ def test_the_table_is_that_of_the_program(program):
 
 
 def test_no_name_of_the_input_is_hidden_by_a_method():
-    for name, entry in _input.table().items():
+    for name, entry in namelists.table().items():
         assert not hasattr(asperity.Case, name) or name == "case"
         for variable in entry.variables:
             assert not hasattr(Group, variable), f"{name}.{variable}"
@@ -310,7 +310,7 @@ def test_completion_and_repr():
     assert {"grid", "phase", "title", "run", "check"} <= set(dir(case))
     assert {"nx", "boundary"} <= set(dir(case.grid))
     assert "velocity_x" in dir(case.phase[0])
-    assert case._ipython_key_completions_() == list(_input.table())
+    assert case._ipython_key_completions_() == list(namelists.table())
     assert "prony_g" in case.material._ipython_key_completions_()
     assert repr(case) == "! a case without a file\n" + str(case)
     assert repr(case.grid) == "&grid\n  nx = 32\n  ny = 1\n  lx = 0.001\n/"

@@ -6,7 +6,7 @@ import pytest
 from conftest import frictional_result, write_result
 
 import asperity
-from asperity._derived import (
+from asperity.results.derived import (
     closure,
     direction,
     energy_terms,

@@ -33,14 +33,14 @@ def test_the_version_is_written_once(root):
 
 def test_what_an_installation_holds(root):
     files = {str(path) for path in distribution("asperity").files or []}
-    if not any(name.endswith("asperity/result.py") for name in files):
+    if not any(name.endswith("asperity/results/run.py") for name in files):
         # Installed in place: the plan of the build says what a wheel would hold.
         plan = json.loads((root / ".venv" / "python" / "meson-info" / "intro-install_plan.json")
                           .read_text())
         files = {entry["destination"].replace("{bindir}", "bin")
                  for part in plan.values() for entry in part.values()}
-    ends = ["bin/asperity", "asperity/__init__.py", "asperity/result.py", "asperity/py.typed",
-            "asperity/theory/__init__.py", "asperity/page/report.html", "asperity/page/page.js"]
+    ends = ["bin/asperity", "asperity/__init__.py", "asperity/results/run.py", "asperity/py.typed",
+            "asperity/theory/__init__.py", "asperity/views/page/report.html", "asperity/views/page/page.js"]
     for end in ends:
         assert any(name.endswith(end) for name in files), end
     assert any("asperity/_core." in name for name in files)

@@ -14,8 +14,8 @@ from matplotlib.quiver import Quiver, QuiverKey
 
 import asperity
 from asperity.__main__ import main
-from asperity._style import NO_CONTACT, SLIP, STICK
 from asperity.plot import si_scale
+from asperity.views.style import NO_CONTACT, SLIP, STICK
 
 
 @pytest.fixture(autouse=True)

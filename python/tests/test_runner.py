@@ -117,6 +117,35 @@ def test_no_convergence_keeps_the_result(case):
     assert caught.value.result.history.rows == 1
 
 
+def test_a_run_that_fails_closes_no_other_run(case, tmp_path, monkeypatch):
+    """Each handle is closed once, and handles are not given to later runs."""
+    closed, opened = [], []
+    close, begin = runner._close, runner._open
+
+    def note_close(handle):
+        closed.append(handle)
+        return close(handle)
+
+    def note_open(*arguments):
+        outputs = begin(*arguments)
+        opened.append(outputs[0])
+        return outputs
+
+    monkeypatch.setattr(runner, "_close", note_close)
+    monkeypatch.setattr(runner, "_open", note_open)
+    failing = SLIDING + "&solver max_iterations = 1, tolerance = 1e-12 /\n"
+    with pytest.raises(asperity.NotConverged):
+        asperity.run(failing, output=tmp_path / "failing.h5", threads=1)
+    asperity.run(case, threads=1)
+    assert len(opened) == 2 and opened[0] != opened[1]
+    assert closed == opened
+    # an old handle means no run, also while another one is open
+    handle = begin(b"case.nml", SLIDING.encode(), b"%s" % str(tmp_path / "a.h5").encode(), 1, 0)[0]
+    close(opened[0])
+    assert runner._step(handle)[1] == 0
+    close(handle)
+
+
 def test_files_and_arguments(case, tmp_path):
     with pytest.raises(OSError, match="nowhere"):
         asperity.run(tmp_path / "nowhere.nml")

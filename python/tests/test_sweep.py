@@ -398,7 +398,7 @@ def test_broken_results_are_run_anew(tmp_path):
 
 def test_a_program_that_is_missing_or_dies(tmp_path, monkeypatch):
     monkeypatch.setenv("ASPERITY_PROGRAM", str(tmp_path / "none"))
-    asperity._program.program.cache_clear()
+    asperity.runs.program.program.cache_clear()
     try:
         with pytest.raises(OSError, match="none"):
             sweep(wave(), {"phase.pressure": [1e3]}, folder=tmp_path / "a")
@@ -406,13 +406,13 @@ def test_a_program_that_is_missing_or_dies(tmp_path, monkeypatch):
         dies.write_text("#!/bin/sh\nkill -9 $$\n")
         dies.chmod(0o755)
         monkeypatch.setenv("ASPERITY_PROGRAM", str(dies))
-        asperity._program.program.cache_clear()
+        asperity.runs.program.program.cache_clear()
         table = sweep(wave(), {"phase.pressure": [1e3]}, folder=tmp_path / "b", errors="keep")
         assert table.failed[0].message == "killed by signal 9"
         assert table.rows == 1 and table.results == ()
     finally:
         monkeypatch.undo()
-        asperity._program.program.cache_clear()
+        asperity.runs.program.program.cache_clear()
 
 
 def test_a_long_table_is_cut():

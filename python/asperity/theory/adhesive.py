@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq, minimize_scalar
 
-from .._check import array_of, exactly_one, number, positive
+from ..base.check import array_of, exactly_one, number, positive
 from .hertzian import _dome, hertz_displacement
 
 FloatArray = NDArray[np.float64]
@@ -349,46 +349,55 @@ def maugis(
     unit_f = math.pi * w * r
     unit_d = unit_a * unit_a / r
 
-    # the ring narrows as 1/lambda in the JKR limit and widens as lambda^(-1/2) in the DMT limit
-    low, high = -math.log(1.0 + lam) - 25.0, 0.5 * math.log1p(1.0 / lam) + 25.0
-    grid = np.linspace(low, high, 400)
-    forces = [_maugis_state(y, lam)[1] for y in grid]
-    i = int(np.argmin(forces))
-    if 0 < i < grid.size - 1:
-        found = minimize_scalar(
-            lambda y: _maugis_state(y, lam)[1],
-            bounds=(grid[i - 1], grid[i + 1]),
-            method="bounded",
-            options={"xatol": 1e-10},
-        )
-        turn, least = float(found.x), float(found.fun)
-    else:
-        turn, least = float(grid[i]), float(forces[i])
+    turn, least = _maugis_turn(lam)
     pull_off = least * unit_f
-
     if exactly_one(force=force, contact_radius=contact_radius) == "force":
         f = number("force", force, pull_off * (1.0 + 1e-12))  # type: ignore[arg-type]
-        target = max(f / unit_f, least)
-        bottom = turn
-        while _maugis_state(bottom, lam)[1] <= target:
-            bottom -= 1.0
-        y = brentq(lambda y: _maugis_state(y, lam)[1] - target, bottom, turn, xtol=1e-14)
+        y = _maugis_of_force(max(f / unit_f, least), turn, lam)
     else:
         a = positive("contact_radius", contact_radius)  # type: ignore[arg-type]
-        target = a / unit_a
-        bottom, top = turn, turn
-        while _maugis_state(bottom, lam)[0] < target:
-            bottom -= 1.0
-        while _maugis_state(top, lam)[0] > target:
-            top += 1.0
-        y = (
-            bottom
-            if bottom == top
-            else brentq(lambda y: _maugis_state(y, lam)[0] - target, bottom, top, xtol=1e-14)
-        )
+        y = _maugis_of_radius(a / unit_a, turn, lam)
     a_bar, f_bar, d_bar = _maugis_state(y, lam)
     a = a_bar * unit_a
     return AdhesiveContact(
         r, e, w, f_bar * unit_f, a, d_bar * unit_d, pull_off,
         a * math.hypot(1.0, math.exp(y)), stress, lam,
     )
+
+
+def _maugis_turn(lam: float) -> tuple[float, float]:
+    """Return the parameter of the state of the least force, and that force, over pi w R."""
+    # the ring narrows as 1/lambda in the JKR limit and widens as lambda^(-1/2) in the DMT limit
+    low, high = -math.log(1.0 + lam) - 25.0, 0.5 * math.log1p(1.0 / lam) + 25.0
+    grid = np.linspace(low, high, 400)
+    forces = [_maugis_state(y, lam)[1] for y in grid]
+    i = int(np.argmin(forces))
+    if not 0 < i < grid.size - 1:
+        return float(grid[i]), float(forces[i])
+    found = minimize_scalar(
+        lambda y: _maugis_state(y, lam)[1],
+        bounds=(grid[i - 1], grid[i + 1]),
+        method="bounded",
+        options={"xatol": 1e-10},
+    )
+    return float(found.x), float(found.fun)
+
+
+def _maugis_of_force(target: float, turn: float, lam: float) -> float:
+    """Return the parameter of the stable state of a force, over pi w R."""
+    bottom = turn
+    while _maugis_state(bottom, lam)[1] <= target:
+        bottom -= 1.0
+    return brentq(lambda y: _maugis_state(y, lam)[1] - target, bottom, turn, xtol=1e-14)
+
+
+def _maugis_of_radius(target: float, turn: float, lam: float) -> float:
+    """Return the parameter of the state of a contact radius, over its unit."""
+    bottom, top = turn, turn
+    while _maugis_state(bottom, lam)[0] < target:
+        bottom -= 1.0
+    while _maugis_state(top, lam)[0] > target:
+        top += 1.0
+    if bottom == top:
+        return bottom
+    return brentq(lambda y: _maugis_state(y, lam)[0] - target, bottom, top, xtol=1e-14)

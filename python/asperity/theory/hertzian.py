@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._check import array_of, exactly_one, number, positive
+from ..base.check import array_of, exactly_one, number, positive
 
 FloatArray = NDArray[np.float64]
 

@@ -17,9 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 from scipy.special import erf
 
-from .. import surface
-from .._check import array_of, exactly_one, number, poisson_ratio, positive
-from ..material import Prony
+from ..base.check import array_of, exactly_one, number, poisson_ratio, positive
+from ..roads import surface
+from ..rubber.material import Prony
 
 FloatArray = NDArray[np.float64]
 

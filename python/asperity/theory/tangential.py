@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._check import array_of, exactly_one, number, poisson_ratio, positive
+from ..base.check import array_of, exactly_one, number, poisson_ratio, positive
 from .hertzian import HertzContact, _dome, hertz
 
 FloatArray = NDArray[np.float64]

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 from scipy.special import ive, kve
 
-from .._check import array_of, number, poisson_ratio, positive
-from ..material import Prony
+from ..base.check import array_of, number, poisson_ratio, positive
+from ..rubber.material import Prony
 
 FloatArray = NDArray[np.float64]
 

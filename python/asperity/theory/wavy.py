@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._check import array_of, choice, number, poisson_ratio, positive
-from ..material import Prony
+from ..base.check import array_of, choice, number, poisson_ratio, positive
+from ..rubber.material import Prony
 
 FloatArray = NDArray[np.float64]
 

@@ -1,0 +1,1 @@
+"""What all rooms use: checks of arguments, calls of the Fortran library, names, tables, errors."""

@@ -1,0 +1,141 @@
+"""Calls of the Fortran library: one at a time, a status becomes an exception."""
+
+from __future__ import annotations
+
+import functools
+import os
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+# Idle threads sleep: spinning, they slow a run tenfold where others use the machine. OpenMP reads
+# this when its library is loaded, so it comes first.
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+
+from asperity._core import asperity_flat
+
+from .check import choice, no_masked, positive
+from .errors import raise_for_status
+
+__all__ = ["bare", "call", "check_depth", "contact_map", "flag_of_boundary", "height_map",
+           "lengths", "set_threads", "version"]
+
+_lock = threading.Lock()
+
+
+def call(name: str) -> Callable[..., tuple[Any, ...]]:
+    """Return a routine of the library that raises instead of returning a status.
+
+    The routine's last two outputs are its status and message; the others are returned.
+    """
+    routine = getattr(asperity_flat, name)
+
+    @functools.wraps(routine)
+    def checked(*arguments: Any) -> tuple[Any, ...]:
+        with _lock:
+            *outputs, status, message = routine(*arguments)
+        raise_for_status(int(status), message)
+        return tuple(outputs)
+
+    return checked
+
+
+def bare(name: str) -> Callable[..., Any]:
+    """Return a routine of the library that has no status."""
+    routine = getattr(asperity_flat, name)
+
+    @functools.wraps(routine)
+    def locked(*arguments: Any) -> Any:
+        with _lock:
+            return routine(*arguments)
+
+    return locked
+
+
+def version() -> str:
+    """Return the version of the library."""
+    return asperity_flat.library_version().decode().strip()
+
+
+def set_threads(number: int = 0) -> int:
+    """Let the library use a number of threads from here on.
+
+    Parameters
+    ----------
+    number : int
+        Number of threads; 0 takes all processors.
+
+    Returns
+    -------
+    int
+        The number in use.
+
+    Raises
+    ------
+    ValueError
+        If the number is negative.
+
+    Examples
+    --------
+    >>> import asperity
+    >>> asperity.set_threads(1)
+    1
+    """
+    if number < 0:
+        raise ValueError(f"number = {number}: must be 0 or more")
+    with _lock:
+        return int(asperity_flat.set_thread_count(number))
+
+
+def height_map(height: ArrayLike, name: str = "height") -> NDArray[np.float64]:
+    """Return a map as a C-ordered array of doubles of shape (ny, nx); a profile has ny = 1."""
+    no_masked(name, height)
+    if np.iscomplexobj(height):
+        raise ValueError(f"{name}: must be an array of real numbers")
+    try:
+        array = np.ascontiguousarray(height, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name}: must be an array of real numbers") from None
+    if array.ndim == 1 and np.ndim(height) == 1:
+        array = array[None, :]
+    if array.ndim != 2 or np.ndim(height) == 0 or array.size == 0:
+        raise ValueError(f"{name}: has shape {np.shape(height)}: must be (ny, nx)")
+    if not np.isfinite(array).all():
+        j, i = np.argwhere(~np.isfinite(array))[0]
+        raise ValueError(f"{name}[{j}, {i}] = {array[j, i]}: must be finite")
+    return array
+
+
+def lengths(shape: tuple[int, int], lx: float, ly: float | None) -> tuple[float, float]:
+    """Return the lengths of a map of shape (ny, nx); `ly` defaults to square cells."""
+    lx = positive("lx", lx)
+    return lx, lx * shape[0] / shape[1] if ly is None else positive("ly", ly)
+
+
+def flag_of_boundary(boundary: str) -> int:
+    """Return 1 for 'free', 0 for 'periodic'."""
+    return int(choice("boundary", boundary, ("periodic", "free")) == "free")
+
+
+def contact_map(height: ArrayLike, lx: float, ly: float | None, boundary: str
+                ) -> tuple[NDArray[np.float64], float, float, int]:
+    """Return the map, its lengths and the flag of its boundary, fit for a normal contact."""
+    array = height_map(height)
+    lx, ly = lengths(array.shape, lx, ly)
+    free = flag_of_boundary(boundary)
+    if free and array.shape[0] == 1:
+        raise ValueError("boundary = 'free': a line contact has no finite displacement in free"
+                         " space: must be 'periodic'")
+    return array, lx, ly, free
+
+
+def check_depth(displacement: float, array: NDArray[np.float64]) -> None:
+    """Refuse a displacement that brings a periodic map into full contact."""
+    deepest = float(array.max()) - float(array.mean())
+    if displacement >= deepest:
+        raise ValueError(
+            f"displacement = {displacement}: must be below {deepest:g} m, the mean gap at first"
+            " touch: beyond it the pressure of a periodic contact is not determined")

@@ -1,0 +1,174 @@
+"""The verbs ``import`` and ``fit`` of ``python -m asperity``: measured roads and rubbers."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+__all__ = ["add_fit", "add_import"]
+
+
+def add_import(verbs: Any) -> None:
+    """Add the verb ``import`` to the subparsers."""
+    parser = verbs.add_parser(
+        "import", help="make a measured topography ready for a run",
+        description="Read a measured topography of any format that SurfaceTopography knows and"
+                    " write the HDF5 file that `&surface shape = 'file'` takes. What is done comes"
+                    " in this order: crop, level, fill, invert, scale, resample, window; the file"
+                    " keeps the record. Lengths are in the file's own unit.")
+    parser.add_argument("topography", metavar="TOPOGRAPHY", type=Path, help="the instrument's file")
+    parser.add_argument("-o", "--output", metavar="FILE.h5", type=Path, default=Path("surface.h5"),
+                        help="file to write (default: surface.h5)")
+    parser.add_argument("--list", action="store_true", help="list the channels and do nothing")
+    parser.add_argument("--channel", metavar="NAME|N",
+                        help="channel by its name, or its number from 0; default: the heights")
+    parser.add_argument("--unit", metavar="UNIT",
+                        help="unit of length (m, mm, um, nm, pm, A, inch) where the file has none")
+    parser.add_argument("--size", nargs="+", type=float, metavar=("LX", "LY"),
+                        help="lengths where the file has none; a line scan has LX only")
+    parser.add_argument("--transpose", action="store_true",
+                        help="the first index of the file's array runs along y, as in images")
+    parser.add_argument("--crop", nargs="+", type=float, metavar=("X0", "X1"),
+                        help="keep X0 to X1 and Y0 to Y1 (four numbers; two of a line scan)")
+    parser.add_argument("--level", choices=("none", "mean", "tilt", "curvature"), default="mean",
+                        help="what is taken off by least squares (default: mean)")
+    parser.add_argument("--max-missing", type=float, default=0.1, metavar="SHARE",
+                        help="largest share of missing points to fill (default: 0.1)")
+    parser.add_argument("--invert", action="store_true", help="turn the map upside down")
+    parser.add_argument("--scale", type=float, default=1.0, metavar="FACTOR",
+                        help="factor on the heights")
+    parser.add_argument("--resample", nargs="+", type=int, metavar=("NX", "NY"),
+                        help="other numbers of cells; a line scan has NX only")
+    parser.add_argument("--periodic", nargs="?", const="tukey", choices=("tukey", "hann"),
+                        help="bring the edges to the mean height by a window (default: tukey)")
+    parser.add_argument("--taper", type=float, metavar="SHARE",
+                        help="share of each length that the Tukey window tapers (default: 0.2)")
+    parser.add_argument("--restore-rms", action="store_true",
+                        help="scale the windowed heights to the rms height before")
+    parser.set_defaults(call=_import)
+
+
+def _import(chosen: argparse.Namespace) -> int:
+    """Read, write, tell."""
+    from ..roads.measured import channels, import_topography
+
+    if chosen.list:
+        print("\n".join(channels(chosen.topography)))
+        return 0
+    surface = import_topography(
+        chosen.topography, chosen.output, channel=chosen.channel, unit=chosen.unit,
+        size=chosen.size, transpose=chosen.transpose, crop=chosen.crop, level=chosen.level,
+        max_missing=chosen.max_missing, invert=chosen.invert, scale=chosen.scale,
+        resample=chosen.resample, periodic=chosen.periodic, taper=chosen.taper,
+        restore_rms=chosen.restore_rms)
+    print(f"wrote {chosen.output}")
+    print(surface.summary())
+    print()
+    print(surface.to_namelist(chosen.output))
+    return 0
+
+
+def add_fit(verbs: Any) -> None:
+    """Add the verb ``fit`` to the subparsers."""
+    parser = verbs.add_parser(
+        "fit", help="fit a material to DMA data",
+        description="Fit a Prony series to a table of storage and loss moduli and print the"
+                    " `&material` group. Columns and units are read from the header, such as"
+                    " \"f (Hz), G' (MPa), G'' (MPa), T (C)\".")
+    parser.add_argument("table", metavar="DMA.csv", type=Path, help="the table")
+    parser.add_argument("-o", "--output", metavar="FILE.nml", type=Path,
+                        help="write the group there instead of to the standard output")
+    parser.add_argument("--plot", metavar="PNG", type=Path,
+                        help="draw data, fit and error (.png, .pdf, .svg)")
+    parser.add_argument("--arms-per-decade", type=float, default=1.0, metavar="N",
+                        help="relaxation times a decade (default: 1)")
+    parser.add_argument("--least-plateau", type=float, default=0.01, metavar="SHARE",
+                        help="the plateau is at least this share of the lowest storage modulus"
+                             " (default: 0.01)")
+    parser.add_argument("--column", action="append", default=[], metavar="ROLE=NAME|N",
+                        help="column, by name or number from 1, of the frequency, storage, loss,"
+                             " temperature or tan_delta; may be repeated")
+    parser.add_argument("--frequency-unit", metavar="UNIT", help="Hz, kHz, mHz, rad/s or krad/s")
+    parser.add_argument("--modulus-unit", metavar="UNIT", help="Pa, kPa, MPa or GPa")
+    parser.add_argument("--temperature-unit", metavar="UNIT", help="C or K")
+    parser.add_argument("--kind", choices=("shear", "tension"),
+                        help="what the moduli are; default: what the header says, else shear")
+    parser.add_argument("--poisson", type=float, default=0.5, metavar="NU",
+                        help="Poisson ratio (default: 0.5)")
+    parser.add_argument("--wlf", nargs="+", type=float, metavar=("C1", "C2"),
+                        help="constants C1, C2 (K) and, unless --reference gives it, their"
+                             " reference temperature (C); default: found from the overlap")
+    parser.add_argument("--reference", type=float, metavar="T", help="reference temperature, C")
+    parser.add_argument("--temperature", type=float, metavar="T",
+                        help="temperature of the simulation, C (default: the reference)")
+    parser.add_argument("--temperature-tolerance", type=float, default=0.5, metavar="K",
+                        help="temperatures closer than this belong together (default: 0.5)")
+    parser.set_defaults(call=_fit)
+
+
+def _other_groups(path: Path) -> str:
+    """Return the groups of an input that are no materials, '' where there are none."""
+    if not path.is_file():
+        return ""
+    text = path.read_text(encoding="utf-8", errors="replace")
+    found = dict.fromkeys(re.findall(r"(?im)^\s*(&[a-z]\w*)", text))
+    return ", ".join(name for name in found if name.lower() != "&material")
+
+
+def _fit(chosen: argparse.Namespace) -> int:
+    """Read, fit, write, tell."""
+    from ..rubber.dma import fit_dma, read_dma
+    from ..views.style import check_picture
+
+    columns = {}
+    for given in chosen.column:
+        role, equals, name = given.partition("=")
+        if not equals or not name.strip():
+            raise ValueError(f"--column {given}: must be ROLE=NAME or ROLE=NUMBER")
+        columns[role.strip()] = name.strip()
+    check_picture(chosen.plot)
+    output = chosen.output
+    if output is not None:
+        if not output.parent.is_dir():
+            raise OSError(f"{output}: cannot be written: there is no folder"
+                          f" {str(output.parent)!r}")
+        if output.exists() and chosen.table.exists() and output.samefile(chosen.table):
+            raise ValueError(f"--output {output}: is the table itself")
+        other = _other_groups(output)
+        if other:
+            raise ValueError(f"--output {output}: holds {other}, too, and would be replaced: name"
+                             " another file, and add the group from there")
+    if chosen.plot is not None and not chosen.plot.parent.is_dir():
+        raise OSError(f"{chosen.plot}: cannot be written: there is no folder"
+                      f" {str(chosen.plot.parent)!r}")
+    table = read_dma(
+        chosen.table, columns=columns, frequency_unit=chosen.frequency_unit,
+        modulus_unit=chosen.modulus_unit, temperature_unit=chosen.temperature_unit,
+        kind=chosen.kind, poisson=chosen.poisson)
+    fit = fit_dma(
+        table, arms_per_decade=chosen.arms_per_decade, reference=chosen.reference,
+        wlf=chosen.wlf, temperature_tolerance=chosen.temperature_tolerance,
+        least_plateau=chosen.least_plateau)
+    group = fit.to_namelist(poisson=chosen.poisson, temperature=chosen.temperature)
+    told = sys.stdout
+    if output is None:
+        print(group)
+        told = sys.stderr  # the group alone, its comments say all, can be redirected
+    else:
+        output.write_text(group + "\n", encoding="utf-8")
+        print(fit.summary())
+        print(f"wrote {output}")
+    if chosen.plot is not None:
+        import matplotlib
+
+        matplotlib.use("Agg")
+        import matplotlib.pyplot
+
+        figure = fit.plot()
+        figure.savefig(chosen.plot, dpi=150)
+        matplotlib.pyplot.close(figure)
+        print(f"wrote {chosen.plot}", file=told)
+    return 0

@@ -1,0 +1,186 @@
+"""Elastic normal contact with adhesion, by the Fortran library."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..base import library
+from ..base.check import choice, exactly_one, number, positive, whole
+from ..base.errors import NotConverged
+from .normal import FloatArray, NormalContact
+
+__all__ = ["AdhesiveNormalContact", "solve_adhesive"]
+
+POTENTIALS = ("exponential", "gauss", "maugis_dugdale")
+STARTS = ("non_adhesive", "full_contact")
+
+_solve = library.call("contact_adhesive")
+
+
+@dataclass(frozen=True)
+class AdhesiveNormalContact(NormalContact):
+    """A solved contact with adhesion; the fields of `NormalContact`, and those below.
+
+    The pressure holds the attraction; ``pressure - adhesive_pressure`` is that of the wall, zero
+    where the gap is open. The contact area counts the cells whose gap is zero. The residual is the
+    largest of min(gap/range, G range/energy) in size, where G is the pressure of the wall.
+
+    Attributes
+    ----------
+    adhesive_pressure : ndarray
+        Attraction -e'(gap), Pa, not positive.
+    energy_adhesive : float
+        Energy of adhesion of the cell lx by ly, J, not positive.
+    energy_elastic : float
+        Elastic energy of the same, J.
+    """
+
+    adhesive_pressure: FloatArray = field(repr=False)
+    energy_adhesive: float
+    energy_elastic: float
+
+
+def solve_adhesive(
+    height: ArrayLike,
+    lx: float,
+    ly: float | None,
+    modulus: float,
+    *,
+    potential: str = "exponential",
+    energy: float,
+    range: float,
+    pressure: float | None = None,
+    force: float | None = None,
+    displacement: float | None = None,
+    boundary: str = "periodic",
+    tolerance: float = 1e-6,
+    max_iterations: int = 1000,
+    method: str = "fast",
+    start: str | AdhesiveNormalContact = "non_adhesive",
+) -> AdhesiveNormalContact:
+    """Press or pull an elastic half-space on a rigid rough surface that attracts it.
+
+    There is hysteresis: where the attraction is strong, the state depends on where it comes from.
+
+    Parameters
+    ----------
+    height : array_like
+        Height of the surface, m, shape (ny, nx); (nx,) or (1, nx) is a plane-strain line
+        contact. Any memory order and any real type.
+    lx, ly : float
+        Lengths, m; ``ly = None`` means square cells.
+    modulus : float
+        Contact modulus E* = E/(1 - nu^2) = 2 G/(1 - nu), Pa.
+    potential : str
+        'exponential', 'gauss' or 'maugis_dugdale'.
+    energy : float
+        Work of adhesion, J/m2, >= 0.
+    range : float
+        Range of the attraction, m. Cells should be smaller than 0.7 modulus range^2/energy, or
+        the edge of the contact sticks to the grid: a warning says so.
+    pressure, force, displacement : float
+        The load, one of: mean pressure, Pa; force, N; approach from the first touch, m. Negative
+        values pull.
+    boundary : str
+        'periodic' or 'free'.
+    tolerance : float
+        Of the residual.
+    max_iterations : int
+        Most iterations.
+    method : str
+        'fast' or 'thesis' (periodic only).
+    start : str or AdhesiveNormalContact
+        Where from: 'non_adhesive', the contact without adhesion; 'full_contact'; or the solution
+        of a similar load on the same map.
+
+    Returns
+    -------
+    AdhesiveNormalContact
+
+    Raises
+    ------
+    ValueError
+        If an argument is wrong.
+    NotConverged
+        If the tolerance is not reached, or the surfaces part under a pull that no contact holds
+        (then the reason is 'detached'); its ``result`` holds the last state.
+
+    Examples
+    --------
+    >>> import asperity
+    >>> sphere = asperity.surface.shape("paraboloid", 64, lx=40e-6, radius=1e-4, boundary="free")
+    >>> contact = asperity.solve_adhesive(sphere, 40e-6, None, 4e6, energy=0.05, range=0.3e-6,
+    ...                                   displacement=0.0, boundary="free")
+    >>> contact.force < 0 < contact.contact_area
+    True
+    """
+    array, lx, ly, free = library.contact_map(height, lx, ly, boundary)
+    shape = np.shape(height)
+    modulus = positive("modulus", modulus)
+    choice("potential", potential, POTENTIALS)
+    energy = number("energy", energy, 0.0)
+    range = positive("range", range)
+    tolerance = positive("tolerance", tolerance)
+    steps = whole("max_iterations", max_iterations)
+    thesis = choice("method", method, ("fast", "thesis")) == "thesis"
+    if thesis and free:
+        raise ValueError("method = 'thesis': needs boundary = 'periodic'; 'fast' serves both")
+    top = float(array.max())
+    control = exactly_one(pressure=pressure, force=force, displacement=displacement)
+    load = number(control, {"pressure": pressure, "force": force,
+                            "displacement": displacement}[control])  # type: ignore[arg-type]
+    if control == "displacement" and not free:
+        library.check_depth(load, array)
+    if control == "force":
+        load /= lx * ly
+
+    _look_at_cells(array.shape, lx, ly, modulus, energy, range)
+    traction, gap, attraction = (np.zeros_like(array) for _ in "pga")
+    level, origin = _start_from(start, shape, top, traction, gap)
+    level, stuck, iterations, ffts, residual, seconds, converged, reason = _solve(
+        array.T, traction.T, gap.T, attraction.T, lx, ly, free, modulus, potential, energy, range,
+        int(control == "displacement"), load, origin, int(thesis), tolerance, steps, level)
+    mean = float(traction.mean())
+    displaced = gap + array + level
+    result = AdhesiveNormalContact(
+        traction.reshape(shape), gap.reshape(shape), displaced.reshape(shape), mean,
+        mean * lx * ly, float(level) + top, float(np.count_nonzero(gap <= 0.0) / gap.size),
+        int(iterations), int(ffts), float(residual), float(seconds), bool(converged),
+        reason.decode().strip(), attraction.reshape(shape), float(stuck),
+        0.5 * float(np.vdot(traction, displaced)) * lx * ly / array.size)
+    if not result.converged:
+        raise NotConverged(
+            f"the adhesive contact did not converge: {result.reason}; residual"
+            f" {result.residual:.2e} after {result.iterations} iterations, tolerance"
+            f" {tolerance:.2e}", result)
+    return result
+
+
+def _look_at_cells(shape: tuple[int, int], lx: float, ly: float, modulus: float, energy: float,
+                   reach: float) -> None:
+    """Warn if the cells are too large for the range of the attraction."""
+    cell = lx / shape[1] if shape[0] == 1 else max(lx / shape[1], ly / shape[0])
+    if energy > 0.0 and cell > 0.7 * modulus * reach**2 / energy:
+        warnings.warn(
+            f"cells of {cell:.4g} m are larger than 0.7 modulus range^2/energy ="
+            f" {0.7 * modulus * reach**2 / energy:.4g} m: the edge of the contact sticks to the"
+            " grid", UserWarning, stacklevel=3)
+
+
+def _start_from(start: str | AdhesiveNormalContact, shape: tuple[int, ...], top: float,
+                traction: FloatArray, gap: FloatArray) -> tuple[float, int]:
+    """Fill pressure and gap of the start; return its level and the library's word for it."""
+    if isinstance(start, AdhesiveNormalContact):
+        if start.gap.shape != shape:
+            raise ValueError(f"start: has shape {start.gap.shape}: must be {shape}")
+        traction[...] = start.pressure.reshape(traction.shape)
+        gap[...] = start.gap.reshape(gap.shape)
+        return start.displacement - top, 2
+    if isinstance(start, str):
+        return 0.0, STARTS.index(choice("start", start, STARTS))
+    raise ValueError(f"start: is of type {type(start).__name__}: must be one of "
+                     f"{', '.join(map(repr, STARTS))} or an AdhesiveNormalContact")

@@ -1,0 +1,118 @@
+"""The grid of a run and its history: one row for the initial state, one for each step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.names import NamedValues
+from ..base.presenters import present
+
+if TYPE_CHECKING:
+    import pandas
+
+__all__ = ["Grid", "History"]
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The regular grid of cells.
+
+    Attributes
+    ----------
+    nx, ny : int
+        Number of cells; ``ny == 1`` is a plane-strain line contact.
+    lx, ly : float
+        Lengths of the cell, m.
+    boundary : str
+        'periodic' or 'free'.
+    x, y : ndarray
+        Centres of the cells, m; shapes (nx,) and (ny,).
+    """
+
+    nx: int
+    ny: int
+    lx: float
+    ly: float
+    boundary: str
+    x: FloatArray = field(repr=False, compare=False)
+    y: FloatArray = field(repr=False, compare=False)
+
+    @property
+    def dx(self) -> float:
+        """Width of a cell along x, m."""
+        return self.lx / self.nx
+
+    @property
+    def dy(self) -> float:
+        """Width of a cell along y, m."""
+        return self.ly / self.ny
+
+
+class History(NamedValues):
+    """The history of a run: a mapping from names to numpy arrays, one value a row.
+
+    The row 0 is the initial state; a step adds a row. Of a run that is being written, the rows
+    that every column has are shown.
+    """
+
+    def __init__(self, columns: dict[str, NDArray[Any]], units: dict[str, str],
+                 long_names: dict[str, str]) -> None:
+        rows = min((len(column) for column in columns.values()), default=0)
+        super().__init__({name: column[:rows] for name, column in columns.items()},
+                         "column of the history")
+        self._units = units
+        self._long_names = long_names
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return min((len(column) for column in self._values.values()), default=0)
+
+    def units(self, name: str) -> str:
+        """Return the units of a column, '1' for a pure number."""
+        self[name]
+        return self._units.get(name, "1")
+
+    def long_name(self, name: str) -> str:
+        """Return the meaning of a column."""
+        self[name]
+        return self._long_names.get(name, name.replace("_", " "))
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return the history as a table of pandas, which must be installed.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A column a quantity, a line a row of the history, in SI units.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError as error:
+            raise ImportError("to_pandas needs pandas: python -m pip install pandas") from error
+        return pandas.DataFrame(self._values)
+
+    def _repr_html_(self) -> str:
+        return present("history_html", self)
+
+    def __repr__(self) -> str:
+        lines = [f"history of {self.rows} row{'' if self.rows == 1 else 's'}"]
+        for name, column in self._values.items():
+            last = f"{column[-1]:.6g}" if self.rows else "-"
+            units = self._units.get(name, "1")
+            lines.append(f"  {name:<22} {last:>13} {'' if units == '1' else units:<4}"
+                         f" {self._long_names.get(name, '')}".rstrip())
+        if self.rows:
+            lines[0] += "; the last values:"
+        return "\n".join(lines)

@@ -1,0 +1,91 @@
+"""Reading of result files, which the program may be writing at the same time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import h5py
+import numpy as np
+
+__all__ = ["NotAResultError", "attributes_of", "read_file", "scalar_of", "text_of"]
+
+T = TypeVar("T")
+
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+
+
+class NotAResultError(OSError):
+    """The file lacks what every result holds."""
+
+
+def read_file(path: Path, read: Callable[[h5py.File], T]) -> T:
+    """Open the file, read, close it; a file caught in the middle of a write is tried again."""
+    _check(path)
+    reason: OSError
+    options: dict[str, Any] = {"locking": False}  # the program may be writing
+    for attempt in range(5):
+        try:
+            with h5py.File(path, "r", **options) as file:
+                return read(file)
+        except NotAResultError as error:
+            reason = error
+        except (OSError, RuntimeError, KeyError) as error:
+            detail = str(error.args[0] if error.args else error)
+            if "locking flag" in detail:  # the caller has it open through h5py's defaults
+                options = {}
+            reason = OSError(f"{path}: cannot be read: {detail}; if its run was killed,"
+                             " `asperity run CASE.nml --restart` goes on from the last checkpoint;"
+                             " otherwise run the case again")
+        time.sleep(0.02 * (attempt + 1))
+    raise reason from None
+
+
+def _check(path: Path) -> None:
+    """Raise what is wrong with a file before HDF5 looks at it."""
+    if path.is_dir():
+        raise IsADirectoryError(f"{path}: is a folder: name the file RESULT.h5 in it")
+    if not path.exists():
+        raise FileNotFoundError(f"{path}: no such file: `asperity run CASE.nml` makes it")
+    with path.open("rb") as file:
+        start = file.read(8)
+    if not start:
+        raise OSError(f"{path}: is empty: the run has written nothing; run the case again")
+    if start != _SIGNATURE:
+        raise OSError(f"{path}: is not an HDF5 file: name the result of `asperity run`")
+
+
+def text_of(value: Any) -> str:
+    """Return a text attribute, of whatever string type it is."""
+    value = scalar_of(value)
+    if isinstance(value, str):
+        value = value.encode("utf-8", errors="surrogateescape")  # h5py's way with other bytes
+    if isinstance(value, bytes):
+        try:
+            value = value.decode("utf-8")
+        except UnicodeDecodeError:
+            value = value.decode("latin-1")  # of an input that is not UTF-8
+    return str(value).rstrip(" \0")
+
+
+def scalar_of(value: Any) -> Any:
+    """Return the value of an array of one element, anything else as it is."""
+    if isinstance(value, np.ndarray) and value.size == 1:
+        return value.reshape(-1)[0]
+    return value
+
+
+def attributes_of(item: h5py.Group) -> dict[str, Any]:
+    """Return the attributes of an object as plain values."""
+    values = {}
+    for name, value in item.attrs.items():
+        one = scalar_of(value)
+        if isinstance(one, bytes | str):
+            values[name] = text_of(one)
+        elif isinstance(one, np.generic):
+            values[name] = one.item()
+        else:
+            values[name] = one
+    return values

@@ -1,0 +1,125 @@
+"""What a result file tells of its run: title, grid, material, history and how it ended."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.names import NamedValues
+from .history import Grid, History
+from .reading import NotAResultError, attributes_of, read_file, scalar_of, text_of
+
+__all__ = ["ResultFile"]
+
+FloatArray = NDArray[np.float64]
+
+
+class ResultFile:
+    """The file of a run, without its snapshots; `asperity.Run` has those, too.
+
+    Parameters
+    ----------
+    path : str or path
+        The file, RESULT.h5.
+    """
+
+    path: Path
+    grid: Grid
+    history: History
+    material: NamedValues
+    attributes: NamedValues
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = Path(path)
+        self._read()
+
+    def _read(self) -> None:
+        """Read all but the fields; what is there belongs to one moment."""
+        def read(file: h5py.File) -> None:
+            for group in ("grid", "history"):
+                if group not in file:
+                    raise NotAResultError(f"{self.path}: holds no /{group}: it is not a result"
+                                           " of `asperity run`")
+            self.attributes = NamedValues(attributes_of(file), "attribute of the file")
+            self.grid = _grid(file["grid"])
+            material = file.get("material")
+            values = {}
+            if material is not None:
+                values = attributes_of(material) | {
+                    name: item[()] if name.startswith("prony") else scalar_of(item[()])
+                    for name, item in material.items() if isinstance(item, h5py.Dataset)}
+            self.material = NamedValues(values, "property of the material")
+            columns = {name: item for name, item in file["history"].items()
+                       if isinstance(item, h5py.Dataset)}
+            first = [name for name in ("step", "phase", "time") if name in columns]
+            names = first + [name for name in columns if name not in first]
+            self.history = History(
+                {name: np.atleast_1d(columns[name][()]) for name in names},
+                {name: text_of(columns[name].attrs.get("units", "1")) for name in names},
+                {name: text_of(columns[name].attrs.get("long_name", name)) for name in names})
+            keys = [key for key in file.get("snapshots", {}) if key.isdigit()]
+            self._snapshot_keys = sorted(keys, key=int)
+
+        read_file(self.path, read)
+
+    @property
+    def title(self) -> str:
+        """Title of the case."""
+        return str(self.attributes.get("title", ""))
+
+    @property
+    def program(self) -> str:
+        """Name of the program that wrote the file."""
+        return str(self.attributes.get("program", ""))
+
+    @property
+    def version(self) -> str:
+        """Version of the program that wrote the file."""
+        return str(self.attributes.get("version", ""))
+
+    @property
+    def created(self) -> str:
+        """When the file was made, ISO 8601, UTC."""
+        return str(self.attributes.get("created", ""))
+
+    @property
+    def input(self) -> str:
+        """The namelist file of the case, verbatim."""
+        return str(self.attributes.get("input", ""))
+
+    @property
+    def finished(self) -> bool:
+        """Whether the run has come to its end."""
+        return bool(int(self.attributes.get("finished", 0)))
+
+    @property
+    def outcome(self) -> str:
+        """How the run ended: 'running' (or killed), 'finished', 'stopped after ...', or why not."""
+        return str(self.attributes.get("outcome", "finished" if self.finished else "running"))
+
+    @property
+    def warnings(self) -> list[str]:
+        """The warnings of the input, then those of the run (once it has ended or stopped)."""
+        return [line for name in ("warnings", "run_warnings")
+                for line in str(self.attributes.get(name, "")).splitlines() if line.strip()]
+
+    @property
+    def height(self) -> FloatArray:
+        """Height of the road before any sliding, m, shape (ny, nx)."""
+        def read(file: h5py.File) -> FloatArray:
+            if "surface/height" not in file:
+                raise NotAResultError(f"{self.path}: holds no /surface/height")
+            return file["surface/height"][()]
+
+        return read_file(self.path, read)
+
+
+def _grid(group: h5py.Group) -> Grid:
+    """Read the grid."""
+    found = attributes_of(group)
+    return Grid(int(found["nx"]), int(found["ny"]), float(found["lx"]), float(found["ly"]),
+                str(found["boundary"]), group["x"][()], group["y"][()])

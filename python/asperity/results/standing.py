@@ -1,0 +1,108 @@
+"""How a run stands: finished, stopped, going on, or perhaps killed.
+
+A killed run leaves its file as one that goes on does. What tells them apart is how long nothing
+has been written, against the time that a row takes.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .result_file import ResultFile
+
+__all__ = ["duration", "note_of", "rows_of", "seems_dead", "short_time", "silence", "standing",
+           "time_of_row"]
+
+LAST = 20  # rows that tell how long the next one may take
+PATIENCE = 20.0  # times the longest of them
+LEAST = 15.0  # s: what a snapshot or a checkpoint of a large grid may take to be written
+
+
+def duration(seconds: float) -> str:
+    """Return a time in words.
+
+    Examples
+    --------
+    >>> duration(8), duration(75), duration(7300), duration(200000), duration(float("nan"))
+    ('8 s', '1 min 15 s', '2 h 1 min', '2 d 7 h', 'unknown')
+    """
+    if not np.isfinite(seconds):
+        return "unknown"
+    whole = round(seconds)
+    for size, unit, part, name in ((86400, "d", 3600, "h"), (3600, "h", 60, "min"),
+                                   (60, "min", 1, "s")):
+        if whole >= size:
+            return f"{whole // size} {unit} {whole % size // part} {name}"
+    return f"{whole} s"
+
+
+def short_time(seconds: float) -> str:
+    """Return a time in words, with two digits where it is short.
+
+    Examples
+    --------
+    >>> short_time(0.0213), short_time(75)
+    ('0.021 s', '1 min 15 s')
+    """
+    return f"{seconds:.2g} s" if seconds < 10.0 else duration(seconds)
+
+
+def rows_of(run: ResultFile) -> str:
+    """Return how many rows there are, such as '220 of 229 rows' of an unfinished run.
+
+    Of a finished run, or where the file does not tell how many there will be, '1 row'.
+    """
+    rows, expected = run.history.rows, int(run.attributes.get("expected_rows", 0) or 0)
+    if expected and not run.finished:
+        return f"{rows} of {expected} rows"
+    return f"{rows} row{'' if rows == 1 else 's'}"
+
+
+def silence(run: ResultFile) -> float | None:
+    """Return for how many seconds the file has not been written; None if it is gone."""
+    try:
+        return max(0.0, time.time() - run.path.stat().st_mtime)
+    except OSError:
+        return None
+
+
+def time_of_row(run: ResultFile) -> float | None:
+    """Return how long the slowest of the last rows took, s; None while it is not known."""
+    if "seconds" not in run.history or not run.history.rows:
+        return None
+    last = np.asarray(run.history["seconds"][-LAST:], dtype=float)
+    last = last[np.isfinite(last)]
+    return float(last.max()) if len(last) else None
+
+
+def seems_dead(run: ResultFile) -> bool:
+    """Whether a run that has told no end has been silent for much longer than a row takes."""
+    if run.finished or run.outcome != "running":
+        return False
+    quiet, row = silence(run), time_of_row(run)
+    return quiet is not None and row is not None and quiet > max(LEAST, PATIENCE * row)
+
+
+def note_of(run: ResultFile) -> str:
+    """Return what is known of an unfinished run: why it ended, or whether it goes on."""
+    if run.finished:
+        return ""
+    if run.outcome != "running":
+        return run.outcome
+    quiet, row = silence(run), time_of_row(run)
+    if quiet is None:
+        return ""
+    text = f"last written {short_time(quiet)} ago"
+    if seems_dead(run):
+        text += f", and a row takes up to {short_time(row or 0.0)}: perhaps no longer running"
+    return text
+
+
+def standing(run: ResultFile) -> str:
+    """Return how the run stands, in words."""
+    note = note_of(run)
+    return "finished" if run.finished else f"not finished{', ' if note else ''}{note}"

@@ -1,0 +1,1 @@
+"""Roads: height maps made, measured, read and described."""

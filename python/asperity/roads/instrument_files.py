@@ -1,0 +1,234 @@
+"""Reading of instruments' files: by SurfaceTopography, or as a table of numbers."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import io
+import re
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.check import choice, positive
+from .map_files import own_map, text_map
+
+__all__ = ["UNITS", "channels", "read_map", "to_metres"]
+
+FloatArray = NDArray[np.float64]
+
+UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "pm": 1e-12, "A": 1e-10, "km": 1e3,
+         "inch": 0.0254}
+_MICRO = {"\u00b5m": "um", "\u03bcm": "um", "\u00c5": "A", "\u212b": "A", "in": "inch"}
+_PARTS = {"mm": 1e3, "um": 1e6, "nm": 1e9, "pm": 1e12, "A": 1e10}  # exact, unlike 1e-6
+_NEEDS = "pip install 'asperity[import]' (or SurfaceTopography)"
+
+
+def channels(path: str | Path) -> list[str]:
+    """Return a line for each channel of a file: its id, kind, size and unit.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file that SurfaceTopography reads.
+
+    Raises
+    ------
+    OSError
+        If the file is missing, or of no known format.
+    ImportError
+        If SurfaceTopography is not installed.
+    """
+    with _quiet(), _open(Path(path)) as reader:
+        return [_channel_line(channel) for channel in reader.channels]
+
+
+def _open(path: Path) -> Any:
+    """Open a file with SurfaceTopography."""
+    try:
+        from SurfaceTopography import open_topography
+    except ImportError:
+        raise ImportError(f"SurfaceTopography is not installed: {_NEEDS}") from None
+    if not path.exists():
+        raise OSError(f"{path}: there is no such file")
+    if path.is_dir():
+        raise OSError(f"{path}: is a folder, not a file")
+    if not path.stat().st_size:
+        raise OSError(f"{path}: is empty")
+    if (own := own_map(path)) is not None:
+        return own
+    try:
+        with _quiet():
+            reader = open_topography(str(path))
+    except Exception as error:  # readers of damaged files raise what they meet
+        if type(error).__name__ != "CannotDetectFileFormat":
+            raise OSError(f"{path}: cannot be read as a topography: {_reason(error)}") from None
+        try:
+            return text_map(path)
+        except ValueError as fault:
+            if re.search("is not a text file|no table of numbers", str(fault)):
+                raise OSError(f"{path}: is of no format that SurfaceTopography knows") from None
+            raise
+    if _is_doubtful(reader, path):
+        try:
+            found = text_map(path)
+        except ValueError as fault:
+            if reader.format() != "hgt":
+                raise
+            raise OSError(f"{path}: is of no known format: {_reason(fault)}") from None
+        finally:
+            reader.close()
+        return found
+    return reader
+
+
+def _is_doubtful(reader: Any, path: Path) -> bool:
+    """Whether a table is the better reading of a file.
+
+    The format HGT has no mark: any file of 2 n^2 bytes passes for it. And points whose grid has
+    holes are taken for a matrix of two or three columns.
+    """
+    if reader.format() == "hgt":
+        return path.suffix.lower() != ".hgt"
+    return (reader.format() in ("asc", "matrix") and len(reader.channels) == 1
+            and reader.channels[0].physical_sizes is None
+            and reader.channels[0].dim == 2 and reader.channels[0].nb_grid_pts[0] in (2, 3))
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep what readers print or warn of while they try a file off the terminal."""
+    nowhere = io.StringIO()
+    with (contextlib.redirect_stdout(nowhere), contextlib.redirect_stderr(nowhere),
+          warnings.catch_warnings()):
+        warnings.simplefilter("ignore")
+        yield
+
+
+def _reason(error: Exception) -> str:
+    """Return the first line of a message."""
+    return str(error).strip().split("\n")[0] or type(error).__name__
+
+
+def to_metres(value: Any, unit: str) -> Any:
+    """Return lengths in m; 60 um are 6e-5 m, to the last digit."""
+    return value / _PARTS[unit] if unit in _PARTS else value * UNITS[unit]
+
+
+def _channel_line(channel: Any) -> str:
+    """Return what a channel is, in a line."""
+    points = " x ".join(map(str, channel.nb_grid_pts or ())) or "?"
+    kind = "map" if channel.dim == 2 else "line scan"
+    data = "heights" if channel.is_height_channel else str(channel.data_kind.name).lower()
+    return f"{channel.channel_id!r}: {kind} of {data}, {points} points, unit {channel.unit}"
+
+
+def _choose(reader: Any, path: Path, wanted: str | int | None) -> Any:
+    """Return the channel that was asked for."""
+    known = list(reader.channels)
+    listed = "; ".join(_channel_line(channel) for channel in known)
+    if wanted is None:
+        first = reader.default_channel
+        if not first.is_height_channel:
+            first = next((item for item in known if item.is_height_channel), None)
+        if first is None:
+            raise ValueError(f"{path}: holds no heights: {listed}")
+        return first
+    ids = [channel.channel_id for channel in known]
+    if str(wanted) not in ids and str(wanted).lstrip("-").isdigit():
+        index = int(wanted)
+        if not 0 <= index < len(known):
+            raise ValueError(f"channel = {wanted}: {path} has the channels 0 to"
+                             f" {len(known) - 1}: {listed}")
+        wanted = ids[index]
+    found = [item for item in known if wanted in (item.channel_id, item.name)]
+    if not found:
+        raise ValueError(f"channel = {wanted!r}: {path} has {listed}")
+    if not found[0].is_height_channel:
+        raise ValueError(f"channel = {wanted!r}: holds no heights: {_channel_line(found[0])}")
+    return found[0]
+
+
+def _unit_of(name: str | None) -> str | None:
+    """Return a unit's name in ASCII, None where there is none."""
+    return None if name is None else _MICRO.get(str(name).strip(), str(name).strip()) or None
+
+
+def read_map(
+    path: Path, channel: str | int | None, unit: str | None, size: Any, transpose: bool
+) -> tuple[FloatArray, list[float], bool, str, dict[str, Any]]:
+    """Return heights (ny, nx) with NaN where missing, lengths, periodicity, unit and source."""
+    given = _unit_of(unit)
+    if given is not None:
+        choice("unit", given, tuple(UNITS))
+    with _quiet(), _open(path) as reader:
+        chosen = _choose(reader, path, channel)
+        if not chosen.is_uniform:
+            raise ValueError(
+                f"{path}: channel {chosen.channel_id!r} is a line scan with points at uneven"
+                " distances: a run needs a regular grid; interpolate it first, as with"
+                " SurfaceTopography's to_uniform")
+        told = _unit_of(chosen.unit)
+        if told is not None and told not in UNITS:
+            raise ValueError(f"{path}: has the unit {told!r}: must be one of {', '.join(UNITS)}")
+        if told is None and given is None:
+            raise ValueError(f"{path}: names no unit of length: give one (unit = 'um', --unit um)")
+        if told is not None and given is not None and told != given:
+            raise ValueError(f"unit = {given!r}: {path} has its own unit, {told!r}; `scale` scales"
+                             " the heights")
+        arguments: dict[str, Any] = {}
+        if chosen.physical_sizes is None:
+            arguments["physical_sizes"] = _size_of(path, chosen.dim, size, transpose)
+        elif size is not None:
+            known = " x ".join(f"{float(length):g}" for length in chosen.physical_sizes)
+            raise ValueError(f"size: {path} has its own, {known} {told or ''}".rstrip())
+        if told is None:
+            arguments["unit"] = given
+        try:
+            heights, lengths, periodic, metadata = _heights(path, reader, chosen, arguments)
+        except Exception as error:
+            raise OSError(f"{path}: cannot be read: {_reason(error)}") from None
+        source = {
+            "name": path.name,
+            "format": reader.format(),
+            "channel": str(chosen.channel_id),
+            "bytes": path.stat().st_size,
+            "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+            "metadata": metadata,
+        }
+    array = np.ma.filled(np.ma.asarray(heights, dtype=float), np.nan)
+    array = np.where(np.isfinite(array), array, np.nan)
+    if array.ndim == 1:
+        return (array[None, :], [lengths[0], lengths[0] / array.size], periodic,
+                told or str(given), source)
+    if transpose:
+        lengths.reverse()
+    else:
+        array = array.T
+    return array, lengths, periodic, told or str(given), source
+
+
+def _heights(
+    path: Path, reader: Any, channel: Any, arguments: dict[str, Any]
+) -> tuple[Any, list[float], bool, dict[str, Any]]:
+    """Return a channel's heights with x first, lengths, periodicity and what the file tells."""
+    if reader.format() == "npy":  # NumPy reads at once what takes the reader a minute
+        heights = np.load(path, allow_pickle=False)
+        return heights, [float(length) for length in arguments["physical_sizes"]], False, {}
+    topography = channel.topography(**arguments)
+    lengths = [float(length) for length in topography.physical_sizes]
+    return topography.heights(), lengths, bool(topography.is_periodic), dict(topography.info or {})
+
+
+def _size_of(path: Path, dim: int, size: Any, transpose: bool) -> tuple[float, ...]:
+    """Return the lengths in the order of the file's indices."""
+    if size is None:
+        raise ValueError(f"{path}: gives no lengths: give them (size = (lx, ly), --size LX LY)")
+    values = [positive("size", value) for value in np.atleast_1d(np.asarray(size, dtype=object))]
+    if len(values) != dim:
+        raise ValueError(f"size: has {len(values)} lengths, must have {dim}")
+    return tuple(reversed(values)) if transpose else tuple(values)

@@ -1,0 +1,263 @@
+"""Height maps that SurfaceTopography does not read, or reads amiss: tables and this package's own.
+
+They show themselves as its readers and channels do, so that `asperity.measured` treats all alike.
+Tables are matrices of heights, a row of the file a row along x, or columns of points x, z or
+x, y, z on a regular grid, of which some may be missing.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.tables import Rows, cells_of, decimals, is_number, text_lines
+
+__all__ = ["PlainReader", "own_map", "text_map"]
+
+FloatArray = NDArray[np.float64]
+
+_MISSING = {"", "nan", "bad", "-", "--", "---", "***", "*", "x", "n/a", "na", "#n/a", "null", "inf",
+            "-inf", "infinite", "1.#qnan", "-1.#ind", "undefined"}
+_METRES = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9}
+_OFF_GRID = 0.1  # of a cell: more is no regular grid
+_SPARSE = 20.0  # cells a point: more is no grid either
+_NO_GRID = ("lie on no regular grid: interpolate them first, as with scipy.interpolate.griddata,"
+            " and write the matrix of heights")
+
+
+class _Kind(NamedTuple):
+    """What a channel holds."""
+
+    name: str
+
+
+_HEIGHTS = _Kind("HEIGHT")
+
+
+@dataclass
+class PlainMap:
+    """A map as a channel of SurfaceTopography shows itself, and as its topography.
+
+    Attributes
+    ----------
+    array : ndarray, shape (nx, ny) or (nx,)
+        Heights, NaN where missing; x is the first index.
+    channel_id : str
+        Name.
+    physical_sizes : tuple of float, or None
+        Lengths, where the file gives them.
+    unit : str or None
+        Of all lengths, where the file names it.
+    is_periodic : bool
+        Whether opposite edges fit.
+    info : dict
+        What else the file says.
+    """
+
+    array: FloatArray
+    channel_id: str
+    physical_sizes: tuple[float, ...] | None = None
+    unit: str | None = None
+    is_periodic: bool = False
+    info: dict[str, Any] = field(default_factory=dict)
+    is_uniform: bool = True
+    is_height_channel: bool = True
+    data_kind: _Kind = _HEIGHTS
+
+    @property
+    def name(self) -> str:
+        """The same as `channel_id`."""
+        return self.channel_id
+
+    @property
+    def dim(self) -> int:
+        """1 of a line, 2 of a map."""
+        return self.array.ndim
+
+    @property
+    def nb_grid_pts(self) -> tuple[int, ...]:
+        """Number of points along x and y."""
+        return self.array.shape
+
+    def topography(self, physical_sizes: tuple[float, ...] | None = None,
+                   unit: str | None = None) -> PlainMap:
+        """Return the map with what the file lacks."""
+        self.physical_sizes = self.physical_sizes or physical_sizes
+        self.unit = self.unit or unit
+        return self
+
+    def heights(self) -> FloatArray:
+        """Return the heights."""
+        return self.array
+
+
+class PlainReader:
+    """A file with one map, in the manner of SurfaceTopography's readers."""
+
+    def __init__(self, kind: str, channel: PlainMap) -> None:
+        self._kind = kind
+        self.channels = [channel]
+        self.default_channel = channel
+
+    def format(self) -> str:
+        """Return the name of the format."""
+        return self._kind
+
+    def __enter__(self) -> PlainReader:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        return None
+
+
+def own_map(path: Path) -> PlainReader | None:
+    """Return the road of a file of `MeasuredSurface.save` or of a result; None if it is neither.
+
+    Their datasets have the shape (ny, nx), unlike those of other HDF5 files.
+    """
+    import h5py
+
+    if path.stat().st_size < 8 or not h5py.is_hdf5(path):
+        return None
+    with h5py.File(path, "r", locking=False) as file:
+        height, grid = file.get("surface/height"), file.get("grid")
+        if not isinstance(height, h5py.Dataset) or height.ndim != 2 or grid is None or not {
+                "lx", "ly"} <= set(grid.attrs):
+            return None
+        array = np.asarray(height[()], dtype=float).T
+        lx, ly = (float(np.ravel(grid.attrs[name])[0]) for name in ("lx", "ly"))
+        boundary = np.ravel(grid.attrs.get("boundary", "free"))[0]
+        boundary = boundary.decode() if isinstance(boundary, bytes) else str(boundary)
+        info = {name: str(value) for name, value in file.attrs.items()
+                if name in ("title", "program", "created") or name.startswith(("source", "steps"))}
+    periodic = boundary.strip() == "periodic"
+    if array.shape[1] == 1:
+        return PlainReader("asperity", PlainMap(array[:, 0], "surface/height", (lx,), "m",
+                                                periodic, info))
+    return PlainReader("asperity", PlainMap(array, "surface/height", (lx, ly), "m", periodic, info))
+
+
+def text_map(path: Path) -> PlainReader:
+    """Return the map of a text file: a matrix of heights, or columns x, z or x, y, z.
+
+    Raises
+    ------
+    ValueError
+        If the file is no text or no such table, or the points lie on no regular grid.
+    """
+    rows = decimals(cells_of(text_lines(path)))
+    first = next((i for i, (_, cells) in enumerate(rows)
+                  if any(map(is_number, cells)) and all(map(_is_value, cells))), None)
+    if first is None:
+        raise ValueError(f"{path}: holds no table of numbers")
+    body = rows[first:]
+    while all(len(cells) > 1 and cells[-1] == "" for _, cells in body):
+        body = [(line, cells[:-1]) for line, cells in body]  # lines that end with a separator
+    table = _numbers(path, body)
+    columns = table.shape[1]
+    if columns > 3:
+        return PlainReader("text", PlainMap(table.T.copy(), "Default"))
+    if columns == 1:
+        return PlainReader("text", PlainMap(table[:, 0], "Default"))
+    units = _units(rows[first - 1][1] if first else [])
+    unit = None
+    if len(units) == columns:
+        table[:, :-1] *= [_METRES[one] / _METRES[units[-1]] for one in units[:-1]]
+        unit = units[-1]
+    return PlainReader("text", _on_grid(path, table, unit))
+
+
+def _units(head: list[str]) -> list[str]:
+    """Return the units that a header names in parentheses, brackets or behind a stroke.
+
+    Examples
+    --------
+    >>> _units(["x (mm)", "y [mm]", "z / µm"]), _units(["x", "y", "z"])
+    (['mm', 'mm', 'um'], [])
+    """
+    found = [re.search(r"(?:[\[(]\s*|/\s*)([mnuµμ]?m)\s*[\])]?\s*$", cell) for cell in head]
+    units = [re.sub("[µμ]", "u", one[1]) for one in found if one]
+    return [unit for unit in units if unit in _METRES]
+
+
+def _is_value(cell: str) -> bool:
+    """Whether a cell is a number or says that there is none."""
+    return cell.lower() in _MISSING or is_number(cell)
+
+
+def _numbers(path: Path, rows: Rows) -> FloatArray:
+    """Return a table as an array, NaN where a value is missing."""
+    width = len(rows[0][1])
+    values = np.full((len(rows), width), np.nan)
+    for row, (line, cells) in enumerate(rows):
+        if len(cells) != width:
+            raise ValueError(f"{path}: line {line}: has {len(cells)} columns, must have {width} as"
+                             f" line {rows[0][0]}")
+        for column, cell in enumerate(cells):
+            if cell.lower() in _MISSING:
+                continue
+            try:
+                values[row, column] = float(cell)
+            except ValueError:
+                raise ValueError(f"{path}: line {line}: column {column + 1} = {cell!r}: must be a"
+                                 " number") from None
+    return values
+
+
+def _on_grid(path: Path, table: FloatArray, unit: str | None) -> PlainMap:
+    """Return the map of points with their coordinates."""
+    known = np.isfinite(table[:, :-1]).all(axis=1)
+    points, heights = table[known, :-1], table[known, -1]
+    places, counts, sizes = [], [], []
+    for axis, name in enumerate("xy"[: points.shape[1]]):
+        index, step = _steps(points[:, axis])
+        if index is None:
+            raise ValueError(f"{path}: the points {_NO_GRID}" if len(points) else
+                             f"{path}: has no point with {name}")
+        places.append(index)
+        counts.append(int(index.max()) + 1)
+        sizes.append(counts[-1] * step)
+    cells = float(np.prod(counts))
+    if cells > _SPARSE * max(len(heights), 50):
+        raise ValueError(f"{path}: the points {_NO_GRID}")
+    array = np.full(counts, np.nan)
+    at = tuple(places)
+    taken = np.zeros(counts, dtype=int)
+    np.add.at(taken, at, 1)
+    if taken.max() > 1:
+        twice = int((taken > 1).sum())
+        raise ValueError(f"{path}: {twice} point{'s' if twice > 1 else ''} of the grid"
+                         f" stand{'' if twice > 1 else 's'} there more than once")
+    array[at] = heights
+    return PlainMap(array, "Default", tuple(sizes), unit)
+
+
+def _steps(values: FloatArray) -> tuple[NDArray[np.intp] | None, float]:
+    """Return the number of each value on an even scale and its step; None if there is none.
+
+    Examples
+    --------
+    >>> _steps(np.array([0.0, 0.33, 0.67, 1.33]))[0].tolist()
+    [0, 1, 2, 4]
+    """
+    if not len(values):
+        return None, 0.0
+    first, span = float(values.min()), float(np.ptp(values))
+    distinct = np.unique(values)
+    gaps = np.diff(distinct)
+    gaps = gaps[gaps > 1e-6 * span]
+    if not len(gaps):
+        return None, 0.0
+    step = float(np.median(gaps))
+    for _ in range(3):  # coordinates are rounded in files: the whole span tells the step better
+        number = np.rint((values - first) / step)
+        step = float(np.sum(number * (values - first)) / np.sum(number**2))
+    offset = float(np.median(values - first - number * step))
+    if np.abs(values - first - number * step - offset).max() > _OFF_GRID * step:
+        return None, 0.0
+    return number.astype(np.intp), step

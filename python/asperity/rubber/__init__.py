@@ -1,0 +1,1 @@
+"""Rubber: relaxation functions, and how measurements become one."""

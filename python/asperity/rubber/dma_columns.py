@@ -1,0 +1,234 @@
+"""What the header of a DMA table says: its columns, their units, and the kind of the moduli."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from ..base.check import choice
+from ..base.tables import Rows, decimals, is_number
+
+__all__ = ["FREQUENCY_UNITS", "KINDS", "MODULUS_UNITS", "ROLES", "TEMPERATURE_UNITS",
+           "find_columns", "split_header"]
+
+FREQUENCY_UNITS = {"Hz": 2.0 * math.pi, "kHz": 2e3 * math.pi, "mHz": 2e-3 * math.pi,
+                   "rad/s": 1.0, "krad/s": 1e3}
+MODULUS_UNITS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9}
+TEMPERATURE_UNITS = {"C": 0.0, "K": -273.15}
+ROLES = ("frequency", "storage", "loss", "temperature", "tan_delta")
+KINDS = ("shear", "tension")
+
+_ANGULAR = {"omega", "w", "ω", "angular", "angularfrequency", "angfreq", "angularfreq",
+            "angfrequency", "radfreq", "radianfrequency", "kreisfrequenz"}
+_NAMES = {
+    "frequency": {"f", "freq", "frequency", "frequenz", "frequence", "fréquence", "nu",
+                  "reducedfrequency", "messfrequenz", *_ANGULAR},
+    "storage": {"storage", "storagemodulus", "g'", "g1", "gp", "gprime", "gstorage", "gstor", "e'",
+                "e1", "ep", "eprime", "estorage", "estor", "storageg", "storagee",
+                "storagemodulusg'", "storagemoduluse'", "g'storage", "e'storage", "storagemod",
+                "shearstoragemodulus", "tensilestoragemodulus", "speichermodul",
+                "speichermodulg'", "speichermodule'", "moduledeconservation"},
+    "loss": {"loss", "lossmodulus", "g''", "g2", "gpp", "gdoubleprime", "gloss", "e''", "e2",
+             "epp", "edoubleprime", "eloss", "lossg", "losse", "lossmodulusg''",
+             "lossmoduluse''", "g''loss", "e''loss", "lossmod", "shearlossmodulus",
+             "tensilelossmodulus", "verlustmodul", "verlustmodulg''", "verlustmodule''",
+             "moduledeperte"},
+    "temperature": {"t", "temp", "temperature", "temperatur", "température", "sampletemperature",
+                    "probentemperatur"},
+    "tan_delta": {"tandelta", "tand", "tanδ", "tan", "lossfactor", "dampingfactor", "verlustfaktor",
+                  "tan(δ)", "tan(delta)", "tan(d)"},
+}
+_UNIT_SPELLINGS = {
+    "hz": "Hz", "khz": "kHz", "mhz": "mHz", "1/s": "1/s", "s-1": "1/s", "s^-1": "1/s",
+    "rad/s": "rad/s", "rads-1": "rad/s", "rads^-1": "rad/s", "rad/sec": "rad/s", "rads": "rad/s",
+    "rad.s-1": "rad/s", "rad·s-1": "rad/s", "radps": "rad/s", "rad/per/s": "rad/s",
+    "krad/s": "krad/s",
+    "pa": "Pa", "kpa": "kPa", "mpa": "MPa", "gpa": "GPa", "n/mm2": "MPa", "n/mm^2": "MPa",
+    "n/m2": "Pa", "c": "C", "°c": "C", "ºc": "C", "degc": "C", "celsius": "C", "k": "K",
+    "kelvin": "K", "-": "", "1": "",
+}
+_MOST_PREAMBLE = 200  # lines above the header
+
+
+def split_header(
+    path: Path, lines: Rows, given: Mapping[str, str | int]
+) -> tuple[tuple[int, list[str]], list[str], Rows]:
+    """Return the header with its line, the units' line, and the rows of numbers.
+
+    What an instrument says of the sample may stand above the header; where several sweeps follow
+    each other, the header may be repeated.
+    """
+    at = next((i for i, (_, cells) in enumerate(lines[:_MOST_PREAMBLE])
+               if _is_header(cells, given)), None)
+    if at is None:
+        if any(is_number(cell) for cell in lines[0][1]):
+            return (0, []), [], decimals(lines)
+        first_numbers = next((i for i, (_, cells) in enumerate(lines)
+                              if sum(map(is_number, cells)) > 1), len(lines))
+        at = max(range(max(first_numbers, 1)), key=lambda i: (len(lines[i][1]), -i))
+    first, body = lines[at], lines[at + 1 :]
+    units: list[str] = []
+    if body and not any(is_number(cell) for cell in body[0][1]):
+        known = [_unit(cell) for cell in body[0][1]]
+        if any(unit is not None for unit in known):
+            units, body = body[0][1], body[1:]
+    body = _without_headings(body, first[1], units)
+    if not body:
+        raise ValueError(f"{path}: has a header and no numbers")
+    return first, units, decimals(body)
+
+
+def _without_headings(body: Rows, header: list[str], units: list[str]) -> Rows:
+    """Return the rows without repeated headers and what stands above those."""
+    kept: Rows = []
+    for row in body:
+        if row[1] == header:
+            while kept and sum(map(is_number, kept[-1][1])) < 2:
+                kept.pop()
+        elif row[1] != units:
+            kept.append(row)
+    return kept
+
+
+def _is_header(cells: list[str], given: Mapping[str, str | int]) -> bool:
+    """Whether a line names the frequency and a modulus, or the columns that were asked for."""
+    if any(is_number(cell) for cell in cells):
+        return False
+    names = [_name_and_unit(cell)[0] for cell in cells]
+    asked = [wanted for wanted in given.values()
+             if isinstance(wanted, str) and not wanted.isdigit()]
+    if asked and all(wanted.strip() in cells or _plain(wanted) in names for wanted in asked):
+        return True
+    return all(any(name in _NAMES[role] for name in names) for role in ("frequency", "storage"))
+
+
+def _unit(text: str) -> str | None:
+    """Return the unit that a text names, '' for a pure number, None if it names none."""
+    plain = re.sub(r"[\s\[\]()*]", "", text).replace("_", "/")
+    if plain == "mPa":
+        return "mPa"  # no modulus of a rubber: refused later
+    if plain in ("MHz", "MHZ"):
+        return "MHz"
+    return _UNIT_SPELLINGS.get(plain.lower())
+
+
+def _name_and_unit(text: str) -> tuple[str, str | None]:
+    """Split the head of a column into its name and its unit.
+
+    Examples
+    --------
+    >>> _name_and_unit("Storage modulus (MPa)")
+    ('storagemodulus', 'MPa')
+    >>> _name_and_unit("freq_Hz"), _name_and_unit("omega / rad/s"), _name_and_unit("G''")
+    (('freq', 'Hz'), ('omega', 'rad/s'), ("g''", None))
+    """
+    text = re.sub(r"[′’‘`´]", "'", text).replace("″", "''").replace('"', "''").strip()
+    unit: str | None = None
+    found = re.search(r"[\[(]([^\[\]()]*)[\])]\s*$", text)
+    if found and found.start() > 0 and found.group(1).strip().lower() not in ("δ", "delta"):
+        unit = _unit(found.group(1))
+        if unit is None and found.group(1).strip():
+            # letters of the quantity, as in "storage modulus (G')"
+            inner = _plain(found.group(1))
+            unit = None if any(inner in names for names in _NAMES.values()) else found.group(1)
+        text = text[: found.start()].strip()
+        symbol = re.search(r"[\[(]([^\[\]()]*)[\])]$", text)
+        if symbol and any(_plain(symbol.group(1)) in names for names in _NAMES.values()):
+            text = text[: symbol.start()]  # as in "storage modulus (G') (MPa)"
+    else:
+        for gap in re.finditer(r"\s*[/,_]\s*|\s+", text):
+            unit = _unit(text[gap.end() :])
+            if unit is not None and _plain(text[: gap.start()]):
+                text = text[: gap.start()]
+                break
+        else:
+            unit = None
+    return _plain(text), unit
+
+
+def _plain(text: str) -> str:
+    """Return a name without blanks, underscores and capitals."""
+    return re.sub(r"[\s_.\-*]", "", text).lower()
+
+
+def find_columns(
+    path: Path, header: tuple[int, list[str]], units: list[str],
+    given: Mapping[str, str | int],
+) -> tuple[dict[str, int], dict[str, str | None], str | None]:
+    """Return the place of each column, the units found, and whether the moduli are tensile."""
+    heads = header[1]
+    parts = [_name_and_unit(head) for head in heads]
+    places = _places(path, header, parts, given)
+    found: dict[str, str | None] = {}
+    for role, at in places.items():
+        unit = parts[at][1] if at < len(parts) else None
+        if unit is None and at < len(units):
+            unit = _unit(units[at])
+            if unit is None and units[at].strip():
+                unit = units[at]
+        found[role] = unit or None
+    at = places["frequency"]
+    if found["frequency"] == "1/s":  # of an angular frequency radians, else turns
+        found["frequency"] = "rad/s" if at < len(parts) and parts[at][0] in _ANGULAR else "Hz"
+    found["angular"] = "yes" if at < len(parts) and parts[at][0] in _ANGULAR else None
+    kind = None
+    if places["storage"] < len(parts):
+        name = parts[places["storage"]][0]
+        head = heads[places["storage"]]
+        tensile = name.startswith("tensile") or re.match(r"e('|\d|p|storage)", name)
+        if tensile or re.search(r"\bE\s*['′’]", head):
+            kind = "tension"
+    return places, found, kind
+
+
+def _places(path: Path, header: tuple[int, list[str]], parts: list[tuple[str, str | None]],
+            given: Mapping[str, str | int]) -> dict[str, int]:
+    """Return the place of each column: those that were asked for, then those of known names."""
+    line, heads = header
+    places = _asked(path, heads, parts, given)
+    for role, names in _NAMES.items():
+        match = [i for i, (name, _) in enumerate(parts)
+                 if name in names and i not in places.values()]
+        if role in places or not match:
+            continue
+        if len(match) > 1:
+            raise ValueError(f"{path}: line {line}: the columns"
+                             f" {' and '.join(repr(heads[i]) for i in match)} may both be the"
+                             f" {role}: say which (columns, --column {role}=NAME)")
+        places[role] = match[0]
+    if "loss" in places:
+        asked = "tan_delta" in given and "loss" not in given
+        places.pop("loss" if asked else "tan_delta", None)
+    missing = [role for role in ("frequency", "storage") if role not in places]
+    if "loss" not in places and "tan_delta" not in places:
+        missing.append("loss (or tan_delta)")
+    if missing:
+        where = (f"line {line}: the columns {', '.join(map(repr, heads))} have no"
+                 if heads else "has no header: say the number of")
+        raise ValueError(f"{path}: {where} {', '.join(missing)}"
+                         " (columns, --column ROLE=NAME or ROLE=NUMBER)")
+    return places
+
+
+def _asked(path: Path, heads: list[str], parts: list[tuple[str, str | None]],
+           given: Mapping[str, str | int]) -> dict[str, int]:
+    """Return the places of the columns that were asked for by name or number."""
+    for role in given:
+        choice("columns", role, ROLES)
+    places: dict[str, int] = {}
+    for role, wanted in given.items():
+        if isinstance(wanted, int) or wanted.isdigit():
+            if int(wanted) < 1 or (heads and int(wanted) > len(heads)):
+                raise ValueError(f"columns: {role} = {wanted}: must be a number from 1"
+                                 + (f" to {len(heads)}" if heads else ""))
+            places[role] = int(wanted) - 1
+            continue
+        match = [i for i, head in enumerate(heads)
+                 if wanted.strip() == head.strip() or _plain(wanted) == parts[i][0]]
+        if not match:
+            raise ValueError(f"columns: {role} = {wanted!r}: {path} has the columns"
+                             f" {', '.join(map(repr, heads)) or 'without names'}")
+        places[role] = match[0]
+    return places

@@ -1,0 +1,356 @@
+"""A Prony series fitted to a DMA table, several temperatures brought to one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.check import number, positive
+from ..base.presenters import present
+from .dma_table import DmaTable
+from .master_curve import MasterCurve, master_curve
+from .prony import Prony
+from .wlf import WLF
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["DmaFit", "fit_dma"]
+
+FloatArray = NDArray[np.float64]
+Rows = tuple[float, NDArray[np.intp]]  # a temperature, C, and the points measured at it
+
+
+@dataclass(frozen=True)
+class DmaFit:
+    """A Prony series fitted to measurements, with what it was fitted to.
+
+    Attributes
+    ----------
+    material : Prony
+        The series at the reference temperature.
+    omega, storage, loss : ndarray, shape (n,)
+        The data, rad/s and Pa, at the reference temperature, ascending.
+    temperature : ndarray, shape (n,), or None
+        Temperature at which each point was measured, C.
+    reference : float or None
+        Reference temperature, C.
+    wlf : WLF or None
+        Constants, given or fitted to the shifts.
+    shifts : list of (float, float)
+        Temperature and log10 of its shift factor.
+    overlap_error : float or None
+        Rms distance of neighbouring sweeps, log10, where shifts were found from them.
+    error_storage, error_loss, error_tan_delta : float
+        Rms of log10(fit/data).
+    largest_error : float
+        Largest absolute of log10(fit/data) in storage and loss.
+    plateau_bounded : bool
+        Whether the data leave the plateau open and `least_plateau` holds it.
+    name : str
+        Name of the data.
+    notes : list of str
+        What was taken for granted, or looks doubtful.
+    """
+
+    material: Prony
+    omega: FloatArray
+    storage: FloatArray
+    loss: FloatArray
+    temperature: FloatArray | None
+    reference: float | None
+    wlf: WLF | None
+    shifts: list[tuple[float, float]]
+    overlap_error: float | None
+    error_storage: float
+    error_loss: float
+    error_tan_delta: float
+    largest_error: float
+    plateau_bounded: bool
+    name: str
+    notes: list[str]
+
+    @property
+    def valid_range(self) -> tuple[float, float]:
+        """Lowest and highest angular frequency of the data at the reference temperature, rad/s."""
+        return float(self.omega[0]), float(self.omega[-1])
+
+    def summary(self) -> str:
+        """Return a few lines on the fit, its error and its range."""
+        low, high = self.valid_range
+        at = "" if self.reference is None else f" at {self.reference:g} C"
+        lines = [
+            f"{self.name}: {self.omega.size} points",
+            f"arms: {self.material.g.size}, plateau {self.material.g_inf:.4g} Pa, instantaneous"
+            f" modulus {self.material.instantaneous_modulus:.4g} Pa",
+            f"error (rms of log10 fit/data): storage {self.error_storage:.4f}, loss"
+            f" {self.error_loss:.4f}, tan delta {self.error_tan_delta:.4f}; largest"
+            f" {self.largest_error:.4f}",
+            f"valid range: {low:.4g} to {high:.4g} rad/s ({low / (2 * math.pi):.4g} to"
+            f" {high / (2 * math.pi):.4g} Hz){at}",
+        ]
+        if self.shifts and len(self.shifts) > 1:
+            lines.append("shifts (log10 a_T): " + ", ".join(
+                f"{t:g} C {shift:+.3f}" for t, shift in self.shifts))
+        if self.overlap_error is not None:
+            lines.append(f"overlap error (rms of log10): {self.overlap_error:.4f}")
+        if self.wlf is not None:
+            lines.append(f"WLF: c1 = {self.wlf.c1:.6g}, c2 = {self.wlf.c2:.6g} K at"
+                         f" {self.wlf.t_ref:g} C")
+        return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
+
+    def to_namelist(self, *, poisson: float = 0.5, temperature: float | None = None) -> str:
+        """Return the `&material` group, with the errors and the range as comments.
+
+        Parameters
+        ----------
+        poisson : float
+            Poisson ratio.
+        temperature : float, optional
+            Temperature of the simulation, C; the reference temperature if left out. Another one
+            needs WLF constants.
+
+        Raises
+        ------
+        ValueError
+            If a temperature is asked for and the shift is not known.
+        """
+        comment = "".join(f"! {line}\n" for line in self.summary().splitlines())
+        if self.wlf is None:
+            if temperature is not None and temperature != self.reference:
+                raise ValueError(
+                    f"temperature = {temperature:g}: the data give no WLF constants: give them"
+                    " (wlf, --wlf C1 C2)")
+            return comment + self.material.to_namelist(poisson=poisson)
+        return comment + self.material.to_namelist(
+            poisson=poisson, wlf=self.wlf,
+            temperature=self.wlf.t_ref if temperature is None else temperature)
+
+    def plot(self) -> Figure:
+        """Draw data and fit, tan delta, and the error of both.
+
+        Returns
+        -------
+        matplotlib Figure
+        """
+        return present("plot_dma_fit", self)
+
+
+def fit_dma(
+    table: DmaTable,
+    *,
+    arms_per_decade: float = 1.0,
+    reference: float | None = None,
+    wlf: Sequence[float] | None = None,
+    temperature_tolerance: float = 0.5,
+    least_plateau: float = 0.01,
+    slack: float = 0.05,
+) -> DmaFit:
+    """Fit a Prony series to a table.
+
+    Parameters
+    ----------
+    table : DmaTable
+        The measurements; rows in any order.
+    arms_per_decade : float
+        Density of the relaxation times.
+    reference : float, optional
+        Reference temperature, C. With `wlf` any, by default its own; without `wlf` the nearest one
+        of the table, by default the middle one.
+    wlf : (c1, c2) or (c1, c2, t_ref), optional
+        Constants of the shift, -, K, C; t_ref is `reference` if left out. Without them several
+        temperatures are shifted by `asperity.material.master_curve`.
+    temperature_tolerance : float
+        Temperatures closer than this (K) belong to one sweep.
+    least_plateau : float
+        The plateau g_inf is at least this share of the lowest storage modulus: positive also where
+        the data do not reach it. 0 to 1.
+    slack : float
+        Relative increase of the misfit allowed for smoothness; see `asperity.material.Prony.fit`.
+
+    Returns
+    -------
+    DmaFit
+
+    Raises
+    ------
+    ValueError
+        If an option is wrong, or the temperatures cannot be brought to one.
+    """
+    number("least_plateau", least_plateau, 0.0, 1.0)
+    positive("temperature_tolerance", temperature_tolerance)
+    notes = list(table.notes)
+    sweeps: list[Rows] = []
+    if table.temperature is not None:
+        sweeps = _sweeps(table.temperature, temperature_tolerance)
+    found = _shifted(table, sweeps, _constants(wlf, reference), reference, temperature_tolerance)
+    notes += found.notes
+    reduced = table.omega * 10.0**found.log_shift
+    order = np.argsort(reduced, kind="stable")
+    omega, storage, loss = reduced[order], table.storage[order], table.loss[order]
+    notes += _range_notes(table, omega)
+    material = Prony.fit(omega, storage, loss, arms_per_decade=arms_per_decade, slack=slack,
+                         least_plateau=least_plateau)
+    if omega.size < material.g.size:
+        notes.append(f"{omega.size} points for {material.g.size} arms: the series between them is a"
+                     " guess")
+    floor = least_plateau * float(storage.min())
+    bounded = material.g_inf <= floor * (1.0 + 1e-9)
+    if bounded:
+        notes.append("the data do not show the plateau: it is held at"
+                     f" {100 * least_plateau:g} % of the lowest storage modulus")
+    modulus = material.complex_modulus(omega)
+    errors = [np.log10(modulus.real / storage), np.log10(modulus.imag / loss)]
+    errors.append(errors[1] - errors[0])
+    rms = [float(np.sqrt(np.mean(error**2))) for error in errors]
+    return DmaFit(
+        material, omega, storage, loss,
+        None if table.temperature is None else table.temperature[order], found.reference,
+        found.wlf, [(t, float(found.log_shift[rows[0]])) for t, rows in sweeps],
+        found.overlap_error, *rms,
+        float(max(np.abs(errors[0]).max(), np.abs(errors[1]).max())), bounded, table.name, notes)
+
+
+class _Shifted(NamedTuple):
+    """How the points of a table come to the reference temperature."""
+
+    log_shift: FloatArray  # log10 a_T of each point
+    reference: float | None
+    wlf: WLF | None
+    overlap_error: float | None
+    notes: list[str]
+
+
+def _shifted(table: DmaTable, sweeps: list[Rows], constants: WLF | None, reference: float | None,
+             tolerance: float) -> _Shifted:
+    """Return the shifts: those of the constants, or those that lay the sweeps on one curve."""
+    shift = np.zeros(table.omega.size)
+    if constants is not None:
+        for t, rows in sweeps:
+            shift[rows] = math.log10(float(constants.shift_factor(t)))
+        return _Shifted(shift, constants.t_ref, constants, None, [])
+    if len(sweeps) > 1:
+        return _overlaid(table, sweeps, reference, tolerance)
+    if len(sweeps) == 1:
+        measured = sweeps[0][0]
+        if reference is not None and abs(measured - reference) > tolerance:
+            raise ValueError(f"reference = {reference:g}: the data are at {measured:g} C:"
+                             " give WLF constants (wlf, --wlf C1 C2)")
+        reference = measured
+    return _Shifted(shift, reference, None, None, [])
+
+
+def _overlaid(table: DmaTable, sweeps: list[Rows], reference: float | None, tolerance: float
+              ) -> _Shifted:
+    """Return the shifts that lay each sweep over its neighbour."""
+    temperatures = [t for t, _ in sweeps]
+    place = len(sweeps) // 2 if reference is None else int(
+        np.argmin([abs(t - reference) for t in temperatures]))
+    near = temperatures[place]
+    if reference is not None and abs(near - reference) > tolerance:
+        raise ValueError(
+            f"reference = {reference:g}: must be one of the temperatures"
+            f" {', '.join(f'{t:g}' for t in temperatures)}, or give WLF constants")
+    _enough(table, sweeps)
+    curve = master_curve(
+        temperatures, [table.omega[r] for _, r in sweeps],
+        [table.storage[r] for _, r in sweeps], [table.loss[r] for _, r in sweeps], near)
+    shift = np.zeros(table.omega.size)
+    for (_, rows), log_shift in zip(sweeps, curve.log_shift, strict=True):
+        shift[rows] = log_shift
+    notes = []
+    if curve.wlf is None:
+        notes.append(f"the shifts give no WLF constants: the material is known at {near:g} C only")
+    notes += _doubts(table, sweeps, curve)
+    return _Shifted(shift, near if curve.wlf is None else curve.wlf.t_ref, curve.wlf,
+                    curve.overlap_error, notes)
+
+
+def _range_notes(table: DmaTable, omega: FloatArray) -> list[str]:
+    """Say whether the range of frequencies is short; a single frequency raises."""
+    decades = math.log10(float(omega[-1] / omega[0]))
+    if decades < 1e-3:
+        raise ValueError(f"{table.name}: all {omega.size} points are at one frequency,"
+                         f" {omega[0]:.4g} rad/s: a series needs a range of them, or several"
+                         " temperatures with WLF constants (wlf, --wlf C1 C2)")
+    if decades < 1.0:
+        return [f"the data cover {decades:.2g} decades of frequency: beyond them the series is a"
+                " guess"]
+    return []
+
+
+def _constants(wlf: Sequence[float] | None, reference: float | None) -> WLF | None:
+    """Return the constants, at the reference temperature that was asked for."""
+    if reference is not None:
+        number("reference", reference)
+    if wlf is None:
+        return None
+    if len(wlf) == 2:
+        if reference is None:
+            raise ValueError("wlf: has 2 numbers: give its reference temperature, too"
+                             " (reference, --reference T)")
+        wlf = (*wlf, reference)
+    if len(wlf) != 3:
+        raise ValueError(f"wlf: has {len(wlf)} numbers: must be (c1, c2) or (c1, c2, t_ref)")
+    c1, c2, t_ref = (number("wlf", value) for value in wlf)
+    number("wlf c1", c1, 0.0)
+    positive("wlf c2", c2)
+    if reference is None or reference == t_ref:
+        return WLF(c1, c2, t_ref)
+    # The same shifts seen from another temperature (Williams, Landel and Ferry 1955).
+    moved = c2 + reference - t_ref
+    if moved <= 0.0:
+        raise ValueError(f"reference = {reference:g}: must be > t_ref - c2 = {t_ref - c2:g}")
+    return WLF(c1 * c2 / moved, moved, reference)
+
+
+def _sweeps(temperature: FloatArray, tolerance: float) -> list[Rows]:
+    """Return the temperatures, ascending, with their rows."""
+    order = np.argsort(temperature, kind="stable")
+    cuts = np.flatnonzero(np.diff(temperature[order]) > tolerance) + 1
+    sweeps = []
+    for rows in np.split(order, cuts):
+        values = temperature[rows]
+        if np.ptp(values) > 4.0 * tolerance:
+            raise ValueError(
+                f"temperatures from {values.min():g} to {values.max():g} C lie closer than"
+                f" {tolerance:g} K to their neighbours: a ramp? Sweeps of the frequency at"
+                " temperatures further apart are needed, or a smaller temperature_tolerance"
+                " (--temperature-tolerance)")
+        mean = float(values[0]) if np.ptp(values) == 0.0 else round(float(np.mean(values)), 6)
+        sweeps.append((mean, rows))
+    return sweeps
+
+
+def _enough(table: DmaTable, sweeps: list[Rows]) -> None:
+    """See that every sweep can be laid over its neighbour."""
+    for t, rows in sweeps:
+        if np.unique(table.omega[rows]).size < 3:
+            count = int(np.unique(table.omega[rows]).size)
+            raise ValueError(f"{table.name}: {count} frequenc{'y' if count == 1 else 'ies'} at"
+                             f" {t:g} C: shifting needs at least 3, or WLF constants (wlf,"
+                             " --wlf C1 C2)")
+
+
+def _doubts(
+    table: DmaTable, sweeps: list[Rows], curve: MasterCurve
+) -> list[str]:
+    """Say which sweeps hardly reach each other, or do not lie on one curve."""
+    doubts = []
+    ends = []
+    for (t, rows), shift in zip(sweeps, curve.log_shift, strict=True):
+        logs = np.log10(table.omega[rows]) + shift
+        ends.append((t, float(logs.min()), float(logs.max())))
+    for (t1, low1, high1), (t2, low2, high2) in zip(ends[:-1], ends[1:], strict=True):
+        overlap = min(high1, high2) - max(low1, low2)
+        if overlap < 0.15 * min(high1 - low1, high2 - low2):
+            doubts.append(f"the sweeps at {t1:g} and {t2:g} C hardly overlap: their shift is"
+                          " doubtful; leave one out or give WLF constants")
+    if curve.overlap_error > 0.05:
+        doubts.append("neighbouring sweeps do not lie on one curve: the shifts are doubtful")
+    return doubts

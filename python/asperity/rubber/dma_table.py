@@ -1,0 +1,192 @@
+"""Tables of storage and loss moduli, as instruments write them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.check import choice, poisson_ratio
+from ..base.tables import cells_of, text_lines
+from .dma_columns import (
+    FREQUENCY_UNITS,
+    KINDS,
+    MODULUS_UNITS,
+    TEMPERATURE_UNITS,
+    find_columns,
+    split_header,
+)
+
+__all__ = ["DmaTable", "read_dma"]
+
+FloatArray = NDArray[np.float64]
+
+_MOST_FAULTS = 10
+
+
+@dataclass(frozen=True)
+class DmaTable:
+    """Moduli at frequencies, and temperatures where the table has them.
+
+    Attributes
+    ----------
+    omega : ndarray, shape (n,)
+        Angular frequency, rad/s.
+    storage, loss : ndarray, shape (n,)
+        Shear moduli G' and G'', Pa.
+    temperature : ndarray, shape (n,), or None
+        C.
+    name : str
+        Name of the file.
+    notes : list of str
+        What was taken for granted, such as a unit that the header does not name.
+    """
+
+    omega: FloatArray
+    storage: FloatArray
+    loss: FloatArray
+    temperature: FloatArray | None = None
+    name: str = "data"
+    notes: list[str] = field(default_factory=list)
+
+
+def read_dma(
+    path: str | Path,
+    *,
+    columns: Mapping[str, str | int] | None = None,
+    frequency_unit: str | None = None,
+    modulus_unit: str | None = None,
+    temperature_unit: str | None = None,
+    kind: str | None = None,
+    poisson: float = 0.5,
+) -> DmaTable:
+    r"""Read a table of storage and loss moduli.
+
+    Columns are separated by commas, semicolons, tabs or blanks; decimal commas are read where
+    commas do not separate (with decimal points elsewhere they stand between thousands). Lines that
+    start with ``#``, empty ones and those above the header are skipped. Units stand in
+    the header, such as ``f (Hz)``, ``G' [MPa]``, ``T_C``, or in a line of their own below it.
+    Without any, frequencies are in Hz (in rad/s where the column is named omega), moduli in Pa and
+    temperatures in C, and `notes` says so.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    columns : mapping, optional
+        Name or number (from 1) of the column of 'frequency', 'storage', 'loss', 'temperature' or
+        'tan_delta', for those that the header's words do not give. A file without a header needs
+        the numbers.
+    frequency_unit : str, optional
+        'Hz', 'kHz', 'mHz', 'rad/s' or 'krad/s'; goes before the header's.
+    modulus_unit : str, optional
+        'Pa', 'kPa', 'MPa' or 'GPa'; goes before the header's.
+    temperature_unit : str, optional
+        'C' or 'K'; goes before the header's.
+    kind : str, optional
+        'shear', or 'tension' for moduli E: G = E/(2 (1 + poisson)). By default what the names of
+        the columns say (E' and E'' or 'tensile': tension), else 'shear'.
+    poisson : float
+        Poisson ratio, for moduli in tension.
+
+    Returns
+    -------
+    DmaTable
+
+    Raises
+    ------
+    OSError
+        If the file is missing or cannot be read.
+    ValueError
+        With the number of the line of each fault, or what the header lacks.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "dma.csv"
+    >>> _ = path.write_text("f (Hz),G' (MPa),G'' (MPa)\n1,2.0,0.5\n10,3.0,0.9\n99,4.0,2.0\n")
+    >>> read_dma(path).storage.tolist()
+    [2000000.0, 3000000.0, 4000000.0]
+    """
+    path = Path(path)
+    poisson = poisson_ratio(poisson)
+    for word, value, allowed in (("frequency_unit", frequency_unit, FREQUENCY_UNITS),
+                                 ("modulus_unit", modulus_unit, MODULUS_UNITS),
+                                 ("temperature_unit", temperature_unit, TEMPERATURE_UNITS)):
+        if value is not None:
+            choice(word, value, tuple(allowed))
+    if kind is not None:
+        choice("kind", kind, KINDS)
+    header, units, body = split_header(path, cells_of(text_lines(path)), columns or {})
+    places, found_units, found_kind = find_columns(path, header, units, columns or {})
+    notes: list[str] = []
+
+    def unit(role: str, given: str | None, allowed: Mapping[str, float], default: str) -> float:
+        told = found_units.get(role)
+        if given is None and told is not None and told not in allowed:
+            raise ValueError(f"{path}: line {header[0]}: column {role}: has the unit {told!r}: must"
+                             f" be one of {', '.join(allowed)}")
+        if given is None and told is None:
+            notes.append(f"{role}: the header names no unit: taken as {default}")
+        return allowed[given or told or default]
+
+    angular = found_units.get("angular") == "yes"
+    to_omega = unit("frequency", frequency_unit, FREQUENCY_UNITS, "rad/s" if angular else "Hz")
+    if found_units.get("storage") is None and "loss" in places:  # one unit counts for both
+        found_units["storage"] = found_units.get("loss")
+    to_pascal = unit("storage", modulus_unit, MODULUS_UNITS, "Pa")
+    to_celsius = 0.0
+    if "temperature" in places:
+        to_celsius = unit("temperature", temperature_unit, TEMPERATURE_UNITS, "C")
+    values = _numbers(path, body, places)
+    storage = to_pascal * values["storage"]
+    if "loss" in places:
+        to_loss = to_pascal
+        if modulus_unit is None and found_units.get("loss") is not None:
+            to_loss = unit("loss", None, MODULUS_UNITS, "Pa")
+        loss = to_loss * values["loss"]
+    else:
+        percent = found_units.get("tan_delta") == "%"
+        loss = storage * values["tan_delta"] * (0.01 if percent else 1.0)
+    if kind == "tension" or (kind is None and found_kind == "tension"):
+        factor = 0.5 / (1.0 + poisson)
+        storage, loss = factor * storage, factor * loss
+        notes.append(f"moduli in tension: G = E/(2 (1 + poisson)) = {factor:.6g} E")
+    temperature = None
+    if "temperature" in places:
+        temperature = values["temperature"] + to_celsius
+    return DmaTable(to_omega * values["frequency"], storage, loss, temperature, path.name, notes)
+
+
+def _numbers(
+    path: Path, body: list[tuple[int, list[str]]], places: Mapping[str, int]
+) -> dict[str, FloatArray]:
+    """Return the columns as numbers; all faults are told with their lines."""
+    faults: list[str] = []
+    values: dict[str, list[float]] = {role: [] for role in places}
+    most = max(places.values()) + 1
+    for line, cells in body:
+        if len(cells) < most:
+            faults.append(f"{path}: line {line}: has {len(cells)} columns, must have {most}")
+            continue
+        for role, at in places.items():
+            allowed = "a finite number" if role == "temperature" else "a number > 0"
+            try:
+                value = float(cells[at])
+            except ValueError:
+                value = math.nan
+            if not math.isfinite(value) or (role != "temperature" and value <= 0.0):
+                faults.append(f"{path}: line {line}: {role} = {cells[at]!r}: must be {allowed}")
+            values[role].append(value)
+    if faults:
+        more = len(faults) - _MOST_FAULTS
+        if more > 0:
+            faults = [*faults[:_MOST_FAULTS], f"{path}: and {more} more"]
+        raise ValueError("\n".join(faults))
+    if len(body) < 3:
+        raise ValueError(f"{path}: has {len(body)} rows of numbers: must have at least 3")
+    return {role: np.array(column) for role, column in values.items()}

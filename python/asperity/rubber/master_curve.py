@@ -1,0 +1,185 @@
+"""Time-temperature superposition: sweeps at several temperatures brought onto one curve."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import least_squares, minimize_scalar
+
+from ..base.check import array_of, number
+from .wlf import WLF
+
+__all__ = ["MasterCurve", "master_curve"]
+
+FloatArray = NDArray[np.float64]
+
+
+class MasterCurve(NamedTuple):
+    """Measurements at several temperatures, brought to one reference temperature.
+
+    Attributes
+    ----------
+    omega : ndarray, shape (n,)
+        Reduced frequencies omega a_T, rad/s, ascending.
+    storage, loss : ndarray, shape (n,)
+        G' and G'', Pa.
+    temperatures : ndarray, shape (m,)
+        Temperatures, ascending.
+    log_shift : ndarray, shape (m,)
+        log10 a_T of each temperature.
+    wlf : WLF or None
+        Law fitted to the shifts; None with fewer than three temperatures or where no law with
+        c1, c2 > 0 fits.
+    overlap_error : float
+        Rms distance of neighbouring curves in log10 of the modulus, where they overlap.
+    """
+
+    omega: FloatArray
+    storage: FloatArray
+    loss: FloatArray
+    temperatures: FloatArray
+    log_shift: FloatArray
+    wlf: WLF | None
+    overlap_error: float
+
+
+def master_curve(
+    temperatures: ArrayLike,
+    omega: Sequence[ArrayLike],
+    storage: Sequence[ArrayLike],
+    loss: Sequence[ArrayLike],
+    reference: float,
+) -> MasterCurve:
+    """Shift DMA sweeps at several temperatures along the frequency axis onto one curve.
+
+    Each sweep is shifted onto its neighbour nearer to the reference: the shift minimises the
+    mean squared distance of log G' and log G'' over the overlap. No vertical shift.
+
+    Parameters
+    ----------
+    temperatures : array_like, shape (m,)
+        One a sweep, different from each other.
+    omega, storage, loss : sequence of m array_like
+        Angular frequencies (rad/s), G' and G'' (Pa) of each sweep; all > 0, at least three points.
+    reference : float
+        Reference temperature: one of `temperatures`.
+
+    Returns
+    -------
+    MasterCurve
+        `Prony.fit(curve.omega, curve.storage, curve.loss)` makes a material of it.
+
+    Raises
+    ------
+    ValueError
+        If shapes differ, values are out of range or `reference` is not among the temperatures.
+
+    Examples
+    --------
+    >>> from asperity.material import Prony
+    >>> rubber, wlf = Prony(1e6, [2e6, 4e6, 2e6], [1e-3, 1e-2, 1e-1]), WLF(8.0, 120.0, 20.0)
+    >>> t, w = [10.0, 20.0, 30.0, 40.0], np.logspace(-1, 3, 30)
+    >>> cold = [rubber.shifted(x, wlf) for x in t]
+    >>> curve = master_curve(t, [w] * 4, [m.storage_modulus(w) for m in cold],
+    ...                      [m.loss_modulus(w) for m in cold], 20.0)
+    >>> bool(np.allclose(curve.log_shift, np.log10(wlf.shift_factor(t)), atol=0.02))
+    True
+    """
+    values = array_of("temperatures", temperatures, ndim=1)
+    count = values.size
+    for name, sweeps in (("omega", omega), ("storage", storage), ("loss", loss)):
+        if len(sweeps) != count:
+            raise ValueError(f"{name}: has {len(sweeps)} sweeps, must have {count}")
+    order = np.argsort(values)
+    values = values[order]
+    if np.any(np.diff(values) == 0.0):
+        raise ValueError("temperatures: two are equal: must differ")
+    match = np.flatnonzero(values == number("reference", reference))
+    if not match.size:
+        raise ValueError(
+            f"reference = {reference!r}: must be one of the temperatures {values.tolist()}"
+        )
+    sweeps_log: list[tuple[FloatArray, FloatArray]] = []
+    for i in order:
+        columns = []
+        for name, sweeps in (("omega", omega), ("storage", storage), ("loss", loss)):
+            columns.append(
+                np.log10(array_of(f"{name}[{i}]", sweeps[i], low=0.0, low_open=True, ndim=1))
+            )
+        if len({column.size for column in columns}) != 1 or columns[0].size < 3:
+            raise ValueError(
+                f"sweep {i}: omega, storage, loss have {[c.size for c in columns]} values:"
+                " must have the same number, at least 3"
+            )
+        sort = np.argsort(columns[0])
+        sweeps_log.append((columns[0][sort], np.array(columns[1:])[:, sort]))
+
+    start = int(match[0])
+    shift = np.zeros(count)
+    squares: list[float] = []
+    for direction, stop in ((1, count), (-1, -1)):
+        for i in range(start + direction, stop, direction):
+            step, error = _overlay(sweeps_log[i - direction], sweeps_log[i])
+            shift[i] = shift[i - direction] + step
+            squares.append(error)
+    reduced = np.concatenate([x + s for (x, _), s in zip(sweeps_log, shift, strict=True)])
+    moduli = 10.0 ** np.concatenate([y for _, y in sweeps_log], axis=1)
+    sort = np.argsort(reduced, kind="stable")
+    return MasterCurve(
+        10.0 ** reduced[sort],
+        moduli[0, sort],
+        moduli[1, sort],
+        values,
+        shift,
+        _fit_wlf(values, shift, float(reference)),
+        float(np.sqrt(np.mean(squares))) if squares else 0.0,
+    )
+
+
+def _overlay(
+    fixed: tuple[FloatArray, FloatArray], moving: tuple[FloatArray, FloatArray]
+) -> tuple[float, float]:
+    """Return the shift in log10 frequency from `moving` to `fixed`, and the mean square left."""
+    x_fixed, y_fixed = fixed
+    x_moving, y_moving = moving
+
+    def distance(shift: float) -> float:
+        low = max(x_fixed[0], x_moving[0] + shift)
+        high = min(x_fixed[-1], x_moving[-1] + shift)
+        x = np.linspace(low, high, 200)
+        total = 0.0
+        for a, b in zip(y_fixed, y_moving, strict=True):
+            apart = np.interp(x, x_fixed, a) - np.interp(x - shift, x_moving, b)
+            total += float(np.mean(apart**2))
+        return 0.5 * total
+
+    # at least a tenth of the shorter sweep overlaps
+    margin = 0.1 * min(np.ptp(x_fixed), np.ptp(x_moving))
+    lowest = x_fixed[0] - x_moving[-1] + margin
+    highest = x_fixed[-1] - x_moving[0] - margin
+    trial = np.linspace(lowest, highest, 401)
+    near = int(np.argmin([distance(s) for s in trial]))
+    bounds = (trial[max(near - 1, 0)], trial[min(near + 1, trial.size - 1)])
+    found = minimize_scalar(distance, bounds=bounds, method="bounded", options={"xatol": 1e-8})
+    return float(found.x), float(found.fun)
+
+
+def _fit_wlf(temperatures: FloatArray, log_shift: FloatArray, reference: float) -> WLF | None:
+    """Return the WLF constants nearest to the shifts, or None."""
+    difference = temperatures - reference
+    if difference.size < 3:
+        return None
+    lowest = max(0.0, -float(difference.min()))
+
+    def residual(unknowns: FloatArray) -> FloatArray:
+        c1, c2 = np.exp(unknowns)
+        return c1 * difference / (c2 + lowest + difference) + log_shift
+
+    found = least_squares(residual, np.log([10.0, 100.0]), xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    c1, c2 = np.exp(found.x)
+    if not found.success or c1 > 1e4 or c1 < 1e-6:
+        return None
+    return WLF(float(c1), float(c2 + lowest), reference)

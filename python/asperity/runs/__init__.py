@@ -1,0 +1,1 @@
+"""Runs: cases built, run in this process, and swept side by side."""

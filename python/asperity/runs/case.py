@@ -1,0 +1,302 @@
+"""Cases built in Python: the namelists of an input as an object.
+
+Names, types, defaults and checks are those of the program: they come from the Fortran library.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from . import namelists
+from .groups import Group, Groups, UnknownVariableError, entry_of
+
+if TYPE_CHECKING:
+    from ..results import Run
+
+__all__ = ["Case", "Group", "Groups", "UnknownVariableError"]
+
+
+class _Text(str):
+    """A text that is shown as it is."""
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
+class Case:
+    """An input of the program, built, changed, checked, written and run from Python.
+
+    The groups of the input are attributes and items: ``case.grid.nx = 128``,
+    ``case["grid"]["nx"]``. ``case.surface`` and ``case.phase``, which may be repeated, are lists of
+    groups. A name or a value that the program would refuse is refused at once; `check` tells how
+    they fit together. ``str(case)`` is the text of the input.
+
+    Parameters
+    ----------
+    title : str, optional
+        The title, the variable of the group ``case``.
+    **groups
+        Values of the groups, by name: dicts of variables, or lists of dicts for ``surface`` and
+        ``phase``. Numbers may be those of numpy, lists of numbers its arrays.
+
+    Attributes
+    ----------
+    path : Path or None
+        The file it was read from or written to. Paths within the case start from its folder;
+        without a file from the current folder.
+
+    Raises
+    ------
+    ValueError
+        If there is no such group or variable, with the nearest name, or a value is not allowed.
+
+    Examples
+    --------
+    >>> import asperity
+    >>> case = asperity.Case(
+    ...     title="Wave", grid=dict(nx=64, ny=1, lx=1e-3),
+    ...     surface=dict(shape="sine", amplitude=1e-6, wavelength=1e-3),
+    ...     material=dict(shear_modulus=1e6), phase=[dict(pressure=1e4)])
+    >>> case.phase.append(pressure=2e4)
+    >>> case.grid.nx = 128
+    >>> print(case.check().splitlines()[4])
+      nx = 128
+    >>> case.grid.boundary = "open"
+    Traceback (most recent call last):
+    ...
+    ValueError: &grid: boundary = 'open': must be one of 'periodic' | 'free'
+    """
+
+    path: Path | None
+    _groups: dict[str, Group | Groups]
+
+    def __init__(self, title: str | None = None, **groups: Any) -> None:
+        object.__setattr__(self, "_groups", {})
+        object.__setattr__(self, "path", None)
+        for name in namelists.table():
+            self[name] = {} if not namelists.table()[name].is_repeatable else []
+        for name, values in groups.items():
+            self[name] = values
+        if title is not None:
+            self["case"]["title"] = title
+
+    @classmethod
+    def read(cls, source: str | os.PathLike[str]) -> Case:
+        """Return the case of an input, a file or its text.
+
+        Comments are not kept.
+
+        Parameters
+        ----------
+        source : str or path
+            A path, or the namelists themselves: a text that starts with ``&`` or ``!`` or has
+            several lines.
+
+        Raises
+        ------
+        ValueError
+            If names, types or ranges are wrong; all faults are named.
+        OSError
+            If the file cannot be read.
+        """
+        case = cls()
+        if namelists.is_text(source):
+            name, text = "case.nml", str(source)
+        else:
+            name, text = os.fspath(source), _read(Path(source))
+            case.path = Path(source)
+        for group, values in namelists.listed(text, name):
+            if entry_of(group).is_repeatable:
+                new = Group(group)
+                case[group].insert(len(case[group]), new)
+                case[group][-1]._values.update(values)
+            else:
+                case[group]._values.update(values)
+        return case
+
+    @staticmethod
+    def help(name: str | None = None) -> str:
+        """Return what is known of a group or a variable: type, default, units, meaning.
+
+        Parameters
+        ----------
+        name : str, optional
+            Such as ``"grid"`` or ``"phase.velocity_x"``; the names of all groups if left out.
+
+        Examples
+        --------
+        >>> import asperity
+        >>> asperity.Case.help("solver.tolerance")
+        solver.tolerance: real, default 1e-6; (0, 1)
+            Residual of every solve.
+        """
+        if name is None:
+            return _Text("\n".join(f"&{entry.name}: {entry.meaning}"
+                                   for entry in namelists.table().values()))
+        group, _, variable = name.partition(".")
+        if not variable:
+            return _Text(entry_of(group))
+        return _Text(Group(group)._variable(variable))
+
+    def check(self, *, files: bool = True) -> str:
+        """Validate the whole, as ``asperity check`` does.
+
+        Parameters
+        ----------
+        files : bool
+            Look into the height maps, too.
+
+        Returns
+        -------
+        str
+            What the command prints: every resolved setting, the time steps, the memory needed,
+            and warnings.
+
+        Raises
+        ------
+        ValueError
+            With the messages of the command, one a line; the lines are those of ``str(case)``.
+        OSError
+            If a height map cannot be read.
+        """
+        return _Text(namelists.check_text(str(self), self._name, files))
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write the input to a file, which becomes the case's `path`.
+
+        Relative paths of height maps are changed so that they mean the same files from there.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
+        path = Path(path)
+        new = self.copy()
+        new._follow(path.parent)
+        path.write_bytes(namelists.encode(str(new)))
+        object.__setattr__(self, "_groups", new._groups)
+        self.path = path
+        return path
+
+    def _follow(self, folder: Path) -> None:
+        """Change the relative paths of height maps to those seen from another folder."""
+        old = self._name.parent
+        if folder.resolve() == old.resolve():
+            return
+        for surface in self["surface"]:
+            file = surface.file
+            if file and not Path(file).is_absolute():
+                surface.file = os.path.relpath((old / file).resolve(), folder.resolve())
+
+    def run(self, **options: Any) -> Run:
+        """Run the case in this process; `asperity.run` tells the options.
+
+        The result lies where ``case.output.file`` says, by default beside the input's file with
+        the ending .h5; a case without a file counts as ``case.nml`` in the current folder.
+
+        Returns
+        -------
+        Run
+            The opened result.
+
+        Raises
+        ------
+        ValueError, OSError, NotConverged
+            As `asperity.run`.
+        """
+        from .runner import run
+
+        return run(self, **options)
+
+    def copy(self) -> Case:
+        """Return a case of its own with the same values."""
+        new = Case()
+        for name, group in self._groups.items():
+            new[name] = group
+        new.path = self.path
+        return new
+
+    __copy__ = copy
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Case:
+        return self.copy()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"text": str(self), "path": self.path}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        read = Case.read(state["text"] + "\n")
+        object.__setattr__(self, "_groups", read._groups)
+        object.__setattr__(self, "path", state["path"])
+
+    @property
+    def title(self) -> str:
+        """The title: the variable of the group ``case``."""
+        return self["case"].title
+
+    @title.setter
+    def title(self, title: str) -> None:
+        self["case"]["title"] = title
+
+    @property
+    def _name(self) -> Path:
+        """The file's name, for messages and results."""
+        return Path("case.nml") if self.path is None else self.path
+
+    def __getitem__(self, name: str) -> Any:
+        return self._groups[entry_of(name).name]
+
+    def __setitem__(self, name: str, values: Any) -> None:
+        entry = entry_of(name)
+        if values is None:
+            values = [] if entry.is_repeatable else {}
+        self._groups[name] = Groups(name, values) if entry.is_repeatable else Group(name, values)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return self[name]
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name == "path":
+            object.__setattr__(self, "path", None if value is None else Path(value))
+        elif name == "title":
+            self["case"]["title"] = value
+        else:
+            self[name] = value
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *self._groups})
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self._groups)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Case) and self._groups == other._groups
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __str__(self) -> str:
+        blocks = []
+        for name, group in self._groups.items():
+            if isinstance(group, Groups):
+                blocks += map(str, group)
+            elif group or entry_of(name).is_required:
+                blocks.append(str(group))
+        return "".join(f"{block}\n" for block in blocks)
+
+    def __repr__(self) -> str:
+        return f"! {self._name if self.path else 'a case without a file'}\n{self}"
+
+
+def _read(path: Path) -> str:
+    """Return the text of a file."""
+    if not path.exists():
+        raise FileNotFoundError(f"{path}: there is no such file")
+    try:
+        return namelists.decode(path.read_bytes())
+    except OSError as error:
+        raise OSError(f"{path}: cannot be read: {error.strerror}") from None

@@ -1,0 +1,208 @@
+"""The input as the Fortran library knows it: its table, the reading of namelists, the checks."""
+
+from __future__ import annotations
+
+import functools
+import numbers
+import os
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..base import library
+
+__all__ = ["GroupEntry", "Variable", "check_text", "decode", "encode", "fault_of", "format_value",
+           "is_text", "listed", "table"]
+
+_SEPARATOR = "\x1f"
+
+_groups = library.bare("input_groups")
+_listed = library.call("input_listed")
+_check = library.call("input_check")
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable of the input: type, default, units, allowed values and meaning.
+
+    A default in parentheses is none or derived. The kind is 'integer', 'real', 'logical', 'text',
+    'word' (one of several strings), or a list, 'reals' or 'words'.
+    """
+
+    group: str
+    name: str
+    kind: str
+    default: str
+    units: str
+    allowed: str
+    meaning: str
+
+    @property
+    def is_list(self) -> bool:
+        """Whether it takes several values."""
+        return self.kind in ("reals", "words")
+
+    @property
+    def is_required(self) -> bool:
+        """Whether it must be given where it applies."""
+        return self.default.startswith("(required")
+
+    def __str__(self) -> str:
+        units = f" {self.units}" if self.units else ""
+        allowed = "" if self.allowed == "any" else f"; {self.allowed}"
+        return (f"{self.group}.{self.name}: {self.kind}, default {self.default}{units}{allowed}\n"
+                f"    {self.meaning}")
+
+
+@dataclass(frozen=True)
+class GroupEntry:
+    """A group of the input, with its variables by name."""
+
+    name: str
+    is_required: bool
+    is_repeatable: bool
+    meaning: str
+    variables: dict[str, Variable] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        notes = ["required"] * self.is_required + ["may be repeated"] * self.is_repeatable
+        head = f"&{self.name}{' (' + ', '.join(notes) + ')' if notes else ''}: {self.meaning}"
+        return "\n".join([head, *map(str, self.variables.values())])
+
+
+def encode(text: str) -> bytes:
+    """Return the bytes of a text."""
+    return text.encode("utf-8", "surrogateescape")
+
+
+def decode(data: bytes) -> str:
+    """Return the text of bytes; bytes that are no UTF-8 are kept."""
+    return data.decode("utf-8", "surrogateescape")
+
+
+def is_text(source: object) -> bool:
+    """Return whether this is a text of namelists; else it is a path.
+
+    Examples
+    --------
+    >>> is_text("road.nml"), is_text("&grid nx = 8 /"), is_text(" ! a comment"), is_text("")
+    (False, True, True, False)
+    """
+    return isinstance(source, str) and ("\n" in source or source.lstrip()[:1] in tuple("&$!"))
+
+
+@functools.cache
+def table() -> dict[str, GroupEntry]:
+    """Return the groups of the input by name."""
+    groups: dict[str, GroupEntry] = {}
+    for line in _text_of(lambda buffer: (_groups(buffer),)).splitlines():
+        kind, *cells = line.split(_SEPARATOR)
+        if kind == "group":
+            name, required, repeatable, meaning = cells
+            groups[name] = GroupEntry(name, required == "yes", repeatable == "yes", meaning)
+        else:
+            variable = Variable(*cells)
+            groups[variable.group].variables[variable.name] = variable
+    return groups
+
+
+def listed(text: str, path: str | os.PathLike[str] = "") -> list[tuple[str, dict[str, Any]]]:
+    """Return what a text of namelists gives: names of groups with their values, in its order.
+
+    Names, types and ranges are checked, not how the values fit together.
+
+    Parameters
+    ----------
+    text : str
+        The namelists.
+    path : str or path
+        Name of the file, for messages.
+
+    Raises
+    ------
+    ValueError
+        If the text is wrong; all faults are named.
+    """
+    found: list[tuple[str, dict[str, Any]]] = []
+    listing = _text_of(functools.partial(_listed, encode(text), os.fsencode(path)), len(text))
+    for line in listing.split("\n")[:-1]:
+        name, *items = line.split(_SEPARATOR)
+        if name.startswith("&"):
+            found.append((name[1:], {}))
+            continue
+        group, values = found[-1]
+        variable = table()[group].variables[name]
+        converted = [_value(variable.kind, item) for item in items]
+        values[name] = converted if variable.is_list else converted[0]
+    return found
+
+
+def check_text(text: str, path: str | os.PathLike[str], files: bool) -> str:
+    """Return what `asperity check` prints about a text; raise what it reports.
+
+    Without `files` the height maps are not looked into.
+    """
+    return _text_of(functools.partial(_check, encode(text), os.fsencode(path), int(files)))
+
+
+def _value(kind: str, item: str) -> Any:
+    """Return a listed value as one of Python."""
+    if kind == "integer":
+        return int(item)
+    if kind in ("real", "reals"):
+        return float(item)
+    return item == "T" if kind == "logical" else item
+
+
+def _text_of(routine: Any, size: int = 0) -> str:
+    """Return the text that a routine writes into a buffer, made larger if need be."""
+    most = max(30000, 30 * size)
+    while True:
+        buffer = np.empty(most, np.intc)
+        (length,) = routine(buffer)
+        if length <= most:
+            return decode(buffer[:length].astype(np.uint8).tobytes())
+        most = int(length)
+
+
+def fault_of(error: ValueError) -> str:
+    """Return the message of a fault in a text that is no file: without path and line.
+
+    Examples
+    --------
+    >>> fault_of(ValueError(": &phase: dt = 0: must be a positive number (line 2)"))
+    '&phase: dt = 0: must be a positive number'
+    """
+    return "\n".join(re.sub(r" \(line \d+\)$", "", line.removeprefix(": "))
+                     for line in str(error).split("\n"))
+
+
+def format_value(value: object) -> str:
+    """Return a value, or an array of them, as a namelist holds it.
+
+    Reals have the digits that give the same bits again; quotes in strings are doubled.
+
+    Examples
+    --------
+    >>> format_value(True), format_value(0.1), format_value("Persson's"), format_value([1, 2.5])
+    ('.true.', '0.1', "'Persson''s'", '1, 2.5')
+    """
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, str | Path):
+        return "'" + str(value).replace("'", "''") + "'"
+    if isinstance(value, bool):
+        return ".true." if value else ".false."
+    if isinstance(value, numbers.Integral):
+        return str(int(value))
+    if isinstance(value, numbers.Real | np.longdouble):
+        return repr(float(value))
+    if isinstance(value, Iterable):
+        items = list(value)
+        if not any(isinstance(item, list | tuple | dict | np.ndarray) for item in items):
+            return ", ".join(map(format_value, items))
+    raise ValueError(f"{value!r}: must be a number, a logical, a string, or a list of them")

@@ -1,0 +1,124 @@
+"""Runs in process: the loop over the steps is Python's, so that Ctrl-C stops between two steps."""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from pathlib import Path
+from typing import Protocol
+
+from ..base import library
+from ..base.check import whole
+from ..base.errors import NotConverged
+from ..results import Run
+from . import namelists
+
+__all__ = ["run"]
+
+_open = library.call("run_open")
+_step = library.call("run_step")
+_interrupt = library.call("run_interrupt")
+_close = library.call("run_close")
+
+
+class _CaseLike(Protocol):
+    """What is needed of an `asperity.Case`: its text is ``str(case)``."""
+
+    path: Path | None
+
+
+def run(
+    case: str | os.PathLike[str] | _CaseLike,
+    *,
+    output: str | os.PathLike[str] | None = None,
+    threads: int | None = None,
+    restart: bool = False,
+    quiet: bool = True,
+) -> Run:
+    """Run a case in this process, as the command ``asperity run`` does, and open its result.
+
+    Ctrl-C finishes the step in hand, writes a checkpoint and raises KeyboardInterrupt;
+    ``restart=True`` goes on from there to the same numbers.
+
+    Parameters
+    ----------
+    case : str, path or Case
+        The input, CASE.nml; or its text, or an `asperity.Case`.
+    output : str or path, optional
+        The result; what the case says if left out, which is the input's name with .h5 unless
+        ``output.file`` names another. A case without a file counts as ``case.nml`` in the
+        current folder.
+    threads : int, optional
+        Number of threads; what the case says if left out.
+    restart : bool
+        Go on from the checkpoint of an interrupted run.
+    quiet : bool
+        Do not tell the progress on stderr.
+
+    Returns
+    -------
+    Run
+        The opened result.
+
+    Raises
+    ------
+    ValueError
+        If the input is wrong; all faults are named.
+    OSError
+        If a file cannot be read or written.
+    NotConverged
+        If a solver fails; its ``result`` is the opened result, with all steps up to that one.
+
+    Examples
+    --------
+    >>> import asperity
+    >>> asperity.run("nowhere.nml")
+    Traceback (most recent call last):
+    ...
+    OSError: nowhere.nml: there is no such file
+    """
+    if threads is not None:
+        threads = whole("threads", threads)
+    target = b"" if output is None else os.fsencode(output)
+    if output is not None and not 0 < len(target) <= 1024:
+        raise ValueError(f"output: has {len(target)} characters: must have 1 to 1024")
+    path, text = _source(case)
+    handle, rows, first, result, told = _open(os.fsencode(path), namelists.encode(text), target,
+                                              threads or 0, int(restart))
+    failure: NotConverged | None = None
+    try:
+        _warn(told)
+        finished = first >= rows
+        while not finished:
+            finished, step, time, area, friction, told = _step(handle)
+            _warn(told)
+            if not quiet:
+                print(f"step {step} of {rows - 1}, t = {time:.6g} s, contact area {area:.4g},"
+                      f" friction {friction:.4g}", file=sys.stderr)
+    except KeyboardInterrupt:
+        _interrupt(handle)
+        raise
+    except NotConverged as error:
+        failure = error
+    finally:
+        _close(handle)
+    opened = Run(os.fsdecode(result.rstrip()))
+    if failure is not None:
+        raise NotConverged(str(failure), opened) from None
+    return opened
+
+
+def _source(case: str | os.PathLike[str] | _CaseLike) -> tuple[str, str]:
+    """Return the name of a case's file and its text, which is empty if the file holds it."""
+    if namelists.is_text(case):
+        return "case.nml", str(case)
+    if isinstance(case, str | os.PathLike):
+        return os.fspath(case), ""
+    return os.fspath(case.path or "case.nml"), str(case) or "\n"
+
+
+def _warn(told: bytes) -> None:
+    """Raise the warnings of the library as those of Python."""
+    for line in told.decode(errors="replace").strip().splitlines():
+        warnings.warn(line, UserWarning, stacklevel=3)

@@ -1,0 +1,237 @@
+"""The table of a sweep: a row for each case, a column for each parameter and each result."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.names import UnknownNameError, unknown_name
+from ..base.presenters import present
+from ..results import Run, open_result
+
+if TYPE_CHECKING:
+    import pandas
+
+__all__ = ["Failure", "Sweep", "SweepError", "column"]
+
+_ROWS, _CELL = 30, 26   # that are shown: rows, characters of a cell
+
+
+class SweepError(RuntimeError):
+    """Some cases of a sweep failed; the others are done.
+
+    Attributes
+    ----------
+    result : Sweep
+        The table, in which `Sweep.failed` names the failed ones.
+    """
+
+    def __init__(self, message: str, result: Sweep) -> None:
+        super().__init__(message)
+        self.result = result
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A case that failed: its row in the table, its parameters, and why."""
+
+    index: int
+    parameters: dict[str, Any]
+    message: str
+    status: int | None
+
+    def __str__(self) -> str:
+        values = ", ".join(f"{name} = {value}" for name, value in self.parameters.items())
+        return f"{values}: {self.message}"
+
+
+class Sweep(Mapping[str, NDArray[Any]]):
+    """The table of a sweep: one row a case, one column a parameter or a result.
+
+    ``table["friction"]`` and ``table.friction`` are the same numpy array; a failed case has NaN (or
+    None where the column holds no numbers).
+
+    Attributes
+    ----------
+    parameters : tuple of str
+        Names of the columns that were set.
+    results : tuple of str
+        Names of the columns that came out.
+    shape : tuple of int
+        Numbers of values: ``table["friction"].reshape(table.shape)`` has an axis a parameter.
+    paths : list of Path
+        The result files.
+    runs : sequence of Run
+        The results, opened when they are asked for; those of failed cases hold what was reached.
+    failed : list of Failure
+        The cases that failed.
+    """
+
+    def __init__(self, columns: dict[str, NDArray[Any]], parameters: Sequence[str],
+                 shape: tuple[int, ...], paths: list[Path], failed: list[Failure]) -> None:
+        self._columns = columns
+        self.parameters = tuple(parameters)
+        self.results = tuple(name for name in columns if name not in self.parameters)
+        self.shape = shape
+        self.paths = paths
+        self.runs = _Runs(paths)
+        self.failed = failed
+
+    @property
+    def rows(self) -> int:
+        """Number of cases."""
+        return len(self.paths)
+
+    def row(self, index: int) -> dict[str, Any]:
+        """Return a row: parameters and results of one case.
+
+        Parameters
+        ----------
+        index : int
+            Number of the case, from 0; negative from the end.
+
+        Returns
+        -------
+        dict
+            Values by the names of the columns.
+
+        Raises
+        ------
+        IndexError
+            If there are not so many cases.
+        """
+        return {name: column[index] for name, column in self._columns.items()}
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return the table as one of pandas, which must be installed.
+
+        Returns
+        -------
+        pandas.DataFrame
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError as error:
+            raise ImportError("to_pandas needs pandas: python -m pip install pandas") from error
+        return pandas.DataFrame({name: list(column) if column.ndim > 1 else column
+                                 for name, column in self._columns.items()})
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        try:
+            return self._columns[name]
+        except (KeyError, TypeError):
+            raise UnknownNameError(unknown_name("column of the sweep", name,
+                                                self._columns)) from None
+
+    def __getattr__(self, name: str) -> NDArray[Any]:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        try:
+            return self._columns[name]
+        except KeyError:
+            raise AttributeError(unknown_name("column of the sweep", name,
+                                              self._columns)) from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
+
+    def __len__(self) -> int:
+        return len(self._columns)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *self._columns})
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self._columns)
+
+    def _cells(self) -> tuple[str, list[list[str]], str]:
+        """Return a head, the cells of a short table, and what it leaves out."""
+        shown = [*self.parameters, *(name for name in ("contact_area", "friction", "mean_gap")
+                                     if name in self.results)]
+        if len(shown) == len(self.parameters):
+            shown += self.results[:3]
+        cells = [[_short(self._columns[name][row]) for name in shown]
+                 for row in range(min(self.rows, _ROWS))]
+        head = f"sweep of {self.rows} case{'' if self.rows == 1 else 's'}"
+        if self.failed:
+            head += f", {len(self.failed)} failed"
+        more = [f"{number} more {what}" for number, what in
+                ((self.rows - len(cells), "rows"), (len(self._columns) - len(shown), "columns"))
+                if number > 0]
+        return head, [shown, *cells], f"and {' and '.join(more)}" if more else ""
+
+    def __repr__(self) -> str:
+        head, cells, more = self._cells()
+        widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+        lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))
+                 for row in cells]
+        return "\n".join([head, *lines] + [more] * bool(more))
+
+    def _repr_html_(self) -> str:
+        head, (names, *rows), more = self._cells()
+        return present("table_html", tuple(map(escape, names)),
+                          [tuple(map(escape, row)) for row in rows], f"{head} {more}".rstrip())
+
+
+class _Runs(Sequence[Run]):
+    """The results of a sweep, each opened when it is asked for."""
+
+    def __init__(self, paths: list[Path]) -> None:
+        self._paths = paths
+
+    def __getitem__(self, index: Any) -> Any:
+        if isinstance(index, slice):
+            return [open_result(path) for path in self._paths[index]]
+        return open_result(self._paths[index])
+
+    def __len__(self) -> int:
+        return len(self._paths)
+
+    def __repr__(self) -> str:
+        return f"{len(self)} results in {self._paths[0].parent if self._paths else '.'}"
+
+
+def _short(value: Any) -> str:
+    """Return a value for a table.
+
+    Examples
+    --------
+    >>> _short(0.123456789), _short([1] * 50)
+    ('0.123457', '[1, 1, 1, 1, 1, 1, 1, 1...')
+    """
+    text = f"{value:.6g}" if isinstance(value, float | np.floating) else str(value)
+    return text if len(text) <= _CELL else f"{text[:_CELL - 3]}..."
+
+
+def column(values: list[Any]) -> NDArray[Any]:
+    """Return values as an array; None among numbers becomes NaN.
+
+    Examples
+    --------
+    >>> column([1.0, None]), column(["a", None]), column([[1, 2], [3]]).shape
+    (array([ 1., nan]), array(['a', None], dtype=object), (2,))
+    """
+    filled = [value for value in values if value is not None]
+    if all(np.ndim(value) == 0 and not isinstance(value, str) for value in filled):
+        if len(filled) < len(values):
+            values = [np.nan if value is None else value for value in values]
+        array = np.array(values)
+        if array.dtype != object:
+            return array
+    elif len(filled) == len(values) and len({np.shape(value) for value in values}) == 1 \
+            and not isinstance(values[0], str):
+        return np.array(values)
+    column = np.empty(len(values), dtype=object)
+    column[:] = values
+    return column

@@ -1,0 +1,527 @@
+"""Sweeps: the same case with other values, many runs side by side, one table of results."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import itertools
+import json
+import os
+import re
+import signal
+import subprocess
+import tempfile
+import threading
+import time
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import FrameType
+from typing import IO, Any
+
+import numpy as np
+
+from ..base.check import choice, whole
+from ..base.library import version
+from ..results import Run, open_result
+from . import namelists
+from .case import Case
+from .program import program
+from .sweep_progress import Progress
+from .sweep_table import Failure, Sweep, SweepError, column
+
+__all__ = ["sweep"]
+
+_POLL = 0.02            # s between two looks at the processes
+_ECHO = 0.3             # s within which a signal to us and to our group is one
+_PATIENCE = 60.0        # s that a stopped process may take for its checkpoint
+_LONGEST_NAME = 120     # characters of a file's name
+
+
+@dataclass
+class _Job:
+    """One case on its way."""
+
+    values: dict[str, Any]
+    case: Case | None = None
+    name: str = ""
+    path: Path = field(default_factory=Path)        # of the result
+    status: int | None = None                       # None: not run to an end
+    message: str = ""
+    process: subprocess.Popen[bytes] | None = None
+    output: IO[bytes] | None = None
+    restarted: bool = False
+    started: float = 0.0
+
+
+def sweep(
+    base: str | os.PathLike[str] | Case,
+    parameters: Mapping[str | tuple[str, ...], Sequence[Any]],
+    *,
+    zip: bool = False,
+    folder: str | os.PathLike[str] | None = None,
+    jobs: int | None = 1,
+    threads: int = 1,
+    resume: bool = True,
+    measure: Callable[[Run], Mapping[str, Any]] | None = None,
+    errors: str = "raise",
+    quiet: bool = False,
+) -> Sweep:
+    """Run a case with every combination of some values, side by side, and return a table.
+
+    Each case is a process of the program. Its input and its result lie in `folder` under a name
+    made of the values: ``velocity_x=0.1.nml`` and ``velocity_x=0.1.h5``; ``sweep.json`` lists them.
+    A sweep that was stopped goes on where it was: finished results of the same input and version
+    are kept, others are taken up from their checkpoint or run anew. More values can be added later.
+
+    Parameters
+    ----------
+    base : str, path or Case
+        The case: an input file, its text, or an `asperity.Case`.
+    parameters : dict
+        Values by the name ``"group.variable"``. Where a group is repeated,
+        ``"phase[2].velocity_x"`` is the second one (counted from 1, as in the program's messages);
+        without a number there must be one such group, or, for ``phase``, all phases that name the
+        variable are set. Values that belong together have a tuple of names:
+        ``{("grid.nx", "grid.ny"): [(64, 32), (128, 64)]}``.
+        A value None takes the variable out.
+    zip : bool
+        Take the lists in parallel, not all combinations; they must be of one length.
+    folder : str or path, optional
+        Where the results lie; by default ``NAME_sweep`` beside the input NAME.nml, and ``sweep`` in
+        the current folder for a case without a file.
+    jobs : int or None
+        Runs at a time; no more than the processors allow with `threads` each. None takes as many as
+        they allow.
+    threads : int
+        Threads of each run, at most the number of processors.
+    resume : bool
+        Keep finished results of the same input; False runs all anew.
+    measure : callable, optional
+        Takes an opened result and returns a dict of what is wanted from it, the same names for each
+        case. By default the last row of every column of the history. It is called at the end, so
+        that an error in it loses no run: the next call finds the results.
+    errors : {'raise', 'keep'}
+        What to do if cases fail: raise `SweepError`, with the table, once all others are done; or
+        return the table, which names them in ``failed``. With 'raise', inputs that are wrong raise
+        ValueError before anything is run.
+    quiet : bool
+        Tell no progress on stderr: in a terminal a line that is rewritten, elsewhere one line a
+        case.
+
+    Returns
+    -------
+    Sweep
+        One row a case, the last parameter running fastest.
+
+    Raises
+    ------
+    ValueError
+        If a name or a list of values is wrong, or an input.
+    OSError
+        If a file cannot be read or written, or the program is not found.
+    SweepError
+        If cases fail.
+    KeyboardInterrupt
+        At Ctrl-C, when all runs have finished the step in hand and written their checkpoints; a
+        second Ctrl-C ends them at once.
+
+    Examples
+    --------
+    >>> import asperity, tempfile
+    >>> wave = asperity.Case(
+    ...     grid=dict(nx=64, ny=1, lx=1e-3),
+    ...     surface=dict(shape="sine", amplitude=1e-6, wavelength=1e-3),
+    ...     material=dict(shear_modulus=1e6), phase=[dict(pressure=1e3)])
+    >>> table = asperity.sweep(wave, {"phase.pressure": [1e3, 4e3, 1e5]}, quiet=True,
+    ...                        folder=tempfile.mkdtemp())
+    >>> table["contact_area"].tolist()
+    [0.203125, 0.390625, 1.0]
+    """
+    choice("errors", errors, ("raise", "keep"))
+    cores = _processors()
+    if jobs is not None:
+        jobs = whole("jobs", jobs)
+    threads = whole("threads", threads)
+    if threads > cores:
+        raise ValueError(f"threads = {threads}: must be at most the {cores} processors")
+    side_by_side = min(jobs or cores, max(1, cores // threads))
+    case = base.copy() if isinstance(base, Case) else Case.read(base)
+    points, shape = _points(parameters, zip)
+    for names in parameters:
+        for name in _names(names):
+            _targets(case, name)
+    folder = _folder(case) if folder is None else Path(folder)
+    work = _jobs(case, points, folder, keep=errors == "keep")
+    folder.mkdir(parents=True, exist_ok=True)
+    _write_index(folder, work)
+    waiting = []
+    for job in work:
+        if job.case is None:
+            continue
+        if resume and _is_done(job):
+            job.status = 0
+        else:
+            waiting.append(job)
+    _run_all(waiting, len(work), program() if waiting else "", side_by_side, threads, resume, quiet)
+    table = _table(work, shape, measure)
+    if table.failed and errors == "raise":
+        shown = "\n".join(f"  {failure}" for failure in table.failed)
+        raise SweepError(f"{len(table.failed)} of {len(work)} cases failed:\n{shown}", table)
+    return table
+
+
+def _processors() -> int:
+    """Return the number of processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _folder(case: Case) -> Path:
+    """Return where the results lie by default."""
+    return Path("sweep") if case.path is None else case.path.with_name(f"{case.path.stem}_sweep")
+
+
+def _names(names: str | tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names that a key stands for."""
+    return names if isinstance(names, tuple) else (names,)
+
+
+def _points(parameters: Mapping[str | tuple[str, ...], Sequence[Any]], parallel: bool,
+            ) -> tuple[list[dict[str, Any]], tuple[int, ...]]:
+    """Return the values of each case, and the numbers of values."""
+    if not isinstance(parameters, Mapping) or not parameters:
+        raise ValueError(f"parameters = {parameters!r}: must be a dict with a list of values for"
+                         " each name")
+    axes: list[list[dict[str, Any]]] = []
+    seen: set[str] = set()
+    for key, values in parameters.items():
+        names = _names(key)
+        for name in names:
+            if name in seen:
+                raise ValueError(f"parameters: {name} is given twice")
+            seen.add(name)
+        if isinstance(values, str | Mapping) or not np.iterable(values):
+            raise ValueError(f"{key} = {values!r}: must be a list of values")
+        axis = []
+        for value in values:
+            value = _plain(value)
+            if isinstance(key, tuple) and (np.ndim(value) == 0 or len(value) != len(names)):
+                raise ValueError(f"{key}: {value!r}: must be {len(names)} values, one a name")
+            axis.append(dict(zip(names, value if isinstance(key, tuple) else [value],
+                                 strict=True)))
+        if not axis:
+            raise ValueError(f"{key}: has no values")
+        axes.append(axis)
+    lengths = [len(axis) for axis in axes]
+    if parallel:
+        if len(set(lengths)) > 1:
+            counted = ", ".join(f"{key}: {n}" for key, n in zip(parameters, lengths, strict=True))
+            raise ValueError(f"zip: all lists must have one length, but {counted}")
+        groups: Iterator[tuple[dict[str, Any], ...]] = iter(zip(*axes, strict=True))
+        shape: tuple[int, ...] = (lengths[0],)
+    else:
+        groups, shape = itertools.product(*axes), tuple(lengths)
+    return [{name: value for part in group for name, value in part.items()}
+            for group in groups], shape
+
+
+def _plain(value: Any) -> Any:
+    """Return a value with Python's numbers and lists in place of numpy's."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    return value
+
+
+def _targets(case: Case, name: str) -> tuple[list[Any], str]:
+    """Return the groups in which a parameter is set, and its variable.
+
+    Examples
+    --------
+    >>> case = Case(phase=[dict(pressure=1e5), dict(velocity_x=1.0)])
+    >>> groups, variable = _targets(case, "phase.velocity_x")
+    >>> groups[0] is case.phase[1], variable
+    (True, 'velocity_x')
+    >>> _targets(case, "phase.velocity_y")
+    Traceback (most recent call last):
+    ...
+    ValueError: phase.velocity_y: there are 2 &phase and none names velocity_y: which one? \
+Say phase[1].velocity_y to phase[2].velocity_y
+    """
+    found = re.fullmatch(r"\s*(\w+)\s*(?:\[\s*(-?\d+)\s*\])?\s*\.\s*(\w+)\s*", name) \
+        if isinstance(name, str) else None
+    if found is None:
+        raise ValueError(f"{name!r}: must be a name such as 'solver.tolerance' or"
+                         " 'phase[2].velocity_x'")
+    group, number, variable = found.groups()
+    groups = case[group]  # an unknown name is told with the nearest one
+    entry = namelists.table()[group]
+    Case.help(f"{group}.{variable}")
+    if not entry.is_repeatable:
+        if number is not None:
+            raise ValueError(f"{name}: there is only one &{group}: leave the number out")
+        return [groups], variable
+    many = f"there {'is' if len(groups) == 1 else 'are'} {len(groups)} &{group}"
+    if number is not None:
+        if not 1 <= int(number) <= len(groups):
+            raise ValueError(f"{name}: {many}, counted from 1")
+        return [groups[int(number) - 1]], variable
+    if len(groups) == 1:
+        return [groups[0]], variable
+    naming = [one for one in groups if variable in one]
+    if group == "phase" and naming:
+        return naming, variable
+    if not groups:
+        raise ValueError(f"{name}: there is no &{group}")
+    reason = f"{many} and none names {variable}" if group == "phase" else many
+    raise ValueError(f"{name}: {reason}: which one? Say {group}[1].{variable} to"
+                     f" {group}[{len(groups)}].{variable}")
+
+
+def _jobs(base: Case, points: list[dict[str, Any]], folder: Path, keep: bool) -> list[_Job]:
+    """Return the cases of a sweep with their names; inputs that are wrong raise, or are kept."""
+    work = []
+    names: dict[str, dict[str, Any]] = {}
+    for values in points:
+        job = _Job(values, name=_file_name(values))
+        if job.name in names:
+            raise ValueError(f"parameters: {_told(values)} stands twice")
+        names[job.name] = values
+        job.path = folder / f"{job.name}.h5"
+        work.append(job)
+        case = base.copy()
+        try:
+            # The groups are found before any is set: a value does not change where the next goes.
+            places = {name: _targets(case, name) for name in values}
+            for name, value in values.items():
+                groups, variable = places[name]
+                for group in groups:
+                    group[variable] = value
+            case.check(files=False)
+        except (ValueError, OSError) as error:
+            if not keep:
+                raise type(error)(f"{_told(values)}: {error}") from None
+            job.status, job.message = 2, str(error)
+        else:
+            job.case = case
+    return work
+
+
+def _told(values: dict[str, Any]) -> str:
+    """Return the values of a case for a message."""
+    return ", ".join(f"{name} = {value}" for name, value in values.items())
+
+
+def _file_name(values: dict[str, Any]) -> str:
+    """Return the name of a case's files: the same for the same values, whatever else is swept.
+
+    Examples
+    --------
+    >>> _file_name({"phase[2].velocity_x": 0.1, "friction.law": "coulomb"})
+    'phase2.velocity_x=0.1,friction.law=coulomb'
+    """
+    parts = []
+    for name, value in values.items():
+        text = str(value) if np.ndim(value) == 0 else "-".join(map(str, value))
+        parts.append(f"{re.sub(r'[^A-Za-z0-9_.]', '', name)}={text}")
+    whole = ",".join(parts)
+    plain = re.sub(r"[^A-Za-z0-9_.,=+-]", "_", whole)
+    if plain == whole and len(plain) <= _LONGEST_NAME:
+        return plain
+    code = hashlib.sha256(namelists.encode(repr(list(values.items())))).hexdigest()[:12]
+    return f"{plain[:_LONGEST_NAME - 13]}-{code}"
+
+
+def _write_index(folder: Path, work: list[_Job]) -> None:
+    """Write which values belong to which file, with what earlier sweeps have there."""
+    path = folder / "sweep.json"
+    index: dict[str, Any] = {}
+    if path.exists():
+        with contextlib.suppress(ValueError):
+            found = json.loads(path.read_text())
+            index = found if isinstance(found, dict) else {}
+    index.update({f"{job.name}.h5": job.values for job in work})
+    path.write_text(json.dumps(index, indent=1, default=str) + "\n")
+
+
+def _is_done(job: _Job) -> bool:
+    """Return whether a finished result of this very input and version is there."""
+    run = _found(job)
+    return run is not None and run.finished and run.version == version()
+
+
+def _found(job: _Job) -> Run | None:
+    """Return a result of this very input, None where there is none."""
+    if not job.path.exists():
+        return None
+    try:
+        run = open_result(job.path)
+    except OSError:
+        return None
+    return run if run.input == _text(job) else None
+
+
+def _text(job: _Job) -> str:
+    """Return the input of a case as it is written beside its result."""
+    assert job.case is not None
+    case = job.case.copy()
+    case.output.file = None
+    case._follow(job.path.parent)
+    return str(case)
+
+
+def _run_all(waiting: list[_Job], total: int, command: str, side_by_side: int, threads: int,
+             resume: bool, quiet: bool) -> None:
+    """Run the cases, some at a time; whatever ends this ends them."""
+    progress = Progress(total, len(waiting), quiet)
+    queue = list(reversed(waiting))
+    running: list[_Job] = []
+    with _Stops() as stops:
+        try:
+            while (queue or running) and not stops.asked:
+                while queue and len(running) < side_by_side and not stops.asked:
+                    job = queue.pop()
+                    running.append(job)
+                    _start(job, command, threads, restart=resume and _found(job) is not None)
+                    progress.show(len(running))
+                for job in list(running):
+                    assert job.process is not None
+                    if job.process.poll() is None:
+                        continue
+                    if _finish(job):
+                        _start(job, command, threads, restart=False)
+                    else:
+                        running.remove(job)
+                        progress.done(job.name, job.message if job.status else None,
+                                      time.monotonic() - job.started, len(running))
+                time.sleep(_POLL if running else 0.0)
+        finally:
+            progress.end()
+            _stop(running, stops)
+
+
+class _Stops:
+    """SIGINT and SIGTERM as a number to look at, so that none of them cuts a call in two.
+
+    An exception out of a handler may come between any two instructions: within the start of a
+    process, which then goes on unknown to us, or while subprocess holds its lock, which then stays
+    held. So the signals are counted here; at the end they are what they were before: SIGINT
+    KeyboardInterrupt, or what another handler makes of it, SIGTERM the end with status 143.
+    """
+
+    def __init__(self) -> None:
+        self.asked: list[int] = []
+        self._last = 0.0
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> _Stops:
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGINT, signal.SIGTERM):
+                # Who started us with a signal ignored, as a shell does in the background, keeps it.
+                if signal.getsignal(number) != signal.SIG_IGN:
+                    self._before[number] = signal.signal(number, self._note)
+        return self
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        now = time.monotonic()
+        if not self.asked or now - self._last > _ECHO:
+            self.asked.append(number)
+        self._last = now
+
+    def __exit__(self, *error: object) -> None:
+        for number, handler in self._before.items():
+            # None: not set by Python, and not to be set by it.
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
+        if not self.asked:
+            return
+        if self.asked[0] == signal.SIGTERM and self._before[signal.SIGTERM] == signal.SIG_DFL:
+            raise SystemExit(128 + signal.SIGTERM)
+        signal.raise_signal(self.asked[0])
+
+
+def _start(job: _Job, command: str, threads: int, restart: bool) -> None:
+    """Write the input and start the program, in a session of its own: Ctrl-C is passed on by us."""
+    path = job.path.with_suffix(".nml")
+    path.write_bytes(namelists.encode(_text(job)))
+    job.restarted = restart
+    job.started = time.monotonic()
+    job.process = None
+    job.output = tempfile.TemporaryFile()  # noqa: SIM115 - closed where the process ends
+    words = [command, "run", path.name, "--output", job.path.name, "--threads", str(threads),
+             "--quiet"] + ["--restart"] * restart
+    job.process = subprocess.Popen(words, cwd=path.parent, stdin=subprocess.DEVNULL,
+                                   stdout=subprocess.DEVNULL, stderr=job.output,
+                                   start_new_session=True)
+
+
+def _finish(job: _Job) -> bool:
+    """Take what an ended process leaves; return whether it has to be run anew."""
+    assert job.process is not None and job.output is not None
+    job.output.seek(0)
+    told = job.output.read().decode(errors="replace").strip()
+    job.output.close()
+    status = job.process.returncode
+    if job.restarted and status in (2, 3):
+        return True  # no checkpoint that fits
+    job.status = status
+    if status:
+        reason = told or f"the program ended with status {status}"
+        job.message = f"killed by signal {-status}" if status < 0 else reason
+    elif told:
+        job.message = told
+    return False
+
+
+def _stop(running: list[_Job], stops: _Stops) -> None:
+    """Let processes finish the step in hand and write a checkpoint; at a second Ctrl-C, kill."""
+    processes = [job.process for job in running if job.process is not None]
+    for process in processes:
+        process.send_signal(signal.SIGINT)
+    end = time.monotonic() + _PATIENCE
+    while (any(process.poll() is None for process in processes)
+           and len(stops.asked) < 2 and time.monotonic() < end):
+        time.sleep(_POLL)
+    for process in processes:
+        if process.poll() is None:
+            process.kill()
+            process.wait()
+
+
+def _table(work: list[_Job], shape: tuple[int, ...],
+           measure: Callable[[Run], Mapping[str, Any]] | None) -> Sweep:
+    """Return the table of all cases."""
+    failed = []
+    found: list[dict[str, Any] | None] = []
+    told: dict[str, str] = {}
+    for index, job in enumerate(work):
+        if job.status != 0:
+            failed.append(Failure(index, job.values, job.message, job.status))
+            found.append(None)
+            continue
+        for line in job.message.splitlines():
+            told.setdefault(line.removeprefix(f"{job.path.stem}.nml: "), job.name)
+        run = open_result(job.path)
+        found.append({name: column[-1] for name, column in run.history.items()}
+                     if measure is None else _measured(measure, run))
+    for line, name in told.items():
+        warnings.warn(f"{name}: {line}", UserWarning, stacklevel=3)
+    parameters = list(work[0].values)
+    columns = {name: column([job.values[name] for job in work]) for name in parameters}
+    for name in dict.fromkeys(name for row in found if row is not None for name in row):
+        if name in columns:
+            raise ValueError(f"measure: {name} is the name of a parameter")
+        columns[name] = column([None if row is None else row.get(name) for row in found])
+    return Sweep(columns, parameters, shape, [job.path for job in work], failed)
+
+
+def _measured(measure: Callable[[Run], Mapping[str, Any]], run: Run) -> dict[str, Any]:
+    """Return what is asked of a run, by names."""
+    values = measure(run)
+    if not isinstance(values, Mapping) or not all(isinstance(name, str) for name in values):
+        raise ValueError(f"measure: returned {values!r} for {run.path.name}: must return a dict"
+                         " with a value for each name, such as {'friction': 0.5}")
+    return dict(values)

@@ -1,0 +1,148 @@
+"""Snapshots for other programs: xarray data sets and VTK image data, as ParaView reads it."""
+
+from __future__ import annotations
+
+import base64
+import os
+import zlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import xarray
+
+    from ..results import Snapshot
+
+__all__ = ["to_vtk", "to_xarray"]
+
+KINDS = {"f8": "Float64", "f4": "Float32", "i1": "Int8", "i4": "Int32", "i8": "Int64"}
+VECTORS = ("displacement", "traction", "slip")
+
+
+def to_xarray(snapshot: Snapshot) -> xarray.Dataset:
+    """Return a snapshot as a data set of xarray, which must be installed.
+
+    Parameters
+    ----------
+    snapshot : Snapshot
+        All its fields are read.
+
+    Returns
+    -------
+    xarray.Dataset
+        Fields with the dimensions (y, x), coordinates `x` and `y` in m, scalar coordinates `time`
+        and `step`; `units` and `long_name` are attributes, as plots of xarray use them.
+
+    Raises
+    ------
+    ImportError
+        If xarray is not installed.
+    """
+    try:
+        import xarray
+    except ImportError as error:
+        raise ImportError("to_xarray needs xarray: python -m pip install xarray") from error
+    run, grid = snapshot.run, snapshot.run.grid
+
+    def along(name: str, values: NDArray[np.float64]) -> Any:
+        return (name, values, {"units": "m", "long_name": f"centres of the cells along {name}"})
+
+    fields = {name: (("y", "x"), snapshot[name],
+                     {"units": snapshot.units(name), "long_name": snapshot.long_name(name)})
+              for name in snapshot.fields}
+    return xarray.Dataset(
+        fields,
+        coords={"x": along("x", grid.x), "y": along("y", grid.y),
+                "time": ((), snapshot.time, {"units": "s", "long_name": "time"}),
+                "step": ((), snapshot.step, {"long_name": "number of the row"})},
+        attrs={"title": run.title, "phase": snapshot.phase, "boundary": grid.boundary,
+               "lx": grid.lx, "ly": grid.ly, "source": f"{run.program} {run.version}",
+               "file": str(run.path)})
+
+
+def to_vtk(snapshot: Snapshot, path: str | os.PathLike[str]) -> Path:
+    """Write a snapshot as VTK image data (.vti), which ParaView and VisIt open.
+
+    One value a cell; displacements, tractions and slips are vectors, too, of the names
+    `displacement`, `traction` and `slip`, so that glyphs and warps can use them. The time of the
+    snapshot goes with it. All values are in SI units.
+
+    Parameters
+    ----------
+    snapshot : Snapshot
+        All its fields are read.
+    path : str or path
+        The file to write; '.vti' is added where there is no ending.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    ValueError
+        If the name ends otherwise.
+    OSError
+        If the file cannot be written.
+    """
+    target = Path(path)
+    if not target.suffix:
+        target = target.with_name(target.name + ".vti")
+    if target.suffix != ".vti":
+        raise ValueError(f"{target}: VTK image data has the ending .vti")
+    grid = snapshot.run.grid
+    arrays = [_array(name, snapshot[name][..., None]) for name in snapshot.fields]
+    for name in VECTORS:
+        if f"{name}_x" in snapshot and f"{name}_y" in snapshot:
+            last = f"{name}_z"
+            parts = [snapshot[f"{name}_x"], snapshot[f"{name}_y"],
+                     snapshot[last] if last in snapshot else np.zeros((grid.ny, grid.nx))]
+            arrays.append(_array(name, np.stack(parts, axis=-1)))
+    extent = f"0 {grid.nx} 0 {grid.ny} 0 0"
+    # (i, j) is the centre of a cell: the image begins half a cell before.
+    origin = f"{-0.5 * grid.dx!r} {-0.5 * grid.dy!r} 0"
+    field = [_array("TimeValue", np.array([snapshot.time]), tuples=1),
+             _array("step", np.array([snapshot.step], dtype=np.int64), tuples=1)]
+    shown = "pressure" if "pressure" in snapshot else snapshot.fields[0] if snapshot.fields else ""
+    text = "\n".join([
+        '<?xml version="1.0"?>',
+        '<VTKFile type="ImageData" version="1.0" byte_order="LittleEndian" header_type="UInt64"'
+        ' compressor="vtkZLibDataCompressor">',
+        f'<ImageData WholeExtent="{extent}" Origin="{origin}"'
+        f' Spacing="{grid.dx!r} {grid.dy!r} 1">',
+        "<FieldData>", *field, "</FieldData>",
+        f'<Piece Extent="{extent}">',
+        f"<CellData Scalars={quoteattr(shown)}>", *arrays, "</CellData>",
+        "</Piece>", "</ImageData>", "</VTKFile>", ""])
+    target.write_text(text, encoding="ascii", newline="\n")
+    return target
+
+
+def _array(name: str, values: NDArray[Any], tuples: int | None = None) -> str:
+    """Return an array as an element: one compressed block, in base 64.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    values : ndarray
+        Shape (ny, nx, components); any shape with `tuples`.
+    tuples : int, optional
+        Number of tuples, which an array of the field data states.
+    """
+    values = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<"))
+    data = values.tobytes()
+    packed = zlib.compress(data, 6)
+    # Number of blocks, size of each, size of a last one that is cut (none), compressed sizes.
+    head = np.array([1, len(data), 0, len(packed)], dtype="<u8").tobytes()
+    kind = KINDS[values.dtype.str[1:]]
+    count = (f' NumberOfTuples="{tuples}"' if tuples is not None else
+             f' NumberOfComponents="{values.shape[-1]}"')
+    body = (base64.b64encode(head) + base64.b64encode(packed)).decode("ascii")
+    return (f'<DataArray type="{kind}" Name={quoteattr(name)}{count} format="binary">'
+            f"{body}</DataArray>")

@@ -1,0 +1,109 @@
+"""How results show themselves in a notebook: small tables of HTML."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..results.standing import note_of, rows_of
+from .style import si_scale
+
+if TYPE_CHECKING:
+    from ..results import History, Run, Snapshot
+
+__all__ = ["history_html", "run_html", "snapshot_html", "table_html"]
+
+CELL = "text-align:left;padding:0.1em 0.8em 0.1em 0"
+POINTS = 120  # of a small curve
+
+
+def table_html(head: tuple[str, ...], rows: list[tuple[str, ...]], caption: str) -> str:
+    """Return a table; the cells are HTML already."""
+    top = "".join(f'<th style="{CELL}">{name}</th>' for name in head)
+    lines = "".join("<tr>" + "".join(f'<td style="{CELL}">{cell}</td>' for cell in row) + "</tr>"
+                    for row in rows)
+    first = f"<thead><tr>{top}</tr></thead>" if head else ""
+    return (f'<div style="overflow-x:auto"><div>{caption}</div>'
+            f"<table>{first}<tbody>{lines}</tbody></table></div>")
+
+
+def shown(value: Any, units: str) -> str:
+    """Return a value with its prefixed unit."""
+    number = float(value)
+    factor, unit = si_scale(number, units)
+    return escape(f"{number * factor:.4g}{' ' + unit if unit else ''}")
+
+
+def curve(values: NDArray[Any]) -> str:
+    """Return a small curve of values over their number, as SVG; nothing of fewer than two.
+
+    Examples
+    --------
+    >>> curve(np.array([0.0, 1.0])).count("<polyline")
+    1
+    >>> curve(np.array([1.0]))
+    ''
+    """
+    values = np.asarray(values, dtype=float)
+    if len(values) > POINTS:
+        values = values[np.linspace(0, len(values) - 1, POINTS).round().astype(int)]
+    good = np.isfinite(values)
+    if good.sum() < 2:
+        return ""
+    low, high = float(values[good].min()), float(values[good].max())
+    span = high - low or 1.0
+    x = np.linspace(1, 99, len(values))[good]
+    y = 15.0 - 14.0 * (values[good] - low) / span if high > low else np.full(good.sum(), 8.0)
+    points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
+    return ('<svg width="100" height="16" viewBox="0 0 100 16" aria-hidden="true">'
+            f'<polyline points="{points}" fill="none" stroke="#0072B2" stroke-width="1.2"/></svg>')
+
+
+def history_html(history: History) -> str:
+    """Return the history as a table of its columns."""
+    rows = []
+    for name in history:
+        column, units = history[name], history.units(name)
+        numbers = (("", "", "") if not history.rows else
+                   tuple(shown(value, units) for value in (column[-1], column.min(),
+                                                           column.max())))
+        rows.append((f"<code>{escape(name)}</code>", *numbers, curve(column),
+                     escape(history.long_name(name))))
+    return table_html(("column", "last", "smallest", "largest", "", "meaning"), rows,
+                      f"<b>History</b> of {history.rows} row{'' if history.rows == 1 else 's'}")
+
+
+def snapshot_html(snapshot: Snapshot) -> str:
+    """Return the snapshot as a table of its fields."""
+    grid = snapshot.run.grid
+    rows = [(f"<code>{escape(name)}</code>",
+             "" if snapshot.units(name) == "1" else escape(snapshot.units(name)),
+             escape(snapshot.long_name(name))) for name in snapshot.fields]
+    return table_html(("field", "unit", "meaning"), rows,
+                      f"<b>Snapshot</b> of step {snapshot.step}, t = {shown(snapshot.time, 's')},"
+                      f" phase {snapshot.phase}; fields of shape ({grid.ny}, {grid.nx})")
+
+
+def run_html(run: Run) -> str:
+    """Return the run as a table: state, grid, snapshots and the last row."""
+    grid, history = run.grid, run.history
+    steps = run.snapshots.steps
+    told = ", ".join(map(str, steps if len(steps) <= 12 else (*steps[:5], "…", *steps[-3:])))
+    state = "finished" if run.finished else "not finished"
+    rows = [("state", f"{state}, {rows_of(run)}"),
+            ("grid", f"{grid.nx} × {grid.ny} cells, {shown(grid.lx, 'm')} ×"
+                     f" {shown(grid.ly, 'm')}, {escape(grid.boundary)}"),
+            ("snapshots", f"{len(steps)}{f' (steps {told})' if steps else ''}")]
+    if note_of(run):
+        rows.insert(1, ("", escape(note_of(run))))
+    rows += [(escape(name.replace("_", " ")),
+              f"{shown(history[name][-1], history.units(name))} {curve(history[name])}")
+             for name in ("time", "pressure", "contact_area", "friction")
+             if name in history and history.rows]
+    if run.warnings:
+        rows.append(("warnings", "<br>".join(map(escape, run.warnings))))
+    return table_html((), rows, f"<b>{escape(run.title or 'untitled run')}</b>"
+                                f" <code>{escape(str(run.path))}</code>")

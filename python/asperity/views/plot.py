@@ -1,0 +1,294 @@
+"""Pictures of results, with matplotlib: histories, energies, an overview; fields of snapshots.
+
+Colours are told apart by colour-blind readers; axes carry units with SI prefixes (mm, MPa); new
+figures have the widths and letters of a journal's columns.
+"""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from typing import TYPE_CHECKING, Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.names import UnknownNameError, unknown_name
+from ..results.derived import (
+    closure,
+    energy_terms,
+    friction_outside,
+    has_adhesion,
+    has_friction,
+    has_rough_road,
+    is_elastic,
+    rms_slope,
+    road_speed,
+    travel,
+)
+from .plot_fields import plot_field, plot_section
+from .style import (
+    COLOURS,
+    DOUBLE_COLUMN,
+    LABELS,
+    SINGLE_COLUMN,
+    axis_text,
+    label_of,
+    print_style,
+    si_scale,
+    when,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from ..results import Run
+
+__all__ = ["plot_field", "plot_history", "plot_overview", "plot_section", "si_scale"]
+
+# Of the parts of friction and of energy.
+PARTS = {"viscous": (COLOURS[1], "--"), "interface": (COLOURS[2], "-."),
+         "stored": (COLOURS[0], "-"), "friction": (COLOURS[2], "-."), "work": (COLOURS[6], "-")}
+
+
+def plot_history(run: Run, name: str = "contact_area", x: str | None = None,
+                 ax: Axes | None = None, **style: Any) -> Axes:
+    """Draw a column of the history against another one.
+
+    With friction, 'friction' is drawn with its causes (loss in the rubber, interface, and with
+    adhesion the attraction outside the contact), 'contact_area' with what of it sticks, and
+    'sliding_speed' with the road's. 'energy' draws the work put in, and what is stored and lost.
+
+    Parameters
+    ----------
+    run : Run
+        Whose history.
+    name : str
+        Column to draw, or 'energy'.
+    x : str, optional
+        Column along the axis: time by default; where time stands still, pressure or step.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure of one column's width if left out.
+    **style
+        Passed on to `matplotlib.axes.Axes.plot` for the column itself.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes; the figure is ``axes.figure``.
+    """
+    history = run.history
+    if name != "energy" and name not in history:
+        raise UnknownNameError(unknown_name("column of the history", name, [*history, "energy"]))
+    if x is None:
+        x = next((column for column in ("time", "pressure", "step")
+                  if column != name and column in history and np.ptp(history[column]) > 0.0),
+                 "step") if history.rows else "step"
+    factor, unit = si_scale(history[x], history.units(x))
+    along = history[x] * factor
+    with print_style() if ax is None else nullcontext():
+        axes = ax if ax is not None else _new_axes()
+        _draw(run, name, along, axes, style)
+        axes.set_xlabel(axis_text(label_of(x, history), unit))
+        if run.title and ax is None:
+            axes.set_title(run.title, parse_math=False)
+    return axes
+
+
+def plot_overview(run: Run) -> Figure:
+    """Draw what tells most of a run.
+
+    With friction these are friction with its causes, contact and stick area, and sliding speed in
+    time, with maps of the last pressure and of what sticks and slips. Without, the last pressure
+    and gap with contact area (and friction of the moved road) in time; the contact area against
+    the load, beside Persson's theory where the road is rough and the material elastic; or, of a
+    single solve, a section through the contact. A run without snapshots shows its history.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        A figure of two columns' width.
+    """
+    with print_style():
+        snapshot = run.snapshots[-1] if len(run.snapshots) else None
+        moving = run.history.rows > 1 and np.ptp(run.history["time"]) > 0.0
+        if has_friction(run) and moving:
+            return _frictional_overview(run)
+        names = [name for name in ("pressure", "gap") if snapshot is not None and name in snapshot]
+        grid = run.grid
+        ratio = 0.8 if grid.ny == 1 else float(np.clip(grid.ly / grid.lx, 0.4, 1.6))
+        count = len(names) + 1
+        figure, panels = plt.subplots(
+            1, count, figsize=(DOUBLE_COLUMN if count > 1 else SINGLE_COLUMN,
+                               1.0 + 1.75 * ratio if count > 1 else 2.7),
+            layout="constrained", squeeze=False)
+        for name, panel in zip(names, panels[0], strict=False):
+            plot_field(snapshot, name, panel)
+            panel.set_title(LABELS[name])
+        panel = panels[0, -1]
+        if moving:
+            _time_panel(run, panel)
+        elif run.history.rows <= 1 and len(names) == 2 and not has_rough_road(run):
+            plot_section(snapshot, panel)
+        else:
+            _load_panel(run, panel)
+        for other in figure.axes:
+            if other.get_subplotspec() == panel.get_subplotspec() and count > 1:
+                other.set_box_aspect(max(ratio, 0.6))  # as tall as the maps
+        _headline(run, figure)
+        return figure
+
+
+def _frictional_overview(run: Run) -> Figure:
+    """Friction, areas and speed over time at the left, the last maps at the right."""
+    snapshot = run.snapshots[-1] if len(run.snapshots) else None
+    maps = [name for name in ("pressure", "contact") if snapshot is not None and name in snapshot]
+    columns = [name for name in ("friction", "contact_area", "sliding_speed")
+               if name in run.history]
+    grid = run.grid
+    ratio = 0.6 if grid.ny == 1 else float(np.clip(grid.ly / grid.lx, 0.3, 1.3))
+    figure = plt.figure(figsize=(DOUBLE_COLUMN if maps else SINGLE_COLUMN,
+                                 max(5.0, 1.8 + 5.0 * ratio) if maps else 5.0),
+                        layout="constrained")
+    parts = figure.subfigures(1, 2, width_ratios=(1.0, 1.0)) if maps else [figure]
+    panels = parts[0].subplots(len(columns), 1, sharex=True, squeeze=False)[:, 0]
+    along, head = _time_or_travel(run)
+    for name, panel in zip(columns, panels, strict=True):
+        _draw(run, name, along, panel, {})
+    panels[-1].set_xlabel(head)
+    if maps:
+        for name, panel in zip(maps, parts[1].subplots(len(maps), 1, squeeze=False)[:, 0],
+                               strict=True):
+            plot_field(snapshot, name, panel)
+            panel.set_title("Stick and slip" if name == "contact" else LABELS[name],
+                            pad=15.0 if name == "contact" and grid.ny > 1 else None)
+    _headline(run, figure)
+    return figure
+
+
+def _draw(run: Run, name: str, along: NDArray[Any], axes: Axes, style: dict[str, Any]) -> None:
+    """Draw a column, and what belongs to it, over values that stand ready."""
+    history = run.history
+    marked = {"marker": "o" if len(along) <= 40 else ""}
+    axes.grid(alpha=0.3)
+    if name == "energy":
+        _draw_energy(run, along, axes, {**marked, **style})
+        return
+    values = history[name]
+    factor, unit = si_scale(values, history.units(name))
+    parts: list[tuple[str, NDArray[Any], str, str]] = []
+    label = ""
+    if name == "friction" and "friction_viscous" in history and has_friction(run):
+        label = "whole"
+        viscous = history["friction_viscous"]
+        parts = [("loss in the rubber", viscous, *PARTS["viscous"]),
+                 ("interface", values - viscous, *PARTS["interface"])]
+    elif name == "contact_area" and "stick_area" in history and has_friction(run):
+        label = "in contact"
+        parts = [("sticking", history["stick_area"], COLOURS[4], "--")]
+    elif name == "sliding_speed" and "road_x" in history and has_friction(run):
+        label = "mean of the interface"
+        speed = road_speed(run)
+        factor, unit = si_scale([values.max(initial=0.0), speed.max(initial=0.0)],
+                                history.units(name))
+        parts = [("road against the block's top", speed, COLOURS[6], ":")]
+    axes.plot(along, values * factor, **{"color": COLOURS[0], "label": label or None, **marked,
+                                         **style})
+    for part, of_it, colour, dashes in parts:
+        axes.plot(along, of_it * factor, color=colour, linestyle=dashes, label=part)
+    if name == "friction" and has_adhesion(run) and len(run.snapshots):
+        rows, outside = friction_outside(run)
+        if len(rows):
+            axes.plot(along[rows], outside, color=COLOURS[3], marker="s", linestyle="",
+                      label="attraction outside contact", clip_on=False)
+            parts = parts or [("outside", outside, "", "")]
+    axes.set_ylabel(axis_text(label_of(name, history), unit))
+    if parts:
+        axes.legend(frameon=True, framealpha=0.8, edgecolor="none")
+
+
+def _draw_energy(run: Run, along: NDArray[Any], axes: Axes, style: dict[str, Any]) -> None:
+    """Draw work, stored and lost energies, with the error of the books."""
+    terms = energy_terms(run)
+    if not terms:
+        raise ValueError(f"{run.path}: its history holds no energies")
+    factor, unit = si_scale([np.abs(values).max(initial=0.0) for values in terms.values()], "J")
+    names = {"work": "work put in", "stored": "stored", "viscous": "lost in the rubber",
+             "friction": "lost by friction"}
+    for part, values in terms.items():
+        if part in ("work", "stored") or np.any(values):
+            colour, dashes = PARTS[part]
+            axes.plot(along, values * factor, **{"color": colour, "linestyle": dashes,
+                                                 "label": names[part], **style})
+    axes.set_ylabel(axis_text("Energy", unit))
+    missing = closure(run)
+    note = None if missing is None else f"books close to {missing.max(initial=0.0):.1g}"
+    axes.legend(frameon=True, framealpha=0.8, edgecolor="none", title=note,
+                title_fontsize=plt.rcParams["legend.fontsize"])
+
+
+def _headline(run: Run, figure: Figure) -> None:
+    """Write title and time of the last snapshot, and whether the run is finished."""
+    told = [f"{run.title or run.path.name}"]
+    if len(run.snapshots):
+        told.append(when(run.snapshots[-1]))
+    figure.suptitle(": ".join(told) + ("" if run.finished else " (run not finished)"),
+                    parse_math=False)
+
+
+def _load_panel(run: Run, axes: Axes) -> None:
+    """Contact area against pressure, with Persson's theory where it holds."""
+    history = run.history
+    pressure = history["pressure"]
+    factor, unit = si_scale(pressure, "Pa")
+    if (has_rough_road(run) and run.grid.boundary == "periodic" and run.grid.ny > 1
+            and is_elastic(run) and not has_adhesion(run)):
+        modulus = 2.0 * float(run.material.shear_modulus) / (1.0 - float(run.material.poisson))
+        slope = rms_slope(run.grid, run.height)
+        if slope > 0.0 and pressure.max(initial=0.0) > 0.0:
+            from ..theory import persson_area  # SciPy takes its time to load
+
+            loads = np.linspace(0.0, 1.05 * pressure.max(), 200)
+            areas = persson_area(loads, modulus, slope)
+            axes.plot(loads * factor, areas, color=COLOURS[1], linestyle="--",
+                      label="Persson (2001)")
+    axes.plot(pressure * factor, history["contact_area"], color=COLOURS[0], marker="o",
+              linestyle="-" if history.rows > 1 else "", label="this run")
+    axes.set_xlabel(axis_text(LABELS["pressure"], unit))
+    axes.set_ylabel(LABELS["contact_area"])
+    axes.set_xlim(left=min(0.0, 1.05 * pressure.min(initial=0.0) * factor))
+    axes.set_ylim(bottom=0.0)
+    axes.set_title("Contact area against load")
+    axes.grid(alpha=0.3)
+    axes.legend(frameon=False, loc="best")
+
+
+def _time_or_travel(run: Run) -> tuple[np.ndarray, str]:
+    """Return the travel of the road, or the time where it rests, scaled, and the axis's text."""
+    way = travel(run)
+    values, what, unit = ((run.history["time"], "Time", "s") if way is None
+                          else (way, "Travel of the road", "m"))
+    factor, unit = si_scale(values, unit)
+    return values * factor, axis_text(what, unit)
+
+
+def _time_panel(run: Run, axes: Axes) -> None:
+    """Contact area, and friction where the road moves, against time or the road's travel."""
+    names = ["contact_area", *(["friction"] if np.any(run.history["friction"]) else [])]
+    along, head = _time_or_travel(run)
+    for number, (name, panel) in enumerate(zip(names, (axes, None), strict=False)):
+        panel = panel or axes.twinx()
+        panel.plot(along, run.history[name], color=COLOURS[number], linestyle=("-", "--")[number])
+        panel.set_xlabel(head)
+        panel.set_ylabel(LABELS[name])
+        if len(names) == 2:
+            panel.yaxis.label.set_color(COLOURS[number])
+        panel.set_ylim(bottom=min(0.0, 1.05 * float(np.nanmin(run.history[name]))))
+    axes.grid(alpha=0.3)
+    axes.set_title("Contact area and friction" if len(names) == 2 else "Contact area")
+
+
+def _new_axes() -> Axes:
+    """Make a figure of one panel, one column wide."""
+    return plt.subplots(figsize=(SINGLE_COLUMN, 2.5), layout="constrained")[1]

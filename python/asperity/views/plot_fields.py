@@ -1,0 +1,320 @@
+"""Pictures of a snapshot: maps, stick-slip maps with traction arrows, profiles, sections."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from typing import TYPE_CHECKING, Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.patches import Patch
+from matplotlib.transforms import ScaledTranslation
+from numpy.typing import NDArray
+
+from ..results.derived import has_friction
+from .style import (
+    COLOURS,
+    NO_CONTACT,
+    SINGLE_COLUMN,
+    SLIP,
+    STICK,
+    axis_text,
+    label_of,
+    print_style,
+    scale_limit,
+    si_scale,
+    typical_value,
+    when,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ..results import Grid, Snapshot
+
+__all__ = ["plot_field", "plot_section"]
+
+SIGNED = ("traction_x", "traction_y", "slip_x", "slip_y", "displacement_x", "displacement_y")
+ARROWS = 22  # along the longer side
+
+
+def plot_field(snapshot: Snapshot, name: str = "pressure", ax: Axes | None = None,
+               arrows: bool | None = None) -> Axes:
+    """Draw a field of a snapshot: a map with a colour bar, or a profile if ny is 1.
+
+    ``contact`` is a map of what is open, sticks and slips, with a legend and, where there is
+    friction, with arrows of the traction on the rubber.
+
+    Parameters
+    ----------
+    snapshot : Snapshot
+        Whose field.
+    name : str
+        Name of the field.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure of one column's width if left out.
+    arrows : bool, optional
+        Whether to draw the tractions; by default on the map of ``contact`` only.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes; the figure is ``axes.figure``.
+    """
+    grid = snapshot.run.grid
+    field = snapshot[name]
+    with print_style() if ax is None else nullcontext():
+        if ax is None:
+            ratio = 0.55 if grid.ny == 1 else float(np.clip(grid.ly / grid.lx, 0.25, 2.0))
+            ax = _new_axes((SINGLE_COLUMN, 0.75 + (SINGLE_COLUMN - 0.9) * ratio))
+        label = label_of(name, snapshot)
+        if grid.ny == 1 and name == "contact":
+            _contact_profile(snapshot, ax)
+        elif grid.ny == 1:
+            _profile(grid, field[0], label, snapshot.units(name), ax)
+        elif name == "contact":
+            _contact_map(snapshot, field, ax)
+        else:
+            _map(grid, field, name, label, snapshot.units(name), ax)
+        wanted = arrows if arrows is not None else name == "contact"
+        drawn = (wanted and grid.ny > 1 and "traction_x" in snapshot and "traction_y" in snapshot
+                 and _arrows(snapshot, ax))
+        head = "Stick and slip" if name == "contact" and has_friction(snapshot.run) else label
+        ax.set_title(f"{head}, {when(snapshot)}", pad=15.0 if drawn else None)
+    return ax
+
+
+def plot_section(snapshot: Snapshot, ax: Axes | None = None) -> Axes:
+    """Draw pressure and gap along x through the cell of the largest pressure.
+
+    Parameters
+    ----------
+    snapshot : Snapshot
+        With pressure and gap.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw the pressure; the gap gets an axis at the right.
+    """
+    grid = snapshot.run.grid
+    pressure, gap = snapshot["pressure"], snapshot["gap"]
+    row = int(np.unravel_index(np.argmax(pressure), pressure.shape)[0])
+    axes = ax if ax is not None else _new_axes((SINGLE_COLUMN, 2.4))
+    _profile(grid, pressure[row], "Pressure", snapshot.units("pressure"), axes)
+    other = axes.twinx()
+    _profile(grid, gap[row], "Gap", snapshot.units("gap"), other, COLOURS[1], "--")
+    other.grid(visible=False)
+    for panel, colour in ((axes, COLOURS[0]), (other, COLOURS[1])):
+        panel.yaxis.label.set_color(colour)
+    if np.any(gap[row] > 0.0):
+        other.set_ylim(bottom=0.0)
+    length, unit = si_scale(max(grid.lx, grid.ly), "m")
+    axes.set_title(f"Section at y = {grid.y[row] * length:.4g} {unit}")
+    return axes
+
+
+def _frame(grid: Grid) -> tuple[float, str, tuple[float, float, float, float]]:
+    """Return the factor and unit of lengths, and the edges of the map in that unit."""
+    length, unit = si_scale([grid.lx, grid.ly], "m")
+    edges = length * np.array([-0.5 * grid.dx, grid.lx - 0.5 * grid.dx,
+                               -0.5 * grid.dy, grid.ly - 0.5 * grid.dy])
+    return length, unit, tuple(map(float, edges))  # type: ignore[return-value]
+
+
+def _map(grid: Grid, field: NDArray[Any], name: str, label: str, units: str, axes: Axes) -> None:
+    """Draw a map with its colour bar."""
+    factor, unit = si_scale(typical_value(field), units)
+    style: dict[str, Any] = {}
+    extend = "neither"
+    shown = field * factor
+    if name in SIGNED or (name == "pressure" and shown.min(initial=0.0) < 0.0):
+        limit = scale_limit(np.abs(shown))
+        style = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit}
+        extend = "both" if np.abs(shown).max(initial=0.0) > limit else "neither"
+    elif name == "pressure":
+        cmap = plt.get_cmap("viridis").with_extremes(bad=NO_CONTACT)
+        limit = scale_limit(shown[shown > 0.0])
+        style = {"cmap": cmap, "vmin": 0.0, "vmax": limit}
+        extend = "max" if shown.max(initial=0.0) > limit else "neither"
+        shown = np.ma.masked_less_equal(shown, 0.0)
+    else:
+        style = {"cmap": "cividis"}
+        if np.ptp(shown) == 0.0:  # as the gap of full contact
+            style |= {"vmin": min(0.0, shown.flat[0]), "vmax": max(0.0, shown.flat[0]) or 1.0}
+    _, length_unit, edges = _frame(grid)
+    image = axes.imshow(shown, origin="lower", extent=edges, aspect="equal", **style)
+    ratio = float(np.clip(grid.ly / grid.lx, 0.25, 2.5))
+    bar = axes.figure.colorbar(image, ax=axes, extend=extend,
+                               **({"orientation": "horizontal", "pad": 0.12} if ratio < 0.45
+                                  else {"fraction": 0.046 * ratio, "pad": 0.03}))
+    bar.set_label(axis_text(label, unit))
+    axes.set_xlabel(f"x ({length_unit})")
+    axes.set_ylabel(f"y ({length_unit})")
+
+
+def _states(snapshot: Snapshot, contact: NDArray[Any]) -> tuple[list[str], list[str]]:
+    """Return colours and names, with their share of the grid, of the states of contact."""
+    shares = [float(np.mean(contact == state)) for state in range(3)]
+    if has_friction(snapshot.run):
+        named = list(zip((NO_CONTACT, STICK, SLIP), ("open", "stick", "slip"), shares,
+                         strict=True))
+    else:
+        named = [(NO_CONTACT, "open", shares[0]), (STICK, "contact", shares[1] + shares[2])]
+    return ([colour for colour, _, _ in named],
+            [f"{state} {100 * share:.3g} %" for _, state, share in named])
+
+
+def _contact_map(snapshot: Snapshot, contact: NDArray[Any], axes: Axes) -> None:
+    """Draw what is open, sticks and slips."""
+    colours, names = _states(snapshot, contact)
+    cmap = ListedColormap(colours if len(colours) == 3 else [*colours, colours[1]])
+    _, unit, edges = _frame(snapshot.run.grid)
+    axes.imshow(contact, origin="lower", extent=edges, aspect="equal", cmap=cmap,
+                norm=BoundaryNorm([-0.5, 0.5, 1.5, 2.5], 3), interpolation="nearest")
+    length, _, _ = _frame(snapshot.run.grid)
+    left, right, low, high = (length * end for end in window(snapshot))
+    axes.set_xlim(left, right)
+    axes.set_ylim(low, high)
+    axes.set_xlabel(f"x ({unit})")
+    axes.set_ylabel(f"y ({unit})")
+    _state_legend(axes, colours, names)
+
+
+def _state_legend(axes: Axes, colours: list[str], names: list[str]) -> None:
+    """Draw the legend of the states under the axes."""
+    patches = [Patch(facecolor=colour, edgecolor="#888888", linewidth=0.5, label=name)
+               for colour, name in zip(colours, names, strict=True)]
+    # Below the numbers and the name of the axis, however tall the axes are.
+    drop = 2.2 * (plt.rcParams["font.size"] + 5.0) / 72.0
+    under = axes.transAxes + ScaledTranslation(0.0, -drop, axes.figure.dpi_scale_trans)
+    axes.legend(handles=patches, loc="upper center", bbox_to_anchor=(0.5, 0.0),
+                bbox_transform=under, frameon=False, ncols=len(patches), handlelength=1.0,
+                handleheight=1.0, columnspacing=1.2, borderaxespad=0.0)
+
+
+def window(snapshot: Snapshot) -> tuple[float, float, float, float]:
+    """Return the part of the map that is worth to be shown: left, right, lower and upper edge, m.
+
+    It is the whole, but of a contact that takes less than half of a free map, as of a sphere,
+    what lies about it.
+    """
+    grid = snapshot.run.grid
+    whole = (-0.5 * grid.dx, grid.lx - 0.5 * grid.dx, -0.5 * grid.dy, grid.ly - 0.5 * grid.dy)
+    if grid.boundary != "free" or "contact" not in snapshot:
+        return whole
+    j, i = np.nonzero(snapshot["contact"])
+    if not len(i):
+        return whole
+    ends = ((i.min() - 0.5) * grid.dx, (i.max() + 0.5) * grid.dx,
+            (j.min() - 0.5) * grid.dy, (j.max() + 0.5) * grid.dy)
+    side = 1.5 * max(ends[1] - ends[0], ends[3] - ends[2])
+    if side > 0.5 * min(grid.lx, grid.ly):
+        return whole
+    middle_x, middle_y = 0.5 * (ends[0] + ends[1]), 0.5 * (ends[2] + ends[3])
+    return (middle_x - side / 2, middle_x + side / 2, middle_y - side / 2, middle_y + side / 2)
+
+
+def traction_samples(snapshot: Snapshot, side: float | None = None) -> tuple[NDArray[Any], ...]:
+    """Return cells in contact spread over the map and the tractions there.
+
+    The map is cut into squares; each gives its cell in contact that lies nearest to the middle.
+
+    Parameters
+    ----------
+    snapshot : Snapshot
+        With tractions.
+    side : float, optional
+        Side of the squares, m; the longer side of the map over `ARROWS` if left out.
+
+    Returns
+    -------
+    tuple of ndarray
+        Indices i along x and j along y, tractions along x and y in Pa.
+    """
+    grid = snapshot.run.grid
+    in_contact = (snapshot["contact"] > 0 if "contact" in snapshot
+                  else snapshot["pressure"] > 0.0)
+    side = max(grid.lx, grid.ly) / ARROWS if side is None else side
+    j, i = np.nonzero(in_contact)
+    x, y = (i + 0.5) * grid.dx / side, (j + 0.5) * grid.dy / side
+    distance = np.hypot(x % 1.0 - 0.5, y % 1.0 - 0.5)
+    order = np.argsort(distance, kind="stable")
+    columns = int(grid.lx / side) + 2
+    squares = np.floor(y[order]).astype(int) * columns + np.floor(x[order]).astype(int)
+    chosen = order[np.unique(squares, return_index=True)[1]]
+    i, j = i[chosen], j[chosen]
+    return i, j, snapshot["traction_x"][j, i], snapshot["traction_y"][j, i]
+
+
+def _arrows(snapshot: Snapshot, axes: Axes) -> bool:
+    """Draw arrows of the traction on the rubber, with a key; whether there were any."""
+    grid = snapshot.run.grid
+    length, _, _ = _frame(grid)
+    # What is seen: all of the map, or the part about a small contact.
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    seen = max(right - left, high - low) / length
+    i, j, along_x, along_y = traction_samples(snapshot, seen / ARROWS)
+    sizes = np.hypot(along_x, along_y)
+    if not np.any(sizes):
+        return False
+    largest = scale_limit(sizes)
+    longest = 1.5 * length * max(seen / ARROWS, grid.dx, grid.dy)
+    arrows = axes.quiver(grid.x[i] * length, grid.y[j] * length, along_x, along_y, angles="xy",
+                         scale_units="xy", scale=largest / longest, width=0.0045, headwidth=3.6,
+                         headlength=4.2, headaxislength=3.8, minlength=0.6, color="black",
+                         edgecolor="white", linewidth=0.35, zorder=3, clip_on=True)
+    shown = 10.0 ** np.floor(np.log10(largest))
+    shown *= max(step for step in (1.0, 2.0, 5.0) if step * shown <= largest * (1.0 + 1e-12))
+    factor, unit = si_scale(shown, "Pa")
+    # A tenth of an inch above the map, which takes the width or the height of its place.
+    place, figure = axes.get_position(), axes.figure
+    tall = min(place.height * figure.bbox.height,
+               place.width * figure.bbox.width * (high - low) / (right - left)) / figure.dpi
+    axes.quiverkey(arrows, 1.0, 1.0 + 0.09 / max(tall, 0.1), shown,
+                   f"traction {shown * factor:.3g} {unit}",
+                   labelpos="W", coordinates="axes", labelsep=0.05,
+                   fontproperties={"size": plt.rcParams["legend.fontsize"]})
+    return True
+
+
+def _profile(grid: Grid, field: NDArray[Any], label: str, units: str, axes: Axes,
+             colour: str = COLOURS[0], dashes: str = "-") -> None:
+    """Draw values over x."""
+    length, length_unit = si_scale(grid.lx, "m")
+    factor, unit = si_scale(typical_value(field), units)
+    axes.plot(grid.x * length, field * factor, color=colour, linestyle=dashes)
+    axes.set_xlim(grid.x[0] * length, grid.x[-1] * length)
+    axes.set_xlabel(f"x ({length_unit})")
+    axes.set_ylabel(axis_text(label, unit))
+    axes.grid(alpha=0.3)
+
+
+def _contact_profile(snapshot: Snapshot, axes: Axes) -> None:
+    """Draw the tractions of a line contact over shades of what is open, sticks and slips."""
+    grid, contact = snapshot.run.grid, snapshot["contact"][0]
+    colours, names = _states(snapshot, contact[None])
+    length, length_unit = si_scale(grid.lx, "m")
+    edges = np.flatnonzero(np.diff(contact)) + 1
+    for first, behind in zip([0, *edges], [*edges, grid.nx], strict=True):
+        state = int(contact[first])
+        axes.axvspan((first - 0.5) * grid.dx * length, (behind - 0.5) * grid.dx * length,
+                     color=colours[min(state, len(colours) - 1)], linewidth=0.0,
+                     alpha=0.35 if state else 0.6, zorder=0)
+    fields = [name for name in ("pressure", "traction_x", "traction_y")
+              if name in snapshot and (name == "pressure" or np.any(snapshot[name]))]
+    factor, unit = si_scale(max((typical_value(snapshot[name]) for name in fields), default=0.0),
+                            "Pa")
+    styles = (("-", "black"), ("--", COLOURS[1]), (":", COLOURS[3]))
+    for name, (dashes, colour) in zip(fields, styles, strict=False):
+        axes.plot(grid.x * length, snapshot[name][0] * factor, dashes, color=colour,
+                  label=label_of(name, snapshot))
+    axes.set_xlim((-0.5) * grid.dx * length, (grid.nx - 0.5) * grid.dx * length)
+    axes.set_xlabel(f"x ({length_unit})")
+    axes.set_ylabel(axis_text("Traction", unit))
+    if fields:
+        axes.add_artist(axes.legend(loc="upper right", frameon=True, framealpha=0.8))
+    _state_legend(axes, colours, names)
+
+
+def _new_axes(size: tuple[float, float]) -> Axes:
+    """Make a figure of one panel."""
+    return plt.subplots(figsize=size, layout="constrained")[1]

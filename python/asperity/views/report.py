@@ -1,0 +1,375 @@
+"""A page about a result: one HTML file that needs nothing else, for any browser.
+
+`write_report` is what ``python -m asperity report`` calls; `Run.report` calls it, too.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..base.library import version
+from ..results.derived import closure, energy_terms, has_friction, solver_setting
+from ..results.standing import duration, rows_of, seems_dead, short_time, silence, time_of_row
+from .report_data import faulty, now, page_data, phase_names
+from .style import si_scale
+
+if TYPE_CHECKING:
+    from ..results import Run
+
+__all__ = ["report_page", "write_report"]
+
+PAGE = Path(__file__).with_name("page")
+SCRIPTS = ("chart.js", "map.js", "page.js")
+
+
+def write_report(run: Run, path: str | os.PathLike[str] | None = None) -> Path:
+    """Write the page of a run; return its path.
+
+    Parameters
+    ----------
+    run : Run
+        Finished or still going: the page tells what there is.
+    path : str or path, optional
+        The file to write; the result's with ``.html`` if left out.
+
+    Raises
+    ------
+    OSError
+        If the result cannot be read or the page cannot be written.
+    ValueError
+        If the name does not end in .html.
+    """
+    target = run.path.with_suffix(".html") if path is None else Path(path)
+    if target.suffix.lower() in (".h5", ".hdf5"):
+        raise ValueError(f"{target}: the page would overwrite a result: name a file .html")
+    if target.suffix.lower() not in (".html", ".htm") and not target.is_dir():
+        raise ValueError(f"{target}: is no name of a page: must end in .html")
+    text = report_page(run)
+    target.write_text(text, encoding="utf-8", newline="\n")
+    return target
+
+
+def report_page(run: Run) -> str:
+    """Return the page of a run as text.
+
+    Parameters
+    ----------
+    run : Run
+        Finished or still going.
+    """
+    data = page_data(run)
+    data["colours"] = _colours()
+    sections = _sections(run, data)
+    title = run.title or run.path.name
+    parts = {
+        "version": escape(version()),
+        "title": escape(title),
+        "subtitle": _subtitle(run),
+        "style": _file("report.css"),
+        "links": "\n".join(f'<a href="#{key}">{head}</a>' for key, head, _ in sections),
+        "notes": _notes(run),
+        "tiles": _tiles(run),
+        "sections": "\n".join(f'<section id="{key}">\n<h2>{head}</h2>\n{body}\n</section>'
+                              for key, head, body in sections),
+        "footer": f"Page made by asperity {escape(version())} at {now()} from"
+                  f" <code>{escape(run.path.name)}</code>.",
+        "data": _json(data),
+        "script": "\n".join(_file(name) for name in SCRIPTS),
+    }
+    # In one pass: what is put in is not looked through again.
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], _file("report.html"))
+
+
+def _file(name: str) -> str:
+    """Return a file of the page."""
+    return (PAGE / name).read_text(encoding="utf-8").rstrip("\n")
+
+
+def _json(data: dict[str, Any]) -> str:
+    """Return data as JSON that cannot end the element it stands in."""
+    text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c")
+
+
+def _colours() -> dict[str, list[str]]:
+    """Return the colour scales, 33 colours each."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    names = {"pressure": "viridis", "gap": "cividis", "both": "RdBu_r"}
+    return {key: [to_hex(colormaps[name](part)) for part in np.linspace(0, 1, 33)]
+            for key, name in names.items()}
+
+
+def _number(value: float, units: str) -> str:
+    """Return a value in four digits with its prefixed unit."""
+    factor, unit = si_scale(float(f"{value:.4g}"), units)
+    return escape(f"{value * factor:.4g}{' ' + unit if unit else ''}".replace("-", "−"))
+
+
+def _subtitle(run: Run) -> str:
+    """Return the line under the title."""
+    grid = run.grid
+    size = (f"{grid.nx} cells over {_number(grid.lx, 'm')}, line contact" if grid.ny == 1 else
+            f"{grid.nx} × {grid.ny} cells over {_number(grid.lx, 'm')} × {_number(grid.ly, 'm')}")
+    rows = run.history.rows
+    state = "finished" if run.finished else "not finished"
+    return (f"{size}, {escape(grid.boundary)}; {state}, {rows} row{'' if rows == 1 else 's'};"
+            f" made by {escape(run.program)} {escape(run.version)}, {escape(run.created)}")
+
+
+def _notes(run: Run) -> str:
+    """Return the warnings: of the run's state, of the input, of the solvers."""
+    parts = []
+    rows = run.history.rows
+    if not run.finished:
+        parts.append(f"<p><strong>This run is not finished.</strong> {escape(rows_of(run))} were"
+                     f" written when this page was made. {_unfinished(run)}</p>")
+    told = run.warnings + faulty(run)
+    tolerance = solver_setting(run, "tolerance")
+    if tolerance is not None:
+        for name in ("normal", "tangential"):
+            column = f"residual_{name}"
+            if column in run.history and rows:
+                above = int(np.sum(run.history[column] > tolerance * (1.0 + 1e-9)))
+                if above:
+                    told.append(f"the {name} residual of {above} of {rows} rows is above the"
+                                f" tolerance of {tolerance:g}; the largest is"
+                                f" {np.nanmax(run.history[column]):.3g}")
+    if not len(run.snapshots):
+        told.append("the result holds no snapshots: there are no maps")
+    if told:
+        lines = "".join(f"<li>{escape(line)}</li>" for line in told)
+        parts.append(f"<p><strong>Warnings</strong></p><ul>{lines}</ul>")
+    return "\n".join(f'<div class="note">{part}</div>' for part in parts)
+
+
+def _unfinished(run: Run) -> str:
+    """Return why a run is not finished, as far as the file tells, and what to do."""
+    again = ("<code>asperity run CASE.nml --restart</code> goes on from the last checkpoint.")
+    if run.outcome != "running":
+        return f"It ended so: {escape(run.outcome)}; {again}"
+    quiet = silence(run)
+    last = "" if quiet is None else f"The file was last written {short_time(quiet)} before"
+    if seems_dead(run):
+        return (f"{last}, where a row takes up to {short_time(time_of_row(run) or 0.0)}: the run"
+                f" was perhaps killed. If so, {again}")
+    return f"{last}{'. ' if last else ''}Make the page again to see more; if it was killed, {again}"
+
+
+def _tiles(run: Run) -> str:
+    """Return the values of the last row."""
+    history = run.history
+    if not history.rows:
+        return '<p class="note">The history has no rows yet.</p>'
+    names = [("time", "Time"), ("pressure", "Mean pressure"), ("displacement", "Approach"),
+             ("contact_area", "Contact area"), ("mean_gap", "Mean gap")]
+    moving = "friction" in history and np.any(history["friction"])
+    if moving:
+        names.append(("friction", "Friction"))
+        if "friction_viscous" in history and has_friction(run):
+            names.append(("friction_viscous", "of it in the rubber"))
+    if has_friction(run):
+        names += [("stick_area", "Stick area"), ("sliding_speed", "Sliding speed")]
+    tiles = "\n".join(f"<div><dt>{label}</dt><dd>{_number(float(history[name][-1]), units)}</dd>"
+                      "</div>" for name, label in names if name in history
+                      for units in [history.units(name)])
+    step = f", step {history['step'][-1]}" if "step" in history else ""
+    return f'<p class="soft">The last row{step}:</p>\n<dl class="tiles">\n{tiles}\n</dl>'
+
+
+def _sections(run: Run, data: dict[str, Any]) -> list[tuple[str, str, str]]:
+    """Return key, heading and content of the sections."""
+    sections = []
+    has = {chart["section"] for chart in data["charts"]}
+    if "time" in has:
+        head = ("Friction and contact area" if any(chart["id"] == "friction" for chart in
+                                                   data["charts"]) else "Contact area and load")
+        sections.append(("time", head, _history(run, data)))
+    if data["snapshots"]:
+        sections.append(("maps", "Profiles" if run.grid.ny == 1 else "Maps", _maps(run, data)))
+    sections.append(("case", "Case and material", _case(run, data)))
+    if data["spectrum"] or any(each.get("spectrum") for each in data["snapshots"]):
+        text = ("Radial averages of the road at rest and of the rubber's normal displacement at"
+                " the step chosen above.")
+        sections.append(("spectra", "Spectra of road and rubber",
+                         f'<p class="soft">{text}</p>\n'
+                         '<div class="charts" id="charts-spectrum"></div>'))
+    if run.history.rows and energy_terms(run):
+        sections.append(("energies", "Energies", _energies(run)))
+    if run.history.rows and "iterations_normal" in run.history:
+        sections.append(("convergence", "Convergence", _convergence(run)))
+    sections.append(("made", "How it was made", _made(run)))
+    return sections
+
+
+def _table(caption: str, rows: list[tuple[str, str]]) -> str:
+    """Return a table of names and values, which are HTML already."""
+    lines = "\n".join(f'<tr><th scope="row">{name}</th><td>{value}</td></tr>'
+                      for name, value in rows)
+    return f"<table><caption>{caption}</caption><tbody>\n{lines}\n</tbody></table>"
+
+
+def settings_groups(run: Run) -> list[tuple[str, list[tuple[str, str]]]]:
+    """Return the groups of the resolved settings, each with its variables in words."""
+    groups = []
+    text = str(run.attributes.get("settings", ""))
+    for name, body in re.findall(r"(?ms)^&(\w+)\b(.*?)^/", text):
+        variables = []
+        for line in body.splitlines():
+            found = re.match(r"\s*(\w+) = (.*?)\s*(?:! (.*))?$", line)
+            if found:
+                value, comment = found[2].strip("'"), found[3] or ""
+                if comment:
+                    value += f" ({comment})" if "=" in comment else f" {comment}"
+                variables.append((found[1], value))
+        groups.append((name, variables))
+    return groups
+
+
+def _case(run: Run, data: dict[str, Any]) -> str:
+    """Return the tables of the case."""
+    groups = [(name, variables) for name, variables in settings_groups(run)
+              if variables and name not in ("output", "case")]
+    phases = [dict(variables) for name, variables in groups if name == "phase"]
+    tables = [_table(name.capitalize(), [(escape(key.replace("_", " ")), escape(value))
+                                         for key, value in variables])
+              for name, variables in groups if name != "phase"]
+    if not tables:  # an older file
+        grid = run.grid
+        tables.append(_table("Grid", [
+            ("cells", f"{grid.nx} × {grid.ny}"),
+            ("size", f"{_number(grid.lx, 'm')} × {_number(grid.ly, 'm')}"),
+            ("boundary", escape(grid.boundary))]))
+        rows = [(escape(name.replace("_", " ")), escape(str(value)))
+                for name, value in run.material.items()]
+        if rows:
+            tables.append(_table("Material", rows))
+    chart = '<div class="charts" id="charts-material"></div>' if data["modulus"] else ""
+    columns = "\n".join(tables)
+    return f'<div class="columns">\n{columns}\n</div>\n{_phases(phases)}\n{chart}'
+
+
+def _phases(phases: list[dict[str, str]]) -> str:
+    """Return the table of the phases: what any of them sets."""
+    if not phases:
+        return ""
+    nothing = ("0", ".false.", "0 s", "0 m/s", "")
+    names = [name for name in dict.fromkeys(key for phase in phases for key in phase)
+             if name != "name" and any(phase.get(name, "") not in nothing for phase in phases)]
+    head = "".join(f'<th scope="col">{escape(name.replace("_", " "))}</th>'
+                   for name in ("phase", *names))
+    lines = "\n".join(
+        f'<tr><th scope="row">{escape(phase.get("name", "") or str(number))}</th>'
+        + "".join(f"<td>{escape(phase.get(name, '–'))}</td>" for name in names) + "</tr>"
+        for number, phase in enumerate(phases, 1))
+    return (f'<div class="wide"><table class="grid-table"><caption>Phases</caption>'
+            f"<thead><tr>{head}</tr></thead><tbody>\n{lines}\n</tbody></table></div>")
+
+
+def _history(run: Run, data: dict[str, Any]) -> str:
+    """Return the place of the charts of the history."""
+    rows = data["rows"]
+    thinned = "" if rows["shown"] == rows["all"] else (
+        f" {rows['shown']} of {rows['all']} rows are drawn, with the extremes of friction and"
+        " contact area of every stretch.")
+    names = [name for name in phase_names(run) if not re.fullmatch(r"(phase \d+)?", name)]
+    phases = f" Phases: {escape(', '.join(names))}." if names else ""
+    return ('<p class="soft">Hover, tap or use the arrow keys to read values; drag or pinch to'
+            " zoom, double click to see all. The charts of this page zoom together."
+            f"{phases}{thinned}</p>\n"
+            '<p class="control" hidden><label for="axis">Against </label>'
+            '<select id="axis"></select></p>\n'
+            '<div class="charts" id="charts-time"></div>')
+
+
+def _maps(run: Run, data: dict[str, Any]) -> str:
+    """Return the slider and the place of the maps."""
+    grid, shown = data["grid"], len(data["snapshots"])
+    told = []
+    if grid["block"] > 1:
+        told.append(f"Downsampled for this page: means over blocks of {grid['block']}"
+                    f"{'' if run.grid.ny == 1 else ' × ' + str(grid['block'])} cells (of contact"
+                    f" the most frequent state), {grid['mx']} × {grid['my']} of"
+                    f" {grid['nx']} × {grid['ny']} cells.")
+    if shown < data["stored"]:
+        told.append(f"{shown} of {data['stored']} snapshots are on this page.")
+    if not run.finished:
+        told.append("The run is not finished: these are the snapshots so far.")
+    note = f'<p class="soft">{" ".join(told)}</p>\n' if told else ""
+    same = "" if run.grid.ny == 1 or shown < 2 else (
+        '<label><input type="checkbox" id="same" checked> one colour scale for all steps</label>')
+    hidden = " hidden" if shown < 2 else ""
+    kind = "charts" if run.grid.ny == 1 else "maps"
+    return (f'{note}<div class="slider">\n<label for="step"{hidden}>Step</label>\n'
+            f'<button type="button" id="step-back" aria-label="Step before"{hidden}>◀</button>\n'
+            f'<input type="range" id="step" min="0" max="{shown - 1}" value="{shown - 1}" step="1"'
+            f'{hidden}>\n'
+            f'<button type="button" id="step-on" aria-label="Step after"{hidden}>▶</button>\n'
+            f'<output id="step-told" for="step"></output>\n{same}\n</div>\n'
+            f'<div class="{kind}" id="maps-place"></div>')
+
+
+def _energies(run: Run) -> str:
+    """Return the books of energy."""
+    missing = closure(run)
+    text = ""
+    if missing is not None:
+        text = ('<p class="soft">Work put in less stored less lost: at most'
+                f" <strong>{missing.max(initial=0.0):.2g}</strong> of the largest energy so far."
+                "</p>\n")
+    names = [name for name in run.history
+             if name.startswith(("energy_", "dissipated_", "work_"))]
+    rows = [(escape(run.history.long_name(name)), _number(float(run.history[name][-1]), "J"))
+            for name in names if np.any(run.history[name])]
+    table = _table("In the last row", rows) if rows else ""
+    return f'{text}<div class="charts" id="charts-energy"></div>\n{table}'
+
+
+def _convergence(run: Run) -> str:
+    """Return iterations and residuals in words, and the place of their charts."""
+    history = run.history
+    tolerance = solver_setting(run, "tolerance")
+    rows = []
+    if tolerance is not None:
+        rows.append(("tolerance", f"{tolerance:g}"))
+    for name in ("normal", "tangential"):
+        iterations, residual = f"iterations_{name}", f"residual_{name}"
+        if iterations in history and np.any(history[iterations]):
+            rows.append((f"iterations, {name}", f"{history[iterations].min()} to"
+                         f" {history[iterations].max()} a row, {history[iterations].sum()} in all"))
+            if residual in history:
+                at = int(np.argmax(history[residual]))
+                rows.append((f"largest residual, {name}", f"{history[residual][at]:.3g}"
+                             f" (row {at})"))
+    if "ffts" in history:
+        rows.append(("transforms", f"{int(history['ffts'].sum())}"))
+    if "seconds" in history:
+        seconds = float(history["seconds"].sum())
+        rows.append(("time of the solvers",
+                     _number(seconds, "s") if seconds < 60.0 else duration(seconds)))
+    return f'<div class="charts" id="charts-convergence"></div>\n{_table("All rows", rows)}'
+
+
+def _made(run: Run) -> str:
+    """Return program, times, input and settings."""
+    try:
+        written = np.datetime64(int(run.path.stat().st_mtime), "s").astype(str) + "Z"
+    except OSError:
+        written = "-"
+    rows = [("program", f"{escape(run.program)} {escape(run.version)}"),
+            ("started", escape(run.created)), ("file last written", escape(written)),
+            ("file", f"<code>{escape(str(run.path))}</code>"),
+            ("snapshots", str(len(run.snapshots))), ("rows", str(run.history.rows))]
+    settings = str(run.attributes.get("settings", ""))
+    resolved = ("<details><summary>Every setting as it was understood</summary>"
+                f"<pre>{escape(settings)}</pre></details>" if settings else "")
+    return (f"{_table('Result', rows)}\n<h3>Input, word for word</h3>\n"
+            f"<pre>{escape(run.input)}</pre>\n{resolved}")

@@ -1,0 +1,300 @@
+"""What the report page shows of a result: columns, charts, downsampled maps, spectra.
+
+All values stay in SI units; the page gives them their prefixes.
+"""
+
+from __future__ import annotations
+
+import base64
+import re
+from datetime import datetime, timezone
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..results.derived import (
+    has_friction,
+    travel,
+)
+from ..roads import surface
+from .plot_fields import traction_samples
+from .report_charts import MOST_SNAPSHOTS, charts_of
+from .style import label_of
+
+if TYPE_CHECKING:
+    from ..results import Run, Snapshot
+
+__all__ = ["page_data"]
+
+MOST_ROWS = 2000  # of the history on the page
+MOST_CELLS = 8.0e7  # read from the file
+SIDES = (256, 192, 128, 96, 64, 48)  # cells along the longer side of the maps
+BUDGET = 4.0e6  # bytes of all maps
+SPECTRUM_POINTS = 160
+
+FloatArray = NDArray[np.float64]
+
+
+def page_data(run: Run) -> dict[str, Any]:
+    """Return all that the page's script draws, ready for JSON.
+
+    Parameters
+    ----------
+    run : Run
+        Finished or not, with or without snapshots.
+
+    Returns
+    -------
+    dict
+        'columns' (the rows kept of the history), 'axes' (what charts may be drawn against),
+        'charts', 'grid', 'snapshots', 'spectrum' (of the road), 'maps' (names of the fields).
+    """
+    rows = kept_rows(run)
+    columns, charts = charts_of(run)
+    snapshots, shape, block = _snapshots(run)
+    return {
+        "title": run.title or run.path.name,
+        "axes": _axes(run, columns),
+        "columns": {name: _numbers(values[rows]) for name, values in columns.items()},
+        "rows": {"shown": len(rows), "all": run.history.rows},
+        "charts": charts,
+        "grid": {"nx": run.grid.nx, "ny": run.grid.ny, "lx": run.grid.lx, "ly": run.grid.ly,
+                 "mx": shape[1], "my": shape[0], "block": block},
+        "friction": has_friction(run),
+        "snapshots": snapshots,
+        "stored": len(run.snapshots),
+        "spectrum": _spectrum(run, run.height) if _has_height(run) else None,
+        "spectrum_units": "m3" if run.grid.ny == 1 else "m4",
+        "modulus": _modulus(run),
+    }
+
+
+def kept_rows(run: Run) -> NDArray[np.intp]:
+    """Return the rows of the history that the page holds.
+
+    All of them up to `MOST_ROWS`. Of more, of each stretch the rows of the smallest and largest
+    friction and contact area, so that no peak is lost, with the first and the last row and those
+    of snapshots.
+    """
+    rows = run.history.rows
+    if rows <= MOST_ROWS:
+        return np.arange(rows)
+    kept = {0, rows - 1}
+    edges = np.linspace(0, rows, MOST_ROWS // 4 + 1).astype(int)
+    for first, behind in zip(edges[:-1], edges[1:], strict=True):
+        for name in ("friction", "contact_area"):
+            part = run.history[name][first:behind]
+            kept.update((first + int(np.argmin(part)), first + int(np.argmax(part))))
+    return np.array(sorted(kept))
+
+
+def _numbers(values: NDArray[Any]) -> list[float | int | None]:
+    """Return values for JSON, which knows neither nan nor infinity, to ten digits."""
+    if np.issubdtype(values.dtype, np.integer):
+        return [int(value) for value in values]
+    return [float(f"{value:.10g}") if np.isfinite(value) else None for value in values.tolist()]
+
+
+def _axes(run: Run, columns: dict[str, FloatArray]) -> list[dict[str, str]]:
+    """Return what the charts may be drawn against, the default first."""
+    named = {"time": ("Time", "s"), "travel": ("Travel of the road", "m"),
+             "pressure": ("Mean pressure", "Pa"), "displacement": ("Approach", "m"),
+             "step": ("Step", "1")}
+    order = ["time", "travel", "pressure", "displacement", "step"]
+    if travel(run) is not None:
+        order.insert(0, "travel")
+    found = []
+    for name in dict.fromkeys(order):
+        if name in columns and run.history.rows and (
+                name == "step" or np.ptp(columns[name]) > 0.0):
+            found.append({"name": name, "label": named[name][0], "unit": named[name][1]})
+    return found
+
+
+def _has_height(run: Run) -> bool:
+    """Whether the file holds the road."""
+    try:
+        return run.height.size > 0
+    except OSError:
+        return False
+
+
+def _snapshots(run: Run) -> tuple[list[dict[str, Any]], tuple[int, int], int]:
+    """Return the snapshots of the page, the shape of their maps and the cells of a block."""
+    grid = run.grid
+    stored = len(run.snapshots)
+    most = int(min(MOST_SNAPSHOTS, max(2.0, MOST_CELLS / (grid.nx * grid.ny))))
+    chosen = (range(stored) if stored <= most
+              else np.unique(np.linspace(0, stored - 1, most).round().astype(int)))
+    sides = (4096, 2048, 1024, 512) if grid.ny == 1 else SIDES
+    for side in sides:
+        block = -(-max(grid.nx, grid.ny) // side)
+        shape = (-(-grid.ny // block), -(-grid.nx // block))
+        if len(chosen) * shape[0] * shape[1] * 5 * 4 / 3 <= BUDGET:
+            break
+    return [_snapshot(run.snapshots[int(at)], block) for at in chosen], shape, block
+
+
+def _snapshot(snapshot: Snapshot, block: int) -> dict[str, Any]:
+    """Return a snapshot for the page."""
+    run = snapshot.run
+    steps = np.asarray(run.history["step"]) if "step" in run.history else np.zeros(0)
+    rows = np.flatnonzero(steps == snapshot.step)
+    found: dict[str, Any] = {
+        "step": snapshot.step, "time": snapshot.time, "phase": snapshot.phase,
+        "travel": None, "pressure": None, "displacement": None, "fields": {}}
+    if len(rows):
+        row = int(rows[0])
+        for name in ("pressure", "displacement", "contact_area", "friction"):
+            if name in run.history:
+                value = float(run.history[name][row])
+                found[name] = value if np.isfinite(value) else None
+        if "road_x" in run.history and "road_y" in run.history:
+            moved = np.hypot(np.diff(run.history["road_x"][:row + 1]),
+                             np.diff(run.history["road_y"][:row + 1]))
+            found["travel"] = float(moved.sum())
+    names = ["pressure", "gap"]
+    if run.grid.ny == 1:
+        names += ["traction_x", "traction_y"]
+    for name in names:
+        if name in snapshot:
+            field = snapshot[name]
+            if name.startswith("traction") and not np.any(field):
+                continue
+            found["fields"][name] = {
+                "label": label_of(name, snapshot), "units": snapshot.units(name),
+                **packed(blocks(field, block)), "exact": extremes(field)}
+    if "contact" in snapshot:
+        contact = snapshot["contact"]
+        found["contact"] = _encoded(states(contact, block))
+        found["shares"] = [float(np.mean(contact == state)) for state in range(3)]
+    if {"contact", "traction_x", "traction_y"} <= set(snapshot) and run.grid.ny > 1:
+        i, j, along_x, along_y = traction_samples(snapshot)
+        found["arrows"] = [_numbers(values) for values in (
+            run.grid.x[i], run.grid.y[j], along_x, along_y)]
+    if "displacement_z" in snapshot:
+        found["spectrum"] = _spectrum(run, snapshot["displacement_z"])
+    return found
+
+
+def extremes(field: NDArray[Any]) -> list[float]:
+    """Return the least and the largest of the values that are finite; 0 where none is."""
+    good = field[np.isfinite(field)]
+    return [float(good.min()), float(good.max())] if good.size else [0.0, 0.0]
+
+
+def faulty(run: Run) -> list[str]:
+    """Return which columns of the history and which fields hold what is no number."""
+    told = []
+    for name, column in run.history.items():
+        count = int(np.sum(~np.isfinite(column)))
+        if count:
+            told.append(f"{name} is not finite in {count} of {len(column)} rows")
+    if len(run.snapshots):
+        snapshot = run.snapshots[-1]
+        for name in ("pressure", "gap"):
+            if name not in snapshot:
+                continue
+            count = int(np.sum(~np.isfinite(snapshot[name])))
+            if count:
+                told.append(f"{name} of the last snapshot is not finite in {count} cells")
+    return told
+
+
+def blocks(field: NDArray[Any], block: int) -> FloatArray:
+    """Return the means over square blocks of cells; those at the upper edges may be cut.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> blocks(np.array([[1.0, 3.0, 5.0]]), 2)
+    array([[2., 5.]])
+    """
+    if block == 1:
+        return np.asarray(field, dtype=float)
+    sums = _sums(np.asarray(field, dtype=float), block)
+    return sums / _sums(np.ones(field.shape), block)
+
+
+def states(contact: NDArray[Any], block: int) -> NDArray[np.uint8]:
+    """Return the most frequent state of each block of cells; of equals the higher one."""
+    if block == 1:
+        return np.asarray(contact, dtype=np.uint8)
+    counts = np.array([_sums((contact == state).astype(float), block) for state in range(3)])
+    return (2 - np.argmax(counts[::-1], axis=0)).astype(np.uint8)
+
+
+def _sums(field: FloatArray, block: int) -> FloatArray:
+    """Return the sums over blocks."""
+    ny, nx = field.shape
+    rows = np.add.reduceat(field, np.arange(0, ny, block), axis=0)
+    return np.add.reduceat(rows, np.arange(0, nx, block), axis=1)
+
+
+def packed(field: FloatArray) -> dict[str, Any]:
+    """Return a field as 16-bit integers between its extremes, in base 64.
+
+    Cells that are not finite are given the least value; `faulty` tells of them.
+    """
+    finite = np.isfinite(field)
+    if not finite.all():
+        field = np.where(finite, field, field[finite].min() if finite.any() else 0.0)
+    low, high = float(field.min()), float(field.max())
+    step = (high - low) / 65535.0
+    whole = np.zeros(field.shape) if step == 0.0 else np.rint((field - low) / step)
+    top = float(np.percentile(np.abs(field[field != 0.0]), 99.5)) if np.any(field) else 0.0
+    return {"low": low, "high": high, "top": top, "data": _encoded(whole.astype("<u2"))}
+
+
+def _encoded(values: NDArray[Any]) -> str:
+    """Return the bytes of an array in base 64."""
+    return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
+
+
+def _spectrum(run: Run, field: FloatArray) -> dict[str, Any] | None:
+    """Return the radially averaged power spectral density, in bins of equal ratio."""
+    if not np.all(np.isfinite(field)) or np.ptp(field) == 0.0:
+        return None
+    found = surface.psd(field, run.grid.lx, run.grid.ly)
+    wave, density, modes = found.wavenumber, found.psd, found.modes.astype(float)
+    good = (wave > 0.0) & (modes > 0)
+    wave, density, modes = wave[good], density[good], modes[good]
+    if not len(wave) or not np.any(density > 0.0):
+        return None
+    edges = np.geomspace(wave[0], wave[-1] * (1.0 + 1e-9), SPECTRUM_POINTS + 1)
+    number = np.clip(np.searchsorted(edges, wave, side="right") - 1, 0, SPECTRUM_POINTS - 1)
+    total = np.bincount(number, modes, SPECTRUM_POINTS)
+    kept = total > 0
+    means = [np.bincount(number, modes * values, SPECTRUM_POINTS)[kept] / total[kept]
+             for values in (wave, density)]
+    # What round-off leaves where there are no waves would stretch the axis over twenty decades.
+    floor = 1e-16 * means[1].max()
+    shown = means[1] > floor
+    return {"k": _numbers(means[0][shown]), "psd": _numbers(means[1][shown])}
+
+
+def _modulus(run: Run) -> dict[str, Any] | None:
+    """Return storage and loss modulus against frequency, where the material has arms."""
+    arms = np.atleast_1d(run.material.get("prony_g", np.zeros(0)))
+    times = np.atleast_1d(run.material.get("prony_tau", np.zeros(0)))
+    if not len(arms) or len(arms) != len(times) or not np.any(arms):
+        return None
+    spring = float(run.material.get("shear_modulus", 0.0))
+    omega = np.geomspace(0.01 / times.max(), 100.0 / times.min(), 200)
+    product = omega[:, None] * times
+    storage = spring + np.sum(arms * product**2 / (1.0 + product**2), axis=1)
+    loss = np.sum(arms * product / (1.0 + product**2), axis=1)
+    return {"omega": _numbers(omega), "storage": _numbers(storage), "loss": _numbers(loss)}
+
+
+def phase_names(run: Run) -> list[str]:
+    """Return the names of the phases as the resolved settings tell them."""
+    text = str(run.attributes.get("settings", ""))
+    return [(re.search(r"(?m)^\s*name = '(.*)'", body) or ["", ""])[1]
+            for body in re.findall(r"(?ms)^&phase\b(.*?)^/", text)]
+
+
+def now() -> str:
+    """Return the time, ISO 8601, UTC."""
+    return datetime.now(timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")

@@ -1,0 +1,179 @@
+"""What all pictures share: colours, short names, units with SI prefixes, sizes for print."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from ..results import Snapshot
+
+__all__ = ["COLOURS", "DOUBLE_COLUMN", "LABELS", "NO_CONTACT", "PRINT", "SINGLE_COLUMN", "SLIP",
+           "STICK", "axis_text", "check_picture", "label_of", "print_style", "scale_limit",
+           "sentence", "si_scale", "typical_value", "when"]
+
+# Okabe and Ito's palette: blue, vermilion, green, purple, orange, sky blue, black.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+NO_CONTACT, STICK, SLIP = "#e8e8e8", "#0072B2", "#E69F00"
+PREFIXES = {-18: "a", -15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M",
+            9: "G", 12: "T"}
+
+# Widths of the columns of a journal, inches (89 and 183 mm), and the letters that go with them.
+SINGLE_COLUMN, DOUBLE_COLUMN = 3.5, 7.2
+PRINT: dict[str, Any] = {
+    "font.size": 8.0, "axes.titlesize": 8.0, "axes.labelsize": 8.0, "legend.fontsize": 7.0,
+    "xtick.labelsize": 7.0, "ytick.labelsize": 7.0, "figure.titlesize": 9.0,
+    "axes.linewidth": 0.6, "lines.linewidth": 1.2, "lines.markersize": 3.5, "grid.linewidth": 0.5,
+    "xtick.major.width": 0.6, "ytick.major.width": 0.6, "figure.dpi": 150, "savefig.dpi": 300,
+}
+
+# Short names for the axes; other columns and fields show their long name.
+LABELS = {
+    "time": "Time",
+    "pressure": "Pressure",
+    "force": "Normal force",
+    "displacement": "Approach",
+    "contact_area": "Contact area fraction",
+    "stick_area": "Stick area fraction",
+    "sliding_speed": "Sliding speed",
+    "mean_gap": "Mean gap",
+    "gap": "Gap",
+    "friction": "Friction coefficient",
+    "friction_viscous": "Viscous friction coefficient",
+    "height": "Height",
+    "displacement_z": "Normal displacement",
+    "displacement_x": "Displacement along x",
+    "displacement_y": "Displacement along y",
+    "traction_x": "Traction along x",
+    "traction_y": "Traction along y",
+    "slip_x": "Slip along x",
+    "slip_y": "Slip along y",
+    "road_x": "Road displacement along x",
+    "road_y": "Road displacement along y",
+    "contact": "Contact",
+    "energy": "Energy",
+    "energy_elastic": "Elastic energy",
+    "energy_adhesive": "Energy of adhesion",
+    "energy_kinetic": "Kinetic energy",
+    "dissipated_viscous": "Lost in the rubber",
+    "dissipated_numerical": "Lost by the scheme",
+    "dissipated_friction": "Lost by friction",
+    "work_normal": "Normal work",
+    "work_tangential": "Tangential work",
+    "work_load": "Work of the load",
+    "work_drive": "Work of the drive",
+    "iterations_normal": "Iterations, normal",
+    "iterations_tangential": "Iterations, tangential",
+    "residual_normal": "Residual, normal",
+    "residual_tangential": "Residual, tangential",
+    "step": "Step",
+    "phase": "Phase",
+    "ffts": "Transforms",
+    "seconds": "Solver time",
+}
+
+
+def check_picture(path: Path | None) -> None:
+    """Raise ValueError unless matplotlib can write a picture of this ending; None is fine."""
+    from matplotlib.backend_bases import FigureCanvasBase
+
+    if path and path.suffix[1:].lower() not in FigureCanvasBase.get_supported_filetypes():
+        raise ValueError(f"{path}: the ending must be .png, .pdf, .svg or another that matplotlib"
+                         " writes")
+
+
+def si_scale(values: ArrayLike, units: str) -> tuple[float, str]:
+    """Return the factor and the prefixed unit that show values with up to three digits.
+
+    Parameters
+    ----------
+    values : array_like
+        Values in SI units, of any shape.
+    units : str
+        Their unit; '1' for pure numbers, which get no prefix.
+
+    Returns
+    -------
+    factor : float
+        Multiply the values by it.
+    unit : str
+        The prefixed unit.
+
+    Examples
+    --------
+    >>> si_scale([0.0, 2.5e-3], "m")
+    (1000.0, 'mm')
+    >>> si_scale(3.2e6, "Pa")
+    (1e-06, 'MPa')
+    >>> si_scale(0.02, "m/s")
+    (1000.0, 'mm/s')
+    >>> si_scale(7300.0, "s")
+    (1.0, 's')
+    >>> si_scale(0.2, "1")
+    (1.0, '')
+    """
+    if units in ("1", ""):
+        return 1.0, ""
+    finite = np.abs(np.asarray(values, dtype=float))
+    finite = finite[np.isfinite(finite)]
+    largest = float(finite.max(initial=0.0))
+    if largest == 0.0:
+        return 1.0, units
+    # A value that rounds up to 1000 of a prefix takes the next one.
+    exponent = 3 * int(np.floor(np.log10(largest * (1.0 + 1e-9)) / 3.0))
+    exponent = min(exponent, 0 if units == "s" else max(PREFIXES))
+    # What is smaller than all prefixes is round-off mostly.
+    if (not re.fullmatch(r"[A-Za-z]+(/s)?", units) or units == "kg"
+            or exponent < min(PREFIXES)):
+        return 1.0, units
+    return float(f"1e{-exponent}"), PREFIXES[exponent] + units
+
+
+def label_of(name: str, names: Any) -> str:
+    """Return the short name of a column or field; `names.long_name` tells those without one."""
+    return LABELS.get(name) or sentence(names.long_name(name))
+
+
+def axis_text(label: str, unit: str) -> str:
+    """Return the text of an axis."""
+    return f"{label} ({unit})" if unit else label
+
+
+def sentence(text: str) -> str:
+    """Return a text that starts with a capital."""
+    return text[:1].upper() + text[1:]
+
+
+def when(snapshot: Snapshot) -> str:
+    """Return the step and time of a snapshot."""
+    if snapshot.time == 0.0:
+        return f"step {snapshot.step}"
+    factor, unit = si_scale(snapshot.time, "s")
+    return f"step {snapshot.step}, t = {snapshot.time * factor:.4g} {unit}"
+
+
+def scale_limit(values: NDArray[Any]) -> float:
+    """Return the end of a colour scale: the largest value unless a few cells stand far out."""
+    if values.size == 0:
+        return 1.0
+    largest, most = float(values.max()), float(np.percentile(values, 99.5))
+    if largest == 0.0:
+        return 1.0
+    return largest if largest < 1.5 * most or most == 0.0 else most
+
+
+def typical_value(field: NDArray[Any]) -> float:
+    """Return the value that sets the prefix of a colour bar."""
+    positive = np.abs(field[np.nonzero(field)])
+    return scale_limit(positive) if positive.size else 0.0
+
+
+def print_style() -> Any:
+    """Return a context in which new figures have the sizes of print."""
+    import matplotlib as mpl
+
+    return mpl.rc_context(PRINT)

@@ -1,0 +1,242 @@
+"""A live view of a run in the terminal: friction and contact area as lines of text.
+
+The result is opened anew for each look, as `asperity.open` does: that is how later rows are seen.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import textwrap
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
+
+import numpy as np
+
+from ..results import Run
+from ..results.standing import duration, rows_of, seems_dead, short_time, silence, time_of_row
+from .style import si_scale
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+__all__ = ["sparkline", "watch"]
+
+BARS = "▁▂▃▄▅▆▇█"
+
+
+def sparkline(values: ArrayLike, width: int = 40, bars: str = BARS) -> str:
+    """Return values as a line of bars, from the smallest to the largest.
+
+    Parameters
+    ----------
+    values : array_like
+        Shape (n,); nan is left blank. More than `width` values are averaged.
+    width : int
+        Most letters.
+    bars : str
+        Letters from low to high.
+
+    Examples
+    --------
+    >>> sparkline([0, 1, 2, 3])
+    '▁▃▆█'
+    >>> sparkline(np.arange(100.0), 4)
+    '▁▃▆█'
+    >>> sparkline([2.0, 2.0])
+    '▄▄'
+    """
+    values = np.asarray(values, dtype=float)
+    if len(values) > width:
+        parts = np.array_split(values, width)
+        values = np.array([np.nan if np.all(np.isnan(part)) else np.nanmean(part)
+                           for part in parts])
+    good = values[np.isfinite(values)]
+    if not len(good):
+        return " " * len(values)
+    low, high = float(good.min()), float(good.max())
+    if high - low <= 1e-12 * max(abs(low), abs(high)):
+        return "".join(bars[(len(bars) - 1) // 2] if np.isfinite(value) else " "
+                       for value in values)
+    places = np.nan_to_num((values - low) / (high - low) * (len(bars) - 1))
+    return "".join(bars[round(place)] if np.isfinite(value) else " "
+                   for place, value in zip(places, values, strict=True))
+
+
+class Pace:
+    """How fast rows are written, from the looks at the file.
+
+    Parameters
+    ----------
+    memory : float
+        Seconds that are looked back.
+    """
+
+    def __init__(self, memory: float = 60.0) -> None:
+        self.memory = memory
+        self.looks: list[tuple[float, int]] = []
+
+    def look(self, now: float, rows: int) -> None:
+        """Note a number of rows at a time in seconds; fewer than before start anew."""
+        if self.looks and rows < self.looks[-1][1]:
+            self.looks.clear()
+        self.looks.append((now, rows))
+        # Of looks that saw nothing new the first and the last are enough.
+        if len(self.looks) > 2 and self.looks[-3][1] == self.looks[-2][1] == rows:
+            self.looks.pop(-2)
+        while len(self.looks) > 2 and now - self.looks[1][0] > self.memory:
+            self.looks.pop(0)
+
+    @property
+    def still(self) -> float:
+        """Seconds since the number of rows was seen to change."""
+        last, rows = self.looks[-1]
+        return last - min(when for when, count in self.looks if count == rows)
+
+    @property
+    def rate(self) -> float | None:
+        """Rows a second; None while it is not known."""
+        (first, start), (last, rows) = self.looks[0], self.looks[-1]
+        return (rows - start) / (last - first) if last > first and rows > start else None
+
+
+def state_of(run: Run, pace: Pace) -> str:
+    """Return how far a run is, in words."""
+    rows, expected = run.history.rows, int(run.attributes.get("expected_rows", 0) or 0)
+    of = f" of {expected}" if expected else ""
+    told = [f"finished, {rows}{of} rows" if run.finished else rows_of(run)]
+    if run.finished:
+        return told[0]
+    if expected:
+        told[0] += f" ({100 * rows // expected} %)"
+    if run.outcome != "running":
+        return f"{told[0]}, {run.outcome}"
+    rate = pace.rate
+    if rate:
+        told.append(f"{rate:.3g} rows/s")
+        if expected > rows:
+            told.append(f"{duration((expected - rows) / rate)} left")
+    quiet = max(pace.still, silence(run) or 0.0)
+    if quiet >= 10.0:
+        told.append(f"no new row for {duration(quiet)}")
+    if seems_dead(run):
+        told[-1] += (f" where a row takes up to {short_time(time_of_row(run) or 0.0)}: perhaps no"
+                     " longer running (--restart goes on from the last checkpoint)")
+    return ", ".join(told)
+
+
+def last_row(run: Run) -> str:
+    """Return the last row of the history in words."""
+    history = run.history
+    if not history.rows:
+        return "no row yet"
+    told = []
+    for name, short in (("step", "step"), ("time", "t ="), ("contact_area", "contact area"),
+                        ("stick_area", "stick area"), ("friction", "friction"),
+                        ("iterations_normal", "iterations"), ("residual_normal", "residual")):
+        if name not in history or (name == "stick_area" and not np.any(history[name])):
+            continue
+        factor, unit = si_scale(history[name][-1], history.units(name))
+        told.append(f"{short} {history[name][-1] * factor:.4g}{' ' + unit if unit else ''}")
+    return ", ".join(told)
+
+
+def picture(run: Run, pace: Pace, width: int, unicode: bool = True) -> list[str]:
+    """Return the lines of the view, none longer than `width`."""
+    history = run.history
+    lines = [f"{run.title or run.path.name} ({run.path})", state_of(run, pace)]
+    names = [("contact_area", "contact area")]
+    if "friction" in history and np.any(history["friction"]):
+        names.insert(0, ("friction", "friction"))
+    if "stick_area" in history and np.any(history["stick_area"]):
+        names.append(("stick_area", "stick area"))
+    for name, label in names:
+        if name in history and history.rows:
+            values = history[name]
+            ends = f" {values[-1]:<9.4g} ({values.min():.3g} to {values.max():.3g})"
+            room = max(width - 14 - len(ends), 8)
+            lines.append(f"{label:>12}  "
+                         f"{sparkline(values, room, BARS if unicode else '_.-=oO#@')}{ends}")
+    lines.append(last_row(run))
+    for line in run.warnings:
+        lines.append(f"warning: {line}")
+    return [part for line in lines for part in
+            ([line] if len(line) <= width else textwrap.wrap(line, width))]
+
+
+def watch(path: str | os.PathLike[str], *, every: float = 1.0, once: bool = False,
+          stream: TextIO | None = None) -> int:
+    """Follow a run until it has ended: is finished, was stopped, or did not converge.
+
+    Parameters
+    ----------
+    path : str or path
+        The result, RESULT.h5.
+    every : float
+        Seconds between two looks.
+    once : bool
+        Show what there is and return.
+    stream : text file, optional
+        Where to write; stdout if left out. A terminal gets a view that is drawn over itself, any
+        other stream a plain line for each change.
+
+    Returns
+    -------
+    int
+        0 when the run has ended, or was shown once; 130 after Ctrl-C.
+
+    Raises
+    ------
+    OSError
+        If there is no such file, or it is not a result.
+    """
+    out = sys.stdout if stream is None else stream
+    live = not once and out.isatty() and os.environ.get("TERM", "") != "dumb"
+    encoding = (getattr(out, "encoding", None) or "ascii").lower().replace("-", "")
+    unicode = encoding.startswith("utf")
+    pace = Pace()
+    drawn: list[str] = []
+    told: Any = None
+    try:
+        run = Run(Path(path))
+        while True:
+            pace.look(time.monotonic(), run.history.rows)
+            if live or once:
+                size = shutil.get_terminal_size((100, 24))
+                lines = picture(run, pace, max(size.columns - 1, 40), unicode)[: size.lines - 1]
+                if live:
+                    _over(out, drawn, lines)
+                else:
+                    out.write("\n".join(lines) + "\n")
+                drawn = lines
+            elif (now := _news(run)) != told:
+                out.write(f"{state_of(run, pace)}: {last_row(run)}\n")
+                told = now
+            out.flush()
+            if run.finished or once or run.outcome != "running":
+                return 0
+            time.sleep(every)
+            run.refresh()
+    except KeyboardInterrupt:
+        # The view ends; the run, another process, goes on.
+        out.write("\n" if live else "")
+        out.flush()
+        return 130
+    except BrokenPipeError:
+        # The reader, such as `head`, has had enough; nothing more can be written at exit, either.
+        if stream is None:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def _news(run: Run) -> tuple[Any, ...]:
+    """Return what a plain line tells: another one is due when it changes."""
+    return run.history.rows, run.finished, run.outcome, seems_dead(run)
+
+
+def _over(out: TextIO, before: list[str], lines: list[str]) -> None:
+    """Draw lines over those drawn before."""
+    up = f"\x1b[{len(before)}A" if before else ""
+    out.write(up + "".join(f"\r\x1b[2K{line}\n" for line in lines) + "\x1b[J")
