@@ -9,9 +9,10 @@ import re
 from importlib.util import find_spec
 from pathlib import Path
 
-from asperity._addresses import MODULES
 from docutils import nodes
 from latex2mathml.converter import convert
+
+from asperity._addresses import MODULES
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -40,7 +40,8 @@ def test_what_an_installation_holds(root):
         files = {entry["destination"].replace("{bindir}", "bin")
                  for part in plan.values() for entry in part.values()}
     ends = ["bin/asperity", "asperity/__init__.py", "asperity/results/run.py", "asperity/py.typed",
-            "asperity/theory/__init__.py", "asperity/views/page/report.html", "asperity/views/page/page.js"]
+            "asperity/theory/__init__.py", "asperity/views/page/report.html",
+            "asperity/views/page/page.js"]
     for end in ends:
         assert any(name.endswith(end) for name in files), end
     assert any("asperity/_core." in name for name in files)
