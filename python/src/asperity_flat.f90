@@ -229,9 +229,11 @@ contains
    !> Elastic normal contact with adhesion: one row of the step loop.
    subroutine contact_adhesive(height, pressure, gap, attraction, nx, ny, lx, ly, is_free, modulus, &
       potential, energy, range_, approach, load, start, thesis, tolerance, max_iterations, old_level, &
-      level, energy_adhesive, iterations, ffts, residual, seconds, converged, reason, status, message)
+      level, energy_adhesive, contact_area, iterations, ffts, residual, seconds, converged, reason, &
+      status, message)
       use adhesion_potential, only : adhesion_potential_type, adhesive_slope, new_adhesion_potential
       use case_settings, only : case_type
+      use contact_rule, only : touches
       use errors, only : error_type
       use normal_step, only : new_normal_step, normal_step_type
       use precision, only : dp
@@ -256,6 +258,7 @@ contains
       real(c_double), intent(in) :: old_level                !! of a start that is given, m
       real(c_double), intent(out) :: level                   !! U - H in contact, m
       real(c_double), intent(out) :: energy_adhesive         !! over the cell, J
+      real(c_double), intent(out) :: contact_area            !! fraction of the cells that touch
       integer(c_int), intent(out) :: iterations
       real(c_double), intent(out) :: ffts, residual, seconds
       integer(c_int), intent(out) :: converged               !! 1 or 0
@@ -273,6 +276,7 @@ contains
 
       level = old_level
       energy_adhesive = 0.0_dp
+      contact_area = 0.0_dp
       case%grid = grid_of(nx, ny, lx, ly, is_free)
       case%material%poisson = 0.0_dp                         ! E* is all that matters
       case%solver%method = 'fast'
@@ -293,6 +297,7 @@ contains
       if (.not. allocated(error)) then
          call side%solve(plan, 0.5_dp*modulus, start /= 2, height, pressure, gap, level, outcome)
          energy_adhesive = side%energy(gap)
+         contact_area = count(touches(side%adhesive, pressure, gap))/real(size(gap), dp)
          do j = 1, ny
             attraction(:, j) = -adhesive_slope(law, gap(:, j))
          end do

@@ -5,6 +5,7 @@
 !> displaced by under the load, and, where it adheres, by some ranges of the attraction. (A tenth of the
 !> rms height is enough, too; but that of a long map on which a summit travels says nothing.)
 module map_edge
+   use contact_rule, only : touches
    use parallel, only : global_min, global_sum
    use precision, only : dp
    use regular_grid, only : boundary_free, grid_type
@@ -27,8 +28,7 @@ contains
    subroutine look_at_edge(grid, range, pressure, displacement, gap, move_x, move_y, rms_height, &
       state, message)
       type(grid_type), intent(in) :: grid
-      real(dp), intent(in) :: range                  !! of adhesion, m: contact is where the gap is zero
-      !                                                 then; 0: there is none, contact is where P > 0
+      real(dp), intent(in) :: range                  !! of adhesion, m; 0: there is none
       real(dp), intent(in) :: pressure(:, :)         !! Pa, [nx, ny]
       real(dp), intent(in) :: displacement(:, :)     !! U_z, m, [nx, ny]
       real(dp), intent(in) :: gap(:, :)              !! m, [nx, ny]
@@ -48,12 +48,12 @@ contains
       least = huge(1.0_dp)
       do j = 1, grid%ny
          if (j <= wy .or. j > grid%ny - wy) then
-            touching = touching + count(merge(gap(:, j) <= 0.0_dp, pressure(:, j) > 0.0_dp, adhesive))
+            touching = touching + count(touches(adhesive, pressure(:, j), gap(:, j)))
             least = min(least, minval(gap(:, j)))
          else
             do i = 1, grid%nx
                if (i > wx .and. i <= grid%nx - wx) cycle
-               if (merge(gap(i, j) <= 0.0_dp, pressure(i, j) > 0.0_dp, adhesive)) touching = touching + 1
+               if (touches(adhesive, pressure(i, j), gap(i, j))) touching = touching + 1
                least = min(least, gap(i, j))
             end do
          end if

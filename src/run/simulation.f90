@@ -16,6 +16,7 @@
 !> pass in hand.
 module simulation
    use case_settings, only : case_type
+   use contact_rule, only : touches
    use errors, only : error_type
    use friction_law, only : law_constant_shear
    use history_row, only : history_row_type
@@ -306,7 +307,7 @@ contains
       allocate (rows(3, self%grid%ny))
       !$omp parallel do default(none) shared(self, field, rows) private(j, touching)
       do j = 1, self%grid%ny
-         touching = touches(self, j)
+         touching = touches(self%side%adhesive, self%pressure(:, j), self%gap(:, j))
          rows(1, j) = sum(field(:, j, 1), touching)
          rows(2, j) = sum(field(:, j, 2), touching)
          rows(3, j) = count(touching)
@@ -553,21 +554,23 @@ contains
       real(dp), intent(in) :: level
       type(history_row_type) :: row
       real(dp), allocatable :: rows(:, :)
+      logical, allocatable :: touching(:)
       real(dp) :: sums(7), cells, area, force(2), outside(2)
       integer :: j
 
       allocate (rows(7, self%grid%ny), source=0.0_dp)
-      !$omp parallel do default(none) shared(self, rows) private(j)
+      !$omp parallel do default(none) shared(self, rows) private(j, touching)
       do j = 1, self%grid%ny
          rows(1, j) = sum(self%pressure(:, j))
-         rows(2, j) = count(touches(self, j))
+         touching = touches(self%side%adhesive, self%pressure(:, j), self%gap(:, j))
+         rows(2, j) = count(touching)
          rows(3, j) = sum(self%gap(:, j))
          if (self%slides) then
             rows(4, j) = sum(self%pressure(:, j)*self%slope_x(:, j))
             rows(5, j) = sum(self%pressure(:, j)*self%slope_y(:, j))
             if (self%side%adhesive) then
-               rows(6, j) = sum(self%pressure(:, j)*self%slope_x(:, j), .not. touches(self, j))
-               rows(7, j) = sum(self%pressure(:, j)*self%slope_y(:, j), .not. touches(self, j))
+               rows(6, j) = sum(self%pressure(:, j)*self%slope_x(:, j), .not. touching)
+               rows(7, j) = sum(self%pressure(:, j)*self%slope_y(:, j), .not. touching)
             end if
          end if
       end do
@@ -622,19 +625,6 @@ contains
       self%drive_force = force
       self%row = row
    end subroutine fill_row
-
-   !> Which cells of a row touch: P > 0, or with adhesion a gap of zero.
-   function touches(self, j) result(yes)
-      type(simulation_type), intent(in) :: self
-      integer, intent(in) :: j
-      logical :: yes(self%grid%nx)
-
-      if (self%side%adhesive) then
-         yes = self%gap(:, j) <= 0.0_dp
-      else
-         yes = self%pressure(:, j) > 0.0_dp
-      end if
-   end function touches
 
    !> The part of friction in a row, and the whole horizontal force. With slope it is the sum of T,
    !> which holds -P grad H; without, both are added.
@@ -708,7 +698,8 @@ contains
       if (holds(self)) touching = 1_int8
       allocate (states(self%grid%nx, self%grid%ny))
       do j = 1, self%grid%ny
-         states(:, j) = merge(touching, 0_int8, touches(self, j))
+         states(:, j) = merge(touching, 0_int8, &
+            touches(self%side%adhesive, self%pressure(:, j), self%gap(:, j)))
       end do
    end subroutine contact_states
 

@@ -14,6 +14,7 @@
 !> history (S, S - S_old, one field an arm).
 module tangential_state
    use case_settings, only : case_type
+   use contact_rule, only : touches
    use errors, only : error_type
    use fft_conv, only : convolution_type, new_tangential_operator
    use friction_cg, only : friction_fast, friction_solver_type, friction_thesis, new_friction_solver, &
@@ -35,6 +36,7 @@ module tangential_state
    type :: tangential_state_type
       type(grid_type) :: grid
       type(friction_law_type) :: law
+      logical :: adhesive = .false.                   !! the contact has an adhesive potential
       logical :: moved = .false.                      !! the road has moved: friction acts
       real(dp) :: thickness = 0.0_dp                  !! h, m
       real(dp) :: mass = 0.0_dp                       !! m, kg/m2
@@ -86,7 +88,8 @@ contains
       nx = self%grid%nx
       ny = self%grid%ny
       adhesive = 0.0_dp
-      if (case%adhesion%potential /= 'none') adhesive = case%adhesion%energy/case%adhesion%range
+      self%adhesive = case%adhesion%potential /= 'none'
+      if (self%adhesive) adhesive = case%adhesion%energy/case%adhesion%range
       self%law = new_friction_law(trim(case%friction%law), case%friction%coefficient, &
          case%friction%shear_strength, adhesive, case%friction%slope_effect, &
          case%solver%slip_law == 'physical')
@@ -231,20 +234,16 @@ contains
       end do
    end subroutine solve
 
-   !> Which cells may carry friction, kept where they slipped: P > 0, or with adhesion no gap.
+   !> Mark the cells that may carry friction, those that touch. A cell that slipped is still marked so.
    subroutine mark_contact(self, pressure, gap)
       type(tangential_state_type), intent(inout) :: self
       real(dp), intent(in) :: pressure(:, :), gap(:, :)
-      logical :: adhesive, touches
       integer :: i, j
 
-      adhesive = self%law%adhesive_pressure > 0.0_dp
-      !$omp parallel do default(none) shared(self, pressure, gap, adhesive) private(i, j, touches)
+      !$omp parallel do default(none) shared(self, pressure, gap) private(i, j)
       do j = 1, self%grid%ny
          do i = 1, self%grid%nx
-            touches = pressure(i, j) > 0.0_dp
-            if (adhesive) touches = gap(i, j) <= 0.0_dp
-            if (.not. touches) then
+            if (.not. touches(self%adhesive, pressure(i, j), gap(i, j))) then
                self%contact(i, j) = 0_int8
             else if (self%contact(i, j) == 0_int8) then
                self%contact(i, j) = 1_int8

@@ -18,8 +18,8 @@
 module adhesion_cg_free
    use adhesion_potential, only : adhesive_slope, potential_gauss
    use adhesion_preconditioner, only : adhesion_preconditioner_type, new_adhesion_preconditioner
-   use adhesion_state, only : adhesion_problem_type, choose_step, clipped_step, collect_step, &
-      control_approach, control_pressure, diagonal_scaling, form_step_row, reason_converged, &
+   use adhesion_state, only : adhesion_problem_type, choose_step, clipped_step, close_gaps, &
+      collect_step, control_approach, control_pressure, diagonal_scaling, form_step_row, reason_converged, &
       reason_detached, reason_limit, reason_stalled, row_total, step_sums_type, stepped_gap, &
       traction_scale
    use errors, only : error_input, error_type, fail
@@ -230,6 +230,7 @@ contains
          end if
       end if
       call hand_out(self, gap, pressure)
+      call close_gaps(problem, length, scale, self%stiffness%threads, gap, pressure)
       if (loaded) outcome%load_error = abs(row_total(self%rows, 1) - force)/max(abs(force), scale)
       outcome%ffts = self%stiffness%ffts + self%operator%ffts - before &
          + nint(self%preconditioner%transforms() - transforms_before, int64)

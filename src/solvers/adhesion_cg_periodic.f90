@@ -23,8 +23,8 @@ module adhesion_cg_periodic
    use adhesion_periodic_state, only : evaluate_load, evaluate_traction, field_sum, finish, &
       is_detached, residual_units, start_gap
    use adhesion_preconditioner, only : adhesion_preconditioner_type, new_adhesion_preconditioner
-   use adhesion_state, only : adhesion_problem_type, choose_step, clipped_step, collect_step, &
-      control_approach, control_pressure, diagonal_scaling, form_step_row, reason_closed, &
+   use adhesion_state, only : adhesion_problem_type, choose_step, clipped_step, close_gaps, &
+      collect_step, control_approach, control_pressure, diagonal_scaling, form_step_row, reason_closed, &
       reason_converged, reason_detached, reason_limit, reason_stalled, row_total, step_sums_type, &
       stepped_gap, sum_shift
    use errors, only : error_input, error_type, fail
@@ -209,6 +209,7 @@ contains
       end if
       call finish(self%stiffness, self%rows, problem, load, total, gap, pressure, outcome)
       level = -mean_height - field_sum(self%stiffness, self%rows, gap)/cells
+      call close_gaps(problem, length, scale, self%stiffness%threads, gap, pressure)
       outcome%ffts = self%stiffness%ffts - before &
          + nint(self%preconditioner%transforms() - transforms_before, int64)
       outcome%seconds = omp_get_wtime() - outcome%seconds

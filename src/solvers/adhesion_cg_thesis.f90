@@ -14,7 +14,7 @@ module adhesion_cg_thesis
    use adhesion_periodic_state, only : evaluate_load, evaluate_traction, field_sum, finish, &
       is_detached, residual_units, start_gap
    use adhesion_potential, only : adhesive_energy, adhesive_terms
-   use adhesion_state, only : adhesion_problem_type, control_approach, control_pressure, &
+   use adhesion_state, only : adhesion_problem_type, close_gaps, control_approach, control_pressure, &
       reason_closed, reason_converged, reason_detached, reason_limit, reason_stalled, row_total, &
       stepped_gap, sum_shift
    use errors, only : error_input, error_type, fail
@@ -163,6 +163,7 @@ contains
       end do
       call finish(self%stiffness, self%rows, problem, load, total, gap, pressure, outcome)
       level = -mean_height - field_sum(self%stiffness, self%rows, gap)/cells
+      call close_gaps(problem, length, scale, self%stiffness%threads, gap, pressure)
       outcome%ffts = self%stiffness%ffts - before
       outcome%seconds = omp_get_wtime() - outcome%seconds
    end subroutine solve

@@ -8,17 +8,18 @@
 !>
 !> Sums are made row by row and then in the order of the rows: they do not depend on the threads.
 module adhesion_state
-   use adhesion_potential, only : adhesion_potential_type, adhesive_curvature, adhesive_terms, &
-      potential_maugis_dugdale, potential_none
+   use adhesion_potential, only : adhesion_potential_type, adhesive_curvature, adhesive_slope, &
+      adhesive_terms, potential_maugis_dugdale, potential_none
+   use contact_rule, only : is_closed
    use normal_state, only : control_approach, control_pressure
    use parallel, only : global_max, global_min, global_sum
    use precision, only : dp
    implicit none
    private
 
-   public :: adhesion_problem_type, choose_step, clipped_step, collect_step, control_approach, &
-      control_pressure, diagonal_scaling, form_step_row, row_total, step_sums_type, stepped_gap, &
-      sum_shift, traction_scale
+   public :: adhesion_problem_type, choose_step, clipped_step, close_gaps, collect_step, &
+      control_approach, control_pressure, diagonal_scaling, form_step_row, row_total, &
+      step_sums_type, stepped_gap, sum_shift, traction_scale
 
    character(*), parameter, public :: reason_converged = 'converged'
    character(*), parameter, public :: reason_detached = 'detached'
@@ -78,6 +79,23 @@ contains
       scaling = 1.0_dp/sqrt(1.0_dp &
          + max(adhesive_curvature(problem%potential, gap), 0.0_dp)/stiffness)
    end function diagonal_scaling
+
+   !> Set to exactly 0 the gaps of a solution in the cells that the wall carries.
+   subroutine close_gaps(problem, length, scale, threads, gap, pressure)
+      type(adhesion_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: length, scale        !! units of the natural residual, m and Pa
+      integer, intent(in) :: threads
+      real(dp), intent(inout) :: gap(:, :)         !! g, m
+      real(dp), intent(in) :: pressure(:, :)       !! P, attraction included, Pa
+      integer :: j
+
+      !$omp parallel do default(none) shared(problem, length, scale, gap, pressure) private(j) &
+      !$omp num_threads(threads)
+      do j = 1, size(gap, 2)
+         where (is_closed(gap(:, j)/length, (pressure(:, j) &
+            + adhesive_slope(problem%potential, gap(:, j)))/scale, problem%tolerance)) gap(:, j) = 0.0_dp
+      end do
+   end subroutine close_gaps
 
    !> Is e' continuous?
    pure function has_smooth_potential(potential) result(smooth)

@@ -141,14 +141,14 @@ def solve_adhesive(
     _look_at_cells(array.shape, lx, ly, modulus, energy, range)
     traction, gap, attraction = (np.zeros_like(array) for _ in "pga")
     level, origin = _start_from(start, shape, top, traction, gap)
-    level, stuck, iterations, ffts, residual, seconds, converged, reason = _solve(
+    level, stuck, area, iterations, ffts, residual, seconds, converged, reason = _solve(
         array.T, traction.T, gap.T, attraction.T, lx, ly, free, modulus, potential, energy, range,
         int(control == "displacement"), load, origin, int(thesis), tolerance, steps, level)
     mean = float(traction.mean())
     displaced = gap + array + level
     result = AdhesiveNormalContact(
         traction.reshape(shape), gap.reshape(shape), displaced.reshape(shape), mean,
-        mean * lx * ly, float(level) + top, float(np.count_nonzero(gap <= 0.0) / gap.size),
+        mean * lx * ly, float(level) + top, float(area),
         int(iterations), int(ffts), float(residual), float(seconds), bool(converged),
         reason.decode().strip(), attraction.reshape(shape), float(stuck),
         0.5 * float(np.vdot(traction, displaced)) * lx * ly / array.size)
