@@ -1,12 +1,13 @@
 !> A small run that writes a result and nothing else: tests kill it, fill its disk, read it.
 module result_writer
    use, intrinsic :: iso_fortran_env, only : error_unit
-   use checkpoint, only : checkpoint_reader_type, checkpoint_writer_type, pair_type
+   use checkpoint, only : checkpoint_reader_type, checkpoint_writer_type
    use errors, only : error_type
    use history_row, only : history_row_type
    use precision, only : dp, int8
    use regular_grid, only : boundary_periodic, grid_type, new_grid
    use result_file, only : result_file_type
+   use state_table, only : state_table_type
    implicit none
    private
 
@@ -70,20 +71,17 @@ contains
       type(checkpoint_reader_type) :: old
       type(error_type), allocatable :: closing
       type(grid_type) :: grid
-      type(pair_type) :: settings(1)
       integer :: step, first
 
-      settings(1)%name = 'grid: nx'
-      settings(1)%value = '7'
       grid = new_grid(nx, ny, 14.0_dp, 4.0_dp, boundary_periodic)
       first = 0
       if (restart) then
          call old%open(path, error)
          if (allocated(error)) return
-         call old%get('step', first, error)
+         call read_state(first)
          if (allocated(error)) return
          call old%close()
-         call output%reopen(path, first, compression, error)
+         call output%reopen(path, old%result_id, first, compression, error)
          first = first + 1
       else
          call output%create(path, 'a small run', '&case title = ''a small run'' /', 'nx = 7', &
@@ -125,14 +123,32 @@ contains
          call output%end_snapshot(error)
       end subroutine write_snapshot
 
+      subroutine read_state(step)
+         integer, intent(out) :: step
+         type(state_table_type) :: table
+         integer, target :: kept_step
+         real(dp), allocatable, target :: kept_pressure(:, :)
+
+         allocate (kept_pressure(nx, ny))
+         call table%add('step', kept_step, 'the last step')
+         call table%add('pressure', kept_pressure, 'Pa', 'the last pressure')
+         call old%get_state(table, error)
+         step = kept_step
+      end subroutine read_state
+
       subroutine write_state(step)
          integer, intent(in) :: step
+         type(state_table_type) :: table
+         integer, target :: kept_step
+         real(dp), allocatable, target :: kept_pressure(:, :)
 
-         call state%start(path, settings, error)
+         kept_step = step
+         kept_pressure = pressure_of(step)
+         call table%add('step', kept_step, 'the last step')
+         call table%add('pressure', kept_pressure, 'Pa', 'the last pressure')
+         call state%start(path, output%id, 'grid: nx = 7', error)
          if (allocated(error)) return
-         call state%put('step', step, error)
-         if (allocated(error)) return
-         call state%put('pressure', pressure_of(step), 'Pa', error)
+         call state%put_state(table, error)
          if (allocated(error)) return
          call state%commit(error)
          if (allocated(error)) return

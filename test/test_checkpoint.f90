@@ -1,91 +1,167 @@
-!> Tests of checkpoints: the state comes back bit by bit, and only into the case it belongs to.
+!> Tests of checkpoints: the state comes back bit by bit, and only into the case it belongs to; a
+!> checkpoint that is not as it was written is refused.
 module test_checkpoint
+   use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use check, only : begin_suite, check_close, check_error, check_no_error, check_that
    use checkpoint, only : checkpoint_path, checkpoint_reader_type, checkpoint_writer_type, &
-      pair_type, remove_checkpoint
-   use errors, only : error_file, error_input, error_type
+      remove_checkpoint
+   use checksum, only : checksum_of_field, checksum_of_file, checksum_of_text, hexadecimal
+   use errors, only : error_convergence, error_file, error_input, error_type
    use file_system, only : file_exists
-   use precision, only : dp
+   use precision, only : dp, int64, int8
+   use state_table, only : state_table_type
    implicit none
    private
 
    public :: run_checkpoint
 
    character(*), parameter :: path = 'test_checkpoint.h5'
+   character(*), parameter :: nl = new_line('a')
+   character(*), parameter :: settings = '&grid: nx = 5'//nl//'&friction: law = coulomb'//nl
+
+   !> A state with a piece of each kind.
+   type :: pieces_type
+      logical :: truth = .true.
+      integer :: whole = 12
+      integer :: wholes(2) = [7, -3]
+      integer(int8), allocatable :: bytes(:, :)
+      real(dp) :: number = 0.1_dp
+      real(dp) :: vector(4) = 0.0_dp
+      real(dp), allocatable :: field(:, :)
+      real(dp), allocatable :: layers(:, :, :)
+      real(dp), allocatable :: missing(:, :)
+      character(8) :: text = 'slide'
+   end type pieces_type
 
 contains
 
    subroutine run_checkpoint()
       call begin_suite('checkpoint')
       call remove_checkpoint(path)
+      call checksums()
       call state_comes_back()
       call other_cases_are_refused()
       call old_one_stays_until_commit()
+      call damage_is_found()
+      call values_that_are_no_numbers_are_refused()
       call remove_checkpoint(path)
       call check_that(.not. file_exists(checkpoint_path(path)), 'removed')
    end subroutine run_checkpoint
 
-   !> The settings of a case.
-   function settings_of(nx, law) result(settings)
-      character(*), intent(in) :: nx, law
-      type(pair_type) :: settings(2)
+   !> The published check value, any split into words and bytes, and a field.
+   subroutine checksums()
+      type(error_type), allocatable :: error
+      character(27) :: text
+      real(dp) :: field(3, 2)
+      integer(int64) :: sum, whole
+      integer :: unit
 
-      settings(1)%name = 'grid: nx'
-      settings(1)%value = nx
-      settings(2)%name = 'friction: law'
-      settings(2)%value = law
-   end function settings_of
+      call check_that(hexadecimal(checksum_of_text('123456789')) == '995DC9BBDF1939FA', &
+         'check value of CRC-64/XZ')
+      text = 'abcdefghijklmnopqrstuvwxyz'//nl
+      whole = checksum_of_text(text)
+      open (newunit=unit, file='test_checksum.txt', access='stream', form='unformatted', &
+         status='replace')
+      write (unit) 'xy', text
+      close (unit)
+      call checksum_of_file('test_checksum.txt', 3_int64, sum, error)
+      call check_no_error(error, 'a file')
+      call check_that(sum == whole, 'three words and three bytes are the same as 27 bytes')
+      open (newunit=unit, file='test_checksum.txt')
+      close (unit, status='delete')
+      call checksum_of_file('test_checksum.txt', 1_int64, sum, error)
+      call check_error(error, 'cannot be read', 'no file')
+      field = reshape([1, 2, 3, 4, 5, 6], [3, 2])
+      sum = checksum_of_field(field)
+      field(2, 2) = nearest(field(2, 2), 1.0_dp)
+      call check_that(checksum_of_field(field) /= sum, 'the last bit of a field')
+      call check_that(checksum_of_field(reshape(field, [2, 3])) /= checksum_of_field(field), 'shape')
+   end subroutine checksums
 
-   !> Arrays of one to three dimensions, whole numbers and texts.
-   subroutine state_comes_back()
+   !> The table of a state.
+   subroutine list(state, table)
+      type(pieces_type), intent(in), target :: state
+      type(state_table_type), intent(out) :: table
+
+      call table%add('part/truth', state%truth, 'a truth')
+      call table%add('part/whole', state%whole, 'a whole number')
+      call table%add('wholes', state%wholes, 'whole numbers')
+      call table%add('bytes', state%bytes, 'small whole numbers')
+      call table%add('number', state%number, 's', 'a number')
+      call table%add('vector', state%vector, 'm', 'numbers')
+      call table%add('field', state%field, 'Pa', 'a field')
+      call table%add('layers', state%layers, 'Pa', 'fields')
+      call table%add('missing', state%missing, 'Pa', 'a field that this case does not have')
+      call table%add('text', state%text, 'a word')
+   end subroutine list
+
+   !> Write a checkpoint of a state.
+   subroutine write_state(state, error)
+      type(pieces_type), intent(in), target :: state
+      type(error_type), allocatable, intent(out) :: error
       type(checkpoint_writer_type) :: writer
+      type(state_table_type) :: table
+
+      call list(state, table)
+      call writer%start(path, 'id', settings, error)
+      if (.not. allocated(error)) call writer%put_number('summit', 0.3_dp, error)
+      if (.not. allocated(error)) call writer%put_state(table, error)
+      if (.not. allocated(error)) call writer%commit(error)
+   end subroutine write_state
+
+   !> Every kind of piece comes back with all its bits.
+   subroutine state_comes_back()
       type(checkpoint_reader_type) :: reader
       type(error_type), allocatable :: error
-      real(dp) :: field(5, 3), layers(5, 3, 2), vector(4), x(4), f(5, 3), g(5, 3, 2), time
-      character(:), allocatable :: text
-      integer :: step
+      type(pieces_type), target :: state, found
+      type(state_table_type) :: table
+      real(dp) :: summit
 
-      call random_number(field)
-      call random_number(layers)
-      call random_number(vector)
+      allocate (state%field(5, 3), state%layers(5, 3, 2), state%bytes(5, 3))
+      call random_number(state%field)
+      call random_number(state%layers)
+      call random_number(state%vector)
+      state%bytes = 2_int8
+      state%bytes(4, 1) = 1_int8
       call check_that(checkpoint_path('a/b.h5') == 'a/b.checkpoint.h5', 'name')
       call check_that(checkpoint_path('a/b.out') == 'a/b.out.checkpoint.h5', 'another name')
       call reader%open(path, error)
       call check_error(error, 'has no checkpoint to go on from', 'none')
       call check_that(error%status == error_file, 'status of none')
-
-      call writer%start(path, settings_of('5', 'coulomb'), error)
-      call check_no_error(error, 'start')
-      call writer%put('pressure', field, 'Pa', error)
-      call writer%put('arms', layers, 'm', error)
-      call writer%put('road', vector, 'm', error)
-      call writer%put('step', 12, error)
-      call writer%put('time', 0.1_dp, error)
-      call writer%put('phase', 'slide', error)
-      call check_no_error(error, 'put')
-      call writer%commit(error)
-      call check_no_error(error, 'commit')
+      call write_state(state, error)
+      call check_no_error(error, 'written')
       call check_that(.not. file_exists(checkpoint_path(path)//'.new'), 'no temporary file left')
 
+      found = pieces_type(truth=.false., whole=0, wholes=0, number=0.0_dp, text='')
+      allocate (found%field(5, 3), found%layers(5, 3, 2), found%bytes(5, 3))
+      call list(found, table)
       call reader%open(path, error)
       call check_no_error(error, 'open')
-      call reader%get('pressure', f, error)
-      call check_no_error(error, 'get a field')
-      call check_that(all(abs(f - field) <= 0.0_dp), 'field')
-      call reader%get('arms', g, error)
-      call check_that(all(abs(g - layers) <= 0.0_dp), 'layers')
-      call reader%get('road', x, error)
-      call check_that(all(abs(x - vector) <= 0.0_dp), 'vector')
-      call reader%get('step', step, error)
-      call check_that(step == 12, 'step')
-      call reader%get('time', time, error)
-      call check_close(time, 0.1_dp, 0.0_dp, 'time')
-      call reader%get('phase', text, error)
-      call check_that(text == 'slide', 'text')
-      call reader%get('pressure', f(:4, :), error)
-      call check_error(error, 'pressure: the extents are 5 3, the case needs 4 3', 'extents')
-      call reader%get('gap', f, error)
-      call check_error(error, 'there is no dataset "/gap"', 'missing piece')
+      call check_that(reader%result_id == 'id', 'id of the result')
+      call reader%get_number('summit', summit, error)
+      call check_close(summit, 0.3_dp, 0.0_dp, 'a number beside the state')
+      call reader%get_state(table, error)
+      call check_no_error(error, 'get the state')
+      call check_that(found%truth .and. found%whole == 12 .and. all(found%wholes == [7, -3]), 'integers')
+      call check_that(all(found%bytes == state%bytes) .and. found%text == 'slide', 'bytes and text')
+      call check_that(all(abs(found%field - state%field) <= 0.0_dp), 'field')
+      call check_that(all(abs(found%layers - state%layers) <= 0.0_dp), 'layers')
+      call check_that(all(abs(found%vector - state%vector) <= 0.0_dp), 'vector')
+      call check_close(found%number, 0.1_dp, 0.0_dp, 'number')
+
+      deallocate (found%field)
+      allocate (found%field(4, 3), found%missing(5, 3))
+      call list(found, table)
+      call reader%get_state(table, error)
+      call check_error(error, '/state/field: the extents are 5 3, the case needs 4 3', 'extents')
+      found%field = state%field
+      call list(found, table)
+      call reader%get_state(table, error)
+      call check_error(error, 'there is no dataset "/state/missing"', 'missing piece')
+      deallocate (found%missing, found%layers)
+      call list(found, table)
+      call reader%get_state(table, error)
+      call check_error(error, 'the state has 9 pieces, the case needs 8', 'a piece too many')
       call reader%close()
    end subroutine state_comes_back
 
@@ -93,21 +169,19 @@ contains
    subroutine other_cases_are_refused()
       type(checkpoint_reader_type) :: reader
       type(error_type), allocatable :: error
-      type(pair_type) :: more(3)
 
       call reader%open(path, error)
-      call reader%compare(settings_of('5', 'coulomb'), error)
+      call reader%compare(settings, error)
       call check_no_error(error, 'same case')
-      call reader%compare(settings_of('6', 'none'), error)
-      call check_error(error, 'grid: nx is 5 in the checkpoint and 6 in the case', 'first')
-      call check_error(error, 'friction: law is coulomb in the checkpoint and none in the case', &
+      call reader%compare('&grid: nx = 6'//nl//'&friction: law = none'//nl, error)
+      call check_error(error, '&grid: nx is 5 in the checkpoint and 6 in the case', 'first')
+      call check_error(error, '&friction: law is coulomb in the checkpoint and none in the case', &
          'second')
       call check_that(error%status == error_input, 'status')
-      more(:2) = settings_of('5', 'coulomb')
-      more(3)%name = 'grid: ny'
-      more(3)%value = '3'
-      call reader%compare(more, error)
-      call check_error(error, 'knows no "grid: ny"', 'unknown setting')
+      call reader%compare(settings//'&grid: ny = 3'//nl, error)
+      call check_error(error, 'knows no "&grid: ny"', 'unknown setting')
+      call reader%compare('&grid: nx = 5'//nl, error)
+      call check_error(error, 'it has settings that the case does not have', 'missing setting')
       call reader%close()
    end subroutine other_cases_are_refused
 
@@ -116,21 +190,74 @@ contains
       type(checkpoint_writer_type) :: writer
       type(checkpoint_reader_type) :: reader
       type(error_type), allocatable :: error
-      integer :: step
+      real(dp) :: summit
 
-      call writer%start(path, settings_of('5', 'coulomb'), error)
-      call writer%put('step', 13, error)
+      call writer%start(path, 'id', settings, error)
+      call writer%put_number('summit', 0.4_dp, error)
       call reader%open(path, error)
-      call reader%get('step', step, error)
-      call check_that(step == 12, 'old one')
+      call reader%get_number('summit', summit, error)
+      call check_close(summit, 0.3_dp, 0.0_dp, 'old one')
       call reader%close()
       call writer%commit(error)
       call reader%open(path, error)
-      call reader%get('step', step, error)
-      call check_that(step == 13, 'new one')
+      call reader%get_number('summit', summit, error)
+      call check_close(summit, 0.4_dp, 0.0_dp, 'new one')
       call reader%close()
-      call writer%start('no_such_folder/x.h5', settings_of('5', 'coulomb'), error)
+      call writer%start('no_such_folder/x.h5', 'id', settings, error)
       call check_error(error, 'there is no folder', 'missing folder')
    end subroutine old_one_stays_until_commit
+
+   !> One bit, wherever it is, and a cut or longer file: HDF5 does not get to see it.
+   subroutine damage_is_found()
+      type(checkpoint_reader_type) :: reader
+      type(error_type), allocatable :: error
+      integer(int8), allocatable :: bytes(:)
+      integer(int64) :: length
+      integer :: place, step, unit, refused, tried
+
+      inquire (file=checkpoint_path(path), size=length)
+      allocate (bytes(length))
+      open (newunit=unit, file=checkpoint_path(path), access='stream', form='unformatted')
+      read (unit) bytes
+      step = max(1, int(length)/200)
+      refused = 0
+      tried = 0
+      do place = 1, int(length), step
+         write (unit, pos=place) ieor(bytes(place), shiftl(1_int8, mod(place, 8)))
+         flush (unit)
+         call reader%open(path, error)
+         tried = tried + 1
+         if (allocated(error)) then
+            if (error%status == error_file) refused = refused + 1
+         end if
+         write (unit, pos=place) bytes(place)
+      end do
+      call check_that(refused == tried .and. tried > 100, 'every flipped bit is found')
+      write (unit, pos=length + 1) 0_int8
+      flush (unit)
+      call reader%open(path, error)
+      call check_error(error, 'is damaged', 'a byte too many')
+      close (unit)
+   end subroutine damage_is_found
+
+   !> A whole checkpoint with a value that is not a number is refused with the status of a solver.
+   subroutine values_that_are_no_numbers_are_refused()
+      type(checkpoint_reader_type) :: reader
+      type(error_type), allocatable :: error
+      type(pieces_type), target :: state
+      type(state_table_type) :: table
+
+      allocate (state%layers(5, 3, 2), source=0.0_dp)
+      state%layers(2, 1, 2) = ieee_value(1.0_dp, ieee_quiet_nan)
+      call write_state(state, error)
+      call check_no_error(error, 'written')
+      call reader%open(path, error)
+      call check_no_error(error, 'opened')
+      call list(state, table)
+      call reader%get_state(table, error)
+      call check_error(error, '/state/layers holds a value that is not a finite number', 'not a number')
+      call check_that(error%status == error_convergence, 'status of a solver')
+      call reader%close()
+   end subroutine values_that_are_no_numbers_are_refused
 
 end module test_checkpoint

@@ -92,7 +92,7 @@ contains
       call file%read('/snapshots/000012/contact', field, error)
       call check_that(nint(field(2, 1)) == 1 .and. nint(field(1, 2)) == 0, 'contact map')
       call check_that(file%has('/checkpoint'), 'checkpoint seen through the result')
-      call file%read('/checkpoint/pressure', field, error)
+      call file%read('/checkpoint/state/pressure', field, error)
       call check_that(all(abs(field - pressure_of(11)) <= 0.0_dp), 'field of the checkpoint')
       call file%close(error)
    end subroutine layout_is_kept
@@ -108,7 +108,7 @@ contains
 
       call write_result(path, 14, 0, .false., error)
       call check_no_error(error, 'written')
-      call output%reopen(path, 7, 0, error)
+      call output%reopen(path, id_of(path), 7, 0, error)
       call check_no_error(error, 'opened again')
       call check_that(output%rows == 8, 'rows kept')
       call output%close(error)
@@ -134,10 +134,25 @@ contains
       call check_that(size(names) == 5, 'snapshots')
       call file%close(error)
 
-      call output%reopen(path, 14, 0, error)
+      call output%reopen(path, 'another', 13, 0, error)
+      call check_error(error, 'is not the result that test_result_file.checkpoint.h5 belongs to', 'other id')
+      call output%reopen(path, id_of(path), 14, 0, error)
       call check_error(error, 'the history has 14 rows, the run would go on after row 14', 'far')
       call check_that(error%status == error_file, 'status')
    end subroutine run_goes_on
+
+   !> The id of a result.
+   function id_of(name) result(id)
+      character(*), intent(in) :: name
+      character(:), allocatable :: id
+      type(hdf5_file_type) :: file
+      type(error_type), allocatable :: error
+
+      call file%open(name, 'read', error)
+      call file%read_attribute('/', 'id', id, error)
+      call check_that(len(id) == 32, 'an id of 32 digits')
+      call file%close(error)
+   end function id_of
 
    !> What cannot be done is said; a file that cannot be made leaves nothing.
    subroutine wrong_use_is_refused()

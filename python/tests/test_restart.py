@@ -10,6 +10,8 @@ import shutil
 import signal
 from pathlib import Path
 
+import h5py
+import numpy as np
 import pytest
 import viscoelastic_case as vc
 from conftest import PATIENCE
@@ -120,6 +122,56 @@ def test_other_case(program: str, case: Path) -> None:
         assert vc.count(case.with_suffix(".h5")) == rows
     # what the numbers do not depend on may change
     case.write_text(vc.text(output="checkpoint_every = 7").replace("threads = 1", "threads = 2"))
+    assert vc.run(program, case, "--restart").returncode == 0
+
+
+def write_map(folder: Path, heights: np.ndarray) -> None:
+    """Write the height map that the cases below read."""
+    with h5py.File(folder / "map.h5", "w") as file:
+        file["surface/height"] = heights
+
+
+def stopped_case(program: str, folder: Path, name: str, extra: str = "") -> Path:
+    """Start a case whose road is a map in a file, stop it after some rows, and return its input."""
+    case = folder / f"{name}.nml"
+    case.write_text(vc.text(size=24, extra=extra).replace(
+        "shape = 'self_affine', hurst = 0.8, wavelength_long = 0.6e-3,\n"
+        "   wavelength_short = 0.15e-3, rms_height = 4e-6, seed = 3",
+        "shape = 'file', file = 'map.h5'"))
+    assert "map.h5" in case.read_text()
+    process = vc.start(program, case)
+    vc.wait_for_rows(process, case.with_suffix(".h5"), 3, signal.SIGTERM)
+    process.communicate(timeout=PATIENCE)
+    assert process.returncode == 143
+    return case
+
+
+def test_other_height_map(program: str, tmp_path: Path) -> None:
+    """A map with the same values at other places has the same rms height and summit."""
+    heights = 4e-6 * np.random.default_rng(1).standard_normal((17, 24))
+    write_map(tmp_path, heights)
+    case = stopped_case(program, tmp_path, "case")
+    write_map(tmp_path, heights[::-1])
+    done = vc.run(program, case, "--restart")
+    assert done.returncode == 2, done.stderr
+    assert "&surface 1: checksum of the height map is" in done.stderr
+    write_map(tmp_path, heights)
+    assert vc.run(program, case, "--restart").returncode == 0
+
+
+def test_result_of_another_run(program: str, tmp_path: Path) -> None:
+    """A checkpoint goes on with the result that it was written with, and with no other."""
+    heights = 4e-6 * np.random.default_rng(1).standard_normal((17, 24))
+    write_map(tmp_path, heights)
+    case = stopped_case(program, tmp_path, "case")
+    other = stopped_case(program, tmp_path, "other")
+    shutil.copy(case.with_suffix(".h5"), tmp_path / "kept.h5")
+    shutil.copy(other.with_suffix(".h5"), case.with_suffix(".h5"))
+    done = vc.run(program, case, "--restart")
+    assert done.returncode == 2, done.stderr
+    assert "case.h5: is not the result that" in done.stderr
+    assert (case.with_suffix(".h5").read_bytes() == other.with_suffix(".h5").read_bytes())
+    shutil.copy(tmp_path / "kept.h5", case.with_suffix(".h5"))
     assert vc.run(program, case, "--restart").returncode == 0
 
 

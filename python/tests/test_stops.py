@@ -100,14 +100,15 @@ def test_warnings_after_stops(tmp_path: Path, text: str, word: str) -> None:
     vc.assert_same(parts.with_suffix(".h5"), whole.with_suffix(".h5"))
 
 
-def test_a_checkpoint_without_these_notes_is_refused(tmp_path: Path) -> None:
-    """One that an older program wrote: the message names the file and what it lacks."""
+def test_a_checkpoint_that_was_changed_is_refused(tmp_path: Path) -> None:
+    """Whatever else writes into a checkpoint makes it another one than the run wrote."""
     case = tmp_path / "case.nml"
     case.write_text(vc.text(steps=4, size=24))
     go(case, 3)
     with h5py.File(tmp_path / "case.checkpoint.h5", "a") as file:
-        del file["watches"]
-    with pytest.raises(OSError, match=r"case\.checkpoint\.h5.*watches"):
+        assert file["state/passes/steps"].attrs["long_name"]
+        del file["state/passes/steps"]
+    with pytest.raises(OSError, match=r"case\.checkpoint\.h5.*damaged"):
         asperity.run(case, restart=True)
 
 

@@ -439,6 +439,13 @@ module hdf5_c
          integer(c_int) :: status
       end function h5pset_small_data_block_size
 
+      function h5pset_userblock(list, length) bind(c, name='H5Pset_userblock') result(status)
+         import :: c_int, hid_t, hsize_t
+         integer(hid_t), value :: list
+         integer(hsize_t), value :: length
+         integer(c_int) :: status
+      end function h5pset_userblock
+
       function h5pset_alignment(list, threshold, alignment) &
          bind(c, name='H5Pset_alignment') result(status)
          import :: c_int, hid_t, hsize_t

@@ -28,12 +28,12 @@ module hdf5_file
       procedure :: create_column
       procedure :: append
       procedure, private :: write_real_0, write_real_1, write_real_2, write_real_3, write_int8_2, &
-         read_real_1, read_real_2, read_real_3, write_text, write_integer, write_real, read_text, &
+         read_real_0, read_real_1, read_real_2, read_real_3, write_text, write_integer, write_real, read_text, &
          read_integer, read_real, store, load, store_attribute, load_number
       !> Write a new dataset.
       generic :: write => write_real_0, write_real_1, write_real_2, write_real_3, write_int8_2
       !> Read a whole dataset.
-      generic :: read => read_real_1, read_real_2, read_real_3
+      generic :: read => read_real_0, read_real_1, read_real_2, read_real_3
       !> Write an attribute, or a new value into one.
       generic :: write_attribute => write_text, write_integer, write_real
       !> Read an attribute.
@@ -384,6 +384,21 @@ contains
       call self%checked(status, 'the dataset cannot be read', path, error)
       call h5oclose_f(dataset, ignored)
    end subroutine load
+
+   !> Read a single real.
+   subroutine read_real_0(self, path, value, error)
+      class(hdf5_file_type), intent(inout) :: self
+      character(*), intent(in) :: path
+      real(dp), intent(out) :: value
+      type(error_type), allocatable, intent(out) :: error
+      real(dp), target :: buffer(1)
+      integer :: none(0)
+
+      buffer = 0.0_dp
+      call wanted_shape(self, path, 0, none, error)
+      if (.not. allocated(error)) call self%load(path, c_loc(buffer), error)
+      value = buffer(1)
+   end subroutine read_real_0
 
    !> Read a vector of reals; numbers of any other kind are converted.
    subroutine read_real_1(self, path, values, error)

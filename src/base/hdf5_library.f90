@@ -17,7 +17,8 @@ module hdf5_library
       h5pcreate, h5pset_alignment, h5pset_attr_phase_change, h5pset_chunk, h5pset_chunk_cache, &
       h5pset_create_intermediate_group, h5pset_deflate, h5pset_est_link_info, &
       h5pset_fclose_degree, h5pset_fill_time, h5pset_libver_bounds, h5pset_link_phase_change, &
-      h5pset_meta_block_size, h5pset_shuffle, h5pset_small_data_block_size, h5sclose, h5screate, &
+      h5pset_meta_block_size, h5pset_shuffle, h5pset_small_data_block_size, &
+      h5pset_userblock, h5sclose, h5screate, &
       h5screate_simple, h5sget_simple_extent_dims, h5sget_simple_extent_ndims, &
       h5sselect_hyperslab, h5t_c_s1_g, h5t_ieee_f64le_g, h5t_native_double_g, h5t_native_int8_g, &
       h5t_native_int_g, h5t_std_i32le_g, h5t_std_i8le_g, h5tclose, h5tcopy, h5tget_size, &
@@ -37,7 +38,7 @@ module hdf5_library
       h5pset_create_inter_group_f, h5pset_deflate_f, h5pset_est_link_info_f, &
       h5pset_fclose_degree_f, h5pset_fill_time_f, h5pset_libver_bounds_f, &
       h5pset_link_phase_change_f, h5pset_meta_block_size_f, h5pset_shuffle_f, &
-      h5pset_small_data_block_size_f, h5sclose_f, h5screate_f, h5screate_simple_f, &
+      h5pset_small_data_block_size_f, h5pset_userblock_f, h5sclose_f, h5screate_f, h5screate_simple_f, &
       h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, &
       h5tclose_f, h5tcopy_f, h5tget_size_f, h5tis_variable_str_f, h5tset_cset_f, h5tset_strpad_f
    public :: hid_t, hsize_t, size_t
@@ -604,6 +605,14 @@ contains
 
       status = h5pset_small_data_block_size(list, length)
    end subroutine h5pset_small_data_block_size_f
+
+   subroutine h5pset_userblock_f(list, length, status)
+      integer(hid_t), intent(in) :: list
+      integer(hsize_t), intent(in) :: length
+      integer, intent(out) :: status
+
+      status = h5pset_userblock(list, length)
+   end subroutine h5pset_userblock_f
 
    subroutine h5pset_alignment_f(list, threshold, alignment, status)
       integer(hid_t), intent(in) :: list

@@ -30,7 +30,7 @@ module hdf5_tree
       h5pcreate_f, h5pset_alignment_f, h5pset_attr_phase_change_f, h5pset_create_inter_group_f, &
       h5pset_est_link_info_f, h5pset_fclose_degree_f, h5pset_libver_bounds_f, &
       h5pset_link_phase_change_f, h5pset_meta_block_size_f, h5pset_small_data_block_size_f, &
-      hid_t, hsize_t
+      h5pset_userblock_f, hid_t, hsize_t
    use hdf5_errors, only : last_reason, start_hdf5
    use precision, only : int64
    implicit none
@@ -81,12 +81,13 @@ module hdf5_tree
 contains
 
    !> Open a file.
-   subroutine open_file(self, path, mode, error, alignment)
+   subroutine open_file(self, path, mode, error, alignment, user_block)
       class(hdf5_tree_type), intent(inout) :: self
       character(*), intent(in) :: path
       character(*), intent(in) :: mode      !! 'read', 'create' (replaces a file) or 'append'
       type(error_type), allocatable, intent(out) :: error
       integer, intent(in), optional :: alignment  !! of what is added, bytes; default 512
+      integer, intent(in), optional :: user_block !! bytes at the start of a new file that HDF5 leaves alone
       integer(hid_t) :: access_list, creation
       integer :: status, ignored
 
@@ -107,6 +108,8 @@ contains
          case ('create')
             call h5pcreate_f(H5P_FILE_CREATE_F, creation, status)
             if (status >= 0) call set_one_block(creation, 24, 24, status)
+            if (status >= 0 .and. present(user_block)) &
+               call h5pset_userblock_f(creation, int(user_block, hsize_t), status)
             if (status >= 0) call h5fcreate_f(self%path, H5F_ACC_TRUNC_F, self%id, status, &
                creation_prp=creation, access_prp=access_list)
          case ('append')
@@ -440,6 +443,7 @@ contains
       if (status >= 0) then
          deallocate (names)
          allocate (names(count))
+         names = ''
          do i = 1, count
             call h5lget_name_by_idx_f(location, local, i - 1, names(i), status)
             if (status < 0) exit

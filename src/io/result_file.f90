@@ -9,6 +9,7 @@ module result_file
    use hdf5_file, only : hdf5_file_type
    use history_row, only : column_count, column_type, history_columns, history_row_type, row_values
    use precision, only : dp, int8
+   use random_id, only : new_id
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use utc_clock, only : utc_time
    use version, only : asperity_version
@@ -51,6 +52,7 @@ module result_file
       type(snapshot_type) :: current                 !! the snapshot under construction
       character(:), allocatable :: current_path
       character(:), allocatable, public :: path      !! name of the file
+      character(:), allocatable, public :: id        !! identity, which a checkpoint names
       integer, public :: rows = 0                    !! rows of the history
    contains
       procedure :: create => create_result
@@ -111,6 +113,7 @@ contains
       self%compression = compression
       self%rows = 0
       self%path = trim(path)
+      self%id = new_id()
       self%xdmf_path = sibling_path(path, '.xdmf')
       if (allocated(self%snapshots)) deallocate (self%snapshots)
       allocate (self%snapshots(0))
@@ -186,6 +189,8 @@ contains
       call self%file%write_attribute('/', 'version', asperity_version, error)
       if (allocated(error)) return
       call self%file%write_attribute('/', 'created', utc_time(), error)
+      if (allocated(error)) return
+      call self%file%write_attribute('/', 'id', self%id, error)
       if (allocated(error)) return
       call self%file%write_attribute('/', 'input', input, error)
       if (allocated(error)) return
@@ -474,9 +479,10 @@ contains
    end subroutine close_result
 
    !> Open a result to go on with it after a given row: later rows and snapshots are dropped.
-   subroutine reopen_result(self, path, last_step, compression, error)
+   subroutine reopen_result(self, path, id, last_step, compression, error)
       class(result_file_type), intent(inout) :: self
       character(*), intent(in) :: path
+      character(*), intent(in) :: id        !! of the result that the checkpoint belongs to
       integer, intent(in) :: last_step      !! the last row to keep, from 0
       integer, intent(in) :: compression    !! of fields, 0 none to 9 smallest
       type(error_type), allocatable, intent(out) :: error
@@ -487,7 +493,10 @@ contains
       self%xdmf_path = sibling_path(path, '.xdmf')
       call self%file%open(self%path, 'append', error)
       if (allocated(error)) return
-      call go_back(self, last_step, error)
+      call self%read_text('id', self%id, error)
+      if (.not. allocated(error) .and. self%id /= id) call fail(error, error_input, self%path// &
+         ': is not the result that '//sibling_path(path, '.checkpoint.h5')//' belongs to')
+      if (.not. allocated(error)) call go_back(self, last_step, error)
       if (allocated(error)) call self%file%close(closing)
    end subroutine reopen_result
 

@@ -23,7 +23,7 @@ module viscoelastic_energy
    implicit none
    private
 
-   public :: energy_books_type, new_books, book_step, books_values, books_from_values
+   public :: energy_books_type, new_books, book_step
 
    !> Cumulative books, in J, of one set of products.
    type :: energy_books_type
@@ -36,8 +36,6 @@ module viscoelastic_energy
       real(dp), allocatable :: arm(:)       !! E_k, Pa2 m3
       real(dp), allocatable :: arm_du(:)    !! p_k.dU of the last step with p_k from its end, J
    end type energy_books_type
-
-   integer, parameter :: fixed_values = 6   !! numbers of the books beside those of the arms
 
 contains
 
@@ -163,31 +161,5 @@ contains
       end do
       self%du_ds = d
    end subroutine advance_arms
-
-   !> The books as an array, for a checkpoint.
-   pure function books_values(self) result(values)
-      type(energy_books_type), intent(in) :: self
-      real(dp) :: values(fixed_values + 2*size(self%arm))
-
-      values = [self%cell_area, self%stored, self%work, self%dissipated, self%numerical, &
-         self%du_ds, self%arm, self%arm_du]
-   end function books_values
-
-   !> The books that `books_values` made into an array.
-   pure function books_from_values(values) result(self)
-      real(dp), intent(in) :: values(:)
-      type(energy_books_type) :: self
-      integer :: arms
-
-      arms = (size(values) - fixed_values)/2
-      self%cell_area = values(1)
-      self%stored = values(2)
-      self%work = values(3)
-      self%dissipated = values(4)
-      self%numerical = values(5)
-      self%du_ds = values(6)
-      allocate (self%arm(arms), source=values(fixed_values + 1:fixed_values + arms))
-      allocate (self%arm_du(arms), source=values(fixed_values + arms + 1:fixed_values + 2*arms))
-   end function books_from_values
 
 end module viscoelastic_energy

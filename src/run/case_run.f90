@@ -3,18 +3,20 @@
 !> The program and the Python package drive it alike: `open`, `step` until `finished`, `close`. A stop
 !> between two steps writes a checkpoint; a failing solver keeps all there is in the result.
 module case_run
+   use case_identity, only : identity_of
    use case_report, only : resolved_input
    use case_settings, only : case_type
-   use checkpoint, only : checkpoint_reader_type, checkpoint_writer_type, pair_type, &
+   use checkpoint, only : checkpoint_path, checkpoint_reader_type, checkpoint_writer_type, &
       remove_checkpoint
-   use errors, only : error_convergence, error_type, fail
+   use checksum, only : hexadecimal
+   use errors, only : error_convergence, error_input, error_type, fail
    use parallel, only : set_threads
    use precision, only : dp, int64, int8
    use result_file, only : result_file_type
    use schedule, only : count_rows
    use simulation, only : new_simulation, simulation_type
    use simulation_state, only : load_state, save_state
-   use text_tools, only : exact_text, to_text
+   use text_tools, only : to_text
    implicit none
    private
 
@@ -29,6 +31,8 @@ module case_run
       character(:), allocatable, private :: told   !! all of them
       type(result_file_type), private :: result
       character(:), allocatable, private :: path   !! of the result
+      character(:), allocatable, private :: settings   !! every resolved setting, one per line
+      character(:), allocatable, private :: identity   !! what must agree for a restart
       integer, private :: next_time = 1            !! next of the times for snapshots
       integer, private :: last_snapshot = -1       !! row of the last snapshot
       integer(int64), private :: saved_at = 0      !! clock of the last checkpoint
@@ -60,6 +64,8 @@ contains
       call system_clock(self%saved_at)
       call new_simulation(self%sim, case, error)
       if (allocated(error)) return
+      self%settings = resolved_input(self%sim%case)
+      self%identity = identity_of(self%settings)//map_lines(self%sim)
       if (restart) then
          call take_up(self, error)
       else
@@ -78,10 +84,12 @@ contains
          snapshots = size(case%output%snapshot_times) + 1
          if (case%output%snapshot_every > 0) &
             snapshots = snapshots + self%rows/case%output%snapshot_every
-         call self%result%create(self%path, trim(case%title), case%input, resolved_input(case), &
+         call self%result%create(self%path, trim(case%title), case%input, self%settings, &
             self%sim%grid, self%sim%height, self%rows, snapshots, case%output%compression, error)
          if (allocated(error)) return
          call write_material(self, error)
+         if (allocated(error)) return
+         call self%result%write_text('height_maps', checksums_of_maps(self%sim), error)
          if (allocated(error)) return
          call self%result%write_text('warnings', case%warnings, error)
          if (allocated(error)) return
@@ -121,11 +129,13 @@ contains
 
       call reader%open(self%path, error)
       if (allocated(error)) return
-      call reader%compare(identity(self%sim), error)
+      call reader%compare(self%identity, error)
+      if (.not. allocated(error)) call compare_map(self, reader, error)
       if (.not. allocated(error)) call load_state(self%sim, reader, error)
       call reader%close()
       if (allocated(error)) return
-      call self%result%reopen(self%path, self%sim%row%step, self%sim%case%output%compression, error)
+      call self%result%reopen(self%path, reader%result_id, self%sim%row%step, &
+         self%sim%case%output%compression, error)
       if (allocated(error)) return
       call self%result%write_text('outcome', 'running', error)
       if (allocated(error)) return
@@ -140,6 +150,27 @@ contains
          end do
       end associate
    end subroutine take_up
+
+   !> See that the height map is that of the checkpoint. Maps from files are bound by their checksums
+   !> in the identity; a map that is computed may differ by rounding on another machine.
+   subroutine compare_map(self, reader, error)
+      type(run_type), intent(in) :: self
+      type(checkpoint_reader_type), intent(inout) :: reader
+      type(error_type), allocatable, intent(out) :: error
+      real(dp), parameter :: rounding = 1e-9_dp
+      real(dp) :: rms_height, summit, allowed
+
+      call reader%get_number('rms_height', rms_height, error)
+      if (allocated(error)) return
+      call reader%get_number('summit', summit, error)
+      if (allocated(error)) return
+      allowed = rounding*max(self%sim%rms_height, abs(self%sim%summit))
+      if (abs(rms_height - self%sim%rms_height) <= allowed .and. &
+         abs(summit - self%sim%summit) <= allowed) return
+      call fail(error, error_input, checkpoint_path(self%path)//': the height map has the rms height '// &
+         to_text(rms_height)//' m and the summit '//to_text(summit)//' m in the checkpoint, '// &
+         to_text(self%sim%rms_height)//' m and '//to_text(self%sim%summit)//' m in the case')
+   end subroutine compare_map
 
    !> The warnings that the run had left, but for those of rows that are done again.
    subroutine take_up_warnings(self, error)
@@ -280,7 +311,11 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(checkpoint_writer_type) :: writer
 
-      call writer%start(self%path, identity(self%sim), error)
+      call writer%start(self%path, self%result%id, self%identity, error)
+      if (allocated(error)) return
+      call writer%put_number('rms_height', self%sim%rms_height, error)
+      if (allocated(error)) return
+      call writer%put_number('summit', self%sim%summit, error)
       if (allocated(error)) return
       call save_state(self%sim, writer, error)
       if (allocated(error)) return
@@ -326,67 +361,31 @@ contains
       self%sim%warnings = ''
    end subroutine collect_warnings
 
-   !> What must agree for a run to go on from a checkpoint: every setting of the case that the
-   !> numbers depend on, and the height map.
-   function identity(sim) result(pairs)
+   !> The checksums of the height maps that are files, as lines of the identity.
+   function map_lines(sim) result(lines)
       type(simulation_type), intent(in) :: sim
-      type(pair_type), allocatable :: pairs(:)
-      character(:), allocatable :: text, line, group, name
-      integer :: at, next, equals, note, surfaces, phases
-
-      text = resolved_input(sim%case)
-      allocate (pairs(0))
-      group = ''
-      name = ''
-      surfaces = 0
-      phases = 0
-      at = 1
-      do while (at <= len(text))
-         next = index(text(at:), new_line('a'))
-         if (next == 0) next = len(text) - at + 2
-         line = trim(adjustl(text(at:at + next - 2)))
-         at = at + next
-         if (len(line) == 0) cycle
-         if (line(1:1) == '&') then
-            group = line
-            name = line
-            if (line == '&surface') then
-               surfaces = surfaces + 1
-               name = line//' '//to_text(surfaces)
-            else if (line == '&phase') then
-               phases = phases + 1
-               name = line//' '//to_text(phases)
-            end if
-         end if
-         equals = index(line, '=')
-         if (equals == 0) cycle
-         if (group == '&case' .or. group == '&output') cycle
-         if (group == '&solver' .and. index(line, 'threads') == 1) cycle
-         note = index(line, ' ! ')
-         if (note == 0) note = len(line) + 1
-         call add_pair(pairs, name//': '//trim(line(:equals - 1)), &
-            trim(adjustl(line(equals + 1:note - 1))))
-      end do
-      call add_pair(pairs, 'height map: rms height', exact_text(sim%rms_height))
-      call add_pair(pairs, 'height map: summit', exact_text(sim%summit))
-   end function identity
-
-   !> Add a pair. (In an array constructor, gfortran 12 loses the length of a text that a function
-   !> returns.)
-   subroutine add_pair(pairs, name, value)
-      type(pair_type), allocatable, intent(inout) :: pairs(:)
-      character(*), intent(in) :: name, value
-      type(pair_type), allocatable :: longer(:)
+      character(:), allocatable :: lines
       integer :: i
 
-      allocate (longer(size(pairs) + 1))
-      do i = 1, size(pairs)
-         longer(i)%name = pairs(i)%name
-         longer(i)%value = pairs(i)%value
+      lines = ''
+      do i = 1, size(sim%case%surfaces)
+         if (sim%case%surfaces(i)%shape == 'file') lines = lines//'&surface '//to_text(i)// &
+            ': checksum of the height map = '//hexadecimal(sim%map_checksums(i))//new_line('a')
       end do
-      longer(size(longer))%name = name
-      longer(size(longer))%value = value
-      call move_alloc(longer, pairs)
-   end subroutine add_pair
+   end function map_lines
+
+   !> The same checksums with blanks between them.
+   function checksums_of_maps(sim) result(text)
+      type(simulation_type), intent(in) :: sim
+      character(:), allocatable :: text
+      integer :: i
+
+      text = ''
+      do i = 1, size(sim%case%surfaces)
+         if (sim%case%surfaces(i)%shape == 'file') &
+            text = trim(text//' '//hexadecimal(sim%map_checksums(i)))
+      end do
+      text = adjustl(text)
+   end function checksums_of_maps
 
 end module case_run

@@ -10,7 +10,7 @@ module pass_watch
    implicit none
    private
 
-   public :: pass_watch_type, pass_watch_from_values, pass_watch_values, watch_passes
+   public :: pass_watch_type, watch_passes
 
    !> Passes from which on the pressure should settle, and from which on little should be left.
    integer, parameter :: some = 4, many = 8
@@ -60,22 +60,5 @@ contains
          message = message//'. Allow more passes, take smaller steps, a finer mesh, or some density'
       end if
    end subroutine watch_passes
-
-   !> What has been seen so far as numbers, for a checkpoint.
-   pure function pass_watch_values(self) result(values)
-      type(pass_watch_type), intent(in) :: self
-      real(dp) :: values(2)
-
-      values = [merge(1.0_dp, 0.0_dp, self%reported), real(self%steps, dp)]
-   end function pass_watch_values
-
-   !> The way back.
-   pure function pass_watch_from_values(values) result(self)
-      real(dp), intent(in) :: values(2)
-      type(pass_watch_type) :: self
-
-      self%reported = values(1) > 0.5_dp
-      self%steps = nint(values(2))
-   end function pass_watch_from_values
 
 end module pass_watch

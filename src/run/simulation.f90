@@ -83,6 +83,7 @@ module simulation
       real(dp), allocatable, private :: new_slope_x(:, :), new_slope_y(:, :)   !! of the pass in hand
       real(dp), allocatable, private :: past(:, :)  !! traction of the history, Pa
       real(dp) :: rms_height = 0.0_dp               !! of the original map about its mean, m
+      integer(int64), allocatable :: map_checksums(:)   !! of the height maps that are files, by term
    contains
       procedure :: advance
       procedure :: place_road
@@ -106,7 +107,7 @@ contains
       nx = self%grid%nx
       ny = self%grid%ny
       self%slides = any(abs(case%phases%velocity_x) > 0.0_dp .or. abs(case%phases%velocity_y) > 0.0_dp)
-      call new_height(self%grid, case%surfaces, self%height, error)
+      call new_height(self%grid, case%surfaces, self%height, error, self%map_checksums)
       if (allocated(error)) return
       call new_normal_step(self%side, case, self%height, error)
       if (allocated(error)) return

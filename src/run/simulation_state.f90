@@ -1,202 +1,168 @@
 !> The state of a run in a checkpoint: all that `advance` needs to go on to the same numbers.
+!>
+!> `list_state` is the only place that names the pieces of the state. A new state variable is one
+!> line there; the checkpoint and the restart follow.
 module simulation_state
    use checkpoint, only : checkpoint_reader_type, checkpoint_writer_type
    use errors, only : error_type
-   use history_row, only : column_count, row_from_values, row_values
-   use pass_watch, only : pass_watch_from_values, pass_watch_values
-   use precision, only : dp, int8
+   use history_row, only : column_count, column_type, history_columns, row_from_values, row_values
+   use precision, only : dp
    use simulation, only : simulation_type
-   use stick_slip_watch, only : watch_from_values, watch_values
-   use viscoelastic_energy, only : books_from_values, books_values
-   use zener, only : is_elastic
+   use state_table, only : state_table_type
+   use tangential_state, only : tangential_state_type
+   use viscoelastic_energy, only : energy_books_type
+   use zener, only : history_type
    implicit none
    private
 
    public :: load_state, save_state
 
-   integer, parameter :: schedule_values = 11
-
 contains
 
    !> Put the state into a checkpoint.
    subroutine save_state(sim, writer, error)
-      type(simulation_type), intent(in) :: sim
+      type(simulation_type), intent(in), target :: sim
       type(checkpoint_writer_type), intent(inout) :: writer
       type(error_type), allocatable, intent(out) :: error
+      type(state_table_type) :: table
+      real(dp), target :: row(column_count)
 
-      associate (s => sim%schedule)
-         call writer%put('schedule', [real(s%row, dp), real(s%phase, dp), real(s%step, dp), &
-            merge(1.0_dp, 0.0_dp, s%entered), s%start_time, s%start_load, s%start_x, s%start_y, &
-            s%held_load, s%velocity_x, s%velocity_y], '1', error)
-         if (allocated(error)) return
-         call writer%put('held_control', s%held_control, error)
-         if (allocated(error)) return
-      end associate
-      call writer%put('row', row_values(sim%row), '1', error)
-      if (allocated(error)) return
-      call writer%put('motion', [sim%direction, sim%drive_force, sim%velocity, sim%drifted, &
-         real(sim%moved_cells, dp), sim%level], '1', error)
-      if (allocated(error)) return
-      call writer%put('watches', [watch_values(sim%watch), real(sim%edge, dp), &
-         pass_watch_values(sim%pass_watch)], '1', error)
-      if (allocated(error)) return
-      call writer%put('pressure', sim%pressure, 'Pa', error)
-      if (allocated(error)) return
-      call writer%put('gap', sim%gap, 'm', error)
-      if (allocated(error)) return
-      call writer%put('displacement_z', sim%displacement, 'm', error)
-      if (allocated(error)) return
-      call writer%put('books', books_values(sim%books), 'J', error)
-      if (allocated(error)) return
-      if (sim%frictional) call save_tangential(sim, writer, error)
-      if (allocated(error)) return
-      if (is_elastic(sim%material)) return
-      call writer%put('dt_old', sim%material%dt_old, error)
-      if (allocated(error)) return
-      call writer%put('history_s', sim%history%s, 'Pa', error)
-      if (allocated(error)) return
-      if (size(sim%history%ds) > 0) call writer%put('history_ds', sim%history%ds, 'Pa', error)
-      if (allocated(error)) return
-      call writer%put('history_arm', sim%history%arm, 'Pa', error)
+      row = row_values(sim%row)
+      call list_state(sim, row, table)
+      call writer%put_state(table, error)
    end subroutine save_state
 
    !> Take the state from a checkpoint into a new simulation of the same case.
    subroutine load_state(sim, reader, error)
-      type(simulation_type), intent(inout) :: sim
+      type(simulation_type), intent(inout), target :: sim
       type(checkpoint_reader_type), intent(inout) :: reader
       type(error_type), allocatable, intent(out) :: error
-      real(dp) :: numbers(schedule_values), row(column_count), motion(11), watches(7)
-      real(dp), allocatable :: books(:)
-      character(:), allocatable :: control
+      type(state_table_type) :: table
+      real(dp), target :: row(column_count)
 
-      call reader%get('schedule', numbers, error)
-      if (allocated(error)) return
-      call reader%get('held_control', control, error)
-      if (allocated(error)) return
-      associate (s => sim%schedule)
-         s%row = nint(numbers(1))
-         s%phase = nint(numbers(2))
-         s%step = nint(numbers(3))
-         s%entered = numbers(4) > 0.5_dp
-         s%start_time = numbers(5)
-         s%start_load = numbers(6)
-         s%start_x = numbers(7)
-         s%start_y = numbers(8)
-         s%held_load = numbers(9)
-         s%velocity_x = numbers(10)
-         s%velocity_y = numbers(11)
-         s%held_control = control
-      end associate
-      call reader%get('row', row, error)
+      row = 0.0_dp
+      call list_state(sim, row, table)
+      call reader%get_state(table, error)
       if (allocated(error)) return
       sim%row = row_from_values(row)
-      call reader%get('motion', motion, error)
-      if (allocated(error)) return
-      sim%direction = motion(1:2)
-      sim%drive_force = motion(3:4)
-      sim%velocity = motion(5:6)
-      sim%drifted = motion(7:8)
-      sim%moved_cells = nint(motion(9:10))
-      sim%level = motion(11)
-      call reader%get('watches', watches, error)
-      if (allocated(error)) return
-      sim%watch = watch_from_values(watches(1:4))
-      sim%edge = nint(watches(5))
-      sim%pass_watch = pass_watch_from_values(watches(6:7))
-      sim%first = .false.
-      call reader%get('pressure', sim%pressure, error)
-      if (allocated(error)) return
-      call reader%get('gap', sim%gap, error)
-      if (allocated(error)) return
-      call reader%get('displacement_z', sim%displacement, error)
-      if (allocated(error)) return
-      allocate (books, source=books_values(sim%books))
-      call reader%get('books', books, error)
-      if (allocated(error)) return
-      sim%books = books_from_values(books)
-      if (sim%frictional) call load_tangential(sim, reader, error)
-      if (allocated(error)) return
-      if (.not. is_elastic(sim%material)) then
-         call reader%get('dt_old', sim%material%dt_old, error)
-         if (allocated(error)) return
-         call reader%get('history_s', sim%history%s, error)
-         if (allocated(error)) return
-         if (size(sim%history%ds) > 0) call reader%get('history_ds', sim%history%ds, error)
-         if (allocated(error)) return
-         call reader%get('history_arm', sim%history%arm, error)
-         if (allocated(error)) return
-      end if
       call sim%place_road(sim%row%road_x, sim%row%road_y)
       sim%finished = sim%schedule%phase > size(sim%case%phases)
    end subroutine load_state
 
+   !> The table of the state: everything that one row leaves to the next.
+   subroutine list_state(sim, row, table)
+      type(simulation_type), intent(in), target :: sim
+      real(dp), intent(in), target :: row(column_count)   !! the last row, as `row_values` has it
+      type(state_table_type), intent(out) :: table
+
+      call list_schedule(sim, table)
+      call list_row(row, table)
+      call table%add('first', sim%first, 'there is no state yet')
+      call table%add('level', sim%level, 'm', 'displacement less height where the gap is zero')
+      call table%add('direction', sim%direction, '1', 'direction of the road''s last motion')
+      call table%add('drive_force', sim%drive_force, 'N', 'horizontal force on the rubber')
+      call table%add('velocity', sim%velocity, 'm/s', 'velocity of the road in the last step')
+      call table%add('drifted', sim%drifted, 'm', 'sum of the expected motions of the surface')
+      call table%add('moved_cells', sim%moved_cells, 'cells by which the pressure has been shifted')
+      call table%add('edge', sim%edge, 'worst that was found at the edge of a free map')
+      call table%add('stick_slip/reported', sim%watch%reported, 'stick-slip has been warned of')
+      call table%add('stick_slip/speed', sim%watch%speed, 'm/s', 'mean slip speed')
+      call table%add('stick_slip/change', sim%watch%change, 'm/s', 'its change in the last step')
+      call table%add('stick_slip/turns', sim%watch%turns, 'alternations of that change')
+      call table%add('passes/reported', sim%pass_watch%reported, &
+         'passes that do not settle have been warned of')
+      call table%add('passes/steps', sim%pass_watch%steps, 'steps whose passes did not settle')
+
+      call table%add('pressure', sim%pressure, 'Pa', 'normal traction on the rubber')
+      call table%add('gap', sim%gap, 'm', 'gap between rubber and road')
+      call table%add('displacement', sim%displacement, 'm', 'displacement of the rubber along z')
+      call table%add('dt_old', sim%material%dt_old, 's', 'length of the last step, 0 after a jump')
+      call list_books('books', sim%books, table)
+      call list_history('history', sim%history, table)
+      if (sim%frictional) call list_tangential(sim%tangential, table)
+   end subroutine list_state
+
+   !> Where the run stands in its phases.
+   subroutine list_schedule(sim, table)
+      type(simulation_type), intent(in), target :: sim
+      type(state_table_type), intent(inout) :: table
+
+      associate (s => sim%schedule)
+         call table%add('schedule/row', s%row, 'number of the last row')
+         call table%add('schedule/phase', s%phase, 'phase in hand')
+         call table%add('schedule/step', s%step, 'steps of the phase that are done')
+         call table%add('schedule/entered', s%entered, 'the first row of the phase is done')
+         call table%add('schedule/start_time', s%start_time, 's', 'start of the phase')
+         call table%add('schedule/start_load', s%start_load, '1', &
+            'load at the start of the phase, in the units of its control')
+         call table%add('schedule/start_x', s%start_x, 'm', 'road at the start of the phase')
+         call table%add('schedule/start_y', s%start_y, 'm', 'road at the start of the phase')
+         call table%add('schedule/held_control', s%held_control, 'what is held so far')
+         call table%add('schedule/held_load', s%held_load, '1', &
+            'load held so far, in the units of its control')
+         call table%add('schedule/velocity_x', s%velocity_x, 'm/s', 'velocity of the road so far')
+         call table%add('schedule/velocity_y', s%velocity_y, 'm/s', 'velocity of the road so far')
+      end associate
+   end subroutine list_schedule
+
+   !> The last row, by the names of its columns.
+   subroutine list_row(row, table)
+      real(dp), intent(in), target :: row(column_count)
+      type(state_table_type), intent(inout) :: table
+      type(column_type) :: columns(column_count)
+      integer :: i
+
+      columns = history_columns()
+      do i = 1, column_count
+         call table%add('row/'//trim(columns(i)%name), row(i), trim(columns(i)%units), &
+            trim(columns(i)%long_name))
+      end do
+   end subroutine list_row
+
+   !> Books of energy. The area of a cell belongs to the case.
+   subroutine list_books(prefix, books, table)
+      character(*), intent(in) :: prefix
+      type(energy_books_type), intent(in), target :: books
+      type(state_table_type), intent(inout) :: table
+
+      call table%add(prefix//'/stored', books%stored, 'J', 'elastic energy')
+      call table%add(prefix//'/work', books%work, 'J', 'work done by the traction')
+      call table%add(prefix//'/dissipated', books%dissipated, 'J', 'energy lost in the rubber')
+      call table%add(prefix//'/numerical', books%numerical, 'J', 'the part that the scheme lost')
+      call table%add(prefix//'/du_ds', books%du_ds, 'm3', 'dU.dS of the last step')
+      call table%add(prefix//'/arm', books%arm, 'Pa2 m3', 'products m_k.p_k of the arms')
+      call table%add(prefix//'/arm_du', books%arm_du, 'J', 'p_k.dU of the last step')
+   end subroutine list_books
+
+   !> The history of the arms.
+   subroutine list_history(prefix, history, table)
+      character(*), intent(in) :: prefix
+      type(history_type), intent(in), target :: history
+      type(state_table_type), intent(inout) :: table
+
+      call table%add(prefix//'/s', history%s, '1', 'S = P over a modulus')
+      call table%add(prefix//'/ds', history%ds, '1', 'S less that of the step before')
+      call table%add(prefix//'/arm', history%arm, 'Pa', 'tractions of the arms')
+   end subroutine list_history
+
    !> The tangential part of the state.
-   subroutine save_tangential(sim, writer, error)
-      type(simulation_type), intent(in) :: sim
-      type(checkpoint_writer_type), intent(inout) :: writer
-      type(error_type), allocatable, intent(out) :: error
+   subroutine list_tangential(t, table)
+      type(tangential_state_type), intent(in), target :: t
+      type(state_table_type), intent(inout) :: table
 
-      associate (t => sim%tangential)
-         call writer%put('tangential', [merge(1.0_dp, 0.0_dp, t%moved), t%speed, t%rate, t%work_mass, &
-            t%lost_mass, t%lost_friction, t%pace], '1', error)
-         if (allocated(error)) return
-         call writer%put('traction', t%traction, 'Pa', error)
-         if (allocated(error)) return
-         call writer%put('contact', real(t%contact, dp), '1', error)
-         if (allocated(error)) return
-         call writer%put('traction_before', t%before, 'Pa', error)
-         if (allocated(error)) return
-         call writer%put('displacement', t%displacement, 'm', error)
-         if (allocated(error)) return
-         call writer%put('tangential_books', books_values(t%books), 'J', error)
-         if (allocated(error) .or. is_elastic(sim%material)) return
-         call writer%put('tangential_s', t%history%s, 'Pa', error)
-         if (allocated(error)) return
-         if (size(t%history%ds) > 0) call writer%put('tangential_ds', t%history%ds, 'Pa', error)
-         if (allocated(error)) return
-         call writer%put('tangential_arm', t%history%arm, 'Pa', error)
-      end associate
-   end subroutine save_tangential
-
-   !> The same from a checkpoint.
-   subroutine load_tangential(sim, reader, error)
-      type(simulation_type), intent(inout) :: sim
-      type(checkpoint_reader_type), intent(inout) :: reader
-      type(error_type), allocatable, intent(out) :: error
-      real(dp) :: numbers(9)
-      real(dp), allocatable :: books(:), states(:, :)
-
-      associate (t => sim%tangential)
-         call reader%get('tangential', numbers, error)
-         if (allocated(error)) return
-         t%moved = numbers(1) > 0.5_dp
-         t%speed = numbers(2:3)
-         t%rate = numbers(4:5)
-         t%work_mass = numbers(6)
-         t%lost_mass = numbers(7)
-         t%lost_friction = numbers(8)
-         t%pace = numbers(9)
-         call reader%get('traction', t%traction, error)
-         if (allocated(error)) return
-         states = real(t%contact, dp)
-         call reader%get('contact', states, error)
-         if (allocated(error)) return
-         t%contact = nint(states, int8)
-         call reader%get('traction_before', t%before, error)
-         if (allocated(error)) return
-         call reader%get('displacement', t%displacement, error)
-         if (allocated(error)) return
-         allocate (books, source=books_values(t%books))
-         call reader%get('tangential_books', books, error)
-         if (allocated(error)) return
-         t%books = books_from_values(books)
-         if (is_elastic(sim%material)) return
-         call reader%get('tangential_s', t%history%s, error)
-         if (allocated(error)) return
-         if (size(t%history%ds) > 0) call reader%get('tangential_ds', t%history%ds, error)
-         if (allocated(error)) return
-         call reader%get('tangential_arm', t%history%arm, error)
-      end associate
-   end subroutine load_tangential
+      call table%add('tangential/moved', t%moved, 'the road has moved: friction acts')
+      call table%add('tangential/speed', t%speed, 'm/s', 'speed of the mass over the road')
+      call table%add('tangential/rate', t%rate, 'm/s', 'mean speed of the surface in the contact')
+      call table%add('tangential/pace', t%pace, 's', 'length of the last step, 0 after a jump')
+      call table%add('tangential/work_mass', t%work_mass, 'J', 'work done on the mass')
+      call table%add('tangential/lost_mass', t%lost_mass, 'J', 'energy that the mass lost')
+      call table%add('tangential/lost_friction', t%lost_friction, 'J', 'energy lost by friction')
+      call table%add('tangential/traction', t%traction, 'Pa', 'tangential traction')
+      call table%add('tangential/before', t%before, 'Pa', 'tangential traction of the step before')
+      call table%add('tangential/displacement', t%displacement, 'm', 'tangential displacement')
+      call table%add('tangential/contact', t%contact, '0 open, 1 stick, 2 slip')
+      call list_books('tangential/books', t%books, table)
+      call list_history('tangential/history', t%history, table)
+   end subroutine list_tangential
 
 end module simulation_state

@@ -9,7 +9,7 @@ module stick_slip_watch
    implicit none
    private
 
-   public :: stick_slip_watch_type, watch_from_values, watch_slip, watch_values
+   public :: stick_slip_watch_type, watch_slip
 
    integer, parameter :: turns_to_report = 6          !! alternations more than other steps
    real(dp), parameter :: large = 0.1_dp              !! a change that counts, of the road's speed
@@ -49,24 +49,5 @@ contains
          'passes (now '//to_text(passes)//'); if that does not end it, give the block the smallest '// &
          'density that does (now '//to_text(density)//' kg/m3)'
    end subroutine watch_slip
-
-   !> What has been seen so far as numbers, for a checkpoint.
-   pure function watch_values(self) result(values)
-      type(stick_slip_watch_type), intent(in) :: self
-      real(dp) :: values(4)
-
-      values = [merge(1.0_dp, 0.0_dp, self%reported), self%speed, self%change, real(self%turns, dp)]
-   end function watch_values
-
-   !> The way back.
-   pure function watch_from_values(values) result(self)
-      real(dp), intent(in) :: values(4)
-      type(stick_slip_watch_type) :: self
-
-      self%reported = values(1) > 0.5_dp
-      self%speed = values(2)
-      self%change = values(3)
-      self%turns = nint(values(4))
-   end function watch_from_values
 
 end module stick_slip_watch

@@ -9,9 +9,10 @@
 !> Memory: the height, and one field more while a file is read or a random surface made.
 module surface
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
+   use checksum, only : checksum_of_field
    use errors, only : add_fault, error_input, error_type, fail
    use hdf5_file, only : read_field
-   use precision, only : dp, pi
+   use precision, only : dp, int64, pi
    use regular_grid, only : boundary_periodic, grid_type
    use surface_self_affine, only : add_self_affine
    use surface_settings, only : surface_settings_type
@@ -27,13 +28,17 @@ module surface
 contains
 
    !> The height of the road on every cell: the sum of all terms.
-   subroutine new_height(grid, terms, height, error)
+   subroutine new_height(grid, terms, height, error, map_checksums)
       type(grid_type), intent(in) :: grid
       type(surface_settings_type), intent(in) :: terms(:)          !! none: flat
       real(dp), allocatable, intent(out) :: height(:, :)           !! m, shape [nx, ny]
       type(error_type), allocatable, intent(out) :: error
+      !> Checksums of the maps that are read from files, by the number of the term; 0 for other terms
+      integer(int64), allocatable, intent(out), optional :: map_checksums(:)
+      integer(int64) :: map_checksum
       integer :: i, j, n
 
+      if (present(map_checksums)) allocate (map_checksums(size(terms)), source=0_int64)
       call check_terms(terms, error)
       if (allocated(error)) return
       allocate (height(grid%nx, grid%ny))
@@ -50,7 +55,8 @@ contains
          case ('self_affine')
             call add_self_affine(grid, terms(n), height, error)
          case ('file')
-            call add_file(grid, terms(n), height, error)
+            call add_file(grid, terms(n), height, map_checksum, error)
+            if (present(map_checksums)) map_checksums(n) = map_checksum
          case default
             call add_analytic(grid, terms(n), height)
          end select
@@ -178,16 +184,19 @@ contains
    end function known_shapes
 
    !> Add a height map from a file, times its scale.
-   subroutine add_file(grid, term, height, error)
+   subroutine add_file(grid, term, height, map_checksum, error)
       type(grid_type), intent(in) :: grid
       type(surface_settings_type), intent(in) :: term         !! checked
       real(dp), intent(inout) :: height(:, :)
+      integer(int64), intent(out) :: map_checksum             !! of the map as it is in the file
       type(error_type), allocatable, intent(out) :: error
       real(dp), allocatable :: map(:, :)
       integer :: i, j
 
+      map_checksum = 0_int64
       call read_map(grid, term, map, error)
       if (allocated(error)) return
+      map_checksum = checksum_of_field(map)
       !$omp parallel do default(none) shared(grid, height, map, term) private(i)
       do j = 1, grid%ny
          do i = 1, grid%nx
