@@ -74,17 +74,23 @@ def test_direction_of_the_road(frictional):
     assert direction(run, 5) == pytest.approx((0.0, -1.0))
 
 
-def test_friction_of_the_pressure_is_the_program_s(program, tmp_path):
+@pytest.mark.filterwarnings("ignore:.*edge of the free map")
+@pytest.mark.parametrize(("boundary", "interpolation"), [
+    ("periodic", "cubic"), ("periodic", "linear"), ("free", "cubic"), ("free", "linear")])
+def test_friction_of_the_pressure_is_the_program_s(program, tmp_path, boundary, interpolation):
     """Without friction the whole of it lies where the slopes of the moved road say, obliquely."""
-    (tmp_path / "case.nml").write_text("""
-&grid nx = 48, ny = 33, lx = 1e-3, ly = 0.6e-3 /
+    shape = "" if boundary == "periodic" else "&surface shape = 'sphere', radius = 4e-3 /"
+    load = "pressure = 0.1e6" if boundary == "periodic" else "force = 0.02"
+    (tmp_path / "case.nml").write_text(f"""
+&grid nx = 48, ny = 33, lx = 1e-3, ly = 0.6e-3, boundary = '{boundary}' /
 &surface shape = 'self_affine', hurst = 0.8, rms_slope = 0.2, wavelength_long = 0.4e-3,
          wavelength_short = 0.17e-3 /
+{shape}
 &material shear_modulus = 1e6, prony_g = 2e6, prony_tau = 1e-4 /
 &adhesion potential = 'exponential', energy = 0.05, range = 5e-6 /
-&phase pressure = 0.1e6, relaxed = .true. /
+&phase {load}, relaxed = .true. /
 &phase duration = 0.1e-3, steps = 8, velocity_x = 1.0, velocity_y = 0.37 /
-&solver tolerance = 1e-5 /
+&solver tolerance = 1e-5, interpolation = '{interpolation}' /
 &output snapshot_every = 4 /
 """)
     run = asperity.run(tmp_path / "case.nml")

@@ -66,7 +66,7 @@ module case_settings
       character(word_length) :: time_scheme         !! 'exponential2' | 'exponential' | 'backward_euler'
       integer :: passes
       character(word_length) :: slip_law            !! 'physical' | 'thesis'
-      character(word_length) :: interpolation       !! 'linear' | 'cubic'
+      character(word_length) :: interpolation       !! 'cubic' | 'linear'
       character(word_length) :: precision           !! 'double' | 'mixed'
       integer :: threads                            !! 0: all processors
    end type solver_settings_type

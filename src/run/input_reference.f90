@@ -232,8 +232,10 @@ contains
             'Most outer passes of a step with friction.'), &
          row('solver', 'slip_law', kind_word, '''physical''', '', '''physical'' | ''thesis''', &
             'Direction of slip on slopes.'), &
-         row('solver', 'interpolation', kind_word, '''linear''', '', '''linear'' | ''cubic''', &
-            'Of the road between cells.'), &
+         row('solver', 'interpolation', kind_word, '''cubic''', '', '''cubic'' | ''linear''', &
+            'How heights and slopes of a road that slides are read from its cells: by the cubic spline '// &
+            'and its own slopes, or bilinearly with central differences. The second suits maps with '// &
+            'jumps, which a spline overshoots between cells.'), &
          row('solver', 'precision', kind_word, '''double''', '', '''double'' | ''mixed''', &
             '''mixed'': contact without adhesion takes its steps with transforms in single precision '// &
             'and checks them in double, to the same tolerance; adhesion and friction stay double. '// &

@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from .run import Run
     from .snapshot import Snapshot
 
-__all__ = ["closure", "energy_terms", "friction_outside", "has_adhesion", "has_friction",
-           "has_rough_road", "is_elastic", "moved_slopes", "rms_slope", "road_slopes", "road_speed",
-           "setting", "solver_setting", "travel"]
+__all__ = ["RoadSlopes", "closure", "energy_terms", "friction_outside", "has_adhesion",
+           "has_friction", "has_rough_road", "is_elastic", "moved_slopes", "rms_slope",
+           "road_speed", "setting", "solver_setting", "travel"]
 
 FloatArray = NDArray[np.float64]
 
@@ -159,26 +159,125 @@ def direction(run: Run, row: int) -> tuple[float, float] | None:
     return None
 
 
-def road_slopes(run: Run) -> list[FloatArray]:
-    """Return dH/dx and dH/dy of the road at its cells, by central differences."""
-    grid, height = run.grid, run.height
-    slopes = []
-    for axis, spacing in ((1, grid.dx), (0, grid.dy)):
-        if height.shape[axis] < 2:
-            slopes.append(np.zeros_like(height))
-        elif grid.boundary == "periodic":
-            slopes.append((np.roll(height, -1, axis) - np.roll(height, 1, axis)) / (2 * spacing))
+def spline_coefficients(height: FloatArray, axis: int, periodic: bool) -> FloatArray:
+    """Return the coefficients of the cubic B-splines through a map, along one axis.
+
+    On a bounded map the second derivatives at the ends come from one-sided differences, as in the
+    program (Fortran module `cubic_spline`).
+
+    Parameters
+    ----------
+    height : ndarray
+        The map, or the coefficients along the other axis.
+    axis : int
+        Axis along which the coefficients are found.
+    periodic : bool
+        Whether the map wraps.
+
+    Returns
+    -------
+    ndarray
+        One coefficient before the first cell and two behind the last one more than the map.
+    """
+    from scipy.linalg import solve_banded
+    from scipy.ndimage import spline_filter1d
+
+    lines = np.moveaxis(height, axis, 0)
+    n = len(lines)
+    if n == 1:
+        inner = lines[[0, 0, 0, 0]]
+    elif periodic:
+        inner = spline_filter1d(lines, order=3, axis=0, mode="grid-wrap")
+        inner = inner[np.arange(-1, n + 2) % n]
+    else:
+        rule = {2: [0.0, 0.0], 3: [1.0, -2.0, 1.0]}.get(n, [2.0, -5.0, 4.0, -1.0])
+        bends = [np.tensordot(rule, part[:len(rule)], 1) for part in (lines, lines[::-1])]
+        right = 6.0 * lines
+        right[0], right[-1] = 6.0 * lines[0] - bends[0], 6.0 * lines[-1] - bends[1]
+        bands = np.ones((3, n))
+        bands[1] = 4.0
+        bands[1, [0, -1]] = 6.0
+        bands[0, 1] = bands[2, -2] = 0.0
+        inner = solve_banded((1, 1), bands, right.reshape(n, -1)).reshape(lines.shape)
+        ends = [2.0 * inner[0] - inner[1] + bends[0], 2.0 * inner[-1] - inner[-2] + bends[1]]
+        inner = np.concatenate([ends[:1], inner, [ends[1], ends[1]]])
+    return np.moveaxis(inner, 0, axis)
+
+
+class RoadSlopes:
+    """The slopes of the road of a run, as its `interpolation` takes them.
+
+    Parameters
+    ----------
+    run : Run
+        A result with the height of its road.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self.grid, self.height = run.grid, run.height
+        self.periodic = self.grid.boundary == "periodic"
+        # A file that does not tell comes from before cubic splines became the default.
+        self.cubic = (setting(run, "solver", "interpolation") or "linear") == "cubic"
+        if self.cubic:
+            along_y = spline_coefficients(self.height, 0, self.periodic)
+            self.coefficients = spline_coefficients(along_y, 1, self.periodic)
         else:
-            slopes.append(np.gradient(height, spacing, axis=axis))
-    return slopes
+            self.central = [self.differences(1, self.grid.dx), self.differences(0, self.grid.dy)]
+
+    def differences(self, axis: int, spacing: float) -> FloatArray:
+        """Return central differences, one-sided ones on the rim of a free map."""
+        height = self.height
+        if height.shape[axis] < 2:
+            return np.zeros_like(height)
+        if self.periodic:
+            return (np.roll(height, -1, axis) - np.roll(height, 1, axis)) / (2 * spacing)
+        return np.gradient(height, spacing, axis=axis)
+
+    def at(self, y: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return dH/dx and dH/dy at places in cells; 0 more than one cell outside a free map."""
+        from scipy.ndimage import map_coordinates
+
+        if not self.cubic:
+            mode = "grid-wrap" if self.periodic else "grid-constant"
+            along_x, along_y = (map_coordinates(slope, [y, x], order=1, mode=mode)
+                                for slope in self.central)
+            return along_x, along_y
+        inside = np.ones_like(x)
+        places = []
+        for place, n in ((y, self.height.shape[0]), (x, self.height.shape[1])):
+            if self.periodic:
+                places.append(place % n)
+            else:
+                within = np.clip(place, 0.0, n - 1.0)
+                inside = inside * np.maximum(0.0, 1.0 - np.abs(place - within))
+                places.append(within)
+        cells = [np.minimum(np.floor(place).astype(int), n - 1)
+                 for place, n in zip(places, self.height.shape, strict=True)]
+        weights_y, slopes_y = spline_weights(places[0] - cells[0])
+        weights_x, slopes_x = spline_weights(places[1] - cells[1])
+        along_x, along_y = np.zeros_like(x), np.zeros_like(x)
+        for m in range(4):
+            for k in range(4):
+                value = inside * self.coefficients[cells[0] + m, cells[1] + k]
+                along_x += weights_y[m] * slopes_x[k] * value / self.grid.dx
+                along_y += slopes_y[m] * weights_x[k] * value / self.grid.dy
+        return along_x, along_y
+
+
+def spline_weights(u: FloatArray) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Return the four cubic B-splines about a point at `u`, 0 to 1, of a cell, and their slopes."""
+    w = 1.0 - u
+    weights = [w**3 / 6, (4 - 6 * u**2 + 3 * u**3) / 6, (4 - 6 * w**2 + 3 * w**3) / 6, u**3 / 6]
+    slopes = [-w**2 / 2, 1.5 * u**2 - 2 * u, 2 * w - 1.5 * w**2, u**2 / 2]
+    return weights, slopes
 
 
 def moved_slopes(snapshot: Snapshot, road: tuple[float, float],
-                 slopes: list[FloatArray] | None = None) -> tuple[FloatArray, FloatArray]:
+                 slopes: RoadSlopes | None = None) -> tuple[FloatArray, FloatArray]:
     """Return the slopes of the road under the points of the rubber, as the program takes them.
 
-    Central differences of the height, interpolated between cells where the road has moved to,
-    seen from the displaced rubber.
+    They are those of the cubic spline through the map (or bilinear between central differences,
+    with `interpolation = 'linear'`) where the road has moved to, seen from the displaced rubber.
 
     Parameters
     ----------
@@ -186,27 +285,23 @@ def moved_slopes(snapshot: Snapshot, road: tuple[float, float],
         Its displacements along x and y are used where it has them.
     road : tuple of float
         How far the road has moved along x and y, m.
-    slopes : list of ndarray, optional
-        Those of `road_slopes`, where many snapshots are looked at.
+    slopes : RoadSlopes, optional
+        That of the run, where many snapshots are looked at.
 
     Returns
     -------
     tuple of ndarray
         dH/dx and dH/dy, shape (ny, nx).
     """
-    from scipy.ndimage import map_coordinates
-
     grid = snapshot.run.grid
-    slopes = road_slopes(snapshot.run) if slopes is None else slopes
-    at = list(np.indices(slopes[0].shape).astype(float))
+    slopes = RoadSlopes(snapshot.run) if slopes is None else slopes
+    at = list(np.indices(snapshot.run.height.shape).astype(float))
     for axis, (name, spacing, moved) in enumerate((("displacement_y", grid.dy, road[1]),
                                                    ("displacement_x", grid.dx, road[0]))):
         at[axis] -= moved / spacing
         if name in snapshot:
             at[axis] += snapshot[name] / spacing
-    mode = "grid-wrap" if grid.boundary == "periodic" else "constant"
-    along_x, along_y = (map_coordinates(slope, at, order=1, mode=mode) for slope in slopes)
-    return along_x, along_y
+    return slopes.at(*at)
 
 
 def friction_outside(run: Run) -> tuple[FloatArray, FloatArray]:
@@ -239,7 +334,7 @@ def friction_outside(run: Run) -> tuple[FloatArray, FloatArray]:
         pressure = snapshot["pressure"]
         if along is None or pressure.mean() == 0.0:
             continue
-        slopes = road_slopes(run) if slopes is None else slopes
+        slopes = RoadSlopes(run) if slopes is None else slopes
         slope_x, slope_y = moved_slopes(snapshot, (float(run.history["road_x"][row]),
                                                    float(run.history["road_y"][row])), slopes)
         slope = along[0] * slope_x + along[1] * slope_y
