@@ -84,7 +84,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
         "curve_friction": {gamma: item.friction for gamma, item in curve.items()},
         "curve_area": curve[1.0].contact_area}
     # full contact, where the theory is exact for the spectrum of the very map
-    smooth = Road(64, SIDE, HURST, (4, 8), SLOPE)
+    smooth = Road(128, SIDE, HURST, (4, 8), SLOPE)
     high = 200e6
     spectrum = theory.surface_psd(smooth.map(1), SIDE)
     expected = theory.persson(*spectrum, compound(), high, 10.0, gamma=GAMMA)
@@ -115,10 +115,12 @@ def check(data: dict[str, Any], quick: bool) -> None:
             assert (area > wide["areas"][number - 1]).all(), "more scales, more contact"
     assert (wide["uncorrected"] > wide["cuts"][0]).all(), "the factor S is not below 1"
     # The steady theory is exact in full contact. Eight cells in the shortest wave cost 1.3 % of the
-    # friction, 16 cells 0.6 %, 32 cells 0.4 %; the rest are the few directions of the waves.
+    # The steady theory is exact in full contact. With eight cells in the shortest wave the friction
+    # is 2.9 % too high, because a step of one cell is then long for the arms that relax within it;
+    # with 16 cells 0.4 %, with 32 -0.2 %, which are the few directions of the waves.
     found, expected = data["full"]["found"], data["full"]["theory"]
     assert found[1] == 1.0, f"contact {found[1]}, not full"
-    assert abs(found[0] / expected[0] - 1) < 0.02, f"full contact: {found[0]} for {expected[0]}"
+    assert abs(found[0] / expected[0] - 1) < 0.01, f"full contact: {found[0]} for {expected[0]}"
     # Partial contact: the theory is an estimate. At low load its slope is sqrt(8/pi), that of
     # asperities that do not interact sqrt(2 pi), 57 % more: runs lie between. Eight cells in the
     # shortest wave add 5 % (docs/choosing.md), more where a spot is but a few cells.
