@@ -1,0 +1,206 @@
+!> Anderson acceleration of a fixed-point iteration x = g(x) for fields (Anderson 1965; type II).
+!>
+!> With the residual f = g(x) - x and the differences df_i, dg_i of f and of g(x) between successive
+!> iterates, the next iterate is
+!>
+!>     g(x) - sum gamma_i dg_i,   gamma minimises |f - sum gamma_i df_i|
+!>
+!> For linear g this is GMRES in another form. It may overshoot where g has kinks: the caller decides
+!> when to accelerate, and calls `forget` where the old differences no longer apply.
+!>
+!> A state has one or more components, each with a weight in the norm; a component of weight zero is
+!> carried along by the same gamma. The least squares problem is solved by its normal equations on
+!> columns of unit length, newest column first; a column that depends on newer ones to single precision
+!> is left out. Sums are added row by row in a fixed order: results do not depend on the threads.
+!>
+!> Memory: for each pair two fields of single precision a component, which is enough because the
+!> residual itself is never taken from them; and two fields of doubles a component.
+module anderson
+   use parallel, only : global_sum, thread_count
+   use precision, only : dp, sp
+   implicit none
+   private
+
+   public :: anderson_type, new_anderson
+
+   real(dp), parameter :: dependent = 1.0e-12_dp     !! squared length of what a column adds
+
+   !> The last differences. Plain data; may be kept from solve to solve.
+   type :: anderson_type
+      integer :: nx = 0, components = 0, ny = 0
+      integer :: pairs = 0                           !! that are kept at most
+      integer :: used = 0                            !! pairs there are
+      integer, private :: newest = 0
+      integer, private :: threads = 1
+      logical, private :: begun = .false.            !! there is a last iterate
+      real(dp), allocatable, private :: gram(:, :)   !! df_i.df_j
+      real(sp), allocatable, private :: df(:, :, :, :)   !! [nx, components, ny, pairs]
+      real(sp), allocatable, private :: dg(:, :, :, :)
+      real(dp), allocatable, private :: last_f(:, :, :), last_g(:, :, :)
+   contains
+      procedure :: forget
+      procedure :: step
+   end type anderson_type
+
+contains
+
+   !> Make room for a number of pairs.
+   subroutine new_anderson(self, nx, components, ny, pairs)
+      type(anderson_type), intent(out) :: self
+      integer, intent(in) :: nx, components, ny
+      integer, intent(in) :: pairs
+
+      self%nx = nx
+      self%components = components
+      self%ny = ny
+      self%pairs = pairs
+      self%threads = merge(1, thread_count(), nx*ny < 16384)
+      allocate (self%gram(pairs, pairs), source=0.0_dp)
+      allocate (self%df(nx, components, ny, pairs), self%dg(nx, components, ny, pairs))
+      allocate (self%last_f(nx, components, ny), self%last_g(nx, components, ny))
+   end subroutine new_anderson
+
+   !> Begin anew: what was learnt does not apply any more.
+   pure subroutine forget(self)
+      class(anderson_type), intent(inout) :: self
+
+      self%used = 0
+      self%newest = 0
+      self%begun = .false.
+   end subroutine forget
+
+   !> The next iterate from x and its residual; `plain` takes g(x) itself but learns all the same.
+   subroutine step(self, weights, f, x, plain)
+      class(anderson_type), intent(inout) :: self
+      real(dp), intent(in) :: weights(self%components)              !! of the components in the norm
+      real(dp), intent(in) :: f(self%nx, self%components, self%ny)  !! g(x) - x
+      real(dp), intent(inout) :: x(self%nx, self%components, self%ny)   !! in: x; out: the next
+      logical, intent(in) :: plain
+      real(dp), allocatable :: gamma(:)
+      integer :: j
+
+      allocate (gamma(self%pairs), source=0.0_dp)
+      call learn(self, weights, f, x, gamma)
+      if (plain) gamma = 0.0_dp
+      !$omp parallel do default(none) shared(self, f, x, gamma) private(j) num_threads(self%threads)
+      do j = 1, self%ny
+         call combine_row(self, gamma, j, f(:, :, j), x(:, :, j))
+      end do
+   end subroutine step
+
+   !> A row of the next iterate.
+   subroutine combine_row(self, gamma, j, f, x)
+      class(anderson_type), intent(inout) :: self
+      real(dp), intent(in) :: gamma(:)
+      integer, intent(in) :: j
+      real(dp), intent(in) :: f(self%nx, self%components)
+      real(dp), intent(inout) :: x(self%nx, self%components)
+      integer :: k
+
+      self%last_f(:, :, j) = f
+      x = x + f
+      self%last_g(:, :, j) = x
+      do k = 1, self%used
+         if (abs(gamma(k)) > 0.0_dp) x = x - gamma(k)*self%dg(:, :, j, k)
+      end do
+   end subroutine combine_row
+
+   !> Take in the newest pair, and find gamma.
+   subroutine learn(self, weights, f, x, gamma)
+      class(anderson_type), intent(inout) :: self
+      real(dp), intent(in) :: weights(self%components)
+      real(dp), intent(in) :: f(self%nx, self%components, self%ny)
+      real(dp), intent(in) :: x(self%nx, self%components, self%ny)
+      real(dp), intent(inout) :: gamma(:)
+      real(dp), allocatable :: rows(:, :), sums(:)
+      integer :: j, k
+
+      if (.not. self%begun) then
+         self%begun = .true.
+         return
+      end if
+      self%newest = mod(self%newest, self%pairs) + 1
+      self%used = min(self%used + 1, self%pairs)
+      allocate (rows(2*self%pairs, self%ny), sums(2*self%pairs))
+      !$omp parallel do default(none) shared(self, weights, f, x, rows) private(j) &
+      !$omp num_threads(self%threads)
+      do j = 1, self%ny
+         call learn_row(self, weights, j, f(:, :, j), x(:, :, j), rows(:, j))
+      end do
+      sums = 0.0_dp
+      do j = 1, self%ny
+         sums = sums + rows(:, j)
+      end do
+      sums = global_sum(sums)
+      do k = 1, self%used
+         self%gram(k, self%newest) = sums(k)
+         self%gram(self%newest, k) = sums(k)
+      end do
+      call solve_gram(self, sums(self%pairs + 1:), gamma)
+   end subroutine learn
+
+   !> A row of the newest pair, and its products: df.df_k, then f.df_k.
+   subroutine learn_row(self, weights, j, f, x, sums)
+      class(anderson_type), intent(inout) :: self
+      real(dp), intent(in) :: weights(self%components)
+      integer, intent(in) :: j
+      real(dp), intent(in) :: f(self%nx, self%components)
+      real(dp), intent(in) :: x(self%nx, self%components)
+      real(dp), intent(out) :: sums(2*self%pairs)
+      real(dp) :: a, b, w
+      integer :: c, i, k, n
+
+      n = self%newest
+      sums = 0.0_dp
+      do c = 1, self%components
+         self%df(:, c, j, n) = real(f(:, c) - self%last_f(:, c, j), sp)
+         self%dg(:, c, j, n) = real((x(:, c) + f(:, c)) - self%last_g(:, c, j), sp)
+         w = weights(c)**2
+         if (w <= 0.0_dp) cycle
+         do k = 1, self%used
+            a = 0.0_dp
+            b = 0.0_dp
+            !$omp simd reduction(+:a, b)
+            do i = 1, self%nx
+               a = a + real(self%df(i, c, j, n), dp)*self%df(i, c, j, k)
+               b = b + f(i, c)*self%df(i, c, j, k)
+            end do
+            sums(k) = sums(k) + w*a
+            sums(self%pairs + k) = sums(self%pairs + k) + w*b
+         end do
+      end do
+   end subroutine learn_row
+
+   !> Minimise |f - sum gamma_i df_i|: Cholesky factors of the Gram matrix of unit columns.
+   subroutine solve_gram(self, projections, gamma)
+      class(anderson_type), intent(in) :: self
+      real(dp), intent(in) :: projections(:)         !! f.df_k
+      real(dp), intent(inout) :: gamma(:)
+      real(dp) :: factor(self%pairs, self%pairs), rhs(self%pairs), length(self%pairs), pivot
+      integer :: order(self%pairs)
+      integer :: a, b, i, kept
+
+      kept = 0
+      do i = 0, self%used - 1
+         a = modulo(self%newest - 1 - i, self%pairs) + 1
+         if (self%gram(a, a) <= 0.0_dp) cycle
+         length(kept + 1) = sqrt(self%gram(a, a))
+         do b = 1, kept
+            factor(kept + 1, b) = (self%gram(a, order(b))/(length(kept + 1)*length(b)) &
+               - dot_product(factor(kept + 1, :b - 1), factor(b, :b - 1)))/factor(b, b)
+         end do
+         pivot = 1.0_dp - sum(factor(kept + 1, :kept)**2)
+         if (pivot <= dependent) cycle
+         kept = kept + 1
+         order(kept) = a
+         factor(kept, kept) = sqrt(pivot)
+         rhs(kept) = (projections(a)/length(kept) &
+            - dot_product(factor(kept, :kept - 1), rhs(:kept - 1)))/factor(kept, kept)
+      end do
+      do i = kept, 1, -1
+         rhs(i) = (rhs(i) - dot_product(factor(i + 1:kept, i), rhs(i + 1:kept)))/factor(i, i)
+         gamma(order(i)) = rhs(i)/length(i)
+      end do
+   end subroutine solve_gram
+
+end module anderson

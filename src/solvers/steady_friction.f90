@@ -1,0 +1,369 @@
+!> Steady sliding with friction: pressure, traction and the road under the displaced rubber at once.
+!>
+!> Unknown are the state z of the normal solver (module steady_normal), the displacement u with which
+!> the road is read, and the slip r = e + du/ds. One round of the iteration is
+!>
+!>     P = pressure of z;   T = bound(P (T/P) + c_t r)                      (module steady_bound)
+!>     u' = A_T T - offset;   r' = e + d(A_T T)/ds                          six transforms
+!>     u+ = u + beta (u' - u);   read the road at x + u+: H, grad H
+!>     z+ = some plain steps of the normal solver under H                   two transforms each
+!>
+!> The offset is the mean of A_T T weighted by P: the road is read relative to the mean displacement of
+!> the contact, so that the contact stays where it is on the grid. What is left out, `offset`, is how
+!> much further the road stands. With slope, T holds -P grad H, which makes the passes over u return with
+!> a factor of -(1..2) |grad H|^2: hence the relaxation by beta. Near the solution Anderson acceleration
+!> of (z, u) finishes; r is carried along. From the start it diverges.
+!>
+!> Converged means: the duality gap of P under the road at x + u, u = A_T T of the traction handed out,
+!> and |bound(T + c_t r) - T|/|T|, all recomputed, are below the tolerance.
+!>
+!> Memory beside the caller's: 16 fields, 50 for the acceleration in single precision, and 10 of doubles.
+module steady_friction
+   use anderson, only : anderson_type, new_anderson
+   use friction_law, only : friction_law_type
+   use interpolation, only : displaced, interpolation_type
+   use normal_state, only : gap_measure_type, measure_gap, normal_problem_type, prepare_problem, &
+      reason_converged, reason_iterations
+   use parallel, only : global_sum
+   use precision, only : dp, int64
+   use projection, only : project_simplex
+   use regular_grid, only : grid_type
+   use solver_result, only : solver_result_type
+   use steady_bound, only : bound_tractions, compare_tractions, largest_force
+   use steady_normal, only : mean_of, new_steady_normal, steady_measure_type, steady_normal_type
+   use steady_operator, only : steady_operator_type
+   implicit none
+   private
+
+   public :: new_steady_friction, steady_contact_type, steady_friction_type
+
+   integer, parameter :: pairs = 10              !! of the acceleration
+   integer, parameter :: components = 5          !! of a state: z, u, r
+
+   !> A steady contact with friction.
+   type :: steady_contact_type
+      real(dp), allocatable :: pressure(:, :)          !! P, Pa
+      real(dp), allocatable :: gap(:, :)               !! m
+      real(dp), allocatable :: height(:, :)            !! H of the road at x + u, m
+      real(dp), allocatable :: slope_x(:, :), slope_y(:, :)   !! grad H there
+      real(dp), allocatable :: traction(:, :, :)       !! T, Pa [nx, 2, ny]
+      real(dp), allocatable :: displacement(:, :, :)   !! A_T T without its mean mode, m [nx, 2, ny]
+      real(dp), allocatable :: slip(:, :, :)           !! r, the slip speed over the road's speed
+      real(dp) :: level = 0.0_dp                       !! U - H where the gap is zero, m
+      real(dp) :: offset(2) = 0.0_dp                   !! mean displacement of the contact, m
+   end type steady_contact_type
+
+   !> How the rounds go: what is relaxed by how much, and whether they are accelerated.
+   type :: pace_type
+      real(dp) :: beta = 0.5_dp                  !! part of a change of u that is taken
+      integer :: inner = 4                       !! normal steps in a round
+      logical :: accelerated = .false.
+      real(dp) :: near = 0.03_dp                 !! change below which rounds are accelerated
+      real(dp) :: least = huge(1.0_dp)           !! change so far, while accelerated
+      real(dp) :: marked = huge(1.0_dp)          !! change some rounds ago
+      integer :: since = 0                       !! rounds since then
+      real(dp) :: weights(components) = 0.0_dp
+      real(dp) :: accepted = 0.0_dp              !! change below which a solution is checked
+   end type pace_type
+
+   !> Work fields. Not to be copied.
+   type :: steady_friction_type
+      type(grid_type) :: grid
+      type(friction_law_type) :: law
+      type(steady_normal_type) :: normal
+      real(dp) :: direction(2) = 0.0_dp                !! e
+      real(dp) :: base(2) = 0.0_dp                     !! displacement of the road, m
+      real(dp) :: c = 0.0_dp                           !! c_t, Pa
+      real(dp), allocatable, private :: state(:, :, :)     !! z, u, r [nx, 5, ny]
+      real(dp), allocatable, private :: residual(:, :, :)
+      real(dp), allocatable, private :: ratio(:, :, :)     !! T/P [nx, 2, ny]
+      real(dp), allocatable, private :: place(:, :, :)     !! u+, m [nx, 2, ny]
+      type(anderson_type), private :: memory
+   contains
+      procedure :: solve
+   end type steady_friction_type
+
+contains
+
+   !> Make room.
+   subroutine new_steady_friction(self, grid, law)
+      type(steady_friction_type), intent(out) :: self
+      type(grid_type), intent(in) :: grid
+      type(friction_law_type), intent(in) :: law
+
+      self%grid = grid
+      self%law = law
+      call new_steady_normal(self%normal, grid)
+      allocate (self%state(grid%nx, components, grid%ny), self%residual(grid%nx, components, grid%ny), &
+         self%ratio(grid%nx, 2, grid%ny), self%place(grid%nx, 2, grid%ny), source=0.0_dp)
+      call new_anderson(self%memory, grid%nx, components, grid%ny, pairs)
+   end subroutine new_steady_friction
+
+   !> Solve for the steady state over a road. Not converging is an outcome.
+   subroutine solve(self, operator, problem, road, contact, normal, rubbing)
+      class(steady_friction_type), intent(inout) :: self
+      type(steady_operator_type), intent(inout) :: operator    !! with its symbols set
+      type(normal_problem_type), intent(in) :: problem         !! warm: pressure, gap, traction are a start
+      type(interpolation_type), intent(in) :: road
+      type(steady_contact_type), intent(inout) :: contact
+      type(solver_result_type), intent(out) :: normal          !! iterations, error of the pressure
+      type(solver_result_type), intent(out) :: rubbing         !! rounds, error of the traction
+      type(normal_problem_type) :: task
+      type(steady_measure_type) :: measure
+      type(pace_type) :: pace
+      real(dp) :: change
+      integer(int64) :: before
+      logical :: determined
+
+      before = operator%ffts
+      call prepare_problem(problem, self%grid, operator%threads, contact%height, task, determined)
+      call begin(self, operator, task, contact, normal)
+      pace%accepted = task%tolerance
+      normal%reason = reason_iterations
+      rubbing%reason = reason_iterations
+      do
+         call round(self, operator, task, road, pace, contact, measure, change)
+         rubbing%iterations = rubbing%iterations + 1
+         normal%iterations = normal%iterations + pace%inner
+         if (max(change, measure%change/measure%size) <= pace%accepted .and. &
+            measure%error <= task%tolerance) then
+            call finish(self, operator, task, road, contact, normal, rubbing)
+            if (normal%converged .and. rubbing%converged) exit
+            pace%accepted = 0.5_dp*pace%accepted
+         end if
+         if (rubbing%iterations >= task%max_iterations) then
+            call finish(self, operator, task, road, contact, normal, rubbing)
+            exit
+         end if
+         call advance(self, operator, task, pace, rubbing%iterations, &
+            max(change, measure%change/measure%size), measure)
+      end do
+      normal%ffts = operator%ffts - before
+   end subroutine solve
+
+   !> The first state: that handed in, or the frictionless one.
+   subroutine begin(self, operator, task, contact, normal)
+      class(steady_friction_type), intent(inout) :: self
+      type(steady_operator_type), intent(inout) :: operator
+      type(normal_problem_type), intent(in) :: task
+      type(steady_contact_type), intent(inout) :: contact
+      type(solver_result_type), intent(out) :: normal
+      type(normal_problem_type) :: rough
+      integer :: c
+
+      call self%memory%forget()
+      if (task%warm) then
+         call self%normal%start(operator, task, contact%height, contact%pressure, contact%gap)
+         call operator%shear(contact%traction, contact%displacement, contact%slip)
+         call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio, operator%threads)
+      else
+         rough = task
+         rough%tolerance = max(task%tolerance, 1e-2_dp)
+         call self%normal%solve(operator, rough, contact%height, contact%pressure, contact%gap, &
+            contact%level, normal)
+         contact%displacement = 0.0_dp
+         contact%slip = 0.0_dp
+         do c = 1, 2
+            self%ratio(:, c, :) = largest_force(self%law, 1.0_dp)*self%direction(c)
+         end do
+      end if
+      contact%offset = contact_mean(contact)
+      self%state(:, 1, :) = self%normal%z
+      do c = 1, 2
+         self%state(:, 1 + c, :) = contact%displacement(:, c, :) - contact%offset(c)
+         self%state(:, 3 + c, :) = self%direction(c) + contact%slip(:, c, :)
+      end do
+      self%c = 5.0_dp*largest_force(self%law, sum(contact%pressure)/max(count(contact%pressure > 0.0_dp), 1))
+   end subroutine begin
+
+   !> One round: from the state to its residual. The contact takes P, T, A_T T and the road at u+.
+   subroutine round(self, operator, task, road, pace, contact, measure, change)
+      class(steady_friction_type), intent(inout) :: self
+      type(steady_operator_type), intent(inout) :: operator
+      type(normal_problem_type), intent(in) :: task
+      type(interpolation_type), intent(in) :: road
+      type(pace_type), intent(in) :: pace
+      type(steady_contact_type), intent(inout) :: contact
+      type(steady_measure_type), intent(out) :: measure    !! of the last normal step
+      real(dp), intent(out) :: change                      !! |u' - u|/|u'|
+      real(dp) :: mean
+      integer :: c, j, k
+
+      contact%pressure(:, :) = self%state(:, 1, :)
+      call project_simplex(contact%pressure, task%target*size(contact%pressure))
+      call bound_tractions(self%law, self%c, contact%pressure, contact%slope_x, contact%slope_y, &
+         self%ratio, self%state(:, 4:5, :), contact%traction, operator%threads)
+      call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio, operator%threads)
+      call operator%shear(contact%traction, contact%displacement, contact%slip)
+      contact%offset = contact_mean(contact)
+      do c = 1, 2
+         !$omp parallel do default(none) shared(self, contact, pace, c) private(j)
+         do j = 1, self%grid%ny
+            self%residual(:, 1 + c, j) = pace%beta*(contact%displacement(:, c, j) - contact%offset(c) &
+               - self%state(:, 1 + c, j))
+            self%residual(:, 3 + c, j) = pace%beta*(self%direction(c) + contact%slip(:, c, j) &
+               - self%state(:, 3 + c, j))
+            self%place(:, c, j) = self%state(:, 1 + c, j) + self%residual(:, 1 + c, j)
+         end do
+      end do
+      change = relative_change(self, pace%beta)
+      call displaced(road, self%base(1), self%base(2), self%place(:, 1, :), self%place(:, 2, :), &
+         contact%height, contact%slope_x, contact%slope_y)
+      mean = mean_of(contact%height)
+      self%normal%z(:, :) = self%state(:, 1, :)
+      do k = 1, pace%inner
+         call self%normal%evaluate(operator, task, contact%height, mean, self%normal%z, measure)
+         self%normal%z = self%normal%z + self%normal%residual
+      end do
+      self%residual(:, 1, :) = self%normal%z - self%state(:, 1, :)
+   end subroutine round
+
+   !> |u' - u|/|u'|, from the relaxed change.
+   function relative_change(self, beta) result(change)
+      class(steady_friction_type), intent(in) :: self
+      real(dp), intent(in) :: beta
+      real(dp) :: change
+      real(dp) :: sums(2)
+      integer :: j
+
+      sums = 0.0_dp
+      do j = 1, self%grid%ny
+         sums(1) = sums(1) + sum(self%residual(:, 2:3, j)**2)
+         sums(2) = sums(2) + sum((self%state(:, 2:3, j) + self%residual(:, 2:3, j)/beta)**2)
+      end do
+      sums = global_sum(sums)
+      change = sqrt(sums(1)/max(sums(2), tiny(1.0_dp)))/beta
+   end function relative_change
+
+   !> The next state: a relaxed or an accelerated step; and how the rounds go on.
+   subroutine advance(self, operator, task, pace, rounds, change, measure)
+      class(steady_friction_type), intent(inout) :: self
+      type(steady_operator_type), intent(inout) :: operator
+      type(normal_problem_type), intent(in) :: task
+      type(pace_type), intent(inout) :: pace
+      integer, intent(in) :: rounds
+      real(dp), intent(in) :: change
+      type(steady_measure_type), intent(in) :: measure
+      logical :: changed
+
+      if (pace%accelerated .and. change > 4.0_dp*pace%least) then
+         pace%accelerated = .false.
+         pace%near = 0.3_dp*pace%least
+      else if (.not. pace%accelerated .and. change < pace%near) then
+         pace%accelerated = .true.
+         pace%least = change
+         pace%weights = 0.0_dp
+         pace%weights(1) = 1.0_dp
+         pace%weights(2:3) = measure%size/max(length_of(self), tiny(1.0_dp))
+         call self%memory%forget()
+      end if
+      if (pace%accelerated) then
+         pace%least = min(pace%least, change)
+         call self%memory%step(pace%weights, self%residual, self%state, plain=.false.)
+      else
+         self%state = self%state + self%residual
+         pace%since = pace%since + 1
+         if (pace%since >= 25) then
+            if (change > 0.5_dp*pace%marked) then
+               pace%beta = max(0.15_dp, 0.6_dp*pace%beta)
+               pace%inner = min(12, pace%inner + 3)
+            end if
+            pace%marked = change
+            pace%since = 0
+         end if
+      end if
+      if (.not. any(rounds == [8, 16, 32, 64])) return
+      self%normal%z(:, :) = self%state(:, 1, :)
+      call self%normal%rescale(operator, task, measure%scale, changed)
+      if (.not. changed) return
+      self%state(:, 1, :) = self%normal%z
+      call self%memory%forget()
+   end subroutine advance
+
+   !> |u| of the state.
+   function length_of(self) result(length)
+      class(steady_friction_type), intent(in) :: self
+      real(dp) :: length
+      integer :: j
+
+      length = 0.0_dp
+      do j = 1, self%grid%ny
+         length = length + sum(self%state(:, 2:3, j)**2)
+      end do
+      length = sqrt(global_sum(length))
+   end function length_of
+
+   !> Hand out: T within the bound of P and of the slopes, the displacement of that T, the road there,
+   !> and the errors of it all.
+   subroutine finish(self, operator, task, road, contact, normal, rubbing)
+      class(steady_friction_type), intent(inout) :: self
+      type(steady_operator_type), intent(inout) :: operator
+      type(normal_problem_type), intent(in) :: task
+      type(interpolation_type), intent(in) :: road
+      type(steady_contact_type), intent(inout) :: contact
+      type(solver_result_type), intent(inout) :: normal, rubbing
+      type(gap_measure_type) :: found
+      real(dp), allocatable :: again(:, :, :)
+
+      contact%pressure(:, :) = self%normal%pressure
+      call read_road(self, road, contact)
+      call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio, operator%threads)
+      call bound_tractions(self%law, self%c, contact%pressure, contact%slope_x, contact%slope_y, &
+         self%ratio, contact%slip, contact%traction, operator%threads)
+      call operator%shear(contact%traction, contact%displacement, contact%slip)
+      call read_road(self, road, contact)
+
+      call operator%displace(contact%pressure, contact%gap)
+      contact%gap = contact%gap - contact%height
+      found = measure_gap(task, contact%pressure, contact%gap, operator%threads)
+      contact%level = found%level
+      contact%gap = contact%gap - contact%level
+      normal%residual = found%error
+      normal%load_error = found%load_error
+      normal%converged = found%error <= task%tolerance
+      if (normal%converged) normal%reason = reason_converged
+
+      call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio, operator%threads)
+      allocate (again, mold=contact%traction)
+      call bound_tractions(self%law, self%c, contact%pressure, contact%slope_x, contact%slope_y, &
+         self%ratio, contact%slip, again, operator%threads)
+      rubbing%residual = sqrt(sum((again - contact%traction)**2)/max(sum(contact%traction**2), tiny(1.0_dp)))
+      rubbing%converged = rubbing%residual <= task%tolerance
+      if (rubbing%converged) rubbing%reason = reason_converged
+   end subroutine finish
+
+   !> The road at x + u, u = A_T T less its mean over the contact; and r. In: slip holds d(A_T T)/ds.
+   subroutine read_road(self, road, contact)
+      type(steady_friction_type), intent(in) :: self
+      type(interpolation_type), intent(in) :: road
+      type(steady_contact_type), intent(inout) :: contact
+      integer :: c
+
+      contact%offset = contact_mean(contact)
+      do c = 1, 2
+         contact%slip(:, c, :) = self%direction(c) + contact%slip(:, c, :)
+      end do
+      call displaced(road, self%base(1) + contact%offset(1), self%base(2) + contact%offset(2), &
+         contact%displacement(:, 1, :), contact%displacement(:, 2, :), contact%height, contact%slope_x, &
+         contact%slope_y)
+   end subroutine read_road
+
+   !> Mean of the displacement weighted by the pressure.
+   function contact_mean(contact) result(mean)
+      type(steady_contact_type), intent(in) :: contact
+      real(dp) :: mean(2)
+      real(dp) :: sums(3)
+      integer :: c, j
+
+      sums = 0.0_dp
+      do j = 1, size(contact%pressure, 2)
+         do c = 1, 2
+            sums(c) = sums(c) + dot_product(contact%pressure(:, j), contact%displacement(:, c, j))
+         end do
+         sums(3) = sums(3) + sum(contact%pressure(:, j))
+      end do
+      sums = global_sum(sums)
+      mean = sums(1:2)/max(sums(3), tiny(1.0_dp))
+   end function contact_mean
+
+end module steady_friction
