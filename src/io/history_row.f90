@@ -8,7 +8,7 @@ module history_row
 
    public :: column_type, history_columns, history_row_type, row_values, row_from_values
 
-   integer, parameter, public :: column_count = 32     !! number of columns
+   integer, parameter, public :: column_count = 34     !! number of columns
 
    !> What a column holds.
    type :: column_type
@@ -46,6 +46,8 @@ module history_row
       real(dp) :: dissipated_viscous = 0.0_dp!! energy lost in the rubber, the scheme's own loss included, J
       real(dp) :: dissipated_numerical = 0.0_dp!! the part of the lost energy that is the scheme's own, J
       real(dp) :: dissipated_friction = 0.0_dp!! energy lost by friction in the interface, J
+      real(dp) :: power_viscous = 0.0_dp    !! rate of loss in the rubber, W
+      real(dp) :: power_friction = 0.0_dp   !! rate of loss by friction in the interface, W
       integer :: iterations_normal = 0      !! iterations of the normal solver
       integer :: iterations_tangential = 0  !! iterations of the tangential solver
       real(dp) :: residual_normal = 0.0_dp  !! residual of the normal solution, recomputed
@@ -99,6 +101,10 @@ contains
             'the part of the lost energy that is the scheme''s own', .false.), &
          column_type('dissipated_friction', 'J', &
             'energy lost by friction in the interface', .false.), &
+         column_type('power_viscous', 'W', &
+            'rate of loss in the rubber; mean over the step, or of the steady state', .false.), &
+         column_type('power_friction', 'W', &
+            'rate of loss by friction; mean over the step, or of the steady state', .false.), &
          column_type('iterations_normal', '1', 'iterations of the normal solver', .true.), &
          column_type('iterations_tangential', '1', 'iterations of the tangential solver', .true.), &
          column_type('residual_normal', '1', &
@@ -140,12 +146,14 @@ contains
       values(24) = row%dissipated_viscous
       values(25) = row%dissipated_numerical
       values(26) = row%dissipated_friction
-      values(27) = real(row%iterations_normal, dp)
-      values(28) = real(row%iterations_tangential, dp)
-      values(29) = row%residual_normal
-      values(30) = row%residual_tangential
-      values(31) = row%ffts
-      values(32) = row%seconds
+      values(27) = row%power_viscous
+      values(28) = row%power_friction
+      values(29) = real(row%iterations_normal, dp)
+      values(30) = real(row%iterations_tangential, dp)
+      values(31) = row%residual_normal
+      values(32) = row%residual_tangential
+      values(33) = row%ffts
+      values(34) = row%seconds
    end function row_values
 
    !> The row that `row_values` made into an array.
@@ -179,12 +187,14 @@ contains
       row%dissipated_viscous = values(24)
       row%dissipated_numerical = values(25)
       row%dissipated_friction = values(26)
-      row%iterations_normal = nint(values(27))
-      row%iterations_tangential = nint(values(28))
-      row%residual_normal = values(29)
-      row%residual_tangential = values(30)
-      row%ffts = values(31)
-      row%seconds = values(32)
+      row%power_viscous = values(27)
+      row%power_friction = values(28)
+      row%iterations_normal = nint(values(29))
+      row%iterations_tangential = nint(values(30))
+      row%residual_normal = values(31)
+      row%residual_tangential = values(32)
+      row%ffts = values(33)
+      row%seconds = values(34)
    end function row_from_values
 
 end module history_row

@@ -23,7 +23,7 @@ module viscoelastic_energy
    implicit none
    private
 
-   public :: energy_books_type, new_books, book_step
+   public :: energy_books_type, new_books, book_state, book_step
 
    !> Cumulative books, in J, of one set of products.
    type :: energy_books_type
@@ -78,6 +78,25 @@ contains
       self%dissipated = self%dissipated + loss
       self%numerical = self%numerical + numerical
    end subroutine book_step
+
+   !> Book a state that is not reached by a step: its work is what it stores more than the last one.
+   pure subroutine book_state(self, g_e, g, u_s, du_ds, arm, arm_du)
+      type(energy_books_type), intent(inout) :: self
+      real(dp), intent(in) :: g_e           !! long-term modulus, Pa
+      real(dp), intent(in) :: g(:)          !! moduli of the arms, Pa
+      real(dp), intent(in) :: u_s           !! U.S, m3
+      real(dp), intent(in) :: du_ds         !! dU.dS of the step that led to the state, m3
+      real(dp), intent(in) :: arm(:)        !! E_k, Pa2 m3
+      real(dp), intent(in) :: arm_du(:)     !! p_k.dU of that step, J
+      real(dp) :: stored
+
+      stored = 0.5_dp*g_e*u_s + sum(arm/(2.0_dp*g))
+      self%work = self%work + (stored - self%stored)
+      self%stored = stored
+      self%du_ds = du_ds
+      self%arm = arm
+      self%arm_du = arm_du
+   end subroutine book_state
 
    !> Work and loss of a backward Euler step.
    pure subroutine implicit_step(self, material, products, work, loss, numerical)

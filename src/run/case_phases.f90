@@ -9,7 +9,7 @@ module case_phases
    use input_faults, only : faults_type
    use input_group, only : group_values_type
    use precision, only : dp
-   use regular_grid, only : grid_type
+   use regular_grid, only : boundary_periodic, grid_type
    use text_tools, only : to_text
    implicit none
    private
@@ -44,6 +44,7 @@ contains
             phase%static = .not. phase%duration > 0.0_dp .and. .not. group%bad('duration')
             phase%linear = group%text_value('ramp') == 'linear'
             phase%relaxed = group%logical_value('relaxed')
+            phase%steady = group%logical_value('steady')
             phase%velocity_x = group%real_value('velocity_x')
             phase%velocity_y = group%real_value('velocity_y')
             if (i == 1) then
@@ -53,6 +54,7 @@ contains
             end if
             call check_load(group, phase, adhesive, faults)
             call check_combination(group, phase, material, faults)
+            if (phase%steady) call check_steady(group, phase, grid, material, adhesive, faults)
             call resolve_steps(group, phase, grid, material, faults)
             call warn_of_steps(i, phase, grid, material, warnings)
          end associate
@@ -141,7 +143,7 @@ contains
       if (.not. phase%static) return
       do i = 1, size(timed)
          if (.not. group%usable(trim(timed(i)))) cycle
-         if (i > 1 .and. abs(group%real_value(trim(timed(i)))) <= 0.0_dp) cycle
+         if (i > 1 .and. (phase%steady .or. abs(group%real_value(trim(timed(i)))) <= 0.0_dp)) cycle
          call group%fault(trim(timed(i)), 'needs a duration: a phase without one is one static solve', &
             faults)
       end do
@@ -150,6 +152,29 @@ contains
             'needs a duration, or ramp = ''linear'' for a series of static solves up to the load', faults)
       end if
    end subroutine check_combination
+
+   !> Settings that a steady phase excludes or needs.
+   subroutine check_steady(group, phase, grid, material, adhesive, faults)
+      type(group_values_type), intent(in) :: group
+      type(phase_settings_type), intent(in) :: phase
+      type(grid_type), intent(in) :: grid
+      type(material_settings_type), intent(in) :: material
+      logical, intent(in) :: adhesive
+      type(faults_type), intent(inout) :: faults
+
+      if (phase%relaxed) call group%fault('steady', &
+         'excludes relaxed = .true.: one says that the road has slid for ever, the other that it has '// &
+         'rested; with a velocity of zero steady means the same as relaxed', faults)
+      if (phase%linear) call group%fault('steady', &
+         'excludes ramp = ''linear'': the load of a steady state is constant', faults)
+      if (phase%control == 'displacement') call group%fault('steady', &
+         'excludes control = ''displacement'': give pressure or force', faults)
+      if (grid%nx > 0 .and. grid%boundary /= boundary_periodic) call group%fault('steady', &
+         'needs &grid boundary = ''periodic''', faults)
+      if (adhesive) call group%fault('steady', 'needs &adhesion potential = ''none''', faults)
+      if (size(material%prony_g) > 0 .and. .not. material%shear_modulus > 0.0_dp) &
+         call group%fault('steady', 'needs a long-term shear modulus above 0: this material flows', faults)
+   end subroutine check_steady
 
    !> Number of steps and time step.
    subroutine resolve_steps(group, phase, grid, material, faults)

@@ -183,7 +183,8 @@ contains
             control_units(phase%control)//nl
       end if
       text = text//string('ramp', merge('linear', 'step  ', phase%linear))//truth('relaxed', phase%relaxed)// &
-         number('velocity_x', phase%velocity_x, 'm/s')//number('velocity_y', phase%velocity_y, 'm/s')// &
+         truth('steady', phase%steady)//number('velocity_x', phase%velocity_x, 'm/s')// &
+         number('velocity_y', phase%velocity_y, 'm/s')// &
          '/'//nl
    end function phase_text
 

@@ -55,6 +55,7 @@ module case_settings
       logical :: given                              !! the phase names its load itself
       logical :: linear                             !! ramp = 'linear'
       logical :: relaxed
+      logical :: steady                             !! the first row is a state of steady sliding
       real(dp) :: velocity_x, velocity_y            !! of the road, m/s
    end type phase_settings_type
 

@@ -211,6 +211,8 @@ contains
             'The load jumps at the start, or grows through the phase.'), &
          row('phase', 'relaxed', kind_logical, '.false.', '', 'any', &
             'Start as if the load had rested there for ever.'), &
+         row('phase', 'steady', kind_logical, '.false.', '', 'any', &
+            'Start as if the road had slid for ever under this load at this velocity.'), &
          row('phase', 'velocity_x', kind_real, '0.0', 'm/s', 'any', &
             'Velocity of the road relative to the top of the block, along x.'), &
          row('phase', 'velocity_y', kind_real, '0.0', 'm/s', 'any', 'The same along y.')]

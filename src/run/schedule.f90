@@ -1,7 +1,8 @@
 !> The rows of a run: which solve comes next, at what time, under what load and speed.
 !>
 !> A phase with a duration begins with a jump where it is the first, where its load differs from the
-!> one held so far and is not ramped, or where it starts relaxed; then come its steps. A phase
+!> one held so far and is not ramped, or where it starts relaxed or steady; then come its steps.
+!> A steady phase at rest is a relaxed one. A phase
 !> without a duration is static: one instantaneous solve, or a series of them up to its load.
 module schedule
    use case_settings, only : phase_settings_type
@@ -16,6 +17,8 @@ module schedule
       integer :: phase = 0                        !! number of the phase, from 1
       logical :: instantaneous = .false.          !! a jump or a static solve
       logical :: relaxed = .false.                !! the load has rested for ever
+      logical :: steady = .false.                 !! the road has slid for ever at this velocity
+      real(dp) :: next_dt = 0.0_dp                !! the step in time after a steady row, s; 0: none
       logical :: new_speed = .false.              !! the speed of the road changed just before
       real(dp) :: time = 0.0_dp                   !! s
       real(dp) :: dt = 0.0_dp                     !! s; 0 where instantaneous
@@ -73,7 +76,7 @@ contains
 
       begins = .false.
       if (phase%static) return
-      begins = control == '' .or. phase%relaxed
+      begins = control == '' .or. phase%relaxed .or. phase%steady
       if (.not. phase%linear) begins = begins .or. control /= phase%control(:12) .or. &
          abs(load - phase%target) > 0.0_dp
    end function begins_with_row
@@ -118,6 +121,11 @@ contains
          end if
          self%entered = .true.
          row%relaxed = phase%relaxed .and. row%instantaneous
+         if (phase%steady .and. row%instantaneous) then
+            row%steady = abs(phase%velocity_x) > 0.0_dp .or. abs(phase%velocity_y) > 0.0_dp
+            row%relaxed = .not. row%steady
+            row%next_dt = phase%dt
+         end if
          row%time = self%start_time + part*phase%duration
          row%road_x = self%start_x + part*phase%duration*phase%velocity_x
          row%road_y = self%start_y + part*phase%duration*phase%velocity_y

@@ -30,6 +30,7 @@ module simulation
    use regular_grid, only : boundary_free, grid_type
    use schedule, only : next_row, planned_row_type, schedule_type
    use solver_result, only : solver_result_type
+   use steady_step, only : new_steady_step, steady_step_type
    use stick_slip_watch, only : stick_slip_watch_type, watch_slip
    use surface, only : new_height
    use tangential_state, only : new_tangential_state, tangential_state_type
@@ -77,6 +78,9 @@ module simulation
       real(dp), allocatable, private :: settled(:, :)   !! pressure of the pass before, Pa
       integer :: edge = edge_clear                  !! worst found at the edge of a free map
       type(normal_step_type), private :: side
+      type(steady_step_type) :: steady              !! rows of steady sliding, where the case has any
+      logical :: has_steady = .false.               !! some phase is steady
+      logical :: was_steady = .false.               !! the last row was one of steady sliding
       logical :: first = .true.                     !! no state yet
       real(dp) :: level = 0.0_dp                    !! U - H where the gap is zero, m
       real(dp), allocatable, private :: slope_x(:, :), slope_y(:, :)
@@ -128,6 +132,9 @@ contains
          allocate (self%slope_x(nx, ny), self%slope_y(nx, ny))
          call self%place_road(0.0_dp, 0.0_dp)
       end if
+      self%has_steady = self%slides .and. any(case%phases%steady)
+      if (self%has_steady) call new_steady_step(self%steady, case, self%rms_height, error)
+      if (allocated(error)) return
       self%frictional = self%slides .and. case%friction%law /= 'none'
       if (.not. self%frictional) return
       call new_tangential_state(self%tangential, case, self%material, error)
@@ -150,13 +157,17 @@ contains
       call begin_step(self, plan, error)
       if (allocated(error)) return
       call system_clock(start, rate)
-      if (.not. is_elastic(self%material)) call history_field(self%history, self%material, self%past)
-      if (self%frictional) call self%tangential%begin(self%material, &
-         [plan%road_x - self%row%road_x, plan%road_y - self%row%road_y], plan%dt)
-      call move_road(self, plan)
+      if (.not. plan%steady) then
+         if (.not. is_elastic(self%material)) call history_field(self%history, self%material, self%past)
+         if (self%frictional) call self%tangential%begin(self%material, &
+            [plan%road_x - self%row%road_x, plan%road_y - self%row%road_y], plan%dt)
+         call move_road(self, plan)
+      end if
 
       rubbing%converged = .true.
-      if (.not. rubs(self)) then
+      if (plan%steady) then
+         call slide_for_ever(self, plan, outcome, rubbing, level)
+      else if (.not. rubs(self)) then
          call solve_normal(self, plan, outcome, level)
       else if (plan%instantaneous) then
          call jump_passes(self, plan, outcome, level)
@@ -173,13 +184,70 @@ contains
             self%reason = trim(self%reason)//' before the tractions settled'
       end if
 
-      call commit_step(self, level)
+      if (.not. plan%steady) call commit_step(self, level)
+      self%was_steady = plan%steady
       call system_clock(now)
       outcome%seconds = real(now - start, dp)/real(rate, dp)
       call watch_edge(self, plan)
       call fill_row(self, plan, outcome, rubbing, level)
       self%finished = self%schedule%phase > size(self%case%phases)
    end subroutine advance
+
+   !> A row of steady sliding: its state, and what the arms remember of it where time goes on.
+   subroutine slide_for_ever(self, plan, outcome, rubbing, level)
+      type(simulation_type), intent(inout) :: self
+      type(planned_row_type), intent(inout) :: plan      !! the road moves to where the state finds it
+      type(solver_result_type), intent(out) :: outcome, rubbing
+      real(dp), intent(out) :: level
+      real(dp) :: next_dt
+
+      if (.not. self%was_steady) call self%steady%begin_curve([self%row%road_x, self%row%road_y])
+      call self%steady%solve(plan, self%road, outcome, rubbing)
+      self%schedule%start_x = self%schedule%start_x + (self%steady%place(1) - plan%road_x)
+      self%schedule%start_y = self%schedule%start_y + (self%steady%place(2) - plan%road_y)
+      plan%road_x = self%steady%place(1)
+      plan%road_y = self%steady%place(2)
+      self%velocity = [plan%velocity_x, plan%velocity_y]
+      self%direction = self%velocity/norm2(self%velocity)
+      self%drift = 0.0_dp
+      self%moved_cells = nint((self%steady%place - self%drifted)/[self%grid%dx, self%grid%dy])
+      associate (found => self%steady%contact)
+         self%pressure(:, :) = found%pressure
+         self%gap(:, :) = found%gap
+         self%height(:, :) = found%height
+         self%slope_x(:, :) = found%slope_x
+         self%slope_y(:, :) = found%slope_y
+         level = found%level
+         self%displacement(:, :) = found%gap + found%height + level
+      end associate
+      self%level = level
+      self%first = .false.
+
+      next_dt = 0.0_dp
+      if (size(self%history%ds) > 0) next_dt = plan%next_dt
+      call self%steady%remember_normal(next_dt, self%history, self%books)
+      if (self%frictional) then
+         call self%tangential%take_steady(self%steady%contact, self%velocity)
+         call self%steady%remember_tangential(next_dt, self%tangential%history, self%tangential%books)
+      end if
+      call finish_step(self%material)
+      self%material%dt_old = next_dt
+   end subroutine slide_for_ever
+
+   !> What a row of steady sliding knows better than the sums over the cells.
+   subroutine fill_steady(self, row, force)
+      type(simulation_type), intent(in) :: self
+      type(history_row_type), intent(inout) :: row
+      real(dp), intent(inout) :: force(2)           !! in: by the slopes of the mesh; out: by the losses, N
+      real(dp) :: viscous
+
+      viscous = dot_product(self%steady%viscous_force, self%direction)/row%pressure
+      force = force + self%direction*((viscous - row%friction_viscous)*row%force)
+      row%friction_viscous = viscous
+      row%power_viscous = self%steady%losses%normal + self%steady%losses%tangential
+      row%power_friction = self%steady%power_friction
+      row%sliding_speed = norm2(self%velocity)
+   end subroutine fill_steady
 
    !> Does friction act yet?
    pure function rubs(self) result(yes)
@@ -605,6 +673,13 @@ contains
          call watch_stick_slip(self, plan, row%sliding_speed)
       end if
       if (holds(self)) row%stick_area = row%contact_area
+      row%power_viscous = 0.0_dp
+      row%power_friction = 0.0_dp
+      if (plan%dt > 0.0_dp) then
+         row%power_viscous = (row%dissipated_viscous - self%row%dissipated_viscous)/plan%dt
+         row%power_friction = (row%dissipated_friction - self%row%dissipated_friction)/plan%dt
+      end if
+      if (plan%steady) call fill_steady(self, row, force)
       row%friction = 0.0_dp
       if (abs(row%force) > 0.0_dp .and. any(abs(self%direction) > 0.0_dp)) &
          row%friction = dot_product(force, self%direction)/row%force
@@ -620,7 +695,7 @@ contains
       row%residual_normal = outcome%residual
       row%ffts = real(outcome%ffts + rubbing%ffts, dp)
       row%seconds = outcome%seconds
-      row%work_drive = self%row%work_drive &
+      if (.not. plan%steady) row%work_drive = self%row%work_drive &
          + 0.5_dp*(force(1) + self%drive_force(1))*(row%road_x - self%row%road_x) &
          + 0.5_dp*(force(2) + self%drive_force(2))*(row%road_y - self%row%road_y)
       self%drive_force = force
@@ -711,6 +786,7 @@ contains
       call self%side%destroy()
       call destroy_history(self%history)
       if (self%frictional) call self%tangential%destroy()
+      if (self%has_steady) call self%steady%destroy()
    end subroutine destroy
 
 end module simulation

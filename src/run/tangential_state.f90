@@ -24,6 +24,7 @@ module tangential_state
    use precision, only : dp, int64, int8
    use regular_grid, only : boundary_periodic, grid_type
    use solver_result, only : solver_result_type
+   use steady_friction, only : steady_contact_type
    use viscoelastic_energy, only : book_step, energy_books_type, new_books
    use zener, only : commit_history, destroy_history, history_field, history_type, &
       new_history, new_products, products_type, zener_type
@@ -67,6 +68,7 @@ module tangential_state
       procedure :: extrapolate
       procedure :: solve
       procedure :: return_to_bound
+      procedure :: take_steady
       procedure :: commit
       procedure :: kinetic
       procedure :: sums
@@ -280,6 +282,40 @@ contains
       end if
       self%slip = self%displacement - self%trial
    end subroutine return_to_bound
+
+   !> Take a state of steady sliding. Its history and energies are set by the caller.
+   subroutine take_steady(self, found, velocity)
+      class(tangential_state_type), intent(inout) :: self
+      type(steady_contact_type), intent(in) :: found
+      real(dp), intent(in) :: velocity(2)             !! of the road, m/s
+      real(dp), parameter :: within = 1.0_dp + 1e-6_dp  !! s of the bound from which a point sticks
+      real(dp) :: slope(2), star(2), before
+      integer :: i, j
+
+      before = self%kinetic()
+      self%moved = .true.
+      self%pace = 0.0_dp
+      self%rate = 0.0_dp
+      self%speed = -velocity
+      if (self%mass > 0.0_dp) self%work_mass = self%work_mass + self%kinetic() - before
+      !$omp parallel do default(none) shared(self, found) private(i, j, slope, star)
+      do j = 1, self%grid%ny
+         do i = 1, self%grid%nx
+            self%traction(i, j, :) = found%traction(i, :, j)
+            self%displacement(i, j, :) = found%displacement(i, :, j)
+            slope = [found%slope_x(i, j), found%slope_y(i, j)]
+            star = self%law%normal_traction(found%pressure(i, j), slope)
+            self%contact(i, j) = 0_int8
+            if (found%pressure(i, j) <= 0.0_dp) cycle
+            self%contact(i, j) = 2_int8
+            if (self%law%bound_ratio(found%pressure(i, j), slope, self%traction(i, j, :) - star) > within) &
+               self%contact(i, j) = 1_int8
+         end do
+      end do
+      self%before(:, :, :) = self%traction
+      self%trial(:, :, :) = self%displacement
+      self%slip(:, :, :) = 0.0_dp
+   end subroutine take_steady
 
    !> End the step: history, energies, the motion of the mass.
    subroutine commit(self, material, pressure, slope_x, slope_y)

@@ -4,7 +4,7 @@
 !> * `resolve`: the resolvent (1 + c K)^-1 of the normal solver (module steady_normal).
 !> * `press`: K^-1 of a displacement, for the start.
 !> * `shear`: U_T and dU_T/ds from T, six transforms.
-!> * `split_spectrum`: the transform of a field, for losses and for the memory of the arms.
+!> * `spectrum`: the transform of a field, for losses; `apply_table`: any other symbol.
 !>
 !> Memory: one field for the spectrum of the normal side and four for that of the tangential one; the
 !> symbols take one field, and six more with friction; the resolvent one.
@@ -36,6 +36,13 @@ module steady_operator
       procedure :: multiply => multiply_pair
    end type pair_type
 
+   !> Keeps the modes as they are.
+   type, extends(multiplier_type) :: keeper_type
+      complex(dp), pointer, contiguous :: table(:, :) => null()
+   contains
+      procedure :: multiply => keep_modes
+   end type keeper_type
+
    !> The operators of one grid; the symbols change with the velocity. Not to be copied.
    type :: steady_operator_type
       integer :: nx = 0, ny = 0
@@ -58,6 +65,7 @@ module steady_operator
       procedure :: resolve
       procedure :: shear
       procedure :: apply_table
+      procedure :: spectrum
       procedure :: destroy
    end type steady_operator_type
 
@@ -169,6 +177,19 @@ contains
       call pass_through(self, multiplier, x, y)
    end subroutine apply_table
 
+   !> The modes of a field, sum f exp(-i q.x) over the cells.
+   subroutine spectrum(self, field, modes)
+      class(steady_operator_type), intent(inout) :: self
+      real(dp), intent(in) :: field(:, :)
+      complex(dp), intent(inout), target, contiguous :: modes(0:, 0:)   !! (0:last, 0:ny-1)
+      type(keeper_type) :: keeper
+      real(dp), allocatable :: unused(:, :)
+
+      keeper%table(0:, 0:) => modes
+      allocate (unused(self%nx, self%ny))
+      call pass_through(self, keeper, field, unused)
+   end subroutine spectrum
+
    !> One field through a multiplier.
    subroutine pass_through(self, multiplier, x, y)
       class(steady_operator_type), intent(inout) :: self
@@ -223,6 +244,16 @@ contains
 
       modes(:, 1) = self%table(first:first + size(modes, 1) - 1, j)*modes(:, 1)
    end subroutine multiply_scalar
+
+   !> Keep the modes.
+   subroutine keep_modes(self, first, j, modes)
+      class(keeper_type), intent(in) :: self
+      integer, intent(in) :: first
+      integer, intent(in) :: j
+      complex(dp), intent(inout) :: modes(:, :)
+
+      self%table(first:first + size(modes, 1) - 1, j) = modes(:, 1)
+   end subroutine keep_modes
 
    !> Multiply two inputs by two symmetric tensors.
    subroutine multiply_pair(self, first, j, modes)

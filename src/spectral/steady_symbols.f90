@@ -28,131 +28,138 @@ module steady_symbols
    implicit none
    private
 
-   public :: new_steady_symbols, steady_symbols_type
+   public :: medium_type, mode_waves, new_steady_symbols, steady_modulus, steady_symbols_type
 
-   !> The symbols of one velocity. Elastic ones are those of a unit shear modulus.
+   !> What the symbols depend on.
+   type :: medium_type
+      type(grid_type) :: grid
+      real(dp) :: poisson = 0.5_dp
+      real(dp) :: modulus = 0.0_dp                     !! long-term shear modulus, Pa, > 0
+      real(dp), allocatable :: g(:), tau(:)            !! arms, Pa and s
+      real(dp) :: velocity(2) = 0.0_dp                 !! V, m/s; not zero
+      real(dp) :: dt = 0.0_dp                          !! step of the scheme, s; 0: the continuum
+   end type medium_type
+
+   !> The symbols of one velocity.
    type :: steady_symbols_type
-      integer :: nx = 0, ny = 0
-      integer :: last = 0                              !! of the tables' first index
-      real(dp) :: velocity(2) = 0.0_dp                 !! V, m/s
-      complex(dp), allocatable :: normal(:, :)         !! K, m/Pa
+      integer :: last = 0                              !! of the tables' index along x
+      complex(dp), allocatable :: normal(:, :)         !! K, m/Pa (0:last, 0:ny-1)
       complex(dp), allocatable :: tangential(:, :, :)  !! A_T: xx, yy, xy, m/Pa (3, 0:last, 0:ny-1)
       complex(dp), allocatable :: stretch(:, :, :)     !! d/ds A_T alike, 1/Pa
       real(dp) :: longest = 0.0_dp                     !! largest |K|, m/Pa
       real(dp) :: shortest = 0.0_dp                    !! smallest |K|, m/Pa
    end type steady_symbols_type
 
-   !> What the symbols of one wave vector depend on.
-   type :: medium_type
-      real(dp) :: poisson
-      real(dp) :: modulus                              !! long-term, Pa
-      real(dp), allocatable :: g(:), tau(:)
-      real(dp) :: velocity(2)
-      real(dp) :: dt                                   !! 0: the continuum
-   end type medium_type
-
 contains
 
-   !> The symbols for a velocity that is not zero.
-   subroutine new_steady_symbols(self, grid, last, poisson, modulus, g, tau, velocity, frictional, dt)
+   !> The symbols of a medium.
+   subroutine new_steady_symbols(self, medium, last, frictional)
       type(steady_symbols_type), intent(out) :: self
-      type(grid_type), intent(in) :: grid
+      type(medium_type), intent(in) :: medium
       integer, intent(in) :: last                      !! last wave number along x of the tables
-      real(dp), intent(in) :: poisson
-      real(dp), intent(in) :: modulus                  !! long-term shear modulus, Pa, > 0
-      real(dp), intent(in) :: g(:), tau(:)             !! arms, Pa and s
-      real(dp), intent(in) :: velocity(2)              !! m/s
       logical, intent(in) :: frictional                !! the tangential symbols are needed
-      real(dp), intent(in), optional :: dt             !! of the scheme, s; the continuum by default
-      type(medium_type) :: medium
-      integer :: i, j
+      integer :: i, j, nx, ny
 
-      medium%poisson = poisson
-      medium%modulus = modulus
-      allocate (medium%g, source=g)
-      allocate (medium%tau, source=tau)
-      medium%velocity = velocity
-      medium%dt = 0.0_dp
-      if (present(dt)) medium%dt = dt
-      self%nx = grid%nx
-      self%ny = grid%ny
+      nx = medium%grid%nx
+      ny = medium%grid%ny
       self%last = last
-      self%velocity = velocity
-      allocate (self%normal(0:last, 0:grid%ny - 1), source=(0.0_dp, 0.0_dp))
+      allocate (self%normal(0:last, 0:ny - 1), source=(0.0_dp, 0.0_dp))
       if (frictional) then
-         allocate (self%tangential(3, 0:last, 0:grid%ny - 1), source=(0.0_dp, 0.0_dp))
-         allocate (self%stretch(3, 0:last, 0:grid%ny - 1), source=(0.0_dp, 0.0_dp))
+         allocate (self%tangential(3, 0:last, 0:ny - 1), source=(0.0_dp, 0.0_dp))
+         allocate (self%stretch, source=self%tangential)
       end if
-      !$omp parallel do default(none) shared(self, grid, medium, frictional) private(i, j)
-      do j = 0, grid%ny - 1
-         do i = 0, grid%nx/2
-            if (i + j == 0) cycle
-            call mode_symbols(self, grid, medium, frictional, i, j)
+      !$omp parallel do default(none) shared(self, medium, frictional, nx, ny) private(i, j)
+      do j = 0, ny - 1
+         do i = 0, nx/2
+            if (i + j > 0) call mode_symbols(self, medium, frictional, i, j)
          end do
       end do
-      self%longest = maxval(abs(self%normal(0:grid%nx/2, :)))
-      self%shortest = minval(abs(self%normal(0:grid%nx/2, :)), mask=abs(self%normal(0:grid%nx/2, :)) > 0.0_dp)
+      self%longest = maxval(abs(self%normal(0:nx/2, :)))
+      self%shortest = minval(abs(self%normal(0:nx/2, :)), mask=abs(self%normal(0:nx/2, :)) > 0.0_dp)
    end subroutine new_steady_symbols
 
-   !> The symbols of one mode: the mean over the signs that it stands for.
-   subroutine mode_symbols(self, grid, medium, frictional, i, j)
+   !> The symbols of one mode: the mean over the wave vectors that it stands for.
+   subroutine mode_symbols(self, medium, frictional, i, j)
       type(steady_symbols_type), intent(inout) :: self
-      type(grid_type), intent(in) :: grid
       type(medium_type), intent(in) :: medium
       logical, intent(in) :: frictional
       integer, intent(in) :: i, j
       complex(dp) :: compliance, derivative
-      real(dp) :: q(2), length, weight, elastic(3)
-      integer :: mode, sign_x, sign_y, signs(2), along_x, along_y
+      real(dp) :: waves(2, 4), q, elastic(3)
+      integer :: k, count
 
-      mode = j
-      if (2*j > grid%ny) mode = j - grid%ny
-      signs = [merge(2, 1, 2*i == grid%nx), merge(2, 1, 2*j == grid%ny)]
-      weight = 1.0_dp/product(signs)
-      do sign_y = 1, signs(2)
-         do sign_x = 1, signs(1)
-            along_x = merge(i, -i, sign_x == 1)
-            along_y = merge(mode, -mode, sign_y == 1)
-            q = 2.0_dp*pi*[along_x/grid%lx, along_y/grid%ly]
-            length = norm2(q)
-            call responses(medium, dot_product(q, medium%velocity), compliance, derivative)
-            self%normal(i, j) = self%normal(i, j) + weight*(1.0_dp - medium%poisson)/length*compliance
-            if (.not. frictional) cycle
-            elastic = [1.0_dp - medium%poisson*(q(1)/length)**2, &
-               1.0_dp - medium%poisson*(q(2)/length)**2, -medium%poisson*q(1)*q(2)/length**2]/length
-            if (any(signs == 2)) elastic(3) = 0.0_dp
-            self%tangential(:, i, j) = self%tangential(:, i, j) + weight*elastic*compliance
-            self%stretch(:, i, j) = self%stretch(:, i, j) + weight*elastic*compliance*derivative
-         end do
+      call mode_waves(medium%grid, i, j, waves, count)
+      do k = 1, count
+         q = norm2(waves(:, k))
+         compliance = 1.0_dp/(count*q*steady_modulus(medium, dot_product(waves(:, k), medium%velocity)))
+         self%normal(i, j) = self%normal(i, j) + (1.0_dp - medium%poisson)*compliance
+         if (.not. frictional) cycle
+         derivative = along_motion(medium, dot_product(waves(:, k), medium%velocity))
+         elastic = [1.0_dp - medium%poisson*(waves(1, k)/q)**2, &
+            1.0_dp - medium%poisson*(waves(2, k)/q)**2, -medium%poisson*product(waves(:, k)/q)]
+         if (count > 1) elastic(3) = 0.0_dp
+         self%tangential(:, i, j) = self%tangential(:, i, j) + elastic*compliance
+         self%stretch(:, i, j) = self%stretch(:, i, j) + elastic*compliance*derivative
       end do
    end subroutine mode_symbols
 
-   !> 1/G*, and the symbol of the derivative along the motion, at q.V.
-   pure subroutine responses(medium, rate, compliance, derivative)
+   !> The wave vectors that a mode stands for: one, or both signs of a Nyquist component.
+   pure subroutine mode_waves(grid, i, j, waves, count)
+      type(grid_type), intent(in) :: grid
+      integer, intent(in) :: i                         !! along x, 0 to nx/2
+      integer, intent(in) :: j                         !! along y, 0 to ny-1
+      real(dp), intent(out) :: waves(2, 4)             !! q, rad/m
+      integer, intent(out) :: count                    !! 1, 2 or 4
+      integer :: along_y
+
+      along_y = merge(j - grid%ny, j, 2*j > grid%ny)
+      waves = 0.0_dp
+      waves(:, 1) = 2.0_dp*pi*[i/grid%lx, along_y/grid%ly]
+      count = 1
+      if (2*i == grid%nx) then
+         waves(:, 2) = [-waves(1, 1), waves(2, 1)]
+         count = 2
+      end if
+      if (2*j == grid%ny) then
+         waves(1, count + 1:2*count) = waves(1, 1:count)
+         waves(2, count + 1:2*count) = -waves(2, 1:count)
+         count = 2*count
+      end if
+   end subroutine mode_waves
+
+   !> G* of a mode with the rate q.V.
+   pure function steady_modulus(medium, rate) result(modulus)
       type(medium_type), intent(in) :: medium
       real(dp), intent(in) :: rate                     !! q.V, rad/s
-      complex(dp), intent(out) :: compliance           !! 1/Pa
-      complex(dp), intent(out) :: derivative           !! 1/m
-      complex(dp) :: modulus, rho
+      complex(dp) :: modulus                           !! Pa
+      complex(dp) :: rho
       real(dp) :: phi, chi, x
       integer :: k
 
       if (medium%dt <= 0.0_dp) then
          modulus = complex_modulus(medium%modulus, medium%g, medium%tau, -rate)
-         derivative = cmplx(0.0_dp, rate/norm2(medium%velocity), dp)
-      else
-         rho = exp(cmplx(0.0_dp, rate*medium%dt, dp))
-         modulus = medium%modulus
-         do k = 1, size(medium%g)
-            x = medium%dt/medium%tau(k)
-            phi = mean_decay(x)
-            chi = slope_response(x)
-            modulus = modulus + medium%g(k)*((phi + chi)*(1.0_dp - rho) - chi*(rho - rho**2)) &
-               /(1.0_dp - exp(-x)*rho)
-         end do
-         derivative = (rho - 1.0_dp)/(norm2(medium%velocity)*medium%dt)
+         return
       end if
-      compliance = 1.0_dp/modulus
-   end subroutine responses
+      rho = exp(cmplx(0.0_dp, rate*medium%dt, dp))
+      modulus = medium%modulus
+      do k = 1, size(medium%g)
+         x = medium%dt/medium%tau(k)
+         phi = mean_decay(x)
+         chi = slope_response(x)
+         modulus = modulus + medium%g(k)*((phi + chi)*(1.0_dp - rho) - chi*(rho - rho**2)) &
+            /(1.0_dp - exp(-x)*rho)
+      end do
+   end function steady_modulus
+
+   !> The symbol of the derivative along the motion.
+   pure function along_motion(medium, rate) result(derivative)
+      type(medium_type), intent(in) :: medium
+      real(dp), intent(in) :: rate                     !! q.V, rad/s
+      complex(dp) :: derivative                        !! 1/m
+
+      derivative = cmplx(0.0_dp, rate, dp)
+      if (medium%dt > 0.0_dp) derivative = (exp(cmplx(0.0_dp, rate*medium%dt, dp)) - 1.0_dp)/medium%dt
+      derivative = derivative/norm2(medium%velocity)
+   end function along_motion
 
 end module steady_symbols

@@ -1,0 +1,166 @@
+!> The memory of the arms in a state of steady sliding, from which a run goes on in time.
+!>
+!> With S = P/G* (module zener: S is the traction that would hold the displacement elastically) arm k
+!> carries the traction p_k = g_k i omega tau_k/(1 + i omega tau_k) S, mode by mode, and so for T. One
+!> step dt earlier a field was the same, moved back by V dt: S_old = rho S with rho = exp(i q.V dt), so
+!> that the first step in time has a step before it.
+module steady_memory
+   use parallel, only : global_sum
+   use precision, only : dp
+   use steady_losses, only : elastic_forms
+   use steady_operator, only : steady_operator_type
+   use steady_symbols, only : medium_type, mode_waves, steady_modulus
+   use viscoelastic_energy, only : energy_books_type, book_state
+   use zener, only : history_type
+   implicit none
+   private
+
+   public :: book_memory, remember_field
+
+   integer, parameter :: whole = 0           !! response of S; k > 0: of arm k
+   integer, parameter :: increment = -1      !! response of S - S_old
+
+contains
+
+   !> The memory of one component of a field of tractions.
+   subroutine remember_field(operator, medium, dt, field, component, history)
+      type(steady_operator_type), intent(inout) :: operator
+      type(medium_type), intent(in) :: medium
+      real(dp), intent(in) :: dt                       !! of the step to come, s; 0: none
+      real(dp), intent(in) :: field(:, :)              !! P or a component of T, Pa
+      integer, intent(in) :: component
+      type(history_type), intent(inout) :: history
+      real(dp), allocatable :: result(:, :)
+      integer :: k, shape_1d(1)
+
+      if (size(medium%g) == 0) return
+      allocate (result(size(field, 1), size(field, 2)))
+      shape_1d = size(field)
+      call respond(whole)
+      history%s(:, component) = reshape(result, shape_1d)
+      if (size(history%ds) > 0) then
+         call respond(increment)
+         history%ds(:, component) = reshape(result, shape_1d)
+      end if
+      do k = 1, size(medium%g)
+         call respond(k)
+         history%arm(:, k, component) = reshape(result, shape_1d)
+      end do
+
+   contains
+
+      !> The field through one response.
+      subroutine respond(which)
+         integer, intent(in) :: which
+         complex(dp), allocatable :: table(:, :)
+         integer :: i, j
+
+         allocate (table(0:operator%last, 0:operator%ny - 1), source=(0.0_dp, 0.0_dp))
+         !$omp parallel do default(none) shared(table, medium, dt, which, operator) private(i, j)
+         do j = 0, operator%ny - 1
+            do i = 0, operator%nx/2
+               table(i, j) = response(medium, dt, which, i, j)
+            end do
+         end do
+         call operator%apply_table(table, field, result)
+      end subroutine respond
+
+   end subroutine remember_field
+
+   !> The response of a mode over its traction: the mean over the wave vectors that it stands for.
+   pure function response(medium, dt, which, i, j) result(ratio)
+      type(medium_type), intent(in) :: medium
+      real(dp), intent(in) :: dt
+      integer, intent(in) :: which                     !! whole, increment or the number of an arm
+      integer, intent(in) :: i, j
+      complex(dp) :: ratio
+      complex(dp) :: part
+      real(dp) :: waves(2, 4), rate
+      integer :: count, k
+
+      call mode_waves(medium%grid, i, j, waves, count)
+      ratio = (0.0_dp, 0.0_dp)
+      do k = 1, count
+         rate = dot_product(waves(:, k), medium%velocity)
+         part = 1.0_dp/(count*steady_modulus(medium, rate))
+         if (which == increment) part = part*(1.0_dp - exp(cmplx(0.0_dp, rate*dt, dp)))
+         if (which > whole) part = part*medium%g(which)*arm_ratio(-rate*medium%tau(which))
+         ratio = ratio + part
+      end do
+   end function response
+
+   !> i x/(1 + i x) without overflow.
+   pure function arm_ratio(x) result(ratio)
+      real(dp), intent(in) :: x                        !! omega tau
+      complex(dp) :: ratio
+
+      if (abs(x) > 1.0_dp) then
+         ratio = 1.0_dp/cmplx(1.0_dp, -1.0_dp/x, dp)
+      else
+         ratio = cmplx(0.0_dp, x, dp)/cmplx(1.0_dp, x, dp)
+      end if
+   end function arm_ratio
+
+   !> The stored energy, and what the books keep from the last step.
+   subroutine book_memory(medium, dt, thickness, p, t, books)
+      type(medium_type), intent(in) :: medium
+      real(dp), intent(in) :: dt
+      real(dp), intent(in) :: thickness                !! of the block: its mean shear, m
+      complex(dp), intent(in) :: p(0:, 0:)             !! transform of the pressure, or of no extent
+      complex(dp), intent(in) :: t(0:, 0:, :)          !! of the traction, or of no extent
+      type(energy_books_type), intent(inout) :: books
+      real(dp), allocatable :: rows(:, :), total(:)
+      real(dp) :: area
+      integer :: arms, j
+
+      arms = size(medium%g)
+      allocate (rows(2 + 2*arms, 0:medium%grid%ny - 1))
+      !$omp parallel do default(none) shared(medium, dt, p, t, rows) private(j)
+      do j = 0, medium%grid%ny - 1
+         if (size(p) > 0) call row_products(medium, dt, j, rows(:, j), p=p(:, j))
+         if (size(t) > 0) call row_products(medium, dt, j, rows(:, j), t=t(:, j, :))
+      end do
+      allocate (total(size(rows, 1)), source=0.0_dp)
+      do j = 0, medium%grid%ny - 1
+         total = total + rows(:, j)
+      end do
+      total = global_sum(total)
+      if (size(t) > 0) total(1) = total(1) + thickness*sum(abs(t(0, 0, :))**2) &
+         /(real(medium%grid%nx, dp)*medium%grid%ny)**2/medium%modulus**2
+      area = medium%grid%lx*medium%grid%ly
+      call book_state(books, medium%modulus, medium%g, area*total(1), area*total(2), &
+         area*total(3:2 + arms), area*total(3 + arms:))
+   end subroutine book_memory
+
+   !> Sums over the modes of a row, per area: U.S, dU.dS, and for each arm m_k.p_k and p_k.dU.
+   subroutine row_products(medium, dt, j, sums, p, t)
+      type(medium_type), intent(in) :: medium
+      real(dp), intent(in) :: dt
+      integer, intent(in) :: j
+      real(dp), intent(out) :: sums(:)
+      complex(dp), intent(in), optional :: p(0:)
+      complex(dp), intent(in), optional :: t(0:, :)
+      complex(dp) :: pressure, traction(2), change, arm
+      real(dp) :: form
+      integer :: arms, i, k
+
+      arms = size(medium%g)
+      sums = 0.0_dp
+      pressure = (0.0_dp, 0.0_dp)
+      traction = (0.0_dp, 0.0_dp)
+      do i = 0, medium%grid%nx/2
+         if (present(p)) pressure = p(i)
+         if (present(t)) traction = t(i, :)
+         form = sum(elastic_forms(medium, i, j, pressure, traction))
+         change = response(medium, dt, increment, i, j)
+         sums(1) = sums(1) + form*abs(response(medium, dt, whole, i, j))**2
+         sums(2) = sums(2) + form*abs(change)**2
+         do k = 1, arms
+            arm = response(medium, dt, k, i, j)
+            sums(2 + k) = sums(2 + k) + form*abs(arm)**2
+            sums(2 + arms + k) = sums(2 + arms + k) + form*real(conjg(arm)*change, dp)
+         end do
+      end do
+   end subroutine row_products
+
+end module steady_memory

@@ -1,0 +1,353 @@
+!> A row of steady sliding: the state that a road reaches that slides for ever.
+!>
+!> Solvers: `steady_normal` without friction, `steady_friction` with it. A row that follows a steady row
+!> starts from its state; where two rows went before and only the speed or only the load changes, from
+!> the straight line through both in the logarithm of what changes.
+!>
+!> The road is read relative to the mean displacement of the contact, which keeps the contact in its place on
+!> the grid from row to row. The road of the row therefore stands where `place` says: at the place of
+!> the first steady row plus that mean displacement.
+!>
+!> Energy: per area the road does V.(T - P grad H) of work, with T alone where it holds -P grad H. Modes
+!> give the rate of loss exactly. In the sum over cells of -P grad H the slopes of the mesh stand for
+!> those of U_z; taking the loss instead converges faster with the mesh. Hence
+!>
+!>     friction_viscous = [loss by P/|V| + mean(P grad H.dU_T/ds)]/mean P
+!>
+!> which tends to -mean(P dH/ds)/mean P. What friction loses is mean((T - T*).r) |V|.
+module steady_step
+   use case_settings, only : case_type
+   use errors, only : error_type
+   use friction_law, only : friction_law_type, new_friction_law
+   use interpolation, only : interpolation_type, shifted
+   use normal_state, only : normal_problem_type
+   use parallel, only : global_sum
+   use precision, only : dp, int8
+   use regular_grid, only : grid_type
+   use schedule, only : planned_row_type
+   use solver_result, only : solver_result_type
+   use steady_friction, only : new_steady_friction, steady_contact_type, steady_friction_type
+   use steady_losses, only : steady_losses_type, sum_losses
+   use steady_memory, only : book_memory, remember_field
+   use steady_normal, only : new_steady_normal, steady_normal_type
+   use steady_operator, only : new_steady_operator, steady_operator_type
+   use steady_symbols, only : medium_type, new_steady_symbols, steady_symbols_type
+   use viscoelastic_energy, only : energy_books_type
+   use zener, only : history_type
+   implicit none
+   private
+
+   public :: new_steady_step, steady_start_type, steady_step_type
+
+   !> A state from which a later row may start.
+   type :: steady_start_type
+      logical :: known = .false.
+      real(dp) :: pressure_mean = 0.0_dp               !! the load, Pa
+      real(dp) :: velocity(2) = 0.0_dp                 !! m/s
+      real(dp), allocatable :: pressure(:, :)          !! Pa
+      real(dp), allocatable :: gap(:, :)               !! m
+      real(dp), allocatable :: traction(:, :, :)       !! Pa [nx, 2, ny]; no extent without friction
+   end type steady_start_type
+
+   !> Solvers and the last states. Not to be copied.
+   type :: steady_step_type
+      type(grid_type) :: grid
+      logical :: frictional = .false.
+      type(friction_law_type) :: law
+      type(medium_type) :: medium
+      real(dp) :: thickness = 0.0_dp                   !! of the block, m
+      type(steady_contact_type) :: contact             !! the state of the last row
+      type(steady_losses_type) :: losses               !! of that state
+      real(dp) :: base(2) = 0.0_dp                     !! place of the road without the offset, m
+      real(dp) :: place(2) = 0.0_dp                    !! of the road in the last row, m
+      real(dp) :: viscous_force(2) = 0.0_dp            !! mean of -P grad H, from the losses, Pa
+      real(dp) :: power_friction = 0.0_dp              !! W over the cell
+      real(dp) :: scheme_dt = 0.0_dp                   !! for tests: symbols of a scheme with this step, s
+      type(steady_start_type) :: last, before          !! states of the last two rows
+      real(dp), private :: tolerance = 1e-6_dp
+      integer, private :: max_iterations = 1000
+      real(dp), private :: rms_height = 0.0_dp
+      type(steady_operator_type), private :: operator
+      type(steady_normal_type), private :: normal
+      type(steady_friction_type), private :: coupled
+      complex(dp), allocatable, private :: p_modes(:, :), t_modes(:, :, :)
+   contains
+      procedure :: solve
+      procedure :: remember_normal
+      procedure :: remember_tangential
+      procedure :: begin_curve
+      procedure :: destroy
+   end type steady_step_type
+
+contains
+
+   !> Prepare the solvers that a case needs.
+   subroutine new_steady_step(self, case, rms_height, error)
+      type(steady_step_type), intent(out) :: self
+      type(case_type), intent(in) :: case
+      real(dp), intent(in) :: rms_height               !! of the road about its mean, m
+      type(error_type), allocatable, intent(out) :: error
+      integer :: nx, ny
+
+      self%grid = case%grid
+      nx = self%grid%nx
+      ny = self%grid%ny
+      self%frictional = case%friction%law /= 'none'
+      self%tolerance = case%solver%tolerance
+      self%max_iterations = case%solver%max_iterations
+      self%rms_height = rms_height
+      self%thickness = case%material%thickness
+      self%medium%grid = case%grid
+      self%medium%poisson = case%material%poisson
+      self%medium%modulus = case%material%shear_modulus
+      allocate (self%medium%g, source=case%material%prony_g)
+      allocate (self%medium%tau, source=case%material%prony_tau)
+      call new_steady_operator(self%operator, self%grid, self%frictional, error)
+      if (allocated(error)) return
+      associate (c => self%contact)
+         allocate (c%pressure(nx, ny), c%gap(nx, ny), c%height(nx, ny), c%slope_x(nx, ny), &
+            c%slope_y(nx, ny), source=0.0_dp)
+         if (self%frictional) then
+            allocate (c%traction(nx, 2, ny), c%displacement(nx, 2, ny), c%slip(nx, 2, ny), source=0.0_dp)
+         else
+            allocate (c%traction(nx, 2, 0), c%displacement(nx, 2, 0), c%slip(nx, 2, 0))
+         end if
+      end associate
+      if (self%frictional) then
+         self%law = new_friction_law(trim(case%friction%law), case%friction%coefficient, &
+            case%friction%shear_strength, 0.0_dp, case%friction%slope_effect, &
+            case%solver%slip_law == 'physical')
+         call new_steady_friction(self%coupled, self%grid, self%law)
+      else
+         call new_steady_normal(self%normal, self%grid)
+      end if
+   end subroutine new_steady_step
+
+   !> Forget the states of earlier rows; the next steady row finds the road here.
+   subroutine begin_curve(self, place)
+      class(steady_step_type), intent(inout) :: self
+      real(dp), intent(in) :: place(2)                 !! of the road, m
+
+      self%base = place
+      self%last%known = .false.
+      self%before%known = .false.
+   end subroutine begin_curve
+
+   !> Find the state of a row: the contact, where the road stands, the losses.
+   subroutine solve(self, plan, road, outcome, rubbing)
+      class(steady_step_type), intent(inout) :: self
+      type(planned_row_type), intent(in) :: plan
+      type(interpolation_type), intent(in) :: road
+      type(solver_result_type), intent(out) :: outcome   !! of the pressure
+      type(solver_result_type), intent(out) :: rubbing   !! of the traction
+      type(steady_symbols_type) :: symbols
+      type(normal_problem_type) :: problem
+
+      self%medium%velocity = [plan%velocity_x, plan%velocity_y]
+      self%medium%dt = self%scheme_dt
+      call new_steady_symbols(symbols, self%medium, self%operator%last, self%frictional)
+      call self%operator%set_symbols(symbols)
+      problem%modulus = self%medium%modulus
+      problem%target = plan%load
+      if (plan%control == 'force') problem%target = plan%load/(self%grid%lx*self%grid%ly)
+      problem%tolerance = self%tolerance
+      problem%max_iterations = self%max_iterations
+      problem%rms_height = self%rms_height
+      call start_from(self, problem)
+
+      rubbing%converged = .true.
+      call shifted(road, self%base(1), self%base(2), self%contact%height, self%contact%slope_x, &
+         self%contact%slope_y)
+      if (self%frictional) then
+         self%coupled%direction = self%medium%velocity/norm2(self%medium%velocity)
+         self%coupled%base = self%base
+         call self%coupled%solve(self%operator, problem, road, self%contact, outcome, rubbing)
+         call add_mean_shear(self)
+      else
+         call self%normal%solve(self%operator, problem, self%contact%height, self%contact%pressure, &
+            self%contact%gap, self%contact%level, outcome)
+      end if
+      self%place = self%base + self%contact%offset
+      call find_losses(self)
+      call keep_state(self, problem%target)
+   end subroutine solve
+
+   !> The displacement's mean mode: the shear of a block of finite thickness.
+   subroutine add_mean_shear(self)
+      type(steady_step_type), intent(inout) :: self
+      real(dp) :: mean
+      integer :: c, j
+
+      do c = 1, 2
+         mean = 0.0_dp
+         do j = 1, self%grid%ny
+            mean = mean + sum(self%contact%traction(:, c, j))
+         end do
+         mean = global_sum(mean)/(real(self%grid%nx, dp)*self%grid%ny)*self%thickness/self%medium%modulus
+         self%contact%displacement(:, c, :) = self%contact%displacement(:, c, :) + mean
+         self%contact%offset(c) = self%contact%offset(c) + mean
+      end do
+   end subroutine add_mean_shear
+
+   !> The start of a row: nothing, the last state, or what follows from the last two.
+   subroutine start_from(self, problem)
+      type(steady_step_type), intent(inout) :: self
+      type(normal_problem_type), intent(inout) :: problem
+      real(dp) :: part, scale
+      integer :: j
+
+      problem%warm = self%last%known
+      if (.not. problem%warm) return
+      part = onward(self, problem%target)
+      associate (c => self%contact, a => self%last, b => self%before)
+         scale = sum(a%pressure)/max(sum(a%gap), tiny(1.0_dp))
+         do j = 1, self%grid%ny
+            ! Pressure and gap are one quantity on both sides of zero.
+            c%pressure(:, j) = a%pressure(:, j) - scale*a%gap(:, j)
+            if (part > 0.0_dp .or. part < 0.0_dp) c%pressure(:, j) = c%pressure(:, j) &
+               + part*(c%pressure(:, j) - b%pressure(:, j) + scale*b%gap(:, j))
+            c%gap(:, j) = max(-c%pressure(:, j), 0.0_dp)/scale
+            c%pressure(:, j) = max(c%pressure(:, j), 0.0_dp)
+            if (.not. self%frictional) cycle
+            c%traction(:, :, j) = a%traction(:, :, j)
+            if (part > 0.0_dp .or. part < 0.0_dp) &
+               c%traction(:, :, j) = c%traction(:, :, j) + part*(a%traction(:, :, j) - b%traction(:, :, j))
+         end do
+         problem%warm = sum(c%pressure) > 0.0_dp
+      end associate
+   end subroutine start_from
+
+   !> How far to go on along the line through the last two states; 0: not at all.
+   pure function onward(self, target) result(part)
+      type(steady_step_type), intent(in) :: self
+      real(dp), intent(in) :: target                   !! mean pressure of the row, Pa
+      real(dp) :: part
+      real(dp) :: speed(3), turn, load(3)
+      real(dp), parameter :: same = 1e-9_dp, farthest = 2.0_dp
+
+      part = 0.0_dp
+      if (.not. self%before%known) return
+      speed = log([norm2(self%before%velocity), norm2(self%last%velocity), norm2(self%medium%velocity)])
+      load = log([self%before%pressure_mean, self%last%pressure_mean, target])
+      turn = norm2(self%medium%velocity/exp(speed(3)) - self%last%velocity/exp(speed(2))) &
+         + norm2(self%last%velocity/exp(speed(2)) - self%before%velocity/exp(speed(1)))
+      if (turn > same) return
+      if (maxval(load) - minval(load) <= same .and. abs(speed(2) - speed(1)) > same) then
+         part = (speed(3) - speed(2))/(speed(2) - speed(1))
+      else if (maxval(speed) - minval(speed) <= same .and. abs(load(2) - load(1)) > same) then
+         part = (load(3) - load(2))/(load(2) - load(1))
+      end if
+      if (abs(part) > farthest) part = 0.0_dp
+   end function onward
+
+   !> Keep the state of the row for the next ones.
+   subroutine keep_state(self, target)
+      type(steady_step_type), intent(inout) :: self
+      real(dp), intent(in) :: target
+
+      if (self%last%known) self%before = self%last
+      self%last%known = .true.
+      self%last%pressure_mean = target
+      self%last%velocity = self%medium%velocity
+      self%last%pressure = self%contact%pressure
+      self%last%gap = max(self%contact%gap, 0.0_dp)
+      self%last%traction = self%contact%traction
+   end subroutine keep_state
+
+   !> The losses of the state, and the forces that follow from them.
+   subroutine find_losses(self)
+      type(steady_step_type), intent(inout) :: self
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: direction(2), speed, area, sums(4)
+      integer :: j, last
+
+      last = self%operator%last
+      if (.not. allocated(self%p_modes)) then
+         allocate (self%p_modes(0:last, 0:self%grid%ny - 1))
+         allocate (self%t_modes(0:last, 0:self%grid%ny - 1, merge(2, 0, self%frictional)))
+      end if
+      call self%operator%spectrum(self%contact%pressure, self%p_modes)
+      do j = 1, size(self%t_modes, 3)
+         call self%operator%spectrum(self%contact%traction(:, j, :), self%t_modes(:, :, j))
+      end do
+      call sum_losses(self%medium, self%p_modes, self%t_modes, self%losses)
+
+      allocate (rows(4, self%grid%ny))
+      !$omp parallel do default(none) shared(self, rows) private(j)
+      do j = 1, self%grid%ny
+         call row_forces(self, j, rows(:, j))
+      end do
+      sums = 0.0_dp
+      do j = 1, self%grid%ny
+         sums = sums + rows(:, j)
+      end do
+      sums = global_sum(sums)/(real(self%grid%nx, dp)*self%grid%ny)
+      speed = norm2(self%medium%velocity)
+      direction = self%medium%velocity/speed
+      area = self%grid%lx*self%grid%ly
+      self%power_friction = sums(4)*speed*area
+      ! Across the motion the slopes of the mesh are all there is.
+      self%viscous_force = -sums(1:2)
+      self%viscous_force = self%viscous_force + direction*(self%losses%normal/(speed*area) + sums(3) &
+         - dot_product(self%viscous_force, direction))
+   end subroutine find_losses
+
+   !> Sums over a row: P grad H, P grad H.(r - e), (T - T*).r.
+   subroutine row_forces(self, j, sums)
+      type(steady_step_type), intent(in) :: self
+      integer, intent(in) :: j
+      real(dp), intent(out) :: sums(4)
+      real(dp) :: slope(2), r(2), star(2), direction(2)
+      integer :: i
+
+      sums = 0.0_dp
+      direction = self%medium%velocity/norm2(self%medium%velocity)
+      associate (c => self%contact)
+         do i = 1, self%grid%nx
+            if (c%pressure(i, j) <= 0.0_dp) cycle
+            slope = [c%slope_x(i, j), c%slope_y(i, j)]
+            sums(1:2) = sums(1:2) + c%pressure(i, j)*slope
+            if (.not. self%frictional) cycle
+            r = c%slip(i, :, j)
+            star = self%law%normal_traction(c%pressure(i, j), slope)
+            sums(3) = sums(3) + c%pressure(i, j)*dot_product(slope, r - direction)
+            sums(4) = sums(4) + dot_product(c%traction(i, :, j) - star, r)
+         end do
+      end associate
+   end subroutine row_forces
+
+   !> The memory of the normal side, and its stored energy.
+   subroutine remember_normal(self, dt, history, books)
+      class(steady_step_type), intent(inout) :: self
+      real(dp), intent(in) :: dt                       !! of the step to come, s; 0: none
+      type(history_type), intent(inout) :: history
+      type(energy_books_type), intent(inout) :: books
+      complex(dp) :: none(0:-1, 0:-1, 2)
+
+      call remember_field(self%operator, self%medium, dt, self%contact%pressure, 1, history)
+      call book_memory(self%medium, dt, 0.0_dp, self%p_modes, none, books)
+   end subroutine remember_normal
+
+   !> The same of the tangential side.
+   subroutine remember_tangential(self, dt, history, books)
+      class(steady_step_type), intent(inout) :: self
+      real(dp), intent(in) :: dt
+      type(history_type), intent(inout) :: history
+      type(energy_books_type), intent(inout) :: books
+      complex(dp) :: none(0:-1, 0:-1)
+      integer :: c
+
+      do c = 1, 2
+         call remember_field(self%operator, self%medium, dt, self%contact%traction(:, c, :), c, history)
+      end do
+      call book_memory(self%medium, dt, self%thickness, none, self%t_modes, books)
+   end subroutine remember_tangential
+
+   !> Free plans and memory.
+   subroutine destroy(self)
+      class(steady_step_type), intent(inout) :: self
+
+      call self%operator%destroy()
+   end subroutine destroy
+
+end module steady_step
