@@ -29,6 +29,7 @@ program main
    use test_simulation, only : run_simulation
    use test_simulation_adhesion, only : run_simulation_adhesion
    use test_simulation_sliding, only : run_simulation_sliding
+   use test_steady, only : run_steady
    use test_simulation_friction, only : run_simulation_friction
    use test_normal_invariance, only : run_normal_invariance
    use test_normal_limits, only : run_normal_limits
@@ -57,6 +58,7 @@ program main
    if (wanted('checkpoint')) call run_checkpoint()
    if (wanted('simulation')) call run_simulation()
    if (wanted('simulation_sliding')) call run_simulation_sliding()
+   if (wanted('steady')) call run_steady()
    if (wanted('simulation_friction')) call run_simulation_friction()
    if (wanted('simulation_adhesion')) call run_simulation_adhesion()
    if (wanted('friction_law')) call run_friction_law()

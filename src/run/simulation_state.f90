@@ -9,6 +9,7 @@ module simulation_state
    use precision, only : dp
    use simulation, only : simulation_type
    use state_table, only : state_table_type
+   use steady_step, only : steady_start_type
    use tangential_state, only : tangential_state_type
    use viscoelastic_energy, only : energy_books_type
    use zener, only : history_type
@@ -80,6 +81,12 @@ contains
       call list_books('books', sim%books, table)
       call list_history('history', sim%history, table)
       if (sim%frictional) call list_tangential(sim%tangential, table)
+      if (.not. sim%has_steady) return
+      call table%add('steady/now', sim%was_steady, 'the last row was one of steady sliding')
+      call table%add('steady/base', sim%steady%base, 'm', &
+         'place of the road in steady rows, less the mean displacement of the contact')
+      call list_start('steady/last', sim%steady%last, table)
+      call list_start('steady/before', sim%steady%before, table)
    end subroutine list_state
 
    !> Where the run stands in its phases.
@@ -144,6 +151,21 @@ contains
       call table%add(prefix//'/ds', history%ds, '1', 'S less that of the step before')
       call table%add(prefix//'/arm', history%arm, 'Pa', 'tractions of the arms')
    end subroutine list_history
+
+   !> A state of steady sliding from which the next row may start.
+   subroutine list_start(prefix, start, table)
+      character(*), intent(in) :: prefix
+      type(steady_start_type), intent(in), target :: start
+      type(state_table_type), intent(inout) :: table
+
+      call table%add(prefix//'/known', start%known, 'there is such a state')
+      call table%add(prefix//'/pressure_mean', start%pressure_mean, 'Pa', 'load')
+      call table%add(prefix//'/velocity', start%velocity, 'm/s', 'velocity of the road')
+      call table%add(prefix//'/pressure', start%pressure, 'Pa', 'normal traction on the rubber')
+      call table%add(prefix//'/gap', start%gap, 'm', 'gap between rubber and road')
+      if (size(start%traction) > 0) &
+         call table%add(prefix//'/traction', start%traction, 'Pa', 'tangential traction')
+   end subroutine list_start
 
    !> The tangential part of the state.
    subroutine list_tangential(t, table)

@@ -112,6 +112,9 @@ contains
          else
             allocate (c%traction(nx, 2, 0), c%displacement(nx, 2, 0), c%slip(nx, 2, 0))
          end if
+         allocate (self%last%pressure, self%last%gap, source=c%pressure)
+         allocate (self%last%traction, source=c%traction)
+         self%before = self%last
       end associate
       if (self%frictional) then
          self%law = new_friction_law(trim(case%friction%law), case%friction%coefficient, &

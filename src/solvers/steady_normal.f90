@@ -168,7 +168,7 @@ contains
       call operator%set_scale(self%c)
       where (pressure > 0.0_dp)
          self%z = pressure
-      elsewhere
+      else where
          self%z = -self%c*max(gap - level, 0.0_dp)
       end where
    end subroutine start

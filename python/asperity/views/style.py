@@ -62,6 +62,8 @@ LABELS = {
     "dissipated_viscous": "Lost in the rubber",
     "dissipated_numerical": "Lost by the scheme",
     "dissipated_friction": "Lost by friction",
+    "power_viscous": "Rate of loss in the rubber",
+    "power_friction": "Rate of loss by friction",
     "work_normal": "Normal work",
     "work_tangential": "Tangential work",
     "work_load": "Work of the load",

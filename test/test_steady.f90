@@ -1,0 +1,223 @@
+!> Tests of steady sliding: closed forms, limits of speed, invariances, balances, the way on in time.
+module test_steady
+   use check, only : begin_suite, check_close, check_that
+   use precision, only : dp, pi
+   use prony, only : complex_modulus
+   use simulation_runs, only : check_books, last, nl, record_type, run_case, write_map
+   use text_tools, only : exact_text, to_text
+   implicit none
+   private
+
+   public :: run_steady
+
+   !> A road of random waves, 64 by 48 cells of 1 mm, and a rubber with two arms.
+   character(*), parameter :: road = '&surface shape = ''self_affine'', hurst = 0.8, '// &
+      'wavelength_long = 48e-3, wavelength_short = 8e-3, rms_slope = 0.15, seed = 3 /'//nl
+   character(*), parameter :: rubber = '&material shear_modulus = 1e6, prony_g = 5e6, 4e6, '// &
+      'prony_tau = 1e-2, 1e-4 /'//nl
+   character(*), parameter :: grid = '&grid nx = 64, ny = 48, lx = 64e-3, ly = 48e-3 /'//nl
+
+   character(*), parameter :: map_file = 'build/test_steady_map.h5'
+
+contains
+
+   subroutine run_steady()
+      call begin_suite('steady')
+      call test_full_contact()
+      call test_speed_limits()
+      call test_turned()
+      call test_balance()
+      call test_plane_strain()
+      call test_onward_in_time()
+      call test_curve()
+   end subroutine run_steady
+
+   !> Full contact with a wave: P = p + K^-1 H, so that friction is k^2 h^2 G''(k V)/(2 (1-nu) p).
+   subroutine test_full_contact()
+      type(record_type) :: record
+      real(dp), parameter :: length = 10e-3_dp, height = 20e-6_dp, load = 2e5_dp, speed = 0.3_dp
+      real(dp) :: exact, k
+
+      k = 2.0_dp*pi/length
+      exact = 0.5_dp*(k*height)**2*aimag(complex_modulus(1e6_dp, [5e6_dp, 4e6_dp], [1e-2_dp, 1e-4_dp], &
+         k*speed))/(0.55_dp*load)
+      call run_case('&grid nx = 32, ny = 6, lx = 10e-3 /'//nl//'&surface shape = ''sine'', amplitude = '// &
+         exact_text(height)//', wavelength = 10e-3 /'//nl//'&material poisson = 0.45, shear_modulus = '// &
+         '1e6, prony_g = 5e6, 4e6, prony_tau = 1e-2, 1e-4 /'//nl//'&phase steady = T, pressure = '// &
+         exact_text(load)//', velocity_x = '//exact_text(speed)//' /', 'full contact', record)
+      call check_close(record%rows(0)%contact_area, 1.0_dp, 0.0_dp, 'full contact')
+      call check_close(record%rows(0)%friction/exact, 1.0_dp, 1e-12_dp, 'full contact: friction')
+      call check_close(record%rows(0)%power_viscous/(exact*record%rows(0)%force*speed), 1.0_dp, 1e-12_dp, &
+         'full contact: power')
+   end subroutine test_full_contact
+
+   !> At rest a steady state is a relaxed one, very slow and very fast it is that of G_e and of G(0).
+   subroutine test_speed_limits()
+      type(record_type) :: slow, fast, relaxed, rest, glassy
+      character(*), parameter :: case = grid//road//rubber//'&solver tolerance = 1e-9 /'//nl
+      character(*), parameter :: line = '&grid nx = 256, ny = 1, lx = 64e-3 /'//nl//road//rubber// &
+         '&solver tolerance = 1e-9 /'//nl
+
+      call run_case(case//'&phase relaxed = T, pressure = 2e5 /', 'relaxed', relaxed)
+      call run_case(case//'&phase steady = T, pressure = 2e5 /', 'steady at rest', rest)
+      call run_case(case//'&phase steady = T, pressure = 2e5, velocity_x = -1e-8 /', 'slow', slow)
+      call run_case(line//'&phase pressure = 2e5 /', 'glassy', glassy)
+      call run_case(line//'&phase steady = T, pressure = 2e5, velocity_x = 1e8 /', 'fast', fast)
+      call check_close(maxval(abs(rest%pressure - relaxed%pressure)), 0.0_dp, 0.0_dp, 'at rest')
+      call check_close(maxval(abs(slow%pressure - relaxed%pressure))/maxval(relaxed%pressure), 0.0_dp, &
+         1e-5_dp, 'slow as relaxed')
+      call check_close(maxval(abs(slow%gap - relaxed%gap))/maxval(relaxed%gap), 0.0_dp, 1e-5_dp, 'slow: gap')
+      call check_close(slow%rows(0)%displacement/relaxed%rows(0)%displacement, 1.0_dp, 1e-7_dp, &
+         'slow: approach')
+      call check_close(slow%rows(0)%energy_elastic/relaxed%rows(0)%energy_elastic, 1.0_dp, 1e-6_dp, &
+         'slow: stored energy')
+      call check_that(abs(slow%rows(0)%friction) < 1e-6_dp, 'slow: no friction')
+      ! In a plane, modes across the motion stay relaxed at any speed; on a line there are none.
+      call check_close(maxval(abs(fast%pressure - glassy%pressure))/maxval(glassy%pressure), 0.0_dp, &
+         1e-5_dp, 'fast as glassy')
+      call check_that(abs(fast%rows(0)%friction) < 1e-6_dp, 'fast: no friction')
+      call check_books(slow, 'slow')
+   end subroutine test_speed_limits
+
+   !> The same road turned by 90 degrees and mirrored, with friction in an oblique direction.
+   subroutine test_turned()
+      type(record_type) :: straight, turned, mirrored
+      real(dp) :: height(40, 32)
+
+      height = wavy(40, 32)
+      straight = slid('straight', height, 0.8_dp, 0.3_dp)
+      turned = slid('turned', transpose(height), 0.3_dp, 0.8_dp)
+      mirrored = slid('mirrored', height(40:1:-1, :), -0.8_dp, 0.3_dp)
+      call check_close(maxval(abs(transpose(turned%pressure) - straight%pressure)) &
+         /maxval(straight%pressure), 0.0_dp, 1e-6_dp, 'turned: pressure')
+      call check_close(turned%rows(0)%friction/straight%rows(0)%friction, 1.0_dp, 1e-7_dp, 'turned: friction')
+      call check_close(turned%rows(0)%traction_y/straight%rows(0)%traction_x, 1.0_dp, 1e-7_dp, &
+         'turned: traction')
+      call check_close(mirrored%rows(0)%friction/straight%rows(0)%friction, 1.0_dp, 1e-7_dp, &
+         'mirrored: friction')
+      call check_close(maxval(abs(mirrored%pressure(40:1:-1, :) - straight%pressure)) &
+         /maxval(straight%pressure), 0.0_dp, 1e-6_dp, 'mirrored: pressure')
+   end subroutine test_turned
+
+   !> A smooth road without symmetry, m.
+   function wavy(nx, ny) result(height)
+      integer, intent(in) :: nx, ny
+      real(dp) :: height(nx, ny)
+      real(dp) :: x, y
+      integer :: i, j
+
+      do j = 1, ny
+         do i = 1, nx
+            x = 2.0_dp*pi*(i - 0.5_dp)/nx
+            y = 2.0_dp*pi*(j - 0.5_dp)/ny
+            height(i, j) = 1e-3_dp*(cos(x + 0.3_dp) + 0.6_dp*cos(2.0_dp*y - 0.7_dp) &
+               + 0.4_dp*cos(2.0_dp*x + 3.0_dp*y) + 0.3_dp*cos(3.0_dp*x - y + 1.0_dp))
+         end do
+      end do
+   end function wavy
+
+   !> A steady row with friction on the slope, over a given road of cells of 1 mm.
+   function slid(what, height, velocity_x, velocity_y, settings) result(record)
+      character(*), intent(in) :: what
+      real(dp), intent(in) :: height(:, :)
+      real(dp), intent(in) :: velocity_x, velocity_y
+      character(*), intent(in), optional :: settings   !! of the law
+      type(record_type) :: record
+      character(:), allocatable :: more
+
+      more = '&friction law = ''coulomb'', coefficient = 0.4 /'
+      if (present(settings)) more = settings
+      call write_map(map_file, height)
+      call run_case('&grid nx = '//to_text(size(height, 1))//', ny = '//to_text(size(height, 2))// &
+         ', lx = '//exact_text(1e-3_dp*size(height, 1))//' /'//nl// &
+         '&surface shape = ''file'', file = '''//map_file//''' /'//nl//rubber//more//nl// &
+         '&solver tolerance = 1e-8, interpolation = ''cubic'' /'//nl//'&phase steady = T, pressure = 5e4, '// &
+         'velocity_x = '//exact_text(velocity_x)//', velocity_y = '//exact_text(velocity_y)//' /', &
+         what, record)
+   end function slid
+
+   !> Power in is power out, with the slope; without it the flat law leaves out a part.
+   subroutine test_balance()
+      type(record_type) :: slope, flat
+      real(dp) :: drive
+
+      slope = slid('slope', wavy(40, 32), 0.8_dp, 0.3_dp)
+      associate (row => slope%rows(0))
+         drive = row%friction*row%force*hypot(0.8_dp, 0.3_dp)
+         call check_close((row%power_viscous + row%power_friction)/drive, 1.0_dp, 1e-9_dp, 'balance: slope')
+         call check_that(row%power_viscous > 0.0_dp .and. row%power_friction > 0.0_dp, 'balance: losses')
+         call check_close(row%stick_area, 0.0_dp, 0.0_dp, 'all slips')
+         call check_close(row%sliding_speed, hypot(0.8_dp, 0.3_dp), 1e-12_dp, 'sliding speed')
+         call check_close(row%residual_tangential, 0.0_dp, 1e-8_dp, 'tangential residual')
+      end associate
+      flat = slid('flat', wavy(40, 32), 0.8_dp, 0.3_dp, &
+         '&friction law = ''coulomb'', coefficient = 0.4, slope_effect = F /')
+      associate (row => flat%rows(0))
+         drive = row%friction*row%force*hypot(0.8_dp, 0.3_dp)
+         call check_close((row%power_viscous + row%power_friction)/drive, 1.0_dp, 0.1_dp, 'balance: flat')
+      end associate
+      call check_books(slope, 'steady, slope')
+   end subroutine test_balance
+
+   !> Plane strain, nu = 1/2, flat law: T = mu P and A_xx = A_zz, so that U_x = mu U_z; the road is read
+   !> at x + U_x, and stands further by the mean of U_x under the pressure.
+   subroutine test_plane_strain()
+      type(record_type) :: record
+
+      call run_case('&grid nx = 256, ny = 1, lx = 64e-3 /'//nl//'&surface shape = ''sine'', amplitude = '// &
+         '1e-3, wavelength = 32e-3 /'//nl//'&surface shape = ''sine'', amplitude = 0.3e-3, wavelength = '// &
+         '6.4e-3 /'//nl//rubber//'&friction law = ''coulomb'', coefficient = 0.5, slope_effect = F /'//nl// &
+         '&solver tolerance = 1e-9, interpolation = ''cubic'' /'//nl// &
+         '&phase steady = T, pressure = 8e4, velocity_x = 0.2 /', 'plane strain', record)
+      associate (row => record%rows(0))
+         call check_close(row%traction_x/row%pressure, 0.5_dp, 1e-9_dp, 'plane strain: T = mu P')
+         call check_close(row%road_x/(0.5_dp*sum(record%pressure*record%displacement) &
+            /sum(record%pressure)), 1.0_dp, 1e-6_dp, 'plane strain: U_x = mu U_z')
+      end associate
+   end subroutine test_plane_strain
+
+   !> A steady phase with a duration goes on from its state: nothing changes but by the error of the
+   !> steps, while a start from rest is far away.
+   subroutine test_onward_in_time()
+      type(record_type) :: steady, rest
+      character(*), parameter :: steps = 'velocity_x = 0.5, duration = 12e-3, steps = 6 /'
+      character(*), parameter :: laws(2) = [character(80) :: '', &
+         '&friction law = ''coulomb'', coefficient = 0.4 / &solver passes = 8 /']
+      integer :: k
+
+      do k = 1, 2
+         call run_case(grid//road//rubber//trim(laws(k))//nl//'&phase pressure = 1e5, steady = T, '//steps, &
+            'onward', steady)
+         call run_case(grid//road//rubber//trim(laws(k))//nl//'&phase pressure = 1e5, relaxed = T, '//steps, &
+            'from rest', rest)
+         call check_that(last(steady) == 6, 'onward: rows')
+         call check_close(steady%rows(6)%contact_area/steady%rows(0)%contact_area, 1.0_dp, 0.05_dp, &
+            'onward: contact')
+         call check_that(abs(rest%rows(2)%contact_area/steady%rows(0)%contact_area - 1.0_dp) > 0.1_dp, &
+            'from rest: contact')
+         call check_close(steady%rows(6)%power_viscous/steady%rows(0)%power_viscous, 1.0_dp, 0.03_dp, &
+            'onward: losses')
+         call check_close(steady%rows(6)%energy_elastic/steady%rows(0)%energy_elastic, 1.0_dp, 0.03_dp, &
+            'onward: stored energy')
+         call check_books(steady, 'onward')
+      end do
+   end subroutine test_onward_in_time
+
+   !> Rows of a curve start from those before, and end where a row of its own ends.
+   subroutine test_curve()
+      type(record_type) :: curve, alone
+      character(*), parameter :: case = grid//road//rubber// &
+         '&friction law = ''coulomb'', coefficient = 0.4, slope_effect = F / &solver tolerance = 1e-8 /'//nl
+
+      call run_case(case//'&phase steady = T, pressure = 1e5, velocity_x = 0.05 /'//nl// &
+         '&phase steady = T, velocity_x = 0.1 / &phase steady = T, velocity_x = 0.2 /'//nl// &
+         '&phase steady = T, velocity_x = 0.4 /', 'curve', curve)
+      call run_case(case//'&phase steady = T, pressure = 1e5, velocity_x = 0.4 /', 'alone', alone)
+      call check_close(maxval(abs(curve%pressure - alone%pressure))/maxval(alone%pressure), 0.0_dp, 1e-5_dp, &
+         'curve: pressure')
+      call check_close(curve%rows(3)%friction/alone%rows(0)%friction, 1.0_dp, 1e-6_dp, 'curve: friction')
+      call check_that(curve%rows(3)%ffts < alone%rows(0)%ffts, 'curve: fewer transforms, '// &
+         to_text(curve%rows(3)%ffts)//' for '//to_text(alone%rows(0)%ffts))
+   end subroutine test_curve
+
+end module test_steady
