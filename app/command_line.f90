@@ -5,11 +5,11 @@ module command_line
    implicit none
    private
 
-   public :: command_type, help_text, read_command_line
+   public :: argument_text, command_type, help_text, read_command_line
 
    !> A command.
    type :: command_type
-      character(:), allocatable :: verb        !! 'run', 'check', 'template', 'info', 'version', 'help'
+      character(:), allocatable :: verb        !! 'run', 'check', 'template', 'info', 'version', 'help', 'python'
       character(:), allocatable :: path        !! of the input or the result; the name of a template
       character(:), allocatable :: output      !! --output; not allocated if not given
       integer :: threads = -1                  !! --threads; -1 if not given
@@ -17,10 +17,16 @@ module command_line
       logical :: quiet = .false.               !! --quiet
       logical :: reference = .false.           !! --reference
       character(:), allocatable :: help_of     !! verb that help is asked for; '' for the program's
+      character(:), allocatable :: handed_over !! with 'python': the verb
    end type command_type
 
    character(*), parameter :: nl = new_line('a')
-   character(*), parameter :: verbs(4) = [character(8) :: 'run', 'check', 'template', 'info']
+   character(*), parameter :: own_verbs(4) = [character(8) :: 'run', 'check', 'template', 'info']
+   character(*), parameter :: python_verbs(6) = [character(8) :: 'plot', 'report', 'watch', &
+      'import', 'fit', 'friction']             !! what the Python package does
+   character(*), parameter :: verbs(10) = [own_verbs, python_verbs]
+   character(*), parameter :: verbs_there = 'run, check, template, info, plot, report, watch, '// &
+      'import, fit and friction are there'
    character(*), parameter :: options(8) = [character(11) :: '--output', '--threads', '--restart', &
       '--quiet', '--help', '--version', '--reference', '-h']
 
@@ -34,6 +40,16 @@ contains
       logical :: help, options_end
       integer :: i
 
+      if (command_argument_count() > 0) then
+         argument = argument_text(1)
+         if (any(python_verbs == argument)) then
+            ! What follows is for Python to read.
+            command%verb = 'python'
+            command%handed_over = argument
+            command%help_of = ''
+            return
+         end if
+      end if
       command%verb = ''
       help = .false.
       options_end = .false.
@@ -78,7 +94,10 @@ contains
                help = .true.
             else if (.not. any(verbs == argument)) then
                call refuse(''''//ordinary(argument, 60)//''': there is no such command'// &
-                  hint(nearest_name(argument, verbs))//'; run, check, template and info are there')
+                  hint(nearest_name(argument, verbs))//'; '//verbs_there)
+               return
+            else if (any(python_verbs == argument)) then
+               call refuse(''''//argument//''' must be the first word: options stand behind it')
                return
             end if
          else if (.not. allocated(command%path)) then
@@ -95,9 +114,13 @@ contains
             if (any(verbs == command%path)) command%help_of = command%path
          end if
          command%verb = 'help'
+         if (any(python_verbs == command%help_of)) then
+            command%verb = 'python'
+            command%handed_over = command%help_of
+         end if
       else if (command%verb == '') then
-         if (.not. allocated(error)) call refuse('no command is given: run, check, template and info '// &
-            'are there; asperity --help says more')
+         if (.not. allocated(error)) call refuse('no command is given: '//verbs_there// &
+            '; asperity --help says more')
       else
          call check_fit(command, error)
       end if
@@ -208,7 +231,7 @@ contains
       case ('run')
          text = 'asperity run CASE.nml [--output FILE.h5] [--threads N] [--restart] [--quiet]'//nl//nl// &
             'Run a case. The result is an HDF5 file, beside the input by default. To draw it:'//nl// &
-            'python -m asperity plot RESULT.h5'//nl//nl// &
+            'asperity plot RESULT.h5'//nl//nl// &
             '  --output FILE.h5  write the result there'//nl// &
             '  --threads N       use N threads; all processors by default'//nl// &
             '  --restart         go on from the last checkpoint in the result'//nl// &
@@ -230,7 +253,14 @@ contains
             'asperity run CASE.nml [--output FILE.h5] [--threads N] [--restart] [--quiet]'//nl// &
             'asperity check CASE.nml      validate only: settings, time steps, memory'//nl// &
             'asperity template [NAME]     print an input to start from; without a name, list them'//nl// &
-            'asperity info RESULT.h5      what a result holds'//nl// &
+            'asperity info FILE.h5        what a result or a height map holds'//nl//nl// &
+            'By the Python package, where it is installed:'//nl// &
+            'asperity plot RESULT.h5      draw a result, or make a film of it'//nl// &
+            'asperity report RESULT.h5    a page about it for the browser'//nl// &
+            'asperity watch RESULT.h5     follow a run in the terminal'//nl// &
+            'asperity import TOPOGRAPHY   make a measured road ready for a run'//nl// &
+            'asperity fit DMA.csv         fit a material to measured moduli'//nl// &
+            'asperity friction ROAD ...   friction against speed, pressure and temperature'//nl//nl// &
             'asperity --version | --help  each command also has --help'//nl//nl// &
             'To begin: asperity template hertz > hertz.nml; asperity run hertz.nml'//nl//nl//statuses()
       end select

@@ -8,6 +8,7 @@ program main
       template_text
    use command_line, only : command_type, help_text, read_command_line
    use errors, only : error_input, error_type, fail
+   use hand_over, only : become_python
    use input_reference, only : reference_markdown
    use progress, only : progress_type
    use result_summary, only : summarise_result
@@ -37,6 +38,12 @@ program main
          call check(error)
       case ('info')
          call info(error)
+      case ('python')
+         if (command%help_of == '') then
+            call become_python(error)
+         else
+            call become_python(error, command%handed_over, '--help')
+         end if
       case default
          call run(error)
       end select

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 
 from .base.library import version
@@ -21,7 +22,7 @@ def main(arguments: list[str] | None = None) -> int:
         The words after ``python -m asperity``; those of the process if left out.
     """
     parser = argparse.ArgumentParser(
-        prog="python -m asperity",
+        prog=os.environ.get("ASPERITY_COMMAND", "python -m asperity"),
         description="Measured roads and rubbers into inputs, results into pictures and pages."
                     " Runs are made by the command `asperity`.")
     parser.add_argument("--version", action="version", version=f"asperity {version()}")

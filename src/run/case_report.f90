@@ -2,6 +2,7 @@
 module case_report
    use adhesion_advice, only : adhesion_notes
    use case_settings, only : case_type, phase_settings_type
+   use case_time, only : duration_text, seconds_needed
    use precision, only : dp
    use regular_grid, only : boundary_free
    use text_tools, only : exact_text, to_text
@@ -63,6 +64,7 @@ contains
          counted(sum(case%phases%steps, mask=.not. case%phases%static), 'time step')//' in '// &
          to_text(sum(case%phases%duration))//' s'//nl
       text = text//'! memory: about '//to_text(real(nint(memory*10.0_dp), dp)/10.0_dp)//unit//nl
+      text = text//'! time: '//duration_text(seconds_needed(case))//' here, within a factor of three or so'//nl
       text = text//marked('! ', adhesion_notes(case))//marked('! warning: ', case%warnings)
    end function case_summary
 

@@ -1,0 +1,122 @@
+!> Commands that the Python package does, such as `asperity plot`: the program becomes
+!> `python3 -m asperity plot ...` where it finds a Python that has the package.
+module hand_over
+   use command_line, only : argument_text
+   use errors, only : error_file, error_type, fail
+   use, intrinsic :: iso_c_binding, only : c_char, c_int, c_loc, c_null_char, c_null_ptr, c_ptr, &
+      c_size_t
+   implicit none
+   private
+
+   public :: become_python
+
+   character(*), parameter :: nl = new_line('a')
+
+   !> A shell tries one Python after another: the one that the user names, those that may belong to
+   !> this program (beside it, beside an editable build, around a wheel), and those on PATH. `exec`
+   !> leaves neither the shell nor this program behind, so signals and statuses are Python's.
+   character(*), parameter :: script = &
+      'folder=$1; shift'//nl// &
+      'for python in "$ASPERITY_PYTHON" "$folder/python3" "$folder/../bin/python3" \'//nl// &
+      '    "$folder/../../../../bin/python3" python3 python; do'//nl// &
+      '  command -v "$python" >/dev/null 2>&1 || continue'//nl// &
+      '  "$python" -c "import importlib.util as u, sys; s = u.find_spec(''asperity'')'//nl// &
+      'sys.exit(s is None or s.origin is None)" </dev/null >/dev/null 2>&1 || continue'//nl// &
+      '  ASPERITY_COMMAND=asperity; export ASPERITY_COMMAND'//nl// &
+      '  exec "$python" -m asperity "$@"'//nl// &
+      'done'//nl// &
+      'echo "asperity: $1 is done by the Python package asperity, and no Python found here has it:'// &
+      ' in the source tree, python3 -m pip install . installs it (docs/install.md);'// &
+      ' ASPERITY_PYTHON=/path/to/python3 names a Python that has it" >&2'//nl// &
+      'exit 3'//nl
+
+   !> An argument as C wants it.
+   type :: argument_type
+      character(kind=c_char), allocatable :: text(:)
+   end type argument_type
+
+   interface
+      function c_execv(path, arguments) bind(c, name='execv') result(status)
+         import :: c_char, c_int, c_ptr
+         implicit none
+         character(kind=c_char), intent(in) :: path(*)
+         type(c_ptr), intent(in) :: arguments(*)
+         integer(c_int) :: status
+      end function c_execv
+
+      function c_readlink(path, buffer, length) bind(c, name='readlink') result(count)
+         import :: c_char, c_size_t
+         implicit none
+         character(kind=c_char), intent(in) :: path(*)
+         character(kind=c_char), intent(out) :: buffer(*)
+         integer(c_size_t), value :: length
+         integer(c_size_t) :: count
+      end function c_readlink
+   end interface
+
+contains
+
+   !> Become Python with the words of this program's own command line, or of another one. Returns
+   !> only where no shell can be started.
+   subroutine become_python(error, verb, option)
+      type(error_type), allocatable, intent(out) :: error
+      character(*), intent(in), optional :: verb      !! the only two words, instead of the own ones
+      character(*), intent(in), optional :: option
+      type(argument_type), allocatable, target :: arguments(:)
+      type(c_ptr), allocatable :: pointers(:)
+      integer :: i, n, status
+
+      n = command_argument_count()
+      if (present(verb)) n = 2
+      allocate (arguments(5 + n), pointers(6 + n))
+      call put(arguments(1), 'sh')
+      call put(arguments(2), '-c')
+      call put(arguments(3), script)
+      call put(arguments(4), 'asperity')
+      call put(arguments(5), own_folder())
+      if (present(verb) .and. present(option)) then
+         call put(arguments(6), verb)
+         call put(arguments(7), option)
+      else
+         do i = 1, n
+            call put(arguments(5 + i), argument_text(i))
+         end do
+      end if
+      do i = 1, 5 + n
+         pointers(i) = c_loc(arguments(i)%text)
+      end do
+      pointers(6 + n) = c_null_ptr
+      status = c_execv('/bin/sh'//c_null_char, pointers)
+      call fail(error, error_file, 'asperity: /bin/sh cannot be started')
+   end subroutine become_python
+
+   !> Put a text into an argument.
+   subroutine put(argument, text)
+      type(argument_type), intent(out) :: argument
+      character(*), intent(in) :: text
+      integer :: i
+
+      allocate (argument%text(len(text) + 1))
+      do i = 1, len(text)
+         argument%text(i) = text(i:i)
+      end do
+      argument%text(len(text) + 1) = c_null_char
+   end subroutine put
+
+   !> The folder of this program's file; a folder that is not there where the system does not tell.
+   function own_folder() result(folder)
+      character(:), allocatable :: folder
+      character(kind=c_char) :: buffer(4096)
+      integer :: i, length
+
+      folder = '/nowhere'
+      length = int(c_readlink('/proc/self/exe'//c_null_char, buffer, size(buffer, kind=c_size_t)))
+      do i = length, 2, -1
+         if (buffer(i) == '/') then
+            folder = transfer(buffer(:i - 1), repeat(' ', i - 1))
+            return
+         end if
+      end do
+   end function own_folder
+
+end module hand_over
