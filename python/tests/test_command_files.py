@@ -141,6 +141,6 @@ def test_check_estimates_the_time_of_a_run(program, tmp_path):
     subprocess.run([program, "run", "case.nml", "--quiet"], cwd=tmp_path, check=True)
     taken = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
     assert taken / 6 < expected < 6 * taken
-    # A grid of 256 times as many cells takes a little more than 256 times as long.
     large = SLIDING.replace("64", "1024")
-    assert 100 * expected < estimated(program, tmp_path, large) < 1000 * expected
+    # Rows of 256 times as many cells; on the small grid, writing a row counts as well.
+    assert 30 * expected < estimated(program, tmp_path, large) < 1000 * expected

@@ -166,6 +166,14 @@ def test_commands_stand_in_blocks(page):
         assert not re.match(r"    " + COMMAND.pattern, line), line
 
 
+def test_nobody_is_told_to_install_a_package_that_is_not_ours():
+    """On PyPI the name asperity belongs to nobody here: whoever installs it gets a stranger's."""
+    told = re.compile(r"pip install (?:-\S+ )*[\"']?asperity\b")
+    files = [ROOT / page for page in PAGES] + list((ROOT / "python" / "asperity").rglob("*.py")) + \
+        list((ROOT / "app").glob("*.f90")) + list((ROOT / "tools").glob("*"))
+    assert [str(file) for file in files if file.is_file() and told.search(file.read_text())] == []
+
+
 def test_namelist_of_the_readme_is_ten_lines():
     (case,) = (block for block in blocks("README.md") if block.language == "fortran")
     (script,) = (block for block in blocks("README.md") if block.language == "python")

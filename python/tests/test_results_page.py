@@ -17,10 +17,11 @@ def blocks(language):
     return re.findall(rf"```{language}\n(.*?)```", PAGE, flags=re.DOTALL)
 
 
-def test_commands_of_the_page(road):
+def test_commands_of_the_page(program, road):
     commands = blocks("sh")
     assert len(commands) == 3
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    path = os.pathsep.join([str(Path(program).parent), str(Path(sys.executable).parent),
+                            os.environ["PATH"]])
     told = ""
     for block in commands:
         done = subprocess.run(["sh", "-ec", block], cwd=road, capture_output=True, text=True,
@@ -51,4 +52,4 @@ def test_snippets_of_the_page(road, monkeypatch, capsys):
 
 def test_every_verb_of_looking_is_on_the_page(capsys):
     for verb in ("plot", "report", "watch"):
-        assert f"python -m asperity {verb} " in PAGE
+        assert f"asperity {verb} " in PAGE

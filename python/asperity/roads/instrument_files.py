@@ -25,7 +25,7 @@ UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "pm": 1e-12, "A": 1e-10, 
          "inch": 0.0254}
 _MICRO = {"\u00b5m": "um", "\u03bcm": "um", "\u00c5": "A", "\u212b": "A", "in": "inch"}
 _PARTS = {"mm": 1e3, "um": 1e6, "nm": 1e9, "pm": 1e12, "A": 1e10}  # exact, unlike 1e-6
-_NEEDS = "pip install 'asperity[import]' (or SurfaceTopography)"
+_NEEDS = "pip install SurfaceTopography"
 
 
 def channels(path: str | Path) -> list[str]:
