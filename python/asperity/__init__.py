@@ -21,21 +21,28 @@ if TYPE_CHECKING:
     from . import theory
     from .base.errors import NotConverged
     from .base.library import set_threads
-    from .contact import AdhesiveNormalContact, NormalContact, solve_adhesive, solve_normal
+    from .contact import (
+        AdhesiveNormalContact,
+        NormalContact,
+        operators,
+        solve_adhesive,
+        solve_normal,
+    )
     from .results import Run
     from .results import open_result as open
     from .roads import surface
     from .rubber import dma, material
     from .runs.case import Case
     from .runs.runner import run
+    from .runs.simulation import Simulation
     from .runs.sweep_table import Sweep, SweepError
     from .runs.sweeps import sweep
 
     __version__: str
 
-__all__ = ["AdhesiveNormalContact", "Case", "NormalContact", "NotConverged", "Run", "Sweep",
-           "SweepError", "__version__", "dma", "material", "open", "run", "set_threads",
-           "solve_adhesive", "solve_normal", "surface", "sweep", "theory"]
+__all__ = ["AdhesiveNormalContact", "Case", "NormalContact", "NotConverged", "Run", "Simulation",
+           "Sweep", "SweepError", "__version__", "dma", "material", "open", "operators", "run",
+           "set_threads", "solve_adhesive", "solve_normal", "surface", "sweep", "theory"]
 
 _addresses.install(__name__)
 presenters.register({name: f"{__name__}.{module}"

@@ -13,7 +13,10 @@ module asperity_flat
    public :: surface_height, surface_psd, surface_radial_psd, surface_statistics
    public :: contact_adhesive, contact_normal
    public :: input_check, input_groups, input_listed
-   public :: run_close, run_interrupt, run_open, run_step
+   public :: operator_apply, operator_close, operator_open, operator_symbol
+   public :: run_close, run_field, run_interrupt, run_open, run_row, run_step, row_columns
+   public :: simulation_close, simulation_load, simulation_open, simulation_save, simulation_steer, &
+      simulation_step
 
 contains
 
@@ -450,6 +453,424 @@ contains
       call free_run(int(handle))
       call report(error, status, message)
    end subroutine run_close
+
+   !> The columns of a row: lines 'name units whole long_name', with whole = 1 for whole numbers.
+   subroutine row_columns(most, buffer, length)
+      use history_row, only : column_count, column_type, history_columns
+      integer(c_int), intent(in) :: most                       !! characters that the buffer holds
+      integer(c_int), intent(inout) :: buffer(most)             !! codes of the characters
+      integer(c_int), intent(out) :: length                    !! of the text; above `most`: none is written
+      type(column_type) :: columns(column_count)
+      character(:), allocatable :: text
+      integer :: i
+
+      columns = history_columns()
+      text = ''
+      do i = 1, column_count
+         text = text//trim(columns(i)%name)//' '//trim(columns(i)%units)//' '// &
+            merge('1', '0', columns(i)%whole)//' '//trim(columns(i)%long_name)//new_line('a')
+      end do
+      call put_text(text, buffer, length)
+   end subroutine row_columns
+
+   !> The last row of a run or a simulation, in the order of `row_columns`.
+   subroutine run_row(handle, n, values, status, message)
+      use errors, only : error_input, error_type, fail
+      use history_row, only : column_count, row_values
+      use run_handles, only : sim_of
+      use simulation, only : simulation_type
+      integer(c_int), intent(in) :: handle
+      integer(c_int), intent(in) :: n                          !! the number of columns
+      real(c_double), intent(inout) :: values(n)
+      integer(c_int), intent(out) :: status
+      character(len=2000), intent(out) :: message
+      type(error_type), allocatable :: error
+      type(simulation_type), pointer :: sim
+
+      sim => sim_of(int(handle))
+      if (.not. associated(sim)) then
+         call fail(error, error_input, 'the simulation is closed')
+      else if (n /= column_count) then
+         call fail(error, error_input, 'a row has another number of columns')
+      else
+         values = row_values(sim%row)
+      end if
+      call report(error, status, message)
+   end subroutine run_row
+
+   !> A field of a run or a simulation, as a snapshot would hold it; 'height' is the road under the
+   !> rubber.
+   subroutine run_field(handle, name, nx, ny, values, status, message)
+      use errors, only : error_input, error_type, fail
+      use precision, only : dp, int8
+      use run_handles, only : sim_of
+      use simulation, only : simulation_type
+      integer(c_int), intent(in) :: handle
+      character(len=*), intent(in) :: name
+      integer(c_int), intent(in) :: nx, ny
+      real(c_double), intent(inout) :: values(nx, ny)
+      integer(c_int), intent(out) :: status
+      character(len=2000), intent(out) :: message
+      type(error_type), allocatable :: error
+      type(simulation_type), pointer :: sim
+      real(dp), allocatable :: field(:, :)
+      integer(int8), allocatable :: states(:, :)
+
+      sim => sim_of(int(handle))
+      if (.not. associated(sim)) then
+         call fail(error, error_input, 'the simulation is closed')
+      else if (nx /= sim%grid%nx .or. ny /= sim%grid%ny) then
+         call fail(error, error_input, 'the field has another shape')
+      else if (name == 'height') then
+         values(:, :) = sim%height
+      else if (name == 'contact') then
+         call sim%contact_states(states)
+         values(:, :) = real(states, dp)
+      else
+         call sim%field(name, field)
+         values(:, :) = field
+      end if
+      call report(error, status, message)
+   end subroutine run_field
+
+   !> Prepare a simulation that writes no files.
+   subroutine simulation_open(path, text, threads, handle, rows, nx, ny, lx, ly, warnings, status, &
+      message)
+      use case_identity, only : identity_of
+      use case_input, only : parse_case, read_case
+      use case_report, only : resolved_input
+      use case_run, only : map_lines
+      use case_settings, only : case_type
+      use errors, only : error_input, error_type, fail
+      use parallel, only : set_threads
+      use run_handles, only : driven_of, driven_type, free_driven, new_driven
+      use schedule, only : count_rows
+      use simulation, only : new_simulation
+      character(len=*), intent(in) :: path
+      character(len=*), intent(in) :: text                 !! the input; empty: what the file holds
+      integer(c_int), intent(in) :: threads                !! 0: what the case says
+      integer(c_int), intent(out) :: handle
+      integer(c_int), intent(out) :: rows                  !! rows of the whole history
+      integer(c_int), intent(out) :: nx, ny
+      real(c_double), intent(out) :: lx, ly
+      character(len=20000), intent(out) :: warnings
+      integer(c_int), intent(out) :: status
+      character(len=20000), intent(out) :: message
+      type(error_type), allocatable :: error
+      type(case_type) :: case
+      type(driven_type), pointer :: driven
+      integer :: number
+!f2py threadsafe
+
+      handle = 0
+      rows = 0
+      nx = 0
+      ny = 0
+      lx = 0.0_c_double
+      ly = 0.0_c_double
+      warnings = ''
+      if (len(text) > 0) then
+         call parse_case(text, trim(path), case, error)
+      else
+         call read_case(trim(path), case, error)
+      end if
+      if (.not. allocated(error)) then
+         call new_driven(number)
+         if (number == 0) call fail(error, error_input, 'too many simulations are open: close some')
+      end if
+      if (.not. allocated(error)) then
+         if (threads > 0) case%solver%threads = threads
+         call set_threads(case%solver%threads)
+         warnings = case%warnings
+         driven => driven_of(number)
+         call new_simulation(driven%sim, case, error, movable=.not. all(case%phases%static))
+         if (allocated(error)) then
+            call free_driven(number)
+         else
+            driven%settings = without_files(identity_of(resolved_input(case)))//map_lines(driven%sim)
+            driven%start_tau = case%material%prony_tau
+            driven%start_temperature = case%material%temperature
+            handle = number
+            rows = count_rows(case%phases)
+            nx = case%grid%nx
+            ny = case%grid%ny
+            lx = case%grid%lx
+            ly = case%grid%ly
+            call take_warnings(driven%sim%warnings, warnings)
+            driven%sim%warnings = ''
+         end if
+      end if
+      call report(error, status, message)
+   end subroutine simulation_open
+
+   !> Settings without the names of height maps: their checksums say whether they are the same.
+   function without_files(settings) result(kept)
+      character(len=*), intent(in) :: settings             !! lines 'group: name = value'
+      character(:), allocatable :: kept, line
+      integer :: at, next
+
+      kept = ''
+      at = 1
+      do while (at <= len(settings))
+         next = index(settings(at:), new_line('a'))
+         if (next == 0) next = len(settings) - at + 2
+         line = settings(at:at + next - 2)
+         at = at + next
+         if (index(line, ': file = ') == 0) kept = kept//line//new_line('a')
+      end do
+   end function without_files
+
+   !> Do a row. Where a solver did not converge, the state reached is kept and the status says so.
+   subroutine simulation_step(handle, finished, warnings, status, message)
+      use errors, only : error_convergence, error_input, error_type, fail
+      use run_handles, only : driven_of, driven_type
+      use text_tools, only : to_text
+      integer(c_int), intent(in) :: handle
+      integer(c_int), intent(out) :: finished              !! 1: no row is left
+      character(len=20000), intent(out) :: warnings
+      integer(c_int), intent(out) :: status
+      character(len=2000), intent(out) :: message
+      type(error_type), allocatable :: error
+      type(driven_type), pointer :: driven
+!f2py threadsafe
+
+      finished = 1
+      warnings = ''
+      driven => driven_of(int(handle))
+      if (.not. associated(driven)) then
+         call fail(error, error_input, 'the simulation is closed')
+      else
+         associate (sim => driven%sim)
+            if (.not. sim%finished) call sim%advance(error)
+            finished = merge(1, 0, sim%finished)
+            call take_warnings(sim%warnings, warnings)
+            sim%warnings = ''
+            if (.not. allocated(error) .and. .not. sim%converged) call fail(error, error_convergence, &
+               'step '//to_text(sim%row%step)//' of phase '//to_text(sim%row%phase)//', t = '// &
+               to_text(sim%row%time)//' s: the solver did not converge: '//trim(sim%reason)// &
+               '; residual '//to_text(sim%residual)//', allowed '// &
+               to_text(sim%case%solver%tolerance))
+         end associate
+      end if
+      call report(error, status, message)
+   end subroutine simulation_step
+
+   !> Set a load, the velocity or the temperature, from the next row on.
+   subroutine simulation_steer(handle, what, first, second, status, message)
+      use errors, only : error_input, error_type, fail
+      use run_handles, only : driven_of, driven_type
+      use steering, only : steer_load, steer_temperature, steer_velocity
+      integer(c_int), intent(in) :: handle
+      character(len=*), intent(in) :: what        !! 'pressure', 'force', 'displacement', 'velocity', 'temperature'
+      real(c_double), intent(in) :: first, second !! the second for the velocity along y only
+      integer(c_int), intent(out) :: status
+      character(len=2000), intent(out) :: message
+      type(error_type), allocatable :: error
+      type(driven_type), pointer :: driven
+
+      driven => driven_of(int(handle))
+      if (.not. associated(driven)) then
+         call fail(error, error_input, 'the simulation is closed')
+      else
+         select case (what)
+         case ('velocity')
+            call steer_velocity(driven%sim, [first, second], error)
+         case ('temperature')
+            call steer_temperature(driven%sim, first, driven%start_temperature, driven%start_tau, error)
+         case default
+            call steer_load(driven%sim, what, first, error)
+         end select
+      end if
+      call report(error, status, message)
+   end subroutine simulation_steer
+
+   !> Write the state of a simulation, as a checkpoint of `path`.
+   subroutine simulation_save(handle, path, status, message)
+      use checkpoint, only : checkpoint_writer_type
+      use errors, only : error_input, error_type, fail
+      use run_handles, only : driven_of, driven_type
+      use simulation_state, only : save_state
+      integer(c_int), intent(in) :: handle
+      character(len=*), intent(in) :: path
+      integer(c_int), intent(out) :: status
+      character(len=2000), intent(out) :: message
+      type(error_type), allocatable :: error
+      type(driven_type), pointer :: driven
+      type(checkpoint_writer_type) :: writer
+
+      driven => driven_of(int(handle))
+      if (.not. associated(driven)) then
+         call fail(error, error_input, 'the simulation is closed')
+      else
+         call writer%start(path, 'a simulation', driven%settings, error)
+         if (.not. allocated(error)) call save_state(driven%sim, writer, error)
+         if (.not. allocated(error)) call writer%commit(error)
+      end if
+      call report(error, status, message)
+   end subroutine simulation_save
+
+   !> Take the state of a simulation from the checkpoint of `path`, written by `simulation_save`.
+   subroutine simulation_load(handle, path, finished, status, message)
+      use checkpoint, only : checkpoint_reader_type
+      use errors, only : error_input, error_type, fail
+      use run_handles, only : driven_of, driven_type
+      use simulation_state, only : load_state
+      integer(c_int), intent(in) :: handle
+      character(len=*), intent(in) :: path
+      integer(c_int), intent(out) :: finished              !! 1: no row is left
+      integer(c_int), intent(out) :: status
+      character(len=20000), intent(out) :: message
+      type(error_type), allocatable :: error
+      type(driven_type), pointer :: driven
+      type(checkpoint_reader_type) :: reader
+
+      finished = 0
+      driven => driven_of(int(handle))
+      if (.not. associated(driven)) then
+         call fail(error, error_input, 'the simulation is closed')
+      else
+         call reader%open(path, error)
+         if (.not. allocated(error)) then
+            call reader%compare(driven%settings, error)
+            if (.not. allocated(error)) call load_state(driven%sim, reader, error)
+            call reader%close()
+            finished = merge(1, 0, driven%sim%finished)
+         end if
+      end if
+      call report(error, status, message)
+   end subroutine simulation_load
+
+   !> Free a simulation; a handle that is not in use is no error.
+   subroutine simulation_close(handle, status, message)
+      use errors, only : error_type
+      use run_handles, only : driven_of, driven_type, free_driven
+      integer(c_int), intent(in) :: handle
+      integer(c_int), intent(out) :: status
+      character(len=2000), intent(out) :: message
+      type(error_type), allocatable :: error
+      type(driven_type), pointer :: driven
+
+      driven => driven_of(int(handle))
+      if (associated(driven)) call driven%sim%destroy()
+      call free_driven(int(handle))
+      call report(error, status, message)
+   end subroutine simulation_close
+
+   !> Prepare an operator: the displacements that tractions cause.
+   subroutine operator_open(tangential, nx, ny, lx, ly, is_free, modulus, poisson, thickness, handle, &
+      mx, my, status, message)
+      use errors, only : error_input, error_type, fail
+      use fft_conv, only : new_normal_operator, new_tangential_operator
+      use operator_handles, only : free_operator, new_operator, operator_of, operator_type
+      integer(c_int), intent(in) :: tangential                 !! 1: tangential, 0: normal
+      integer(c_int), intent(in) :: nx, ny
+      real(c_double), intent(in) :: lx, ly
+      integer(c_int), intent(in) :: is_free                    !! 1: free boundary, 0: periodic
+      real(c_double), intent(in) :: modulus                    !! shear modulus, Pa
+      real(c_double), intent(in) :: poisson
+      real(c_double), intent(in) :: thickness                  !! of the block, m; 0: half-space
+      integer(c_int), intent(out) :: handle
+      integer(c_int), intent(out) :: mx, my                    !! lengths of the transforms
+      integer(c_int), intent(out) :: status
+      character(len=2000), intent(out) :: message
+      type(error_type), allocatable :: error
+      type(operator_type), pointer :: operator
+      integer :: number
+
+      handle = 0
+      mx = 0
+      my = 0
+      call new_operator(number)
+      if (number == 0) then
+         call fail(error, error_input, 'too many operators are open')
+      else
+         operator => operator_of(number)
+         operator%modulus = modulus
+         if (tangential == 1) then
+            call new_tangential_operator(operator%map, grid_of(nx, ny, lx, ly, is_free), poisson, &
+               thickness, error)
+         else
+            call new_normal_operator(operator%map, grid_of(nx, ny, lx, ly, is_free), poisson, error)
+         end if
+         if (allocated(error)) then
+            call free_operator(number)
+         else
+            handle = number
+            mx = operator%map%mx
+            my = operator%map%my
+         end if
+      end if
+      call report(error, status, message)
+   end subroutine operator_open
+
+   !> Displacements of tractions; the fields along y are for a tangential operator only.
+   subroutine operator_apply(handle, nx, ny, px, py, ux, uy, status, message)
+      use errors, only : error_input, error_type, fail
+      use operator_handles, only : operator_of, operator_type
+      integer(c_int), intent(in) :: handle
+      integer(c_int), intent(in) :: nx, ny
+      real(c_double), intent(in) :: px(nx, ny), py(nx, ny)     !! Pa
+      real(c_double), intent(inout) :: ux(nx, ny), uy(nx, ny)  !! m
+      integer(c_int), intent(out) :: status
+      character(len=2000), intent(out) :: message
+      type(error_type), allocatable :: error
+      type(operator_type), pointer :: operator
+
+      operator => operator_of(int(handle))
+      if (.not. associated(operator)) then
+         call fail(error, error_input, 'the operator is closed')
+      else if (nx /= operator%map%nx .or. ny /= operator%map%ny) then
+         call fail(error, error_input, 'the field has another shape')
+      else if (operator%map%components == 2) then
+         call operator%map%apply_vector(px, py, ux, uy)
+         ux(:, :) = ux/operator%modulus
+         uy(:, :) = uy/operator%modulus
+      else
+         call operator%map%apply(px, ux)
+         ux(:, :) = ux/operator%modulus
+      end if
+      call report(error, status, message)
+   end subroutine operator_apply
+
+   !> One part of an operator's symbol, for a field and its transform without factors: the first
+   !> half of the wave numbers along both directions.
+   subroutine operator_symbol(handle, part, columns, rows, values, status, message)
+      use errors, only : error_input, error_type, fail
+      use operator_handles, only : operator_of, operator_type
+      use precision, only : dp
+      integer(c_int), intent(in) :: handle
+      integer(c_int), intent(in) :: part                       !! 1; of a tangential one 1: xx, 2: yy, 3: xy
+      integer(c_int), intent(in) :: columns, rows              !! mx/2 + 1 and my/2 + 1
+      real(c_double), intent(inout) :: values(columns, rows)   !! m/Pa
+      integer(c_int), intent(out) :: status
+      character(len=2000), intent(out) :: message
+      type(error_type), allocatable :: error
+      type(operator_type), pointer :: operator
+
+      operator => operator_of(int(handle))
+      if (.not. associated(operator)) then
+         call fail(error, error_input, 'the operator is closed')
+      else if (columns /= operator%map%mx/2 + 1 .or. rows /= operator%map%my/2 + 1) then
+         call fail(error, error_input, 'the symbol has another shape')
+      else
+         values(:, :) = operator%map%symbol(0:columns - 1, 0:rows - 1, part)* &
+            (real(operator%map%mx, dp)*real(operator%map%my, dp)/operator%modulus)
+      end if
+      call report(error, status, message)
+   end subroutine operator_symbol
+
+   !> Free an operator; a handle that is not in use is no error.
+   subroutine operator_close(handle, status, message)
+      use errors, only : error_type
+      use operator_handles, only : free_operator
+      integer(c_int), intent(in) :: handle
+      integer(c_int), intent(out) :: status
+      character(len=2000), intent(out) :: message
+      type(error_type), allocatable :: error
+
+      call free_operator(int(handle))
+      call report(error, status, message)
+   end subroutine operator_close
 
    !> The table of the input's groups and variables, as `input_table` writes it.
    subroutine input_groups(most, buffer, length)

@@ -20,7 +20,7 @@ module case_run
    implicit none
    private
 
-   public :: run_type
+   public :: map_lines, run_type
 
    !> A run in hand. Not to be copied.
    type :: run_type

@@ -10,7 +10,7 @@ module schedule
    implicit none
    private
 
-   public :: count_rows, next_row, planned_row_type, schedule_type
+   public :: change_velocity, count_rows, next_row, planned_row_type, schedule_type
 
    !> What a row asks for.
    type :: planned_row_type
@@ -44,6 +44,7 @@ module schedule
       real(dp) :: held_load = 0.0_dp
       real(dp) :: velocity_x = 0.0_dp             !! of the road so far, m/s
       real(dp) :: velocity_y = 0.0_dp
+      logical :: speed_changed = .false.          !! by `change_velocity`, since the last row
    end type schedule_type
 
 contains
@@ -100,6 +101,8 @@ contains
             self%velocity_x = phase%velocity_x
             self%velocity_y = phase%velocity_y
          end if
+         row%new_speed = row%new_speed .or. self%speed_changed
+         self%speed_changed = .false.
          row%phase = self%phase
          row%control = phase%control(:12)
          row%velocity_x = phase%velocity_x
@@ -143,6 +146,32 @@ contains
          end if
       end associate
    end subroutine next_row
+
+   !> Let the road move with another velocity from the last row on: in the phase in hand and all later.
+   subroutine change_velocity(self, phases, velocity, road)
+      type(schedule_type), intent(inout) :: self
+      type(phase_settings_type), intent(inout) :: phases(:)
+      real(dp), intent(in) :: velocity(2)          !! m/s
+      real(dp), intent(in) :: road(2)              !! displacement of the road at the last row, m
+      real(dp) :: elapsed
+      integer :: k
+
+      if (self%phase > size(phases)) return
+      if (self%entered) then
+         self%speed_changed = self%speed_changed .or. abs(velocity(1) - self%velocity_x) > 0.0_dp .or. &
+            abs(velocity(2) - self%velocity_y) > 0.0_dp
+         ! The road's place is reckoned from the start of the phase, as if it had always moved so.
+         elapsed = real(self%step, dp)/phases(self%phase)%steps*phases(self%phase)%duration
+         self%start_x = road(1) - elapsed*velocity(1)
+         self%start_y = road(2) - elapsed*velocity(2)
+         self%velocity_x = velocity(1)
+         self%velocity_y = velocity(2)
+      end if
+      do k = self%phase, size(phases)
+         phases(k)%velocity_x = velocity(1)
+         phases(k)%velocity_y = velocity(2)
+      end do
+   end subroutine change_velocity
 
    !> The load from which a phase's ramp starts, in the phase's control.
    pure function load_at_start(self, phase, present_load) result(load)

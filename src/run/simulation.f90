@@ -74,7 +74,7 @@ module simulation
       type(tangential_state_type) :: tangential
       type(stick_slip_watch_type) :: watch          !! what has been seen of the mean slip
       type(pass_watch_type) :: pass_watch           !! what has been seen of passes that do not settle
-      logical, private :: slides = .false.          !! some phase moves the road
+      logical :: slides = .false.                   !! the road moves in some phase, or may be made to
       real(dp), allocatable, private :: settled(:, :)   !! pressure of the pass before, Pa
       integer :: edge = edge_clear                  !! worst found at the edge of a free map
       type(normal_step_type), private :: side
@@ -99,10 +99,11 @@ module simulation
 contains
 
    !> Prepare a run: surface, operators, fields.
-   subroutine new_simulation(self, case, error)
+   subroutine new_simulation(self, case, error, movable)
       type(simulation_type), intent(out) :: self
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
+      logical, intent(in), optional :: movable      !! be prepared for a motion of the road that no phase asks for
       integer :: nx, ny
 
       self%case = case
@@ -111,6 +112,7 @@ contains
       nx = self%grid%nx
       ny = self%grid%ny
       self%slides = any(abs(case%phases%velocity_x) > 0.0_dp .or. abs(case%phases%velocity_y) > 0.0_dp)
+      if (present(movable)) self%slides = self%slides .or. movable
       call new_height(self%grid, case%surfaces, self%height, error, self%map_checksums)
       if (allocated(error)) return
       call new_normal_step(self%side, case, self%height, error)

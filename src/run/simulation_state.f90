@@ -109,6 +109,8 @@ contains
             'load held so far, in the units of its control')
          call table%add('schedule/velocity_x', s%velocity_x, 'm/s', 'velocity of the road so far')
          call table%add('schedule/velocity_y', s%velocity_y, 'm/s', 'velocity of the road so far')
+         call table%add('schedule/speed_changed', s%speed_changed, &
+            'the velocity was changed since the last row')
       end associate
    end subroutine list_schedule
 

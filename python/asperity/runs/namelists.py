@@ -16,7 +16,7 @@ import numpy as np
 from ..base import library
 
 __all__ = ["GroupEntry", "Variable", "check_text", "decode", "encode", "fault_of", "format_value",
-           "is_text", "listed", "table"]
+           "is_text", "listed", "source", "table"]
 
 _SEPARATOR = "\x1f"
 
@@ -93,6 +93,18 @@ def is_text(source: object) -> bool:
     (False, True, True, False)
     """
     return isinstance(source, str) and ("\n" in source or source.lstrip()[:1] in tuple("&$!"))
+
+
+def source(case: Any) -> tuple[str, str]:
+    """Return the name of a case's file and its text, which is empty if the file holds it.
+
+    A case is a path, a text of namelists, or an object with a ``path`` whose text is ``str(case)``.
+    """
+    if is_text(case):
+        return "case.nml", str(case)
+    if isinstance(case, str | os.PathLike):
+        return os.fspath(case), ""
+    return os.fspath(case.path or "case.nml"), str(case) or "\n"
 
 
 @functools.cache

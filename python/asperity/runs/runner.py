@@ -5,14 +5,17 @@ from __future__ import annotations
 import os
 import sys
 import warnings
+from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from ..base import library
 from ..base.check import whole
 from ..base.errors import NotConverged
 from ..results import Run
 from . import namelists
+from .row import Row
+from .simulation import RunView
 
 __all__ = ["run"]
 
@@ -35,6 +38,7 @@ def run(
     threads: int | None = None,
     restart: bool = False,
     quiet: bool = True,
+    callback: Callable[[Row, RunView], Any] | None = None,
 ) -> Run:
     """Run a case in this process, as the command ``asperity run`` does, and open its result.
 
@@ -55,6 +59,11 @@ def run(
         Go on from the checkpoint of an interrupted run.
     quiet : bool
         Do not tell the progress on stderr.
+    callback : callable, optional
+        Called after each row as ``callback(row, sim)``, with the row (its columns are attributes)
+        and a view of the run with ``row``, ``rows`` and ``fields``. Where it returns False, the run
+        ends cleanly with a checkpoint, from which ``restart=True`` goes on. To change the load
+        between rows use `asperity.Simulation`.
 
     Returns
     -------
@@ -83,16 +92,22 @@ def run(
     target = b"" if output is None else os.fsencode(output)
     if output is not None and not 0 < len(target) <= 1024:
         raise ValueError(f"output: has {len(target)} characters: must have 1 to 1024")
-    path, text = _source(case)
+    path, text = namelists.source(case)
     handle, rows, first, result, told = _open(os.fsencode(path), namelists.encode(text), target,
                                               threads or 0, int(restart))
     failure: NotConverged | None = None
+    view: RunView | None = None
     try:
         _warn(told)
         finished = first >= rows
         while not finished:
             finished, step, time, area, friction, told = _step(handle)
             _warn(told)
+            if callback is not None:
+                view = view or RunView(handle, rows, _shape(result))
+                if callback(view.row, view) is False and not finished:
+                    _interrupt(handle)
+                    break
             if not quiet:
                 print(f"step {step} of {rows - 1}, t = {time:.6g} s, contact area {area:.4g},"
                       f" friction {friction:.4g}", file=sys.stderr)
@@ -109,13 +124,10 @@ def run(
     return opened
 
 
-def _source(case: str | os.PathLike[str] | _CaseLike) -> tuple[str, str]:
-    """Return the name of a case's file and its text, which is empty if the file holds it."""
-    if namelists.is_text(case):
-        return "case.nml", str(case)
-    if isinstance(case, str | os.PathLike):
-        return os.fspath(case), ""
-    return os.fspath(case.path or "case.nml"), str(case) or "\n"
+def _shape(result: bytes) -> tuple[int, int]:
+    """Return the shape of the fields of a result."""
+    grid = Run(os.fsdecode(result.rstrip())).grid
+    return grid.ny, grid.nx
 
 
 def _warn(told: bytes) -> None:

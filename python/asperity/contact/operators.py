@@ -1,0 +1,275 @@
+"""The operators of the solvers: displacements of an elastic half-space from tractions.
+
+For those who develop methods. Users import this module as ``asperity.operators``. Fields have the
+shape (ny, nx), tangential ones (2, ny, nx) with the parts along x and y first.
+"""
+
+from __future__ import annotations
+
+import weakref
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..base import library
+from ..base.check import positive
+from ..base.check import whole as whole_number
+from ..base.errors import NotConverged
+
+__all__ = ["NormalOperator", "TangentialOperator", "normal", "tangential"]
+
+FloatArray = NDArray[np.float64]
+
+_open = library.call("operator_open")
+_apply = library.call("operator_apply")
+_symbol = library.call("operator_symbol")
+_close = library.call("operator_close")
+
+
+class _Operator:
+    """What the two kinds share: a handle of the library, and the inverse by conjugate gradients."""
+
+    nx: int
+    ny: int
+    lx: float
+    ly: float
+    boundary: str
+    modulus: float
+    _components: int
+
+    def __init__(self, nx: int, ny: int, lx: float, ly: float | None, modulus: float,
+                 boundary: str, poisson: float, thickness: float) -> None:
+        self.nx, self.ny = whole_number("nx", nx), whole_number("ny", ny)
+        self.lx, self.ly = library.lengths((self.ny, self.nx), lx, ly)
+        self.modulus, self.boundary = positive("modulus", modulus), boundary
+        free = library.flag_of_boundary(boundary)
+        shear = self.modulus if self._components == 2 else 0.5 * self.modulus
+        handle, mx, my = _open(int(self._components == 2), self.nx, self.ny, self.lx, self.ly, free,
+                               shear, poisson, thickness)
+        self._handle, self._transform = int(handle), (int(my), int(mx))
+        weakref.finalize(self, _close, self._handle)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the fields."""
+        return (self.ny, self.nx) if self._components == 1 else (2, self.ny, self.nx)
+
+    def _field(self, name: str, field: ArrayLike) -> FloatArray:
+        array = np.ascontiguousarray(field, dtype=np.float64)
+        if array.shape != self.shape:
+            raise ValueError(f"{name}: has shape {array.shape}: must be {self.shape}")
+        return array
+
+    def _applied(self, tractions: FloatArray) -> FloatArray:
+        """Return the displacements of a field that has been checked."""
+        px, py = tractions if self._components == 2 else (tractions, np.zeros(self.shape))
+        ux, uy = np.zeros((self.ny, self.nx)), np.zeros((self.ny, self.nx))
+        _apply(self._handle, px.T, py.T, ux.T, uy.T)
+        return np.stack([ux, uy]) if self._components == 2 else ux
+
+    def _half(self, part: int) -> FloatArray:
+        """Return a part of the symbol over the first half of the wave numbers."""
+        my, mx = self._transform
+        values = np.zeros((my // 2 + 1, mx // 2 + 1))
+        _symbol(self._handle, part, values.T)
+        return values
+
+    def _whole(self, part: int, sign: int = 1) -> FloatArray:
+        """Return a part of the symbol in the order of an FFT; `sign` is that for k -> (-kx, ky)."""
+        my, mx = self._transform
+        kx, ky = np.arange(mx), np.arange(my)
+        half = self._half(part)
+        values = half[np.minimum(ky, my - ky)[:, None], np.minimum(kx, mx - kx)[None, :]]
+        if sign < 0:
+            flip_x = np.where(kx > mx // 2, -1.0, 1.0)
+            flip_y = np.where(ky > my // 2, -1.0, 1.0)
+            values = values * flip_x[None, :] * flip_y[:, None]
+        return values
+
+    def _solved(self, displacements: FloatArray, tolerance: float, most: int) -> FloatArray:
+        """Return the tractions by conjugate gradients: the operator is symmetric and positive."""
+        periodic = self.boundary == "periodic"
+        mean_axes = (-2, -1)
+        target = displacements
+        if periodic:
+            target = target - target.mean(axis=mean_axes, keepdims=True)
+        found = np.zeros(self.shape)
+        residual = target.copy()
+        direction = residual.copy()
+        square = float(np.vdot(residual, residual))
+        limit = (tolerance**2) * float(np.vdot(target, target))
+        for _ in range(most):
+            if square <= limit:
+                return found
+            image = self._applied(direction)
+            if periodic:
+                image -= image.mean(axis=mean_axes, keepdims=True)
+            length = square / float(np.vdot(direction, image))
+            found += length * direction
+            residual -= length * image
+            old, square = square, float(np.vdot(residual, residual))
+            direction = residual + (square / old) * direction
+        if square <= limit:
+            return found
+        raise NotConverged(f"inverse: the residual is {np.sqrt(square / limit) * tolerance:.3g}"
+                           f" after {most} iterations, allowed {tolerance:g}", found)
+
+    def __repr__(self) -> str:
+        kind = "tangential" if self._components == 2 else "normal"
+        return (f"{kind} operator of {self.nx} x {self.ny} cells, {self.lx:g} m x {self.ly:g} m,"
+                f" {self.boundary}, modulus {self.modulus:g} Pa")
+
+
+class NormalOperator(_Operator):
+    """Normal displacements of an elastic half-space from normal tractions; made by `normal`.
+
+    Attributes
+    ----------
+    symbol : ndarray
+        Real factors of the modes, m/Pa, in the order of ``numpy.fft.fft2``: of shape (ny, nx) in a
+        periodic cell, where ``apply(p)`` is ``ifft2(symbol * fft2(p)).real``; of the shape of the
+        grid padded with zeros in free space, where the first ny x nx values of that are.
+    """
+
+    _components = 1
+
+    def apply(self, pressure: ArrayLike) -> FloatArray:
+        """Return the displacements, m, of normal tractions, Pa; shapes (ny, nx)."""
+        return self._applied(self._field("pressure", pressure))
+
+    def inverse(self, displacement: ArrayLike, *, tolerance: float = 1e-12,
+                max_iterations: int = 10000) -> FloatArray:
+        """Return the tractions, Pa, that cause displacements, m.
+
+        In a periodic cell the mean of the displacements is left out and that of the tractions is
+        zero. In free space the equations are solved by conjugate gradients.
+
+        Parameters
+        ----------
+        displacement : array_like
+            Displacements, m, of shape (ny, nx).
+        tolerance : float
+            Residual over the displacements, in free space.
+        max_iterations : int
+            The most iterations, in free space.
+
+        Raises
+        ------
+        NotConverged
+            If the tolerance is not reached; its ``result`` are the tractions found.
+        """
+        field = self._field("displacement", displacement)
+        if self.boundary != "periodic":
+            return self._solved(field, tolerance, max_iterations)
+        symbol = self.symbol
+        inverse = np.divide(1.0, symbol, out=np.zeros_like(symbol), where=symbol > 0.0)
+        return np.fft.ifft2(inverse * np.fft.fft2(field)).real
+
+    @property
+    def symbol(self) -> FloatArray:
+        """Real factors of the modes, m/Pa."""
+        return self._whole(1)
+
+
+class TangentialOperator(_Operator):
+    """Tangential displacements of an elastic half-space from tangential tractions.
+
+    Made by `tangential`.
+
+    Attributes
+    ----------
+    symbol : ndarray
+        Real factors of the modes, m/Pa, of shape (2, 2, ny, nx), in the order of
+        ``numpy.fft.fft2``; in free space on the grid padded with zeros.
+    """
+
+    _components = 2
+
+    def apply(self, traction: ArrayLike) -> FloatArray:
+        """Return the displacements, m, of tractions, Pa; shapes (2, ny, nx)."""
+        return self._applied(self._field("traction", traction))
+
+    def inverse(self, displacement: ArrayLike, *, tolerance: float = 1e-12,
+                max_iterations: int = 10000) -> FloatArray:
+        """Return the tractions, Pa, that cause displacements, m, of shape (2, ny, nx).
+
+        The means are left out as by `NormalOperator.inverse`. The equations are solved by
+        conjugate gradients.
+        """
+        return self._solved(self._field("displacement", displacement), tolerance, max_iterations)
+
+    @property
+    def symbol(self) -> FloatArray:
+        """Real factors of the modes, m/Pa."""
+        xx, yy, xy = self._whole(1), self._whole(2), self._whole(3, sign=-1)
+        return np.stack([np.stack([xx, xy]), np.stack([xy, yy])])
+
+
+def normal(nx: int, ny: int, lx: float, ly: float | None = None, *, modulus: float,
+           boundary: str = "periodic") -> NormalOperator:
+    """Return the operator from normal tractions to normal displacements of a half-space.
+
+    Parameters
+    ----------
+    nx, ny : int
+        Number of cells.
+    lx, ly : float
+        Lengths of the cell, m; `ly` defaults to square cells.
+    modulus : float
+        Plane-strain modulus E* = 2 G/(1 - nu), Pa.
+    boundary : str
+        'periodic' or 'free'.
+
+    Returns
+    -------
+    NormalOperator
+
+    Examples
+    --------
+    >>> import asperity, numpy as np
+    >>> op = asperity.operators.normal(64, 64, 1.0, modulus=2.0)
+    >>> p = np.cos(2 * np.pi * np.arange(64) / 64) * np.ones((64, 1))
+    >>> np.allclose(op.apply(p), 2 / (2.0 * 2 * np.pi) * p)
+    True
+    >>> np.allclose(op.inverse(op.apply(p)), p)
+    True
+    """
+    return NormalOperator(nx, ny, lx, ly, modulus, boundary, 0.0, 0.0)
+
+
+def tangential(nx: int, ny: int, lx: float, ly: float | None = None, *, modulus: float,
+               poisson: float = 0.5, thickness: float = 0.0, boundary: str = "periodic",
+               ) -> TangentialOperator:
+    """Return the operator from tangential tractions to tangential displacements of a half-space.
+
+    Parameters
+    ----------
+    nx, ny : int
+        Number of cells.
+    lx, ly : float
+        Lengths of the cell, m; `ly` defaults to square cells.
+    modulus : float
+        Shear modulus G, Pa.
+    poisson : float
+        Poisson ratio.
+    thickness : float
+        Thickness of the block, m, which gives the mean traction of a periodic cell a displacement;
+        0 leaves the mean out.
+    boundary : str
+        'periodic' or 'free'.
+
+    Returns
+    -------
+    TangentialOperator
+    """
+    return TangentialOperator(nx, ny, lx, ly, modulus, boundary, _ratio(poisson),
+                              float(thickness))
+
+
+def _ratio(poisson: Any) -> float:
+    """Return a Poisson ratio that an elastic body can have."""
+    value = float(poisson)
+    if not -1.0 < value <= 0.5:
+        raise ValueError(f"poisson = {poisson}: must be above -1 and at most 0.5")
+    return value

@@ -1,0 +1,86 @@
+"""One row of the history as an object, with the columns that the library knows."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base import library
+from ..base.names import NamedValues
+
+__all__ = ["Column", "Row", "columns"]
+
+_columns = library.bare("row_columns")
+
+
+class Column(NamedTuple):
+    """What a column of the history holds."""
+
+    name: str
+    units: str
+    is_whole: bool
+    long_name: str
+
+
+@functools.cache
+def columns() -> tuple[Column, ...]:
+    """Return the columns of the history, in the order of the library."""
+    buffer = np.zeros(100000, dtype=np.intc)
+    length = int(_columns(buffer))
+    found = []
+    for line in bytes(buffer[:length].astype(np.uint8)).decode().splitlines():
+        name, units, is_whole, long_name = line.split(" ", 3)
+        found.append(Column(name, units, is_whole == "1", long_name))
+    return tuple(found)
+
+
+class Row(NamedValues):
+    """A row of the history: its columns are items and attributes, in SI units.
+
+    Examples
+    --------
+    >>> row = Row(range(len(columns())))
+    >>> row.step, row["time"]
+    (0, 2.0)
+    """
+
+    step: int
+    phase: int
+    time: float
+    pressure: float
+    force: float
+    displacement: float
+    contact_area: float
+    mean_gap: float
+    road_x: float
+    road_y: float
+    traction_x: float
+    traction_y: float
+    stick_area: float
+    sliding_speed: float
+    friction_viscous: float
+    friction: float
+    work_normal: float
+    work_tangential: float
+    work_load: float
+    work_drive: float
+    energy_elastic: float
+    energy_adhesive: float
+    energy_kinetic: float
+    dissipated_viscous: float
+    dissipated_numerical: float
+    dissipated_friction: float
+    iterations_normal: int
+    iterations_tangential: int
+    residual_normal: float
+    residual_tangential: float
+    ffts: float
+    seconds: float
+
+    def __init__(self, values: NDArray[Any] | range) -> None:
+        super().__init__({column.name: int(value) if column.is_whole else float(value)
+                          for column, value in zip(columns(), values, strict=True)},
+                         "column of the history")

@@ -1,0 +1,99 @@
+"""The operators for method developers: against closed forms, the solvers, and numpy's FFT."""
+
+import numpy as np
+import pytest
+
+import asperity
+
+
+def random(*shape):
+    return np.random.default_rng(7).standard_normal(shape)
+
+
+@pytest.mark.parametrize(("nx", "ny"), [(24, 18), (15, 9), (32, 1), (10, 11)])
+def test_the_normal_symbol_is_that_of_a_half_space(nx, ny):
+    lx, ly, modulus = 2e-3, 1.1e-3, 3e6
+    op = asperity.operators.normal(nx, ny, lx, ly, modulus=modulus)
+    qx = 2 * np.pi * np.fft.fftfreq(nx, lx / nx)
+    qy = 2 * np.pi * np.fft.fftfreq(ny, ly / ny)
+    q = np.hypot(qx[None, :], qy[:, None])
+    exact = np.divide(2.0, modulus * q, out=np.zeros_like(q), where=q > 0)
+    assert op.symbol.shape == (ny, nx)
+    assert np.allclose(op.symbol, exact, rtol=1e-12, atol=1e-25)
+    p = random(ny, nx)
+    assert np.allclose(op.apply(p), np.fft.ifft2(op.symbol * np.fft.fft2(p)).real,
+                       rtol=0, atol=1e-12 * np.abs(op.apply(p)).max())
+    assert np.allclose(op.inverse(op.apply(p)), p - p.mean(), atol=1e-9)
+
+
+def test_the_solver_of_a_contact_uses_this_operator():
+    height = asperity.surface.self_affine(48, 40, lx=1e-3, ly=0.9e-3, wavelength_short=1e-4,
+                                          rms_slope=0.2)
+    for boundary in ("periodic", "free"):
+        contact = asperity.solve_normal(height, 1e-3, 0.9e-3, 4e6, pressure=5e4,
+                                        boundary=boundary)
+        op = asperity.operators.normal(48, 40, 1e-3, 0.9e-3, modulus=4e6, boundary=boundary)
+        difference = op.apply(contact.pressure) - height - contact.gap
+        assert np.ptp(difference) < 1e-4 * np.ptp(height)
+
+
+def test_free_space_is_reciprocal_and_has_an_inverse():
+    op = asperity.operators.normal(14, 11, 1e-3, 0.7e-3, modulus=1e6, boundary="free")
+    p, s = random(2, 11, 14)
+    assert np.vdot(s, op.apply(p)) == pytest.approx(np.vdot(p, op.apply(s)), rel=1e-12)
+    assert np.allclose(op.inverse(op.apply(p)), p, atol=1e-8)
+    my, mx = op.symbol.shape
+    assert my >= 2 * 11 - 1 and mx >= 2 * 14 - 1
+    padded = np.zeros((my, mx))
+    padded[:11, :14] = p
+    image = np.fft.ifft2(op.symbol * np.fft.fft2(padded)).real[:11, :14]
+    assert np.allclose(image, op.apply(p), rtol=0, atol=1e-12 * np.abs(image).max())
+    with pytest.raises(asperity.NotConverged) as caught:
+        op.inverse(op.apply(p), max_iterations=2)
+    assert caught.value.result.shape == (11, 14)
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+@pytest.mark.parametrize("poisson", [0.5, 0.2])
+def test_the_tangential_operator(boundary, poisson):
+    nx, ny = 12, 10
+    op = asperity.operators.tangential(nx, ny, 1e-3, 0.8e-3, modulus=1e6, poisson=poisson,
+                                       boundary=boundary)
+    t, s = random(2, 2, ny, nx)
+    u = op.apply(t)
+    assert np.vdot(s, u) == pytest.approx(np.vdot(t, op.apply(s)), rel=1e-11)
+    my, mx = op.symbol.shape[2:]
+    padded = np.zeros((2, my, mx))
+    padded[:, :ny, :nx] = t
+    image = np.fft.ifft2(np.einsum("abij,bij->aij", op.symbol, np.fft.fft2(padded))).real
+    assert np.allclose(image[:, :ny, :nx], u, rtol=0, atol=1e-12 * np.abs(u).max())
+    back = op.inverse(u)
+    if boundary == "periodic":
+        t = t - t.mean(axis=(1, 2), keepdims=True)
+    assert np.allclose(back, t, atol=1e-7)
+
+
+def test_the_tangential_symbol_of_a_half_space():
+    n, length, shear, poisson = 12, 1e-3, 1e6, 0.3
+    op = asperity.operators.tangential(n, n, length, modulus=shear, poisson=poisson)
+    q = 2 * np.pi * 2 / length                       # a wave along x: in line, and across
+    assert op.symbol[0, 0, 0, 2] == pytest.approx((1 - poisson) / (shear * q), rel=1e-12)
+    assert op.symbol[1, 1, 0, 2] == pytest.approx(1 / (shear * q), rel=1e-12)
+    assert op.symbol[0, 1, 0, 2] == pytest.approx(0.0, abs=1e-25)
+    # An oblique wave: xy = -poisson qx qy/(G q^3), odd in each wave number.
+    q = 2 * np.pi * np.hypot(1, 2) / length
+    assert op.symbol[0, 1, 2, 1] == pytest.approx(-poisson * 2 / 5 / (shear * q), rel=1e-12)
+    assert op.symbol[0, 1, 2, -1] == pytest.approx(poisson * 2 / 5 / (shear * q), rel=1e-12)
+
+
+def test_wrong_shapes_and_values():
+    op = asperity.operators.normal(8, 4, 1.0, 1.0, modulus=1.0)
+    with pytest.raises(ValueError, match=r"must be \(4, 8\)"):
+        op.apply(np.zeros((8, 4)))
+    with pytest.raises(ValueError, match="boundary"):
+        asperity.operators.normal(8, 4, 1.0, modulus=1.0, boundary="open")
+    with pytest.raises(ValueError, match="modulus"):
+        asperity.operators.normal(8, 4, 1.0, modulus=-1.0)
+    with pytest.raises(ValueError, match="poisson"):
+        asperity.operators.tangential(8, 4, 1.0, modulus=1.0, poisson=0.7)
+    assert "8 x 4 cells" in repr(op)

@@ -1,0 +1,115 @@
+!> Changing the load, the velocity of the road or the temperature of a simulation between two rows.
+!>
+!> What is set holds from the next row on, for the phase in hand and all that follow, whatever their
+!> settings say; their durations and steps stay. Within a phase the new load is reached at the end of
+!> the next step. A load that is set before a phase begins makes that phase begin with a jump, as
+!> `ramp = 'step'` does.
+module steering
+   use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
+   use errors, only : error_input, error_type, fail
+   use precision, only : dp
+   use prony, only : wlf_shift
+   use schedule, only : change_velocity
+   use simulation, only : simulation_type
+   use text_tools, only : to_text
+   implicit none
+   private
+
+   public :: steer_load, steer_temperature, steer_velocity
+
+contains
+
+   !> Prescribe a load.
+   subroutine steer_load(sim, control, load, error)
+      type(simulation_type), intent(inout) :: sim
+      character(*), intent(in) :: control             !! 'pressure' | 'force' | 'displacement'
+      real(dp), intent(in) :: load                    !! Pa, N or m
+      type(error_type), allocatable, intent(out) :: error
+      integer :: k
+
+      if (.not. ieee_is_finite(load)) then
+         call fail(error, error_input, control//' = '//to_text(load)//': must be a finite number')
+      else if (control /= 'displacement' .and. sim%case%adhesion%potential == 'none' .and. &
+         .not. load > 0.0_dp) then
+         call fail(error, error_input, control//' = '//to_text(load)// &
+            ': must be positive without adhesion')
+      end if
+      if (allocated(error)) return
+      do k = sim%schedule%phase, size(sim%case%phases)
+         sim%case%phases(k)%control = control
+         sim%case%phases(k)%target = load
+         sim%case%phases(k)%given = .true.
+         sim%case%phases(k)%linear = .false.
+      end do
+   end subroutine steer_load
+
+   !> Let the road move with a velocity.
+   subroutine steer_velocity(sim, velocity, error)
+      type(simulation_type), intent(inout) :: sim
+      real(dp), intent(in) :: velocity(2)             !! along x and y, m/s
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. all(ieee_is_finite(velocity))) then
+         call fail(error, error_input, 'velocity = ('//to_text(velocity(1))//', '// &
+            to_text(velocity(2))//'): must be two finite numbers')
+      else if (.not. sim%slides) then
+         call fail(error, error_input, 'velocity: no phase of the case has a duration, so the road '// &
+            'cannot move')
+      end if
+      if (allocated(error)) return
+      call change_velocity(sim%schedule, sim%case%phases, velocity, &
+         [sim%row%road_x, sim%row%road_y])
+   end subroutine steer_velocity
+
+   !> Bring the rubber to a temperature: its relaxation times shift by the WLF law.
+   subroutine steer_temperature(sim, temperature, start_temperature, start_tau, error)
+      type(simulation_type), intent(inout) :: sim
+      real(dp), intent(in) :: temperature             !! C
+      real(dp), intent(in) :: start_temperature       !! of the case, C
+      real(dp), intent(in) :: start_tau(:)            !! relaxation times at that temperature, s
+      type(error_type), allocatable, intent(out) :: error
+      real(dp) :: factor
+
+      associate (material => sim%case%material)
+         if (size(material%prony_tau) == 0) then
+            call fail(error, error_input, 'temperature: the material is elastic: it has no '// &
+               'relaxation times to shift')
+            return
+         end if
+         if (.not. material%wlf_c2 > 0.0_dp) then
+            call fail(error, error_input, 'temperature: the case needs wlf_c1 and wlf_c2')
+            return
+         end if
+         if (.not. (ieee_is_finite(temperature) .and. &
+            temperature > material%reference_temperature - material%wlf_c2)) then
+            call fail(error, error_input, 'temperature = '//to_text(temperature)// &
+               ': must be above reference_temperature - wlf_c2 = '// &
+               to_text(material%reference_temperature - material%wlf_c2))
+            return
+         end if
+         factor = shift(temperature)/shift(start_temperature)
+         if (.not. (factor > 1.0e-100_dp .and. factor < 1.0e100_dp)) then
+            call fail(error, error_input, 'temperature = '//to_text(temperature)// &
+               ': shifts the relaxation times by a factor of '//to_text(factor))
+            return
+         end if
+         material%temperature = temperature
+         material%prony_tau = factor*start_tau
+         sim%material%tau = factor*start_tau
+      end associate
+
+   contains
+
+      !> The WLF factor of the case's material.
+      function shift(at) result(factor_there)
+         real(dp), intent(in) :: at
+         real(dp) :: factor_there
+
+         associate (m => sim%case%material)
+            factor_there = wlf_shift(at, m%reference_temperature, m%wlf_c1, m%wlf_c2)
+         end associate
+      end function shift
+
+   end subroutine steer_temperature
+
+end module steering
