@@ -140,7 +140,7 @@ class MeasuredSurface:
             raise OSError(f"{path}: cannot be written: there is no folder {str(path.parent)!r}")
         if path.is_dir():
             raise OSError(f"{path}: is a folder, not a file")
-        if _is_result(path):
+        if is_result(path):
             raise ValueError(f"{path}: is the result of a run: name another file")
         ny, nx = self.height.shape
         temporary = path.with_name(path.name + ".new")
@@ -179,7 +179,7 @@ class MeasuredSurface:
         return path
 
 
-def _is_result(path: Path) -> bool:
+def is_result(path: Path) -> bool:
     """Whether a file is the result of a run, which is not to be replaced by a map."""
     import h5py
 

@@ -7,8 +7,9 @@ module as ``asperity.surface``.
 from __future__ import annotations
 
 from .generated import self_affine, shape
+from .held_maps import save
 from .measured import MeasuredSurface, import_topography, load
 from .statistics import RadialPsd, Statistics, psd, psd_map, statistics
 
 __all__ = ["MeasuredSurface", "RadialPsd", "Statistics", "import_topography", "load", "psd",
-           "psd_map", "self_affine", "shape", "statistics"]
+           "psd_map", "save", "self_affine", "shape", "statistics"]

@@ -9,6 +9,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..roads.held_maps import keep_beside, map_of_file
 from . import namelists
 from .groups import Group, Groups, UnknownVariableError, entry_of
 
@@ -39,7 +40,11 @@ class Case:
         The title, the variable of the group ``case``.
     **groups
         Values of the groups, by name: dicts of variables, or lists of dicts for ``surface`` and
-        ``phase``. Numbers may be those of numpy, lists of numbers its arrays.
+        ``phase``. Numbers may be those of numpy, lists of numbers its arrays. A surface may be a
+        height map, too: an array of shape (ny, nx) in m, summits largest, or a topography of
+        SurfaceTopography; the grid then has its cells, and of a topography its lengths, unless
+        it is told others. Maps pass through a temporary file; `write` and `run` copy them beside
+        the input or the result.
 
     Attributes
     ----------
@@ -79,6 +84,7 @@ class Case:
             self[name] = {} if not namelists.table()[name].is_repeatable else []
         for name, values in groups.items():
             self[name] = values
+        self._take_grid()
         if title is not None:
             self["case"]["title"] = title
 
@@ -174,12 +180,43 @@ class Case:
             The file.
         """
         path = Path(path)
-        new = self.copy()
+        new = self.kept_in(path.parent)
         new._follow(path.parent)
+        for old, surface in zip(self["surface"], new["surface"], strict=True):
+            if map_of_file(old.file) is not None:
+                surface.file = Path(surface.file).name
         path.write_bytes(namelists.encode(str(new)))
         object.__setattr__(self, "_groups", new._groups)
         self.path = path
         return path
+
+    def kept_in(self, folder: str | os.PathLike[str]) -> Case:
+        """Return a case whose height maps, where they are arrays, lie in a folder as files.
+
+        Parameters
+        ----------
+        folder : str or path
+            Where the maps are copied to.
+        """
+        new = self.copy()
+        for surface in new["surface"]:
+            if map_of_file(surface.file) is not None:
+                surface.file = str(keep_beside(surface.file, Path(folder)).resolve())
+        return new
+
+    def _take_grid(self) -> None:
+        """Give the grid what the first height map knows and nobody has said."""
+        held = next((held for held in (map_of_file(one.file) for one in self["surface"])
+                     if held is not None), None)
+        if held is None:
+            return
+        ny, nx = held.height.shape
+        known: dict[str, Any] = {"nx": nx, "ny": ny, "lx": held.lx, "ly": held.ly}
+        if held.periodic is False and ny > 1:
+            known["boundary"] = "free"
+        for name, value in known.items():
+            if value is not None and name not in self["grid"]:
+                self["grid"][name] = value
 
     def _follow(self, folder: Path) -> None:
         """Change the relative paths of height maps to those seen from another folder."""
@@ -240,6 +277,12 @@ class Case:
     @title.setter
     def title(self, title: str) -> None:
         self["case"]["title"] = title
+
+    @property
+    def result(self) -> Path:
+        """The result that a run writes unless it is told another."""
+        file = self["output"].file
+        return self._name.parent / file if file else self._name.with_suffix(".h5")
 
     @property
     def _name(self) -> Path:

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, MutableMapping, Mutable
 from typing import Any, overload
 
 from ..base.names import UnknownNameError, unknown_name
+from ..roads.held_maps import held_map, is_map
 from . import namelists
 
 __all__ = ["Group", "Groups", "UnknownVariableError", "entry_of"]
@@ -198,12 +199,14 @@ class Groups(MutableSequence[Group]):
 
     def __init__(self, name: str, groups: Iterable[Mapping[str, Any]] = ()) -> None:
         self._name = entry_of(name).name
-        if isinstance(groups, Mapping):
+        if isinstance(groups, Mapping) or is_map(groups):
             groups = [groups]
         self._groups = [self._group(values) for values in groups]
 
     def _group(self, values: Mapping[str, Any]) -> Group:
-        """Return a new group with these values."""
+        """Return a new group with these values; a height map becomes the file that holds it."""
+        if self._name == "surface" and is_map(values):
+            values = {"shape": "file", "file": str(held_map(values))}
         return Group(self._name, values)
 
     @overload

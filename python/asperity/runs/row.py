@@ -73,6 +73,8 @@ class Row(NamedValues):
     dissipated_viscous: float
     dissipated_numerical: float
     dissipated_friction: float
+    power_viscous: float
+    power_friction: float
     iterations_normal: int
     iterations_tangential: int
     residual_normal: float

@@ -14,6 +14,7 @@ from ..base.check import whole
 from ..base.errors import NotConverged
 from ..results import Run
 from . import namelists
+from .case import Case
 from .row import Row
 from .simulation import RunView
 
@@ -92,6 +93,9 @@ def run(
     target = b"" if output is None else os.fsencode(output)
     if output is not None and not 0 < len(target) <= 1024:
         raise ValueError(f"output: has {len(target)} characters: must have 1 to 1024")
+    if isinstance(case, Case):
+        # A result outlives this process: height maps that are arrays are kept beside it.
+        case = case.kept_in((Path(output) if output else case.result).parent)
     path, text = namelists.source(case)
     handle, rows, first, result, told = _open(os.fsencode(path), namelists.encode(text), target,
                                               threads or 0, int(restart))

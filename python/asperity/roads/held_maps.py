@@ -1,0 +1,184 @@
+"""Height maps that Python holds, as arrays or SurfaceTopography objects, as files for the program.
+
+The program reads heights from HDF5 files. A map that is given as an array is written to a folder of
+this process, under a name made of its content; the folder goes with the process. Where an input or
+a result is kept, the map is copied beside it (`keep_beside`).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import tempfile
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import h5py
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..base import library
+from ..base.check import positive
+from .instrument_files import to_metres
+
+__all__ = ["HeldMap", "held_map", "is_map", "keep_beside", "map_of_file", "save"]
+
+
+class HeldMap(NamedTuple):
+    """A height map in memory."""
+
+    height: NDArray[np.float64]  # (ny, nx), m
+    lx: float | None             # m; None where unknown
+    ly: float | None
+    periodic: bool | None
+
+
+_folder: tempfile.TemporaryDirectory[str] | None = None
+_held: dict[Path, HeldMap] = {}
+
+
+def is_map(value: object) -> bool:
+    """Return whether this is an array or a topography, as opposed to variables of a group."""
+    return isinstance(value, np.ndarray) or _is_topography(value)
+
+
+def _is_topography(value: object) -> bool:
+    return callable(getattr(value, "heights", None)) and hasattr(value, "physical_sizes")
+
+
+def _map_of(value: Any, name: str = "surface") -> HeldMap:
+    """Return an array or a topography as a map in metres, summits largest."""
+    if not _is_topography(value):
+        return HeldMap(library.height_map(value, name), None, None, None)
+    unit = getattr(value, "unit", None)
+    if unit is None:
+        raise ValueError(f"{name}: the topography has no unit: give it one, as"
+                         " topography.to_unit('m') or by its constructor")
+    sizes = to_metres(np.ravel(value.physical_sizes), unit)
+    heights = np.asarray(to_metres(np.ma.filled(value.heights(), np.nan), unit), dtype=float)
+    height = library.height_map(np.atleast_2d(heights.T), name)
+    ly = float(sizes[1]) if len(sizes) > 1 else None
+    return HeldMap(height, float(sizes[0]), ly, bool(getattr(value, "is_periodic", False)))
+
+
+def held_map(value: Any) -> Path:
+    """Write a map to the folder of this process and return the file."""
+    global _folder
+    held = _map_of(value)
+    if _folder is None:
+        _folder = tempfile.TemporaryDirectory(prefix="asperity-maps-")
+    digest = hashlib.sha256(np.ascontiguousarray(held.height).tobytes())
+    digest.update(repr((held.height.shape, held.lx, held.ly, held.periodic)).encode())
+    path = Path(_folder.name) / f"surface-{digest.hexdigest()[:16]}.h5"
+    if path not in _held:
+        _write(path, held, "a map that was given as an array")
+        _held[path] = held
+    return path
+
+
+def map_of_file(file: str | None) -> HeldMap | None:
+    """Return the map behind a file of `held_map`, None for any other file."""
+    return _held.get(Path(file)) if file else None
+
+
+def keep_beside(file: str, folder: Path) -> Path:
+    """Copy the file of a held map into a folder, where it has the same name; return the copy."""
+    source = Path(file)
+    target = folder / source.name
+    if not target.exists():
+        new = target.with_name(target.name + ".new")
+        shutil.copyfile(source, new)
+        new.replace(target)
+    return target
+
+
+def save(path: str | Path, height: ArrayLike, lx: float | None = None, ly: float | None = None, *,
+         boundary: str | None = None, title: str = "") -> Path:
+    """Write heights as the HDF5 file that ``&surface shape = 'file'`` takes.
+
+    A file of that name is replaced, unless it is the result of a run.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    height : array_like, shape (ny, nx), or a topography of SurfaceTopography
+        Heights, m, summits largest. A topography brings its unit, its lengths and whether it is
+        periodic.
+    lx, ly : float, optional
+        Lengths, m; `ly` defaults to square cells. Those of a topography are its own.
+    boundary : str, optional
+        'periodic' or 'free'; of an array 'periodic' by default.
+    title : str
+        A title, kept in the file.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    ValueError
+        If heights or lengths are wrong, or the file is the result of a run.
+    OSError
+        If it cannot be written.
+
+    Examples
+    --------
+    >>> import asperity, pathlib, tempfile
+    >>> height = asperity.surface.self_affine(32, lx=1e-3, wavelength_short=1e-4,
+    ...                                       rms_slope=0.1)
+    >>> folder = pathlib.Path(tempfile.mkdtemp())
+    >>> asperity.surface.save(folder / "road.h5", height, 1e-3).name
+    'road.h5'
+    >>> asperity.surface.load(folder / "road.h5").lx
+    0.001
+    """
+    held = _map_of(height, "height")
+    if held.lx is None:
+        if lx is None:
+            raise ValueError("lx: must be given with an array of heights")
+        lx, ly = library.lengths(held.height.shape, lx, ly)
+        held = HeldMap(held.height, lx, ly, boundary != "free")
+    elif lx is not None or ly is not None:
+        raise ValueError("lx, ly: a topography has its own lengths")
+    if boundary is not None:
+        held = held._replace(periodic=not library.flag_of_boundary(boundary))
+    return _write(Path(path), held, title)
+
+
+def _write(path: Path, held: HeldMap, title: str) -> Path:
+    """Write the file, which appears when it is complete."""
+    from .measured import is_result
+
+    if not path.parent.is_dir():
+        raise OSError(f"{path}: cannot be written: there is no folder {str(path.parent)!r}")
+    if path.is_dir():
+        raise OSError(f"{path}: is a folder, not a file")
+    if is_result(path):
+        raise ValueError(f"{path}: is the result of a run: name another file")
+    ny, nx = held.height.shape
+    new = path.with_name(path.name + ".new")
+    try:
+        with h5py.File(new, "w") as file:
+            file.attrs.update(title=title, program="asperity", version=library.version(),
+                              created=f"{datetime.now(timezone.utc):%Y-%m-%dT%H:%M:%SZ}")
+            data = file.create_dataset("surface/height", data=held.height)
+            data.attrs.update(units="m", long_name="height of the road")
+            if held.lx is not None:
+                lx = positive("lx", held.lx)
+                ly = lx * ny / nx if held.ly is None else positive("ly", held.ly)
+                grid = file.create_group("grid")
+                grid.attrs.update(nx=np.int32(nx), ny=np.int32(ny), lx=lx, ly=ly,
+                                  boundary="periodic" if held.periodic else "free")
+                for name, count, length in (("x", nx, lx), ("y", ny, ly)):
+                    axis = grid.create_dataset(name, data=np.arange(count) * length / count)
+                    axis.attrs.update(units="m", long_name=f"centres of the cells along {name}")
+                data.attrs.update(lx=lx, ly=ly)
+        new.replace(path)
+    except OSError as error:
+        new.unlink(missing_ok=True)
+        raise OSError(f"{path}: cannot be written: {error}") from None
+    return path

@@ -1,0 +1,115 @@
+"""Height maps as arrays and topographies, everywhere where a map is taken."""
+
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import asperity
+
+pytestmark = pytest.mark.filterwarnings("ignore:&")
+
+MATERIAL = dict(shear_modulus=1e6)
+
+
+def wave(ny=20, nx=24):
+    x, y = np.arange(nx) / nx, np.arange(ny) / ny
+    return 1e-6 * (np.cos(2 * np.pi * x) + 0.5 * np.cos(4 * np.pi * y)[:, None])
+
+
+def solved(height, lx, ly, **load):
+    return asperity.solve_normal(height, lx, ly, 2 * 1e6 / 0.5, tolerance=1e-8, **load)
+
+
+def test_a_case_takes_an_array(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    height = wave()
+    case = asperity.Case(surface=height, grid=dict(lx=1.2e-3, ly=0.8e-3), material=MATERIAL,
+                         phase=dict(pressure=3e3), solver=dict(tolerance=1e-8))
+    assert (case.grid.nx, case.grid.ny) == (24, 20)
+    assert "nx = 24" in case.check()
+    run = case.run()
+    exact = solved(height, 1.2e-3, 0.8e-3, pressure=3e3)
+    assert np.allclose(run.snapshots[-1].pressure, exact.pressure, atol=1e-6 * exact.pressure.max())
+    assert np.array_equal(run.height, height)
+    maps = [path for path in tmp_path.iterdir() if path.name.startswith("surface-")]
+    assert len(maps) == 1 and str(maps[0]) in run.input
+
+
+def test_a_simulation_takes_an_array_and_writes_nothing(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    case = asperity.Case(surface=wave(), grid=dict(lx=1.2e-3), material=MATERIAL,
+                         phase=dict(pressure=3e3))
+    sim = asperity.Simulation(case)
+    sim.advance()
+    assert np.array_equal(sim.fields.height, wave())
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_written_case_is_complete_without_this_process(tmp_path, program):
+    case = asperity.Case(surface=[wave(), dict(shape="sine", amplitude=1e-7, wavelength=1e-3)],
+                         grid=dict(lx=1e-3), material=MATERIAL, phase=dict(pressure=3e3))
+    case.write(tmp_path / "case.nml")
+    case.write(tmp_path / "again.nml")
+    names = sorted(path.name for path in tmp_path.iterdir())
+    assert names[:2] == ["again.nml", "case.nml"] and len(names) == 3
+    for surface in case.surface[:1]:
+        assert not Path(surface.file).is_absolute()
+    moved = tmp_path.with_name(tmp_path.name + "_moved")
+    tmp_path.rename(moved)
+    subprocess.run([program, "run", "case.nml", "--quiet"], cwd=moved, check=True)
+    assert asperity.open(moved / "case.h5").finished
+
+
+@pytest.mark.parametrize("value", [
+    np.array([1.0, np.nan]), np.zeros((2, 2, 2)), np.array([["a"]])])
+def test_what_is_no_map(value):
+    with pytest.raises(ValueError, match="surface"):
+        asperity.Case(surface=value)
+
+
+def test_a_map_of_another_size_than_the_grid_is_refused():
+    case = asperity.Case(surface=wave(), grid=dict(nx=12, ny=20, lx=1e-3), material=MATERIAL,
+                         phase=dict(pressure=3e3))
+    with pytest.raises(ValueError, match="12"):
+        case.check()
+
+
+def test_a_topography_brings_its_grid(tmp_path):
+    topography = pytest.importorskip("SurfaceTopography")
+    height = wave()
+    given = topography.Topography(1e6 * height.T, (1200.0, 800.0), unit="um", periodic=True)
+    case = asperity.Case(surface=given, material=MATERIAL, phase=dict(pressure=3e3))
+    assert case.grid.lx == pytest.approx(1.2e-3) and case.grid.ly == pytest.approx(0.8e-3)
+    assert case.grid.boundary == "periodic" and (case.grid.nx, case.grid.ny) == (24, 20)
+    sim = asperity.Simulation(case)
+    assert np.allclose(sim.fields.height, 0.0) or np.allclose(sim.fields.height, height)
+    free = topography.Topography(1e6 * height.T, (1200.0, 800.0), unit="um")
+    assert asperity.Case(surface=free).grid.boundary == "free"
+    with pytest.raises(ValueError, match="has no unit"):
+        asperity.Case(surface=topography.Topography(height.T, (1.0, 1.0)))
+    path = asperity.surface.save(tmp_path / "map.h5", given)
+    assert np.allclose(asperity.surface.load(path).height, height)
+    with pytest.raises(ValueError, match="its own lengths"):
+        asperity.surface.save(path, given, 1.0)
+
+
+def test_saved_arrays(tmp_path, program):
+    path = asperity.surface.save(tmp_path / "road.h5", wave(), 1e-3, 0.9e-3, title="waves")
+    loaded = asperity.surface.load(path)
+    assert np.allclose(loaded.height, wave(), rtol=0, atol=1e-18) and loaded.periodic
+    assert (loaded.lx, loaded.ly) == (1e-3, 0.9e-3)
+    (tmp_path / "case.nml").write_text(
+        "&grid nx=24, ny=20, lx=1e-3, ly=0.9e-3 / &surface shape='file', file='road.h5' /"
+        "&material shear_modulus=1e6 / &phase pressure=1e3 /")
+    told = subprocess.run([program, "check", "case.nml"], cwd=tmp_path, capture_output=True,
+                          text=True, check=True)
+    assert told.stderr == "" and "warning" not in told.stdout.replace("! warning: &surface", "")
+    with pytest.raises(ValueError, match="lx: must be given"):
+        asperity.surface.save(path, wave())
+    with pytest.raises(OSError, match="there is no folder"):
+        asperity.surface.save(tmp_path / "no" / "road.h5", wave(), 1.0)
+    run = asperity.run(tmp_path / "case.nml")
+    with pytest.raises(ValueError, match="is the result of a run"):
+        asperity.surface.save(run.path, wave(), 1.0)
