@@ -327,8 +327,76 @@ def test_exports_as_instruments_write_them(tmp_path):
     np.testing.assert_allclose(table.temperature, [10.0] * 3 + [20.0] * 3)
     assert table.notes == []
     path.write_text(path.read_text().replace("2,5;1,225;0,2", "2,5;;0,2"))
-    with pytest.raises(ValueError, match="line 10: storage = '': must be a number > 0"):
-        read_dma(path)
+    table = read_dma(path)
+    assert table.storage.size == 5
+    assert any("1 of 6 points have no value" in note for note in table.notes)
+
+
+def test_wide_tables_are_those_of_long_ones(tmp_path):
+    """Heads with temperatures, temperatures above the heads, a frequency for each temperature."""
+    frequencies, celsius = np.array([0.1, 1.0, 10.0, 50.0]), (-20.0, 0.0, 25.5)
+    storage = {t: 1e6 * (2.0 - 0.01 * t + 0.1 * np.arange(4)) for t in celsius}
+    loss = {t: 1e5 * (3.0 - 0.02 * t + 0.1 * np.arange(4)) for t in celsius}
+
+    def rows(*columns):
+        return "".join(";".join(f"{value!r}" for value in row) + "\n" for row in
+                       zip(*columns, strict=True))
+
+    pairs = [values for t in celsius for values in ((storage[t] / 1e6).tolist(),
+                                                    (loss[t] / 1e6).tolist())]
+    heads = "f (Hz);" + ";".join(f"G' {t:g} °C (MPa);G'' {t:g} °C (MPa)" for t in celsius)
+    above = (";" + ";".join(f"{t + 273.15:g} K;" for t in celsius) + "\nf;"
+             + ";".join(["G';G''"] * 3) + "\nHz;" + ";".join(["MPa;MPa"] * 3))
+    own = ";".join(f"freq (Hz) @ {t:g}C;storage modulus @ {t:g}C (MPa);tan delta @ {t:g}C"
+                   for t in celsius)
+    tangents = [values for t in celsius for values in (
+        frequencies.tolist(), (storage[t] / 1e6).tolist(), (loss[t] / storage[t]).tolist())]
+    for text in (heads + "\n" + rows(frequencies.tolist(), *pairs),
+                 "Sample: tread\n" + above + "\n" + rows(frequencies.tolist(), *pairs),
+                 own + "\n" + rows(*tangents)):
+        path = tmp_path / "wide.csv"
+        path.write_text(text)
+        table = read_dma(path)
+        np.testing.assert_allclose(table.temperature, np.repeat(celsius, 4), atol=1e-9)
+        np.testing.assert_allclose(table.omega, 2 * np.pi * np.tile(frequencies, 3))
+        np.testing.assert_allclose(table.storage, np.concatenate([storage[t] for t in celsius]))
+        np.testing.assert_allclose(table.loss, np.concatenate([loss[t] for t in celsius]))
+
+
+def test_overloads_are_left_out(tmp_path):
+    path = tmp_path / "dma.csv"
+    path.write_text("f (Hz),G' (Pa) at 0 C,G'' (Pa) at 0 C,G' (Pa) at 9 C,G'' (Pa) at 9 C\n"
+                    "1,10,2,8,1\n2,OVL,OVL,9,1.5\n3,12,3,,\n4,13,3.5,11,2.5\n")
+    table = read_dma(path)
+    assert table.storage.tolist() == [10.0, 12.0, 13.0, 8.0, 9.0, 11.0]
+    assert table.temperature.tolist() == [0.0] * 3 + [9.0] * 3
+    assert "2 of 8 points have no value" in " ".join(table.notes)
+
+
+def test_vertical_shifts_are_found_and_written(tmp_path):
+    """A rubber whose moduli grow with the temperature: a_T and b_T come back."""
+    rubber, wlf = Prony(1e6, [2e6, 4e6, 2e6], [1e-3, 1e-2, 1e-1]), WLF(8.0, 120.0, 20.0)
+    omega = np.logspace(-1, 3, 30)
+    celsius = np.array([0.0, 10.0, 20.0, 30.0])
+    rise = (273.15 + celsius) / 293.15
+    cold = [rubber.shifted(t, wlf) for t in celsius]
+    table = DmaTable(np.tile(omega, 4),
+                     np.concatenate([b * m.storage_modulus(omega)
+                                     for b, m in zip(rise, cold, strict=True)]),
+                     np.concatenate([b * m.loss_modulus(omega)
+                                     for b, m in zip(rise, cold, strict=True)]),
+                     np.repeat(celsius, 30))
+    fit = fit_dma(table, reference=20.0, vertical=True)
+    np.testing.assert_allclose([b for _, b in fit.vertical_shifts], np.log10(rise), atol=3e-3)
+    np.testing.assert_allclose([a for _, a in fit.shifts], np.log10(wlf.shift_factor(celsius)),
+                               atol=0.03)
+    plain = fit_dma(table, reference=20.0)
+    assert plain.vertical_shifts == [] and fit.overlap_error < 0.5 * plain.overlap_error
+    lines = fit.write_shifts(tmp_path / "shifts.csv").read_text().splitlines()
+    assert lines[0] == "temperature,log10_a_t,a_t,b_t"
+    values = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
+    np.testing.assert_allclose(values[:, 2], 10.0 ** values[:, 1])
+    np.testing.assert_allclose(values[:, 3], rise, rtol=8e-3)
 
 
 def test_commas_between_thousands(tmp_path):

@@ -289,9 +289,9 @@ def test_a_signal_cuts_no_call_in_two(tmp_path, monkeypatch, number, moment):
 
     case = wave()
     case.phase.append(duration=1.0, steps=100000, velocity_x=1e-3)
-    program = asperity.sweeps.program()
-    monkeypatch.setattr(asperity.sweeps, "program", lambda: program)
-    monkeypatch.setattr(asperity.sweeps.subprocess, "Popen", Process)
+    program = asperity.runs.program.program()
+    monkeypatch.setattr(asperity.runs.means, "program", lambda: program)
+    monkeypatch.setattr(asperity.runs.jobs.subprocess, "Popen", Process)
     before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)

@@ -106,6 +106,10 @@ def add_fit(verbs: Any) -> None:
                         help="temperature of the simulation, C (default: the reference)")
     parser.add_argument("--temperature-tolerance", type=float, default=0.5, metavar="K",
                         help="temperatures closer than this belong together (default: 0.5)")
+    parser.add_argument("--vertical", action="store_true",
+                        help="shift moduli, too, where shifts are found from the overlap")
+    parser.add_argument("--shifts", metavar="FILE.csv", type=Path,
+                        help="write the shifts a_T and b_T of each temperature there")
     parser.set_defaults(call=_fit)
 
 
@@ -151,7 +155,7 @@ def _fit(chosen: argparse.Namespace) -> int:
     fit = fit_dma(
         table, arms_per_decade=chosen.arms_per_decade, reference=chosen.reference,
         wlf=chosen.wlf, temperature_tolerance=chosen.temperature_tolerance,
-        least_plateau=chosen.least_plateau)
+        least_plateau=chosen.least_plateau, vertical=chosen.vertical)
     group = fit.to_namelist(poisson=chosen.poisson, temperature=chosen.temperature)
     told = sys.stdout
     if output is None:
@@ -161,6 +165,8 @@ def _fit(chosen: argparse.Namespace) -> int:
         output.write_text(group + "\n", encoding="utf-8")
         print(fit.summary())
         print(f"wrote {output}")
+    if chosen.shifts is not None:
+        print(f"wrote {fit.write_shifts(chosen.shifts)}", file=told)
     if chosen.plot is not None:
         import matplotlib
 

@@ -11,7 +11,7 @@ from ..base.check import choice
 from ..base.tables import Rows, decimals, is_number
 
 __all__ = ["FREQUENCY_UNITS", "KINDS", "MODULUS_UNITS", "ROLES", "TEMPERATURE_UNITS",
-           "find_columns", "split_header"]
+           "find_columns", "role_of", "split_header"]
 
 FREQUENCY_UNITS = {"Hz": 2.0 * math.pi, "kHz": 2e3 * math.pi, "mHz": 2e-3 * math.pi,
                    "rad/s": 1.0, "krad/s": 1e3}
@@ -151,6 +151,18 @@ def _name_and_unit(text: str) -> tuple[str, str | None]:
 def _plain(text: str) -> str:
     """Return a name without blanks, underscores and capitals."""
     return re.sub(r"[\s_.\-*]", "", text).lower()
+
+
+def role_of(head: str) -> str | None:
+    """Return the role that the head of a column names, such as 'storage', or None.
+
+    Examples
+    --------
+    >>> role_of("G' (MPa)"), role_of("f (Hz)"), role_of("sample")
+    ('storage', 'frequency', None)
+    """
+    name = _name_and_unit(head)[0]
+    return next((role for role, names in _NAMES.items() if name in names), None)
 
 
 def find_columns(

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -56,6 +57,8 @@ class DmaFit:
         Name of the data.
     notes : list of str
         What was taken for granted, or looks doubtful.
+    vertical_shifts : list of (float, float)
+        Temperature and log10 of its vertical factor b_T; empty unless asked for.
     """
 
     material: Prony
@@ -74,6 +77,7 @@ class DmaFit:
     plateau_bounded: bool
     name: str
     notes: list[str]
+    vertical_shifts: list[tuple[float, float]] = field(default_factory=list)
 
     @property
     def valid_range(self) -> tuple[float, float]:
@@ -97,6 +101,9 @@ class DmaFit:
         if self.shifts and len(self.shifts) > 1:
             lines.append("shifts (log10 a_T): " + ", ".join(
                 f"{t:g} C {shift:+.3f}" for t, shift in self.shifts))
+        if self.vertical_shifts:
+            lines.append("vertical shifts (log10 b_T): " + ", ".join(
+                f"{t:g} C {shift:+.3f}" for t, shift in self.vertical_shifts))
         if self.overlap_error is not None:
             lines.append(f"overlap error (rms of log10): {self.overlap_error:.4f}")
         if self.wlf is not None:
@@ -131,6 +138,31 @@ class DmaFit:
             poisson=poisson, wlf=self.wlf,
             temperature=self.wlf.t_ref if temperature is None else temperature)
 
+    def write_shifts(self, path: str | Path) -> Path:
+        """Write the shifts as a table: temperature, log10_a_t, a_t, b_t; return its path.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file, NAME.csv; temperatures in C.
+
+        Raises
+        ------
+        ValueError
+            If the table has one temperature only.
+        OSError
+            If the file cannot be written.
+        """
+        if len(self.shifts) < 2:
+            raise ValueError(f"{self.name}: has one temperature: there are no shifts to write")
+        upward = dict(self.vertical_shifts)
+        lines = ["temperature,log10_a_t,a_t,b_t"]
+        lines += [f"{t!r},{shift!r},{10.0**shift!r},{10.0**upward.get(t, 0.0)!r}"
+                  for t, shift in self.shifts]
+        path = Path(path)
+        path.write_text("\n".join(lines) + "\n", encoding="ascii")
+        return path
+
     def plot(self) -> Figure:
         """Draw data and fit, tan delta, and the error of both.
 
@@ -150,6 +182,7 @@ def fit_dma(
     temperature_tolerance: float = 0.5,
     least_plateau: float = 0.01,
     slack: float = 0.05,
+    vertical: bool = False,
 ) -> DmaFit:
     """Fit a Prony series to a table.
 
@@ -172,6 +205,8 @@ def fit_dma(
         the data do not reach it. 0 to 1.
     slack : float
         Relative increase of the misfit allowed for smoothness; see `asperity.material.Prony.fit`.
+    vertical : bool
+        Where shifts are found from the overlap, shift moduli, too: G(omega, T) = b_T G(omega a_T).
 
     Returns
     -------
@@ -188,11 +223,14 @@ def fit_dma(
     sweeps: list[Rows] = []
     if table.temperature is not None:
         sweeps = _sweeps(table.temperature, temperature_tolerance)
-    found = _shifted(table, sweeps, _constants(wlf, reference), reference, temperature_tolerance)
+    found = _shifted(table, sweeps, _constants(wlf, reference), reference, temperature_tolerance,
+                     vertical)
     notes += found.notes
     reduced = table.omega * 10.0**found.log_shift
     order = np.argsort(reduced, kind="stable")
-    omega, storage, loss = reduced[order], table.storage[order], table.loss[order]
+    omega = reduced[order]
+    storage, loss = (values[order] * 10.0 ** -found.log_vertical[order]
+                     for values in (table.storage, table.loss))
     notes += _range_notes(table, omega)
     material = Prony.fit(omega, storage, loss, arms_per_decade=arms_per_decade, slack=slack,
                          least_plateau=least_plateau)
@@ -213,13 +251,15 @@ def fit_dma(
         None if table.temperature is None else table.temperature[order], found.reference,
         found.wlf, [(t, float(found.log_shift[rows[0]])) for t, rows in sweeps],
         found.overlap_error, *rms,
-        float(max(np.abs(errors[0]).max(), np.abs(errors[1]).max())), bounded, table.name, notes)
+        float(max(np.abs(errors[0]).max(), np.abs(errors[1]).max())), bounded, table.name, notes,
+        [(t, float(found.log_vertical[rows[0]])) for t, rows in sweeps] if vertical else [])
 
 
 class _Shifted(NamedTuple):
     """How the points of a table come to the reference temperature."""
 
     log_shift: FloatArray  # log10 a_T of each point
+    log_vertical: FloatArray  # log10 b_T of each point
     reference: float | None
     wlf: WLF | None
     overlap_error: float | None
@@ -227,26 +267,26 @@ class _Shifted(NamedTuple):
 
 
 def _shifted(table: DmaTable, sweeps: list[Rows], constants: WLF | None, reference: float | None,
-             tolerance: float) -> _Shifted:
+             tolerance: float, vertical: bool) -> _Shifted:
     """Return the shifts: those of the constants, or those that lay the sweeps on one curve."""
-    shift = np.zeros(table.omega.size)
+    shift, level = np.zeros(table.omega.size), np.zeros(table.omega.size)
     if constants is not None:
         for t, rows in sweeps:
             shift[rows] = math.log10(float(constants.shift_factor(t)))
-        return _Shifted(shift, constants.t_ref, constants, None, [])
+        return _Shifted(shift, level, constants.t_ref, constants, None, [])
     if len(sweeps) > 1:
-        return _overlaid(table, sweeps, reference, tolerance)
+        return _overlaid(table, sweeps, reference, tolerance, vertical)
     if len(sweeps) == 1:
         measured = sweeps[0][0]
         if reference is not None and abs(measured - reference) > tolerance:
             raise ValueError(f"reference = {reference:g}: the data are at {measured:g} C:"
                              " give WLF constants (wlf, --wlf C1 C2)")
         reference = measured
-    return _Shifted(shift, reference, None, None, [])
+    return _Shifted(shift, level, reference, None, None, [])
 
 
-def _overlaid(table: DmaTable, sweeps: list[Rows], reference: float | None, tolerance: float
-              ) -> _Shifted:
+def _overlaid(table: DmaTable, sweeps: list[Rows], reference: float | None, tolerance: float,
+              vertical: bool) -> _Shifted:
     """Return the shifts that lay each sweep over its neighbour."""
     temperatures = [t for t, _ in sweeps]
     place = len(sweeps) // 2 if reference is None else int(
@@ -259,15 +299,16 @@ def _overlaid(table: DmaTable, sweeps: list[Rows], reference: float | None, tole
     _enough(table, sweeps)
     curve = master_curve(
         temperatures, [table.omega[r] for _, r in sweeps],
-        [table.storage[r] for _, r in sweeps], [table.loss[r] for _, r in sweeps], near)
-    shift = np.zeros(table.omega.size)
-    for (_, rows), log_shift in zip(sweeps, curve.log_shift, strict=True):
-        shift[rows] = log_shift
+        [table.storage[r] for _, r in sweeps], [table.loss[r] for _, r in sweeps], near,
+        vertical=vertical)
+    shift, level = np.zeros(table.omega.size), np.zeros(table.omega.size)
+    for (_, rows), along, up in zip(sweeps, curve.log_shift, curve.log_vertical, strict=True):
+        shift[rows], level[rows] = along, up
     notes = []
     if curve.wlf is None:
         notes.append(f"the shifts give no WLF constants: the material is known at {near:g} C only")
     notes += _doubts(table, sweeps, curve)
-    return _Shifted(shift, near if curve.wlf is None else curve.wlf.t_ref, curve.wlf,
+    return _Shifted(shift, level, near if curve.wlf is None else curve.wlf.t_ref, curve.wlf,
                     curve.overlap_error, notes)
 
 

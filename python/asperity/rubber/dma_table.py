@@ -11,15 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.check import choice, poisson_ratio
-from ..base.tables import cells_of, text_lines
+from ..base.tables import Rows, cells_of, text_lines
 from .dma_columns import (
     FREQUENCY_UNITS,
     KINDS,
     MODULUS_UNITS,
     TEMPERATURE_UNITS,
     find_columns,
+    role_of,
     split_header,
 )
+from .dma_wide import MISSING, unfolded
 
 __all__ = ["DmaTable", "read_dma"]
 
@@ -68,8 +70,10 @@ def read_dma(
 
     Columns are separated by commas, semicolons, tabs or blanks; decimal commas are read where
     commas do not separate (with decimal points elsewhere they stand between thousands). Lines that
-    start with ``#``, empty ones and those above the header are skipped. Units stand in
-    the header, such as ``f (Hz)``, ``G' [MPa]``, ``T_C``, or in a line of their own below it.
+    start with ``#``, empty ones and those above the header are skipped. Points whose cells are
+    empty or hold a word such as OVL are left out. A wide table has columns for each temperature,
+    which the heads name, as ``G' (MPa) at -20 C``, or a line above them. Units stand in the
+    header, such as ``f (Hz)``, ``G' [MPa]``, ``T_C``, or in a line of their own below it.
     Without any, frequencies are in Hz (in rad/s where the column is named omega), moduli in Pa and
     temperatures in C, and `notes` says so.
 
@@ -121,9 +125,10 @@ def read_dma(
             choice(word, value, tuple(allowed))
     if kind is not None:
         choice("kind", kind, KINDS)
-    header, units, body = split_header(path, cells_of(text_lines(path)), columns or {})
+    lines = unfolded(cells_of(text_lines(path)), role_of)
+    header, units, body = split_header(path, lines, columns or {})
     places, found_units, found_kind = find_columns(path, header, units, columns or {})
-    notes: list[str] = []
+    body, notes = _measured(body, places)
 
     def unit(role: str, given: str | None, allowed: Mapping[str, float], default: str) -> float:
         told = found_units.get(role)
@@ -160,6 +165,19 @@ def read_dma(
     if "temperature" in places:
         temperature = values["temperature"] + to_celsius
     return DmaTable(to_omega * values["frequency"], storage, loss, temperature, path.name, notes)
+
+
+def _measured(body: Rows, places: Mapping[str, int]) -> tuple[Rows, list[str]]:
+    """Return the rows without those that lack a value, as where the instrument overloads."""
+    most = max(places.values()) + 1
+    kept = [(line, cells) for line, cells in body
+            if len(cells) < most
+            or not any(cells[at].strip().lower() in MISSING for at in places.values())]
+    left_out = len(body) - len(kept)
+    if not left_out:
+        return body, []
+    return kept, [f"{left_out} of {len(body)} points have no value (empty, or a word such as OVL):"
+                  " left out"]
 
 
 def _numbers(

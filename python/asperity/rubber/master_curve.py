@@ -35,6 +35,9 @@ class MasterCurve(NamedTuple):
         c1, c2 > 0 fits.
     overlap_error : float
         Rms distance of neighbouring curves in log10 of the modulus, where they overlap.
+    log_vertical : ndarray, shape (m,)
+        log10 b_T of each temperature: G(omega, T) = b_T G(omega a_T, reference); zeros unless
+        vertical shifts were asked for.
     """
 
     omega: FloatArray
@@ -44,6 +47,7 @@ class MasterCurve(NamedTuple):
     log_shift: FloatArray
     wlf: WLF | None
     overlap_error: float
+    log_vertical: FloatArray
 
 
 def master_curve(
@@ -52,11 +56,13 @@ def master_curve(
     storage: Sequence[ArrayLike],
     loss: Sequence[ArrayLike],
     reference: float,
+    *,
+    vertical: bool = False,
 ) -> MasterCurve:
     """Shift DMA sweeps at several temperatures along the frequency axis onto one curve.
 
     Each sweep is shifted onto its neighbour nearer to the reference: the shift minimises the
-    mean squared distance of log G' and log G'' over the overlap. No vertical shift.
+    mean squared distance of log G' and log G'' over the overlap.
 
     Parameters
     ----------
@@ -66,6 +72,8 @@ def master_curve(
         Angular frequencies (rad/s), G' and G'' (Pa) of each sweep; all > 0, at least three points.
     reference : float
         Reference temperature: one of `temperatures`.
+    vertical : bool
+        Shift along the axis of the modulus, too, storage and loss alike.
 
     Returns
     -------
@@ -102,31 +110,19 @@ def master_curve(
         raise ValueError(
             f"reference = {reference!r}: must be one of the temperatures {values.tolist()}"
         )
-    sweeps_log: list[tuple[FloatArray, FloatArray]] = []
-    for i in order:
-        columns = []
-        for name, sweeps in (("omega", omega), ("storage", storage), ("loss", loss)):
-            columns.append(
-                np.log10(array_of(f"{name}[{i}]", sweeps[i], low=0.0, low_open=True, ndim=1))
-            )
-        if len({column.size for column in columns}) != 1 or columns[0].size < 3:
-            raise ValueError(
-                f"sweep {i}: omega, storage, loss have {[c.size for c in columns]} values:"
-                " must have the same number, at least 3"
-            )
-        sort = np.argsort(columns[0])
-        sweeps_log.append((columns[0][sort], np.array(columns[1:])[:, sort]))
-
+    sweeps_log = [_logarithms(i, omega[i], storage[i], loss[i]) for i in order]
     start = int(match[0])
-    shift = np.zeros(count)
+    shift, upward = np.zeros(count), np.zeros(count)
     squares: list[float] = []
     for direction, stop in ((1, count), (-1, -1)):
         for i in range(start + direction, stop, direction):
-            step, error = _overlay(sweeps_log[i - direction], sweeps_log[i])
+            step, rise, error = _overlay(sweeps_log[i - direction], sweeps_log[i], vertical)
             shift[i] = shift[i - direction] + step
+            upward[i] = upward[i - direction] + rise
             squares.append(error)
     reduced = np.concatenate([x + s for (x, _), s in zip(sweeps_log, shift, strict=True)])
-    moduli = 10.0 ** np.concatenate([y for _, y in sweeps_log], axis=1)
+    moduli = 10.0 ** np.concatenate(
+        [y - up for (_, y), up in zip(sweeps_log, upward, strict=True)], axis=1)
     sort = np.argsort(reduced, kind="stable")
     return MasterCurve(
         10.0 ** reduced[sort],
@@ -136,25 +132,44 @@ def master_curve(
         shift,
         _fit_wlf(values, shift, float(reference)),
         float(np.sqrt(np.mean(squares))) if squares else 0.0,
+        upward,
     )
 
 
+def _logarithms(place: int, *sweep: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return log10 of the frequencies of a sweep, ascending, and of its moduli, shape (2, n)."""
+    columns = [np.log10(array_of(f"{name}[{place}]", values, low=0.0, low_open=True, ndim=1))
+               for name, values in zip(("omega", "storage", "loss"), sweep, strict=True)]
+    if len({column.size for column in columns}) != 1 or columns[0].size < 3:
+        raise ValueError(
+            f"sweep {place}: omega, storage, loss have {[c.size for c in columns]} values:"
+            " must have the same number, at least 3")
+    sort = np.argsort(columns[0])
+    return columns[0][sort], np.array(columns[1:])[:, sort]
+
+
 def _overlay(
-    fixed: tuple[FloatArray, FloatArray], moving: tuple[FloatArray, FloatArray]
-) -> tuple[float, float]:
-    """Return the shift in log10 frequency from `moving` to `fixed`, and the mean square left."""
+    fixed: tuple[FloatArray, FloatArray], moving: tuple[FloatArray, FloatArray], vertical: bool
+) -> tuple[float, float, float]:
+    """Return how `moving` comes to lie over `fixed`, and the mean square that is left.
+
+    That is the shift in log10 frequency, and by how much log10 of the modulus lies higher.
+    """
     x_fixed, y_fixed = fixed
     x_moving, y_moving = moving
 
-    def distance(shift: float) -> float:
+    def apart(shift: float) -> FloatArray:
         low = max(x_fixed[0], x_moving[0] + shift)
         high = min(x_fixed[-1], x_moving[-1] + shift)
         x = np.linspace(low, high, 200)
-        total = 0.0
-        for a, b in zip(y_fixed, y_moving, strict=True):
-            apart = np.interp(x, x_fixed, a) - np.interp(x - shift, x_moving, b)
-            total += float(np.mean(apart**2))
-        return 0.5 * total
+        return np.array([np.interp(x, x_fixed, a) - np.interp(x - shift, x_moving, b)
+                         for a, b in zip(y_fixed, y_moving, strict=True)])
+
+    def distance(shift: float) -> float:
+        found = apart(shift)
+        if vertical:
+            found = found - found.mean()
+        return 0.5 * float(np.sum(np.mean(found**2, axis=1)))
 
     # at least a tenth of the shorter sweep overlaps
     margin = 0.1 * min(np.ptp(x_fixed), np.ptp(x_moving))
@@ -164,7 +179,8 @@ def _overlay(
     near = int(np.argmin([distance(s) for s in trial]))
     bounds = (trial[max(near - 1, 0)], trial[min(near + 1, trial.size - 1)])
     found = minimize_scalar(distance, bounds=bounds, method="bounded", options={"xatol": 1e-8})
-    return float(found.x), float(found.fun)
+    rise = -float(apart(float(found.x)).mean()) if vertical else 0.0
+    return float(found.x), rise, float(found.fun)
 
 
 def _fit_wlf(temperatures: FloatArray, log_shift: FloatArray, reference: float) -> WLF | None:

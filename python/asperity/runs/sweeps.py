@@ -8,51 +8,26 @@ import itertools
 import json
 import os
 import re
-import signal
-import subprocess
-import tempfile
-import threading
-import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from concurrent.futures import Executor
 from pathlib import Path
-from types import FrameType
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
-from ..base.check import choice, whole
-from ..base.library import version
+from ..base.check import choice
 from ..results import Run, open_result
 from . import namelists
 from .case import Case
-from .program import program
-from .sweep_progress import Progress
+from .jobs import Job, is_done
+from .means import Means, run_jobs, share_of_processors
+from .progress import Progress
 from .sweep_table import Failure, Sweep, SweepError, column
 
 __all__ = ["sweep"]
 
-_POLL = 0.02            # s between two looks at the processes
-_ECHO = 0.3             # s within which a signal to us and to our group is one
-_PATIENCE = 60.0        # s that a stopped process may take for its checkpoint
 _LONGEST_NAME = 120     # characters of a file's name
-
-
-@dataclass
-class _Job:
-    """One case on its way."""
-
-    values: dict[str, Any]
-    case: Case | None = None
-    name: str = ""
-    path: Path = field(default_factory=Path)        # of the result
-    status: int | None = None                       # None: not run to an end
-    message: str = ""
-    process: subprocess.Popen[bytes] | None = None
-    output: IO[bytes] | None = None
-    restarted: bool = False
-    started: float = 0.0
 
 
 def sweep(
@@ -67,6 +42,8 @@ def sweep(
     measure: Callable[[Run], Mapping[str, Any]] | None = None,
     errors: str = "raise",
     quiet: bool = False,
+    executor: Executor | None = None,
+    slurm: str | None = None,
 ) -> Sweep:
     """Run a case with every combination of some values, side by side, and return a table.
 
@@ -109,6 +86,15 @@ def sweep(
     quiet : bool
         Tell no progress on stderr: in a terminal a line that is rewritten, elsewhere one line a
         case.
+    executor : concurrent.futures.Executor, optional
+        Runs the cases in place of processes of this machine, each by one call: Dask's
+        ``client.get_executor()``, mpi4py's ``MPICommExecutor`` or any other one. Its workers must
+        see `folder`; `jobs` does not count then. At Ctrl-C cases that wait are cancelled, those
+        that run come to their end.
+    slurm : str, optional
+        Options of ``sbatch``, such as "--time=1:00:00 --partition=short": the cases are submitted
+        as one job array that fills `folder`. The table then names them as failed until they are
+        there: the same call later gathers them, and submits nothing while they are in the queue.
 
     Returns
     -------
@@ -140,13 +126,7 @@ def sweep(
     [0.203125, 0.390625, 1.0]
     """
     choice("errors", errors, ("raise", "keep"))
-    cores = _processors()
-    if jobs is not None:
-        jobs = whole("jobs", jobs)
-    threads = whole("threads", threads)
-    if threads > cores:
-        raise ValueError(f"threads = {threads}: must be at most the {cores} processors")
-    side_by_side = min(jobs or cores, max(1, cores // threads))
+    side_by_side, threads = share_of_processors(jobs, threads)
     case = base.copy() if isinstance(base, Case) else Case.read(base)
     points, shape = _points(parameters, zip)
     for names in parameters:
@@ -160,23 +140,17 @@ def sweep(
     for job in work:
         if job.case is None:
             continue
-        if resume and _is_done(job):
+        if resume and is_done(job):
             job.status = 0
         else:
             waiting.append(job)
-    _run_all(waiting, len(work), program() if waiting else "", side_by_side, threads, resume, quiet)
+    run_jobs(waiting, folder, Progress("sweep", len(work), len(waiting), quiet), Means(
+        side_by_side, threads, resume, executor, slurm))
     table = _table(work, shape, measure)
-    if table.failed and errors == "raise":
+    if table.failed and errors == "raise" and slurm is None:
         shown = "\n".join(f"  {failure}" for failure in table.failed)
         raise SweepError(f"{len(table.failed)} of {len(work)} cases failed:\n{shown}", table)
     return table
-
-
-def _processors() -> int:
-    """Return the number of processors this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _folder(case: Case) -> Path:
@@ -282,12 +256,12 @@ Say phase[1].velocity_y to phase[2].velocity_y
                      f" {group}[{len(groups)}].{variable}")
 
 
-def _jobs(base: Case, points: list[dict[str, Any]], folder: Path, keep: bool) -> list[_Job]:
+def _jobs(base: Case, points: list[dict[str, Any]], folder: Path, keep: bool) -> list[Job]:
     """Return the cases of a sweep with their names; inputs that are wrong raise, or are kept."""
     work = []
     names: dict[str, dict[str, Any]] = {}
     for values in points:
-        job = _Job(values, name=_file_name(values))
+        job = Job(values, name=_file_name(values))
         if job.name in names:
             raise ValueError(f"parameters: {_told(values)} stands twice")
         names[job.name] = values
@@ -336,7 +310,7 @@ def _file_name(values: dict[str, Any]) -> str:
     return f"{plain[:_LONGEST_NAME - 13]}-{code}"
 
 
-def _write_index(folder: Path, work: list[_Job]) -> None:
+def _write_index(folder: Path, work: list[Job]) -> None:
     """Write which values belong to which file, with what earlier sweeps have there."""
     path = folder / "sweep.json"
     index: dict[str, Any] = {}
@@ -348,150 +322,7 @@ def _write_index(folder: Path, work: list[_Job]) -> None:
     path.write_text(json.dumps(index, indent=1, default=str) + "\n")
 
 
-def _is_done(job: _Job) -> bool:
-    """Return whether a finished result of this very input and version is there."""
-    run = _found(job)
-    return run is not None and run.finished and run.version == version()
-
-
-def _found(job: _Job) -> Run | None:
-    """Return a result of this very input, None where there is none."""
-    if not job.path.exists():
-        return None
-    try:
-        run = open_result(job.path)
-    except OSError:
-        return None
-    return run if run.input == _text(job) else None
-
-
-def _text(job: _Job) -> str:
-    """Return the input of a case as it is written beside its result."""
-    assert job.case is not None
-    case = job.case.copy()
-    case.output.file = None
-    case._follow(job.path.parent)
-    return str(case)
-
-
-def _run_all(waiting: list[_Job], total: int, command: str, side_by_side: int, threads: int,
-             resume: bool, quiet: bool) -> None:
-    """Run the cases, some at a time; whatever ends this ends them."""
-    progress = Progress(total, len(waiting), quiet)
-    queue = list(reversed(waiting))
-    running: list[_Job] = []
-    with _Stops() as stops:
-        try:
-            while (queue or running) and not stops.asked:
-                while queue and len(running) < side_by_side and not stops.asked:
-                    job = queue.pop()
-                    running.append(job)
-                    _start(job, command, threads, restart=resume and _found(job) is not None)
-                    progress.show(len(running))
-                for job in list(running):
-                    assert job.process is not None
-                    if job.process.poll() is None:
-                        continue
-                    if _finish(job):
-                        _start(job, command, threads, restart=False)
-                    else:
-                        running.remove(job)
-                        progress.done(job.name, job.message if job.status else None,
-                                      time.monotonic() - job.started, len(running))
-                time.sleep(_POLL if running else 0.0)
-        finally:
-            progress.end()
-            _stop(running, stops)
-
-
-class _Stops:
-    """SIGINT and SIGTERM as a number to look at, so that none of them cuts a call in two.
-
-    An exception out of a handler may come between any two instructions: within the start of a
-    process, which then goes on unknown to us, or while subprocess holds its lock, which then stays
-    held. So the signals are counted here; at the end they are what they were before: SIGINT
-    KeyboardInterrupt, or what another handler makes of it, SIGTERM the end with status 143.
-    """
-
-    def __init__(self) -> None:
-        self.asked: list[int] = []
-        self._last = 0.0
-        self._before: dict[int, Any] = {}
-
-    def __enter__(self) -> _Stops:
-        if threading.current_thread() is threading.main_thread():
-            for number in (signal.SIGINT, signal.SIGTERM):
-                # Who started us with a signal ignored, as a shell does in the background, keeps it.
-                if signal.getsignal(number) != signal.SIG_IGN:
-                    self._before[number] = signal.signal(number, self._note)
-        return self
-
-    def _note(self, number: int, frame: FrameType | None) -> None:
-        now = time.monotonic()
-        if not self.asked or now - self._last > _ECHO:
-            self.asked.append(number)
-        self._last = now
-
-    def __exit__(self, *error: object) -> None:
-        for number, handler in self._before.items():
-            # None: not set by Python, and not to be set by it.
-            signal.signal(number, signal.SIG_DFL if handler is None else handler)
-        if not self.asked:
-            return
-        if self.asked[0] == signal.SIGTERM and self._before[signal.SIGTERM] == signal.SIG_DFL:
-            raise SystemExit(128 + signal.SIGTERM)
-        signal.raise_signal(self.asked[0])
-
-
-def _start(job: _Job, command: str, threads: int, restart: bool) -> None:
-    """Write the input and start the program, in a session of its own: Ctrl-C is passed on by us."""
-    path = job.path.with_suffix(".nml")
-    path.write_bytes(namelists.encode(_text(job)))
-    job.restarted = restart
-    job.started = time.monotonic()
-    job.process = None
-    job.output = tempfile.TemporaryFile()  # noqa: SIM115 - closed where the process ends
-    words = [command, "run", path.name, "--output", job.path.name, "--threads", str(threads),
-             "--quiet"] + ["--restart"] * restart
-    job.process = subprocess.Popen(words, cwd=path.parent, stdin=subprocess.DEVNULL,
-                                   stdout=subprocess.DEVNULL, stderr=job.output,
-                                   start_new_session=True)
-
-
-def _finish(job: _Job) -> bool:
-    """Take what an ended process leaves; return whether it has to be run anew."""
-    assert job.process is not None and job.output is not None
-    job.output.seek(0)
-    told = job.output.read().decode(errors="replace").strip()
-    job.output.close()
-    status = job.process.returncode
-    if job.restarted and status in (2, 3):
-        return True  # no checkpoint that fits
-    job.status = status
-    if status:
-        reason = told or f"the program ended with status {status}"
-        job.message = f"killed by signal {-status}" if status < 0 else reason
-    elif told:
-        job.message = told
-    return False
-
-
-def _stop(running: list[_Job], stops: _Stops) -> None:
-    """Let processes finish the step in hand and write a checkpoint; at a second Ctrl-C, kill."""
-    processes = [job.process for job in running if job.process is not None]
-    for process in processes:
-        process.send_signal(signal.SIGINT)
-    end = time.monotonic() + _PATIENCE
-    while (any(process.poll() is None for process in processes)
-           and len(stops.asked) < 2 and time.monotonic() < end):
-        time.sleep(_POLL)
-    for process in processes:
-        if process.poll() is None:
-            process.kill()
-            process.wait()
-
-
-def _table(work: list[_Job], shape: tuple[int, ...],
+def _table(work: list[Job], shape: tuple[int, ...],
            measure: Callable[[Run], Mapping[str, Any]] | None) -> Sweep:
     """Return the table of all cases."""
     failed = []

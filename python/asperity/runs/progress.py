@@ -1,4 +1,4 @@
-"""What a sweep tells on stderr while it runs."""
+"""What many runs tell on stderr while they go on."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ __all__ = ["Progress"]
 class Progress:
     """What is told on stderr: a line that is rewritten in a terminal, else one line a case."""
 
-    def __init__(self, total: int, waiting: int, quiet: bool, stream: TextIO | None = None) -> None:
+    def __init__(self, what: str, total: int, waiting: int, quiet: bool,
+                 stream: TextIO | None = None) -> None:
+        self._what = what
         self._stream = sys.stderr if stream is None else stream
         self._quiet = quiet
         self._terminal = self._stream.isatty()
@@ -23,7 +25,7 @@ class Progress:
         self._start = time.monotonic()
         self._width = 0
         if self._kept and not quiet:
-            self._line(f"sweep: {self._kept} of {total} results are there already")
+            self._line(f"{self._what}: {self._kept} of {total} results are there already")
 
     def _line(self, text: str) -> None:
         """Write a line of its own."""
@@ -37,7 +39,7 @@ class Progress:
         """Rewrite the line of a terminal."""
         if self._quiet or not self._terminal:
             return
-        text = f"sweep: {self._state()}, {running} running{self._left()}"
+        text = f"{self._what}: {self._state()}, {running} running{self._left()}"
         self._stream.write("\r" + text.ljust(self._width))
         self._stream.flush()
         self._width = len(text)
@@ -63,7 +65,7 @@ class Progress:
             return
         if fault is not None or not self._terminal:
             how = f"done in {_duration(seconds)}" if fault is None else f"FAILED: {fault}"
-            self._line(f"sweep: {self._state()}{self._left()}: {name}: {how}")
+            self._line(f"{self._what}: {self._state()}{self._left()}: {name}: {how}")
         self.show(running)
 
     def end(self) -> None:

@@ -1,0 +1,293 @@
+"""Power spectral densities of roads: measured on maps and profiles, joined, cut, and drawn from.
+
+The density Phi is that of `asperity.surface.psd` (m4): mean(h^2) = int Phi k dk/(2 pi). Persson's
+C(q) is Phi/(4 pi^2). Between its knots a spectrum is straight in log-log.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.check import array_of, number, positive
+
+__all__ = ["Spectrum", "isotropic_of_profile", "join_spectra", "spectrum_of_map"]
+
+FloatArray = NDArray[np.float64]
+
+_PER_DECADE = 20        # bands of a measured spectrum
+_WAVES_IN_MAP = 3.0     # of the longest wave that a scan tells reliably
+_CELLS_IN_WAVE = 6.0    # of the shortest one
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """An isotropic power spectral density by its knots.
+
+    Attributes
+    ----------
+    wavenumber : ndarray, shape (n,)
+        rad/m, ascending.
+    psd : ndarray, shape (n,)
+        m4, > 0.
+    name : str
+        Where it comes from.
+    notes : list of str
+        What the user should know.
+    """
+
+    wavenumber: FloatArray
+    psd: FloatArray
+    name: str = "spectrum"
+    notes: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        k = array_of("wavenumber", self.wavenumber, low=0.0, low_open=True, ndim=1, increasing=True)
+        psd = array_of("psd", self.psd, low=0.0, low_open=True, ndim=1)
+        if k.size < 2 or psd.size != k.size:
+            raise ValueError(f"wavenumber, psd: have {k.size} and {psd.size} values: must have the"
+                             " same number, at least 2")
+        object.__setattr__(self, "wavenumber", k)
+        object.__setattr__(self, "psd", psd)
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """Longest and shortest wavelength, m."""
+        return 2.0 * math.pi / self.wavenumber[0], 2.0 * math.pi / self.wavenumber[-1]
+
+    def at(self, wavenumber: FloatArray) -> FloatArray:
+        """Return the density at wavenumbers (rad/m), m4; zero outside of the band."""
+        wavenumber = np.asarray(wavenumber, dtype=float)
+        inside = (wavenumber >= self.wavenumber[0] * (1 - 1e-12)) & (
+            wavenumber <= self.wavenumber[-1] * (1 + 1e-12))
+        logs = np.interp(np.log(np.where(inside, wavenumber, self.wavenumber[0])),
+                         np.log(self.wavenumber), np.log(self.psd))
+        return np.where(inside, np.exp(logs), 0.0)
+
+    def cut(self, long: float | None = None, short: float | None = None) -> Spectrum:
+        """Return the part between two wavelengths, m.
+
+        Parameters
+        ----------
+        long, short : float, optional
+            Longest and shortest wavelength; the spectrum's own if left out.
+
+        Raises
+        ------
+        ValueError
+            If nothing is left.
+        """
+        low = self.wavenumber[0] if long is None else max(
+            self.wavenumber[0], 2.0 * math.pi / positive("long", long))
+        high = self.wavenumber[-1] if short is None else min(
+            self.wavenumber[-1], 2.0 * math.pi / positive("short", short))
+        if not low < high:
+            raise ValueError(f"{self.name}: has waves of {self.band[0]:.3g} to {self.band[1]:.3g}"
+                             " m, and none of those that are wanted")
+        inner = (self.wavenumber > low * (1 + 1e-12)) & (self.wavenumber < high * (1 - 1e-12))
+        k = np.concatenate([[low], self.wavenumber[inner], [high]])
+        return Spectrum(k, self.at(k), self.name, list(self.notes))
+
+    def scaled(self, factor: float) -> Spectrum:
+        """Return the spectrum of heights times a factor."""
+        return Spectrum(self.wavenumber, self.psd * factor**2, self.name, list(self.notes))
+
+    def draw(self, nx: int, ny: int, lx: float, ly: float, seed: int) -> FloatArray:
+        """Return a periodic map with random phases and the amplitudes of the spectrum.
+
+        Parameters
+        ----------
+        nx, ny : int
+            Cells; a profile (ny = 1) is one through a map of the same spectrum's amplitudes.
+        lx, ly : float
+            Lengths, m.
+        seed : int
+            Another seed, another map; the same seed, the same bits.
+
+        Returns
+        -------
+        ndarray, shape (ny, nx)
+            Heights, m.
+        """
+        kx = 2.0 * math.pi * np.fft.rfftfreq(nx, lx / nx)
+        ky = 2.0 * math.pi * np.fft.fftfreq(ny, ly / ny)
+        amplitude = np.sqrt(self.at(np.hypot(kx, ky[:, None])) * lx * ly)
+        # The phases of white noise are those of a real map; its amplitudes are replaced.
+        noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((ny, nx)))
+        size = np.abs(noise)
+        phases = np.where(size > 0.0, noise / np.where(size > 0.0, size, 1.0), 1.0)
+        density = nx * ny / (lx * ly)
+        return np.fft.irfft2(amplitude * phases * density, s=(ny, nx))
+
+
+def spectrum_of_map(height: FloatArray, lx: float, ly: float, *, periodic: bool = False,
+                    name: str = "map") -> Spectrum:
+    """Return the spectrum of a measured map within the range that it tells reliably.
+
+    A map that is not periodic is levelled and weighted by Hann's window first. The range goes from
+    a third of the shorter length to six cells.
+
+    Parameters
+    ----------
+    height : ndarray, shape (ny, nx)
+        Heights, m; with ny = 1 a profile, taken as a cut through an isotropic road.
+    lx, ly : float
+        Lengths, m.
+    periodic : bool
+        Whether opposite edges fit.
+    name : str
+        Of the spectrum.
+
+    Returns
+    -------
+    Spectrum
+    """
+    ny, nx = height.shape
+    weights = np.ones_like(height)
+    if not periodic:
+        height = height - height.mean() if ny == 1 else _levelled(height)
+        weights = _hann(nx) * (1.0 if ny == 1 else _hann(ny)[:, None])
+    modes = np.fft.rfft2((height - np.average(height, weights=weights)) * weights)
+    power = np.abs(modes)**2 / (nx * ny * float(np.sum(weights**2)))
+    kx = 2.0 * math.pi * np.fft.rfftfreq(nx, lx / nx)
+    if ny == 1:
+        # of the profile: mean(h^2) = int Phi1 dk/pi over k > 0
+        k, psd = _banded(kx[1:], power[0, 1:] * lx, lx, lx / nx)
+        return isotropic_of_profile(k, psd, name=name)
+    ky = 2.0 * math.pi * np.fft.fftfreq(ny, ly / ny)
+    k = np.hypot(kx, ky[:, None]).ravel()[1:]
+    k, psd = _banded(k, (power * lx * ly).ravel()[1:], min(lx, ly), max(lx / nx, ly / ny))
+    return Spectrum(k, psd, name)
+
+
+def isotropic_of_profile(wavenumber: FloatArray, psd: FloatArray, *, name: str = "profile"
+                         ) -> Spectrum:
+    """Return the spectrum of the isotropic road of whose profiles this is the spectrum.
+
+    Phi(k) = -2 int_k^inf Phi1'(y)/sqrt(y^2 - k^2) dy, Abel's transform, where the profile's
+    density Phi1 (m3) is straight in log-log between the knots and goes on beyond the last one.
+
+    Parameters
+    ----------
+    wavenumber : ndarray, shape (n,)
+        rad/m, ascending.
+    psd : ndarray, shape (n,)
+        Density of the profile, m3: mean(h^2) = int Phi1 dk/pi.
+    name : str
+        Of the spectrum.
+
+    Returns
+    -------
+    Spectrum
+    """
+    k = array_of("wavenumber", wavenumber, low=0.0, low_open=True, ndim=1, increasing=True)
+    level = np.log(array_of("psd", psd, low=0.0, low_open=True, ndim=1))
+    logs = np.log(k)
+    slopes = np.diff(level) / np.diff(logs)
+    tail = min(float(np.polyfit(logs[-6:], level[-6:], 1)[0]), -1.0)
+    # y = k cosh(t): the root is gone, and the integrand falls as exp((tail) t)
+    t = np.linspace(0.0, 40.0 / abs(tail), 4001)
+    found = np.empty(k.size)
+    for i, one in enumerate(logs):
+        y = one + np.log(np.cosh(t))
+        piece = np.clip(np.searchsorted(logs, y, side="right") - 1, 0, slopes.size - 1)
+        beyond = y >= logs[-1]
+        slope = np.where(beyond, tail, slopes[piece])
+        value = np.where(beyond, level[-1] + tail * (y - logs[-1]),
+                         level[piece] + slopes[piece] * (y - logs[piece]))
+        found[i] = -2.0 * np.trapezoid(slope * np.exp(value - y), t)
+    good = found > 0.0
+    notes = [] if good.all() else [f"{name}: {int((~good).sum())} bands of the profile have no"
+                                   " isotropic counterpart and are left out"]
+    return Spectrum(k[good], found[good], name, notes)
+
+
+def join_spectra(spectra: Sequence[Spectrum], name: str | None = None) -> Spectrum:
+    """Return one spectrum of several scans, each within the range that it tells reliably.
+
+    Where ranges overlap, logarithms are averaged with weights that fade towards the ends of each
+    range, so that no step is left. Gaps are bridged by a straight line in log-log, and noted.
+
+    Parameters
+    ----------
+    spectra : sequence of Spectrum
+        At least one.
+    name : str, optional
+        Of the result.
+
+    Returns
+    -------
+    Spectrum
+
+    Examples
+    --------
+    >>> wide = Spectrum(np.array([1e2, 1e4]), np.array([1e-10, 1e-16]))
+    >>> fine = Spectrum(np.array([1e3, 1e6]), np.array([1e-13, 1e-22]))
+    >>> bool(np.allclose(join_spectra([wide, fine]).at(np.array([1e5])), 1e-19))
+    True
+    """
+    if not spectra:
+        raise ValueError("spectra: must have at least one")
+    notes = [note for one in spectra for note in one.notes]
+    if len(spectra) == 1:
+        return spectra[0]
+    low = min(one.wavenumber[0] for one in spectra)
+    high = max(one.wavenumber[-1] for one in spectra)
+    knots = np.unique(np.concatenate([one.wavenumber for one in spectra]))
+    total, weight = np.zeros(knots.size), np.zeros(knots.size)
+    for one in spectra:
+        ends = np.log([one.wavenumber[0], one.wavenumber[-1]])
+        inside = (knots >= one.wavenumber[0]) & (knots <= one.wavenumber[-1])
+        at = np.log(knots[inside])
+        share = np.minimum(at - ends[0], ends[1] - at) / (ends[1] - ends[0])
+        part = np.maximum(share, 1e-6)
+        total[inside] += part * np.log(one.at(knots[inside]))
+        weight[inside] += part
+    ordered = sorted(spectra, key=lambda one: one.wavenumber[0])
+    reach = ordered[0].wavenumber[-1]
+    for one in ordered[1:]:
+        if one.wavenumber[0] > reach:
+            notes.append(f"no scan tells of waves from {2 * math.pi / reach:.3g} to"
+                         f" {2 * math.pi / one.wavenumber[0]:.3g} m: bridged by a power law")
+        reach = max(reach, one.wavenumber[-1])
+    notes.append(f"{len(spectra)} spectra joined, waves of {2 * math.pi / low:.3g} to"
+                 f" {2 * math.pi / high:.3g} m")
+    # knots closer than 1e-6 are one
+    apart = np.concatenate([[True], np.diff(np.log(knots)) > 1e-6])
+    return Spectrum(knots[apart], np.exp(total / weight)[apart],
+                    name or " and ".join(one.name for one in spectra), notes)
+
+
+def _levelled(height: FloatArray) -> FloatArray:
+    """Return a map without its mean plane."""
+    ny, nx = height.shape
+    x, y = np.linspace(-1.0, 1.0, nx), np.linspace(-1.0, 1.0, ny)[:, None]
+    height = height - height.mean()
+    height = height - x * float(np.sum(height * x) / (ny * np.sum(x**2)))
+    return height - y * float(np.sum(height * y) / (nx * np.sum(y**2)))
+
+
+def _hann(count: int) -> FloatArray:
+    """Return Hann's window at the centres of cells."""
+    return 0.5 - 0.5 * np.cos(2.0 * math.pi * (np.arange(count) + 0.5) / count)
+
+
+def _banded(k: FloatArray, psd: FloatArray, length: float, cell: float
+            ) -> tuple[FloatArray, FloatArray]:
+    """Return the means over bands of equal ratio, within the reliable range."""
+    low = 2.0 * math.pi * _WAVES_IN_MAP / length
+    high = 2.0 * math.pi / (_CELLS_IN_WAVE * cell)
+    number("cells", high / low, 1.0, low_open=True)
+    count = max(2, math.ceil(_PER_DECADE * math.log10(high / low)))
+    edges = np.geomspace(low, high, count + 1)
+    band = np.searchsorted(edges, k, side="right") - 1
+    inside = (band >= 0) & (band < count)
+    modes = np.bincount(band[inside], minlength=count)
+    waves = np.bincount(band[inside], np.log(k[inside]), count)
+    sums = np.bincount(band[inside], psd[inside], count)
+    kept = (modes > 0) & (sums > 0.0)
+    return np.exp(waves[kept] / modes[kept]), sums[kept] / modes[kept]

@@ -1,0 +1,239 @@
+"""Where jobs are run: on this machine, by an executor, or by Slurm."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import json
+import os
+import shlex
+import shutil
+import subprocess
+import time
+from concurrent.futures import Executor, Future
+from pathlib import Path
+from typing import NamedTuple
+
+from ..base.check import whole
+from .jobs import Job, Stops, found_result, run_here, write_input
+from .program import program
+from .progress import Progress
+
+__all__ = ["Means", "run_file", "run_jobs", "share_of_processors", "submit"]
+
+_POLL = 0.2             # s between two looks at an executor
+_QUEUE = "slurm.json"   # what was submitted from a folder
+
+
+class Means(NamedTuple):
+    """How jobs are run.
+
+    Attributes
+    ----------
+    side_by_side, threads : int
+        Processes at a time on this machine, and the threads of each.
+    resume : bool
+        Whether to go on from checkpoints.
+    executor : concurrent.futures.Executor or None
+        What runs the jobs instead.
+    slurm : str or None
+        Options of ``sbatch``, which is to run them instead.
+    """
+
+    side_by_side: int
+    threads: int = 1
+    resume: bool = True
+    executor: Executor | None = None
+    slurm: str | None = None
+
+
+def share_of_processors(jobs: int | None, threads: int) -> tuple[int, int]:
+    """Return how many runs go side by side, and the threads of each.
+
+    Parameters
+    ----------
+    jobs : int or None
+        Runs that are wanted; None: as many as the processors allow.
+    threads : int
+        Threads of each run.
+
+    Raises
+    ------
+    ValueError
+        If a number is wrong, or there are not so many processors.
+    """
+    cores = (len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity")
+             else os.cpu_count() or 1)
+    if jobs is not None:
+        jobs = whole("jobs", jobs)
+    threads = whole("threads", threads)
+    if threads > cores:
+        raise ValueError(f"threads = {threads}: must be at most the {cores} processors")
+    return min(jobs or cores, max(1, cores // threads)), threads
+
+
+def run_jobs(waiting: list[Job], folder: Path, progress: Progress, means: Means) -> None:
+    """Run jobs by the means that were chosen; their status and message are set.
+
+    Parameters
+    ----------
+    waiting : list of Job
+        What is to be run.
+    folder : Path
+        Where their files lie.
+    progress : Progress
+        What tells how far it is.
+    means : Means
+        How they are run.
+    """
+    if not waiting:
+        progress.end()
+    elif means.slurm is not None:
+        said = submit(waiting, folder, means.slurm, means.threads)
+        for job in waiting:
+            job.message = said
+    elif means.executor is not None:
+        _run_by_executor(waiting, means, progress)
+    else:
+        run_here(waiting, program(), means.side_by_side, means.threads, means.resume, progress)
+
+
+# ---- executors -------------------------------------------------------------------------------
+
+
+def run_file(path: str, threads: int, restart: bool) -> tuple[int, str]:
+    """Run an input that is written; this is what a worker of an executor calls.
+
+    Parameters
+    ----------
+    path : str
+        The input, NAME.nml; the result is NAME.h5 beside it.
+    threads : int
+        Threads of the run.
+    restart : bool
+        Whether to go on from a checkpoint; without a fitting one the case is run anew.
+
+    Returns
+    -------
+    (int, str)
+        Exit status of the program, and what it printed on stderr.
+    """
+    file = Path(path)
+    result = file.with_suffix(".h5")
+    words = [program(), "run", file.name, "--output", result.name, "--threads", str(threads),
+             "--quiet"]
+    for more in ([["--restart"]] if restart else []) + [[]]:
+        if not more:
+            result.unlink(missing_ok=True)
+        done = subprocess.run([*words, *more], cwd=file.parent, stdin=subprocess.DEVNULL,
+                              capture_output=True, start_new_session=True, check=False)
+        if not more or done.returncode not in (2, 3):
+            break
+    return done.returncode, done.stderr.decode(errors="replace").strip()
+
+
+def _run_by_executor(waiting: list[Job], means: Means, progress: Progress) -> None:
+    """Hand each job to the executor and wait for all."""
+    assert means.executor is not None
+    asked: dict[Future[tuple[int, str]], Job] = {}
+    for job in waiting:
+        restart = means.resume and found_result(job) is not None
+        path = write_input(job).resolve()
+        job.started = time.monotonic()
+        asked[means.executor.submit(run_file, str(path), means.threads, restart)] = job
+    left = set(asked)
+    with Stops() as stops:
+        try:
+            while left and not stops.asked:
+                done, left = concurrent.futures.wait(
+                    left, timeout=_POLL, return_when=concurrent.futures.FIRST_COMPLETED)
+                for future in done:
+                    job = asked[future]
+                    _take(job, future)
+                    progress.done(job.name, job.message if job.status else None,
+                                  time.monotonic() - job.started, len(left))
+        finally:
+            for future in left:
+                future.cancel()
+            progress.end()
+
+
+def _take(job: Job, future: Future[tuple[int, str]]) -> None:
+    """Take what a worker returns, or the exception that ended it."""
+    error = future.exception()
+    if error is not None:
+        job.status, job.message = 1, f"the worker failed: {type(error).__name__}: {error}"
+        return
+    job.status, job.message = future.result()
+    if job.status and not job.message:
+        job.message = f"the program ended with status {job.status}"
+
+
+# ---- Slurm -----------------------------------------------------------------------------------
+
+_SCRIPT = """#!/bin/sh
+# One case of the list in {names}: the number of the task is its line, from 0.
+cd {folder} || exit 1
+name=$(sed -n "$((SLURM_ARRAY_TASK_ID + 1))p" {names})
+if [ -f "$name.h5" ]; then
+  {program} run "$name.nml" --output "$name.h5" --threads {threads} --quiet --restart && exit 0
+  rm -f "$name.h5"
+fi
+{program} run "$name.nml" --output "$name.h5" --threads {threads} --quiet
+"""
+
+
+def submit(waiting: list[Job], folder: Path, options: str, threads: int) -> str:
+    """Submit jobs as one array to Slurm, unless earlier ones are in the queue; say what was done.
+
+    Parameters
+    ----------
+    waiting : list of Job
+        What is to be run.
+    folder : Path
+        Where their files lie; the nodes must see it.
+    options : str
+        Further options of ``sbatch``.
+    threads : int
+        Threads of each run.
+
+    Raises
+    ------
+    OSError
+        If ``sbatch`` is not there or refuses.
+    """
+    known = _queued(folder)
+    if known is not None:
+        return f"in the queue of Slurm as job {known}"
+    command = shutil.which("sbatch")
+    if command is None:
+        raise FileNotFoundError("sbatch is not found: `slurm` needs a machine that submits to"
+                                " Slurm")
+    for job in waiting:
+        write_input(job)
+    (folder / "waiting.txt").write_text("".join(f"{job.name}\n" for job in waiting))
+    script = folder / "job.sh"
+    script.write_text(_SCRIPT.format(
+        names="waiting.txt", folder=shlex.quote(str(folder.resolve())), threads=threads,
+        program=shlex.quote(program())))
+    words = [command, "--parsable", f"--array=0-{len(waiting) - 1}", f"--cpus-per-task={threads}",
+             f"--chdir={folder.resolve()}", *shlex.split(options), str(script.resolve())]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise OSError(f"sbatch ended with status {done.returncode}: {done.stderr.strip()}")
+    number = done.stdout.strip().split(";")[0]
+    (folder / _QUEUE).write_text(json.dumps({"job": number, "cases": len(waiting)}) + "\n")
+    return f"submitted to Slurm as job {number}"
+
+
+def _queued(folder: Path) -> str | None:
+    """Return the job that was submitted from a folder, if it is still in the queue."""
+    try:
+        number = str(json.loads((folder / _QUEUE).read_text())["job"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    command = shutil.which("squeue")
+    if command is None:
+        return None
+    done = subprocess.run([command, "--noheader", f"--jobs={number}"], capture_output=True,
+                          text=True, check=False)
+    return number if done.returncode == 0 and done.stdout.strip() else None
