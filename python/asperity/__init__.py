@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from . import theory
     from .base.errors import NotConverged
     from .base.library import set_threads
+<<<<<<< HEAD
     from .contact import (
         AdhesiveNormalContact,
         NormalContact,
@@ -28,6 +29,10 @@ if TYPE_CHECKING:
         solve_adhesive,
         solve_normal,
     )
+=======
+    from .contact import AdhesiveNormalContact, NormalContact, solve_adhesive, solve_normal
+    from .curves import friction_curve
+>>>>>>> 6571574 (Friction curves: roads, rubber, runs, page; a verb and a function)
     from .results import Run
     from .results import open_result as open
     from .roads import surface
@@ -40,8 +45,13 @@ if TYPE_CHECKING:
 
     __version__: str
 
+<<<<<<< HEAD
 __all__ = ["AdhesiveNormalContact", "Case", "NormalContact", "NotConverged", "Run", "Simulation",
            "Sweep", "SweepError", "__version__", "dma", "material", "open", "operators", "run",
+=======
+__all__ = ["AdhesiveNormalContact", "Case", "NormalContact", "NotConverged", "Run", "Sweep",
+           "SweepError", "__version__", "dma", "friction_curve", "material", "open", "run",
+>>>>>>> 6571574 (Friction curves: roads, rubber, runs, page; a verb and a function)
            "set_threads", "solve_adhesive", "solve_normal", "surface", "sweep", "theory"]
 
 _addresses.install(__name__)

@@ -8,6 +8,7 @@ import sys
 
 from .base.library import version
 from .commands.data import add_fit, add_import
+from .commands.friction import add_friction
 from .commands.results import add_plot, add_report, add_watch
 
 __all__ = ["main"]
@@ -27,7 +28,7 @@ def main(arguments: list[str] | None = None) -> int:
                     " Runs are made by the command `asperity`.")
     parser.add_argument("--version", action="version", version=f"asperity {version()}")
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
-    for add in (add_plot, add_import, add_fit, add_report, add_watch):
+    for add in (add_plot, add_import, add_fit, add_friction, add_report, add_watch):
         add(verbs)
     chosen = parser.parse_args(arguments)
     try:
@@ -36,6 +37,8 @@ def main(arguments: list[str] | None = None) -> int:
         return _fail(error, 3)
     except (KeyError, IndexError, ValueError) as error:
         return _fail(error, 2)
+    except RuntimeError as error:
+        return _fail(error, 4)
 
 
 def _fail(error: Exception, status: int) -> int:

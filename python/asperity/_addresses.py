@@ -48,6 +48,7 @@ NAMES = {
     "Simulation": ("runs.simulation", "Simulation"),
     "Sweep": ("runs.sweep_table", "Sweep"),
     "SweepError": ("runs.sweep_table", "SweepError"),
+    "friction_curve": ("curves", "friction_curve"),
     "open": ("results", "open_result"),
     "run": ("runs.runner", "run"),
     "set_threads": ("base.library", "set_threads"),
@@ -61,6 +62,7 @@ PRESENTERS = {
     "history_html": "views.html",
     "plot_dma_fit": "views.plot_material",
     "plot_field": "views.plot",
+    "plot_friction_curve": "views.plot_curve",
     "plot_history": "views.plot",
     "plot_overview": "views.plot",
     "plot_prony": "views.plot_material",
@@ -69,6 +71,7 @@ PRESENTERS = {
     "table_html": "views.html",
     "to_vtk": "views.export",
     "to_xarray": "views.export",
+    "write_curve_page": "views.curve_page",
     "write_report": "views.report",
 }
 

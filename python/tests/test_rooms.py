@@ -13,7 +13,8 @@ import asperity
 
 PACKAGE = ROOT / "python" / "asperity"
 # From the ground floor up: a room may use what stands before it.
-FLOORS = ("base", "roads", "rubber", "contact", "results", "theory", "views", "runs", "commands")
+FLOORS = ("base", "roads", "rubber", "contact", "results", "theory", "views", "runs", "curves",
+          "commands")
 ADDRESSES = ("adhesive_contact", "case", "contact", "dma", "errors", "export", "material",
              "measured", "plot", "plot_fields", "report", "report_data", "result", "runner",
              "surface", "sweep_table", "sweeps", "theory", "watch")
@@ -135,8 +136,8 @@ def test_addresses_are_imported_directly():
 
 def test_public_names_are_there():
     for name in ("AdhesiveNormalContact", "Case", "NormalContact", "NotConverged", "Run", "Sweep",
-                 "SweepError", "__version__", "dma", "material", "open", "run", "set_threads",
-                 "solve_adhesive", "solve_normal", "surface", "sweep", "theory"):
+                 "SweepError", "__version__", "dma", "friction_curve", "material", "open", "run",
+                 "set_threads", "solve_adhesive", "solve_normal", "surface", "sweep", "theory"):
         assert name in asperity.__all__ and name in dir(asperity)
         assert getattr(asperity, name) is not None
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):

@@ -353,7 +353,7 @@ def test_a_stop_is_clean_and_is_taken_up(tmp_path, number):
     case.phase[1].duration = None
     with pytest.raises(subprocess.CalledProcessError):  # the checkpoint is of the whole case
         case.write(tmp_path / "other.nml")
-        subprocess.run([asperity.sweeps.program(), "run", "other.nml", "--output", first.name,
+        subprocess.run([asperity.runs.program.program(), "run", "other.nml", "--output", first.name,
                         "--restart", "--quiet"], cwd=tmp_path, check=True, capture_output=True)
     assert rows_of(first) == len(before)
 

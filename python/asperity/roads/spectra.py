@@ -92,6 +92,24 @@ class Spectrum:
         k = np.concatenate([[low], self.wavenumber[inner], [high]])
         return Spectrum(k, self.at(k), self.name, list(self.notes))
 
+    def extended(self, short: float) -> Spectrum:
+        """Return the spectrum with waves down to a length (m), by the power law of its last decade.
+
+        Examples
+        --------
+        >>> line = Spectrum(np.array([1e2, 1e4]), np.array([1e-10, 1e-16]))
+        >>> round(float(np.log10(line.extended(2e-5 * math.pi).psd[-1])), 9)
+        -19.0
+        """
+        k, psd = self.wavenumber, self.psd
+        end = 2.0 * math.pi / positive("short", short)
+        if end <= k[-1]:
+            return self
+        last = k >= 0.1 * k[-1] if np.count_nonzero(k >= 0.1 * k[-1]) > 1 else slice(-2, None)
+        slope = float(np.polyfit(np.log(k[last]), np.log(psd[last]), 1)[0])
+        return Spectrum(np.append(k, end), np.append(psd, psd[-1] * (end / k[-1]) ** slope),
+                        self.name, list(self.notes))
+
     def scaled(self, factor: float) -> Spectrum:
         """Return the spectrum of heights times a factor."""
         return Spectrum(self.wavenumber, self.psd * factor**2, self.name, list(self.notes))

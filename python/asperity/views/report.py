@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 from html import escape
@@ -17,15 +16,15 @@ import numpy as np
 from ..base.library import version
 from ..results.derived import closure, energy_terms, has_friction, solver_setting
 from ..results.standing import duration, rows_of, seems_dead, short_time, silence, time_of_row
+from .page_parts import PAGE, colour_scales, fill_page, page_file, page_json
 from .report_data import faulty, now, page_data, phase_names
 from .style import si_scale
 
 if TYPE_CHECKING:
     from ..results import Run
 
-__all__ = ["report_page", "write_report"]
+__all__ = ["PAGE", "SCRIPTS", "report_page", "write_report"]
 
-PAGE = Path(__file__).with_name("page")
 SCRIPTS = ("chart.js", "map.js", "page.js")
 
 
@@ -65,14 +64,14 @@ def report_page(run: Run) -> str:
         Finished or still going.
     """
     data = page_data(run)
-    data["colours"] = _colours()
+    data["colours"] = colour_scales()
     sections = _sections(run, data)
     title = run.title or run.path.name
     parts = {
         "version": escape(version()),
         "title": escape(title),
         "subtitle": _subtitle(run),
-        "style": _file("report.css"),
+        "style": page_file("report.css"),
         "links": "\n".join(f'<a href="#{key}">{head}</a>' for key, head, _ in sections),
         "notes": _notes(run),
         "tiles": _tiles(run),
@@ -80,32 +79,10 @@ def report_page(run: Run) -> str:
                               for key, head, body in sections),
         "footer": f"Page made by asperity {escape(version())} at {now()} from"
                   f" <code>{escape(run.path.name)}</code>.",
-        "data": _json(data),
-        "script": "\n".join(_file(name) for name in SCRIPTS),
+        "data": page_json(data),
+        "script": "\n".join(page_file(name) for name in SCRIPTS),
     }
-    # In one pass: what is put in is not looked through again.
-    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], _file("report.html"))
-
-
-def _file(name: str) -> str:
-    """Return a file of the page."""
-    return (PAGE / name).read_text(encoding="utf-8").rstrip("\n")
-
-
-def _json(data: dict[str, Any]) -> str:
-    """Return data as JSON that cannot end the element it stands in."""
-    text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c")
-
-
-def _colours() -> dict[str, list[str]]:
-    """Return the colour scales, 33 colours each."""
-    from matplotlib import colormaps
-    from matplotlib.colors import to_hex
-
-    names = {"pressure": "viridis", "gap": "cividis", "both": "RdBu_r"}
-    return {key: [to_hex(colormaps[name](part)) for part in np.linspace(0, 1, 33)]
-            for key, name in names.items()}
+    return fill_page(parts)
 
 
 def _number(value: float, units: str) -> str:

@@ -77,8 +77,9 @@ let charts = 0;
 
 /**
  * A line chart. `options`: title, label, unit, log, logX, zero (y starts at 0), series of {label,
- * colour, dash, marks, x, y}, levels of {value, label}, bands of {from, to, state}, and xLabel,
- * xUnit. `group`: charts that zoom along x together.
+ * colour, dash, marks, x, y, low, high} (between low and high a line has a ribbon), levels of
+ * {value, label}, bands of {from, to, state}, xLabel, xUnit, and pick, which is called with the x
+ * that was clicked and the number of the nearest line. `group`: charts that zoom along x together.
  */
 class Chart {
   constructor(parent, options, group = null) {
@@ -204,8 +205,10 @@ class Chart {
         if (line.y[i] === null || line.x[i] === null) continue;
         const x = this.toX(line.x[i]), y = this.toY(line.y[i]);
         if (x < x0 || x > x1 || !Number.isFinite(y)) continue;
-        if (y < low) low = y;
-        if (y > high) high = y;
+        for (const value of [y, ...this.ribbonAt(line, i)]) {
+          if (value < low) low = value;
+          if (value > high) high = value;
+        }
       }
     }
     for (const level of options.levels || []) {
@@ -288,7 +291,34 @@ class Chart {
     this.drawCursor();
   }
 
+  /** The ends of a line's ribbon at a point. */
+  ribbonAt(line, i) {
+    if (!line.low || line.low[i] === null || line.high[i] === null) return [];
+    const ends = [this.toY(line.low[i]), this.toY(line.high[i])];
+    return ends.every(Number.isFinite) ? ends : [];
+  }
+
+  /** The ribbon of a line, piece by piece. */
+  drawRibbon(inside, line) {
+    let piece = [];
+    const close = () => {
+      if (piece.length > 1) {
+        const ends = [...piece.map(([x, low]) => [x, low]),
+          ...piece.reverse().map(([x, , high]) => [x, high])];
+        inside.append(svg("path", {class: `ribbon fill${line.colour}`, d: ends.map(([x, y], n) =>
+          `${n ? "L" : "M"}${x.toFixed(1)} ${this.py(y).toFixed(1)}`).join("") + "Z"}));
+      }
+      piece = [];
+    };
+    for (let i = 0; i < line.x.length; i++) {
+      const ends = line.x[i] === null ? [] : this.ribbonAt(line, i);
+      if (ends.length) piece.push([this.px(this.toX(line.x[i])), ...ends]); else close();
+    }
+    close();
+  }
+
   drawLine(inside, line) {
+    if (line.low) this.drawRibbon(inside, line);
     const points = [];
     let path = "", open = false;
     for (let i = 0; i < line.x.length; i++) {
@@ -356,6 +386,21 @@ class Chart {
       }
     });
     this.readout.textContent = told.join(" · ");
+  }
+
+  /** Tell which point was chosen: the x of the cursor, and the line nearest to a height. */
+  pick(clientY = null) {
+    if (!this.options.pick || this.cursor === null) return;
+    let best = null, near = Infinity;
+    const top = this.svg.getBoundingClientRect().top;
+    this.options.series.forEach((line, number) => {
+      const i = line.x.lastIndexOf(this.cursor);
+      if (i < 0 || line.y[i] === null || this.hidden.has(number)) return;
+      const away = clientY === null ? number
+        : Math.abs(this.py(this.toY(line.y[i])) + top - clientY);
+      if (away < near) { near = away; best = number; }
+    });
+    if (best !== null) this.options.pick(this.cursor, best);
   }
 
   hint() { return this.range ? "Double click or 0: show all." : "\u00a0"; }
@@ -433,6 +478,8 @@ class Chart {
         const ends = [value(start.position), value(at(event))].sort((a, b) => a - b);
         this.setRange(ends);
       }
+      if (event.type === "pointerup" && start && !start.pinch
+          && Math.abs(at(event) - start.position) <= 6) this.pick(event.clientY);
       if (!pointers.size) start = null;
     };
     root.addEventListener("pointerup", end);
@@ -451,7 +498,7 @@ class Chart {
         Home: () => this.step(-1e9), End: () => this.step(1e9),
         "+": () => this.zoom(0.5, this.cursor === null ? null : this.toX(this.cursor)),
         "=": () => this.zoom(0.5, this.cursor === null ? null : this.toX(this.cursor)),
-        "-": () => this.zoom(2), 0: () => this.setRange(null)};
+        "-": () => this.zoom(2), 0: () => this.setRange(null), Enter: () => this.pick()};
       const act = acts[event.key];
       if (!act || event.ctrlKey || event.metaKey || event.altKey) return;
       event.preventDefault();

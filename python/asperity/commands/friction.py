@@ -1,0 +1,191 @@
+"""The verb ``friction``: from a road and a rubber to friction, steady sliding."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from ..results.friction_curve import FrictionCurve
+
+__all__ = ["add_friction"]
+
+_KINDS = (".html", ".csv", ".nc", ".png", ".pdf", ".svg")
+
+
+def numbers(text: str) -> list[float]:
+    """Return the numbers of ``1e-4:10:25`` (first, last, how many, on a log scale) or of a list.
+
+    Examples
+    --------
+    >>> numbers("1e5,3e5"), numbers("0.01:1:3")
+    ([100000.0, 300000.0], [0.01, 0.1, 1.0])
+    """
+    parts = text.split(":")
+    try:
+        if len(parts) == 1:
+            return [float(part) for part in text.split(",")]
+        first, last, count = float(parts[0]), float(parts[1]), int(parts[2])
+        if len(parts) != 3 or not 0.0 < first < last or count < 2:
+            raise ValueError
+    except (ValueError, IndexError):
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: must be numbers with commas, or FIRST:LAST:COUNT with 0 < FIRST < LAST and"
+            " COUNT of at least 2") from None
+    found = [float(f"{value:.12g}") for value in np.geomspace(first, last, count)]
+    return found
+
+
+def add_friction(verbs: Any) -> None:
+    """Add the verb `friction`."""
+    parser = verbs.add_parser(
+        "friction", help="friction curves from roads and a rubber",
+        description="Friction against speed, pressure and temperature, of steady sliding, on"
+                    " patches of measured roads or on drawn ones. The runs lie beside the output;"
+                    " stopped, the same command goes on. Persson's theory stands beside.")
+    parser.add_argument("roads", metavar="ROAD", nargs="+",
+                        help="a height map in any format that `import` reads; spectrum:FILE;"
+                             " self_affine:hurst=0.8,wavelength_long=1e-3,wavelength_short=1e-5,"
+                             "rms_slope=0.2")
+    parser.add_argument("--material", required=True, metavar="RUBBER", type=Path,
+                        help="a namelist with &material, or a DMA table")
+    _add_points(parser)
+    _add_road(parser)
+    _add_rubber(parser)
+    _add_runs(parser)
+    parser.set_defaults(call=_friction)
+
+
+def _add_points(parser: argparse.ArgumentParser) -> None:
+    """Add what spans the curve."""
+    parser.add_argument("--speeds", type=numbers, default=numbers("1e-4:10:25"), metavar="V",
+                        help="m/s: FIRST:LAST:COUNT or a list (default: 1e-4:10:25)")
+    parser.add_argument("--pressures", type=numbers, default=[2e5], metavar="P",
+                        help="Pa (default: 2e5)")
+    parser.add_argument("--temperatures", type=numbers, metavar="T",
+                        help="C (default: that of the rubber)")
+    parser.add_argument("--coefficient", type=float, default=0.0, metavar="MU",
+                        help="Coulomb's coefficient in the interface (default: 0, frictionless)")
+    parser.add_argument("--slope", action="store_true",
+                        help="let Coulomb's law act on the true slope of the road")
+    parser.add_argument("--tolerance", type=float, default=1e-5, metavar="E",
+                        help="of the solver (default: 1e-5)")
+
+
+def _add_road(parser: argparse.ArgumentParser) -> None:
+    """Add how patches are made."""
+    parser.add_argument("--cells", type=int, default=512, metavar="N",
+                        help="cells of a side of a patch (default: 512)")
+    parser.add_argument("--patches", type=int, default=8, metavar="N",
+                        help="number of patches (default: 8)")
+    parser.add_argument("--error", type=float, metavar="MU",
+                        help="take more patches until half of the 95 %% interval is below this")
+    parser.add_argument("--side", type=float, metavar="M", help="length of drawn patches, m")
+    parser.add_argument("--short", type=float, metavar="M", help="shortest wave that is kept, m")
+    parser.add_argument("--extend", type=float, metavar="M",
+                        help="shortest wave to which the spectrum is thought to go on, m, for what"
+                             " the left-out waves would add")
+    parser.add_argument("--angle", type=float, metavar="DEGREES",
+                        help="between the velocity and x (default: 0 on maps, 31.7 on drawn roads)")
+    parser.add_argument("--join", choices=("blend", "smooth", "mirror", "window"),
+                        help="how patches are made periodic (default: blend where there is room,"
+                             " else smooth)")
+    parser.add_argument("--outliers", choices=("report", "remove"), default="report",
+                        help="single cells far off their neighbours (default: report)")
+    parser.add_argument("--draw", action="store_true",
+                        help="draw maps of the joined spectrum instead of cutting patches")
+    parser.add_argument("--seed", type=int, default=1, help="other patches (default: 1)")
+    parser.add_argument("--unit", help="unit of lengths of maps that name none")
+    parser.add_argument("--size", nargs="+", type=float, metavar=("LX", "LY"),
+                        help="lengths of maps that give none, in their unit")
+
+
+def _add_rubber(parser: argparse.ArgumentParser) -> None:
+    """Add how a DMA table is fitted."""
+    parser.add_argument("--wlf", nargs="+", type=float, metavar=("C1", "C2"),
+                        help="constants of the shift of a DMA table, see `fit`")
+    parser.add_argument("--reference", type=float, metavar="T",
+                        help="reference temperature of a DMA table, C")
+    parser.add_argument("--vertical", action="store_true",
+                        help="shift the moduli of a DMA table, too")
+
+
+def _add_runs(parser: argparse.ArgumentParser) -> None:
+    """Add how the runs are made, and what is written."""
+    parser.add_argument("--jobs", type=int, metavar="N",
+                        help="runs at a time (default: one for each processor)")
+    parser.add_argument("--slurm", metavar="OPTIONS",
+                        help="submit the runs as a job array with these options of sbatch; the same"
+                             " command gathers them later")
+    parser.add_argument("--plan", action="store_true", help="print the plan and run nothing")
+    parser.add_argument("--folder", type=Path, metavar="FOLDER",
+                        help="of the runs (default: OUTPUT_runs beside the first output)")
+    parser.add_argument("--no-resume", action="store_true", help="run all anew")
+    parser.add_argument("--quiet", action="store_true", help="tell no progress")
+    parser.add_argument("-o", "--output", metavar="FILE", type=Path, action="append",
+                        help=".html, .csv, .nc or .png; may be repeated (default: friction.html and"
+                             " friction.csv)")
+
+
+def _friction(chosen: argparse.Namespace) -> int:
+    """Plan, run, write."""
+    outputs = chosen.output or [Path("friction.html"), Path("friction.csv")]
+    for output in outputs:
+        if output.suffix.lower() not in _KINDS:
+            raise ValueError(f"--output {output}: must end in {', '.join(_KINDS)}")
+        if not output.parent.is_dir():
+            raise OSError(f"{output}: cannot be written: there is no folder"
+                          f" {str(output.parent)!r}")
+    from ..curves import plan_curve, run_curve
+    from ..curves.running import SubmittedError
+    from ..curves.sources import compound_of, road_of
+    from ..runs.means import Means, share_of_processors
+
+    options = {name: getattr(chosen, name) for name in ("unit", "size")
+               if getattr(chosen, name) is not None}
+    road = road_of(chosen.roads, cells=chosen.cells, side=chosen.side, join=chosen.join,
+                   short=chosen.short, outliers=chosen.outliers, draw=chosen.draw,
+                   seed=chosen.seed, **options)
+    compound = compound_of(chosen.material, wlf=chosen.wlf, reference=chosen.reference,
+                           vertical=chosen.vertical)
+    plan = plan_curve(road, compound, speeds=chosen.speeds, pressures=chosen.pressures,
+                      temperatures=chosen.temperatures, patches=chosen.patches,
+                      coefficient=chosen.coefficient, slope_effect=chosen.slope,
+                      angle=chosen.angle, tolerance=chosen.tolerance)
+    means = Means(*share_of_processors(chosen.jobs, 1), not chosen.no_resume, None, chosen.slurm)
+    print(plan.told(means.side_by_side), flush=True)
+    if chosen.plan:
+        return 0
+    folder = chosen.folder or outputs[0].with_name(f"{outputs[0].stem}_runs")
+    try:
+        curve = run_curve(plan, folder, means, error=chosen.error, extend=chosen.extend,
+                          quiet=chosen.quiet)
+    except SubmittedError as told:
+        print(told)
+        return 0
+    print(curve.summary())
+    for output in outputs:
+        print(f"wrote {_write(curve, output)}")
+    return 0 if np.isfinite(curve.values["friction"]).all() else 4
+
+
+def _write(curve: FrictionCurve, output: Path) -> Path:
+    """Write a file of the kind that its name tells."""
+    kind = output.suffix.lower()
+    if kind == ".csv":
+        return curve.to_csv(output)
+    if kind == ".nc":
+        return curve.to_netcdf(output)
+    if kind == ".html":
+        return curve.to_html(output)
+    if "matplotlib.pyplot" not in sys.modules:
+        import matplotlib
+
+        matplotlib.use("Agg")
+    figure = curve.plot()
+    figure.savefig(output, dpi=300)
+    return output

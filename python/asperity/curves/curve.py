@@ -1,0 +1,189 @@
+"""Friction of a rubber on a road, from files to a data set in one call."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..base.check import positive, whole
+from ..results.friction_curve import FrictionCurve
+from ..runs.means import Means, share_of_processors
+from .gathering import gather
+from .plan import CurvePlan, plan_curve
+from .running import run_pieces
+from .sources import compound_of, road_of
+
+if TYPE_CHECKING:
+    import xarray
+
+__all__ = ["friction_curve", "run_curve"]
+
+MOST_PATCHES = 64       # that are taken for the sake of `error`
+
+
+def friction_curve(
+    roads: Any,
+    material: Any,
+    *,
+    speeds: Sequence[float],
+    pressures: Sequence[float],
+    temperatures: Sequence[float] | None = None,
+    coefficient: float = 0.0,
+    slope_effect: bool = False,
+    cells: int = 512,
+    patches: int = 8,
+    side: float | None = None,
+    angle: float | None = None,
+    join: str | None = None,
+    short: float | None = None,
+    outliers: str = "report",
+    draw: bool = False,
+    extend: float | None = None,
+    wlf: Sequence[float] | None = None,
+    reference: float | None = None,
+    vertical: bool = False,
+    tolerance: float = 1e-5,
+    error: float | None = None,
+    seed: int = 1,
+    folder: str | Path = "friction_runs",
+    jobs: int | None = None,
+    threads: int = 1,
+    resume: bool = True,
+    executor: Executor | None = None,
+    slurm: str | None = None,
+    quiet: bool = False,
+    **options: Any,
+) -> xarray.Dataset:
+    """Return friction against speed, pressure and temperature, of steady sliding.
+
+    Every point is a steady state on a patch of the road. The runs lie in `folder`; after a stop the
+    same call goes on where it was, and other speeds or patches can be asked for later.
+
+    Parameters
+    ----------
+    roads : str, path, MeasuredSurface, Spectrum, or a list of them
+        Measured maps in any format that `asperity.surface.load` reads; ``"spectrum:FILE"``;
+        ``"self_affine:hurst=0.8,wavelength_long=1e-3,wavelength_short=1e-5,rms_slope=0.2"``;
+        profiles, which stand for isotropic roads.
+    material : str, path or Prony
+        A namelist with ``&material``, a DMA table, or a series.
+    speeds, pressures : array_like
+        m/s and Pa.
+    temperatures : array_like, optional
+        C; the rubber's own if left out.
+    coefficient : float
+        Of Coulomb's law in the interface; 0: the viscous friction alone.
+    slope_effect : bool
+        Let that law act on the true slope of the road.
+    cells, patches : int
+        Of a side of a patch, and how many patches.
+    side, short : float, optional
+        Length of drawn patches, and the shortest wave that is kept, m.
+    angle : float, optional
+        Between the road's velocity and x, degrees; 0 on measured maps, 31.7 on drawn ones.
+    join : str, optional
+        How patches of measured maps are made periodic: 'blend', 'smooth', 'mirror', 'window'.
+    outliers : {'report', 'remove'}
+        What to do about single cells that lie far off their neighbours.
+    draw : bool
+        Draw maps of the joined spectrum of the roads instead of cutting patches from them.
+    extend : float, optional
+        Shortest wave (m) to which the road's spectrum is thought to go on: what the left-out waves
+        would add is ``friction_left_out``.
+    wlf, reference, vertical
+        Of the fit of a DMA table, see `asperity.dma.fit_dma`.
+    tolerance : float
+        Of the solver.
+    error : float, optional
+        Take more patches until half of the 95 % interval of friction is below this everywhere, at
+        most 64.
+    seed : int
+        Another seed, other patches; the same seed, the same numbers to the last bit.
+    folder : str or path
+        Where maps, inputs and results lie.
+    jobs, threads, resume, executor, slurm, quiet
+        See `asperity.sweep`; by default as many runs at a time as there are processors.
+    **options
+        For `asperity.surface.load`, such as `unit` and `size`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions pressure, temperature, speed, patch; see
+        `asperity.results.friction_curve.FrictionCurve.to_xarray`.
+
+    Raises
+    ------
+    ValueError, OSError
+        If an argument is wrong, or a file cannot be read.
+    RuntimeError
+        If runs fail, or were submitted to Slurm and are not there yet.
+    """
+    sources = list(roads) if isinstance(roads, list | tuple) else [roads]
+    road = road_of(sources, cells=cells, side=side, join=join, short=short, outliers=outliers,
+                   draw=draw, seed=seed, **options)
+    compound = compound_of(material, wlf=wlf, reference=reference, vertical=vertical)
+    plan = plan_curve(road, compound, speeds=speeds, pressures=pressures,
+                      temperatures=temperatures, patches=patches, coefficient=coefficient,
+                      slope_effect=slope_effect, angle=angle, tolerance=tolerance)
+    means = Means(*share_of_processors(jobs, threads), resume, executor, slurm)
+    return run_curve(plan, folder, means, error=error, extend=extend, quiet=quiet).to_xarray()
+
+
+def run_curve(
+    plan: CurvePlan,
+    folder: str | Path,
+    means: Means,
+    *,
+    error: float | None = None,
+    most_patches: int = MOST_PATCHES,
+    extend: float | None = None,
+    quiet: bool = False,
+) -> FrictionCurve:
+    """Run a plan and return the curve.
+
+    Parameters
+    ----------
+    plan : CurvePlan
+        See `asperity.curves.plan_curve`.
+    folder : str or path
+        Where maps, inputs and results lie.
+    means : Means
+        How the runs are made.
+    error : float, optional
+        Half of the 95 % interval of friction that is wanted; more patches are taken for it.
+    most_patches : int
+        At most so many.
+    extend : float, optional
+        See `friction_curve`.
+    quiet : bool
+        Tell no progress.
+
+    Returns
+    -------
+    FrictionCurve
+    """
+    whole("most_patches", most_patches)
+    if error is not None:
+        positive("error", error)
+        if plan.patches < 2 and (plan.road.count or 2) > 1:
+            plan = replace(plan, patches=2)
+    while True:
+        curve = gather(plan, run_pieces(plan, Path(folder), means, quiet), extend)
+        found = curve.largest_error
+        limit = min(most_patches, plan.road.count or most_patches)
+        if error is None or found <= error:
+            return curve
+        if plan.patches >= limit:
+            curve.notes.append(f"half of the 95 % interval of friction is {found:.3g}, not below"
+                               f" {error:g}: {plan.patches} patches are the most"
+                               + (" that the road has" if plan.road.count == limit else ""))
+            return curve
+        wanted = 2 * plan.patches
+        if math.isfinite(found):
+            wanted = min(wanted, math.ceil(plan.patches * (found / error) ** 2))
+        plan = replace(plan, patches=min(limit, max(wanted, plan.patches + 1)))

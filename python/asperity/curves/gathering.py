@@ -1,0 +1,171 @@
+"""A friction curve from the results of its runs."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import theory
+from ..base.library import version
+from ..results import Run
+from ..results.friction_curve import FrictionCurve
+from ..results.losses import losses_of
+from ..roads.joins import load_at_join
+from ..roads.patches import Patch
+from ..roads.spectra import Spectrum
+from .plan import CurvePlan
+from .running import Piece
+
+__all__ = ["GAMMA", "gather"]
+
+FloatArray = NDArray[np.float64]
+
+#: Factor of Yang and Persson in the theory beside the runs, as the thesis takes it.
+GAMMA = 0.45
+
+_NAMES = ("friction", "friction_viscous", "contact_area", "mean_gap")
+
+
+def gather(plan: CurvePlan, pieces: list[tuple[Piece, Patch]], extend: float | None = None
+           ) -> FrictionCurve:
+    """Return the curve.
+
+    Parameters
+    ----------
+    plan : CurvePlan
+        What was run.
+    pieces : list of (Piece, Patch)
+        The runs.
+    extend : float, optional
+        Shortest wave (m) to which the spectrum of the road is thought to go on, for what the
+        left-out waves would add.
+    """
+    axes = (plan.pressure.size, plan.temperature.size, plan.speed.size)
+    values = {name: np.full((*axes, plan.patches), math.nan) for name in _NAMES}
+    sources: dict[tuple[int, int, int], tuple[Path, int]] = {}
+    lost: list[tuple[Piece, int, Run]] = []
+    missing = []
+    for piece, _ in pieces:
+        run, rows, finished = piece.rows()
+        for row in range(rows):
+            at = (piece.i, piece.j, piece.first + row)
+            for name in _NAMES:
+                values[name][(*at, piece.patch)] = run.history[name][row]
+            if piece.patch == 0:
+                sources[at] = (piece.job.path, int(run.history["step"][row]))
+        lost.append((piece, rows, run))
+        if not finished:
+            missing.append(f"{plan.speed[piece.first + rows]:.4g} m/s on patch {piece.patch}")
+    values["friction_interface"] = values["friction"] - values["friction_viscous"]
+    notes = [*plan.road.notes, *plan.compound.notes, *plan.notes]
+    if missing:
+        notes.append(f"{len(missing)} points did not converge and are left out: "
+                     + ", ".join(missing[:5]) + (" and others" if len(missing) > 5 else ""))
+    notes += _join_note(plan, lost)
+    losses, octave = _losses(plan, lost)
+    return FrictionCurve(
+        plan.pressure, plan.temperature, plan.speed, _labels(pieces), values,
+        _theory(plan, pieces, extend), losses, octave, plan.compound.series.tau,
+        np.array([plan.compound.a_t(float(t)) for t in plan.temperature]),
+        np.array([plan.compound.b_t(float(t)) for t in plan.temperature]), sources,
+        _settings(plan, extend), notes)
+
+
+def _labels(pieces: list[tuple[Piece, Patch]]) -> list[str]:
+    """Return where each patch comes from."""
+    return list({piece.patch: patch.label for piece, patch in pieces}.values())
+
+
+def _settings(plan: CurvePlan, extend: float | None) -> dict[str, Any]:
+    """Return how the curve was made."""
+    patch = plan.road.patch(0)
+    ny, nx = patch.height.shape
+    return {
+        "title": f"{plan.compound.name} on {plan.road.name}", "road": plan.road.name,
+        "rubber": plan.compound.name, "nx": nx, "ny": ny, "lx": patch.lx, "ly": patch.ly,
+        "join": plan.road.join, "shortest_wave": plan.road.short,
+        "coefficient": plan.coefficient, "slope_effect": plan.slope_effect, "angle": plan.angle,
+        "tolerance": plan.tolerance, "poisson": plan.compound.poisson, "gamma_persson": GAMMA,
+        "extended_to": "no" if extend is None else extend, "source": f"asperity {version()}"}
+
+
+def _mean_spectrum(patches: list[Patch]) -> tuple[FloatArray, FloatArray]:
+    """Return the mean spectrum of patches of one size."""
+    found = [theory.surface_psd(patch.height, patch.lx, patch.ly) for patch in patches]
+    wave = found[0][0]
+    same = [psd for k, psd in found if k.shape == wave.shape and np.allclose(k, wave, rtol=1e-6)]
+    return wave, np.mean(same, axis=0)
+
+
+def _theory(plan: CurvePlan, pieces: list[tuple[Piece, Patch]], extend: float | None
+            ) -> dict[str, FloatArray]:
+    """Return Persson's theory for the patches, and what it adds for the whole road."""
+    patches = list({piece.patch: patch for piece, patch in pieces}.values())
+    spectrum = _mean_spectrum(patches)
+    whole = plan.road.whole_spectrum
+    if extend is not None:
+        whole = whole.extended(extend)
+    long = max(patches[0].lx, patches[0].ly)
+    axes = (plan.pressure.size, plan.temperature.size, plan.speed.size)
+    found = {name: np.zeros(axes) for name in ("friction_persson", "area_persson",
+                                               "friction_left_out")}
+    for j, celsius in enumerate(plan.temperature):
+        series = plan.compound.at(float(celsius))
+
+        def solve(k: FloatArray, psd: FloatArray, series=series) -> theory.PerssonContact:
+            return theory.persson(k, psd, series, plan.pressure[:, None], plan.speed,
+                                  poisson=plan.compound.poisson, gamma=GAMMA)
+
+        contact = solve(*spectrum)
+        found["friction_persson"][:, j] = contact.friction
+        found["area_persson"][:, j] = contact.contact_area
+        kept = whole.cut(long, plan.road.short)
+        if _is_wider(whole, kept):
+            found["friction_left_out"][:, j] = (
+                solve(whole.wavenumber, whole.psd).friction
+                - solve(kept.wavenumber, kept.psd).friction)
+    return found
+
+
+def _is_wider(whole: Spectrum, kept: Spectrum) -> bool:
+    """Whether a spectrum has waves that another one lacks."""
+    return (whole.wavenumber[0] < 0.999 * kept.wavenumber[0]
+            or whole.wavenumber[-1] > 1.001 * kept.wavenumber[-1])
+
+
+def _join_note(plan: CurvePlan, lost: list[tuple[Piece, int, Run]]) -> list[str]:
+    """Say how much of the load the join of the patches carries."""
+    if plan.road.join == "none":
+        return []
+    shares = [load_at_join(run.snapshots[-1].pressure, plan.road.join)
+              for _, rows, run in lost if rows and len(run.snapshots)]
+    if not shares:
+        return []
+    load, area = np.mean(shares, axis=0)
+    return [f"the patches are made periodic by {plan.road.join!r}: {100 * load:.1f} % of the load"
+            f" lies at the join, on {100 * area:.1f} % of the area"]
+
+
+def _losses(plan: CurvePlan, lost: list[tuple[Piece, int, Run]]
+            ) -> tuple[dict[str, FloatArray], FloatArray]:
+    """Return the losses by octave and arm, means over the patches, and the octaves."""
+    axes = (plan.pressure.size, plan.temperature.size, plan.speed.size)
+    sums: dict[str, FloatArray] = {}
+    count = np.zeros(axes)
+    octave = np.zeros(0)
+    for piece, rows, run in lost:
+        found = losses_of(run)
+        if found is None:
+            continue
+        octave = found.octave
+        area = run.grid.lx * run.grid.ly
+        at = (piece.i, piece.j, slice(piece.first, piece.first + rows))
+        for name, table in (("loss_octave", found.by_octave), ("loss_arm", found.by_arm)):
+            sums.setdefault(name, np.zeros((*axes, table.shape[1])))[at] += table[:rows] / area
+        count[at] += 1
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return {name: table / count[..., None] for name, table in sums.items()}, octave

@@ -1,0 +1,268 @@
+"""What a friction curve will take: the runs, their number, time and memory, told beforehand."""
+
+from __future__ import annotations
+
+import math
+import re
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.check import array_of, number, positive, whole
+from ..roads.patches import DrawnRoad, MeasuredRoad, Patch
+from ..rubber.compound import Compound
+from ..runs.case import Case
+
+__all__ = ["CurvePlan", "plan_curve"]
+
+FloatArray = NDArray[np.float64]
+
+#: Real transforms of one solve at 128 cells a side: with and without friction in the interface.
+_TRANSFORMS = {True: 450.0, False: 140.0}
+_GROWTH = 0.4           # of that number with the cells of a side
+_OTHER_WORK = 1.8       # the whole time of a solve over that of its transforms
+
+
+@dataclass(frozen=True)
+class CurvePlan:
+    """A friction curve before it is run.
+
+    Attributes
+    ----------
+    road : DrawnRoad or MeasuredRoad
+        What the rubber slides on.
+    compound : Compound
+        The rubber.
+    speed, pressure, temperature : ndarray
+        m/s, Pa, C.
+    patches : int
+        Number of patches to begin with.
+    coefficient : float
+        Of Coulomb's law in the interface; 0 is a frictionless interface.
+    slope_effect : bool
+        Whether the law acts on the true slope.
+    angle : float
+        Between the road's velocity and x, degrees.
+    tolerance : float
+        Of the solver.
+    notes : list of str
+        What the user should know.
+    """
+
+    road: DrawnRoad | MeasuredRoad
+    compound: Compound
+    speed: FloatArray
+    pressure: FloatArray
+    temperature: FloatArray
+    patches: int
+    coefficient: float = 0.0
+    slope_effect: bool = False
+    angle: float = 0.0
+    tolerance: float = 1e-5
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def solves(self) -> int:
+        """Number of steady states."""
+        return self.patches * self.speed.size * self.pressure.size * self.temperature.size
+
+    def case(self, patch: Patch, file: str, i: int, j: int, first: int = 0) -> Case:
+        """Return the case of a patch at one pressure and temperature: a phase for each speed.
+
+        Parameters
+        ----------
+        patch : Patch
+            The map.
+        file : str
+            Its file, as the input names it.
+        i, j : int
+            Indices of the pressure and the temperature.
+        first : int
+            Index of the first speed.
+        """
+        ny, nx = patch.height.shape
+        series = self.compound.at(float(self.temperature[j]))
+        along, across = (math.cos(math.radians(self.angle)), math.sin(math.radians(self.angle)))
+        phases: list[dict[str, Any]] = []
+        for speed in self.speed[first:]:
+            phase = dict(steady=True, pressure=float(self.pressure[i]),
+                         velocity_x=float(speed) * along)
+            if self.angle:
+                phase["velocity_y"] = float(speed) * across
+            phases.append(phase)
+        groups: dict[str, Any] = dict(
+            grid=dict(nx=nx, ny=ny, lx=patch.lx, ly=patch.ly),
+            surface=dict(shape="file", file=file),
+            material=dict(poisson=self.compound.poisson, shear_modulus=series.g_inf),
+            phase=phases, solver=dict(tolerance=self.tolerance),
+            output=dict(snapshot_fields=["pressure"], snapshot_every=0))
+        if series.g.size:
+            groups["material"] |= dict(prony_g=series.g, prony_tau=series.tau)
+        if self.coefficient > 0.0:
+            groups["friction"] = dict(law="coulomb", coefficient=self.coefficient,
+                                      slope_effect=self.slope_effect)
+        return Case(title=f"{patch.label}, {self.pressure[i]:g} Pa, {self.temperature[j]:g} C",
+                    **groups)
+
+    def seconds(self) -> float:
+        """Return the estimated time of all solves one after the other on this machine, s."""
+        ny, nx = self.road.patch(0).height.shape
+        field_ = np.random.default_rng(1).standard_normal((ny, nx))
+        tries = []
+        for _ in range(3):
+            start = time.perf_counter()
+            np.fft.irfft2(np.fft.rfft2(field_), s=field_.shape)
+            tries.append(time.perf_counter() - start)
+        transforms = _TRANSFORMS[self.coefficient > 0.0] * (max(nx, ny) / 128) ** _GROWTH
+        return 0.5 * min(tries) * transforms * _OTHER_WORK * self.solves
+
+    def memory(self) -> float:
+        """Return the memory of one run as the program foretells it, bytes; NaN if it does not."""
+        patch = self.road.patch(0)
+        found = re.search(r"memory: about ([\d.]+) (\w?B)",
+                          self.case(patch, "patch.h5", 0, 0).check(files=False))
+        units = {"B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12}
+        return float(found[1]) * units[found[2]] if found else math.nan
+
+    def told(self, side_by_side: int = 1) -> str:
+        """Return what will be done, in some lines.
+
+        Parameters
+        ----------
+        side_by_side : int
+            Runs at a time.
+        """
+        road, patch = self.road, self.road.patch(0)
+        ny, nx = patch.height.shape
+        kept = f"{_longest(self):.4g} to {road.short:.4g} m"
+        lines = [
+            f"road       {road.name}: {self.patches} patches of {nx} x {ny} cells,"
+            f" {patch.lx:.4g} x {patch.ly:.4g} m"
+            + ("" if road.join == "none" else f", made periodic by {road.join!r}"),
+            f"waves      {kept} are kept of {road.whole_spectrum.band[0]:.4g} to"
+            f" {min(road.whole_spectrum.band[1], road.short):.4g} m",
+            f"rubber     {self.compound.name}: {self.compound.series.g.size} arms",
+            f"points     {self.speed.size} speeds x {self.pressure.size} pressures x"
+            f" {self.temperature.size} temperatures",
+            f"solves     {self.solves} steady states in"
+            f" {self.solves // self.speed.size} runs, {side_by_side} at a time",
+            f"time       about {_told(self.seconds() / side_by_side)}, by the transforms of this"
+            " machine",
+            f"memory     about {self.memory() * side_by_side / 1e6:.0f} MB",
+        ]
+        return "\n".join([*lines, *(f"note       {note}" for note in [
+            *self.road.notes, *self.compound.notes, *self.notes])])
+
+
+def plan_curve(
+    road: DrawnRoad | MeasuredRoad,
+    compound: Compound,
+    *,
+    speeds: Sequence[float] | FloatArray,
+    pressures: Sequence[float] | FloatArray,
+    temperatures: Sequence[float] | FloatArray | None = None,
+    patches: int = 8,
+    coefficient: float = 0.0,
+    slope_effect: bool = False,
+    angle: float | None = None,
+    tolerance: float = 1e-5,
+) -> CurvePlan:
+    """Return the plan of a curve; what is wrong is told before anything is run.
+
+    Parameters
+    ----------
+    road : DrawnRoad or MeasuredRoad
+        See `asperity.curves.sources.road_of`.
+    compound : Compound
+        See `asperity.curves.sources.compound_of`.
+    speeds, pressures : array_like
+        m/s and Pa, > 0, no value twice.
+    temperatures : array_like, optional
+        C; the rubber's own if left out.
+    patches : int
+        Number of patches; at most those that the road has.
+    coefficient : float
+        Of Coulomb's law, >= 0.
+    slope_effect : bool
+        Let the law act on the true slope.
+    angle : float, optional
+        Between the road's velocity and x, degrees. Default: 0 on measured maps, 31.7 on drawn ones:
+        sliding along an axis the rubber meets its own footprint after one side.
+    tolerance : float
+        Of the solver.
+
+    Raises
+    ------
+    ValueError
+        If a value is not allowed.
+    """
+    speed = np.sort(array_of("speeds", speeds, low=0.0, low_open=True, ndim=1))
+    pressure = np.sort(array_of("pressures", pressures, low=0.0, low_open=True, ndim=1))
+    usual = [compound.temperature] if temperatures is None else temperatures
+    temperature = (np.asarray(usual, dtype=float) if temperatures is None
+                   else np.sort(array_of("temperatures", usual, ndim=1)))
+    for name, values in (("speeds", speed), ("pressures", pressure),
+                         ("temperatures", temperature)):
+        if not values.size:
+            raise ValueError(f"{name}: has no values")
+        if np.any(np.diff(values) == 0.0):
+            raise ValueError(f"{name}: {values[:-1][np.diff(values) == 0.0][0]:g} stands twice")
+    wanted, notes = whole("patches", patches), []
+    if road.count is not None and wanted > road.count:
+        notes.append(f"the maps have room for {road.count} patches that do not overlap, not for"
+                     f" {wanted}")
+        wanted = road.count
+    if angle is None:
+        angle = 0.0 if road.is_measured else 31.7
+    plan = CurvePlan(road, compound, speed, pressure, temperature, wanted,
+                     number("coefficient", coefficient, 0.0), slope_effect,
+                     number("angle", angle, -360.0, 360.0), positive("tolerance", tolerance), notes)
+    for celsius in temperature:
+        compound.at(float(celsius))
+        notes += _band_note(plan, float(celsius))
+    if road.is_measured and angle % 90.0 == 0.0:
+        notes.append("sliding along an axis of a periodic patch the rubber meets its own footprint"
+                     " after one side; an oblique direction (angle, --angle) avoids it")
+    return plan
+
+
+def _longest(plan: CurvePlan) -> float:
+    """Return the longest wave of the patches, m."""
+    patch = plan.road.patch(0)
+    return min(max(patch.lx, patch.ly), plan.road.whole_spectrum.band[0]) \
+        if not plan.road.is_measured else max(patch.lx, patch.ly)
+
+
+def _band_note(plan: CurvePlan, celsius: float) -> list[str]:
+    """Say at which speeds V/wavelength leaves the measured band of the rubber."""
+    within = plan.compound.speeds_within(celsius, plan.road.short, _longest(plan))
+    if within is None:
+        return []
+    low, high = within
+    below, above = plan.speed[plan.speed < low], plan.speed[plan.speed > high]
+    notes = []
+    for some, where, end in ((below, "below", low), (above, "above", high)):
+        if some.size:
+            notes.append(f"at {celsius:g} C, {some.size} of {plan.speed.size} speeds ({some[0]:.3g}"
+                         f" to {some[-1]:.3g} m/s) load the rubber in part {where} the measured"
+                         f" frequencies: the limit is {end:.3g} m/s, beyond it the series is a"
+                         " guess")
+    return notes
+
+
+def _told(seconds: float) -> str:
+    """Return a time in words.
+
+    Examples
+    --------
+    >>> _told(30.0), _told(4000.0)
+    ('30 s', '1 h 7 min')
+    """
+    if seconds < 90.0:
+        return f"{max(seconds, 1.0):.0f} s"
+    minutes = round(seconds / 60.0)
+    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"

@@ -1,0 +1,147 @@
+"""The runs of a friction curve: one for each patch, pressure and temperature, all speeds in it.
+
+Each speed starts from the state of the one before. Where a solver does not converge, the point is
+left out, and another run goes on with the next speed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..results import Run, open_result
+from ..roads.patches import Patch
+from ..runs.jobs import Job, found_result, is_done
+from ..runs.means import Means, run_jobs
+from ..runs.progress import Progress
+from .plan import CurvePlan
+
+__all__ = ["CurveError", "Piece", "SubmittedError", "run_pieces"]
+
+
+class CurveError(RuntimeError):
+    """Some runs of a curve failed; the finished ones are kept for the next call."""
+
+
+class SubmittedError(RuntimeError):
+    """The runs were submitted and are not there yet; the same call later gathers them."""
+
+
+@dataclass
+class Piece:
+    """A run of a curve, and which points it gives.
+
+    Attributes
+    ----------
+    patch, i, j, first : int
+        Indices of the patch, the pressure, the temperature and the first speed.
+    job : Job
+        The run.
+    """
+
+    patch: int
+    i: int
+    j: int
+    first: int
+    job: Job
+
+    def rows(self) -> tuple[Run, int, bool]:
+        """Return the result, how many of its rows hold steady states, and whether it went through.
+
+        The last row of a run that did not converge is its best state, which is none.
+        """
+        run = open_result(self.job.path)
+        return run, run.history.rows - (0 if run.finished else 1), run.finished
+
+
+def run_pieces(plan: CurvePlan, folder: Path, means: Means, quiet: bool = False
+               ) -> list[tuple[Piece, Patch]]:
+    """Run what is not there yet; return all pieces with their patches.
+
+    Parameters
+    ----------
+    plan : CurvePlan
+        What to run.
+    folder : Path
+        Where maps, inputs and results lie.
+    means : Means
+        How the runs are made.
+    quiet : bool
+        Tell no progress.
+
+    Raises
+    ------
+    CurveError
+        If a run fails otherwise than by a solver that does not converge.
+    SubmittedError
+        If the runs were given to Slurm.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    patches = [plan.road.patch(number) for number in range(plan.patches)]
+    files = [patch.save(folder).name for patch in patches]
+    pieces = [_piece(plan, patches[n], files[n], folder, (n, i, j, 0))
+              for n in range(plan.patches)
+              for i in range(plan.pressure.size) for j in range(plan.temperature.size)]
+    begun, fresh = list(pieces), pieces
+    while fresh:
+        waiting = [piece.job for piece in fresh if not _is_there(piece.job)]
+        progress = Progress("friction", len(fresh), len(waiting), quiet)
+        run_jobs(waiting, folder, progress, means)
+        if waiting and means.slurm is not None:
+            raise SubmittedError(f"{len(waiting)} runs {waiting[0].message}; the same command"
+                                 " gathers them when they are done")
+        _look_for_failures(fresh)
+        fresh = [_piece(plan, patches[piece.patch], files[piece.patch], folder,
+                        (piece.patch, piece.i, piece.j, first))
+                 for piece, first in _broken_off(fresh, plan)]
+        begun += fresh
+    return [(piece, patches[piece.patch]) for piece in begun]
+
+
+def _piece(plan: CurvePlan, patch: Patch, file: str, folder: Path,
+           place: tuple[int, int, int, int]) -> Piece:
+    """Return a run of a curve."""
+    n, i, j, first = place
+    case = plan.case(patch, file, i, j, first)
+    if n == 0:
+        case.output.snapshot_every = 1  # the maps that the page shows
+    case.path = folder / "case.nml"
+    name = f"{patch.code}-p{plan.pressure[i]:.6g}-T{plan.temperature[j]:.6g}"
+    if first:
+        name += f"-from{first}"
+    values = {"patch": n, "pressure": plan.pressure[i], "temperature": plan.temperature[j]}
+    return Piece(n, i, j, first, Job(values, case, name, folder / f"{name}.h5"))
+
+
+def _is_there(job: Job) -> bool:
+    """Whether a result of this very input is there, through to its end or to a lack of convergence.
+
+    The status of the job is set.
+    """
+    if is_done(job):
+        job.status = 0
+        return True
+    run = found_result(job)
+    if run is not None and not run.finished and "converge" in run.outcome:
+        job.status = 4
+        return True
+    return False
+
+
+def _look_for_failures(pieces: list[Piece]) -> None:
+    """Raise what made runs fail."""
+    failed = [piece.job for piece in pieces if piece.job.status not in (0, 4)]
+    if failed:
+        told = "\n".join(f"  {job.name}: {job.message or 'was not run'}" for job in failed[:10])
+        raise CurveError(f"{len(failed)} of {len(pieces)} runs failed:\n{told}")
+
+
+def _broken_off(pieces: list[Piece], plan: CurvePlan) -> Iterator[tuple[Piece, int]]:
+    """Return the pieces that ended at a speed, and the index of the next speed, if there is one."""
+    for piece in pieces:
+        if piece.job.status == 4:
+            _, rows, _ = piece.rows()
+            following = piece.first + rows + 1
+            if following < plan.speed.size:
+                yield piece, following

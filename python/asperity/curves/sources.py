@@ -1,0 +1,216 @@
+"""What a road or a rubber is made from: files of several kinds, or words."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..base.check import positive
+from ..base.tables import cells_of, decimals, is_number, text_lines
+from ..roads.measured import MeasuredSurface, load
+from ..roads.patches import DrawnRoad, MeasuredRoad
+from ..roads.spectra import Spectrum, join_spectra, spectrum_of_map
+from ..rubber.compound import Compound
+from ..rubber.dma_fit import fit_dma
+from ..rubber.dma_table import read_dma
+from ..rubber.material import Prony
+from ..rubber.wlf import WLF
+from ..runs.case import Case
+from ..theory.rough import self_affine_psd
+
+__all__ = ["compound_of", "road_of"]
+
+Road = DrawnRoad | MeasuredRoad
+
+_SELF_AFFINE = ("hurst", "wavelength_long", "wavelength_rolloff", "wavelength_short", "rms_height",
+                "rms_slope")
+
+
+def road_of(
+    sources: Sequence[str | Path | MeasuredSurface | Spectrum],
+    *,
+    cells: int = 512,
+    side: float | None = None,
+    join: str | None = None,
+    short: float | None = None,
+    outliers: str = "report",
+    draw: bool = False,
+    seed: int = 1,
+    **options: Any,
+) -> Road:
+    """Return the road of files or words.
+
+    Parameters
+    ----------
+    sources : sequence of str, path, MeasuredSurface or Spectrum
+        Measured maps of any format that `asperity.surface.load` reads: patches are cut from them.
+        ``"spectrum:FILE"``: a table of wave numbers (rad/m) and densities. A profile stands for the
+        isotropic road that has such profiles. ``"self_affine:hurst=0.8,wavelength_long=1e-3,
+        wavelength_short=1e-5,rms_slope=0.2"``. Spectra and profiles are joined into one.
+    cells : int
+        Of a side of each patch.
+    side : float, optional
+        Length of drawn patches, m.
+    join, short, outliers, seed
+        As in `asperity.roads.patches.MeasuredRoad`.
+    draw : bool
+        Draw random maps of the joined spectrum of the maps, instead of cutting patches.
+    **options
+        For `asperity.surface.load`.
+
+    Returns
+    -------
+    DrawnRoad or MeasuredRoad
+
+    Raises
+    ------
+    OSError, ValueError
+        If a file cannot be read, or what it holds is no road.
+    """
+    maps: list[MeasuredSurface] = []
+    spectra: list[Spectrum] = []
+    for source in sources:
+        found = _road_source(source, options)
+        if isinstance(found, Spectrum):
+            spectra.append(found)
+        elif found.height.shape[0] == 1 or draw:
+            spectra.append(spectrum_of_map(found.height, found.lx, found.ly,
+                                           periodic=found.periodic,
+                                           name=str(found.source.get("name", "map"))))
+        else:
+            maps.append(found)
+    if maps and spectra:
+        raise ValueError("roads: maps and spectra together: give one kind, or draw = True (--draw)"
+                         " for maps from the joined spectrum of all")
+    if maps:
+        if side is not None:
+            raise ValueError("side: goes with drawn roads: patches of maps have the maps' cells")
+        return MeasuredRoad(maps, cells, join, short, outliers, seed)
+    if join is not None:
+        raise ValueError("join: goes with patches of measured maps")
+    return DrawnRoad(join_spectra(spectra), cells, side, short, seed)
+
+
+def _road_source(source: str | Path | MeasuredSurface | Spectrum, options: dict[str, Any]
+                 ) -> MeasuredSurface | Spectrum:
+    """Return what one source is."""
+    if isinstance(source, MeasuredSurface | Spectrum):
+        return source
+    words = str(source)
+    if words.startswith("self_affine:"):
+        return _self_affine(words.partition(":")[2])
+    if words.startswith("spectrum:"):
+        return _spectrum_file(Path(words.partition(":")[2]))
+    return load(words, level=options.pop("level", "tilt"), **options)
+
+
+def _self_affine(words: str) -> Spectrum:
+    """Return the spectrum of the words ``hurst=0.8,...``."""
+    values: dict[str, float] = {}
+    for part in filter(None, words.split(",")):
+        name, equals, text = part.partition("=")
+        name = name.strip()
+        if not equals or name not in _SELF_AFFINE or not is_number(text.strip()):
+            raise ValueError(f"self_affine: {part!r}: must be NAME=NUMBER, NAME one of"
+                             f" {', '.join(_SELF_AFFINE)}")
+        values[name] = float(text)
+    lacks = [name for name in ("hurst", "wavelength_long", "wavelength_short")
+             if name not in values]
+    if lacks:
+        raise ValueError(f"self_affine: lacks {', '.join(lacks)}")
+    long = values["wavelength_long"]
+    return Spectrum(*self_affine_psd(
+        values["hurst"], long, values.get("wavelength_rolloff", long), values["wavelength_short"],
+        rms_height=values.get("rms_height"), rms_slope=values.get("rms_slope")), "self-affine road")
+
+
+def _spectrum_file(path: Path) -> Spectrum:
+    """Return the spectrum of a table: wave numbers (rad/m) and densities.
+
+    The second column is Phi (m4), or Persson's C = Phi/(4 pi^2) where its head says C, or m3 for
+    the density of a profile.
+    """
+    rows = cells_of(text_lines(path))
+    heads = [] if is_number(rows[0][1][0]) else rows[0][1]
+    body = decimals(rows[1:] if heads else rows)
+    try:
+        values = np.array([[float(cell) for cell in cells[:2]] for _, cells in body])
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}: must have two columns of numbers, wave number (rad/m)"
+                         " and density (m4)") from None
+    if values.ndim != 2 or values.shape[0] < 2 or values.shape[1] < 2:
+        raise ValueError(f"{path}: must have two columns of numbers, at least two rows")
+    head = heads[1] if len(heads) > 1 else ""
+    factor = 4.0 * math.pi**2 if re.match(r"\s*C\b", head) else 1.0
+    order = np.argsort(values[:, 0])
+    wave, psd = values[order, 0], factor * values[order, 1]
+    if re.search(r"m\^?3|m³", head):
+        from ..roads.spectra import isotropic_of_profile
+
+        return isotropic_of_profile(wave, psd, name=path.name)
+    return Spectrum(wave, psd, path.name)
+
+
+def compound_of(
+    source: str | Path | Prony | Compound,
+    *,
+    wlf: Sequence[float] | None = None,
+    reference: float | None = None,
+    vertical: bool = False,
+    arms_per_decade: float = 1.0,
+) -> Compound:
+    """Return the rubber of a namelist with ``&material``, a DMA table, or a series.
+
+    Parameters
+    ----------
+    source : str, path, Prony or Compound
+        A file whose first word is a group, such as ``&material``, is a namelist; any other one a
+        table that `asperity.dma.read_dma` reads.
+    wlf, reference, vertical, arms_per_decade
+        As in `asperity.dma.fit_dma`, for tables.
+
+    Returns
+    -------
+    Compound
+
+    Raises
+    ------
+    OSError, ValueError
+        If the file cannot be read, or what it holds is no rubber.
+    """
+    if isinstance(source, Compound):
+        return source
+    if isinstance(source, Prony):
+        return Compound(source, None if reference is None else float(reference),
+                        None if wlf is None else WLF(*wlf))
+    path = Path(source)
+    lines = text_lines(path)
+    words = next((line.strip() for _, line in lines if not line.strip().startswith("!")), "")
+    if words.startswith(("&", "$")):
+        return _of_namelist(path)
+    fit = fit_dma(read_dma(path), wlf=wlf, reference=reference, vertical=vertical,
+                  arms_per_decade=arms_per_decade)
+    return Compound(fit.material, fit.reference, fit.wlf, dict(fit.shifts),
+                    dict(fit.vertical_shifts), fit.valid_range, fit.name, list(fit.notes))
+
+
+def _of_namelist(path: Path) -> Compound:
+    """Return the rubber of the group `material` of an input."""
+    group = Case.read(path).material
+    spring = float(group.shear_modulus or 0.0)
+    if group.zener_g0:
+        series = Prony.from_zener(spring, group.zener_g0, group.zener_g1, group.zener_eta)
+    else:
+        series = Prony(spring, group.prony_g or (), group.prony_tau or ())
+    reference = float(group.reference_temperature)
+    wlf = None
+    if group.wlf_c1 is not None and group.wlf_c2 is not None:
+        wlf = WLF(float(group.wlf_c1), float(group.wlf_c2), reference)
+    given = reference if group.temperature is None else float(group.temperature)
+    poisson = positive("poisson", group.poisson) if group.poisson else 0.0
+    return Compound(series, reference, wlf, name=path.name, poisson=poisson, usual=given)

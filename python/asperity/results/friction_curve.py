@@ -1,0 +1,279 @@
+"""Friction against speed, pressure and temperature: values of every patch, means, intervals.
+
+Arrays have the dimensions (pressure, temperature, speed, patch), or these without the patch.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.presenters import present
+
+if TYPE_CHECKING:
+    import xarray
+
+__all__ = ["COLUMNS", "MEANINGS", "FrictionCurve", "interval"]
+
+FloatArray = NDArray[np.float64]
+
+COLUMNS = ("pressure", "temperature", "speed", "friction", "friction_low", "friction_high",
+           "friction_viscous", "contact_area", "mean_gap", "friction_persson", "patches")
+
+#: Units and meaning of each variable.
+MEANINGS = {
+    "pressure": ("Pa", "mean pressure"),
+    "temperature": ("degC", "temperature of the rubber"),
+    "speed": ("m/s", "speed of the road"),
+    "friction": ("1", "friction coefficient"),
+    "friction_viscous": ("1", "friction by loss in the rubber"),
+    "friction_interface": ("1", "friction by the traction in the interface"),
+    "contact_area": ("1", "contact area over the apparent one"),
+    "mean_gap": ("m", "mean gap"),
+    "friction_persson": ("1", "friction by Persson's theory for the spectrum of the patches"),
+    "area_persson": ("1", "contact area by Persson's theory"),
+    "friction_left_out": ("1", "what the left-out waves of the road would add, by that theory"),
+    "loss_octave": ("W/m2", "loss in the rubber by octave of the wavelength, mean over patches"),
+    "loss_arm": ("W/m2", "loss in the rubber by arm of the Prony series, mean over patches"),
+    "octave": ("m", "longest wavelength of the octave"),
+    "relaxation_time": ("s", "relaxation time of the arm at the reference temperature"),
+    "a_t": ("1", "shift of the relaxation times"),
+    "b_t": ("1", "factor of the moduli"),
+}
+
+
+def interval(values: FloatArray, confidence: float = 0.95) -> tuple[FloatArray, FloatArray,
+                                                                    FloatArray, NDArray[np.intp]]:
+    """Return mean and confidence interval over the last axis, by Student's t.
+
+    Parameters
+    ----------
+    values : ndarray, shape (..., n)
+        Values of the patches; those that are NaN are left out.
+    confidence : float
+        0 to 1.
+
+    Returns
+    -------
+    mean, low, high : ndarray, shape (...)
+        The ends are NaN where fewer than two values are there.
+    count : ndarray of int, shape (...)
+        Number of values.
+
+    Examples
+    --------
+    >>> mean, low, high, count = interval(np.array([1.0, 2.0, 3.0]))
+    >>> float(mean), round(float(high), 4), int(count)
+    (2.0, 4.4841, 3)
+    """
+    from scipy.stats import t
+
+    good = np.isfinite(values)
+    count = good.sum(axis=-1)
+    filled = np.where(good, values, 0.0)
+    mean = np.where(count > 0, filled.sum(axis=-1) / np.maximum(count, 1), math.nan)
+    square = np.where(good, (values - mean[..., None]) ** 2, 0.0).sum(axis=-1)
+    free = np.maximum(count - 1, 1)
+    half = t.ppf(0.5 + 0.5 * confidence, free) * np.sqrt(square / free / np.maximum(count, 1))
+    half = np.where(count > 1, half, math.nan)
+    return mean, mean - half, mean + half, count
+
+
+@dataclass(frozen=True)
+class FrictionCurve:
+    """Friction of a rubber on a road.
+
+    Attributes
+    ----------
+    pressure, temperature, speed : ndarray
+        Pa, C, m/s; the axes.
+    patches : list of str
+        Where each patch comes from.
+    values : dict of ndarray, shape (pressure, temperature, speed, patch)
+        'friction', 'friction_viscous', 'friction_interface', 'contact_area', 'mean_gap'; NaN where
+        a solver did not converge.
+    theory : dict of ndarray, shape (pressure, temperature, speed)
+        'friction_persson', 'area_persson', 'friction_left_out'.
+    losses : dict of ndarray, shape (pressure, temperature, speed, parts)
+        'loss_octave' and 'loss_arm', W/m2, where the results hold them.
+    octave, relaxation_time : ndarray
+        Longest wavelength of each octave, m; relaxation time of each arm, s.
+    a_t, b_t : ndarray, shape (temperature,)
+        Shifts of the rubber.
+    sources : dict
+        Result file and row of a point of the first patch, by the indices of the point.
+    settings : dict
+        How it was made.
+    notes : list of str
+        What the user should know.
+    """
+
+    pressure: FloatArray
+    temperature: FloatArray
+    speed: FloatArray
+    patches: list[str]
+    values: dict[str, FloatArray]
+    theory: dict[str, FloatArray]
+    losses: dict[str, FloatArray]
+    octave: FloatArray
+    relaxation_time: FloatArray
+    a_t: FloatArray
+    b_t: FloatArray
+    sources: dict[tuple[int, int, int], tuple[Path, int]] = field(default_factory=dict, repr=False)
+    settings: dict[str, Any] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    def mean(self, name: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return mean and 95 % interval of a variable over the patches.
+
+        Parameters
+        ----------
+        name : str
+            One of `values`.
+
+        Returns
+        -------
+        mean, low, high : ndarray, shape (pressure, temperature, speed)
+        """
+        return interval(self.values[name])[:3]
+
+    @property
+    def largest_error(self) -> float:
+        """Half of the widest 95 % interval of friction; infinite with a single patch."""
+        _, low, high, _ = interval(self.values["friction"])
+        half = 0.5 * (high - low)
+        return float(half.max()) if np.isfinite(half).all() else math.inf
+
+    def rows(self) -> list[tuple[float, ...]]:
+        """Return the rows of the table, with the columns of `COLUMNS`."""
+        means = {name: self.mean(name) for name in ("friction", "friction_viscous", "contact_area",
+                                                    "mean_gap")}
+        count = interval(self.values["friction"])[3]
+        rows = []
+        for i, j, k in np.ndindex(count.shape):
+            at = (i, j, k)
+            rows.append((
+                float(self.pressure[i]), float(self.temperature[j]), float(self.speed[k]),
+                *(float(part[at]) for part in means["friction"]),
+                float(means["friction_viscous"][0][at]), float(means["contact_area"][0][at]),
+                float(means["mean_gap"][0][at]), float(self.theory["friction_persson"][at]),
+                int(count[at])))
+        return rows
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write the table; return the file.
+
+        Parameters
+        ----------
+        path : str or Path
+            NAME.csv.
+        """
+        lines = [",".join(COLUMNS)]
+        lines += [",".join(repr(value) for value in row) for row in self.rows()]
+        path = Path(path)
+        path.write_text("\n".join(lines) + "\n", encoding="ascii")
+        return path
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return everything as a data set of xarray, which must be installed.
+
+        Returns
+        -------
+        xarray.Dataset
+            Dimensions pressure, temperature, speed, patch, octave and arm; every variable has
+            `units` and `long_name`. Means and ends of the intervals are ``friction_mean``,
+            ``friction_low``, ``friction_high`` and so on.
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError as error:
+            raise ImportError("to_xarray needs xarray: python -m pip install xarray") from error
+        axes = ("pressure", "temperature", "speed")
+
+        def told(name: str, more: str = "") -> dict[str, str]:
+            return {"units": MEANINGS[name][0], "long_name": MEANINGS[name][1] + more}
+
+        variables: dict[str, Any] = {}
+        for name, array in self.values.items():
+            variables[name] = ((*axes, "patch"), array, told(name))
+            ends = zip(("mean", "low", "high"), self.mean(name), strict=True)
+            for end, part in ends:
+                variables[f"{name}_{end}"] = (axes, part, told(name, {
+                    "mean": ", mean over patches", "low": ", lower end of the 95 % interval",
+                    "high": ", upper end of the 95 % interval"}[end]))
+        for name, array in self.theory.items():
+            variables[name] = (axes, array, told(name))
+        for name, array in self.losses.items():
+            part = name.removeprefix("loss_")
+            variables[name] = ((*axes, part), array, told(name))
+        for name in ("a_t", "b_t"):
+            variables[name] = ("temperature", getattr(self, name), told(name))
+        variables["relaxation_time"] = ("arm", self.relaxation_time, told("relaxation_time"))
+        coordinates: dict[str, Any] = {name: (name, getattr(self, name), told(name))
+                                       for name in axes}
+        coordinates["patch"] = ("patch", np.arange(len(self.patches)))
+        coordinates["octave"] = ("octave", self.octave, told("octave"))
+        settings = {name: str(value) for name, value in self.settings.items()}
+        return xarray.Dataset(variables, coordinates,
+                              {**settings, "patches": "\n".join(self.patches),
+                               "notes": "\n".join(self.notes)})
+
+    def to_netcdf(self, path: str | Path) -> Path:
+        """Write everything as a netCDF file (classic format); return the file.
+
+        Parameters
+        ----------
+        path : str or Path
+            NAME.nc.
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed.
+        """
+        path = Path(path)
+        self.to_xarray().to_netcdf(path, engine="scipy")
+        return path
+
+    def plot(self) -> Any:
+        """Draw friction and contact area against speed; return the figure of matplotlib."""
+        return present("plot_friction_curve", self)
+
+    def to_html(self, path: str | Path) -> Path:
+        """Write a page for any browser; return the file.
+
+        Parameters
+        ----------
+        path : str or Path
+            NAME.html.
+        """
+        return present("write_curve_page", self, path)
+
+    def summary(self) -> str:
+        """Return the table as text, and the notes."""
+        heads = ("p (Pa)", "T (C)", "v (m/s)", "friction", "95 % interval", "viscous", "area",
+                 "Persson", "patches")
+        lines = ["  ".join(head.rjust(max(9, len(head))) for head in heads)]
+        for row in self.rows():
+            low, high = row[4:6]
+            known = f"{low:.4f}..{high:.4f}" if math.isfinite(low) else "-"
+            cells = (f"{row[0]:.4g}", f"{row[1]:g}", f"{row[2]:.4g}", f"{row[3]:.4f}", known,
+                     f"{row[6]:.4f}", f"{row[7]:.4g}", f"{row[9]:.4f}", str(row[10]))
+            lines.append("  ".join(cell.rjust(max(9, len(head)))
+                                   for cell, head in zip(cells, heads, strict=True)))
+        return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
+
+    def settings_text(self) -> Mapping[str, str]:
+        """Return how it was made, in words."""
+        return {name: str(value) for name, value in self.settings.items()}

@@ -1,0 +1,278 @@
+"""Patches of roads: parts of measured maps made periodic, or maps drawn from a spectrum.
+
+A patch is what one run slides on. Several patches of a road give the scatter of friction, and so
+its interval. The same settings and the same seed give the same bits.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.check import choice, positive, whole
+from .joins import JOINS, join, margin_of
+from .measured import MeasuredSurface
+from .outliers import find_outliers
+from .spectra import Spectrum, join_spectra, spectrum_of_map
+
+__all__ = ["DrawnRoad", "MeasuredRoad", "Patch", "low_pass"]
+
+FloatArray = NDArray[np.float64]
+
+_CELLS_IN_DRAWN_WAVE = 8.0      # of the shortest wave of a drawn map
+_CELLS_IN_MEASURED_WAVE = 6.0   # of the shortest wave of a measured map
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A periodic map that a run slides on.
+
+    Attributes
+    ----------
+    height : ndarray, shape (ny, nx)
+        Heights, m; their mean is zero.
+    lx, ly : float
+        Lengths, m.
+    label : str
+        Where it comes from.
+    """
+
+    height: FloatArray = field(repr=False)
+    lx: float
+    ly: float
+    label: str
+
+    @property
+    def code(self) -> str:
+        """A word that changes with the heights and the lengths."""
+        found = hashlib.sha256(np.ascontiguousarray(self.height).tobytes())
+        found.update(repr((self.height.shape, self.lx, self.ly)).encode())
+        return found.hexdigest()[:12]
+
+    def save(self, folder: Path) -> Path:
+        """Write the map to the folder, unless it is there; return the file.
+
+        Parameters
+        ----------
+        folder : Path
+            Where to write ``patch-CODE.h5``.
+        """
+        path = folder / f"patch-{self.code}.h5"
+        if not path.exists():
+            surface = MeasuredSurface(
+                self.height, self.lx, self.ly, True, "m",
+                source={"name": self.label, "format": "patch", "metadata": {}})
+            surface.save(path)
+        return path
+
+
+def low_pass(height: FloatArray, lx: float, ly: float, short: float) -> FloatArray:
+    """Return a periodic map without the waves below a length.
+
+    Parameters
+    ----------
+    height : ndarray, shape (ny, nx)
+        Heights, m.
+    lx, ly : float
+        Lengths, m.
+    short : float
+        Shortest wave that is kept, m.
+    """
+    ny, nx = height.shape
+    kx = np.fft.rfftfreq(nx, lx / nx)
+    ky = np.fft.fftfreq(ny, ly / ny)
+    modes = np.fft.rfft2(height)
+    modes[np.hypot(kx, ky[:, None]) > (1.0 + 1e-9) / short] = 0.0
+    return np.fft.irfft2(modes, s=height.shape)
+
+
+class DrawnRoad:
+    """Maps drawn from a spectrum, one for each number of a patch.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        The whole spectrum; waves of fewer than eight cells, and those longer than the side, are
+        left out.
+    cells : int
+        Of each side.
+    side : float, optional
+        Length, m. Default: so that the shortest wave has eight cells, but at least twice the
+        longest wave where that many cells resolve less.
+    short : float, optional
+        Shortest wave, m; eight cells if left out.
+    seed : int
+        Another seed, other maps.
+    """
+
+    is_measured = False
+    join = "none"
+    count: int | None = None    # of patches: as many as are wanted
+
+    def __init__(self, spectrum: Spectrum, cells: int, side: float | None = None,
+                 short: float | None = None, seed: int = 1) -> None:
+        self.whole_spectrum = spectrum
+        self.cells = whole("cells", cells)
+        self.side = 2.0 * spectrum.band[0] if side is None else positive("side", side)
+        least = _CELLS_IN_DRAWN_WAVE * self.side / cells
+        self.short = max(least if short is None else positive("short", short), spectrum.band[1])
+        self.spectrum = spectrum.cut(self.side, self.short)
+        self.seed = seed
+        self.notes = list(spectrum.notes)
+        if short is not None and short < 0.999 * least:
+            self.notes.append(f"the shortest wave, {short:.3g} m, has fewer than eight of the cells"
+                              f" of {self.side / cells:.3g} m")
+
+    @property
+    def name(self) -> str:
+        """Name of the road."""
+        return self.whole_spectrum.name
+
+    def patch(self, number: int) -> Patch:
+        """Return the patch of a number, from 0."""
+        height = self.spectrum.draw(self.cells, self.cells, self.side, self.side,
+                                    self.seed + number)
+        return Patch(height, self.side, self.side, f"{self.name}, seed {self.seed + number}")
+
+
+class MeasuredRoad:
+    """Patches cut from measured maps.
+
+    Parameters
+    ----------
+    maps : sequence of MeasuredSurface
+        At least one, none a profile.
+    cells : int
+        Cells of a side of a patch, those of the map; fewer where the map is smaller.
+    method : str, optional
+        How a patch is made periodic, one of `asperity.roads.joins.JOINS`. Default: 'blend' where
+        the maps have room for its margin, else 'smooth'; 'none' for maps that are periodic.
+    short : float, optional
+        Shortest wave that is kept, m; six cells if left out.
+    outliers : str
+        'report' or 'remove'.
+    seed : int
+        Order in which the patches are taken.
+    """
+
+    is_measured = True
+
+    def __init__(self, maps: Sequence[MeasuredSurface], cells: int, method: str | None = None,
+                 short: float | None = None, outliers: str = "report", seed: int = 1) -> None:
+        if not maps:
+            raise ValueError("maps: must have at least one")
+        choice("outliers", outliers, ("report", "remove"))
+        cells = whole("cells", cells)
+        self.notes: list[str] = []
+        self._maps = [self._clean(one, outliers) for one in maps]
+        fewest = min(min(one.height.shape) for one in maps)
+        whole_maps = all(one.periodic and max(one.height.shape) <= cells for one in maps)
+        self.join = self._join(method, fewest, cells, whole_maps)
+        self.cells = self._cells(fewest, cells)
+        self._places = self._cut(seed)
+        self.count = len(self._places)
+        steps = [max(one.lx / one.height.shape[1], one.ly / one.height.shape[0]) for one in maps]
+        least = _CELLS_IN_MEASURED_WAVE * max(steps)
+        self.short = least if short is None else positive("short", short)
+        self.whole_spectrum = join_spectra([
+            spectrum_of_map(one.height, one.lx, one.ly, periodic=one.periodic,
+                            name=one.source.get("name", "map")) for one in self._maps])
+
+    @property
+    def name(self) -> str:
+        """Name of the road."""
+        return " and ".join(dict.fromkeys(str(one.source.get("name", "map"))
+                                          for one in self._maps))
+
+    def patch(self, number: int) -> Patch:
+        """Return the patch of a number, from 0 to `count` - 1."""
+        which, row, column = self._places[number]
+        one = self._maps[which]
+        ny, nx = one.height.shape
+        step_x, step_y = one.lx / nx, one.ly / ny
+        if self.join == "none" and one.periodic and max(one.height.shape) <= self.cells:
+            height, rows, columns = one.height, ny, nx
+        else:
+            rows = columns = self.cells
+            margin = margin_of(self.cells) if self.join == "blend" else 0
+            part = one.height[row : row + rows + margin, column : column + columns + margin]
+            height = join(_levelled(part), self.join, (rows, columns))
+            rows, columns = height.shape
+        lx, ly = columns * step_x, rows * step_y
+        height = low_pass(height, lx, ly, self.short)
+        label = f"{one.source.get('name', 'map')}, rows from {row}, columns from {column}"
+        return Patch(height - height.mean(), lx, ly, label)
+
+    def _clean(self, one: MeasuredSurface, outliers: str) -> MeasuredSurface:
+        """Return a map without outliers, if they are to be removed; note them in any case."""
+        name = one.source.get("name", "map")
+        if one.height.shape[0] == 1:
+            raise ValueError(f"{name}: is a profile: no patches can be cut from it; it serves as"
+                             " the spectrum of an isotropic road")
+        found = find_outliers(one.height)
+        if not found.count:
+            return one
+        if outliers == "report":
+            self.notes.append(f"{name}: {found.told()}; `outliers = 'remove'` (--outliers remove)"
+                              " puts the median of the neighbours there")
+            return one
+        self.notes.append(f"{name}: {found.told()}: replaced by the median of the neighbours")
+        return MeasuredSurface(found.mended, one.lx, one.ly, one.periodic, one.unit, one.steps,
+                               one.source, one.notes)
+
+    def _join(self, method: str | None, fewest: int, cells: int, whole_maps: bool) -> str:
+        """Return the method that makes patches periodic."""
+        if method is not None:
+            return choice("join", method, JOINS)
+        if whole_maps:
+            return "none"
+        return "blend" if fewest >= cells + margin_of(cells) else "smooth"
+
+    def _cells(self, fewest: int, cells: int) -> int:
+        """Return the cells of a side that the maps have room for; an even number."""
+        room = fewest
+        if self.join == "blend":
+            room = math.floor(fewest / (margin_of(1000) / 1000 + 1.0))
+        found = min(cells, room)
+        found -= found % 2
+        if found < 16:
+            raise ValueError(f"cells: the maps have {fewest} cells along the shorter side: too few")
+        if found < cells:
+            self.notes.append(f"patches of {found} cells: the maps have no room for {cells}")
+        return found
+
+    def _cut(self, seed: int) -> list[tuple[int, int, int]]:
+        """Return which map and where: parts that do not overlap, in an order of the seed."""
+        need = self.cells + (margin_of(self.cells) if self.join == "blend" else 0)
+        places = []
+        for which, one in enumerate(self._maps):
+            ny, nx = one.height.shape
+            if self.join == "none" and one.periodic and max(ny, nx) <= self.cells:
+                places.append((which, 0, 0))
+                continue
+            along = [_starts(count, self.cells, need) for count in (ny, nx)]
+            places += [(which, row, column) for row in along[0] for column in along[1]]
+        order = np.random.default_rng(seed).permutation(len(places))
+        return [places[i] for i in order]
+
+
+def _starts(count: int, cells: int, need: int) -> list[int]:
+    """Return where patches begin along an axis: spread out, their inner cells apart."""
+    fit = max(1, (count - (need - cells)) // cells)
+    return [round(place) for place in np.linspace(0, count - need, fit)] if fit > 1 else [
+        (count - need) // 2]
+
+
+def _levelled(part: FloatArray) -> FloatArray:
+    """Return a part without its mean plane."""
+    ny, nx = part.shape
+    x, y = np.linspace(-1.0, 1.0, nx), np.linspace(-1.0, 1.0, ny)[:, None]
+    part = part - part.mean()
+    part = part - x * float(np.sum(part * x) / (ny * np.sum(x**2)))
+    return part - y * float(np.sum(part * y) / (nx * np.sum(y**2)))

@@ -1,0 +1,125 @@
+"""A rubber at any temperature: its series, how the temperature shifts it, and where it is known."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..base.check import number
+from .prony import Prony
+from .wlf import WLF
+
+__all__ = ["Compound"]
+
+
+@dataclass(frozen=True)
+class Compound:
+    """A rubber.
+
+    Attributes
+    ----------
+    series : Prony
+        At the reference temperature.
+    reference : float or None
+        Reference temperature, C; None if it is known at one, unnamed temperature only.
+    wlf : WLF or None
+        Law of the shift.
+    shifts : dict
+        log10 a_T by measured temperature, for a rubber without such a law.
+    vertical_shifts : dict
+        log10 b_T by measured temperature; empty: b_T = 1.
+    valid_range : (float, float) or None
+        Angular frequencies at the reference temperature between which it was measured, rad/s.
+    name : str
+        Where it comes from.
+    notes : list of str
+        What the user should know.
+    poisson : float
+        Poisson ratio.
+    usual : float or None
+        The temperature to take if none is asked for, C; the reference if left out.
+    """
+
+    series: Prony
+    reference: float | None = None
+    wlf: WLF | None = None
+    shifts: dict[float, float] = field(default_factory=dict)
+    vertical_shifts: dict[float, float] = field(default_factory=dict)
+    valid_range: tuple[float, float] | None = None
+    name: str = "rubber"
+    notes: list[str] = field(default_factory=list)
+    poisson: float = 0.5
+    usual: float | None = None
+
+    @property
+    def temperature(self) -> float:
+        """The temperature to take if none is asked for, C; NaN if no temperature is known."""
+        found = self.reference if self.usual is None else self.usual
+        return math.nan if found is None else found
+
+    def a_t(self, temperature: float) -> float:
+        """Return a_T: relaxation times at a temperature (C) over those at the reference.
+
+        Raises
+        ------
+        ValueError
+            If the shift at that temperature is not known.
+
+        Examples
+        --------
+        >>> rubber = Compound(Prony(1e6, [1e6], [1.0]), 20.0, WLF(8.0, 100.0, 20.0))
+        >>> rubber.a_t(20.0), rubber.a_t(40.0) < 0.1
+        (1.0, True)
+        """
+        if math.isnan(temperature) or temperature == self.reference:
+            return 1.0
+        number("temperature", temperature)
+        if self.wlf is not None:
+            return float(self.wlf.shift_factor(temperature))
+        return 10.0 ** self._interpolated(temperature, self.shifts, "a_T")
+
+    def b_t(self, temperature: float) -> float:
+        """Return b_T: moduli at a temperature (C) over those at the reference; 1 if not known."""
+        if not self.vertical_shifts or math.isnan(temperature) or temperature == self.reference:
+            return 1.0
+        return 10.0 ** self._interpolated(temperature, self.vertical_shifts, "b_T")
+
+    def at(self, temperature: float) -> Prony:
+        """Return the series at a temperature, C: every tau times a_T, every modulus times b_T."""
+        along, upward = self.a_t(temperature), self.b_t(temperature)
+        return Prony(upward * self.series.g_inf, upward * self.series.g, along * self.series.tau)
+
+    def speeds_within(self, temperature: float, short: float, long: float
+                      ) -> tuple[float, float] | None:
+        """Return between which speeds all waves of a road load it within the measured band.
+
+        Parameters
+        ----------
+        temperature : float
+            C.
+        short, long : float
+            Shortest and longest wavelength, m.
+
+        Returns
+        -------
+        (float, float) or None
+            Lowest and highest speed, m/s, with the longest wave at the lower and the shortest at
+            the upper end; the lowest may be above the highest. None if no band is known.
+        """
+        if self.valid_range is None:
+            return None
+        low, high = (omega / self.a_t(temperature) for omega in self.valid_range)
+        return low * long / (2.0 * math.pi), high * short / (2.0 * math.pi)
+
+    def _interpolated(self, temperature: float, shifts: dict[float, float], what: str) -> float:
+        """Return a shift between measured temperatures."""
+        known = np.array(sorted(shifts))
+        if len(known) < 2:
+            raise ValueError(f"temperature = {temperature:g}: {self.name} gives no {what}: give WLF"
+                             " constants (wlf, --wlf C1 C2)")
+        if not known[0] <= temperature <= known[-1]:
+            raise ValueError(f"temperature = {temperature:g}: {self.name} gives {what} from"
+                             f" {known[0]:g} to {known[-1]:g} C only")
+        return float(np.interp(temperature, known, [shifts[t] for t in known]))

@@ -1,0 +1,193 @@
+"""The page of a friction curve: one HTML file that needs nothing else, for any browser."""
+
+from __future__ import annotations
+
+import math
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.library import version
+from ..results import open_result
+from .page_parts import colour_scales, fill_page, page_file, page_json
+from .report_data import blocks, now, packed
+
+if TYPE_CHECKING:
+    from ..results.friction_curve import FrictionCurve
+
+__all__ = ["curve_page", "write_curve_page"]
+
+SCRIPTS = ("chart.js", "map.js", "curve.js")
+_BUDGET = 12e6          # characters of all maps together
+_SIDES = (192, 128, 96, 64, 48, 32)
+
+_NAMES = {"friction": "friction", "friction_viscous": "viscous", "friction_interface": "interface",
+          "contact_area": "contact area", "mean_gap": "mean gap",
+          "friction_persson": "Persson", "area_persson": "Persson"}
+
+
+def write_curve_page(curve: FrictionCurve, path: str | Path) -> Path:
+    """Write the page; return the file.
+
+    Parameters
+    ----------
+    curve : FrictionCurve
+        What to show.
+    path : str or Path
+        NAME.html.
+
+    Raises
+    ------
+    ValueError
+        If the name does not end in .html.
+    OSError
+        If the page cannot be written.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in (".html", ".htm"):
+        raise ValueError(f"{target}: is no name of a page: must end in .html")
+    target.write_text(curve_page(curve), encoding="utf-8", newline="\n")
+    return target
+
+
+def curve_page(curve: FrictionCurve) -> str:
+    """Return the page of a curve as text."""
+    data = _data(curve)
+    title = str(curve.settings.get("title", "Friction"))
+    sections = [("curves", "Curves", _curves_section()), ("point", "Chosen point",
+                                                          _point_section(data)),
+                ("table", "Table", _table(curve)), ("how", "How it was made", _settings(curve))]
+    parts = {
+        "version": escape(version()),
+        "title": escape(title),
+        "subtitle": escape(_subtitle(curve)),
+        "style": page_file("report.css"),
+        "links": "\n".join(f'<a href="#{key}-part">{head}</a>' for key, head, _ in sections),
+        "notes": _notes(curve),
+        "tiles": "",
+        "sections": "\n".join(
+            f'<section id="{key}-part">\n<h2>{head}</h2>\n{body}\n</section>'
+            for key, head, body in sections),
+        "footer": f"Page made by asperity {escape(version())} at {now()}.",
+        "data": page_json(data),
+        "script": "\n".join(page_file(name) for name in SCRIPTS),
+    }
+    return fill_page(parts)
+
+
+def _subtitle(curve: FrictionCurve) -> str:
+    """Return the line under the title."""
+    counts = [f"{len(values)} {name}{'' if len(values) == 1 else 's'}" for name, values in
+              (("pressure", curve.pressure), ("temperature", curve.temperature),
+               ("speed", curve.speed))]
+    patches = len(curve.patches)
+    return (f"{', '.join(counts)}; {patches} patch{'' if patches == 1 else 'es'} of"
+            f" {curve.settings['nx']} × {curve.settings['ny']} cells; steady sliding")
+
+
+def _numbers(values: NDArray[Any]) -> Any:
+    """Return an array as nested lists for JSON, to eight digits, None where there is no number."""
+    if values.ndim:
+        return [_numbers(part) for part in values]
+    value = float(values)
+    return float(f"{value:.8g}") if math.isfinite(value) else None
+
+
+def _data(curve: FrictionCurve) -> dict[str, Any]:
+    """Return what the page draws."""
+    values: dict[str, Any] = {}
+    for name in curve.values:
+        mean, low, high = curve.mean(name)
+        values |= {name: _numbers(mean), f"{name}_low": _numbers(low),
+                   f"{name}_high": _numbers(high)}
+    if not float(curve.settings.get("coefficient", 0.0)):
+        for name in ("friction_viscous", "friction_interface"):
+            values.pop(name, None)  # the whole friction is viscous
+    values |= {name: _numbers(array) for name, array in curve.theory.items()}
+    maps, grid = _maps(curve)
+    return {
+        "axes": {name: _numbers(getattr(curve, name))
+                 for name in ("pressure", "temperature", "speed")},
+        "a_t": _numbers(curve.a_t), "values": values, "names": _NAMES,
+        "losses": {name: _numbers(array) for name, array in curve.losses.items()},
+        "octave": _numbers(curve.octave), "relaxation": _numbers(curve.relaxation_time),
+        "maps": maps, "grid": grid, "colours": colour_scales()}
+
+
+def _maps(curve: FrictionCurve) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the pressure of the points of the first patch, and the grid of the maps."""
+    if not curve.sources:
+        return {}, {}
+    runs = {path: open_result(path) for path in {path for path, _ in curve.sources.values()}}
+    first = next(iter(runs.values())).grid
+    side = next((one for one in _SIDES if len(curve.sources) * one * one * 8 / 3 <= _BUDGET),
+                _SIDES[-1])
+    block = -(-max(first.nx, first.ny) // side)
+    maps = {}
+    for at, (path, step) in curve.sources.items():
+        snapshots = runs[path].snapshots
+        if step in snapshots.steps:
+            found = packed(blocks(snapshots.at_step(step).pressure, block))
+            maps[",".join(map(str, at))] = found
+    grid = {"nx": first.nx, "ny": first.ny, "lx": first.lx, "ly": first.ly, "block": block,
+            "mx": -(-first.nx // block), "my": -(-first.ny // block)}
+    return maps, grid
+
+
+def _curves_section() -> str:
+    """Return the charts and the choices above them."""
+    return ('<p class="soft">Mean over the patches with its 95 % interval; broken: Persson\'s'
+            " theory for the same roughness. Click on a point to see where it touches and where it"
+            ' loses energy.</p>\n<div class="choices" id="choices"></div>\n<div class="charts"'
+            ' id="curves"></div>')
+
+
+def _point_section(data: dict[str, Any]) -> str:
+    """Return the losses and the map of the chosen point."""
+    parts = ['<p>At <strong id="point"></strong>:</p>']
+    if data["losses"]:
+        parts.append('<div class="charts" id="losses"></div>')
+    if data["maps"]:
+        parts.append('<div class="maps" id="map"></div>')
+    return "\n".join(parts)
+
+
+def _notes(curve: FrictionCurve) -> str:
+    """Return the notes."""
+    if not curve.notes:
+        return ""
+    lines = "".join(f"<li>{escape(note)}</li>" for note in curve.notes)
+    return f'<div class="note"><p><strong>Notes</strong></p><ul>{lines}</ul></div>'
+
+
+def _table(curve: FrictionCurve) -> str:
+    """Return the table of the means."""
+    heads = ("pressure (Pa)", "temperature (°C)", "speed (m/s)", "friction", "low", "high",
+             "viscous", "contact area", "mean gap (m)", "Persson", "patches")
+    top = "".join(f"<th>{head}</th>" for head in heads)
+    body = "".join("<tr>" + "".join(f"<td>{_cell(value)}</td>" for value in row) + "</tr>"
+                   for row in curve.rows())
+    return (f'<div class="wide"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody>'
+            "</table></div>")
+
+
+def _cell(value: float) -> str:
+    """Return a number of the table."""
+    return f"{value:.4g}".replace("-", "−") if math.isfinite(value) else "–"
+
+
+def _settings(curve: FrictionCurve) -> str:
+    """Return how the curve was made."""
+    rows = "".join(f"<tr><th>{escape(name.replace('_', ' '))}</th><td>{escape(value)}</td></tr>"
+                   for name, value in curve.settings_text().items())
+    patches = "".join(f"<li>{escape(label)}</li>" for label in curve.patches)
+    left = np.asarray(curve.theory["friction_left_out"])
+    more = ""
+    if np.any(left > 1e-4):
+        more = (f"<p>By Persson's theory, the waves that are left out would add up to"
+                f" {float(left.max()):.3g} to the friction.</p>")
+    return (f'<div class="wide"><table>{rows}</table></div>{more}<details><summary>Patches'
+            f"</summary><ol>{patches}</ol></details>")

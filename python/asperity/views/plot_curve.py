@@ -1,0 +1,77 @@
+"""Pictures of friction curves for print."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from .style import COLOURS, DOUBLE_COLUMN, print_style, si_scale
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..results.friction_curve import FrictionCurve
+
+__all__ = ["plot_friction_curve"]
+
+
+def plot_friction_curve(curve: FrictionCurve) -> Figure:
+    """Draw friction and contact area with their 95 % intervals, Persson's theory broken.
+
+    They are drawn against the speed, or, of a single speed, against the pressure or the
+    temperature; each combination of the other two has a colour.
+
+    Parameters
+    ----------
+    curve : FrictionCurve
+        What to draw.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    axes = {"speed": curve.speed, "pressure": curve.pressure, "temperature": curve.temperature}
+    along = next((name for name, values in axes.items() if values.size > 1), "speed")
+    order = ("pressure", "temperature", "speed")
+    place = order.index(along)
+    with print_style():
+        figure, (left, right) = plt.subplots(1, 2, figsize=(DOUBLE_COLUMN, 3.0),
+                                             layout="constrained")
+        others = [name for name in order if name != along]
+        for number, at in enumerate(np.ndindex(*(axes[name].size for name in others))):
+            where = list(at)
+            where.insert(place, slice(None))
+            label = ", ".join(_words(name, float(axes[name][i]))
+                              for name, i in zip(others, at, strict=True) if axes[name].size > 1)
+            colour = COLOURS[number % len(COLOURS)]
+            for panel, name, theory in ((left, "friction", "friction_persson"),
+                                        (right, "contact_area", "area_persson")):
+                mean, low, high = (part[tuple(where)] for part in curve.mean(name))
+                panel.fill_between(axes[along], low, high, color=colour, alpha=0.2, linewidth=0)
+                panel.plot(axes[along], mean, "o-", color=colour, label=label or "runs")
+                panel.plot(axes[along], curve.theory[theory][tuple(where)], "--", color=colour,
+                           linewidth=0.9)
+        for panel, text in ((left, "Friction coefficient"), (right, "Contact area fraction")):
+            if along != "temperature":
+                panel.set_xscale("log")
+            panel.set_xlabel({"speed": "Speed (m/s)", "pressure": "Pressure (Pa)",
+                              "temperature": "Temperature (°C)"}[along])
+            panel.set_ylabel(text)
+            panel.grid(alpha=0.3)
+        left.set_ylim(bottom=min(0.0, left.get_ylim()[0]))
+        right.set_yscale("log")
+        left.plot([], [], "k--", linewidth=0.9, label="Persson's theory")
+        left.legend(frameon=True, framealpha=0.8, edgecolor="none")
+        figure.suptitle(str(curve.settings.get("title", "")), parse_math=False)
+    return figure
+
+
+def _words(name: str, value: float) -> str:
+    """Return a value with its unit."""
+    if name == "temperature":
+        return f"{value:g} °C"
+    unit = "Pa" if name == "pressure" else "m/s"
+    factor, prefixed = si_scale(value, unit)
+    return f"{value * factor:.3g} {prefixed}"
