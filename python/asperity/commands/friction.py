@@ -92,8 +92,7 @@ def _add_road(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--angle", type=float, metavar="DEGREES",
                         help="between the velocity and x (default: 0 on maps, 31.7 on drawn roads)")
     parser.add_argument("--join", choices=("blend", "smooth", "mirror", "window"),
-                        help="how patches are made periodic (default: blend where there is room,"
-                             " else smooth)")
+                        help="how patches are made periodic (default: blend)")
     parser.add_argument("--outliers", choices=("report", "remove"), default="report",
                         help="single cells far off their neighbours (default: report)")
     parser.add_argument("--draw", action="store_true",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
@@ -10,6 +11,7 @@ from ..base.presenters import present
 from .result_file import ResultFile
 from .snapshot import Snapshots
 from .standing import note_of, rows_of, standing
+from .steady import SteadyMean, steady_mean
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -78,6 +80,33 @@ class Run(ResultFile):
         last written: where that is much longer than a row takes, the run was perhaps killed.
         """
         return standing(self)
+
+    def steady(self, column: str = "friction") -> SteadyMean:
+        """Return the mean of a column over whole laps at the end of the slide, with its error.
+
+        A mean over part of a lap depends on which part it is: a warning tells.
+
+        Parameters
+        ----------
+        column : str
+            Name of a column of the history.
+
+        Returns
+        -------
+        SteadyMean
+            `mean`, `error` (standard error, NaN of fewer than two laps) and `laps`.
+
+        Raises
+        ------
+        KeyError
+            If there is no such column.
+        ValueError
+            If the history has no rows.
+        """
+        found = steady_mean(self, column)
+        if found.note:
+            warnings.warn(f"{self.path}: {column}: {found.note}", UserWarning, stacklevel=2)
+        return found
 
     @overload
     def plot(self) -> Figure: ...

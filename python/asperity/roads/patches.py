@@ -151,8 +151,9 @@ class MeasuredRoad:
     cells : int
         Cells of a side of a patch, those of the map; fewer where the map is smaller.
     method : str, optional
-        How a patch is made periodic, one of `asperity.roads.joins.JOINS`. Default: 'blend' where
-        the maps have room for its margin, else 'smooth'; 'none' for maps that are periodic.
+        How a patch is made periodic, one of `asperity.roads.joins.JOINS`. Default: 'blend', whose
+        join carries the load that belongs there (``tools/joins.py`` measures it); 'none' for maps
+        that are periodic and no larger than a patch.
     short : float, optional
         Shortest wave that is kept, m; six cells if left out.
     outliers : str
@@ -173,7 +174,7 @@ class MeasuredRoad:
         self._maps = [self._clean(one, outliers) for one in maps]
         fewest = min(min(one.height.shape) for one in maps)
         whole_maps = all(one.periodic and max(one.height.shape) <= cells for one in maps)
-        self.join = self._join(method, fewest, cells, whole_maps)
+        self.join = choice("join", method or ("none" if whole_maps else "blend"), JOINS)
         self.cells = self._cells(fewest, cells)
         self._places = self._cut(seed)
         self.count = len(self._places)
@@ -225,14 +226,6 @@ class MeasuredRoad:
         self.notes.append(f"{name}: {found.told()}: replaced by the median of the neighbours")
         return MeasuredSurface(found.mended, one.lx, one.ly, one.periodic, one.unit, one.steps,
                                one.source, one.notes)
-
-    def _join(self, method: str | None, fewest: int, cells: int, whole_maps: bool) -> str:
-        """Return the method that makes patches periodic."""
-        if method is not None:
-            return choice("join", method, JOINS)
-        if whole_maps:
-            return "none"
-        return "blend" if fewest >= cells + margin_of(cells) else "smooth"
 
     def _cells(self, fewest: int, cells: int) -> int:
         """Return the cells of a side that the maps have room for; an even number."""

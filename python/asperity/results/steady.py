@@ -1,0 +1,146 @@
+"""Means of a slide over whole laps: how far a column of the history is from its steady value.
+
+On a periodic road the rubber meets the same road again after a lap. The mean over part of a lap
+depends on which part it is and may even have the wrong sign; that over whole laps does not.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .result_file import ResultFile
+
+__all__ = ["SteadyMean", "steady_mean"]
+
+FloatArray = NDArray[np.float64]
+
+
+class SteadyMean(NamedTuple):
+    """A mean while sliding.
+
+    Attributes
+    ----------
+    mean : float
+        Over whole laps at the end of the slide; over what there is where that is less than a lap.
+    error : float
+        Standard error of the mean, from the scatter of the laps and their correlation; NaN of
+        fewer than two laps, 0 of a steady phase.
+    laps : float
+        Laps that the mean is over; infinite of a steady phase, which is the state after all laps.
+    note : str
+        What the user should know; '' if nothing.
+    """
+
+    mean: float
+    error: float
+    laps: float
+    note: str = ""
+
+
+def steady_mean(run: ResultFile, column: str = "friction") -> SteadyMean:
+    """Return the mean of a column over whole laps at the end of a run.
+
+    The slide is what the run does last at constant velocity. Its first lap is left out if there
+    are two or more: it holds the start.
+
+    Parameters
+    ----------
+    run : ResultFile
+        The result.
+    column : str
+        Name of a column of the history.
+
+    Returns
+    -------
+    SteadyMean
+
+    Raises
+    ------
+    KeyError
+        If there is no such column.
+    ValueError
+        If the history has no rows.
+    """
+    values = np.asarray(run.history[column], dtype=float)
+    if not values.size:
+        raise ValueError(f"{run.path}: has no rows")
+    if _is_steady(run):
+        return SteadyMean(float(values[-1]), 0.0, math.inf)
+    first, travel, lap = _slide(run)
+    if travel.size < 2:
+        return SteadyMean(float(values[-1]), math.nan, 0.0,
+                          "the road does not move at the end of the run: the last row stands for"
+                          " the mean")
+    values = values[first:]
+    total = travel[-1] / lap
+    if total < 1.0 - 1e-9:
+        mean = _mean_between(travel, values, 0.5 * travel[-1], travel[-1])
+        return SteadyMean(mean, math.nan, 0.5 * total,
+                          f"the slide is {total:.2g} laps long, and the mean is over its second"
+                          " half: over part of a lap it depends on which part that is, and may"
+                          " even have the wrong sign")
+    count = max(1, math.floor(total - 1.0 + 1e-9))
+    ends = travel[-1] - lap * np.arange(count, -1, -1.0)
+    laps = np.array([_mean_between(travel, values, max(low, 0.0), high)
+                     for low, high in zip(ends[:-1], ends[1:], strict=True)])
+    note = "" if total >= 2.0 - 1e-9 else ("the slide is less than two laps long: the mean is over"
+                                           " the last one, and may hold what is left of the start")
+    return SteadyMean(float(laps.mean()), _error(laps), float(count), note)
+
+
+def _is_steady(run: ResultFile) -> bool:
+    """Whether the last row is a steady phase without time."""
+    if "phase" not in run.history or run.history.rows == 0:
+        return False
+    number = int(run.history["phase"][-1])
+    settings = str(run.attributes.get("settings", "") or run.input)
+    phases = re.findall(r"(?is)&phase\b(.*?)(?:\n\s*/|/\s*(?:\n|$))", settings)
+    if number > len(phases) or not re.search(r"(?i)\bsteady\s*=\s*\.?t", phases[number - 1]):
+        return False
+    return int(np.sum(np.asarray(run.history["phase"]) == number)) == 1
+
+
+def _slide(run: ResultFile) -> tuple[int, FloatArray, float]:
+    """Return the first row of the last slide, its travel row by row, and the length of a lap."""
+    if "road_x" not in run.history or run.history.rows < 2:
+        return 0, np.zeros(0), 1.0
+    step = np.diff([run.history["road_x"], run.history["road_y"]], axis=1)
+    time = np.diff(run.history["time"])
+    moving = (time > 0.0) & (np.hypot(*step) > 0.0)
+    if not moving[-1]:
+        return 0, np.zeros(0), 1.0
+    speed = step / np.where(time > 0.0, time, 1.0)
+    size = float(np.hypot(*speed[:, -1]))
+    same = moving & (np.hypot(*(speed - speed[:, -1:])) < 1e-6 * size)
+    first = int(np.flatnonzero(~same)[-1]) + 1 if not same.all() else 0
+    travel = np.concatenate([[0.0], np.cumsum(np.hypot(*step[:, first:]))])
+    along = np.abs(speed[:, -1]) / size
+    sides = (run.grid.lx, run.grid.ly)
+    lap = min(side / part for side, part in zip(sides, along, strict=True) if part > 1e-9)
+    return first, travel, lap
+
+
+def _mean_between(travel: FloatArray, values: FloatArray, low: float, high: float) -> float:
+    """Return the mean over a stretch of the travel, by the trapezoidal rule."""
+    inner = (travel > low) & (travel < high)
+    places = np.concatenate([[low], travel[inner], [high]])
+    return float(np.trapezoid(np.interp(places, travel, values), places) / (high - low))
+
+
+def _error(laps: FloatArray) -> float:
+    """Return the standard error of the mean of laps, whose neighbours are correlated."""
+    if laps.size < 2:
+        return math.nan
+    scatter = laps - laps.mean()
+    square = float(np.sum(scatter**2))
+    if square == 0.0:
+        return 0.0
+    correlation = float(np.sum(scatter[1:] * scatter[:-1])) / square
+    correlation = min(max(correlation, 0.0), 0.99)
+    free = max(laps.size * (1.0 - correlation) / (1.0 + correlation), 1.0)
+    return math.sqrt(square / (laps.size - 1) / free)
