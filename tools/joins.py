@@ -1,4 +1,4 @@
-"""Compare the methods that make a patch of a road periodic: what load does the join carry?
+"""Compare methods that make a patch of a road periodic: what load the join carries.
 
 Patches are cut from larger random roads. On each, made periodic by each method, an elastic contact
 is solved; beside it the same number of maps of the same spectrum that are periodic by themselves.

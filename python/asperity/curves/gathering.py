@@ -13,7 +13,6 @@ from .. import theory
 from ..base.library import version
 from ..results import Run
 from ..results.friction_curve import FrictionCurve
-from ..results.losses import losses_of
 from ..roads.joins import load_at_join
 from ..roads.patches import Patch
 from ..roads.spectra import Spectrum
@@ -158,14 +157,16 @@ def _losses(plan: CurvePlan, lost: list[tuple[Piece, int, Run]]
     count = np.zeros(axes)
     octave = np.zeros(0)
     for piece, rows, run in lost:
-        found = losses_of(run)
-        if found is None:
-            continue
-        octave = found.octave
-        area = run.grid.lx * run.grid.ly
-        at = (piece.i, piece.j, slice(piece.first, piece.first + rows))
-        for name, table in (("loss_octave", found.by_octave), ("loss_arm", found.by_arm)):
-            sums.setdefault(name, np.zeros((*axes, table.shape[1])))[at] += table[:rows] / area
-        count[at] += 1
+        known = getattr(run, "losses", {})
+        for row in range(rows):
+            found = known.get(int(run.history["step"][row]))
+            if found is None:
+                continue
+            octave = found.wavelength
+            at = (piece.i, piece.j, piece.first + row)
+            for name, part in (("loss_octave", found.octave), ("loss_arm", found.arm)):
+                table = sums.setdefault(name, np.zeros((*axes, part.size)))
+                table[at] += part / (run.grid.lx * run.grid.ly)
+            count[at] += 1
     with np.errstate(invalid="ignore", divide="ignore"):
         return {name: table / count[..., None] for name, table in sums.items()}, octave

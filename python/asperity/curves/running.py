@@ -6,6 +6,7 @@ left out, and another run goes on with the next speed.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -107,7 +108,9 @@ def _piece(plan: CurvePlan, patch: Patch, file: str, folder: Path,
     if n == 0:
         case.output.snapshot_every = 1  # the maps that the page shows
     case.path = folder / "case.nml"
-    name = f"{patch.code}-p{plan.pressure[i]:.6g}-T{plan.temperature[j]:.6g}"
+    # Other settings have other names: the results of several curves may lie in one folder.
+    code = hashlib.sha256(str(case).encode()).hexdigest()[:8]
+    name = f"{patch.code}-p{plan.pressure[i]:.6g}-T{plan.temperature[j]:.6g}-{code}"
     if first:
         name += f"-from{first}"
     values = {"patch": n, "pressure": plan.pressure[i], "temperature": plan.temperature[j]}

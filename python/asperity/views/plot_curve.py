@@ -37,8 +37,13 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
     order = ("pressure", "temperature", "speed")
     place = order.index(along)
     with print_style():
-        figure, (left, right) = plt.subplots(1, 2, figsize=(DOUBLE_COLUMN, 3.0),
-                                             layout="constrained")
+        panels = [("friction", "", "Friction coefficient"),
+                  ("friction_viscous", "friction_persson", "Viscous friction coefficient"),
+                  ("contact_area", "area_persson", "Contact area fraction")]
+        if not float(curve.settings.get("coefficient", 0.0)):
+            panels = panels[1:]  # the whole friction is viscous
+        figure, places = plt.subplots(1, len(panels), figsize=(DOUBLE_COLUMN, 2.8),
+                                      layout="constrained")
         others = [name for name in order if name != along]
         for number, at in enumerate(np.ndindex(*(axes[name].size for name in others))):
             where = list(at)
@@ -46,24 +51,25 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
             label = ", ".join(_words(name, float(axes[name][i]))
                               for name, i in zip(others, at, strict=True) if axes[name].size > 1)
             colour = COLOURS[number % len(COLOURS)]
-            for panel, name, theory in ((left, "friction", "friction_persson"),
-                                        (right, "contact_area", "area_persson")):
+            for panel, (name, theory, _) in zip(places, panels, strict=True):
                 mean, low, high = (part[tuple(where)] for part in curve.mean(name))
                 panel.fill_between(axes[along], low, high, color=colour, alpha=0.2, linewidth=0)
                 panel.plot(axes[along], mean, "o-", color=colour, label=label or "runs")
-                panel.plot(axes[along], curve.theory[theory][tuple(where)], "--", color=colour,
-                           linewidth=0.9)
-        for panel, text in ((left, "Friction coefficient"), (right, "Contact area fraction")):
+                if theory:
+                    panel.plot(axes[along], curve.theory[theory][tuple(where)], "--",
+                               color=colour, linewidth=0.9)
+        for panel, (_, _, text) in zip(places, panels, strict=True):
             if along != "temperature":
                 panel.set_xscale("log")
             panel.set_xlabel({"speed": "Speed (m/s)", "pressure": "Pressure (Pa)",
                               "temperature": "Temperature (°C)"}[along])
             panel.set_ylabel(text)
             panel.grid(alpha=0.3)
-        left.set_ylim(bottom=min(0.0, left.get_ylim()[0]))
-        right.set_yscale("log")
-        left.plot([], [], "k--", linewidth=0.9, label="Persson's theory")
-        left.legend(frameon=True, framealpha=0.8, edgecolor="none")
+        for panel in places[:-1]:
+            panel.set_ylim(bottom=min(0.0, panel.get_ylim()[0]))
+        places[-1].set_yscale("log")
+        places[0].plot([], [], "k--", linewidth=0.9, label="Persson's theory")
+        places[0].legend(frameon=True, framealpha=0.8, edgecolor="none")
         figure.suptitle(str(curve.settings.get("title", "")), parse_math=False)
     return figure
 

@@ -1,0 +1,487 @@
+"""Friction curves: points equal single runs, intervals cover, nothing depends on how it was run."""
+
+import csv
+import json
+import os
+import signal
+import stat
+import subprocess
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from browser import BROWSER, Browser
+from conftest import PATIENCE
+
+import asperity
+from asperity.__main__ import main
+from asperity.curves import CurvePlan, plan_curve, run_curve
+from asperity.curves.running import SubmittedError
+from asperity.curves.sources import compound_of, road_of
+from asperity.material import WLF, Prony
+from asperity.results.friction_curve import COLUMNS, interval
+from asperity.rubber.compound import Compound
+from asperity.runs.means import Means
+
+ROAD = "self_affine:hurst=0.8,wavelength_long=1e-3,wavelength_short=2.5e-4,rms_slope=0.15"
+RUBBER = Prony(1e6, [3e6, 5e6, 8e6], [1e-4, 1e-3, 1e-2])
+LAW = WLF(8.0, 120.0, 20.0)
+COMPOUND = Compound(RUBBER, 20.0, LAW)
+NAMELIST = """&material shear_modulus = 1e6, prony_g = 3e6, 5e6, 8e6, prony_tau = 1e-4, 1e-3, 1e-2,
+   reference_temperature = 20.0, wlf_c1 = 8.0, wlf_c2 = 120.0 /
+"""
+
+
+def small_plan(cells=32, **options):
+    """Return a plan of few points."""
+    given = dict(speeds=[1e-3, 1e-2, 1e-1], pressures=[2e5], patches=2) | options
+    return plan_curve(road_of([ROAD], cells=cells), COMPOUND, **given)
+
+
+def curve_of(plan, folder, jobs=1, **options):
+    return run_curve(plan, folder, Means(jobs), quiet=True, **options)
+
+
+# ---- statistics ------------------------------------------------------------------------------
+
+
+def test_the_interval_covers_the_mean():
+    """In 95 % of repeated draws, of patches whose friction is normal, and nearly of skewed ones."""
+    random = np.random.default_rng(1)
+    for count in (3, 8):
+        draws = random.normal(0.3, 0.04, size=(20000, count))
+        _, low, high, _ = interval(draws)
+        assert abs(np.mean((low <= 0.3) & (high >= 0.3)) - 0.95) < 0.006
+    skewed = np.exp(random.normal(0.0, 0.25, size=(20000, 8)))
+    _, low, high, _ = interval(skewed)
+    assert np.mean((low <= np.exp(0.5 * 0.25**2)) & (high >= np.exp(0.5 * 0.25**2))) > 0.93
+
+
+def test_intervals_leave_out_what_did_not_converge():
+    values = np.array([[1.0, 2.0, np.nan, 3.0], [np.nan, np.nan, np.nan, 5.0]])
+    mean, low, high, count = interval(values)
+    assert count.tolist() == [3, 1]
+    assert mean.tolist() == [2.0, 5.0]
+    assert np.isnan([low[1], high[1]]).all() and low[0] < 2.0 < high[0]
+
+
+def test_the_interval_covers_the_mean_of_64_patches(tmp_path):
+    """Of real ones: 64 patches stand for the road, draws of 8 of them for what a user runs."""
+    curve = curve_of(small_plan(cells=24, speeds=[1e-2], patches=64), tmp_path, jobs=2)
+    friction = curve.values["friction"][0, 0, 0]
+    assert np.isfinite(friction).all() and np.std(friction) > 0.01 * friction.mean()
+    random = np.random.default_rng(2)
+    draws = np.array([random.choice(friction, 8, replace=True) for _ in range(4000)])
+    _, low, high, _ = interval(draws)
+    covered = np.mean((low <= friction.mean()) & (high >= friction.mean()))
+    assert 0.92 < covered < 0.985
+
+
+# ---- points ----------------------------------------------------------------------------------
+
+
+def test_points_are_single_runs(tmp_path):
+    """With friction in the interface, obliquely, at another temperature."""
+    plan = small_plan(temperatures=[20.0, 40.0], coefficient=0.3, tolerance=1e-8)
+    curve = curve_of(plan, tmp_path / "curve")
+    assert curve.values["friction"].shape == (1, 2, 3, 2)
+    patch = plan.road.patch(1)
+    rubber = RUBBER.shifted(40.0, LAW)
+    angle = np.radians(plan.angle)
+    case = asperity.Case(
+        grid=dict(nx=32, ny=32, lx=patch.lx, ly=patch.ly),
+        surface=dict(shape="file", file=str(patch.save(tmp_path))),
+        material=dict(shear_modulus=rubber.g_inf, prony_g=rubber.g, prony_tau=rubber.tau),
+        friction=dict(law="coulomb", coefficient=0.3, slope_effect=False),
+        phase=dict(steady=True, pressure=2e5, velocity_x=1e-2 * np.cos(angle),
+                   velocity_y=1e-2 * np.sin(angle)),
+        solver=dict(tolerance=1e-8))
+    row = asperity.run(case, output=tmp_path / "one.h5", threads=1).history
+    for name in ("friction", "friction_viscous", "contact_area", "mean_gap"):
+        assert curve.values[name][0, 1, 1, 1] == pytest.approx(row[name][-1], rel=2e-6), name
+
+
+def test_a_shift_of_temperature_is_one_of_speed(tmp_path):
+    factor = float(LAW.shift_factor(40.0))
+    speeds = np.array([1e-2, 1e-1])
+    warm = curve_of(small_plan(speeds=speeds, temperatures=[40.0]), tmp_path)
+    cold = curve_of(small_plan(speeds=speeds * factor, temperatures=[20.0]), tmp_path)
+    for name in ("friction", "contact_area", "mean_gap"):
+        np.testing.assert_allclose(warm.values[name], cold.values[name], rtol=1e-10, err_msg=name)
+    for name, values in warm.theory.items():
+        np.testing.assert_allclose(values, cold.theory[name], rtol=1e-9, err_msg=name)
+    assert warm.a_t[0] == pytest.approx(factor)
+
+
+def test_a_vertical_shift_is_one_of_pressure(tmp_path):
+    """With all moduli doubled, twice the pressure makes the same contact."""
+    stiff = Compound(RUBBER, 20.0, LAW, vertical_shifts={20.0: 0.0, 40.0: np.log10(2.0)})
+    road = road_of([ROAD], cells=32)
+    factor = float(LAW.shift_factor(40.0))
+    warm = curve_of(plan_curve(road, stiff, speeds=[1e-1], pressures=[4e5], temperatures=[40.0],
+                               patches=1), tmp_path)
+    cold = curve_of(plan_curve(road, stiff, speeds=[1e-1 * factor], pressures=[2e5], patches=1,
+                               temperatures=[20.0]), tmp_path)
+    np.testing.assert_allclose(warm.values["friction"], cold.values["friction"], rtol=1e-9)
+    assert warm.b_t[0] == pytest.approx(2.0)
+
+
+@dataclass(frozen=True)
+class HardPlan(CurvePlan):
+    """A plan whose solver may not iterate enough at one speed."""
+
+    def case(self, patch, file, i, j, first=0):
+        case = super().case(patch, file, i, j, first)
+        case.solver.max_iterations = 1
+        case.solver.tolerance = 1e-12
+        return case
+
+
+def test_points_that_do_not_converge_are_left_out(tmp_path):
+    plan = small_plan(patches=1)
+    hard = HardPlan(**{name: getattr(plan, name) for name in plan.__dataclass_fields__})
+    curve = curve_of(hard, tmp_path)
+    assert np.isnan(curve.values["friction"]).all()
+    assert any("3 points did not converge and are left out" in note for note in curve.notes)
+    before = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5")}
+    assert len(before) == 4  # a map, and a run for each speed
+    curve_of(hard, tmp_path)
+    assert before == {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5")}
+
+
+# ---- however it is run -----------------------------------------------------------------------
+
+
+def same(one, other):
+    """Whether two curves agree to the last bit."""
+    for name in one.values:
+        np.testing.assert_array_equal(one.values[name], other.values[name], err_msg=name)
+    assert one.rows() == other.rows()
+
+
+def test_the_same_however_it_is_run(tmp_path):
+    plan = small_plan(temperatures=[20.0, 40.0])
+    alone = curve_of(plan, tmp_path / "alone")
+    same(alone, curve_of(plan, tmp_path / "four", jobs=4))
+    with ThreadPoolExecutor(2) as executor:
+        same(alone, run_curve(plan, tmp_path / "threads", Means(1, executor=executor), quiet=True))
+    with ProcessPoolExecutor(2) as executor:
+        same(alone, run_curve(plan, tmp_path / "processes", Means(1, executor=executor),
+                              quiet=True))
+    # more patches later keep those that are there
+    more = curve_of(replace(plan, patches=3), tmp_path / "alone")
+    np.testing.assert_array_equal(more.values["friction"][..., :2], alone.values["friction"])
+    other = plan_curve(road_of([ROAD], cells=32, seed=9), COMPOUND, speeds=plan.speed,
+                       pressures=plan.pressure, patches=2)
+    assert np.all(curve_of(other, tmp_path / "other").values["friction"][0, 0]
+                  != alone.values["friction"][0, 0])
+
+
+def test_the_same_after_a_loss(tmp_path):
+    plan = small_plan()
+    whole = curve_of(plan, tmp_path)
+    results = sorted(path for path in tmp_path.glob("*.h5") if "-p" in path.name)
+    results[0].unlink()
+    results[1].write_bytes(results[1].read_bytes()[:5000])
+    same(whole, curve_of(plan, tmp_path))
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_the_same_after_a_stop(tmp_path, number):
+    (tmp_path / "rubber.nml").write_text(NAMELIST)
+    words = [sys.executable, "-m", "asperity", "friction", ROAD, "--material", "rubber.nml",
+             "--speeds", "1e-3:1:6", "--pressures", "2e5", "--cells", "48", "--patches", "4",
+             "--jobs", "1", "-o", "curve.csv", "--folder", "runs"]
+    process = subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.DEVNULL,
+                               stderr=subprocess.PIPE, text=True)
+    for line in process.stderr:
+        if "1 of 4 done" in line:
+            process.send_signal(number)
+            break
+    process.stderr.close()
+    assert process.wait(PATIENCE) in (143, -number)
+    assert not (tmp_path / "curve.csv").exists()
+    time.sleep(1.0)  # a killed command leaves the run in hand to itself
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert "results are there already" in done.stderr
+    stopped = (tmp_path / "curve.csv").read_text()
+    subprocess.run([*words[:-1], "anew", "--quiet"], cwd=tmp_path, capture_output=True, check=True)
+    assert (tmp_path / "curve.csv").read_text() == stopped
+
+
+SBATCH = """#!/bin/sh
+# A stand-in for Slurm: notes the call, and runs the tasks of an array one after the other.
+echo "$@" >> "{folder}/calls"
+for word in "$@"; do
+  case "$word" in --array=0-*) last=${{word#--array=0-}};; esac
+  script=$word
+done
+task=0
+while [ "$task" -le "$last" ]; do
+  SLURM_ARRAY_TASK_ID=$task sh "$script" || exit 1
+  task=$((task + 1))
+done
+echo "4711;cluster"
+"""
+
+
+def test_a_job_array_fills_the_folder(tmp_path, monkeypatch):
+    tools = tmp_path / "tools"
+    tools.mkdir()
+    for name, text in (("sbatch", SBATCH.format(folder=tmp_path)), ("squeue", "#!/bin/sh\n")):
+        (tools / name).write_text(text)
+        (tools / name).chmod(stat.S_IRWXU)
+    monkeypatch.setenv("PATH", f"{tools}{os.pathsep}{os.environ['PATH']}")
+    plan = small_plan()
+    slurm = Means(1, slurm="--time=1:00:00 --partition='short jobs'")
+    with pytest.raises(SubmittedError, match="2 runs submitted to Slurm as job 4711"):
+        run_curve(plan, tmp_path / "runs", slurm, quiet=True)
+    call = (tmp_path / "calls").read_text()
+    assert "--array=0-1" in call and "--time=1:00:00" in call and "--partition=short jobs" in call
+    assert json.loads((tmp_path / "runs" / "slurm.json").read_text())["job"] == "4711"
+    gathered = run_curve(plan, tmp_path / "runs", slurm, quiet=True)
+    assert (tmp_path / "calls").read_text() == call  # nothing was submitted again
+    same(gathered, curve_of(plan, tmp_path / "here"))
+
+
+def test_jobs_in_the_queue_are_not_submitted_again(tmp_path, monkeypatch):
+    for name, text in (("sbatch", "#!/bin/sh\necho x >> calls\necho 12\n"),
+                       ("squeue", "#!/bin/sh\necho 12 PENDING\n")):
+        (tmp_path / name).write_text(text)
+        (tmp_path / name).chmod(stat.S_IRWXU)
+    monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
+    monkeypatch.chdir(tmp_path)
+    slurm = Means(1, slurm="")
+    for word in ("submitted to Slurm as job 12", "in the queue of Slurm as job 12"):
+        with pytest.raises(SubmittedError, match=word):
+            run_curve(small_plan(), tmp_path / "runs", slurm, quiet=True)
+    assert (tmp_path / "calls").read_text() == "x\n"
+
+
+def test_more_patches_until_the_error_is_small(tmp_path):
+    plan = small_plan(speeds=[1e-2], patches=2)
+    first = curve_of(plan, tmp_path)
+    wanted = 0.6 * first.largest_error
+    curve = curve_of(plan, tmp_path, error=wanted)
+    assert curve.largest_error <= wanted and len(curve.patches) > 2
+    few = curve_of(plan, tmp_path, error=1e-9, most_patches=3)
+    assert len(few.patches) == 3
+    assert any("3 patches are the most" in note for note in few.notes)
+
+
+# ---- what is written -------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def curve(tmp_path_factory):
+    plan = small_plan(temperatures=[20.0, 40.0], pressures=[1e5, 3e5], coefficient=0.3, patches=3)
+    return curve_of(plan, tmp_path_factory.mktemp("curve"), jobs=2, extend=5e-5)
+
+
+def test_table(curve, tmp_path):
+    with curve.to_csv(tmp_path / "curve.csv").open() as file:
+        rows = list(csv.reader(file))
+    assert tuple(rows[0]) == COLUMNS == (
+        "pressure", "temperature", "speed", "friction", "friction_low", "friction_high",
+        "friction_viscous", "contact_area", "mean_gap", "friction_persson", "patches")
+    assert len(rows) == 1 + 2 * 2 * 3
+    values = np.array(rows[1:], dtype=float)
+    assert values[0, :3].tolist() == [1e5, 20.0, 1e-3]
+    np.testing.assert_array_equal(values[:, 3], curve.values["friction"].mean(axis=3).ravel())
+    assert (values[:, 4] < values[:, 3]).all() and (values[:, 3] < values[:, 5]).all()
+    assert (values[:, 10] == 3).all()
+
+
+def test_data_set_and_netcdf(curve, tmp_path):
+    xarray = pytest.importorskip("xarray")
+    found = curve.to_xarray()
+    assert found["friction"].dims == ("pressure", "temperature", "speed", "patch")
+    for name, variable in found.variables.items():
+        if name != "patch":
+            assert variable.attrs["units"] and variable.attrs["long_name"], name
+    with xarray.open_dataset(curve.to_netcdf(tmp_path / "curve.nc")) as again:
+        xarray.testing.assert_equal(again.load(), found)
+        assert again["friction"].attrs == found["friction"].attrs
+        assert float(again.attrs["coefficient"]) == 0.3
+    assert float(found["friction_mean"].sel(pressure=1e5, temperature=20.0, speed=1e-3)) == (
+        pytest.approx(curve.values["friction"][0, 0, 0].mean()))
+
+
+def test_losses_are_the_power(curve):
+    """By octaves and by arms the same, and the viscous friction times pressure and speed."""
+    octave = curve.losses["loss_octave"].sum(axis=-1)
+    np.testing.assert_allclose(octave, curve.losses["loss_arm"].sum(axis=-1), rtol=1e-9)
+    power = (curve.values["friction_viscous"].mean(axis=3) * curve.pressure[:, None, None]
+             * curve.speed)
+    np.testing.assert_allclose(octave, power, rtol=1e-9)
+
+
+def test_what_left_out_waves_add(curve):
+    """The spectrum, thought to go on to shorter waves, adds friction; Persson's area is less."""
+    assert (curve.theory["friction_left_out"] > 0.0).all()
+    assert curve.settings["extended_to"] == 5e-5
+    ratio = curve.values["contact_area"].mean(axis=3) / curve.theory["area_persson"]
+    assert (ratio > 0.95).all() and (ratio < 1.9).all()
+
+
+def test_picture(curve, tmp_path):
+    figure = curve.plot()
+    labels = [panel.get_ylabel() for panel in figure.axes]
+    assert labels == ["Friction coefficient", "Viscous friction coefficient",
+                      "Contact area fraction"]
+    figure.savefig(tmp_path / "curve.png")
+    assert (tmp_path / "curve.png").stat().st_size > 20000
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium with chromedriver")
+def test_page_in_a_browser(curve, tmp_path):
+    page = curve.to_html(tmp_path / "curve.html")
+    with Browser(tmp_path) as browser:
+        browser.window(1200, 900)
+        browser.open(page)
+        assert browser.console() == []
+        counted = browser.run("return [document.querySelectorAll('#curves figure').length,"
+                              " document.querySelectorAll('#losses figure').length,"
+                              " document.querySelectorAll('#map canvas').length]")
+        assert counted == [5, 2, 1]
+        ribbons = browser.run("return document.querySelectorAll('.ribbon').length")
+        assert ribbons >= 4
+        before = browser.run("return document.querySelector('#map canvas').toDataURL()")
+        assert "speed 10 mm/s" in browser.run(
+            "return document.getElementById('point').textContent")
+        browser.run("document.querySelector('#curves figure > svg').scrollIntoView("
+                    "{block: 'center'})")
+        left, top, width = browser.run(
+            "const box = document.querySelector('#curves figure > svg').getBoundingClientRect();"
+            " return [box.left, box.top, box.width]")
+        place = (left + width - 16, top + 40)
+        browser.drag(place, place)
+        assert "speed 100 mm/s" in browser.run(
+            "return document.getElementById('point').textContent")
+        assert browser.run("return document.querySelector('#map canvas').toDataURL()") != before
+        for against in ("pressure", "temperature", "reduced", "speed"):
+            browser.run("const choice = document.getElementById('against'); choice.value ="
+                        " arguments[0]; choice.dispatchEvent(new Event('change'))", against)
+            drawn = browser.run("return document.querySelectorAll('#curves figure:first-child"
+                                " path.line').length")
+            assert drawn == {"pressure": 2, "temperature": 2, "reduced": 4, "speed": 4}[against]
+        browser.run("const choice = document.getElementById('choose-pressure'); choice.value = '1';"
+                    " choice.dispatchEvent(new Event('change'))")
+        assert browser.run("return document.querySelectorAll('#curves figure:first-child path.line'"
+                           ").length") == 2
+        assert browser.console() == []
+        for size in ((390, 800), (1200, 900)):
+            browser.window(*size, touch=size[0] < 500)
+            wide = browser.run("return document.documentElement.scrollWidth")
+            assert wide <= size[0] + 1
+
+
+# ---- from files ------------------------------------------------------------------------------
+
+
+def test_from_an_instrument_and_a_messy_table_to_numbers(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("SurfaceTopography")
+    monkeypatch.chdir(tmp_path)
+    road = asperity.surface.self_affine(
+        128, lx=4e-3, wavelength_long=1e-3, wavelength_short=2.5e-4, rms_slope=0.15, seed=3)
+    height = road + 1e-5 * np.linspace(0, 1, 128)        # the instrument stood askew
+    height[40, 50] += 1e-3                               # a speck of dust
+    text = "\n".join(";".join(f"{value * 1e6:.4f}".replace(".", ",") for value in row)
+                     for row in height)
+    (tmp_path / "plate.csv").write_text(text + "\n", encoding="latin-1")
+    frequencies, celsius = np.logspace(-1, 2, 13), (0.0, 20.0, 40.0)
+    lines = ["Probe: Lauffläche", ";".join(["", *(f"{t:g} °C;" for t in celsius)]),
+             ";".join(["Frequenz (Hz)", *(["Speichermodul (MPa);Verlustmodul (MPa)"] * 3)])]
+    for number, f in enumerate(frequencies):
+        cells = [f"{f:.6g}"]
+        for t in celsius:
+            modulus = RUBBER.shifted(t, LAW).complex_modulus(2 * np.pi * f) / 1e6
+            over = number == 12 and t == 0.0
+            cells += ["OVL", ""] if over else [f"{modulus.real:.8g}", f"{modulus.imag:.8g}"]
+        lines.append(";".join(cells).replace(".", ","))
+    (tmp_path / "dma.csv").write_text("\n".join(lines) + "\n", encoding="latin-1")
+    words = ["friction", "plate.csv", "--unit", "um", "--size", "4000", "4000", "--outliers",
+             "remove", "--material", "dma.csv", "--speeds", "1e-3,1e-2", "--pressures", "2e5",
+             "--temperatures", "20,30", "--cells", "48", "--patches", "9", "--quiet", "-o",
+             "curve.csv", "-o", "curve.html"]
+    assert main([*words, "--plan"]) == 0
+    told = capsys.readouterr().out
+    assert "solves     16 steady states in 8 runs" in told
+    assert "the maps have room for 4 patches that do not overlap, not for 9" in told
+    assert "1 of 16384 cells lie far off their neighbours" in told
+    assert "1 of 39 points have no value" in told
+    assert not (tmp_path / "curve_runs").exists()
+    assert main(words) == 0
+    told = capsys.readouterr().out
+    assert "of the load lies at the join" in told
+    with (tmp_path / "curve.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 4 and {row["patches"] for row in rows} == {"4"}
+    # the same road and the very rubber that the files hold
+    exact = asperity.theory.persson(
+        *asperity.theory.surface_psd(road, 4e-3), RUBBER.shifted(30.0, LAW), 2e5, 1e-2,
+        gamma=0.45)
+    found = next(row for row in rows if row["temperature"] == "30.0" and row["speed"] == "0.01")
+    assert float(found["friction_persson"]) == pytest.approx(float(exact.friction), rel=0.25)
+    assert float(found["friction"]) == pytest.approx(float(found["friction_persson"]), rel=0.35)
+
+
+def test_the_measured_band_of_the_rubber():
+    rubber = replace(COMPOUND, valid_range=(1.0, 1e4))
+    low, high = rubber.speeds_within(20.0, 1e-4, 1e-3)
+    assert low == pytest.approx(1e-3 / (2 * np.pi)) and high == pytest.approx(1.0 / (2 * np.pi))
+    factor = float(LAW.shift_factor(40.0))
+    assert rubber.speeds_within(40.0, 1e-4, 1e-3)[1] == pytest.approx(high / factor)
+    plan = plan_curve(road_of([ROAD], cells=32), rubber, speeds=[1e-5, 1e-2, 10.0],
+                      pressures=[1e5])
+    assert sum("the measured frequencies" in note for note in plan.notes) == 2
+
+
+def test_rubber_of_several_kinds(tmp_path):
+    (tmp_path / "rubber.nml").write_text("! tread\n" + NAMELIST)
+    found = compound_of(tmp_path / "rubber.nml")
+    assert found.series == RUBBER and found.wlf == LAW and found.temperature == 20.0
+    (tmp_path / "zener.nml").write_text(
+        "&material shear_modulus = 1e6, zener_g0 = 2e6, zener_g1 = 3e6, zener_eta = 1e3,"
+        " temperature = 40, wlf_c1 = 8, wlf_c2 = 120 /\n")
+    found = compound_of(tmp_path / "zener.nml")
+    assert found.series == Prony.from_zener(1e6, [2e6], [3e6], [1e3])
+    assert found.temperature == 40.0 and found.reference == 20.0
+    shifted = Compound(RUBBER, 20.0, shifts={0.0: 2.0, 20.0: 0.0, 40.0: -1.0})
+    assert shifted.a_t(10.0) == pytest.approx(10.0)
+    with pytest.raises(ValueError, match="gives a_T from 0 to 40 C only"):
+        shifted.a_t(50.0)
+    with pytest.raises(ValueError, match="gives no a_T"):
+        Compound(RUBBER, 20.0).a_t(30.0)
+
+
+@pytest.mark.parametrize("words, message", [
+    (["self_affine:hurst=0.8", "--material", "r.nml"], "lacks wavelength_long"),
+    (["self_affine:hurts=0.8", "--material", "r.nml"], "NAME one of hurst"),
+    ([ROAD, "--material", "r.nml", "--speeds", "1,1"], "speeds: 1 stands twice"),
+    ([ROAD, "--material", "r.nml", "--pressures=-1"], "pressures"),
+    ([ROAD, "--material", "r.nml", "--patches", "0"], "patches = 0"),
+    ([ROAD, "--material", "r.nml", "--temperatures=-200"], "temperature = -200"),
+    ([ROAD, "--material", "r.nml", "--join", "blend"], "join: goes with patches"),
+    ([ROAD, "--material", "r.nml", "-o", "curve.txt"], "must end in .html"),
+    ([ROAD, "--material", "r.nml", "--jobs", "0"], "jobs = 0"),
+])
+def test_wrong_arguments(tmp_path, monkeypatch, capsys, words, message):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "r.nml").write_text(NAMELIST)
+    assert main(["friction", *words, "--cells", "32"]) == 2
+    assert message in capsys.readouterr().err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["r.nml"]
+
+
+def test_python_gives_a_data_set(tmp_path):
+    pytest.importorskip("xarray")
+    found = asperity.friction_curve(
+        ROAD, RUBBER, speeds=[1e-2, 1e-1], pressures=[2e5], cells=32, patches=2, quiet=True,
+        folder=tmp_path, jobs=1)
+    assert dict(found.sizes)["speed"] == 2 and dict(found.sizes)["patch"] == 2
+    assert float(found["friction"].min()) > 0.0
+    assert bool(np.isnan(found["temperature"].values).all())
