@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from . import theory
     from .base.errors import NotConverged
     from .base.library import set_threads
-<<<<<<< HEAD
     from .contact import (
         AdhesiveNormalContact,
         NormalContact,
@@ -29,10 +28,7 @@ if TYPE_CHECKING:
         solve_adhesive,
         solve_normal,
     )
-=======
-    from .contact import AdhesiveNormalContact, NormalContact, solve_adhesive, solve_normal
     from .curves import friction_curve
->>>>>>> 6571574 (Friction curves: roads, rubber, runs, page; a verb and a function)
     from .results import Run
     from .results import open_result as open
     from .roads import surface
@@ -45,14 +41,10 @@ if TYPE_CHECKING:
 
     __version__: str
 
-<<<<<<< HEAD
 __all__ = ["AdhesiveNormalContact", "Case", "NormalContact", "NotConverged", "Run", "Simulation",
-           "Sweep", "SweepError", "__version__", "dma", "material", "open", "operators", "run",
-=======
-__all__ = ["AdhesiveNormalContact", "Case", "NormalContact", "NotConverged", "Run", "Sweep",
-           "SweepError", "__version__", "dma", "friction_curve", "material", "open", "run",
->>>>>>> 6571574 (Friction curves: roads, rubber, runs, page; a verb and a function)
-           "set_threads", "solve_adhesive", "solve_normal", "surface", "sweep", "theory"]
+           "Sweep", "SweepError", "__version__", "dma", "friction_curve", "material", "open",
+           "operators", "run", "set_threads", "solve_adhesive", "solve_normal", "surface", "sweep",
+           "theory"]
 
 _addresses.install(__name__)
 presenters.register({name: f"{__name__}.{module}"
