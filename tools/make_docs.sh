@@ -19,5 +19,12 @@ if grep -i warning build/ford.log; then
 fi
 python tools/localize_ford.py build/fortran/fortran
 python -m sphinx -q -W --keep-going -j auto -c docs -d build/doctrees . build/site
+# Who opens the folder itself is led to the first page.
+cat >build/site/index.html <<'EOF'
+<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><title>Asperity</title>
+<meta http-equiv="refresh" content="0; url=docs/index.html"></head>
+<body><p><a href="docs/index.html">Documentation of Asperity</a></p></body></html>
+EOF
 python tools/check_site.py build/site
-echo "documentation: build/site/docs/index.html"
+echo "documentation: build/site/index.html"

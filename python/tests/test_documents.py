@@ -147,7 +147,17 @@ def check_fortran(folder, out):
     assert float(peak) == pytest.approx(float(hertz), rel=1e-3)
 
 
-OUTCOMES = {"README.md": check_readme, "docs/first_run.md": check_first_run,
+def check_driving(folder, out):
+    area = float(re.search(r"contact area (\S+), wanted 0.25", out).group(1))
+    assert area == pytest.approx(0.25, abs=0.003)
+    assert (folder / "constant_area.png").stat().st_size > 5000
+    early, late = re.findall(r"^(False|True) (\S+)$", out, flags=re.M)
+    assert early[0] == "False" and late[0] == "True"
+    assert float(early[1]) == pytest.approx(1e-4, rel=0.05) and float(late[1]) == 4e-4
+
+
+OUTCOMES = {"docs/driving.md": check_driving,
+            "README.md": check_readme, "docs/first_run.md": check_first_run,
             "docs/coming_from.md": check_coming_from, "docs/api/fortran.md": check_fortran}
 
 
