@@ -1,4 +1,4 @@
-!> Checksums: CRC-64 of bytes, of a file and of a field.
+!> Checksums (CRC-64) of bytes, of a file and of a field.
 !>
 !> The polynomial is that of ECMA-182, bits in reflected order, as in the xz file format
 !> (CRC-64/XZ): the checksum of the nine bytes '123456789' is 995DC9BBDF1939FA. A CRC finds every

@@ -19,13 +19,16 @@ def add_plot(verbs: Any) -> None:
                     " the contact area.")
     plot.add_argument("result", metavar="RESULT.h5", help="result of `asperity run`")
     plot.add_argument("-o", "--output", metavar="PNG", type=Path,
-                      help="picture to write (.png, .pdf, .svg); default: RESULT.png beside the"
-                           " result")
+                      help="picture to write (.png, .pdf, .svg; a film .gif, .mp4);"
+                           " default: RESULT.png beside the result")
     plot.add_argument("--show", action="store_true", help="open a window instead of writing")
     what = plot.add_mutually_exclusive_group()
     what.add_argument("--field", metavar="NAME",
                       help="draw a field of a snapshot, as pressure; contact shows what sticks"
                            " and slips, with the tractions")
+    what.add_argument("--film", metavar="NAME", nargs="?", const="",
+                      help="make a film of a field over all snapshots (.gif, or .mp4 with ffmpeg);"
+                           " without a name of what sticks and slips, or of the pressure")
     what.add_argument("--history", metavar="NAME",
                       help="draw a column of the history, as friction (with its causes), or energy")
     plot.add_argument("--step", type=int, help="the snapshot's step; default: the last one")
@@ -50,8 +53,11 @@ def _plot(chosen: argparse.Namespace) -> int:
 
     if chosen.output is not None and chosen.output.is_dir():
         raise IsADirectoryError(f"{chosen.output}: is a folder: name a picture in it")
-    check_picture(chosen.output)
+    if chosen.film is None:
+        check_picture(chosen.output)
     run = open_result(chosen.result)
+    if chosen.film is not None:
+        return _film(run, chosen)
     if chosen.field:
         if not len(run.snapshots):
             raise ValueError(f"{run.path}: holds no snapshots yet")
@@ -69,6 +75,17 @@ def _plot(chosen: argparse.Namespace) -> int:
     figure.savefig(output, dpi=300)
     plt.close(figure)
     print(f"wrote {output}")
+    return 0
+
+
+def _film(run: Any, chosen: argparse.Namespace) -> int:
+    """Make a film."""
+    from ..views.film import film
+
+    if chosen.show:
+        chosen.error("--show does not go with --film")
+    output = film(run, chosen.output or run.path.with_suffix(".gif"), chosen.film or None)
+    print(f"wrote {output} ({output.stat().st_size / 1e6:.1f} MB)")
     return 0
 
 

@@ -92,7 +92,10 @@ def plot_history(run: Run, name: str = "contact_area", x: str | None = None,
         _draw(run, name, along, axes, style)
         axes.set_xlabel(axis_text(label_of(x, history), unit))
         if run.title and ax is None:
-            axes.set_title(run.title, parse_math=False)
+            above = axes.get_legend()
+            rows = 0 if above is None else -(-len(above.get_texts()) // above._ncols)
+            axes.set_title(run.title, parse_math=False,
+                           pad=6.0 + 1.5 * rows * plt.rcParams["legend.fontsize"])
     return axes
 
 
@@ -204,8 +207,10 @@ def _draw(run: Run, name: str, along: NDArray[Any], axes: Axes, style: dict[str,
                       label="attraction outside contact", clip_on=False)
             parts = parts or [("outside", outside, "", "")]
     axes.set_ylabel(axis_text(label_of(name, history), unit))
-    if parts:
-        axes.legend(frameon=True, framealpha=0.8, edgecolor="none")
+    if not parts:
+        _sane_limits(axes, values * factor)
+    else:
+        _legend_above(axes)
 
 
 def _draw_energy(run: Run, along: NDArray[Any], axes: Axes, style: dict[str, Any]) -> None:
@@ -224,8 +229,30 @@ def _draw_energy(run: Run, along: NDArray[Any], axes: Axes, style: dict[str, Any
     axes.set_ylabel(axis_text("Energy", unit))
     missing = closure(run)
     note = None if missing is None else f"books close to {missing.max(initial=0.0):.1g}"
-    axes.legend(frameon=True, framealpha=0.8, edgecolor="none", title=note,
-                title_fontsize=plt.rcParams["legend.fontsize"])
+    _legend_above(axes)
+    if note:
+        axes.text(0.99, 0.02, note, transform=axes.transAxes, ha="right", va="bottom",
+                  fontsize=plt.rcParams["legend.fontsize"],
+                  bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5})
+
+
+def _legend_above(axes: Axes) -> None:
+    """Draw the legend above the axes, where it hides no data."""
+    count = len(axes.get_legend_handles_labels()[1])
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False,
+                ncols=count if count <= 3 else 2, columnspacing=1.2, handlelength=1.8,
+                borderaxespad=0.3)
+
+
+def _sane_limits(axes: Axes, values: NDArray[Any]) -> None:
+    """Let a column that stays as it is, up to round-off, be a level line over zero."""
+    values = values[np.isfinite(values)]
+    largest = float(np.abs(values).max(initial=0.0))
+    if not len(values) or float(np.ptp(values)) > 1e-6 * largest:
+        return
+    level = float(values.mean())
+    axes.set_ylim(*((0.0, 1.25 * level) if level > 0.0 else (1.25 * level, 0.0) if level < 0.0
+                    else (-1.0, 1.0)))
 
 
 def _headline(run: Run, figure: Figure) -> None:
@@ -256,12 +283,13 @@ def _load_panel(run: Run, axes: Axes) -> None:
     axes.plot(pressure * factor, history["contact_area"], color=COLOURS[0], marker="o",
               linestyle="-" if history.rows > 1 else "", label="this run")
     axes.set_xlabel(axis_text(LABELS["pressure"], unit))
-    axes.set_ylabel(LABELS["contact_area"])
+    axes.set_ylabel(axis_text(LABELS["contact_area"], ""))
     axes.set_xlim(left=min(0.0, 1.05 * pressure.min(initial=0.0) * factor))
     axes.set_ylim(bottom=0.0)
-    axes.set_title("Contact area against load")
+    axes.set_title("Contact area against load",
+                   pad=6.0 + 1.5 * plt.rcParams["legend.fontsize"])
     axes.grid(alpha=0.3)
-    axes.legend(frameon=False, loc="best")
+    _legend_above(axes)
 
 
 def _time_or_travel(run: Run) -> tuple[np.ndarray, str]:
@@ -281,7 +309,7 @@ def _time_panel(run: Run, axes: Axes) -> None:
         panel = panel or axes.twinx()
         panel.plot(along, run.history[name], color=COLOURS[number], linestyle=("-", "--")[number])
         panel.set_xlabel(head)
-        panel.set_ylabel(LABELS[name])
+        panel.set_ylabel(axis_text(LABELS[name], ""))
         if len(names) == 2:
             panel.yaxis.label.set_color(COLOURS[number])
         panel.set_ylim(bottom=min(0.0, 1.05 * float(np.nanmin(run.history[name]))))

@@ -32,8 +32,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..results import Grid, Snapshot
+    from ..results.result_file import ResultFile
 
-__all__ = ["plot_field", "plot_section"]
+__all__ = ["field_style", "frame_of", "plot_field", "plot_section", "state_style",
+           "without_open_cells"]
 
 SIGNED = ("traction_x", "traction_y", "slip_x", "slip_y", "displacement_x", "displacement_y")
 ARROWS = 22  # along the longer side
@@ -67,7 +69,11 @@ def plot_field(snapshot: Snapshot, name: str = "pressure", ax: Axes | None = Non
     with print_style() if ax is None else nullcontext():
         if ax is None:
             ratio = 0.55 if grid.ny == 1 else float(np.clip(grid.ly / grid.lx, 0.25, 2.0))
-            ax = _new_axes((SINGLE_COLUMN, 0.75 + (SINGLE_COLUMN - 0.9) * ratio))
+            height = 0.75 + (SINGLE_COLUMN - 0.9) * ratio
+            label = axis_text(label_of(name, snapshot), "kPa")
+            if grid.ny > 1 and name != "contact" and _bar_lies(label, ratio, 0.775 * SINGLE_COLUMN):
+                height += 0.5
+            ax = _new_axes((SINGLE_COLUMN, height))
         label = label_of(name, snapshot)
         if grid.ny == 1 and name == "contact":
             _contact_profile(snapshot, ax)
@@ -112,7 +118,7 @@ def plot_section(snapshot: Snapshot, ax: Axes | None = None) -> Axes:
     return axes
 
 
-def _frame(grid: Grid) -> tuple[float, str, tuple[float, float, float, float]]:
+def frame_of(grid: Grid) -> tuple[float, str, tuple[float, float, float, float]]:
     """Return the factor and unit of lengths, and the edges of the map in that unit."""
     length, unit = si_scale([grid.lx, grid.ly], "m")
     edges = length * np.array([-0.5 * grid.dx, grid.lx - 0.5 * grid.dx,
@@ -120,35 +126,72 @@ def _frame(grid: Grid) -> tuple[float, str, tuple[float, float, float, float]]:
     return length, unit, tuple(map(float, edges))  # type: ignore[return-value]
 
 
+def field_style(field: NDArray[Any], name: str, units: str) -> tuple[float, str, dict[str, Any]]:
+    """Return how a field is coloured: factor and unit of the scale, and arguments of imshow.
+
+    Fields of both signs have a scale that is white at zero; those of one sign begin at zero.
+    """
+    factor, unit = si_scale(typical_value(field), units)
+    low, high = float(field.min()) * factor, float(field.max()) * factor
+    limit = scale_limit(np.abs(field)) * factor
+    if name in SIGNED or (name == "pressure" and low < 0.0):
+        if low >= -1e-3 * limit:
+            return factor, unit, {"cmap": "viridis", "vmin": 0.0, "vmax": limit}
+        if high <= 1e-3 * limit:
+            return factor, unit, {"cmap": "viridis_r", "vmin": -limit, "vmax": 0.0}
+        return factor, unit, {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit}
+    if name == "pressure":
+        cmap = plt.get_cmap("viridis").with_extremes(bad=NO_CONTACT)
+        return factor, unit, {"cmap": cmap, "vmin": 0.0,
+                              "vmax": scale_limit(field[field > 0.0]) * factor}
+    if low == high:  # as the gap of full contact
+        return factor, unit, {"cmap": "cividis", "vmin": min(0.0, low),
+                              "vmax": max(0.0, low) or 1.0}
+    return factor, unit, {"cmap": "cividis", "vmin": low, "vmax": high}
+
+
+def without_open_cells(field: NDArray[Any], name: str) -> NDArray[Any]:
+    """Return a field to be drawn; cells of no pressure are masked, they are out of contact."""
+    if name == "pressure" and field.min(initial=0.0) >= 0.0:
+        return np.ma.masked_less_equal(field, 0.0)
+    return field
+
+
+def _bar_lies(text: str, ratio: float, width: float) -> bool:
+    """Return whether the colour bar lies below a map of this width, in inches."""
+    needed = 0.6 * len(text) * plt.rcParams["axes.labelsize"] / 72.0
+    return ratio < 0.45 or needed > 0.85 * width * ratio
+
+
 def _map(grid: Grid, field: NDArray[Any], name: str, label: str, units: str, axes: Axes) -> None:
     """Draw a map with its colour bar."""
-    factor, unit = si_scale(typical_value(field), units)
-    style: dict[str, Any] = {}
-    extend = "neither"
-    shown = field * factor
-    if name in SIGNED or (name == "pressure" and shown.min(initial=0.0) < 0.0):
-        limit = scale_limit(np.abs(shown))
-        style = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit}
-        extend = "both" if np.abs(shown).max(initial=0.0) > limit else "neither"
-    elif name == "pressure":
-        cmap = plt.get_cmap("viridis").with_extremes(bad=NO_CONTACT)
-        limit = scale_limit(shown[shown > 0.0])
-        style = {"cmap": cmap, "vmin": 0.0, "vmax": limit}
-        extend = "max" if shown.max(initial=0.0) > limit else "neither"
-        shown = np.ma.masked_less_equal(shown, 0.0)
-    else:
-        style = {"cmap": "cividis"}
-        if np.ptp(shown) == 0.0:  # as the gap of full contact
-            style |= {"vmin": min(0.0, shown.flat[0]), "vmax": max(0.0, shown.flat[0]) or 1.0}
-    _, length_unit, edges = _frame(grid)
+    factor, unit, style = field_style(field, name, units)
+    shown = without_open_cells(field * factor, name)
+    scaled = (float(field.min()) * factor, float(field.max()) * factor)
+    slack = 1e-9 * (style["vmax"] - style["vmin"])
+    above = scaled[1] > style["vmax"] + slack
+    below = style["vmin"] < 0.0 and scaled[0] < style["vmin"] - slack
+    extend = {(False, False): "neither", (True, False): "max", (False, True): "min",
+              (True, True): "both"}[above, below]
+    _, length_unit, edges = frame_of(grid)
     image = axes.imshow(shown, origin="lower", extent=edges, aspect="equal", **style)
     ratio = float(np.clip(grid.ly / grid.lx, 0.25, 2.5))
+    text = axis_text(label, unit)
+    # A bar beside the map is as tall as the map, and its label must not be longer.
+    width = axes.get_position().width * axes.figure.bbox.width / axes.figure.dpi
+    lies = _bar_lies(text, ratio, width)
     bar = axes.figure.colorbar(image, ax=axes, extend=extend,
-                               **({"orientation": "horizontal", "pad": 0.12} if ratio < 0.45
+                               **({"orientation": "horizontal", "pad": 0.12} if lies
                                   else {"fraction": 0.046 * ratio, "pad": 0.03}))
-    bar.set_label(axis_text(label, unit))
+    bar.set_label(text)
     axes.set_xlabel(f"x ({length_unit})")
     axes.set_ylabel(f"y ({length_unit})")
+
+
+def state_style(run: ResultFile) -> dict[str, Any]:
+    """Return arguments of imshow for what is open, sticks and slips."""
+    colours = [NO_CONTACT, STICK, SLIP] if has_friction(run) else [NO_CONTACT, STICK, STICK]
+    return {"cmap": ListedColormap(colours), "norm": BoundaryNorm([-0.5, 0.5, 1.5, 2.5], 3)}
 
 
 def _states(snapshot: Snapshot, contact: NDArray[Any]) -> tuple[list[str], list[str]]:
@@ -166,11 +209,10 @@ def _states(snapshot: Snapshot, contact: NDArray[Any]) -> tuple[list[str], list[
 def _contact_map(snapshot: Snapshot, contact: NDArray[Any], axes: Axes) -> None:
     """Draw what is open, sticks and slips."""
     colours, names = _states(snapshot, contact)
-    cmap = ListedColormap(colours if len(colours) == 3 else [*colours, colours[1]])
-    _, unit, edges = _frame(snapshot.run.grid)
-    axes.imshow(contact, origin="lower", extent=edges, aspect="equal", cmap=cmap,
-                norm=BoundaryNorm([-0.5, 0.5, 1.5, 2.5], 3), interpolation="nearest")
-    length, _, _ = _frame(snapshot.run.grid)
+    _, unit, edges = frame_of(snapshot.run.grid)
+    axes.imshow(contact, origin="lower", extent=edges, aspect="equal",
+                interpolation="nearest", **state_style(snapshot.run))
+    length, _, _ = frame_of(snapshot.run.grid)
     left, right, low, high = (length * end for end in window(snapshot))
     axes.set_xlim(left, right)
     axes.set_ylim(low, high)
@@ -248,7 +290,7 @@ def traction_samples(snapshot: Snapshot, side: float | None = None) -> tuple[NDA
 def _arrows(snapshot: Snapshot, axes: Axes) -> bool:
     """Draw arrows of the traction on the rubber, with a key; whether there were any."""
     grid = snapshot.run.grid
-    length, _, _ = _frame(grid)
+    length, _, _ = frame_of(grid)
     # What is seen: all of the map, or the part about a small contact.
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     seen = max(right - left, high - low) / length

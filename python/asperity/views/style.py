@@ -141,8 +141,15 @@ def label_of(name: str, names: Any) -> str:
 
 
 def axis_text(label: str, unit: str) -> str:
-    """Return the text of an axis."""
-    return f"{label} ({unit})" if unit else label
+    """Return the text of an axis, which begins with a small letter.
+
+    Examples
+    --------
+    >>> axis_text("Time", "ms"), axis_text("Contact area fraction", "")
+    ('time (ms)', 'contact area fraction')
+    """
+    text = label[:1].lower() + label[1:]
+    return f"{text} ({unit})" if unit else text
 
 
 def sentence(text: str) -> str:

@@ -1,0 +1,117 @@
+"""Films of a run: a field of all its snapshots on one scale, beside a curve of the history."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
+
+from ..results.derived import has_friction
+from .plot_fields import field_style, frame_of, state_style, without_open_cells
+from .style import COLOURS, DOUBLE_COLUMN, LABELS, axis_text, label_of, print_style, si_scale, when
+
+if TYPE_CHECKING:
+    from ..results import Run
+
+__all__ = ["film"]
+
+_ENDINGS = {".gif", ".mp4"}
+
+
+def film(run: Run, path: Path, field: str | None = None, *, frames_per_second: float = 12.0
+         ) -> Path:
+    """Write a film of a field: one frame per snapshot, with friction or contact area beside it.
+
+    Parameters
+    ----------
+    run : Run
+        With two or more snapshots (``&output snapshot_every``), and ny above 1.
+    path : Path
+        The film: .gif, or .mp4 where ffmpeg is installed.
+    field : str, optional
+        The field; with friction what sticks and slips, else the pressure.
+    frames_per_second : float
+        Frames in a second.
+
+    Returns
+    -------
+    Path
+        The film.
+
+    Raises
+    ------
+    ValueError
+        If the ending is another, or there are too few snapshots.
+    OSError
+        If ffmpeg is missing for an .mp4.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in _ENDINGS:
+        raise ValueError(f"{path}: the ending of a film must be .gif or .mp4")
+    if len(run.snapshots) < 2:
+        raise ValueError(f"{run.path}: a film needs two snapshots or more:"
+                         " `&output snapshot_every = 1 /` stores one for each row")
+    if run.grid.ny == 1:
+        raise ValueError(f"{run.path}: a film needs a map: this is a line contact, ny = 1")
+    if path.suffix.lower() == ".mp4":
+        if not FFMpegWriter.isAvailable():
+            raise OSError(f"{path}: ffmpeg is not installed: write a .gif")
+        writer: Any = FFMpegWriter(fps=frames_per_second)
+    else:
+        writer = PillowWriter(fps=frames_per_second)
+    if field is None:
+        field = "contact" if has_friction(run) and "contact" in run.snapshots[0] else "pressure"
+    with print_style():
+        animation, figure = _animation(run, field)
+        animation.save(path, writer=writer, dpi=110)
+        plt.close(figure)
+    return path
+
+
+def _animation(run: Run, field: str) -> tuple[FuncAnimation, Any]:
+    """Return the frames and their figure."""
+    grid, snapshots = run.grid, list(run.snapshots)
+    ratio = float(np.clip(grid.ly / grid.lx, 0.4, 1.2))
+    figure, (panel, curve) = plt.subplots(
+        1, 2, figsize=(DOUBLE_COLUMN, 1.1 + 2.9 * ratio), layout="constrained",
+        width_ratios=(1.25, 1.0))
+    _, unit, edges = frame_of(grid)
+    if field == "contact":
+        image = panel.imshow(snapshots[0][field], origin="lower", extent=edges,
+                             interpolation="nearest", **state_style(run))
+    else:
+        fields = [snapshot[field] for snapshot in snapshots]
+        factor, scale_unit, style = field_style(np.stack(fields), field,
+                                                snapshots[0].units(field))
+        image = panel.imshow(without_open_cells(fields[0] * factor, field), origin="lower",
+                             extent=edges, **style)
+        figure.colorbar(image, ax=panel, shrink=0.9).set_label(
+            axis_text(label_of(field, snapshots[0]), scale_unit))
+    panel.set_xlabel(f"x ({unit})")
+    panel.set_ylabel(f"y ({unit})")
+
+    history = run.history
+    column = "friction" if np.any(history["friction"]) else "contact_area"
+    along = "time" if np.ptp(history["time"]) > 0.0 else "step"
+    scale, along_unit = si_scale(history[along], history.units(along))
+    curve.plot(history[along] * scale, history[column], color=COLOURS[0])
+    (mark,) = curve.plot([], [], "o", color=COLOURS[1])
+    curve.set_xlabel(axis_text(LABELS[along], along_unit))
+    curve.set_ylabel(axis_text(LABELS[column], ""))
+    curve.grid(alpha=0.3)
+    title = panel.set_title(when(snapshots[0]))
+
+    def draw(number: int) -> Any:
+        snapshot = snapshots[number]
+        values = snapshot[field]
+        image.set_data(values if field == "contact"
+                       else without_open_cells(values * factor, field))
+        row = int(np.searchsorted(history["step"], snapshot.step))
+        mark.set_data([history[along][row] * scale], [history[column][row]])
+        title.set_text(when(snapshot))
+        return image, mark, title
+
+    return FuncAnimation(figure, draw, frames=len(snapshots), blit=False), figure
