@@ -8,6 +8,7 @@ program main
    use test_base, only : run_base
    use test_case_input, only : run_case_input
    use test_checkpoint, only : run_checkpoint
+   use test_coupled_passes, only : run_coupled_passes
    use test_fft_conv, only : run_fft_conv
    use test_friction_cg, only : run_friction_cg
    use test_friction_law, only : run_friction_law
@@ -17,7 +18,6 @@ program main
    use test_mixed, only : run_mixed
    use test_namelist, only : run_namelist
    use test_progress, only : run_progress
-   use test_pass_place, only : run_pass_place
    use test_prony, only : run_prony
    use test_result_file, only : run_result_file
    use test_roughness, only : run_roughness
@@ -44,7 +44,6 @@ program main
    if (wanted('base')) call run_base()
    if (wanted('fft_conv')) call run_fft_conv()
    if (wanted('hdf5_file')) call run_hdf5_file()
-   if (wanted('pass_place')) call run_pass_place()
    if (wanted('prony')) call run_prony()
    if (wanted('surface')) call run_surface()
    if (wanted('roughness')) call run_roughness()
@@ -59,6 +58,7 @@ program main
    if (wanted('simulation')) call run_simulation()
    if (wanted('simulation_sliding')) call run_simulation_sliding()
    if (wanted('steady')) call run_steady()
+   if (wanted('coupled_passes')) call run_coupled_passes()
    if (wanted('simulation_friction')) call run_simulation_friction()
    if (wanted('simulation_adhesion')) call run_simulation_adhesion()
    if (wanted('friction_law')) call run_friction_law()

@@ -8,7 +8,7 @@ module history_row
 
    public :: column_type, history_columns, history_row_type, row_values, row_from_values
 
-   integer, parameter, public :: column_count = 34     !! number of columns
+   integer, parameter, public :: column_count = 36     !! number of columns
 
    !> What a column holds.
    type :: column_type
@@ -52,6 +52,8 @@ module history_row
       integer :: iterations_tangential = 0  !! iterations of the tangential solver
       real(dp) :: residual_normal = 0.0_dp  !! residual of the normal solution, recomputed
       real(dp) :: residual_tangential = 0.0_dp!! residual of the tangential solution, recomputed
+      integer :: passes = 0                 !! passes of the step with friction
+      real(dp) :: residual_coupling = 0.0_dp!! what remains of the coupling of both solutions
       real(dp) :: ffts = 0.0_dp             !! real transforms of the size of the grid
       real(dp) :: seconds = 0.0_dp          !! wall time of the solvers, s
    end type history_row_type
@@ -111,6 +113,9 @@ contains
             'residual of the normal solution, recomputed', .false.), &
          column_type('residual_tangential', '1', &
             'residual of the tangential solution, recomputed', .false.), &
+         column_type('passes', '1', 'passes of a step with friction', .true.), &
+         column_type('residual_coupling', '1', &
+            'mismatch of the road under the surface found and the road solved on', .false.), &
          column_type('ffts', '1', 'real transforms of the size of the grid', .false.), &
          column_type('seconds', 's', 'wall time of the solvers', .false.)]
    end function history_columns
@@ -152,8 +157,10 @@ contains
       values(30) = real(row%iterations_tangential, dp)
       values(31) = row%residual_normal
       values(32) = row%residual_tangential
-      values(33) = row%ffts
-      values(34) = row%seconds
+      values(33) = real(row%passes, dp)
+      values(34) = row%residual_coupling
+      values(35) = row%ffts
+      values(36) = row%seconds
    end function row_values
 
    !> The row that `row_values` made into an array.
@@ -193,8 +200,10 @@ contains
       row%iterations_tangential = nint(values(30))
       row%residual_normal = values(31)
       row%residual_tangential = values(32)
-      row%ffts = values(33)
-      row%seconds = values(34)
+      row%passes = nint(values(33))
+      row%residual_coupling = values(34)
+      row%ffts = values(35)
+      row%seconds = values(36)
    end function row_from_values
 
 end module history_row

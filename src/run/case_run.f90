@@ -222,7 +222,7 @@ contains
          outcome = 'step '//to_text(self%sim%row%step)//' of phase '//to_text(self%sim%row%phase)// &
             ', t = '//to_text(self%sim%row%time)//' s: the solver did not converge: '// &
             trim(self%sim%reason)//'; residual '//to_text(self%sim%residual)//', allowed '// &
-            to_text(self%sim%case%solver%tolerance)
+            to_text(self%sim%allowed)
          call leave_word(self, outcome, error)
          if (allocated(error)) return
          call fail(error, error_convergence, self%path//': '//outcome// &

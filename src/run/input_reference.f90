@@ -230,7 +230,7 @@ contains
             'The default algorithms, or those of the thesis.'), &
          row('solver', 'time_scheme', kind_word, '''exponential2''', '', &
             '''exponential2'' | ''exponential'' | ''backward_euler''', 'Time integration of the arms.'), &
-         row('solver', 'passes', kind_integer, '2', '', 'positive', &
+         row('solver', 'passes', kind_integer, '0', '', 'not negative', &
             'Most outer passes of a step with friction.'), &
          row('solver', 'slip_law', kind_word, '''physical''', '', '''physical'' | ''thesis''', &
             'Direction of slip on slopes.'), &

@@ -32,7 +32,7 @@ module normal_step
       type(adhesion_solver_type), private :: sticky
       logical, private :: thesis = .false.
       logical, private :: full_contact = .false.
-      real(dp), private :: tolerance = 1e-6_dp
+      real(dp) :: tolerance = 1e-6_dp              !! of the next solve
       integer, private :: max_iterations = 1000
    contains
       procedure :: solve

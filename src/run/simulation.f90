@@ -4,93 +4,62 @@
 !> solves the contact, ends the step of the material and books the energies. Who calls it writes
 !> files or fills arrays. The state can be saved and taken up again (module simulation_state).
 !>
-!> A step with friction is made of passes (thesis, 3.5): tangential solve, heights and slopes where
-!> the rubber then is, normal solve; until the pressure settles or `passes` are done. These ask for
-!> displacements only, to ten times the tolerance until the pressure has nearly settled. A last
-!> tangential solve under the last pressure settles the traction, so that it belongs to it. Where a
-!> pass reads the road: module `pass_place`. A jump of the load has passes, too.
-!>
-!> Fields of doubles beside those of the normal solver: H, P, gap, U; with sliding the original map and
-!> the two slopes; with Prony arms the history (S, S - S_old and one field an arm) and its traction; with
-!> friction those of module tangential_state, the pressure of the pass before and two slopes of the
-!> pass in hand.
+!> A row in which friction acts is made of passes: module `coupled_passes`. The state and what solves
+!> it: module `contact_state`. How the road moves at the start of a row: module `road_motion`.
 module simulation
    use case_settings, only : case_type
    use contact_rule, only : touches
+   use contact_state, only : contact_state_type, solve_normal
+   use coupled_passes, only : coupled_passes_type, new_coupled_passes
+   use coupling_advice, only : advice_on_passes
    use errors, only : error_type
-   use friction_law, only : law_constant_shear
    use history_row, only : history_row_type
-   use interpolation, only : displaced, interpolation_type, new_interpolation, shifted
+   use interpolation, only : new_interpolation
    use map_edge, only : edge_clear, look_at_edge
-   use normal_step, only : new_normal_step, normal_step_type
+   use normal_step, only : new_normal_step
    use parallel, only : global_sum
-   use pass_place, only : carry, pass_secant_type
-   use pass_watch, only : pass_watch_type, watch_passes
    use precision, only : dp, int64, int8
-   use regular_grid, only : boundary_free, grid_type
+   use road_motion, only : move_road, place_road
    use schedule, only : next_row, planned_row_type, schedule_type
    use solver_result, only : solver_result_type
    use steady_step, only : new_steady_step, steady_step_type
    use stick_slip_watch, only : stick_slip_watch_type, watch_slip
    use surface, only : new_height
-   use tangential_state, only : new_tangential_state, tangential_state_type
+   use tangential_state, only : new_tangential_state
    use text_tools, only : to_text
-   use viscoelastic_energy, only : book_step, energy_books_type, new_books
-   use zener, only : commit_history, destroy_history, finish_step, history_field, history_type, &
-      is_elastic, new_history, new_products, new_zener, products_type, restart_order, start_jump, &
-      start_relaxed, start_step, zener_type
+   use viscoelastic_energy, only : book_step, new_books
+   use zener, only : commit_history, destroy_history, finish_step, history_field, is_elastic, &
+      new_history, new_products, new_zener, products_type, restart_order, start_jump, &
+      start_relaxed, start_step
    implicit none
    private
 
    public :: new_simulation, simulation_type
 
+   !> What remains of the coupling where the case limits the passes: above this a warning tells of it.
+   real(dp), parameter :: large_mismatch = 1.0e-4_dp
+
    !> A run in hand. Not to be copied.
-   type :: simulation_type
-      type(case_type) :: case
-      type(grid_type) :: grid
+   type, extends(contact_state_type) :: simulation_type
       type(schedule_type) :: schedule
       type(history_row_type) :: row                 !! the last row
       logical :: converged = .true.                 !! the last row's solvers met the tolerance
       logical :: finished = .false.                 !! no row is left
-      character(64) :: reason = ''                  !! why not converged
+      character(320) :: reason = ''                 !! why not converged
       real(dp) :: residual = 0.0_dp                 !! of the solver that did not, or of the normal one
+      real(dp) :: allowed = 0.0_dp                  !! of that residual
+      logical :: told_passes = .false.              !! a warning has told of passes that did not settle
       character(:), allocatable :: warnings         !! new ones, a line each; the caller clears them
-      real(dp), allocatable :: height(:, :)         !! H under the rubber now, m
-      real(dp), allocatable :: pressure(:, :)       !! P, Pa
-      real(dp), allocatable :: gap(:, :)            !! m
-      real(dp), allocatable :: displacement(:, :)   !! U_z, m
-      type(zener_type) :: material
-      type(history_type) :: history                 !! of the normal traction
-      type(energy_books_type) :: books              !! of the normal traction
-      real(dp) :: summit = 0.0_dp                   !! highest point of the original map, m
-      real(dp) :: direction(2) = 0.0_dp             !! of the road's last motion
       real(dp) :: drive_force(2) = 0.0_dp           !! horizontal force on the rubber, N
-      real(dp) :: velocity(2) = 0.0_dp              !! of the road in the last step, m/s
-      real(dp) :: drift(2) = 0.0_dp                 !! expected motion of the surface in the step, m
-      real(dp) :: drifted(2) = 0.0_dp               !! sum of the expected motions of the surface, m
-      integer :: moved_cells(2) = 0                 !! by which P has been shifted so far
-      type(interpolation_type), private :: road
-      logical :: frictional = .false.               !! there is a friction law, and the road moves
-      type(tangential_state_type) :: tangential
       type(stick_slip_watch_type) :: watch          !! what has been seen of the mean slip
-      type(pass_watch_type) :: pass_watch           !! what has been seen of passes that do not settle
-      logical :: slides = .false.                   !! the road moves in some phase, or may be made to
-      real(dp), allocatable, private :: settled(:, :)   !! pressure of the pass before, Pa
       integer :: edge = edge_clear                  !! worst found at the edge of a free map
-      type(normal_step_type), private :: side
+      type(coupled_passes_type), private :: passes
       type(steady_step_type) :: steady              !! rows of steady sliding, where the case has any
       logical :: has_steady = .false.               !! some phase is steady
       logical :: was_steady = .false.               !! the last row was one of steady sliding
-      logical :: first = .true.                     !! no state yet
-      real(dp) :: level = 0.0_dp                    !! U - H where the gap is zero, m
-      real(dp), allocatable, private :: slope_x(:, :), slope_y(:, :)
-      real(dp), allocatable, private :: new_slope_x(:, :), new_slope_y(:, :)   !! of the pass in hand
-      real(dp), allocatable, private :: past(:, :)  !! traction of the history, Pa
-      real(dp) :: rms_height = 0.0_dp               !! of the original map about its mean, m
       integer(int64), allocatable :: map_checksums(:)   !! of the height maps that are files, by term
    contains
       procedure :: advance
-      procedure :: place_road
       procedure :: field
       procedure :: contact_states
       procedure :: destroy
@@ -132,7 +101,8 @@ contains
             error)
          if (allocated(error)) return
          allocate (self%slope_x(nx, ny), self%slope_y(nx, ny))
-         call self%place_road(0.0_dp, 0.0_dp)
+         call place_road(self, 0.0_dp, 0.0_dp)
+         self%rms_slope = rms_about_zero(self%slope_x, self%slope_y)
       end if
       self%has_steady = self%slides .and. any(case%phases%steady)
       if (self%has_steady) call new_steady_step(self%steady, case, self%rms_height, error)
@@ -140,9 +110,22 @@ contains
       self%frictional = self%slides .and. case%friction%law /= 'none'
       if (.not. self%frictional) return
       call new_tangential_state(self%tangential, case, self%material, error)
-      allocate (self%settled(nx, ny), self%new_slope_x(nx, ny), self%new_slope_y(nx, ny), &
-         source=0.0_dp)
+      call new_coupled_passes(self%passes, nx, ny)
    end subroutine new_simulation
+
+   !> Root of the mean square of a vector field.
+   function rms_about_zero(x, y) result(rms)
+      real(dp), intent(in) :: x(:, :), y(:, :)
+      real(dp) :: rms
+      real(dp), allocatable :: rows(:)
+      integer :: j
+
+      allocate (rows(size(x, 2)))
+      do j = 1, size(x, 2)
+         rows(j) = sum(x(:, j)**2 + y(:, j)**2)
+      end do
+      rms = sqrt(global_sum(sum(rows))/global_sum(real(size(x), dp)))
+   end function rms_about_zero
 
    !> Do the next row. Where the solvers did not converge, the state reached is kept.
    subroutine advance(self, error)
@@ -169,15 +152,16 @@ contains
       rubbing%converged = .true.
       if (plan%steady) then
          call slide_for_ever(self, plan, outcome, rubbing, level)
-      else if (.not. rubs(self)) then
-         call solve_normal(self, plan, outcome, level)
-      else if (plan%instantaneous) then
-         call jump_passes(self, plan, outcome, level)
+      else if (.not. self%rubs()) then
+         call solve_normal(self, plan, self%case%solver%tolerance, outcome)
       else
-         call coupled_passes(self, plan, outcome, rubbing, level)
+         call self%passes%solve(self, plan, &
+            [plan%road_x - self%row%road_x, plan%road_y - self%row%road_y], outcome, rubbing)
       end if
+      level = self%level
       self%converged = outcome%converged .and. rubbing%converged
       self%reason = outcome%reason
+      self%allowed = self%case%solver%tolerance
       self%residual = outcome%residual
       if (outcome%converged .and. .not. rubbing%converged) then
          self%reason = 'friction: '//trim(rubbing%reason)
@@ -186,6 +170,7 @@ contains
             self%reason = trim(self%reason)//' before the tractions settled'
       end if
 
+      if (self%rubs() .and. .not. plan%steady) call look_at_passes(self, plan)
       if (.not. plan%steady) call commit_step(self, level)
       self%was_steady = plan%steady
       call system_clock(now)
@@ -251,178 +236,37 @@ contains
       row%sliding_speed = norm2(self%velocity)
    end subroutine fill_steady
 
-   !> Does friction act yet?
-   pure function rubs(self) result(yes)
-      type(simulation_type), intent(in) :: self
-      logical :: yes
+   !> A row whose passes have not settled has not converged. Where the case limits the passes, a
+   !> warning tells of what remains.
+   subroutine look_at_passes(self, plan)
+      type(simulation_type), intent(inout) :: self
+      type(planned_row_type), intent(in) :: plan
+      character(:), allocatable :: message, advice
 
-      yes = .false.
-      if (self%frictional) yes = self%tangential%moved
-   end function rubs
+      associate (solver => self%case%solver, left => self%passes%residual)
+         if (.not. self%converged .or. left <= solver%tolerance) return
+         if (solver%passes > 0) self%allowed = huge(1.0_dp)
+         advice = advice_on_passes(self)
+         if (.not. left <= self%allowed) then
+            self%converged = .false.
+            self%residual = left
+            self%reason = 'the '//to_text(self%passes%passes)//' passes of the step did not settle. '//advice
+         else if (left > large_mismatch .and. .not. self%told_passes) then
+            self%told_passes = .true.
+            message = 'the passes of the step did not settle: residual_coupling is '//to_text(left)// &
+               ' after '//to_text(self%passes%passes)//'. '//advice
+            call add_warning(self, plan, message)
+         end if
+      end associate
+   end subroutine look_at_passes
 
    !> Is there friction that nothing has called for yet? What touches then sticks.
    pure function holds(self) result(yes)
       type(simulation_type), intent(in) :: self
       logical :: yes
 
-      yes = self%case%friction%law /= 'none' .and. .not. rubs(self)
+      yes = self%case%friction%law /= 'none' .and. .not. self%rubs()
    end function holds
-
-   !> The passes of a step with friction.
-   subroutine coupled_passes(self, plan, outcome, rubbing, level)
-      type(simulation_type), intent(inout) :: self
-      type(planned_row_type), intent(in) :: plan
-      type(solver_result_type), intent(out) :: outcome   !! of the normal solves together
-      type(solver_result_type), intent(out) :: rubbing   !! of the tangential solves together
-      real(dp), intent(out) :: level
-      type(solver_result_type) :: part
-      type(pass_secant_type) :: secant
-      character(:), allocatable :: message
-      real(dp), allocatable :: changes(:)
-      real(dp) :: tolerance, place(2)
-      integer :: pass
-
-      allocate (changes(self%case%solver%passes), source=huge(1.0_dp))
-      call self%tangential%extrapolate(.not. plan%new_speed)
-      place = contact_mean(self, self%tangential%displacement) + self%drift
-      do pass = 1, self%case%solver%passes
-         ! What follows needs the displacements only, and needs them no better than the passes settle.
-         tolerance = self%case%solver%tolerance
-         if (changes(max(pass - 1, 1)) > 10.0_dp*tolerance) tolerance = 10.0_dp*tolerance
-         call self%tangential%solve(self%pressure, self%gap, self%slope_x, self%slope_y, tolerance, &
-            .false., part)
-         call add_result(rubbing, part)
-         call follow_rubber(self, plan, secant, place)
-         self%settled(:, :) = self%pressure
-         call solve_normal(self, plan, part, level)
-         call add_result(outcome, part)
-         place = place + contact_mean(self, self%tangential%slip)
-         changes(pass) = unsettled(self)
-         if (.not. part%converged) exit
-         call swap(self%slope_x, self%new_slope_x)
-         call swap(self%slope_y, self%new_slope_y)
-         if (tolerance <= self%case%solver%tolerance .and. changes(pass) <= tolerance) exit
-      end do
-      call self%tangential%solve(self%pressure, self%gap, self%slope_x, self%slope_y, &
-         self%case%solver%tolerance, .true., part)
-      call add_result(rubbing, part)
-      call watch_passes(self%pass_watch, self%case%solver%passes, changes(:min(pass, size(changes))), &
-         self%case%solver%tolerance, self%tangential%law%law == law_constant_shear, message)
-      call add_warning(self, plan, message)
-   end subroutine coupled_passes
-
-   !> The passes of a jump of the load: the road goes with the rubber, which gives way where the new
-   !> pressure holds less friction.
-   subroutine jump_passes(self, plan, outcome, level)
-      type(simulation_type), intent(inout) :: self
-      type(planned_row_type), intent(in) :: plan
-      type(solver_result_type), intent(out) :: outcome   !! of the normal solves together
-      real(dp), intent(out) :: level
-      type(solver_result_type) :: part
-      type(pass_secant_type) :: secant
-      real(dp), allocatable :: traction(:, :, :)
-      integer(int8), allocatable :: contact(:, :)
-      real(dp) :: place(2)
-      integer :: pass
-
-      allocate (traction, source=self%tangential%traction)
-      allocate (contact, source=self%tangential%contact)
-      place = contact_mean(self, self%tangential%displacement)
-      do pass = 1, self%case%solver%passes
-         self%settled(:, :) = self%pressure
-         call solve_normal(self, plan, part, level)
-         call add_result(outcome, part)
-         self%tangential%traction(:, :, :) = traction
-         self%tangential%contact(:, :) = contact
-         call self%tangential%return_to_bound(self%pressure, self%gap, self%slope_x, self%slope_y)
-         if (pass == self%case%solver%passes .or. .not. part%converged) exit
-         if (unsettled(self) <= self%case%solver%tolerance) exit
-         call follow_rubber(self, plan, secant, place)
-         place = place + contact_mean(self, self%tangential%slip)
-         call swap(self%slope_x, self%new_slope_x)
-         call swap(self%slope_y, self%new_slope_y)
-      end do
-   end subroutine jump_passes
-
-   !> Read the road under the surface that a pass has found, into the height and the new slopes.
-   subroutine follow_rubber(self, plan, secant, place)
-      type(simulation_type), intent(inout) :: self
-      type(planned_row_type), intent(in) :: plan
-      type(pass_secant_type), intent(inout) :: secant
-      !> Mean over the contact of the displacement with which the road was read before, m; on return
-      !> what the displacement left in the field of the slip lacks, the same everywhere.
-      real(dp), intent(inout) :: place(2)
-      real(dp) :: residual(2)
-      integer :: c
-
-      residual = contact_mean(self, self%tangential%trial) - place
-      call secant%next(residual, place)
-      do c = 1, 2
-         call carry(self%tangential%trial(:, :, c), residual + place, [self%grid%dx, self%grid%dy], &
-            self%grid%boundary /= boundary_free, self%tangential%slip(:, :, c))
-      end do
-      call displaced(self%road, plan%road_x - place(1), plan%road_y - place(2), &
-         self%tangential%slip(:, :, 1), self%tangential%slip(:, :, 2), self%height, &
-         self%new_slope_x, self%new_slope_y)
-   end subroutine follow_rubber
-
-   !> Mean of a vector field over the contact.
-   function contact_mean(self, field) result(mean)
-      type(simulation_type), intent(in) :: self
-      real(dp), intent(in) :: field(:, :, :)        !! [nx, ny, 2]
-      real(dp) :: mean(2)
-      real(dp), allocatable :: rows(:, :)
-      logical, allocatable :: touching(:)
-      integer :: j
-
-      allocate (rows(3, self%grid%ny))
-      !$omp parallel do default(none) shared(self, field, rows) private(j, touching)
-      do j = 1, self%grid%ny
-         touching = touches(self%side%adhesive, self%pressure(:, j), self%gap(:, j))
-         rows(1, j) = sum(field(:, j, 1), touching)
-         rows(2, j) = sum(field(:, j, 2), touching)
-         rows(3, j) = count(touching)
-      end do
-      mean = global_sum([sum(rows(1, :)), sum(rows(2, :))])/max(global_sum(sum(rows(3, :))), 1.0_dp)
-   end function contact_mean
-
-   !> Exchange two fields.
-   subroutine swap(a, b)
-      real(dp), allocatable, intent(inout) :: a(:, :), b(:, :)
-      real(dp), allocatable :: c(:, :)
-
-      call move_alloc(a, c)
-      call move_alloc(b, a)
-      call move_alloc(c, b)
-   end subroutine swap
-
-   !> Add the record of a solve to that of the step: the last outcome, all the work.
-   subroutine add_result(total, part)
-      type(solver_result_type), intent(inout) :: total
-      type(solver_result_type), intent(in) :: part
-      type(solver_result_type) :: before
-
-      before = total
-      total = part
-      total%iterations = before%iterations + part%iterations
-      total%ffts = before%ffts + part%ffts
-   end subroutine add_result
-
-   !> By how much a pass changed the pressure, over the pressure.
-   function unsettled(self) result(change)
-      type(simulation_type), intent(in) :: self
-      real(dp) :: change
-      real(dp), allocatable :: rows(:, :)
-      integer :: j
-
-      allocate (rows(2, self%grid%ny))
-      !$omp parallel do default(none) shared(self, rows) private(j)
-      do j = 1, self%grid%ny
-         rows(1, j) = sum(abs(self%pressure(:, j) - self%settled(:, j)))
-         rows(2, j) = sum(abs(self%pressure(:, j)))
-      end do
-      change = global_sum(sum(rows(1, :)))/max(global_sum(sum(rows(2, :))), tiny(1.0_dp))
-   end function unsettled
 
    !> End the step: histories and energies of both directions.
    subroutine commit_step(self, level)
@@ -495,115 +339,6 @@ contains
          call start_step(self%material, plan%dt)
       end if
    end subroutine begin_step
-
-   !> Move the road, and the pressure with it: the best start for the solver.
-   subroutine move_road(self, plan)
-      type(simulation_type), intent(inout) :: self
-      type(planned_row_type), intent(in) :: plan
-      integer :: cells(2), c
-      real(dp) :: drift(2), seen(2)
-
-      if (abs(plan%velocity_x) > 0.0_dp .or. abs(plan%velocity_y) > 0.0_dp) &
-         self%direction = [plan%velocity_x, plan%velocity_y]/hypot(plan%velocity_x, plan%velocity_y)
-      if (.not. self%slides) return
-      drift = 0.0_dp
-      if (rubs(self)) then
-         ! The surface is expected to move on as in the step before; where the road starts, with it.
-         drift = self%tangential%rate*plan%dt
-         if (plan%new_speed .and. .not. any(abs(self%velocity) > 0.0_dp)) &
-            drift = [plan%velocity_x, plan%velocity_y]*plan%dt
-      end if
-      self%velocity = [plan%velocity_x, plan%velocity_y]
-      self%drift = drift
-      self%drifted = self%drifted + drift
-      seen = [plan%road_x, plan%road_y] - self%drifted
-      cells = nint(seen/[self%grid%dx, self%grid%dy])
-      if (any(cells /= self%moved_cells)) then
-         call shift_field(self, cells - self%moved_cells, self%pressure)
-         if (self%side%adhesive .and. self%grid%boundary /= boundary_free) &
-            call shift_field(self, cells - self%moved_cells, self%gap)
-         if (rubs(self)) then
-            do c = 1, 2
-               call shift_field(self, cells - self%moved_cells, self%tangential%traction(:, :, c))
-               call shift_field(self, cells - self%moved_cells, self%tangential%before(:, :, c))
-            end do
-            call shift_states(self, cells - self%moved_cells, self%tangential%contact)
-         end if
-         self%moved_cells = cells
-      end if
-      if (rubs(self)) then
-         call displaced(self%road, plan%road_x - drift(1), plan%road_y - drift(2), &
-            self%tangential%displacement(:, :, 1), self%tangential%displacement(:, :, 2), self%height, &
-            self%slope_x, self%slope_y)
-      else
-         call self%place_road(plan%road_x, plan%road_y)
-      end if
-   end subroutine move_road
-
-   !> Heights and slopes of the road at a displacement.
-   subroutine place_road(self, road_x, road_y)
-      class(simulation_type), intent(inout) :: self
-      real(dp), intent(in) :: road_x, road_y        !! m
-
-      if (self%slides) call shifted(self%road, road_x, road_y, self%height, self%slope_x, self%slope_y)
-   end subroutine place_road
-
-   !> Shift a field by whole cells; what enters a free map is zero.
-   subroutine shift_field(self, cells, field)
-      type(simulation_type), intent(inout) :: self
-      integer, intent(in) :: cells(2)
-      real(dp), intent(inout) :: field(:, :)
-      integer :: i, j, from_i, from_j
-      logical :: free
-
-      free = self%grid%boundary == boundary_free
-      !$omp parallel do default(none) shared(self, field, cells, free) &
-      !$omp private(i, j, from_i, from_j)
-      do j = 1, self%grid%ny
-         from_j = j - cells(2)
-         do i = 1, self%grid%nx
-            from_i = i - cells(1)
-            if (.not. free) then
-               self%side%normal%step(i, j) = field(modulo(from_i - 1, self%grid%nx) + 1, &
-                  modulo(from_j - 1, self%grid%ny) + 1)
-            else if (from_i >= 1 .and. from_i <= self%grid%nx .and. &
-               from_j >= 1 .and. from_j <= self%grid%ny) then
-               self%side%normal%step(i, j) = field(from_i, from_j)
-            else
-               self%side%normal%step(i, j) = 0.0_dp
-            end if
-         end do
-      end do
-      field(:, :) = self%side%normal%step
-   end subroutine shift_field
-
-   !> The same for the states of contact.
-   subroutine shift_states(self, cells, states)
-      type(simulation_type), intent(in) :: self
-      integer, intent(in) :: cells(2)
-      integer(int8), intent(inout) :: states(:, :)
-
-      if (self%grid%boundary == boundary_free) then
-         states(:, :) = eoshift(eoshift(states, -cells(1), dim=1), -cells(2), dim=2)
-      else
-         states(:, :) = cshift(cshift(states, -cells(1), dim=1), -cells(2), dim=2)
-      end if
-   end subroutine shift_states
-
-   !> Solve the normal contact under the row's load.
-   subroutine solve_normal(self, plan, outcome, level)
-      type(simulation_type), intent(inout) :: self
-      type(planned_row_type), intent(in) :: plan
-      type(solver_result_type), intent(out) :: outcome
-      real(dp), intent(out) :: level
-
-      level = self%level
-      ! The past, where there are no arms, is not allocated and so not present.
-      call self%side%solve(plan, self%material%q, self%first, self%height, self%pressure, self%gap, &
-         level, outcome, self%past)
-      self%level = level
-      self%first = .false.
-   end subroutine solve_normal
 
    !> U = gap + H + level, into the solver's work field.
    subroutine new_displacement(self, level)
@@ -695,6 +430,12 @@ contains
       end if
       row%iterations_normal = outcome%iterations
       row%residual_normal = outcome%residual
+      row%passes = 0
+      row%residual_coupling = 0.0_dp
+      if (self%rubs() .and. .not. plan%steady) then
+         row%passes = self%passes%passes
+         row%residual_coupling = self%passes%residual
+      end if
       row%ffts = real(outcome%ffts + rubbing%ffts, dp)
       row%seconds = outcome%seconds
       if (.not. plan%steady) row%work_drive = self%row%work_drive &
@@ -721,7 +462,12 @@ contains
       if (self%tangential%law%slope .and. self%tangential%moved) force = outside
       force = force + traction*self%grid%lx*self%grid%ly
       row%sliding_speed = 0.0_dp
-      if (plan%dt > 0.0_dp) row%sliding_speed = dot_product(slip, self%direction)/plan%dt
+      if (plan%dt > 0.0_dp) then
+         row%sliding_speed = dot_product(slip, self%direction)/plan%dt
+      else if (self%tangential%mass > 0.0_dp) then
+         ! The mass moves on through a jump of the load.
+         row%sliding_speed = -dot_product(self%tangential%speed, self%direction)
+      end if
       row%work_tangential = self%tangential%books%work + self%tangential%work_mass &
          + self%tangential%lost_friction
       row%energy_elastic = row%energy_elastic + self%tangential%books%stored
@@ -768,7 +514,7 @@ contains
       integer(int8) :: touching
       integer :: j
 
-      if (rubs(self)) then
+      if (self%rubs()) then
          states = self%tangential%contact
          return
       end if

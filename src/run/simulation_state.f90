@@ -7,6 +7,7 @@ module simulation_state
    use errors, only : error_type
    use history_row, only : column_count, column_type, history_columns, row_from_values, row_values
    use precision, only : dp
+   use road_motion, only : place_road
    use simulation, only : simulation_type
    use state_table, only : state_table_type
    use steady_step, only : steady_start_type
@@ -46,7 +47,7 @@ contains
       call reader%get_state(table, error)
       if (allocated(error)) return
       sim%row = row_from_values(row)
-      call sim%place_road(sim%row%road_x, sim%row%road_y)
+      call place_road(sim, sim%row%road_x, sim%row%road_y)
       sim%finished = sim%schedule%phase > size(sim%case%phases)
    end subroutine load_state
 
@@ -70,9 +71,10 @@ contains
       call table%add('stick_slip/speed', sim%watch%speed, 'm/s', 'mean slip speed')
       call table%add('stick_slip/change', sim%watch%change, 'm/s', 'its change in the last step')
       call table%add('stick_slip/turns', sim%watch%turns, 'alternations of that change')
-      call table%add('passes/reported', sim%pass_watch%reported, &
-         'passes that do not settle have been warned of')
-      call table%add('passes/steps', sim%pass_watch%steps, 'steps whose passes did not settle')
+      call table%add('passes/reported', sim%told_passes, &
+         'passes that did not settle have been warned of')
+      call table%add('passes/first_mismatch', sim%first_mismatch, '1', &
+         'mismatch that the first pass of the last step left')
 
       call table%add('pressure', sim%pressure, 'Pa', 'normal traction on the rubber')
       call table%add('gap', sim%gap, 'm', 'gap between rubber and road')

@@ -19,7 +19,7 @@ module tangential_state
    use fft_conv, only : convolution_type, new_tangential_operator
    use friction_cg, only : friction_fast, friction_solver_type, friction_thesis, new_friction_solver, &
       set_mean_compliance
-   use friction_law, only : friction_law_type, new_friction_law, return_tractions
+   use friction_law, only : friction_law_type, new_friction_law
    use parallel, only : global_sum
    use precision, only : dp, int64, int8
    use regular_grid, only : boundary_periodic, grid_type
@@ -67,7 +67,6 @@ module tangential_state
       procedure :: begin
       procedure :: extrapolate
       procedure :: solve
-      procedure :: return_to_bound
       procedure :: take_steady
       procedure :: commit
       procedure :: kinetic
@@ -128,11 +127,15 @@ contains
       if (.not. self%moved) return
       ! A road that goes back where it began leaves displacements of round-off.
       self%solver%least_scale = self%q*norm2(motion)
+      if (.not. dt > 0.0_dp) self%pace = 0.0_dp
       call history_field(self%history, material, self%past)
       self%past_mean = means(self, self%past)
       do c = 1, 2
          shift = self%q*motion(c)
-         if (self%mass > 0.0_dp .and. dt > 0.0_dp) then
+         if (self%mass > 0.0_dp .and. .not. dt > 0.0_dp) then
+            ! A mass does not move in no time: the mean of the surface stays.
+            shift = shift - self%q*mean_of(self, c)
+         else if (self%mass > 0.0_dp) then
             stiffness = self%q + self%thickness*self%mass/dt**2
             known = self%thickness*(self%past_mean(c) + self%mass*((mean_of(self, c) + motion(c))/dt**2 &
                + self%speed(c)/dt))/stiffness
@@ -144,7 +147,9 @@ contains
             self%drive(:, j, c) = self%q*self%displacement(:, j, c) + shift
          end do
       end do
-      if (self%mass > 0.0_dp .and. dt > 0.0_dp) then
+      if (self%mass > 0.0_dp .and. .not. dt > 0.0_dp) then
+         call set_thickness(self, 0.0_dp)
+      else if (self%mass > 0.0_dp) then
          call set_thickness(self, self%q*self%thickness/(self%q + self%thickness*self%mass/dt**2))
       else
          call set_thickness(self, self%thickness)
@@ -254,35 +259,6 @@ contains
       end do
    end subroutine mark_contact
 
-   !> An instantaneous row: T stays as it is but for the bound of the new pressure, and the rubber
-   !> answers at once. A mass does not move in no time.
-   subroutine return_to_bound(self, pressure, gap, slope_x, slope_y)
-      class(tangential_state_type), intent(inout) :: self
-      real(dp), intent(in) :: pressure(:, :), gap(:, :)
-      real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)
-      real(dp) :: before(2), after(2)
-      integer :: c
-
-      if (.not. self%moved) return
-      self%pace = 0.0_dp
-      call mark_contact(self, pressure, gap)
-      call return_tractions(self%law, pressure, slope_x, slope_y, self%contact, &
-         self%traction(:, :, 1), self%traction(:, :, 2))
-      self%drive = self%traction + self%past
-      call set_thickness(self, self%thickness)
-      call self%operator%apply_vector(self%drive(:, :, 1), self%drive(:, :, 2), self%trial(:, :, 1), &
-         self%trial(:, :, 2))
-      self%trial = self%trial/self%q
-      if (self%mass > 0.0_dp) then
-         before = means(self, self%displacement)
-         after = means(self, self%trial)
-         do c = 1, 2
-            self%trial(:, :, c) = self%trial(:, :, c) + (before(c) - after(c))
-         end do
-      end if
-      self%slip = self%displacement - self%trial
-   end subroutine return_to_bound
-
    !> Take a state of steady sliding. Its history and energies are set by the caller.
    subroutine take_steady(self, found, velocity)
       class(tangential_state_type), intent(inout) :: self
@@ -367,7 +343,9 @@ contains
             if (self%contact(i, j) == 0_int8) cycle
             if (self%law%slope) slope = [slope_x(i, j), slope_y(i, j)]
             star = self%law%normal_traction(pressure(i, j), slope)
-            rows(1, j) = rows(1, j) + dot_product(self%traction(i, j, :) - star, self%slip(i, j, :))
+            ! The slip of a point that sticks is what the solver's tolerance left: it loses nothing.
+            if (self%contact(i, j) == 2_int8) rows(1, j) = rows(1, j) &
+               + dot_product(self%traction(i, j, :) - star, self%slip(i, j, :))
             rows(2:3, j) = rows(2:3, j) + self%trial(i, j, :) - self%displacement(i, j, :)
             rows(4, j) = rows(4, j) + 1.0_dp
          end do

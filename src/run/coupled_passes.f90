@@ -1,0 +1,277 @@
+!> The passes of a row in which friction acts.
+!>
+!> Pressure, traction and the place where the rubber's surface reads the road depend on each other.
+!> With the displacement z of the surface with which the road is read (the place), a pass does
+!>
+!>    H, grad H  from the original map at X + z - D
+!>    P          the normal contact on H
+!>    T, U_T     the tangential contact under P, on the slopes grad H
+!>
+!> and the row is solved where U_T = z: pressure, traction, heights and slopes then belong together.
+!> The fixed point need not attract: T holds -P grad H, which gives a pass the gain -(1..2) |grad H|^2,
+!> friction adds mu |grad H|, and a thick block multiplies the mean of both by its compliance. The
+!> passes therefore use Anderson acceleration on the whole field z (module `anderson_mixing`);
+!> `pass_control` says how accurate their solves are and how long their steps.
+!>
+!> The strains around the contact come with tractions that were found before the pass moved the
+!> contact. Read at U_T, the road would be stretched beside where the contact now is, so `carry` moves
+!> U_T along with the contact. At the fixed point it does nothing.
+!>
+!> The first place comes from the row before: the displacement moves with the road, and its mean goes
+!> on as in the last step. A jump of the load is a row like any other, without motion and time.
+!>
+!> What remains is measured by the road read at U_T against the road solved on, `mismatch` below: the
+!> column `residual_coupling`.
+!>
+!> Fields of doubles: three times two components for the place, its residual and the best place; U_T
+!> of that; height and slopes of the check; and those of the acceleration.
+module coupled_passes
+   use anderson_mixing, only : mixing_type
+   use contact_state, only : contact_mean, contact_state_type, solve_normal
+   use interpolation, only : displaced
+   use parallel, only : global_sum
+   use pass_control, only : pass_control_type
+   use precision, only : dp
+   use regular_grid, only : boundary_free
+   use schedule, only : planned_row_type
+   use solver_result, only : solver_result_type
+   implicit none
+   private
+
+   public :: carry, coupled_passes_type, new_coupled_passes
+
+   integer, parameter, public :: most_passes = 100      !! where the case leaves the number open
+
+   !> Slopes in the contact count as at least this part of the rms slope of the map.
+   real(dp), parameter :: least_slope = 0.1_dp
+
+   !> The work space of the passes and what they came to.
+   type :: coupled_passes_type
+      integer :: passes = 0                             !! done in the last row
+      real(dp) :: residual = 0.0_dp                     !! mismatch that the last row left
+      real(dp), allocatable, private :: place(:, :, :)      !! z, m [nx, ny, 2]
+      real(dp), allocatable, private :: residuals(:, :, :)  !! U_T, carried, less z, m
+      real(dp), allocatable, private :: best_place(:, :, :) !! z of the least mismatch, m
+      real(dp), allocatable, private :: best_found(:, :, :) !! U_T of the same, m
+      real(dp), allocatable, private :: height(:, :)        !! of the road at U_T, m
+      real(dp), allocatable, private :: slope_x(:, :), slope_y(:, :)
+      type(mixing_type), private :: mixing
+   contains
+      procedure :: solve
+   end type coupled_passes_type
+
+contains
+
+   !> Allocate the work space.
+   subroutine new_coupled_passes(self, nx, ny)
+      type(coupled_passes_type), intent(out) :: self
+      integer, intent(in) :: nx, ny
+
+      allocate (self%place(nx, ny, 2), source=0.0_dp)
+      allocate (self%residuals, self%best_place, self%best_found, source=self%place)
+      allocate (self%height(nx, ny), self%slope_x(nx, ny), self%slope_y(nx, ny), source=0.0_dp)
+   end subroutine new_coupled_passes
+
+   !> Solve a row. The road has moved, and the tangential step has begun.
+   subroutine solve(self, state, plan, motion, normal, rubbing)
+      class(coupled_passes_type), intent(inout) :: self
+      class(contact_state_type), intent(inout) :: state
+      type(planned_row_type), intent(in) :: plan
+      real(dp), intent(in) :: motion(2)                  !! of the road in this row, m
+      type(solver_result_type), intent(out) :: normal    !! all normal solves
+      type(solver_result_type), intent(out) :: rubbing   !! all tangential solves
+      type(pass_control_type) :: control
+      real(dp) :: tolerance
+      integer :: most
+      logical :: unlike                                  !! the row before
+
+      tolerance = state%case%solver%tolerance
+      most = state%case%solver%passes
+      if (most == 0) most = most_passes
+      call self%mixing%start()
+      call predict(self, state, motion)
+      unlike = plan%instantaneous .or. plan%new_speed
+      call control%start(tolerance, merge(1.0_dp, state%first_mismatch, unlike))
+      if (.not. plan%instantaneous) call state%tangential%extrapolate(.not. plan%new_speed)
+
+      self%passes = 0
+      do
+         self%passes = self%passes + 1
+         if (self%passes == most) control%accuracy = min(control%accuracy, tolerance)
+         call do_pass(self, state, plan, control%accuracy, normal, rubbing)
+         if (self%passes == 1 .and. .not. plan%instantaneous) state%first_mismatch = self%residual
+         if (self%passes == most .or. .not. normal%converged) exit
+         if (control%accuracy <= tolerance .and. self%residual <= tolerance) then
+            call settle(self, state, plan, rubbing)
+            if (self%residual <= tolerance) return
+         end if
+         call control%judge(self%residual)
+         call choose_place(self, state, control)
+         ! The last of many passes is for the best place that was found.
+         if (self%passes == most - 1 .and. most > 10) self%place(:, :, :) = self%best_place
+      end do
+      call settle(self, state, plan, rubbing)
+   end subroutine solve
+
+   !> One pass at the place, and the mismatch that it leaves.
+   subroutine do_pass(self, state, plan, accuracy, normal, rubbing)
+      class(coupled_passes_type), intent(inout) :: self
+      class(contact_state_type), intent(inout) :: state
+      type(planned_row_type), intent(in) :: plan
+      real(dp), intent(in) :: accuracy                   !! of both solves
+      type(solver_result_type), intent(inout) :: normal, rubbing
+      type(solver_result_type) :: part
+
+      call displaced(state%road, plan%road_x, plan%road_y, self%place(:, :, 1), self%place(:, :, 2), &
+         state%height, state%slope_x, state%slope_y)
+      call solve_normal(state, plan, accuracy, part)
+      call add_result(normal, part)
+      call state%tangential%solve(state%pressure, state%gap, state%slope_x, state%slope_y, accuracy, &
+         .false., part)
+      call add_result(rubbing, part)
+      self%residual = mismatch(self, state, plan)
+   end subroutine do_pass
+
+   !> Let the traction itself settle, which the passes do not need.
+   subroutine settle(self, state, plan, rubbing)
+      class(coupled_passes_type), intent(inout) :: self
+      class(contact_state_type), intent(inout) :: state
+      type(planned_row_type), intent(in) :: plan
+      type(solver_result_type), intent(inout) :: rubbing
+      type(solver_result_type) :: part
+
+      call state%tangential%solve(state%pressure, state%gap, state%slope_x, state%slope_y, &
+         state%case%solver%tolerance, .true., part)
+      call add_result(rubbing, part)
+      self%residual = mismatch(self, state, plan)
+   end subroutine settle
+
+   !> The first place of a row: the displacement of the row before, moved along with the contact, which
+   !> the road takes over the rubber, and with the rubber's mean motion.
+   subroutine predict(self, state, motion)
+      class(coupled_passes_type), intent(inout) :: self
+      class(contact_state_type), intent(in) :: state
+      real(dp), intent(in) :: motion(2)                  !! of the road, m
+      integer :: c
+
+      do c = 1, 2
+         call carry(state%tangential%displacement(:, :, c), state%drift - motion, &
+            [state%grid%dx, state%grid%dy], state%grid%boundary /= boundary_free, &
+            self%place(:, :, c))
+         self%place(:, :, c) = self%place(:, :, c) + state%drift(c)
+      end do
+   end subroutine predict
+
+   !> The next place, from what the last pass found.
+   subroutine choose_place(self, state, control)
+      class(coupled_passes_type), intent(inout) :: self
+      class(contact_state_type), intent(inout) :: state
+      type(pass_control_type), intent(in) :: control
+      real(dp) :: motion(2)
+      integer :: c
+
+      if (control%best_yet) then
+         self%best_place(:, :, :) = self%place
+         self%best_found(:, :, :) = state%tangential%trial
+      end if
+      if (control%go_back) then
+         self%place(:, :, :) = self%best_place
+         state%tangential%trial(:, :, :) = self%best_found
+      end if
+      if (control%forget) call self%mixing%start()
+      motion = contact_mean(state, state%tangential%trial) - contact_mean(state, self%place)
+      do c = 1, 2
+         call carry(state%tangential%trial(:, :, c), motion, [state%grid%dx, state%grid%dy], &
+            state%grid%boundary /= boundary_free, self%residuals(:, :, c))
+         self%residuals(:, :, c) = self%residuals(:, :, c) - self%place(:, :, c)
+      end do
+      call self%mixing%next(self%residuals, control%damping, self%place)
+   end subroutine choose_place
+
+   !> What remains of the coupling: by how much the road at U_T differs from the road solved on. The
+   !> larger of two means that are weighted by the pressure: the difference of the heights over the
+   !> rms height of the map, and that of the slopes over the slopes in the contact.
+   function mismatch(self, state, plan) result(residual)
+      class(coupled_passes_type), intent(inout) :: self
+      class(contact_state_type), intent(in) :: state
+      type(planned_row_type), intent(in) :: plan
+      real(dp) :: residual
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: sums(4)
+      integer :: j, k
+
+      call displaced(state%road, plan%road_x, plan%road_y, state%tangential%trial(:, :, 1), &
+         state%tangential%trial(:, :, 2), self%height, self%slope_x, self%slope_y)
+      allocate (rows(4, state%grid%ny))
+      !$omp parallel do default(none) shared(self, state, rows) private(j)
+      do j = 1, state%grid%ny
+         rows(1, j) = sum(abs(state%pressure(:, j)))
+         rows(2, j) = sum(abs(state%pressure(:, j)*(self%height(:, j) - state%height(:, j))))
+         rows(3, j) = sum(abs(state%pressure(:, j))*hypot(self%slope_x(:, j) - state%slope_x(:, j), &
+            self%slope_y(:, j) - state%slope_y(:, j)))
+         rows(4, j) = sum(abs(state%pressure(:, j))*hypot(state%slope_x(:, j), state%slope_y(:, j)))
+      end do
+      sums = global_sum([(sum(rows(k, :)), k = 1, 4)])
+      residual = 0.0_dp
+      if (.not. sums(1) > 0.0_dp) return
+      residual = max(sums(2)/max(state%rms_height*sums(1), tiny(1.0_dp)), &
+         sums(3)/max(sums(4), least_slope*state%rms_slope*sums(1), tiny(1.0_dp)))
+   end function mismatch
+
+   !> Add the record of a solve to that of the row: the last outcome, all the work.
+   subroutine add_result(total, part)
+      type(solver_result_type), intent(inout) :: total
+      type(solver_result_type), intent(in) :: part
+      type(solver_result_type) :: before
+
+      before = total
+      total = part
+      total%iterations = before%iterations + part%iterations
+      total%ffts = before%ffts + part%ffts
+   end subroutine add_result
+
+   !> A field around the contact after the contact has moved along the rubber by -motion, bilinear.
+   subroutine carry(field, motion, cell, periodic, moved)
+      real(dp), intent(in) :: field(:, :)        !! [nx, ny]
+      real(dp), intent(in) :: motion(2)          !! of the rubber over the road, m
+      real(dp), intent(in) :: cell(2)            !! dx, dy, m
+      logical, intent(in) :: periodic            !! else the rim goes on outside
+      real(dp), intent(out) :: moved(:, :)       !! [nx, ny]
+      real(dp) :: u, v
+      integer :: cells(2), nx, ny, i, j, i0, i1, j0, j1
+
+      nx = size(field, 1)
+      ny = size(field, 2)
+      cells = floor(motion/cell)
+      u = motion(1)/cell(1) - cells(1)
+      v = motion(2)/cell(2) - cells(2)
+      !$omp parallel do default(none) shared(field, moved, cells, u, v, nx, ny, periodic) &
+      !$omp private(i, j, i0, i1, j0, j1)
+      do j = 1, ny
+         j0 = within(j + cells(2), ny, periodic)
+         j1 = within(j + cells(2) + 1, ny, periodic)
+         do i = 1, nx
+            i0 = within(i + cells(1), nx, periodic)
+            i1 = within(i + cells(1) + 1, nx, periodic)
+            moved(i, j) = (1.0_dp - v)*((1.0_dp - u)*field(i0, j0) + u*field(i1, j0)) &
+               + v*((1.0_dp - u)*field(i0, j1) + u*field(i1, j1))
+         end do
+      end do
+   end subroutine carry
+
+   !> The cell itself, its image, or the nearest at the rim.
+   elemental function within(i, n, periodic) result(k)
+      integer, intent(in) :: i, n
+      logical, intent(in) :: periodic
+      integer :: k
+
+      k = i
+      if (k >= 1 .and. k <= n) return
+      if (periodic) then
+         k = modulo(i - 1, n) + 1
+      else
+         k = min(max(i, 1), n)
+      end if
+   end function within
+
+end module coupled_passes

@@ -1,0 +1,60 @@
+!> What to do where the passes of a row did not settle.
+module coupling_advice
+   use contact_state, only : contact_state_type
+   use friction_law, only : law_constant_shear
+   use parallel, only : global_sum
+   use precision, only : dp
+   use text_tools, only : to_text
+   implicit none
+   private
+
+   public :: advice_on_passes
+
+   !> Part of the normal force on places where the friction cone is open uphill, from which it counts.
+   real(dp), parameter :: much = 1.0e-3_dp
+
+contains
+
+   !> A sentence or two: the likely reason, and what helps.
+   function advice_on_passes(self) result(advice)
+      class(contact_state_type), intent(in) :: self
+      character(:), allocatable :: advice
+      real(dp) :: jammed
+
+      jammed = jammed_part(self)
+      if (self%tangential%law%law == law_constant_shear) then
+         advice = 'With constant shear a cell at the edge of the contact carries the whole strength or '// &
+            'nothing, so there may be no solution; law = ''coulomb_orowan'' with a large coefficient has none '// &
+            'of these jumps'
+      else if (jammed > much) then
+         advice = to_text(100.0_dp*jammed)//' % of the normal force is on slopes above '// &
+            '1/coefficient, where friction holds any force uphill and there may be no solution: take a '// &
+            'smoother road or a lower coefficient'
+      else if (self%case%solver%passes > 0) then
+         advice = 'Allow more passes (passes = 0 goes on until they settle)'
+      else
+         advice = 'Take shorter steps or a finer mesh'
+      end if
+   end function advice_on_passes
+
+   !> Part of the normal force that acts on slopes steeper than 1/mu.
+   function jammed_part(self) result(part)
+      class(contact_state_type), intent(in) :: self
+      real(dp) :: part
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: mu
+      integer :: j
+
+      part = 0.0_dp
+      mu = self%tangential%law%coefficient
+      if (.not. self%tangential%law%slope) return
+      allocate (rows(2, self%grid%ny))
+      do j = 1, self%grid%ny
+         rows(1, j) = sum(abs(self%pressure(:, j)))
+         rows(2, j) = sum(abs(self%pressure(:, j)), &
+            mu*hypot(self%slope_x(:, j), self%slope_y(:, j)) > 1.0_dp)
+      end do
+      part = global_sum(sum(rows(2, :)))/max(global_sum(sum(rows(1, :))), tiny(1.0_dp))
+   end function jammed_part
+
+end module coupling_advice

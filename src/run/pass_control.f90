@@ -1,0 +1,103 @@
+!> How accurate the solves of the next pass of a coupled step must be, and how far the step to the
+!> next place is damped.
+!>
+!> A pass needs its solves no better than the passes have settled: to a tenth of the mismatch that
+!> the last pass left (`share`). Three things go wrong on hard roads, and each has its answer:
+!>
+!> * The solves return with nothing done, since their start is within the accuracy asked for. The
+!>   mismatch then holds no information, least where a thick block turns a small error of the
+!>   friction into a long displacement. So where the mismatch does not fall in `patience` passes, the
+!>   share falls tenfold, and the accuracy may become better than the tolerance.
+!> * An extrapolation goes astray. Where the mismatch is ten times the least so far, the
+!>   acceleration forgets what it has seen.
+!> * The passes go round in circles. Where the mismatch has not been halved in `stalled` passes, they
+!>   go back to the best place, and from then on take shorter steps.
+module pass_control
+   use precision, only : dp
+   implicit none
+   private
+
+   public :: pass_control_type
+
+   real(dp), parameter :: coarsest = 1.0e-3_dp      !! accuracy of a solve
+   real(dp), parameter :: finest = 1.0e-4_dp        !! accuracy of a solve, in tolerances
+   real(dp), parameter :: usual_share = 0.1_dp, least_share = 1.0e-6_dp
+   real(dp), parameter :: falls = 0.3_dp            !! a mismatch below this part of the least one falls
+   real(dp), parameter :: slow = 0.5_dp             !! a mismatch above this part of the last falls slowly
+   real(dp), parameter :: slow_damping = 0.5_dp
+   real(dp), parameter :: astray = 10.0_dp
+   real(dp), parameter :: shorter = 0.3_dp, shortest = 0.05_dp    !! steps after a stall
+   integer, parameter :: patience = 2
+   integer, parameter :: stalled = 15
+
+   !> What the passes of a step have shown.
+   type :: pass_control_type
+      real(dp) :: accuracy = coarsest               !! of the solves of the next pass
+      real(dp) :: damping = 1.0_dp                  !! of the step to the next place
+      logical :: forget = .false.                   !! the acceleration starts anew
+      logical :: go_back = .false.                  !! to the best place so far
+      logical :: best_yet = .false.                 !! the last pass was the best
+      real(dp), private :: tolerance = 0.0_dp
+      real(dp), private :: share = usual_share
+      real(dp), private :: length = 1.0_dp          !! of all steps, less than 1 after a stall
+      real(dp), private :: least = huge(1.0_dp)     !! mismatch so far
+      real(dp), private :: last = huge(1.0_dp)      !! mismatch
+      real(dp), private :: milestone = huge(1.0_dp) !! mismatch that must be halved
+      integer, private :: since = 0                 !! passes since the milestone
+      integer, private :: seen = 0
+      integer, private :: idle = 0                  !! passes whose mismatch did not fall
+   contains
+      procedure :: start
+      procedure :: judge
+   end type pass_control_type
+
+contains
+
+   !> Before the first pass of a step.
+   subroutine start(self, tolerance, expected)
+      class(pass_control_type), intent(out) :: self
+      real(dp), intent(in) :: tolerance             !! of the case
+      real(dp), intent(in) :: expected              !! mismatch of the first pass, as in the row before
+
+      self%tolerance = tolerance
+      self%accuracy = min(max(coarsest, tolerance), max(tolerance, usual_share*expected))
+   end subroutine start
+
+   !> After a pass.
+   pure subroutine judge(self, mismatch)
+      class(pass_control_type), intent(inout) :: self
+      real(dp), intent(in) :: mismatch
+
+      self%seen = self%seen + 1
+      self%damping = self%length
+      if (self%seen > 2 .and. mismatch > slow*self%last) self%damping = slow_damping*self%length
+      self%last = mismatch
+
+      self%idle = self%idle + 1
+      if (self%seen == 1 .or. mismatch <= falls*self%least) self%idle = 0
+      if (self%idle == patience) then
+         self%share = max(0.1_dp*self%share, least_share)
+         self%idle = 0
+      end if
+      self%accuracy = max(finest*self%tolerance, self%share*mismatch)
+      if (self%share >= usual_share) self%accuracy = max(self%accuracy, self%tolerance)
+      self%accuracy = min(self%accuracy, max(coarsest, self%tolerance))
+
+      self%forget = mismatch > astray*self%least
+      self%best_yet = mismatch < self%least
+      self%least = min(self%least, mismatch)
+      self%since = self%since + 1
+      if (mismatch < 0.5_dp*self%milestone) then
+         self%milestone = mismatch
+         self%since = 0
+      end if
+      self%go_back = self%since >= stalled
+      if (self%go_back) then
+         self%forget = .true.
+         self%since = 0
+         self%length = max(shorter*self%length, shortest)
+         self%damping = self%length
+      end if
+   end subroutine judge
+
+end module pass_control

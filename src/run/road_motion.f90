@@ -1,0 +1,117 @@
+!> The motion of the road under the rubber at the start of a row.
+!>
+!> The road moves on, and the fields that belong to places of the road (pressure, tractions, states
+!> of contact) are shifted with it by whole cells: they are the best start for the solvers. The
+!> rubber's surface is expected to move on as in the step before.
+module road_motion
+   use contact_state, only : contact_state_type
+   use interpolation, only : displaced, shifted
+   use precision, only : dp, int8
+   use regular_grid, only : boundary_free
+   use schedule, only : planned_row_type
+   implicit none
+   private
+
+   public :: move_road, place_road
+
+contains
+
+   !> Move the road, and the pressure with it.
+   subroutine move_road(self, plan)
+      class(contact_state_type), intent(inout) :: self
+      type(planned_row_type), intent(in) :: plan
+      integer :: cells(2)
+      real(dp) :: drift(2), seen(2)
+
+      if (abs(plan%velocity_x) > 0.0_dp .or. abs(plan%velocity_y) > 0.0_dp) &
+         self%direction = [plan%velocity_x, plan%velocity_y]/hypot(plan%velocity_x, plan%velocity_y)
+      if (.not. self%slides) return
+      drift = 0.0_dp
+      if (self%rubs()) then
+         ! The surface is expected to move on as in the step before; where the road starts, with it.
+         drift = self%tangential%rate*plan%dt
+         if (plan%new_speed .and. .not. any(abs(self%velocity) > 0.0_dp)) &
+            drift = [plan%velocity_x, plan%velocity_y]*plan%dt
+      end if
+      self%velocity = [plan%velocity_x, plan%velocity_y]
+      self%drift = drift
+      self%drifted = self%drifted + drift
+      seen = [plan%road_x, plan%road_y] - self%drifted
+      cells = nint(seen/[self%grid%dx, self%grid%dy])
+      if (any(cells /= self%moved_cells)) then
+         call shift_fields(self, cells - self%moved_cells)
+         self%moved_cells = cells
+      end if
+      ! With friction the passes read the road where the surface is.
+      if (.not. self%rubs()) call place_road(self, plan%road_x, plan%road_y)
+   end subroutine move_road
+
+   !> Heights and slopes of the road at a displacement, under a surface that has not moved.
+   subroutine place_road(self, road_x, road_y)
+      class(contact_state_type), intent(inout) :: self
+      real(dp), intent(in) :: road_x, road_y        !! m
+
+      if (self%slides) call shifted(self%road, road_x, road_y, self%height, self%slope_x, self%slope_y)
+   end subroutine place_road
+
+   !> Shift by whole cells what moves with the road.
+   subroutine shift_fields(self, cells)
+      class(contact_state_type), intent(inout) :: self
+      integer, intent(in) :: cells(2)
+      logical :: free
+      integer :: c
+
+      free = self%grid%boundary == boundary_free
+      call shift_field(cells, free, self%pressure)
+      if (self%side%adhesive .and. .not. free) call shift_field(cells, free, self%gap)
+      if (.not. self%rubs()) return
+      do c = 1, 2
+         call shift_field(cells, free, self%tangential%traction(:, :, c))
+         call shift_field(cells, free, self%tangential%before(:, :, c))
+      end do
+      call shift_states(cells, free, self%tangential%contact)
+   end subroutine shift_fields
+
+   !> Shift a field by whole cells; what enters a free map is zero.
+   subroutine shift_field(cells, free, field)
+      integer, intent(in) :: cells(2)
+      logical, intent(in) :: free
+      real(dp), intent(inout) :: field(:, :)
+      real(dp), allocatable :: moved(:, :)
+      integer :: i, j, from_i, from_j, nx, ny
+
+      nx = size(field, 1)
+      ny = size(field, 2)
+      allocate (moved(nx, ny))
+      !$omp parallel do default(none) shared(field, moved, cells, free, nx, ny) &
+      !$omp private(i, j, from_i, from_j)
+      do j = 1, ny
+         from_j = j - cells(2)
+         do i = 1, nx
+            from_i = i - cells(1)
+            if (.not. free) then
+               moved(i, j) = field(modulo(from_i - 1, nx) + 1, modulo(from_j - 1, ny) + 1)
+            else if (from_i >= 1 .and. from_i <= nx .and. from_j >= 1 .and. from_j <= ny) then
+               moved(i, j) = field(from_i, from_j)
+            else
+               moved(i, j) = 0.0_dp
+            end if
+         end do
+      end do
+      field(:, :) = moved
+   end subroutine shift_field
+
+   !> The same for the states of contact.
+   subroutine shift_states(cells, free, states)
+      integer, intent(in) :: cells(2)
+      logical, intent(in) :: free
+      integer(int8), intent(inout) :: states(:, :)
+
+      if (free) then
+         states(:, :) = eoshift(eoshift(states, -cells(1), dim=1), -cells(2), dim=2)
+      else
+         states(:, :) = cshift(cshift(states, -cells(1), dim=1), -cells(2), dim=2)
+      end if
+   end subroutine shift_states
+
+end module road_motion

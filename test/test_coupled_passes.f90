@@ -1,0 +1,157 @@
+!> Tests of the passes of a row with friction: acceleration, control, and what they settle.
+module test_coupled_passes
+   use anderson_mixing, only : mixing_type
+   use check, only : begin_suite, check_close, check_that
+   use coupled_passes, only : carry
+   use pass_control, only : pass_control_type
+   use precision, only : dp
+   use simulation_runs, only : check_books, nl, record_type, run_case
+   implicit none
+   private
+
+   public :: run_coupled_passes
+
+contains
+
+   subroutine run_coupled_passes()
+      call begin_suite('coupled_passes')
+      call test_carry()
+      call test_mixing()
+      call test_control()
+      call test_thick_block()
+      call test_steep_road()
+   end subroutine run_coupled_passes
+
+   !> Whole cells exactly, parts bilinearly, round a periodic map and on to the rim of a free one.
+   subroutine test_carry()
+      integer, parameter :: nx = 9, ny = 5
+      real(dp), parameter :: cell(2) = [0.5_dp, 0.3_dp]
+      real(dp) :: field(nx, ny), moved(nx, ny), expected(nx, ny)
+      integer :: i, j
+
+      do j = 1, ny
+         do i = 1, nx
+            field(i, j) = sin(1.3_dp*i) + cos(2.1_dp*i*j)
+         end do
+      end do
+      call carry(field, [2, -1]*cell, cell, .true., moved)
+      expected = cshift(cshift(field, 2, dim=1), -1, dim=2)
+      call check_close(maxval(abs(moved - expected)), 0.0_dp, 1.0e-14_dp, 'whole cells, periodic')
+      call carry(field, [-0.25_dp, 0.0_dp]*cell, cell, .true., moved)
+      expected = 0.75_dp*field + 0.25_dp*cshift(field, -1, dim=1)
+      call check_close(maxval(abs(moved - expected)), 0.0_dp, 1.0e-14_dp, 'a part of a cell')
+      call carry(field, [1.5_dp, 0.0_dp]*cell, cell, .false., moved)
+      call check_close(moved(3, 2), 0.5_dp*(field(4, 2) + field(5, 2)), 1.0e-14_dp, 'free, inside')
+      call check_close(moved(nx, 2), field(nx, 2), 1.0e-14_dp, 'free, at the rim')
+   end subroutine test_carry
+
+   !> Maps that plain iteration does not settle: with gains of -2.5 and 1.5 in six directions, and
+   !> one that depends on a field nonlinearly.
+   subroutine test_mixing()
+      integer, parameter :: nx = 8, ny = 5
+      type(mixing_type) :: mixing
+      real(dp) :: gain(nx, ny, 2), answer(nx, ny, 2), z(nx, ny, 2), f(nx, ny, 2), first
+      integer :: i, j, pass
+
+      do j = 1, ny
+         do i = 1, nx
+            gain(i, j, :) = [-2.5_dp + 0.8_dp*mod(i, 3), 0.5_dp*mod(j, 3) + 0.5_dp*mod(i, 2)]
+            answer(i, j, :) = [sin(1.3_dp*i*j), cos(0.7_dp*i + j)]
+         end do
+      end do
+      gain = merge(1.5_dp, gain, abs(gain - 1.0_dp) < 0.1_dp)
+      z = 0.0_dp
+      call mixing%start()
+      do pass = 1, 40
+         f = (gain - 1.0_dp)*(z - answer)
+         if (pass == 1) first = norm2(f)
+         call mixing%next(f, 0.5_dp, z)
+      end do
+      call check_that(norm2(f) < 1.0e-9_dp*first, 'a linear map')
+      z = 0.0_dp
+      call mixing%start()
+      do pass = 1, 60
+         f = (gain - 1.0_dp)*(z - answer) + 0.1_dp*((z - answer)**2 + (cshift(z, 1) - cshift(answer, 1))**3)
+         if (pass == 1) first = norm2(f)
+         call mixing%next(f, 0.5_dp, z)
+      end do
+      call check_that(norm2(f) < 1.0e-8_dp*first, 'a nonlinear map')
+      call mixing%next(0.0_dp*f, 1.0_dp, z)
+      f = z
+      call mixing%next(0.0_dp*f, 1.0_dp, z)
+      call check_close(maxval(abs(z - f)), 0.0_dp, 0.0_dp, 'a place that is found stays')
+   end subroutine test_mixing
+
+   !> The accuracy follows the mismatch, and becomes finer where it does not fall.
+   subroutine test_control()
+      type(pass_control_type) :: control
+      integer :: i
+
+      call control%start(1.0e-6_dp, 1.0e-7_dp)
+      call check_close(control%accuracy, 1.0e-6_dp, 1.0e-20_dp, 'where one pass was enough')
+      call control%start(1.0e-6_dp, 1.0_dp)
+      call check_that(control%accuracy > 1.0e-4_dp, 'where nothing is known')
+      call control%judge(1.0e-2_dp)
+      call check_close(control%accuracy, 1.0e-3_dp, 1.0e-18_dp, 'a tenth of what is left')
+      call control%judge(1.0e-3_dp)
+      call check_close(control%accuracy, 1.0e-4_dp, 1.0e-18_dp, 'a tenth of what is left')
+      call check_that(control%best_yet .and. .not. (control%forget .or. control%go_back), 'goes on')
+      call control%judge(1.0e-3_dp)
+      call check_that(.not. control%best_yet .and. control%damping < 1.0_dp, 'shorter where it is slow')
+      call control%judge(1.0e-3_dp)
+      call check_close(control%accuracy, 1.0e-5_dp, 1.0e-18_dp, 'finer where the mismatch stays')
+      call control%judge(0.1_dp)
+      call check_that(control%forget .and. .not. control%go_back, 'astray')
+      do i = 1, 15
+         call control%judge(1.0e-3_dp)
+         if (control%go_back) exit
+      end do
+      call check_that(control%go_back .and. i < 15, 'back to the best place')
+      call check_that(control%damping < 0.5_dp, 'shorter steps from there')
+   end subroutine test_control
+
+   !> A steep wave under a massless block of forty wavelengths, once sheared: with the strains read
+   !> one pass behind the contact no number of passes ended its jumps (mean change of the speed above
+   !> 1 m/s with 2 passes as with 30).
+   subroutine test_thick_block()
+      type(record_type) :: record
+      real(dp) :: swing
+      integer :: n
+
+      call run_case('&grid nx = 192, ny = 1, lx = 1e-3, ly = 1e-3 /'//nl// &
+         '&surface shape = ''sine'', amplitude = 3e-5, wavelength = 0.5e-3 /'//nl// &
+         '&material shear_modulus = 1e6, thickness = 20e-3 /'//nl// &
+         '&friction law = ''coulomb'', coefficient = 0.5 /'//nl// &
+         '&phase pressure = 0.15e6 /'//nl// &
+         '&phase velocity_x = 1, duration = 1.6e-3, steps = 40 /'//nl// &
+         '&phase velocity_x = 1, duration = 0.3125e-3, steps = 60 /', 'thick block', record)
+      n = size(record%rows)
+      associate (speed => record%rows(n - 30:)%sliding_speed)
+         swing = sum(abs(speed(2:) - speed(:size(speed) - 1)))/(size(speed) - 1)
+         call check_that(swing < 1.0e-3_dp, 'a thick block slides')
+         call check_close(sum(speed)/size(speed), 1.0_dp, 1.0e-3_dp, 'its mean speed')
+      end associate
+   end subroutine test_thick_block
+
+   !> rms slope 0.45 and coefficient 0.8, on which plain passes flip: settled, and the books close.
+   subroutine test_steep_road()
+      type(record_type) :: record
+
+      call run_case('&grid nx = 32, ny = 32, lx = 1e-3, ly = 1e-3 /'//nl// &
+         '&surface shape = ''self_affine'', hurst = 0.8, wavelength_long = 0.5e-3, '// &
+         'wavelength_short = 0.2e-3, rms_slope = 0.45, seed = 3 /'//nl// &
+         '&material shear_modulus = 1e6, prony_g = 2e6, prony_tau = 1e-3, thickness = 0.5e-3 /'//nl// &
+         '&friction law = ''coulomb'', coefficient = 0.8 /'//nl// &
+         '&phase pressure = 0.4e6 /'//nl// &
+         '&phase velocity_x = 0.1, velocity_y = 0.03, duration = 2.5e-3, steps = 8 /'//nl// &
+         '&phase pressure = 0.2e6, duration = 0.6e-3, steps = 2 /'//nl// &
+         '&solver tolerance = 1e-7, interpolation = ''cubic'' /', 'steep road', record)
+      call check_that(maxval(record%rows%residual_coupling) <= 1.0e-7_dp, 'the passes settle')
+      call check_that(maxval(record%rows%passes) > 3, 'it is a hard case')
+      call check_books(record, 'steep road', 1.0e-6_dp)
+      associate (lost => record%rows%dissipated_friction)
+         call check_that(all(lost(2:) >= lost(:size(lost) - 1)), 'friction takes energy, in the jump, too')
+      end associate
+   end subroutine test_steep_road
+
+end module test_coupled_passes
