@@ -1,9 +1,9 @@
 """Try the passes of steps with friction on random hard cases, and list those that did not settle.
 
-Roads are self-affine or made of a few waves, with rms slopes up to 0.6; blocks are half-spaces, thin
-or thick, elastic or with up to five arms, with or without mass and adhesion; cells are periodic or
-free, square or oblong; the road moves along an axis or obliquely. The grids are small, so that 500
-cases take some minutes. A case ends in one of three ways:
+Roads are self-affine or made of a few waves, with rms slopes up to 0.6; blocks are half-spaces,
+thin or thick, elastic or with up to five arms, with or without mass and adhesion; cells are
+periodic or free, square or oblong; the road moves along an axis or obliquely. The grids are small,
+so that 500 cases take some minutes. A case ends in one of three ways:
 
 settled    exit status 0, and `residual_coupling` of all rows is within the tolerance
 told       exit status 4: the run says that a solver or the passes did not converge
@@ -105,7 +105,8 @@ def make_case(seed: int, folder: Path) -> tuple[str, dict[str, Any]]:
     if adhesive:
         reach = 2 * dx * slope
         energy = 0.3 * modulus * reach**2 / dx
-        text += f"&adhesion potential = 'exponential', energy = {energy:.6g}, range = {reach:.6g} /\n"
+        text += (f"&adhesion potential = 'exponential', energy = {energy:.6g}, "
+                 f"range = {reach:.6g} /\n")
     text += (f"&phase pressure = {pressure:.6g} /\n"
              f"&phase velocity_x = {SPEED * np.cos(angle):.6g}, "
              f"velocity_y = {SPEED * np.sin(angle):.6g}, duration = {12 * dt:.9g}, steps = 12 /\n"

@@ -87,7 +87,7 @@ contains
    !>
    !> Normal solver: 10 fields and one padded buffer (one field in periodic mode, four in free mode);
    !> each arm one field, and three for the steps before and their traction; sliding four, the
-   !> original map and its slopes; adhesion 6 fields and a second buffer; friction 32 fields, two
+   !> original map and its slopes; adhesion 6 fields and a second buffer; friction 42 fields, two
    !> buffers, and with arms four fields and two an arm; mixed precision 0.6 of a buffer. The rest:
    !> 26 MB. Measured at 1024 x 1024 cells on one thread, MB: 118 for 119 (elastic), 202 for 202 (three
    !> arms, sliding), 431 for 437 (friction), 742 for 747 (friction, ten arms).
@@ -109,7 +109,7 @@ contains
          buffers = buffers + 1.0_dp
       end if
       if (case%friction%law /= 'none') then
-         fields = fields + 32.0_dp + 2.0_dp*arms
+         fields = fields + 42.0_dp + 2.0_dp*arms
          if (arms > 0) fields = fields + 4.0_dp
          buffers = buffers + 2.0_dp
       end if

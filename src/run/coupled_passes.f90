@@ -23,8 +23,8 @@
 !> What remains is measured by the road read at U_T against the road solved on, `mismatch` below: the
 !> column `residual_coupling`.
 !>
-!> Fields of doubles: three times two components for the place, its residual and the best place; U_T
-!> of that; height and slopes of the check; and those of the acceleration.
+!> Fields of doubles: two components each for the place, its residual and the best place; height and
+!> slopes of the check; and those of the acceleration.
 module coupled_passes
    use anderson_mixing, only : mixing_type
    use contact_state, only : contact_mean, contact_state_type, solve_normal
@@ -52,7 +52,6 @@ module coupled_passes
       real(dp), allocatable, private :: place(:, :, :)      !! z, m [nx, ny, 2]
       real(dp), allocatable, private :: residuals(:, :, :)  !! U_T, carried, less z, m
       real(dp), allocatable, private :: best_place(:, :, :) !! z of the least mismatch, m
-      real(dp), allocatable, private :: best_found(:, :, :) !! U_T of the same, m
       real(dp), allocatable, private :: height(:, :)        !! of the road at U_T, m
       real(dp), allocatable, private :: slope_x(:, :), slope_y(:, :)
       type(mixing_type), private :: mixing
@@ -68,7 +67,7 @@ contains
       integer, intent(in) :: nx, ny
 
       allocate (self%place(nx, ny, 2), source=0.0_dp)
-      allocate (self%residuals, self%best_place, self%best_found, source=self%place)
+      allocate (self%residuals, self%best_place, source=self%place)
       allocate (self%height(nx, ny), self%slope_x(nx, ny), self%slope_y(nx, ny), source=0.0_dp)
    end subroutine new_coupled_passes
 
@@ -165,20 +164,17 @@ contains
    !> The next place, from what the last pass found.
    subroutine choose_place(self, state, control)
       class(coupled_passes_type), intent(inout) :: self
-      class(contact_state_type), intent(inout) :: state
+      class(contact_state_type), intent(in) :: state
       type(pass_control_type), intent(in) :: control
       real(dp) :: motion(2)
       integer :: c
 
-      if (control%best_yet) then
-         self%best_place(:, :, :) = self%place
-         self%best_found(:, :, :) = state%tangential%trial
-      end if
+      if (control%best_yet) self%best_place(:, :, :) = self%place
+      if (control%forget) call self%mixing%start()
       if (control%go_back) then
          self%place(:, :, :) = self%best_place
-         state%tangential%trial(:, :, :) = self%best_found
+         return
       end if
-      if (control%forget) call self%mixing%start()
       motion = contact_mean(state, state%tangential%trial) - contact_mean(state, self%place)
       do c = 1, 2
          call carry(state%tangential%trial(:, :, c), motion, [state%grid%dx, state%grid%dy], &

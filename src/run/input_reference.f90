@@ -231,7 +231,7 @@ contains
          row('solver', 'time_scheme', kind_word, '''exponential2''', '', &
             '''exponential2'' | ''exponential'' | ''backward_euler''', 'Time integration of the arms.'), &
          row('solver', 'passes', kind_integer, '0', '', 'not negative', &
-            'Most outer passes of a step with friction.'), &
+            'Most passes of a step with friction; 0: until they settle.'), &
          row('solver', 'slip_law', kind_word, '''physical''', '', '''physical'' | ''thesis''', &
             'Direction of slip on slopes.'), &
          row('solver', 'interpolation', kind_word, '''cubic''', '', '''cubic'' | ''linear''', &

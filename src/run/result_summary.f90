@@ -143,10 +143,11 @@ contains
       type(hdf5_file_type), intent(inout) :: file
       character(:), allocatable, intent(inout) :: text
       type(error_type), allocatable, intent(out) :: error
-      character(*), parameter :: names(10) = [character(20) :: 'step', 'phase', 'time', 'pressure', &
+      character(*), parameter :: names(11) = [character(20) :: 'step', 'phase', 'time', 'pressure', &
          'displacement', 'contact_area', 'stick_area', 'friction', 'residual_normal', &
-         'residual_tangential']
-      character(*), parameter :: units(10) = [character(3) :: '', '', ' s', ' Pa', ' m', '', '', '', '', '']
+         'residual_tangential', 'residual_coupling']
+      character(*), parameter :: units(11) = [character(3) :: '', '', ' s', ' Pa', ' m', '', '', '', '', '', &
+         '']
       real(dp), allocatable :: column(:)
       real(dp) :: last(size(names)), largest(size(names))
       integer :: expected, i, rows, turn
@@ -195,7 +196,8 @@ contains
       character(*), intent(in) :: name
       logical :: of_friction
 
-      of_friction = any(name == [character(20) :: 'stick_area', 'friction', 'residual_tangential'])
+      of_friction = any(name == [character(20) :: 'stick_area', 'friction', 'residual_tangential', &
+         'residual_coupling'])
    end function is_of_friction
 
 end module result_summary

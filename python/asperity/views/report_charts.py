@@ -147,6 +147,8 @@ class _Charts:
         lines = self.series("residual_normal", "normal", 0)
         if "residual_tangential" in history and np.any(history["residual_tangential"]):
             lines += self.series("residual_tangential", "tangential", 1, "6 3")
+        if "residual_coupling" in history and np.any(history["residual_coupling"]):
+            lines += self.series("residual_coupling", "coupling", 2, "2 3")
         tolerance = solver_setting(self.run, "tolerance")
         self.chart("convergence", "residuals", "Residuals, recomputed", "Residual", "1", lines,
                    log=True, levels=[] if tolerance is None else

@@ -72,6 +72,8 @@ LABELS = {
     "iterations_tangential": "Iterations, tangential",
     "residual_normal": "Residual, normal",
     "residual_tangential": "Residual, tangential",
+    "residual_coupling": "Residual, coupling",
+    "passes": "Passes",
     "step": "Step",
     "phase": "Phase",
     "ffts": "Transforms",
