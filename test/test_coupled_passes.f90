@@ -68,10 +68,10 @@ contains
          call mixing%next(f, 0.5_dp, z)
       end do
       call check_that(norm2(f) < 1.0e-9_dp*first, 'a linear map')
-      z = 0.0_dp
+      z = 0.7_dp*answer
       call mixing%start()
       do pass = 1, 60
-         f = (gain - 1.0_dp)*(z - answer) + 0.1_dp*((z - answer)**2 + (cshift(z, 1) - cshift(answer, 1))**3)
+         f = (gain - 1.0_dp)*(z - answer) + 0.3_dp*sin(z - answer)*cos(cshift(z, 1) - cshift(answer, 1))
          if (pass == 1) first = norm2(f)
          call mixing%next(f, 0.5_dp, z)
       end do

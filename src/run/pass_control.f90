@@ -21,6 +21,7 @@ module pass_control
 
    real(dp), parameter :: coarsest = 1.0e-3_dp      !! accuracy of a solve
    real(dp), parameter :: finest = 1.0e-4_dp        !! accuracy of a solve, in tolerances
+   real(dp), parameter :: round_off = 1.0e-11_dp    !! accuracy that double precision can reach
    real(dp), parameter :: usual_share = 0.1_dp, least_share = 1.0e-6_dp
    real(dp), parameter :: falls = 0.3_dp            !! a mismatch below this part of the least one falls
    real(dp), parameter :: slow = 0.5_dp             !! a mismatch above this part of the last falls slowly
@@ -79,7 +80,7 @@ contains
          self%share = max(0.1_dp*self%share, least_share)
          self%idle = 0
       end if
-      self%accuracy = max(finest*self%tolerance, self%share*mismatch)
+      self%accuracy = max(finest*self%tolerance, round_off, self%share*mismatch)
       if (self%share >= usual_share) self%accuracy = max(self%accuracy, self%tolerance)
       self%accuracy = min(self%accuracy, max(coarsest, self%tolerance))
 
