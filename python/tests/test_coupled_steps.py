@@ -1,0 +1,137 @@
+"""Steps and jumps with friction against solutions found without the program."""
+
+from __future__ import annotations
+
+import h5py
+import numpy as np
+import pytest
+from coupled_reference import Block
+
+import asperity
+from asperity import theory
+
+NX, NY, LENGTH = 9, 6, 1e-3
+
+
+def steep_map(seed: int, slope: float) -> np.ndarray:
+    """Return a map of three waves with an rms slope."""
+    rng = np.random.default_rng(seed)
+    dx = LENGTH / NX
+    x, y = np.meshgrid(np.arange(NX) * dx, np.arange(NY) * dx)
+    height = np.zeros_like(x)
+    for wave in ((1, 0), (1, 1), (2, 0)):
+        k = 2 * np.pi * np.array([wave[0] / LENGTH, wave[1] / (NY * dx)])
+        height += np.cos(k[0] * x + k[1] * y + rng.uniform(0, 6)) / np.hypot(*k)
+    transformed = np.fft.fft2(height)
+    square = sum(np.mean(np.fft.ifft2(2j * np.pi * q * transformed).real ** 2) for q in (
+        np.fft.fftfreq(NX, dx)[None, :], np.fft.fftfreq(NY, dx)[:, None]))
+    return height * slope / np.sqrt(square)
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+@pytest.mark.parametrize(("seed", "slope", "mu", "thickness", "arms"), [
+    (1, 0.45, 0.8, 0.5, [(2e6, 2e-4), (1e6, 3e-3)]),
+    (2, 0.5, 0.6, 0.05, []),
+    (3, 0.3, 0.4, 3.0, [(4e6, 1e-3)])])
+def test_whole_step_against_dense_solution(tmp_path, seed, slope, mu, thickness, arms):
+    """Steep roads under thin and thick blocks, driven obliquely, then half the load at once."""
+    height, dx = steep_map(seed, slope), LENGTH / NX
+    with h5py.File(tmp_path / "road.h5", "w") as file:
+        file["surface"] = height
+    pressure = 0.4 * (1e6 + sum(g for g, _ in arms)) * slope
+    dt = 5e-4
+    prony = "" if not arms else (f", prony_g = {', '.join(f'{g}' for g, _ in arms)}, "
+                                 f"prony_tau = {', '.join(f'{tau}' for _, tau in arms)}")
+    (tmp_path / "case.nml").write_text(
+        f"&grid nx = {NX}, ny = {NY}, lx = {LENGTH}, ly = {NY * dx!r} /\n"
+        "&surface shape = 'file', file = 'road.h5' /\n"
+        f"&material poisson = 0.4, shear_modulus = 1e6, thickness = {thickness * LENGTH}{prony} /\n"
+        f"&friction law = 'coulomb', coefficient = {mu} /\n&phase pressure = {pressure!r} /\n"
+        f"&phase velocity_x = 0.1, velocity_y = 0.04, duration = {2 * dt}, steps = 2 /\n"
+        f"&phase pressure = {pressure / 2!r} /\n"
+        "&solver tolerance = 1e-9, threads = 1, interpolation = 'cubic' /\n"
+        f"&output file = '{tmp_path / 'case.h5'}', snapshot_every = 1 /\n")
+    run = asperity.run(tmp_path / "case.nml", quiet=True)
+    assert run.history["residual_coupling"].max() <= 1e-9
+    assert run.history["passes"].max() > 4, "not a hard case"
+    block = Block(height, dx, poisson=0.4, thickness=thickness * LENGTH, long_term=1e6, arms=arms,
+                  coefficient=mu)
+    rows = [(pressure, (0.0, 0.0), 0.0)] + 2 * [(pressure, (0.1 * dt, 0.04 * dt), dt)] + [
+        (pressure / 2, (0.0, 0.0), 0.0)]
+    for snapshot, row in zip(run.snapshots, rows, strict=True):
+        assert block.step(*row) < 1e-9, "the reference itself"
+        top = block.pressure.max()
+        assert np.abs(snapshot.pressure.ravel() - block.pressure).max() < 2e-6 * top
+        assert np.abs(snapshot.traction_x.ravel() - block.traction[0]).max() < 2e-6 * top
+        assert np.abs(snapshot.traction_y.ravel() - block.traction[1]).max() < 2e-6 * top
+    assert (run.snapshots[-1].contact == 2).any()
+
+
+def held_sphere(tmp_path, factor: float) -> tuple[asperity.Run, float, float]:
+    """Shift a sphere in partial slip, change the load at once, move on; the load, the shift."""
+    radius, modulus, mu = 10e-3, 1e6, 0.01
+    load = 8 * modulus * 1e-9 / (3 * radius)
+    shift = 0.4 * mu * 1e-6 / radius
+    (tmp_path / "case.nml").write_text(
+        "&grid nx = 96, ny = 96, lx = 2.7e-3, boundary = 'free' /\n"
+        f"&surface shape = 'paraboloid', radius = {radius} /\n"
+        f"&material poisson = 0, shear_modulus = {modulus} /\n"
+        f"&friction law = 'coulomb', coefficient = {mu}, slope_effect = .false. /\n"
+        f"&phase force = {load!r} /\n&phase velocity_x = 1e-3, duration = {shift / 1e-3!r}, "
+        "steps = 4 /\n"
+        f"&phase force = {factor * load!r}, velocity_x = 1e-3, duration = {0.05 * shift / 1e-3!r}, "
+        "steps = 1 /\n"
+        f"&solver tolerance = 1e-8, threads = 1 /\n&output file = '{tmp_path / 'case.h5'}' /\n")
+    return asperity.run(tmp_path / "case.nml", quiet=True), load, shift
+
+
+def test_load_drop_in_partial_slip(tmp_path):
+    """Points slip on as the load falls: Cattaneo and Mindlin under the new load (nu = 0)."""
+    for factor in (0.5, 0.9):
+        run, load, shift = held_sphere(tmp_path, factor)
+        history, area = run.history, 2.7e-3**2
+        for row, way in ((4, shift), (5, shift), (6, 1.05 * shift)):
+            force = (1.0 if row == 4 else factor) * load
+            known = theory.mindlin(10e-3, 1e6, 0.0, 0.01, force, shift=way)
+            found = history["traction_x"][row] * area
+            assert found == pytest.approx(float(known.tangential), rel=4e-3), (factor, row)
+        # the stick radius follows from the depths: d(c) = d(a) - shift/mu
+        depth = 1e-4 * factor ** (2 / 3)
+        stick = np.pi * 10e-3 * max(depth - shift / 0.01, 0.0) / area
+        assert history["stick_area"][5] == pytest.approx(stick, abs=3e-3)
+        assert (np.diff(history["dissipated_friction"]) >= 0).all()
+        assert history["sliding_speed"][5] == 0
+        balance = (history["work_normal"] + history["work_tangential"] - history["energy_elastic"]
+                   - history["dissipated_friction"])
+        assert np.abs(balance).max() < 1e-7 * history["energy_elastic"].max()
+
+
+def test_load_rise_sticks(tmp_path):
+    """Under a load that rises, all sticks and the traction stays (nu = 0)."""
+    run, _, _ = held_sphere(tmp_path, 1.5)
+    history = run.history
+    assert history["stick_area"][5] == history["contact_area"][5]
+    assert history["traction_x"][5] == pytest.approx(history["traction_x"][4], rel=1e-6)
+    assert history["dissipated_friction"][5] == pytest.approx(
+        history["dissipated_friction"][4], rel=1e-6)
+
+
+def test_mass_moves_on_through_a_jump(tmp_path):
+    """In no time a mass keeps its place and its speed, whatever the traction does."""
+    (tmp_path / "case.nml").write_text(
+        "&grid nx = 24, ny = 16, lx = 1e-3, ly = 0.7e-3 /\n"
+        "&surface shape = 'paraboloid', radius = 5e-3 /\n"
+        "&material poisson = 0.5, shear_modulus = 1e6, thickness = 1e-3, density = 1e4 /\n"
+        "&friction law = 'coulomb', coefficient = 0.5 /\n&phase pressure = 1e5 /\n"
+        "&phase velocity_x = 0.5, duration = 2e-4, steps = 10 /\n"
+        "&phase pressure = 3e4, velocity_x = 0.5, duration = 2e-5, steps = 1 /\n"
+        "&solver tolerance = 1e-8, threads = 1 /\n"
+        f"&output file = '{tmp_path / 'case.h5'}', snapshot_every = 1 /\n")
+    run = asperity.run(tmp_path / "case.nml", quiet=True)
+    history = run.history
+    assert history["time"][11] == history["time"][10]
+    before, after = (run.snapshots[k].displacement_x.mean() for k in (10, 11))
+    assert after == pytest.approx(before, rel=1e-9)
+    assert history["energy_kinetic"][11] == history["energy_kinetic"][10] > 0
+    assert history["sliding_speed"][11] == pytest.approx(history["sliding_speed"][10], rel=1e-9)
+    assert (np.diff(history["dissipated_friction"]) >= 0).all()
