@@ -106,8 +106,8 @@ def test_a_checkpoint_that_was_changed_is_refused(tmp_path: Path) -> None:
     case.write_text(vc.text(steps=4, size=24))
     go(case, 3)
     with h5py.File(tmp_path / "case.checkpoint.h5", "a") as file:
-        assert file["state/passes/steps"].attrs["long_name"]
-        del file["state/passes/steps"]
+        assert file["state/passes/first_mismatch"].attrs["long_name"]
+        del file["state/passes/first_mismatch"]
     with pytest.raises(OSError, match=r"case\.checkpoint\.h5.*damaged"):
         asperity.run(case, restart=True)
 
