@@ -180,6 +180,18 @@ def test_the_same_however_it_is_run(tmp_path):
                   != alone.values["friction"][0, 0])
 
 
+@pytest.mark.slow
+def test_the_same_through_dask(tmp_path):
+    distributed = pytest.importorskip("distributed")
+    plan = small_plan()
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None,
+                                  local_directory=str(tmp_path)) as cluster, \
+            distributed.Client(cluster) as client:
+        found = run_curve(plan, tmp_path / "dask", Means(1, executor=client.get_executor()),
+                          quiet=True)
+    same(found, curve_of(plan, tmp_path / "alone"))
+
+
 def test_the_same_after_a_loss(tmp_path):
     plan = small_plan()
     whole = curve_of(plan, tmp_path)

@@ -307,5 +307,8 @@ def _banded(k: FloatArray, psd: FloatArray, length: float, cell: float
     modes = np.bincount(band[inside], minlength=count)
     waves = np.bincount(band[inside], np.log(k[inside]), count)
     sums = np.bincount(band[inside], psd[inside], count)
-    kept = (modes > 0) & (sums > 0.0)
-    return np.exp(waves[kept] / modes[kept]), sums[kept] / modes[kept]
+    middle = np.exp(waves / np.maximum(modes, 1))
+    slope = sums * middle**2
+    # numbers far below the rest are the round-off of the Fourier transform
+    kept = (modes > 0) & (slope > 1e-16 * slope.max())
+    return middle[kept], sums[kept] / modes[kept]

@@ -14,7 +14,6 @@ from ..base.check import whole
 from ..base.errors import NotConverged
 from ..results import Run
 from . import namelists
-from .case import Case
 from .row import Row
 from .simulation import RunView
 
@@ -30,6 +29,11 @@ class _CaseLike(Protocol):
     """What is needed of an `asperity.Case`: its text is ``str(case)``."""
 
     path: Path | None
+    result: Path
+
+    def kept_in(self, folder: Path) -> _CaseLike:
+        """Return the case with its height maps kept in files of a folder."""
+        ...
 
 
 def run(
@@ -93,7 +97,7 @@ def run(
     target = b"" if output is None else os.fsencode(output)
     if output is not None and not 0 < len(target) <= 1024:
         raise ValueError(f"output: has {len(target)} characters: must have 1 to 1024")
-    if isinstance(case, Case):
+    if not isinstance(case, str | os.PathLike):
         # A result outlives this process: height maps that are arrays are kept beside it.
         case = case.kept_in((Path(output) if output else case.result).parent)
     path, text = namelists.source(case)

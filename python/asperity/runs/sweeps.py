@@ -18,6 +18,7 @@ import numpy as np
 
 from ..base.check import choice
 from ..results import Run, open_result
+from ..results.steady import steady_mean
 from . import namelists
 from .case import Case
 from .jobs import Job, is_done
@@ -39,7 +40,7 @@ def sweep(
     jobs: int | None = 1,
     threads: int = 1,
     resume: bool = True,
-    measure: Callable[[Run], Mapping[str, Any]] | None = None,
+    measure: Callable[[Run], Mapping[str, Any]] | str | None = None,
     errors: str = "raise",
     quiet: bool = False,
     executor: Executor | None = None,
@@ -78,7 +79,9 @@ def sweep(
     measure : callable, optional
         Takes an opened result and returns a dict of what is wanted from it, the same names for each
         case. By default the last row of every column of the history. It is called at the end, so
-        that an error in it loses no run: the next call finds the results.
+        that an error in it loses no run: the next call finds the results. The word 'steady' stands
+        for the means of `asperity.Run.steady` of all columns that it makes sense for, with
+        ``friction_error`` and ``laps``.
     errors : {'raise', 'keep'}
         What to do if cases fail: raise `SweepError`, with the table, once all others are done; or
         return the table, which names them in ``failed``. With 'raise', inputs that are wrong raise
@@ -126,6 +129,8 @@ def sweep(
     [0.203125, 0.390625, 1.0]
     """
     choice("errors", errors, ("raise", "keep"))
+    if isinstance(measure, str):
+        choice("measure", measure, ("steady",))
     side_by_side, threads = share_of_processors(jobs, threads)
     case = base.copy() if isinstance(base, Case) else Case.read(base)
     points, shape = _points(parameters, zip)
@@ -323,7 +328,7 @@ def _write_index(folder: Path, work: list[Job]) -> None:
 
 
 def _table(work: list[Job], shape: tuple[int, ...],
-           measure: Callable[[Run], Mapping[str, Any]] | None) -> Sweep:
+           measure: Callable[[Run], Mapping[str, Any]] | str | None) -> Sweep:
     """Return the table of all cases."""
     failed = []
     found: list[dict[str, Any] | None] = []
@@ -349,8 +354,23 @@ def _table(work: list[Job], shape: tuple[int, ...],
     return Sweep(columns, parameters, shape, [job.path for job in work], failed)
 
 
-def _measured(measure: Callable[[Run], Mapping[str, Any]], run: Run) -> dict[str, Any]:
+_MEANS = ("friction", "friction_viscous", "contact_area", "mean_gap", "displacement", "stick_area",
+          "sliding_speed", "traction_x", "traction_y", "power_viscous", "power_friction")
+
+
+def _steady(run: Run) -> dict[str, Any]:
+    """Return the means over whole laps, with the error of friction and the laps."""
+    values: dict[str, Any] = {name: steady_mean(run, name).mean for name in _MEANS
+                              if name in run.history}
+    found = run.steady("friction")  # this one warns of part laps
+    return values | {"friction_error": found.error, "laps": found.laps}
+
+
+def _measured(measure: Callable[[Run], Mapping[str, Any]] | str, run: Run) -> dict[str, Any]:
     """Return what is asked of a run, by names."""
+    if isinstance(measure, str):
+        choice("measure", measure, ("steady",))
+        return _steady(run)
     values = measure(run)
     if not isinstance(values, Mapping) or not all(isinstance(name, str) for name in values):
         raise ValueError(f"measure: returned {values!r} for {run.path.name}: must return a dict"

@@ -26,6 +26,7 @@ from ..results.derived import (
     road_speed,
     travel,
 )
+from ..results.steady import steady_mean
 from .plot_fields import plot_field, plot_section
 from .style import (
     COLOURS,
@@ -206,11 +207,27 @@ def _draw(run: Run, name: str, along: NDArray[Any], axes: Axes, style: dict[str,
             axes.plot(along[rows], outside, color=COLOURS[3], marker="s", linestyle="",
                       label="attraction outside contact", clip_on=False)
             parts = parts or [("outside", outside, "", "")]
+    if name == "friction":
+        _draw_mean(run, axes)
     axes.set_ylabel(axis_text(label_of(name, history), unit))
     if not parts:
         _sane_limits(axes, values * factor)
     else:
         _legend_above(axes)
+
+
+def _draw_mean(run: Run, axes: Axes) -> None:
+    """Draw the mean of friction over whole laps; of part of a lap, say so."""
+    if run.history.rows < 2 or not np.any(run.history["friction"]):
+        return
+    found = steady_mean(run, "friction")
+    if 1.0 <= found.laps < np.inf:
+        laps = "last lap" if found.laps == 1.0 else f"last {found.laps:.0f} laps"
+        axes.axhline(found.mean, color=COLOURS[6], linestyle=":", linewidth=0.9,
+                     label=f"mean of the {laps}")
+    elif 0.0 < found.laps < 1.0:
+        axes.annotate(f"{2.0 * found.laps:.2g} of a lap: no mean", (0.98, 0.03),
+                      xycoords="axes fraction", ha="right", fontsize="small", color="0.35")
 
 
 def _draw_energy(run: Run, along: NDArray[Any], axes: Axes, style: dict[str, Any]) -> None:

@@ -16,6 +16,7 @@ import numpy as np
 from ..base.library import version
 from ..results.derived import closure, energy_terms, has_friction, solver_setting
 from ..results.standing import duration, rows_of, seems_dead, short_time, silence, time_of_row
+from ..results.steady import steady_mean
 from .page_parts import PAGE, colour_scales, fill_page, page_file, page_json
 from .report_data import faulty, now, page_data, phase_names
 from .style import si_scale
@@ -159,7 +160,24 @@ def _tiles(run: Run) -> str:
                       "</div>" for name, label in names if name in history
                       for units in [history.units(name)])
     step = f", step {history['step'][-1]}" if "step" in history else ""
-    return f'<p class="soft">The last row{step}:</p>\n<dl class="tiles">\n{tiles}\n</dl>'
+    return (f'<p class="soft">The last row{step}:</p>\n<dl class="tiles">\n{tiles}\n</dl>'
+            + (_mean_friction(run) if moving and history.rows > 1 else ""))
+
+
+def _mean_friction(run: Run) -> str:
+    """Return the mean of friction over whole laps, or that there are none."""
+    found = steady_mean(run, "friction")
+    if not found.laps:
+        return ""
+    if np.isinf(found.laps):
+        return '\n<p class="soft">The last row is steady sliding: the state after all laps.</p>'
+    mean = escape(f"{found.mean:.4g}".replace("-", "−"))
+    if found.laps < 1.0:
+        return f'\n<p class="soft">Mean friction {mean}: {escape(found.note)}.</p>'
+    error = "" if np.isnan(found.error) else f" ± {found.error:.2g}"
+    note = f"; {escape(found.note)}" if found.note else ""
+    return (f'\n<p class="soft">Mean friction over the last {found.laps:.0f}'
+            f" lap{'' if found.laps == 1 else 's'} of the road: {mean}{error}{note}.</p>")
 
 
 def _sections(run: Run, data: dict[str, Any]) -> list[tuple[str, str, str]]:

@@ -1,0 +1,201 @@
+"""Roads: joins, outliers, spectra and patches, against closed forms and roads that are known."""
+
+import h5py
+import numpy as np
+import pytest
+
+import asperity
+from asperity import theory
+from asperity.roads.joins import JOINS, join, load_at_join, margin_of, smooth_part, strip
+from asperity.roads.measured import MeasuredSurface
+from asperity.roads.outliers import find_outliers
+from asperity.roads.patches import MeasuredRoad, low_pass
+from asperity.roads.spectra import Spectrum, isotropic_of_profile, join_spectra, spectrum_of_map
+
+
+def road(cells=256, long=0.25, short=8 / 256, seed=1):
+    """Return a periodic road of side 1 and its spectrum, rms slope 0.1."""
+    spectrum = Spectrum(*theory.self_affine_psd(0.8, long, long, short, rms_slope=0.1))
+    return spectrum.draw(cells, cells, 1.0, 1.0, seed), spectrum
+
+
+def jump(height):
+    """Return the largest step across the opposite edges over the largest one inside."""
+    inside = max(np.abs(np.diff(height, axis=axis)).max() for axis in (0, 1))
+    across = max(np.abs(height[0] - height[-1]).max(), np.abs(height[:, 0] - height[:, -1]).max())
+    return across / inside
+
+
+@pytest.mark.parametrize("method", JOINS[:4])
+def test_joined_patches_are_periodic(method):
+    height, _ = road()
+    margin = margin_of(96) if method == "blend" else 0
+    part = height[20 : 116 + margin, 30 : 126 + margin]
+    assert jump(part[:96, :96]) > 2.0
+    joined = join(part, method, (96, 96))
+    assert joined.shape == ((192, 192) if method == "mirror" else (96, 96))
+    assert jump(joined) < 1.3
+    # the inside is that of the road, but for what carries the jumps
+    inner = slice(24, 72)
+    change = joined[inner, inner] - part[inner, inner]
+    if method in ("blend", "mirror"):
+        np.testing.assert_allclose(change, 0.0, atol=1e-15)
+    assert np.std(change) < 0.5 * np.std(part)
+
+
+def test_the_smooth_part_has_the_laplacian_of_the_jumps():
+    """Periodic plus smooth: inside, both have the Laplacian of the map, and 0."""
+    height, _ = road(64, short=0.125)
+    part = height[:48, :40]
+    smooth = smooth_part(part)
+    laplacian = (smooth[:-2, 1:-1] + smooth[2:, 1:-1] + smooth[1:-1, :-2] + smooth[1:-1, 2:]
+                 - 4 * smooth[1:-1, 1:-1])
+    np.testing.assert_allclose(laplacian, 0.0, atol=1e-14)
+    assert abs(smooth.mean()) < 1e-15
+    level = np.full((8, 8), 3.0)
+    np.testing.assert_allclose(smooth_part(level), 0.0, atol=1e-14)
+    profile = np.linspace(0.0, 1.0, 50)[None, :]
+    flat = join(profile, "smooth")
+    assert np.abs(np.diff(flat)).max() < 1.0 / 20 and np.ptp(flat) < 1e-12 + 0.05
+
+
+def test_blending_keeps_the_roughness():
+    """The weights' squares sum to 1: where parts are independent the variance stays."""
+    heights = []
+    for seed in range(6):
+        height, spectrum = road(seed=seed, long=0.1)
+        part = height[: 96 + margin_of(96), : 96 + margin_of(96)]
+        joined = join(part - part.mean(), "blend", (96, 96))
+        heights.append(np.var(joined[: margin_of(96)]))
+    expected = theory.psd_moments(spectrum.wavenumber, spectrum.psd)[0] ** 2
+    assert np.mean(heights) == pytest.approx(expected, rel=0.2)
+
+
+def test_load_at_the_join():
+    """A uniform pressure has equal shares; a frame that carries all is seen."""
+    even = np.ones((64, 64))
+    for method in JOINS[:4]:
+        load, area = load_at_join(even, method)
+        assert load == pytest.approx(area) and 0.1 < area < 0.45
+    frame = strip((64, 64), 0.125).astype(float)
+    assert load_at_join(frame, "smooth") == (1.0, pytest.approx(frame.mean()))
+
+
+def test_the_window_unloads_its_frame_and_blending_does_not():
+    """What tools/joins.py measures on larger maps, for one map of short waves."""
+    shares = {}
+    for method in ("blend", "window"):
+        found = []
+        for seed in range(12):
+            height, _ = road(seed=seed, long=0.1)
+            part = height[: 96 + margin_of(96), : 96 + margin_of(96)]
+            part = part if method == "blend" else part[:96, :96]
+            map_ = low_pass(join(part, method, (96, 96)), 0.375, 0.375, 6 / 256)
+            solved = asperity.solve_normal(map_, 0.375, 0.375, 1.0, pressure=2e-3, tolerance=1e-4)
+            load, area = load_at_join(solved.pressure, method)
+            found.append(load / area)
+        shares[method] = np.mean(found)
+    assert 0.75 < shares["blend"] < 1.25
+    assert shares["window"] < 0.7
+
+
+def test_outliers_are_single_cells_and_not_steep_edges():
+    height, _ = road()
+    assert find_outliers(height).count == 0
+    y, x = np.mgrid[0:256, 0:256] / 256
+    stones = np.cos(8 * np.pi * x + 1) * np.cos(6 * np.pi * y) > 0.2
+    steps = height + 0.5 * stones                       # with vertical sides
+    assert find_outliers(steps).count == 0
+    dusty = height.copy()
+    dusty[100, 31] += 1.0
+    dusty[5, 6] -= 0.5
+    dusty[5, 7] -= 0.5
+    found = find_outliers(dusty)
+    assert np.argwhere(found.cells).tolist() == [[5, 6], [5, 7], [100, 31]]
+    assert np.abs(found.mended - height)[found.cells].max() < 5 * np.std(height) / 10
+    np.testing.assert_array_equal(found.mended[~found.cells], dusty[~found.cells])
+    assert "3 of 65536 cells lie far off" in found.told()
+    assert find_outliers(np.zeros((8, 8))).count == 0
+
+
+def test_drawn_maps_have_the_spectrum():
+    height, spectrum = road()
+    found = spectrum_of_map(height, 1.0, 1.0, periodic=True)
+    # the band in which the spectrum ends is filled in part
+    inside = found.wavenumber < 0.95 * spectrum.wavenumber[-1]
+    assert inside.sum() >= len(inside) - 1
+    np.testing.assert_allclose(found.psd[inside], spectrum.at(found.wavenumber[inside]), rtol=0.05)
+    np.testing.assert_array_equal(height, road()[0])
+    assert np.any(height != road(seed=2)[0])
+
+
+def test_a_profile_stands_for_its_isotropic_road():
+    """Abel's transform, closed form: Phi = (1 + k^2)^-2 has the profile (1 + k^2)^-1.5 / 4."""
+    k = np.geomspace(1e-2, 1e3, 400)
+    found = isotropic_of_profile(k, 0.25 * (1 + k**2) ** -1.5)
+    inner = (found.wavenumber > 0.05) & (found.wavenumber < 300.0)
+    np.testing.assert_allclose(found.psd[inner], (1 + found.wavenumber[inner] ** 2) ** -2.0,
+                               rtol=5e-3)
+
+
+def test_profiles_of_a_map_have_its_spectrum():
+    height, spectrum = road(512, short=8 / 512)
+    power = np.mean(np.abs(np.fft.rfft(height, axis=1)) ** 2, axis=0)[1:] / 512**2
+    k = 2 * np.pi * np.arange(1, 257)
+    inside = (k >= spectrum.wavenumber[0]) & (k < 0.8 * spectrum.wavenumber[-1])
+    found = isotropic_of_profile(k[inside], power[inside])
+    middle = (found.wavenumber > 2 * spectrum.wavenumber[0]) & (
+        found.wavenumber < 0.4 * spectrum.wavenumber[-1])
+    ratio = np.log10(found.psd[middle] / spectrum.at(found.wavenumber[middle]))
+    assert abs(ratio.mean()) < 0.03
+
+
+def test_scans_are_joined_within_their_ranges():
+    whole = Spectrum(np.geomspace(1e2, 1e6, 41), np.geomspace(1e2, 1e6, 41) ** -3.6)
+    wide, fine = whole.cut(short=2 * np.pi / 1e4), whole.cut(long=2 * np.pi / 3e3).scaled(1.1)
+    joined = join_spectra([wide, fine])
+    assert joined.band == pytest.approx(whole.band)
+    k = np.geomspace(1e2, 1e6, 33)
+    ratio = joined.at(k) / whole.at(k)
+    assert (ratio > 1.0 - 1e-9).all() and (ratio < 1.21 + 1e-9).all()
+    assert ratio[0] == pytest.approx(1.0) and ratio[-1] == pytest.approx(1.21)
+    assert np.abs(np.diff(np.log(ratio))).max() < 0.12    # no step
+    apart = join_spectra([whole.cut(short=2 * np.pi / 1e3), whole.cut(long=2 * np.pi / 1e5)])
+    assert any("no scan tells of waves" in note for note in apart.notes)
+    np.testing.assert_allclose(apart.at(k), whole.at(k), rtol=1e-6)
+
+
+def measured(cells=256, periodic=False, seed=1):
+    height, _ = road(cells, seed=seed)
+    return MeasuredSurface(height, 1e-3, 1e-3, periodic, "m",
+                           source={"name": f"scan {seed}", "format": "x", "metadata": {}})
+
+
+def test_patches_are_apart_and_the_same_again(tmp_path):
+    made = MeasuredRoad([measured()], 64)
+    assert made.join == "blend" and made.count == 9
+    codes = [made.patch(number).code for number in range(9)]
+    assert len(set(codes)) == 9
+    again = MeasuredRoad([measured()], 64)
+    assert [again.patch(number).code for number in range(9)] == codes
+    assert sorted(MeasuredRoad([measured()], 64, seed=2).patch(n).code for n in range(9)) == (
+        sorted(codes))
+    patch = made.patch(0)
+    assert patch.height.shape == (64, 64) and patch.lx == pytest.approx(1e-3 / 4)
+    assert abs(patch.height.mean()) < 1e-18
+    # no waves below six cells
+    modes = np.abs(np.fft.rfft2(patch.height))
+    k = np.hypot(np.fft.rfftfreq(64), np.fft.fftfreq(64)[:, None])
+    assert modes[k > 1 / 5.9].max() < 1e-12 * modes.max()
+    with h5py.File(patch.save(tmp_path)) as file:
+        np.testing.assert_array_equal(file["surface/height"][:], patch.height)
+
+
+def test_small_maps_and_periodic_maps_are_taken_as_they_are():
+    few = MeasuredRoad([measured(64)], 512)
+    assert few.cells == 56 and few.count == 1 and few.join == "blend"
+    assert any("no room for 512" in note for note in few.notes)
+    whole = MeasuredRoad([measured(64, periodic=True), measured(64, periodic=True, seed=2)], 64)
+    assert whole.join == "none" and whole.count == 2
+    with pytest.raises(ValueError, match="too few"):
+        MeasuredRoad([measured(16)], 512)

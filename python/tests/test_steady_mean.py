@@ -1,0 +1,107 @@
+"""Means over whole laps: exact for what repeats, warned of for parts."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import asperity
+from asperity.results.steady import steady_mean
+
+LX, LY = 1e-3, 0.5e-3
+
+
+def run_of(travel, friction, angle=0.0, settings=""):
+    """Return what steady_mean needs of a run: a slide of 0.1 m/s after a row at rest."""
+    along = np.concatenate([[0.0], np.asarray(travel)])
+    columns = {"time": along / 0.1, "road_x": along * math.cos(angle),
+               "road_y": along * math.sin(angle), "phase": np.full(along.size, 1),
+               "friction": np.concatenate([[0.0], np.asarray(friction)])}
+
+    class History(dict):
+        rows = along.size
+
+    return SimpleNamespace(history=History(columns), attributes={"settings": settings}, input="",
+                           path="run.h5", grid=SimpleNamespace(lx=LX, ly=LY))
+
+
+def waves(laps, per_lap=200, drift=0.0):
+    """Return a slide whose friction swings once a lap about 0.3, and settles within the first."""
+    travel = np.arange(1, round(laps * per_lap) + 1) * LX / per_lap
+    phase = 2 * np.pi * travel / LX
+    return travel, 0.3 + 0.2 * np.sin(phase) - 0.3 * np.exp(-8 * travel / LX) + drift * phase
+
+
+def test_whole_laps_give_the_mean_and_parts_do_not():
+    for laps in (2.0, 3.3, 5.75):
+        found = steady_mean(run_of(*waves(laps)))
+        assert found.laps == math.floor(laps) - 1
+        assert found.mean == pytest.approx(0.3, abs=2e-4)
+    _, friction = waves(3.75)
+    assert abs(friction[len(friction) // 2:].mean() - 0.3) > 0.01  # which the second half is not
+
+
+def test_part_of_a_lap_is_told():
+    found = steady_mean(run_of(*waves(0.8)))
+    assert found.laps == pytest.approx(0.4) and math.isnan(found.error)
+    assert "even have the wrong sign" in found.note
+    one = steady_mean(run_of(*waves(1.5)))
+    assert one.laps == 1.0 and "less than two laps" in one.note
+
+
+def test_the_error_is_that_of_the_laps():
+    """Laps that scatter independently: as of their mean; laps that drift have a larger one."""
+    random = np.random.default_rng(3)
+    covered = []
+    for _ in range(300):
+        laps = 0.3 + 0.02 * random.standard_normal(41)
+        travel = np.arange(1, 41 * 20 + 1) * LX / 20
+        found = steady_mean(run_of(travel, np.repeat(laps, 20)))
+        assert found.laps == 40
+        covered.append(abs(found.mean - 0.3) < 2.0 * found.error)
+    assert 0.88 < np.mean(covered) < 0.99
+    drift = steady_mean(run_of(*waves(12.0, drift=0.002)))
+    scatter = 0.002 * 2 * np.pi * np.std(np.arange(11), ddof=1)
+    assert drift.error > 1.5 * scatter / math.sqrt(11)
+
+
+def test_laps_of_oblique_slides():
+    """A lap ends where the road begins anew along one of the axes."""
+    angle = math.radians(20.0)
+    lap = min(LX / math.cos(angle), LY / math.sin(angle))
+    travel = np.arange(1, 1001) * lap * 4.5 / 1000
+    found = steady_mean(run_of(travel, 0.3 + 0.1 * np.sin(2 * np.pi * travel / lap), angle))
+    assert found.laps == 3.0 and found.mean == pytest.approx(0.3, abs=1e-4)
+
+
+def test_real_runs(tmp_path):
+    """A sine wave along the sliding direction: the history is flat once it is steady."""
+    case = asperity.Case(
+        grid=dict(nx=32, ny=1, lx=1e-3),
+        surface=dict(shape="sine", amplitude=2e-6, wavelength=1e-3),
+        material=dict(shear_modulus=1e6, prony_g=2e6, prony_tau=1e-3),
+        phase=[dict(pressure=1e4), dict(velocity_x=0.05, duration=0.08, steps=128)])
+    run = asperity.run(case, output=tmp_path / "slide.h5", threads=1)
+    found = run.steady()
+    assert found.laps == 3.0 and found.error < 1e-3 * found.mean
+    steady = case.copy()
+    steady.phase = [dict(steady=True, pressure=1e4, velocity_x=0.05)]
+    state = asperity.run(steady, output=tmp_path / "steady.h5", threads=1)
+    with_steps = state.steady("friction")
+    assert math.isinf(with_steps.laps) and with_steps.error == 0.0
+    assert with_steps.mean == pytest.approx(found.mean, rel=0.05)
+    page = run.report(tmp_path / "slide.html").read_text()
+    assert "Mean friction over the last 3 laps of the road" in page
+    short = case.copy()
+    short.phase[1].duration, short.phase[1].steps = 0.01, 16
+    part = asperity.run(short, output=tmp_path / "short.h5", threads=1)
+    with pytest.warns(UserWarning, match=r"friction: the slide is 0\.5 laps long"):
+        part.steady()
+    labels = [line.get_label() for line in run.plot("friction").lines]
+    assert "mean of the last 3 laps" in labels
+    table = asperity.sweep(case, {"phase[2].velocity_x": [0.05]}, measure="steady", quiet=True,
+                           folder=tmp_path / "sweep")
+    assert table["friction"][0] == found.mean and table["laps"][0] == 3.0
+    with pytest.raises(KeyError, match="did you mean 'friction'"):
+        run.steady("fricton")
