@@ -24,6 +24,7 @@ contains
    subroutine run_steady()
       call begin_suite('steady')
       call test_full_contact()
+      call test_hunter()
       call test_speed_limits()
       call test_turned()
       call test_balance()
@@ -50,6 +51,32 @@ contains
       call check_close(record%rows(0)%power_viscous/(exact*record%rows(0)%force*speed), 1.0_dp, 1e-12_dp, &
          'full contact: power')
    end subroutine test_full_contact
+
+   !> Hunter's cylinder (Hunter, 1961) at three speeds, as in test_simulation_sliding; the periodic cell
+   !> errs by 1/L^2.
+   subroutine test_hunter()
+      real(dp), parameter :: velocity(3) = [5e-3_dp, 20e-3_dp, 100e-3_dp]
+      real(dp), parameter :: half_width(3) = [0.73826627e-3_dp, 0.67155531e-3_dp, 0.39313100e-3_dp]
+      real(dp), parameter :: exact(3) = [0.0043374599_dp, 0.0154266908_dp, 0.0367341527_dp]
+      real(dp) :: friction(2), length
+      type(record_type) :: record
+      integer :: cells, k, m
+
+      do k = 1, 3
+         do m = 1, 2
+            cells = 2048*m
+            length = cells*half_width(k)/50.0_dp
+            call run_case('&grid nx = '//to_text(cells)//', ny = 1, lx = '//exact_text(length)//' /'//nl// &
+               '&surface shape = ''paraboloid'', radius = 10e-3 /'//nl// &
+               '&material zener_g0 = 2.75e6, zener_g1 = 0.305555555555555e6, zener_eta = 3.05555555555555e3 /' &
+               //nl//'&phase steady = T, pressure = '//exact_text(50.0_dp/length)//', velocity_x = '// &
+               exact_text(velocity(k))//' /'//nl//'&solver tolerance = 1e-8 /', 'Hunter', record)
+            friction(m) = record%rows(0)%friction
+         end do
+         friction(1) = friction(2) + (friction(2) - friction(1))/3.0_dp
+         call check_close(friction(1)/exact(k), 1.0_dp, 5e-4_dp, 'Hunter, steady')
+      end do
+   end subroutine test_hunter
 
    !> At rest a steady state is a relaxed one, very slow and very fast it is that of G_e and of G(0).
    subroutine test_speed_limits()

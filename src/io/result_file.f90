@@ -54,6 +54,7 @@ module result_file
       character(:), allocatable, public :: path      !! name of the file
       character(:), allocatable, public :: id        !! identity, which a checkpoint names
       integer, public :: rows = 0                    !! rows of the history
+      integer, public :: expected_losses = 0         !! rows of steady sliding when it is complete
    contains
       procedure :: create => create_result
       procedure :: reopen => reopen_result
@@ -68,6 +69,7 @@ module result_file
       !> Write a number or numbers into /material.
       generic :: write_material => write_material_value, write_material_values
       procedure :: end_snapshot
+      procedure :: write_losses
       procedure :: last_snapshot
       procedure :: link_checkpoint
       procedure :: unlink_checkpoint
@@ -132,6 +134,8 @@ contains
       call self%file%open(temporary, 'create', error, alignment=4096)
       if (.not. allocated(error)) call self%file%create_group('/snapshots', error, &
          expected_snapshots)
+      if (.not. allocated(error) .and. self%expected_losses > 0) &
+         call self%file%create_group('/losses', error, self%expected_losses)
       if (.not. allocated(error)) call self%file%close(error)
       if (.not. allocated(error)) call self%file%open(temporary, 'append', error)
       if (.not. allocated(error)) call write_frame(self, title, input, settings, height, error)
@@ -427,6 +431,31 @@ contains
       call write_xdmf(self%xdmf_path, self%path, self%grid, self%snapshots, error)
    end subroutine end_snapshot
 
+   !> Write where a state of steady sliding loses its energy, as a group /losses/NNNNNN.
+   subroutine write_losses(self, step, wavelength, octave, arm, error)
+      class(result_file_type), intent(inout) :: self
+      integer, intent(in) :: step                          !! row of the history
+      real(dp), intent(in), contiguous :: wavelength(:)    !! longest of each octave, m
+      real(dp), intent(in), contiguous :: octave(:)        !! rate of loss of each octave, W
+      real(dp), intent(in), contiguous :: arm(:)           !! of each arm, W
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: path
+
+      path = '/losses/'//snapshot_name(step)
+      call self%file%stage_group(path, error)
+      if (allocated(error)) return
+      call self%file%write_attribute(path, 'step', step, error)
+      if (allocated(error)) return
+      call self%file%write(path//'/wavelength', wavelength, 'm', 'longest wavelength of each octave', error)
+      if (allocated(error)) return
+      call self%file%write(path//'/octave', octave, 'W', 'rate of loss in the rubber by octaves', error)
+      if (allocated(error)) return
+      if (size(arm) > 0) call self%file%write(path//'/arm', arm, 'W', &
+         'rate of loss in the rubber by arms of the material', error)
+      if (allocated(error)) return
+      call self%file%publish_group(error)
+   end subroutine write_losses
+
    !> Row of the last snapshot; -1: there is none.
    pure function last_snapshot(self) result(step)
       class(result_file_type), intent(in) :: self
@@ -531,6 +560,8 @@ contains
       if (allocated(error)) return
       call keep_snapshots(self, last_step, error)
       if (allocated(error)) return
+      call keep_losses(self, last_step, error)
+      if (allocated(error)) return
       call self%file%flush(error)
       if (allocated(error)) return
       if (self%rows > last_step + 1) call self%file%publish_group(error)
@@ -568,6 +599,25 @@ contains
       if (allocated(error)) return
       call self%file%flush(error)
    end subroutine shorten_history
+
+   !> Remove the losses of rows behind a row.
+   subroutine keep_losses(self, last_step, error)
+      class(result_file_type), intent(inout) :: self
+      integer, intent(in) :: last_step
+      type(error_type), allocatable, intent(out) :: error
+      character(256), allocatable :: names(:)
+      integer :: i, step
+
+      if (.not. self%file%has_link('/losses')) return
+      call self%file%members('/losses', names, error)
+      if (allocated(error)) return
+      do i = 1, size(names)
+         call self%file%read_attribute('/losses/'//trim(names(i)), 'step', step, error)
+         if (allocated(error)) return
+         if (step > last_step) call self%file%remove('/losses/'//trim(names(i)), error)
+         if (allocated(error)) return
+      end do
+   end subroutine keep_losses
 
    !> Note the snapshots up to a row and remove the later ones, and that of a stop.
    subroutine keep_snapshots(self, last_step, error)

@@ -14,6 +14,7 @@ module case_run
    use precision, only : dp, int64, int8
    use result_file, only : result_file_type
    use schedule, only : count_rows
+   use steady_losses, only : longest_wave
    use simulation, only : new_simulation, simulation_type
    use simulation_state, only : load_state, save_state
    use text_tools, only : to_text
@@ -84,6 +85,7 @@ contains
          snapshots = size(case%output%snapshot_times) + 1
          if (case%output%snapshot_every > 0) &
             snapshots = snapshots + self%rows/case%output%snapshot_every
+         if (self%sim%has_steady) self%result%expected_losses = count(case%phases%steady)
          call self%result%create(self%path, trim(case%title), case%input, self%settings, &
             self%sim%grid, self%sim%height, self%rows, snapshots, case%output%compression, error)
          if (allocated(error)) return
@@ -216,6 +218,8 @@ contains
       call collect_warnings(self)
       call self%result%append_row(self%sim%row, error)
       if (allocated(error)) return
+      if (self%sim%was_steady) call write_losses(self, error)
+      if (allocated(error)) return
       if (snapshot_due(self)) call write_snapshot(self, error)
       if (allocated(error)) return
       if (.not. self%sim%converged) then
@@ -240,6 +244,19 @@ contains
          call self%save(error)
       end if
    end subroutine step_run
+
+   !> Where the last row, one of steady sliding, loses its energy.
+   subroutine write_losses(self, error)
+      type(run_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      integer :: k
+
+      associate (losses => self%sim%steady%losses)
+         call self%result%write_losses(self%sim%row%step, &
+            [(longest_wave(self%sim%grid)/2.0_dp**(k - 1), k = 1, size(losses%octave))], losses%octave, &
+            losses%arm, error)
+      end associate
+   end subroutine write_losses
 
    !> Is a snapshot of the last row due?
    function snapshot_due(self) result(due)

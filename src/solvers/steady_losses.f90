@@ -14,7 +14,7 @@ module steady_losses
    implicit none
    private
 
-   public :: count_octaves, elastic_forms, mode_weight, steady_losses_type, sum_losses
+   public :: elastic_forms, longest_wave, steady_losses_type, sum_losses
 
    !> Rates of loss over the cell, W.
    type :: steady_losses_type

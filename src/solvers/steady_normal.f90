@@ -26,6 +26,7 @@ module steady_normal
    use projection, only : project_simplex
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
+   use steady_active, only : affordable, finish_on_contact
    use steady_operator, only : steady_operator_type
    implicit none
    private
@@ -34,6 +35,7 @@ module steady_normal
 
    integer, parameter :: pairs = 6               !! of the acceleration
    integer, parameter :: sums_count = 7
+   integer, parameter :: trials(*) = [16, 32, 64, 128, 256, 512]   !! of finishing on few cells
    real(dp), parameter :: cautious = 2.0_dp      !! growth of the residual that stops accelerating
 
    !> What one evaluation of the fixed-point map tells.
@@ -90,7 +92,7 @@ contains
       real(dp) :: least, reference, mean
       integer(int64) :: before
       integer :: checks
-      logical :: determined
+      logical :: determined, finished
 
       before = operator%ffts
       call prepare_problem(problem, self%grid, operator%threads, height, task, determined)
@@ -113,6 +115,12 @@ contains
          if (measure%error < 0.7_dp*least) then
             least = measure%error
             self%best(:, :) = self%pressure
+         end if
+         if (outcome%reason /= reason_converged .and. any(outcome%iterations == trials)) then
+            if (affordable(count(self%pressure > 0.0_dp), size(self%pressure))) then
+               call finish_on_contact(operator, task, height, self%pressure, gap, found, finished)
+               if (finished) outcome%reason = reason_converged
+            end if
          end if
          outcome%converged = outcome%reason == reason_converged
          if (outcome%converged .or. outcome%iterations >= task%max_iterations) exit

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import NamedTuple
 
 import h5py
 import numpy as np
@@ -16,6 +17,24 @@ from .reading import NotAResultError, attributes_of, read_file, scalar_of, text_
 __all__ = ["ResultFile"]
 
 FloatArray = NDArray[np.float64]
+
+
+class Losses(NamedTuple):
+    """Where a row of steady sliding loses its energy.
+
+    Attributes
+    ----------
+    wavelength : (n,) array
+        Longest wavelength of each octave, m.
+    octave : (n,) array
+        Rate of loss in the rubber of each octave of the wavelength, W.
+    arm : (m,) array
+        Rate of loss of each arm of the Prony series, W.
+    """
+
+    wavelength: FloatArray
+    octave: FloatArray
+    arm: FloatArray
 
 
 class ResultFile:
@@ -32,6 +51,7 @@ class ResultFile:
     history: History
     material: NamedValues
     attributes: NamedValues
+    losses: dict[int, Losses]
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
@@ -61,6 +81,9 @@ class ResultFile:
                 {name: np.atleast_1d(columns[name][()]) for name in names},
                 {name: text_of(columns[name].attrs.get("units", "1")) for name in names},
                 {name: text_of(columns[name].attrs.get("long_name", name)) for name in names})
+            self.losses = {int(key): Losses(*(
+                np.asarray(group[name][()]) if name in group else np.zeros(0)
+                for name in Losses._fields)) for key, group in file.get("losses", {}).items()}
             keys = [key for key in file.get("snapshots", {}) if key.isdigit()]
             self._snapshot_keys = sorted(keys, key=int)
 

@@ -46,6 +46,8 @@ class Run(ResultFile):
         All attributes of the file.
     history : History
         One value a row: ``run.history["friction"]``.
+    losses : dict[int, Losses]
+        Where each row of steady sliding loses its energy, by the row's number.
     snapshots : Snapshots
         The stored fields: ``run.snapshots[-1].pressure``.
     """
