@@ -1,9 +1,19 @@
 !> Tests of steady sliding: closed forms, limits of speed, invariances, balances, the way on in time.
 module test_steady
-   use check, only : begin_suite, check_close, check_that
+   use case_input, only : parse_case
+   use case_settings, only : case_type
+   use check, only : begin_suite, check_close, check_no_error, check_that
+   use errors, only : error_type
+   use interpolation, only : interpolation_type, new_interpolation
+   use parallel, only : set_threads, thread_count
    use precision, only : dp, pi
    use prony, only : complex_modulus
+   use schedule, only : planned_row_type
+   use simulation, only : new_simulation, simulation_type
    use simulation_runs, only : check_books, last, nl, record_type, run_case, write_map
+   use solver_result, only : solver_result_type
+   use steady_step, only : new_steady_step, steady_step_type
+   use surface, only : new_height
    use text_tools, only : exact_text, to_text
    implicit none
    private
@@ -31,6 +41,8 @@ contains
       call test_plane_strain()
       call test_onward_in_time()
       call test_curve()
+      call test_threads()
+      call test_long_run()
    end subroutine run_steady
 
    !> Full contact with a wave: P = p + K^-1 H, so that friction is k^2 h^2 G''(k V)/(2 (1-nu) p).
@@ -229,6 +241,113 @@ contains
          call check_books(steady, 'onward')
       end do
    end subroutine test_onward_in_time
+
+   !> A long run in time, one cell a step, ends in the steady state of its own scheme: with the symbols of
+   !> exponential2 the solver finds the same fields. With those of the continuum it differs by the error
+   !> of the steps.
+   subroutine test_long_run()
+      character(*), parameter :: laws(3) = [character(80) :: '', &
+         '&friction law = ''coulomb'', coefficient = 0.4, slope_effect = F /', &
+         '&friction law = ''coulomb'', coefficient = 0.4 /']
+      type(case_type) :: case
+      type(simulation_type) :: sim
+      type(steady_step_type) :: steady
+      type(error_type), allocatable :: error
+      integer :: c, law
+
+      call write_map(map_file, 0.4_dp*wavy(24, 16))
+      do law = 1, 3
+         call parse_case('&grid nx = 24, ny = 16, lx = 24e-3 /'//nl//'&surface shape = ''file'', file = '''// &
+            map_file//''' /'//nl//'&material shear_modulus = 1e6, prony_g = 3e6, prony_tau = 1.2e-3 /'//nl// &
+            trim(laws(law))//nl//'&solver tolerance = 1e-10, passes = 20, interpolation = ''cubic'' /'//nl// &
+            '&phase steady = T, pressure = 3e4, velocity_x = 0.5, duration = 96e-3, steps = 48 /', &
+            'test.nml', case, error)
+         call check_no_error(error, 'long run: input')
+         call new_simulation(sim, case, error)
+         call check_no_error(error, 'long run: simulation')
+         do while (.not. sim%finished)
+            call sim%advance(error)
+         end do
+         call find_steady(case, sim, 0.0_dp, steady)
+         call compare('continuum', 0.2_dp)
+         call steady%destroy()
+         call find_steady(case, sim, 2e-3_dp, steady)
+         call compare('scheme', 2e-7_dp)
+         call steady%destroy()
+         call sim%destroy()
+      end do
+
+   contains
+
+      !> The fields of both.
+      subroutine compare(what, tolerance)
+         character(*), intent(in) :: what
+         real(dp), intent(in) :: tolerance
+
+         associate (found => steady%contact)
+            call check_close(norm2(sim%pressure - found%pressure)/norm2(found%pressure), 0.0_dp, tolerance, &
+               'long run: pressure, '//what//' '//trim(laws(law)))
+            do c = 1, merge(2, 0, law > 1)
+               call check_close(norm2(sim%tangential%traction(:, :, c) - found%traction(:, c, :)) &
+                  /norm2(found%traction), 0.0_dp, tolerance, 'long run: traction, '//what//' '// &
+                  trim(laws(law)))
+            end do
+         end associate
+      end subroutine compare
+
+   end subroutine test_long_run
+
+   !> The steady state of a case with the road where a run in time has left it.
+   subroutine find_steady(case, sim, dt, steady)
+      type(case_type), intent(in) :: case
+      type(simulation_type), intent(in) :: sim
+      real(dp), intent(in) :: dt                       !! of the scheme, s; 0: the continuum
+      type(steady_step_type), intent(out) :: steady
+      type(error_type), allocatable :: error
+      type(interpolation_type) :: road
+      type(planned_row_type) :: plan
+      type(solver_result_type) :: normal, rubbing
+      real(dp), allocatable :: height(:, :)
+      real(dp) :: base(2), place(2)
+      integer :: k
+
+      call new_height(case%grid, case%surfaces, height, error)
+      call new_interpolation(road, case%grid, height, 'cubic', error)
+      call new_steady_step(steady, case, sim%rms_height, error)
+      call check_no_error(error, 'long run: steady')
+      steady%scheme_dt = dt
+      plan%load = case%phases(1)%target
+      plan%velocity_x = case%phases(1)%velocity_x
+      place = [sim%row%road_x - 2.0_dp*case%grid%lx, sim%row%road_y]
+      base = 0.0_dp
+      ! The contact's mean displacement hardly depends on the place: a few rounds bring the road there.
+      do k = 1, merge(4, 1, case%friction%law /= 'none')
+         call steady%begin_curve(base)
+         call steady%solve(plan, road, normal, rubbing)
+         call check_that(normal%converged .and. rubbing%converged, 'long run: steady converged')
+         base = base + place - steady%place
+      end do
+   end subroutine find_steady
+
+   !> The number of threads changes no bit.
+   subroutine test_threads()
+      type(record_type) :: one, two
+      character(*), parameter :: case = '&grid nx = 132, ny = 128, lx = 132e-3 /'//nl//road//rubber// &
+         '&friction law = ''coulomb'', coefficient = 0.3 /'//nl// &
+         '&phase steady = T, pressure = 5e4, velocity_x = 0.1, velocity_y = 0.02 /'//nl// &
+         '&solver tolerance = 1e-4 /'
+      integer :: before
+
+      before = thread_count()
+      call set_threads(1)
+      call run_case(case, 'one thread', one)
+      call set_threads(2)
+      call run_case(case, 'two threads', two)
+      call set_threads(before)
+      call check_that(all(abs(one%pressure - two%pressure) <= 0.0_dp) .and. &
+         all(abs(one%drag - two%drag) <= 0.0_dp) .and. &
+         abs(one%rows(0)%power_viscous - two%rows(0)%power_viscous) <= 0.0_dp, 'threads')
+   end subroutine test_threads
 
    !> Rows of a curve start from those before, and end where a row of its own ends.
    subroutine test_curve()

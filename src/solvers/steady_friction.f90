@@ -20,7 +20,7 @@
 !> Memory beside the caller's: 16 fields, 50 for the acceleration in single precision, and 10 of doubles.
 module steady_friction
    use anderson, only : anderson_type, new_anderson
-   use friction_law, only : friction_law_type
+   use friction_law, only : friction_law_type, law_constant_shear
    use interpolation, only : displaced, interpolation_type
    use normal_state, only : gap_measure_type, measure_gap, normal_problem_type, prepare_problem, &
       reason_converged, reason_iterations
@@ -133,6 +133,7 @@ contains
          end if
          if (rubbing%iterations >= task%max_iterations) then
             call finish(self, operator, task, road, contact, normal, rubbing)
+            call explain(self, contact, normal, rubbing)
             exit
          end if
          call advance(self, operator, task, pace, rubbing%iterations, &
@@ -279,6 +280,24 @@ contains
       self%state(:, 1, :) = self%normal%z
       call self%memory%forget()
    end subroutine advance
+
+   !> Why there may be no solution. A constant shear stress jumps at the rim of the contact: the cell
+   !> that it takes out of contact is drawn into it again without it. On a slope steeper than 1/mu the
+   !> law bounds no traction uphill (module friction_law).
+   subroutine explain(self, contact, normal, rubbing)
+      type(steady_friction_type), intent(in) :: self
+      type(steady_contact_type), intent(in) :: contact
+      type(solver_result_type), intent(inout) :: normal, rubbing
+
+      if (normal%converged .and. rubbing%converged) return
+      if (self%law%law == law_constant_shear) then
+         normal%reason = 'cells at the rim of the contact come and go'
+      else if (self%law%slope) then
+         if (any(contact%pressure > 0.0_dp .and. self%law%coefficient*hypot(contact%slope_x, &
+            contact%slope_y) >= 1.0_dp)) normal%reason = 'slopes above 1/coefficient bound no traction'
+      end if
+      rubbing%reason = normal%reason
+   end subroutine explain
 
    !> |u| of the state.
    function length_of(self) result(length)

@@ -1,0 +1,239 @@
+"""Steady phases: an independent dense reference, the result file, restart, messages."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import viscoelastic_case as vc
+
+import asperity
+
+NX, NY, LX, LY = 14, 12, 14e-3, 12e-3
+MODULUS, G, TAU, NU = 1e6, (5e6, 4e6), (3e-3, 2e-4), 0.4
+VELOCITY = np.array([0.7, 0.25])
+PRESSURE = 6e4
+
+
+def waves() -> tuple[np.ndarray, np.ndarray]:
+    """Return all wave vectors (m, 2) of the grid but zero, both signs of Nyquist components, and weights."""
+    vectors, weights = [], []
+    for i in range(-NX // 2, NX // 2 + 1):
+        for j in range(-NY // 2, NY // 2 + 1):
+            if i or j:
+                vectors.append((2 * np.pi * i / LX, 2 * np.pi * j / LY))
+                weights.append((0.5 if abs(2 * i) == NX else 1) * (0.5 if abs(2 * j) == NY else 1))
+    return np.array(vectors), np.array(weights)
+
+
+def modulus(omega: np.ndarray) -> np.ndarray:
+    """Return G*(omega)."""
+    return MODULUS + sum(
+        g * 1j * omega * t / (1 + 1j * omega * t) for g, t in zip(G, TAU, strict=True)
+    )
+
+
+def matrices() -> dict[str, np.ndarray]:
+    """Return the dense matrices of normal and tangential displacement and of d/ds, by plain sums."""
+    q, weight = waves()
+    x, y = np.meshgrid(np.arange(NX) * LX / NX, np.arange(NY) * LY / NY)
+    place = np.column_stack([x.ravel(), y.ravel()])
+    phase = np.exp(1j * place @ q.T)
+    length = np.hypot(*q.T)
+    compliance = weight / (length * modulus(-q @ VELOCITY)) / (NX * NY)
+    along = 1j * (q @ VELOCITY) / np.hypot(*VELOCITY)
+    nyquist = weight < 1
+
+    def dense(symbol: np.ndarray) -> np.ndarray:
+        return ((phase * symbol) @ phase.conj().T).real
+
+    found = {"zz": dense((1 - NU) * compliance)}
+    for name, factor in (
+        ("xx", 1 - NU * (q[:, 0] / length) ** 2),
+        ("yy", 1 - NU * (q[:, 1] / length) ** 2),
+        ("xy", np.where(nyquist, 0, -NU * q[:, 0] * q[:, 1] / length**2)),
+    ):
+        found[name] = dense(factor * compliance)
+        found["d" + name] = dense(factor * compliance * along)
+    return found
+
+
+def text(law: str = "", more: str = "") -> str:
+    """Return the input of the case."""
+    return f"""&grid nx = {NX}, ny = {NY}, lx = {LX}, ly = {LY} /
+&surface shape = 'file', file = 'road.h5' /
+&material poisson = {NU}, shear_modulus = {MODULUS}, prony_g = {G[0]}, {G[1]}, prony_tau = {TAU[0]}, {TAU[1]} /
+{law}
+&phase steady = .true., pressure = {PRESSURE}, velocity_x = {VELOCITY[0]}, velocity_y = {VELOCITY[1]} /
+&solver tolerance = 1e-9 {more} /
+"""
+
+
+def road(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return a road of a few waves, m."""
+    a, b = 2 * np.pi * x / LX, 2 * np.pi * y / LY
+    return 2e-4 * (np.cos(a + 0.4) + 0.7 * np.cos(b) + 0.4 * np.cos(a + 2 * b + 1))
+
+
+def solve(program: str, folder: Path, law: str = "") -> asperity.Run:
+    """Run the case."""
+    x, y = np.meshgrid(np.arange(NX) * LX / NX, np.arange(NY) * LY / NY)
+    with h5py.File(folder / "road.h5", "w") as file:
+        file["surface"] = road(x, y)
+    (folder / "case.nml").write_text(text(law))
+    done = vc.run(program, folder / "case.nml")
+    assert done.returncode == 0, done.stderr
+    return asperity.open(folder / "case.h5")
+
+
+def test_dense_reference(program: str, tmp_path: Path) -> None:
+    """Pressure, gap, losses against dense matrices made by plain sums over the waves."""
+    run = solve(program, tmp_path)
+    found = run.snapshots[-1]
+    k = matrices()["zz"]
+    height = run.snapshots[-1].displacement_z * 0
+    x, y = np.meshgrid(np.arange(NX) * LX / NX, np.arange(NY) * LY / NY)
+    height = road(x, y).ravel()
+    p = found.pressure.ravel()
+    touching = p > 0
+    n = touching.sum()
+    assert 5 < n < 0.8 * NX * NY
+    system = np.block(
+        [[k[np.ix_(touching, touching)], -np.ones((n, 1))], [np.ones((1, n)), np.zeros((1, 1))]]
+    )
+    exact = np.linalg.solve(system, np.append(height[touching], PRESSURE * NX * NY))
+    np.testing.assert_allclose(p[touching], exact[:-1], rtol=0, atol=1e-6 * p.max())
+    gap = k @ p - height - exact[-1]
+    assert gap[~touching].min() > 0  # with P > 0 elsewhere: the solution, and there is but one
+    np.testing.assert_allclose(
+        found.gap.ravel(), np.where(touching, 0, gap), rtol=0, atol=1e-6 * gap.max()
+    )
+    row = {name: run.history[name][0] for name in run.history}
+    q, weight = waves()
+    modes = np.exp(-1j * np.column_stack([x.ravel(), y.ravel()]) @ q.T).T @ p / (NX * NY)
+    omega = -q @ VELOCITY
+    loss = (
+        weight * np.abs(modes) ** 2 * (1j * omega * (1 - NU) / np.hypot(*q.T) / modulus(omega))
+    ).real
+    assert row["power_viscous"] == pytest.approx(loss.sum() * LX * LY, rel=1e-6)
+    assert row["friction"] * row["force"] * np.hypot(*VELOCITY) == pytest.approx(
+        row["power_viscous"], rel=1e-9
+    )
+    losses = run.losses[0]
+    assert losses.octave.sum() == pytest.approx(row["power_viscous"], rel=1e-12)
+    assert losses.arm.sum() == pytest.approx(row["power_viscous"], rel=1e-12)
+    first = np.floor(np.log2(LX / (2 * np.pi / np.hypot(*q.T))) + 1e-9) < 1
+    assert losses.octave[0] == pytest.approx(loss[first].sum() * LX * LY, rel=1e-6)
+    assert losses.wavelength[0] == LX and losses.wavelength[1] == LX / 2
+
+
+def test_dense_friction(program: str, tmp_path: Path) -> None:
+    """Tractions lie on the bound along the slip of the dense matrices; the road is read at x + u."""
+    run = solve(
+        program, tmp_path, "&friction law = 'coulomb', coefficient = 0.5, slope_effect = F /"
+    )
+    found = run.snapshots[-1]
+    m = matrices()
+    p, tx, ty = (getattr(found, name).ravel() for name in ("pressure", "traction_x", "traction_y"))
+    np.testing.assert_allclose(np.hypot(tx, ty), 0.5 * p, rtol=0, atol=1e-9 * p.max())
+    ux, uy = m["xx"] @ tx + m["xy"] @ ty, m["xy"] @ tx + m["yy"] @ ty
+    np.testing.assert_allclose(
+        found.displacement_x.ravel(), ux, rtol=0, atol=1e-9 * np.abs(ux).max()
+    )
+    np.testing.assert_allclose(
+        found.displacement_y.ravel(), uy, rtol=0, atol=1e-9 * np.abs(ux).max()
+    )
+    e = VELOCITY / np.hypot(*VELOCITY)
+    rx, ry = e[0] + m["dxx"] @ tx + m["dxy"] @ ty, e[1] + m["dxy"] @ tx + m["dyy"] @ ty
+    across = np.abs(tx * ry - ty * rx) / np.hypot(rx, ry)
+    assert across.max() < 1e-7 * p.max() and (tx * rx + ty * ry)[p > 0].min() > 0
+    x, y = np.meshgrid(np.arange(NX) * LX / NX, np.arange(NY) * LY / NY)
+    place = run.history["road_x"][0], run.history["road_y"][0]
+    height = road(x.ravel() + ux - place[0], y.ravel() + uy - place[1])
+    level = found.displacement_z.ravel() - found.gap.ravel() - height
+    assert np.ptp(level) < 0.02 * np.ptp(height)  # the spline's error between cells
+    moving = (p @ ux / p.sum(), p @ uy / p.sum())
+    np.testing.assert_allclose(place, moving, rtol=1e-6)
+    heat = (tx * rx + ty * ry).sum() * np.hypot(*VELOCITY) * LX * LY / (NX * NY)
+    assert run.history["power_friction"][0] == pytest.approx(heat, rel=1e-6)
+
+
+def curve(speeds: int = 8) -> str:
+    """Return the input of a curve that ends with some steps in time."""
+    phases = "\n".join(
+        f"&phase steady = T, {'pressure = 2e5, ' if not k else ''}velocity_x = {0.02 * 2**k} /"
+        for k in range(speeds)
+    )
+    return f"""&grid nx = 96, ny = 90, lx = 96e-3, ly = 90e-3 /
+&surface shape = 'self_affine', hurst = 0.8, wavelength_long = 48e-3, wavelength_short = 8e-3,
+   rms_slope = 0.2, seed = 5 /
+&material shear_modulus = 1e6, prony_g = 5e6, 4e6, prony_tau = 1e-2, 1e-4 /
+&friction law = 'coulomb', coefficient = 0.3 /
+{phases}
+&phase steady = T, velocity_x = 0.5, duration = 8e-3, steps = 4 /
+&solver threads = 1 /
+&output checkpoint_minutes = 0 /
+"""
+
+
+def test_restart(program: str, tmp_path: Path) -> None:
+    """A curve that is stopped goes on to the same bits, with the losses of every row."""
+    whole, parts = tmp_path / "whole.nml", tmp_path / "parts.nml"
+    for path in (whole, parts):
+        path.write_text(curve())
+    assert vc.run(program, whole).returncode == 0
+    stops = 0
+    for rows in (3, 10):
+        process = vc.start(program, parts, *(["--restart"] if stops else []))
+        vc.wait_for_rows(process, parts.with_suffix(".h5"), rows, vc.signal.SIGTERM)
+        process.communicate(timeout=vc.PATIENCE)
+        stops += process.returncode == 128 + vc.signal.SIGTERM
+    assert stops >= 1
+    assert vc.run(program, parts, "--restart").returncode == 0
+    vc.assert_same(parts.with_suffix(".h5"), whole.with_suffix(".h5"))
+    one, two = asperity.open(parts.with_suffix(".h5")), asperity.open(whole.with_suffix(".h5"))
+    assert sorted(one.losses) == sorted(two.losses) == list(range(9))
+    for step, losses in one.losses.items():
+        np.testing.assert_array_equal(losses.octave, two.losses[step].octave)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("&phase steady = T, displacement = 1e-4, velocity_x = 1 /", "give pressure or force"),
+        (
+            "&phase steady = T, pressure = 1e5, ramp = 'linear', duration = 1, velocity_x = 1 /",
+            "excludes ramp = 'linear'",
+        ),
+        ("&phase steady = T, relaxed = T, pressure = 1e5, velocity_x = 1 /", "excludes relaxed"),
+        (
+            "&phase steady = T, pressure = 1e5, velocity_x = 1 / &adhesion potential = 'gauss', energy = 0.1,"
+            " range = 1e-6 /",
+            "needs &adhesion potential = 'none'",
+        ),
+        ("&phase pressure = 1e5, velocity_x = 1 /", "needs a duration"),
+    ],
+)
+def test_messages(program: str, tmp_path: Path, change: str, message: str) -> None:
+    """What a steady phase excludes is told with what is allowed."""
+    case = tmp_path / "case.nml"
+    case.write_text(
+        "&grid nx = 8, ny = 8, lx = 1 / &surface shape = 'flat' /"
+        " &material shear_modulus = 1e6, prony_g = 1e6, prony_tau = 1 /\n" + change
+    )
+    done = subprocess.run(
+        [program, "check", str(case)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert message in done.stderr
+
+
+def test_check_lists_it(program: str, tmp_path: Path) -> None:
+    """`asperity check` shows the setting."""
+    case = tmp_path / "case.nml"
+    case.write_text(curve(1))
+    done = subprocess.run([program, "check", str(case)], capture_output=True, text=True, check=True)
+    assert "steady = .true." in done.stdout
