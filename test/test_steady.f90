@@ -255,12 +255,12 @@ contains
       type(error_type), allocatable :: error
       integer :: c, law
 
-      call write_map(map_file, 0.4_dp*wavy(24, 16))
+      call write_map(map_file, 0.3_dp*wavy(16, 12))
       do law = 1, 3
-         call parse_case('&grid nx = 24, ny = 16, lx = 24e-3 /'//nl//'&surface shape = ''file'', file = '''// &
-            map_file//''' /'//nl//'&material shear_modulus = 1e6, prony_g = 3e6, prony_tau = 1.2e-3 /'//nl// &
-            trim(laws(law))//nl//'&solver tolerance = 1e-10, passes = 20, interpolation = ''cubic'' /'//nl// &
-            '&phase steady = T, pressure = 3e4, velocity_x = 0.5, duration = 96e-3, steps = 48 /', &
+         call parse_case('&grid nx = 16, ny = 12, lx = 16e-3 /'//nl//'&surface shape = ''file'', file = '''// &
+            map_file//''' /'//nl//'&material shear_modulus = 1e6, prony_g = 3e6, prony_tau = 0.8e-3 /'//nl// &
+            trim(laws(law))//nl//'&solver tolerance = 1e-10, passes = 30, interpolation = ''cubic'' /'//nl// &
+            '&phase steady = T, pressure = 3e4, velocity_x = 0.5, duration = 64e-3, steps = 32 /', &
             'test.nml', case, error)
          call check_no_error(error, 'long run: input')
          call new_simulation(sim, case, error)

@@ -19,7 +19,7 @@ PRESSURE = 6e4
 
 
 def waves() -> tuple[np.ndarray, np.ndarray]:
-    """Return all wave vectors (m, 2) of the grid but zero, both signs of Nyquist components, and weights."""
+    """Return the wave vectors of the grid but zero, with both signs of Nyquist, and weights."""
     vectors, weights = [], []
     for i in range(-NX // 2, NX // 2 + 1):
         for j in range(-NY // 2, NY // 2 + 1):
@@ -37,7 +37,7 @@ def modulus(omega: np.ndarray) -> np.ndarray:
 
 
 def matrices() -> dict[str, np.ndarray]:
-    """Return the dense matrices of normal and tangential displacement and of d/ds, by plain sums."""
+    """Return dense matrices of the displacements and of their d/ds, by plain sums."""
     q, weight = waves()
     x, y = np.meshgrid(np.arange(NX) * LX / NX, np.arange(NY) * LY / NY)
     place = np.column_stack([x.ravel(), y.ravel()])
@@ -65,9 +65,11 @@ def text(law: str = "", more: str = "") -> str:
     """Return the input of the case."""
     return f"""&grid nx = {NX}, ny = {NY}, lx = {LX}, ly = {LY} /
 &surface shape = 'file', file = 'road.h5' /
-&material poisson = {NU}, shear_modulus = {MODULUS}, prony_g = {G[0]}, {G[1]}, prony_tau = {TAU[0]}, {TAU[1]} /
+&material poisson = {NU}, shear_modulus = {MODULUS}, prony_g = {G[0]}, {G[1]},
+   prony_tau = {TAU[0]}, {TAU[1]} /
 {law}
-&phase steady = .true., pressure = {PRESSURE}, velocity_x = {VELOCITY[0]}, velocity_y = {VELOCITY[1]} /
+&phase steady = .true., pressure = {PRESSURE},
+   velocity_x = {VELOCITY[0]}, velocity_y = {VELOCITY[1]} /
 &solver tolerance = 1e-9 {more} /
 """
 
@@ -131,7 +133,7 @@ def test_dense_reference(program: str, tmp_path: Path) -> None:
 
 
 def test_dense_friction(program: str, tmp_path: Path) -> None:
-    """Tractions lie on the bound along the slip of the dense matrices; the road is read at x + u."""
+    """Tractions lie on the bound along the dense slip; the road is read at x + u."""
     run = solve(
         program, tmp_path, "&friction law = 'coulomb', coefficient = 0.5, slope_effect = F /"
     )
@@ -210,8 +212,8 @@ def test_restart(program: str, tmp_path: Path) -> None:
         ),
         ("&phase steady = T, relaxed = T, pressure = 1e5, velocity_x = 1 /", "excludes relaxed"),
         (
-            "&phase steady = T, pressure = 1e5, velocity_x = 1 / &adhesion potential = 'gauss', energy = 0.1,"
-            " range = 1e-6 /",
+            "&phase steady = T, pressure = 1e5, velocity_x = 1 /"
+            " &adhesion potential = 'gauss', energy = 0.1, range = 1e-6 /",
             "needs &adhesion potential = 'none'",
         ),
         ("&phase pressure = 1e5, velocity_x = 1 /", "needs a duration"),

@@ -221,6 +221,19 @@ contains
       self%material%dt_old = next_dt
    end subroutine slide_for_ever
 
+   !> The rates of loss: means over a step.
+   subroutine fill_powers(self, plan, row)
+      type(simulation_type), intent(in) :: self
+      type(planned_row_type), intent(in) :: plan
+      type(history_row_type), intent(inout) :: row
+
+      row%power_viscous = 0.0_dp
+      row%power_friction = 0.0_dp
+      if (.not. plan%dt > 0.0_dp) return
+      row%power_viscous = (row%dissipated_viscous - self%row%dissipated_viscous)/plan%dt
+      row%power_friction = (row%dissipated_friction - self%row%dissipated_friction)/plan%dt
+   end subroutine fill_powers
+
    !> What a row of steady sliding knows better than the sums over the cells.
    subroutine fill_steady(self, row, force)
       type(simulation_type), intent(in) :: self
@@ -410,12 +423,7 @@ contains
          call watch_stick_slip(self, plan, row%sliding_speed)
       end if
       if (holds(self)) row%stick_area = row%contact_area
-      row%power_viscous = 0.0_dp
-      row%power_friction = 0.0_dp
-      if (plan%dt > 0.0_dp) then
-         row%power_viscous = (row%dissipated_viscous - self%row%dissipated_viscous)/plan%dt
-         row%power_friction = (row%dissipated_friction - self%row%dissipated_friction)/plan%dt
-      end if
+      call fill_powers(self, plan, row)
       if (plan%steady) call fill_steady(self, row, force)
       row%friction = 0.0_dp
       if (abs(row%force) > 0.0_dp .and. any(abs(self%direction) > 0.0_dp)) &

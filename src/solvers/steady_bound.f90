@@ -14,7 +14,7 @@
 !> With the thesis's direction of slip r is parallel to D, and D is w - T* shortened to the bound.
 module steady_bound
    use friction_law, only : friction_law_type, law_constant_shear
-   use parallel, only : global_sum
+   use parallel, only : thread_count
    use precision, only : dp
    implicit none
    private
@@ -26,7 +26,7 @@ module steady_bound
 contains
 
    !> T = bound(start + c r) where P > 0, and zero elsewhere.
-   subroutine bound_tractions(law, c, pressure, slope_x, slope_y, start, slip, traction, threads)
+   subroutine bound_tractions(law, c, pressure, slope_x, slope_y, start, slip, traction)
       type(friction_law_type), intent(in) :: law
       real(dp), intent(in) :: c                        !! c_t, Pa
       real(dp), intent(in) :: pressure(:, :)           !! [nx, ny], Pa
@@ -35,13 +35,12 @@ contains
       real(dp), intent(in) :: start(:, :, :)
       real(dp), intent(in) :: slip(:, :, :)            !! r, [nx, 2, ny]
       real(dp), intent(inout) :: traction(:, :, :)     !! [nx, 2, ny], Pa
-      integer, intent(in) :: threads
       real(dp) :: slope(2), scale
       integer :: i, j
 
       slope = 0.0_dp
       !$omp parallel do default(none) shared(law, c, pressure, slope_x, slope_y, start, slip, traction) &
-      !$omp private(i, j, scale) firstprivate(slope) num_threads(threads)
+      !$omp private(i, j, scale) firstprivate(slope) num_threads(threads_for(pressure))
       do j = 1, size(pressure, 2)
          do i = 1, size(pressure, 1)
             if (pressure(i, j) <= 0.0_dp) then
@@ -66,22 +65,29 @@ contains
    end function unit_of
 
    !> The ratio T/unit of every cell; where there is no pressure the ratio stays as it is.
-   subroutine compare_tractions(law, pressure, traction, ratio, threads)
+   subroutine compare_tractions(law, pressure, traction, ratio)
       type(friction_law_type), intent(in) :: law
       real(dp), intent(in) :: pressure(:, :)
       real(dp), intent(in) :: traction(:, :, :)
       real(dp), intent(inout) :: ratio(:, :, :)
-      integer, intent(in) :: threads
       integer :: i, j
 
       !$omp parallel do default(none) shared(law, pressure, traction, ratio) private(i, j) &
-      !$omp num_threads(threads)
+      !$omp num_threads(threads_for(pressure))
       do j = 1, size(pressure, 2)
          do i = 1, size(pressure, 1)
             if (pressure(i, j) > 0.0_dp) ratio(i, :, j) = traction(i, :, j)/unit_of(law, pressure(i, j))
          end do
       end do
    end subroutine compare_tractions
+
+   !> Small fields are done by one thread.
+   function threads_for(field) result(threads)
+      real(dp), intent(in) :: field(:, :)
+      integer :: threads
+
+      threads = merge(1, thread_count(), size(field) < 16384)
+   end function threads_for
 
    !> bound(w) of one cell.
    pure function bounded(law, pressure, slope, w) result(traction)

@@ -117,7 +117,7 @@ contains
 
       before = operator%ffts
       call prepare_problem(problem, self%grid, operator%threads, contact%height, task, determined)
-      call begin(self, operator, task, contact, normal)
+      call begin(self, operator, task, road, contact, normal)
       pace%accepted = task%tolerance
       normal%reason = reason_iterations
       rubbing%reason = reason_iterations
@@ -143,20 +143,29 @@ contains
    end subroutine solve
 
    !> The first state: that handed in, or the frictionless one.
-   subroutine begin(self, operator, task, contact, normal)
+   subroutine begin(self, operator, task, road, contact, normal)
       class(steady_friction_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
       type(normal_problem_type), intent(in) :: task
+      type(interpolation_type), intent(in) :: road
       type(steady_contact_type), intent(inout) :: contact
       type(solver_result_type), intent(out) :: normal
       type(normal_problem_type) :: rough
       integer :: c
 
       call self%memory%forget()
+      do c = 1, 2
+         self%ratio(:, c, :) = merge(1.0_dp, self%law%coefficient, self%law%law == law_constant_shear) &
+            *self%direction(c)
+      end do
       if (task%warm) then
          call self%normal%start(operator, task, contact%height, contact%pressure, contact%gap)
          call operator%shear(contact%traction, contact%displacement, contact%slip)
-         call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio, operator%threads)
+         contact%offset = contact_mean(contact)
+         call displaced(road, self%base(1) + contact%offset(1), self%base(2) + contact%offset(2), &
+            contact%displacement(:, 1, :), contact%displacement(:, 2, :), contact%height, &
+            contact%slope_x, contact%slope_y)
+         call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio)
       else
          rough = task
          rough%tolerance = max(task%tolerance, 1e-2_dp)
@@ -164,11 +173,8 @@ contains
             contact%level, normal)
          contact%displacement = 0.0_dp
          contact%slip = 0.0_dp
-         do c = 1, 2
-            self%ratio(:, c, :) = largest_force(self%law, 1.0_dp)*self%direction(c)
-         end do
+         contact%offset = 0.0_dp
       end if
-      contact%offset = contact_mean(contact)
       self%state(:, 1, :) = self%normal%z
       do c = 1, 2
          self%state(:, 1 + c, :) = contact%displacement(:, c, :) - contact%offset(c)
@@ -193,8 +199,8 @@ contains
       contact%pressure(:, :) = self%state(:, 1, :)
       call project_simplex(contact%pressure, task%target*size(contact%pressure))
       call bound_tractions(self%law, self%c, contact%pressure, contact%slope_x, contact%slope_y, &
-         self%ratio, self%state(:, 4:5, :), contact%traction, operator%threads)
-      call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio, operator%threads)
+         self%ratio, self%state(:, 4:5, :), contact%traction)
+      call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio)
       call operator%shear(contact%traction, contact%displacement, contact%slip)
       contact%offset = contact_mean(contact)
       do c = 1, 2
@@ -326,9 +332,9 @@ contains
 
       contact%pressure(:, :) = self%normal%pressure
       call read_road(self, road, contact)
-      call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio, operator%threads)
+      call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio)
       call bound_tractions(self%law, self%c, contact%pressure, contact%slope_x, contact%slope_y, &
-         self%ratio, contact%slip, contact%traction, operator%threads)
+         self%ratio, contact%slip, contact%traction)
       call operator%shear(contact%traction, contact%displacement, contact%slip)
       call read_road(self, road, contact)
 
@@ -342,10 +348,10 @@ contains
       normal%converged = found%error <= task%tolerance
       if (normal%converged) normal%reason = reason_converged
 
-      call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio, operator%threads)
+      call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio)
       allocate (again, mold=contact%traction)
       call bound_tractions(self%law, self%c, contact%pressure, contact%slope_x, contact%slope_y, &
-         self%ratio, contact%slip, again, operator%threads)
+         self%ratio, contact%slip, again)
       rubbing%residual = sqrt(sum((again - contact%traction)**2)/max(sum(contact%traction**2), tiny(1.0_dp)))
       rubbing%converged = rubbing%residual <= task%tolerance
       if (rubbing%converged) rubbing%reason = reason_converged

@@ -125,15 +125,7 @@ contains
          outcome%converged = outcome%reason == reason_converged
          if (outcome%converged .or. outcome%iterations >= task%max_iterations) exit
 
-         if (any(outcome%iterations == [8, 16, 32, 64]) .and. misfit(measure%scale, self%c) > 1.5_dp) then
-            self%z = self%z + self%residual
-            call self%take_scale(operator, task, measure%scale)
-            reference = huge(1.0_dp)
-         else
-            call self%memory%step([1.0_dp], self%residual, self%z, &
-               plain=measure%change > cautious*reference)
-            reference = min(measure%change, 1.02_dp*reference)
-         end if
+         call advance(self, operator, task, measure, outcome%iterations, reference)
       end do
       if (.not. outcome%converged) then
          self%pressure(:, :) = self%best
@@ -148,6 +140,26 @@ contains
       outcome%load_error = found%load_error
       outcome%ffts = operator%ffts - before
    end subroutine solve
+
+   !> The next z: an accelerated step, a plain one after the residual has grown, or with another c.
+   subroutine advance(self, operator, task, measure, iteration, reference)
+      class(steady_normal_type), intent(inout) :: self
+      type(steady_operator_type), intent(inout) :: operator
+      type(normal_problem_type), intent(in) :: task
+      type(steady_measure_type), intent(in) :: measure
+      integer, intent(in) :: iteration
+      real(dp), intent(inout) :: reference             !! residual that later ones are compared to, Pa
+
+      if (any(iteration == [8, 16, 32, 64]) .and. misfit(measure%scale, self%c) > 1.5_dp) then
+         self%z = self%z + self%residual
+         call self%take_scale(operator, task, measure%scale)
+         reference = huge(1.0_dp)
+      else
+         call self%memory%step([1.0_dp], self%residual, self%z, &
+            plain=measure%change > cautious*reference)
+         reference = min(measure%change, 1.02_dp*reference)
+      end if
+   end subroutine advance
 
    !> The first state: from the pressure and the gap handed in, or from the road alone.
    subroutine start(self, operator, task, height, pressure, gap)

@@ -4,9 +4,9 @@
     . tools/setup.sh && . tools/install_editable.sh
     python tools/bench/steady.py [--cells 128] [--speeds 7] [--laws none flat slope] [--cold]
 
-A rough road of rms slope 0.3 with waves down to four cells slides under a rubber with one or twelve
-arms that soften it by 10 or 1000. Each line is a curve: the speeds, of the slowest wave's relaxation
-up, the transforms of each row, a mark where it did not converge, and the contact area. By default each
+A rough road of rms slope 0.3 with waves down to four cells slides under a rubber with one or
+twelve arms that soften it by 10 or 1000. Each line is a curve: for each speed the transforms of its
+row and the contact area; ! marks a row that did not converge, which ends the curve. By default each
 row starts from those before it; with --cold each is a run of its own.
 """
 
