@@ -18,6 +18,7 @@ program main
    use test_mixed, only : run_mixed
    use test_namelist, only : run_namelist
    use test_progress, only : run_progress
+   use test_outside_balance, only : run_outside_balance
    use test_prony, only : run_prony
    use test_result_file, only : run_result_file
    use test_roughness, only : run_roughness
@@ -61,6 +62,7 @@ program main
    if (wanted('coupled_passes')) call run_coupled_passes()
    if (wanted('simulation_friction')) call run_simulation_friction()
    if (wanted('simulation_adhesion')) call run_simulation_adhesion()
+   if (wanted('outside_balance')) call run_outside_balance()
    if (wanted('friction_law')) call run_friction_law()
    if (wanted('friction_cg')) call run_friction_cg()
    if (wanted('xdmf')) call run_xdmf()

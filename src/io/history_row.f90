@@ -8,7 +8,7 @@ module history_row
 
    public :: column_type, history_columns, history_row_type, row_values, row_from_values
 
-   integer, parameter, public :: column_count = 36     !! number of columns
+   integer, parameter, public :: column_count = 38     !! number of columns
 
    !> What a column holds.
    type :: column_type
@@ -39,10 +39,12 @@ module history_row
       real(dp) :: work_normal = 0.0_dp      !! work of the normal traction, with the change of the adhesive energy, J
       real(dp) :: work_tangential = 0.0_dp  !! work of the tangential traction and of the driven mass, J
       real(dp) :: work_load = 0.0_dp        !! normal force times displacement, summed over the steps, J
-      real(dp) :: work_drive = 0.0_dp       !! horizontal force times displacement of the road, summed over the steps, J
+      real(dp) :: work_drive = 0.0_dp       !! force of the drive times displacement of the road, summed over the steps, J
+      real(dp) :: work_missing = 0.0_dp     !! work of load and drive that no other column accounts for, J
       real(dp) :: energy_elastic = 0.0_dp   !! energy stored in the rubber, J
       real(dp) :: energy_adhesive = 0.0_dp  !! energy of adhesion, J
       real(dp) :: energy_kinetic = 0.0_dp   !! kinetic energy of the interface, J
+      real(dp) :: energy_radiated = 0.0_dp  !! energy set free by jumps of an adhesive contact within a step, J
       real(dp) :: dissipated_viscous = 0.0_dp!! energy lost in the rubber, the scheme's own loss included, J
       real(dp) :: dissipated_numerical = 0.0_dp!! the part of the lost energy that is the scheme's own, J
       real(dp) :: dissipated_friction = 0.0_dp!! energy lost by friction in the interface, J
@@ -93,10 +95,14 @@ contains
          column_type('work_load', 'J', &
             'normal force times displacement, summed over the steps', .false.), &
          column_type('work_drive', 'J', &
-            'horizontal force times displacement of the road, summed over the steps', .false.), &
+            'horizontal force of the drive times displacement of the road, summed', .false.), &
+         column_type('work_missing', 'J', &
+            'work_load + work_drive less all works and energies: the error of the steps', .false.), &
          column_type('energy_elastic', 'J', 'energy stored in the rubber', .false.), &
          column_type('energy_adhesive', 'J', 'energy of adhesion', .false.), &
          column_type('energy_kinetic', 'J', 'kinetic energy of the interface', .false.), &
+         column_type('energy_radiated', 'J', &
+            'energy set free by jumps of an adhesive contact within a step', .false.), &
          column_type('dissipated_viscous', 'J', &
             'energy lost in the rubber, the scheme''s own loss included', .false.), &
          column_type('dissipated_numerical', 'J', &
@@ -120,90 +126,79 @@ contains
          column_type('seconds', 's', 'wall time of the solvers', .false.)]
    end function history_columns
 
-   !> A row as an array of reals.
+   !> A row as an array of reals, in the order of `history_columns`.
    pure function row_values(row) result(values)
       type(history_row_type), intent(in) :: row
       real(dp) :: values(column_count)
 
-      values(1) = real(row%step, dp)
-      values(2) = real(row%phase, dp)
-      values(3) = row%time
-      values(4) = row%pressure
-      values(5) = row%force
-      values(6) = row%displacement
-      values(7) = row%contact_area
-      values(8) = row%mean_gap
-      values(9) = row%road_x
-      values(10) = row%road_y
-      values(11) = row%traction_x
-      values(12) = row%traction_y
-      values(13) = row%stick_area
-      values(14) = row%sliding_speed
-      values(15) = row%friction_viscous
-      values(16) = row%friction
-      values(17) = row%work_normal
-      values(18) = row%work_tangential
-      values(19) = row%work_load
-      values(20) = row%work_drive
-      values(21) = row%energy_elastic
-      values(22) = row%energy_adhesive
-      values(23) = row%energy_kinetic
-      values(24) = row%dissipated_viscous
-      values(25) = row%dissipated_numerical
-      values(26) = row%dissipated_friction
-      values(27) = row%power_viscous
-      values(28) = row%power_friction
-      values(29) = real(row%iterations_normal, dp)
-      values(30) = real(row%iterations_tangential, dp)
-      values(31) = row%residual_normal
-      values(32) = row%residual_tangential
-      values(33) = real(row%passes, dp)
-      values(34) = row%residual_coupling
-      values(35) = row%ffts
-      values(36) = row%seconds
+      values = [real(row%step, dp), real(row%phase, dp), row%time, row%pressure, row%force, &
+         row%displacement, row%contact_area, row%mean_gap, row%road_x, row%road_y, &
+         row%traction_x, row%traction_y, row%stick_area, row%sliding_speed, &
+         row%friction_viscous, row%friction, row%work_normal, row%work_tangential, &
+         row%work_load, row%work_drive, row%work_missing, row%energy_elastic, &
+         row%energy_adhesive, row%energy_kinetic, row%energy_radiated, row%dissipated_viscous, &
+         row%dissipated_numerical, row%dissipated_friction, row%power_viscous, &
+         row%power_friction, real(row%iterations_normal, dp), &
+         real(row%iterations_tangential, dp), row%residual_normal, row%residual_tangential, &
+         real(row%passes, dp), row%residual_coupling, row%ffts, row%seconds]
    end function row_values
 
    !> The row that `row_values` made into an array.
-   pure function row_from_values(values) result(row)
+   function row_from_values(values) result(row)
       real(dp), intent(in) :: values(column_count)
       type(history_row_type) :: row
+      integer :: at                         !! number of the value read last
 
-      row%step = nint(values(1))
-      row%phase = nint(values(2))
-      row%time = values(3)
-      row%pressure = values(4)
-      row%force = values(5)
-      row%displacement = values(6)
-      row%contact_area = values(7)
-      row%mean_gap = values(8)
-      row%road_x = values(9)
-      row%road_y = values(10)
-      row%traction_x = values(11)
-      row%traction_y = values(12)
-      row%stick_area = values(13)
-      row%sliding_speed = values(14)
-      row%friction_viscous = values(15)
-      row%friction = values(16)
-      row%work_normal = values(17)
-      row%work_tangential = values(18)
-      row%work_load = values(19)
-      row%work_drive = values(20)
-      row%energy_elastic = values(21)
-      row%energy_adhesive = values(22)
-      row%energy_kinetic = values(23)
-      row%dissipated_viscous = values(24)
-      row%dissipated_numerical = values(25)
-      row%dissipated_friction = values(26)
-      row%power_viscous = values(27)
-      row%power_friction = values(28)
-      row%iterations_normal = nint(values(29))
-      row%iterations_tangential = nint(values(30))
-      row%residual_normal = values(31)
-      row%residual_tangential = values(32)
-      row%passes = nint(values(33))
-      row%residual_coupling = values(34)
-      row%ffts = values(35)
-      row%seconds = values(36)
+      at = 0
+      row%step = nint(following())
+      row%phase = nint(following())
+      row%time = following()
+      row%pressure = following()
+      row%force = following()
+      row%displacement = following()
+      row%contact_area = following()
+      row%mean_gap = following()
+      row%road_x = following()
+      row%road_y = following()
+      row%traction_x = following()
+      row%traction_y = following()
+      row%stick_area = following()
+      row%sliding_speed = following()
+      row%friction_viscous = following()
+      row%friction = following()
+      row%work_normal = following()
+      row%work_tangential = following()
+      row%work_load = following()
+      row%work_drive = following()
+      row%work_missing = following()
+      row%energy_elastic = following()
+      row%energy_adhesive = following()
+      row%energy_kinetic = following()
+      row%energy_radiated = following()
+      row%dissipated_viscous = following()
+      row%dissipated_numerical = following()
+      row%dissipated_friction = following()
+      row%power_viscous = following()
+      row%power_friction = following()
+      row%iterations_normal = nint(following())
+      row%iterations_tangential = nint(following())
+      row%residual_normal = following()
+      row%residual_tangential = following()
+      row%passes = nint(following())
+      row%residual_coupling = following()
+      row%ffts = following()
+      row%seconds = following()
+
+   contains
+
+      !> The next value.
+      function following() result(value)
+         real(dp) :: value
+
+         at = at + 1
+         value = values(at)
+      end function following
+
    end function row_from_values
 
 end module history_row

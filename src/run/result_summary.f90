@@ -189,7 +189,28 @@ contains
          if (is_of_friction(names(i)) .and. largest(i) <= 0.0_dp) cycle
          text = text//'largest '//trim(names(i))//' of all rows: '//to_text(largest(i))//nl
       end do
+      call add_missing_work(file, text)
    end subroutine history_text
+
+   !> The line that says how large the error of the steps is in the balance of energy.
+   subroutine add_missing_work(file, text)
+      type(hdf5_file_type), intent(inout) :: file
+      character(:), allocatable, intent(inout) :: text
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: missing(:), load(:), drive(:)
+      real(dp) :: scale
+      integer :: rows
+
+      call file%read('/history/work_missing', missing, error)
+      if (.not. allocated(error)) call file%read('/history/work_load', load, error)
+      if (.not. allocated(error)) call file%read('/history/work_drive', drive, error)
+      if (allocated(error)) return                   ! of an older version
+      rows = min(size(missing), size(load), size(drive))
+      if (rows == 0) return
+      scale = maxval(abs(load(:rows) + drive(:rows)))
+      if (scale > 0.0_dp) text = text//'largest work_missing of all rows: '// &
+         to_text(maxval(abs(missing(:rows)))/scale)//' of the work of load and drive (error of the steps)'//nl
+   end subroutine add_missing_work
 
    !> Is a column zero throughout where nothing slides?
    pure function is_of_friction(name) result(of_friction)

@@ -16,6 +16,7 @@ module schedule
    type :: planned_row_type
       integer :: phase = 0                        !! number of the phase, from 1
       logical :: instantaneous = .false.          !! a jump or a static solve
+      logical :: ramped = .false.                 !! the load has come here along a straight line
       logical :: relaxed = .false.                !! the load has rested for ever
       logical :: steady = .false.                 !! the road has slid for ever at this velocity
       real(dp) :: next_dt = 0.0_dp                !! the step in time after a steady row, s; 0: none
@@ -122,6 +123,7 @@ contains
             if (phase%linear) row%load = self%start_load + part*(phase%target - self%start_load)
             if (self%step == phase%steps) row%load = phase%target
          end if
+         row%ramped = phase%linear .and. self%step > 0 .and. self%row >= 0
          self%entered = .true.
          row%relaxed = phase%relaxed .and. row%instantaneous
          if (phase%steady .and. row%instantaneous) then

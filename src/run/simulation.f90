@@ -17,6 +17,7 @@ module simulation
    use interpolation, only : new_interpolation
    use map_edge, only : edge_clear, look_at_edge
    use normal_step, only : new_normal_step
+   use outside_balance, only : book_outside
    use parallel, only : global_sum
    use precision, only : dp, int64, int8
    use road_motion, only : move_road, place_road
@@ -428,14 +429,6 @@ contains
       row%friction = 0.0_dp
       if (abs(row%force) > 0.0_dp .and. any(abs(self%direction) > 0.0_dp)) &
          row%friction = dot_product(force, self%direction)/row%force
-      if (plan%instantaneous) then
-         ! The path of a jump is not known: its work is what it stores.
-         row%work_load = self%row%work_load + row%work_normal - self%row%work_normal &
-            + row%work_tangential - self%row%work_tangential
-      else
-         row%work_load = self%row%work_load + 0.5_dp*(row%force + self%row%force) &
-            *(row%displacement - self%row%displacement)
-      end if
       row%iterations_normal = outcome%iterations
       row%residual_normal = outcome%residual
       row%passes = 0
@@ -446,9 +439,8 @@ contains
       end if
       row%ffts = real(outcome%ffts + rubbing%ffts, dp)
       row%seconds = outcome%seconds
-      if (.not. plan%steady) row%work_drive = self%row%work_drive &
-         + 0.5_dp*(force(1) + self%drive_force(1))*(row%road_x - self%row%road_x) &
-         + 0.5_dp*(force(2) + self%drive_force(2))*(row%road_y - self%row%road_y)
+      call book_outside(self%row, self%drive_force, force, plan%steady .or. (plan%instantaneous .and. &
+         .not. plan%ramped), self%side%adhesive, row)
       self%drive_force = force
       self%row = row
    end subroutine fill_row

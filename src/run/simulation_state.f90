@@ -186,7 +186,9 @@ contains
       call table%add('tangential/traction', t%traction, 'Pa', 'tangential traction')
       call table%add('tangential/before', t%before, 'Pa', 'tangential traction of the step before')
       call table%add('tangential/displacement', t%displacement, 'm', 'tangential displacement')
+      call table%add('tangential/rubbing', t%rubbing, 'Pa', 'frictional traction T - T* of the last step')
       call table%add('tangential/contact', t%contact, '0 open, 1 stick, 2 slip')
+      call table%add('tangential/rubbed', t%rubbed, 'contact of the last step at the rubber''s own points')
       call list_books('tangential/books', t%books, table)
       call list_history('tangential/history', t%history, table)
    end subroutine list_tangential

@@ -10,8 +10,11 @@
 !> with v the speed of the interface over the road, dU_top = -(D' - D) the motion of the block's top
 !> against it. What of the mean traction moves the mass does not strain the rubber.
 !>
-!> Fields of doubles, two components each: T, that of the step before, U, the trial U', slip, DX', T_h; those of the solver; the
-!> history (S, S - S_old, one field an arm).
+!> The loss by friction is that of the mean traction over the step, second order in its length.
+!>
+!> Fields of doubles, two components each: T, that of the step before, U, the trial U', slip, T - T* of
+!> the step before at the rubber's own points, DX', T_h; those of the solver; the history (S, S - S_old,
+!> one field per arm).
 module tangential_state
    use case_settings, only : case_type
    use contact_rule, only : touches
@@ -47,7 +50,9 @@ module tangential_state
       real(dp), allocatable :: displacement(:, :, :)  !! U_T, m
       real(dp), allocatable :: trial(:, :, :)         !! U_T of the step in hand, m
       real(dp), allocatable :: slip(:, :, :)          !! of the step, m
+      real(dp), allocatable :: rubbing(:, :, :)       !! T - T* at the end of the last step, Pa
       integer(int8), allocatable :: contact(:, :)     !! 0 open, 1 stick, 2 slip
+      integer(int8), allocatable :: rubbed(:, :)      !! the same at the end of the last step
       type(history_type) :: history
       type(energy_books_type) :: books                !! of the strain of the rubber
       real(dp) :: speed(2) = 0.0_dp                   !! v, m/s
@@ -104,8 +109,9 @@ contains
       self%solver%method = merge(friction_thesis, friction_fast, case%solver%method == 'thesis')
       self%solver%max_iterations = case%solver%max_iterations
       allocate (self%traction(nx, ny, 2), source=0.0_dp)
-      allocate (self%before, self%displacement, self%trial, self%slip, self%drive, self%past, source=self%traction)
-      allocate (self%contact(nx, ny), source=0_int8)
+      allocate (self%before, self%displacement, self%trial, self%slip, self%rubbing, self%drive, self%past, &
+         source=self%traction)
+      allocate (self%contact(nx, ny), self%rubbed(nx, ny), source=0_int8)
       call new_history(self%history, material, nx*ny, 2, error)
       if (allocated(error)) return
       call new_books(self%books, material, self%grid%dx*self%grid%dy)
@@ -282,12 +288,15 @@ contains
             slope = [found%slope_x(i, j), found%slope_y(i, j)]
             star = self%law%normal_traction(found%pressure(i, j), slope)
             self%contact(i, j) = 0_int8
+            self%rubbing(i, j, :) = 0.0_dp
             if (found%pressure(i, j) <= 0.0_dp) cycle
+            self%rubbing(i, j, :) = self%traction(i, j, :) - star
             self%contact(i, j) = 2_int8
             if (self%law%bound_ratio(found%pressure(i, j), slope, self%traction(i, j, :) - star) > within) &
                self%contact(i, j) = 1_int8
          end do
       end do
+      self%rubbed(:, :) = self%contact
       self%before(:, :, :) = self%traction
       self%trial(:, :, :) = self%displacement
       self%slip(:, :, :) = 0.0_dp
@@ -331,29 +340,50 @@ contains
       real(dp), intent(in) :: pressure(:, :)
       real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)
       real(dp), allocatable :: rows(:, :)
-      real(dp) :: star(2), slope(2), total(4)
+      real(dp) :: rubbing(2), slope(2), total(4)
       integer :: i, j
 
       allocate (rows(4, self%grid%ny), source=0.0_dp)
       slope = 0.0_dp
       !$omp parallel do default(none) shared(self, pressure, slope_x, slope_y, rows) &
-      !$omp private(i, j, star) firstprivate(slope)
+      !$omp private(i, j, rubbing) firstprivate(slope)
       do j = 1, self%grid%ny
          do i = 1, self%grid%nx
-            if (self%contact(i, j) == 0_int8) cycle
-            if (self%law%slope) slope = [slope_x(i, j), slope_y(i, j)]
-            star = self%law%normal_traction(pressure(i, j), slope)
+            rubbing = 0.0_dp
+            if (self%contact(i, j) /= 0_int8) then
+               if (self%law%slope) slope = [slope_x(i, j), slope_y(i, j)]
+               rubbing = self%traction(i, j, :) - self%law%normal_traction(pressure(i, j), slope)
+               rows(2:3, j) = rows(2:3, j) + self%trial(i, j, :) - self%displacement(i, j, :)
+               rows(4, j) = rows(4, j) + 1.0_dp
+            end if
             ! The slip of a point that sticks is what the solver's tolerance left: it loses nothing.
-            if (self%contact(i, j) == 2_int8) rows(1, j) = rows(1, j) &
-               + dot_product(self%traction(i, j, :) - star, self%slip(i, j, :))
-            rows(2:3, j) = rows(2:3, j) + self%trial(i, j, :) - self%displacement(i, j, :)
-            rows(4, j) = rows(4, j) + 1.0_dp
+            if (self%contact(i, j) /= 1_int8) rows(1, j) = rows(1, j) &
+               + rubbed_off(self%rubbed(i, j) == 1_int8, self%rubbing(i, j, :), rubbing, self%slip(i, j, :))
+            self%rubbing(i, j, :) = rubbing
+            self%rubbed(i, j) = self%contact(i, j)
          end do
       end do
       total = global_sum([(sum(rows(i, :)), i = 1, 4)])
       self%lost_friction = self%lost_friction + total(1)*self%grid%dx*self%grid%dy
       if (self%dt > 0.0_dp .and. total(4) > 0.0_dp) self%rate = total(2:3)/(total(4)*self%dt)
    end subroutine book_friction
+
+   !> What a cell loses by friction in a step, J/m2: the mean of the frictional tractions at both ends times
+   !> the slip. A cell that enters or leaves the contact has none at one end. A cell that stuck at the start
+   !> slips only once its traction has reached its bound, so that the traction of the end counts alone; so it
+   !> does where the slip has turned against the traction of the start, since the cell has stuck in between.
+   pure function rubbed_off(stuck, before, after, slip) result(loss)
+      logical, intent(in) :: stuck                    !! at the start of the step
+      real(dp), intent(in) :: before(2)               !! T - T* at the start of the step, Pa
+      real(dp), intent(in) :: after(2)                !! and at its end, Pa
+      real(dp), intent(in) :: slip(2)                 !! m
+      real(dp) :: loss
+      real(dp) :: first
+
+      loss = max(dot_product(after, slip), 0.0_dp)
+      first = dot_product(before, slip)
+      if (first >= 0.0_dp .and. .not. stuck) loss = 0.5_dp*(first + loss)
+   end function rubbed_off
 
    !> Kinetic energy of the mass, J.
    function kinetic(self) result(energy)

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from .snapshot import Snapshot
 
 __all__ = ["RoadSlopes", "closure", "energy_terms", "friction_outside", "has_adhesion",
-           "has_friction", "has_rough_road", "is_elastic", "moved_slopes", "rms_slope",
-           "road_speed", "setting", "solver_setting", "travel"]
+           "has_friction", "has_rough_road", "is_elastic", "missing_work", "moved_slopes",
+           "rms_slope", "road_speed", "setting", "solver_setting", "travel"]
 
 FloatArray = NDArray[np.float64]
 
@@ -122,6 +122,21 @@ def energy_terms(run: Run) -> dict[str, FloatArray]:
         "friction": total("dissipated_friction"),
     }
     return {name: values for name, values in terms.items() if values is not None}
+
+
+def missing_work(run: Run) -> float | None:
+    """Return the largest `work_missing` over the largest work of load and drive, a number.
+
+    It measures the error of the steps: the work seen from outside and that of the fields agree only
+    as far as the steps resolve the motion. None where the history lacks a column or nothing works.
+    """
+    names = ("work_missing", "work_load", "work_drive")
+    if any(name not in run.history for name in names) or not run.history.rows:
+        return None
+    missing, load, drive = (np.asarray(run.history[name], dtype=float) for name in names)
+    rows = min(len(missing), len(load), len(drive))
+    scale = np.abs(load[:rows] + drive[:rows]).max()
+    return float(np.abs(missing[:rows]).max() / scale) if scale > 0 else None
 
 
 def closure(run: Run) -> FloatArray | None:

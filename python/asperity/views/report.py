@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.library import version
-from ..results.derived import closure, energy_terms, has_friction, solver_setting
+from ..results.derived import closure, energy_terms, has_friction, missing_work, solver_setting
 from ..results.standing import duration, rows_of, seems_dead, short_time, silence, time_of_row
 from ..results.steady import steady_mean
 from .page_parts import PAGE, colour_scales, fill_page, page_file, page_json
@@ -320,6 +320,10 @@ def _energies(run: Run) -> str:
         text = ('<p class="soft">Work put in less stored less lost: at most'
                 f" <strong>{missing.max(initial=0.0):.2g}</strong> of the largest energy so far."
                 "</p>\n")
+    error = missing_work(run)
+    if error is not None:
+        text += ('<p class="soft">Work of load and drive that no column accounts for (error of the'
+                 f" steps): at most <strong>{error:.2g}</strong> of that work.</p>\n")
     names = [name for name in run.history
              if name.startswith(("energy_", "dissipated_", "work_"))]
     rows = [(escape(run.history.long_name(name)), _number(float(run.history[name][-1]), "J"))
