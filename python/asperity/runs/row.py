@@ -67,9 +67,11 @@ class Row(NamedValues):
     work_tangential: float
     work_load: float
     work_drive: float
+    work_missing: float
     energy_elastic: float
     energy_adhesive: float
     energy_kinetic: float
+    energy_radiated: float
     dissipated_viscous: float
     dissipated_numerical: float
     dissipated_friction: float
