@@ -18,6 +18,8 @@ program main
    use test_mixed, only : run_mixed
    use test_namelist, only : run_namelist
    use test_progress, only : run_progress
+   use test_block_motion, only : run_block_motion
+   use test_starting_steps, only : run_starting_steps
    use test_outside_balance, only : run_outside_balance
    use test_prony, only : run_prony
    use test_result_file, only : run_result_file
@@ -62,6 +64,8 @@ program main
    if (wanted('coupled_passes')) call run_coupled_passes()
    if (wanted('simulation_friction')) call run_simulation_friction()
    if (wanted('simulation_adhesion')) call run_simulation_adhesion()
+   if (wanted('starting_steps')) call run_starting_steps()
+   if (wanted('block_motion')) call run_block_motion()
    if (wanted('outside_balance')) call run_outside_balance()
    if (wanted('friction_law')) call run_friction_law()
    if (wanted('friction_cg')) call run_friction_cg()

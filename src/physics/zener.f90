@@ -17,7 +17,8 @@
 !>
 !> with phi, chi from `relaxation_functions` and w = 2 dt/(dt + dt_old), damped by (2 dt_old/dt)^2
 !> where a step is more than twice the last: plain extrapolation would overshoot there. w = 0 in the
-!> first step and after a jump. A jump is a step of no duration: alpha = 1, b1 = g.
+!> first step and after a jump of the load or of a rate: module starting_steps then takes the step in three
+!> parts. A jump is a step of no duration: alpha = 1, b1 = g.
 !>
 !> Memory: S and one field an arm; one more (S - S_old) for exponential2; none for an elastic body.
 !> Results do not depend on the number of threads: sums are formed block by block.
@@ -31,7 +32,7 @@ module zener
 
    public :: history_type, products_type, zener_type
    public :: new_zener, start_step, start_jump, start_relaxed, finish_step, restart_order
-   public :: is_elastic
+   public :: extrapolates, is_elastic, needs_start
    public :: new_history, history_field, commit_history, destroy_history
    public :: new_products
 
@@ -131,6 +132,22 @@ contains
 
       elastic = size(self%g) == 0
    end function is_elastic
+
+   !> Does the scheme look back to the step before?
+   pure function extrapolates(self) result(yes)
+      type(zener_type), intent(in) :: self
+      logical :: yes
+
+      yes = self%scheme == scheme_exponential2 .and. .not. is_elastic(self)
+   end function extrapolates
+
+   !> Is there no step before to look back to?
+   pure function needs_start(self) result(yes)
+      type(zener_type), intent(in) :: self
+      logical :: yes
+
+      yes = .not. self%dt_old > 0.0_dp
+   end function needs_start
 
    !> Coefficients of a step of duration dt. May be called again before `finish_step`.
    pure subroutine start_step(self, dt)

@@ -2,7 +2,8 @@
 !>
 !>    work_load + work_drive = work_normal + work_tangential + energy_radiated + work_missing
 !>
-!> Load and drive are known at the ends of a step; their work is taken by the trapezoidal rule. The right
+!> Load and drive are known at the ends of a step; their work is taken by the trapezoidal rule. Of the force
+!> of friction, what accelerates the mass of the block does not reach the drive at its top. The right
 !> side comes from the fields (modules viscoelastic_energy, tangential_state) and closes by itself. The
 !> two sides share nothing but the solution, so that `work_missing` measures the error of the steps.
 !>
@@ -22,10 +23,11 @@ module outside_balance
 contains
 
    !> Bring the columns of the outside view up to date; all other works of the row are known.
-   pure subroutine book_outside(before, drive_before, drive, abrupt, adhesive, row)
+   pure subroutine book_outside(before, drive_before, drive, inertia, abrupt, adhesive, row)
       type(history_row_type), intent(in) :: before   !! the row before
       real(dp), intent(in) :: drive_before(2)        !! horizontal force on the rubber in the row before, N
       real(dp), intent(in) :: drive(2)               !! the same now, N
+      real(dp), intent(in) :: inertia(2)             !! the part of it that accelerated the mass, mean over the step, N
       logical, intent(in) :: abrupt                  !! a jump: its path is not known
       logical, intent(in) :: adhesive
       type(history_row_type), intent(inout) :: row
@@ -40,7 +42,7 @@ contains
       sunk = row%displacement - before%displacement
       motion = [row%road_x - before%road_x, row%road_y - before%road_y]
       row%work_load = before%work_load + 0.5_dp*(before%force + row%force)*sunk
-      row%work_drive = before%work_drive + 0.5_dp*dot_product(drive_before + drive, motion)
+      row%work_drive = before%work_drive + dot_product(0.5_dp*(drive_before + drive) - inertia, motion)
 
       excess = row%work_load - before%work_load + row%work_drive - before%work_drive - inside
       margin = 0.5_dp*(abs((row%force - before%force)*sunk) + abs(dot_product(drive - drive_before, motion)))

@@ -21,10 +21,12 @@ module schedule
       logical :: steady = .false.                 !! the road has slid for ever at this velocity
       real(dp) :: next_dt = 0.0_dp                !! the step in time after a steady row, s; 0: none
       logical :: new_speed = .false.              !! the speed of the road changed just before
+      logical :: new_rate = .false.               !! the rate of the load changed just before
       real(dp) :: time = 0.0_dp                   !! s
       real(dp) :: dt = 0.0_dp                     !! s; 0 where instantaneous
       character(12) :: control = 'pressure'
       real(dp) :: load = 0.0_dp                   !! Pa, N or m
+      real(dp) :: load_before = 0.0_dp            !! the same at the start of the step
       real(dp) :: road_x = 0.0_dp                 !! displacement of the road, m
       real(dp) :: road_y = 0.0_dp
       real(dp) :: velocity_x = 0.0_dp             !! of the road, m/s
@@ -43,6 +45,7 @@ module schedule
       real(dp) :: start_y = 0.0_dp
       character(12) :: held_control = ''          !! load held so far; '' before the first phase
       real(dp) :: held_load = 0.0_dp
+      real(dp) :: held_rate = 0.0_dp              !! rate of the load in the last step, over s
       real(dp) :: velocity_x = 0.0_dp             !! of the road so far, m/s
       real(dp) :: velocity_y = 0.0_dp
       logical :: speed_changed = .false.          !! by `change_velocity`, since the last row
@@ -122,6 +125,10 @@ contains
             row%load = phase%target
             if (phase%linear) row%load = self%start_load + part*(phase%target - self%start_load)
             if (self%step == phase%steps) row%load = phase%target
+            row%load_before = phase%target
+            if (phase%linear) row%load_before = self%start_load &
+               + real(self%step - 1, dp)/phase%steps*(phase%target - self%start_load)
+            if (self%step == 1 .and. .not. phase%static) call note_rate(self, phase, row)
          end if
          row%ramped = phase%linear .and. self%step > 0 .and. self%row >= 0
          self%entered = .true.
@@ -174,6 +181,21 @@ contains
          phases(k)%velocity_y = velocity(2)
       end do
    end subroutine change_velocity
+
+   !> Note the rate of a phase's load, and whether it differs from that of the step before.
+   subroutine note_rate(self, phase, row)
+      type(schedule_type), intent(inout) :: self
+      type(phase_settings_type), intent(in) :: phase
+      type(planned_row_type), intent(inout) :: row
+      real(dp), parameter :: same = 1e-9_dp        !! relative difference of rates that are one
+      real(dp) :: rate
+
+      rate = 0.0_dp
+      if (phase%linear) rate = (phase%target - self%start_load)/phase%duration
+      row%new_rate = abs(rate - self%held_rate) > same*max(abs(rate), abs(self%held_rate))
+      if (self%held_control /= phase%control(:12)) row%new_rate = .true.
+      self%held_rate = rate
+   end subroutine note_rate
 
    !> The load from which a phase's ramp starts, in the phase's control.
    pure function load_at_start(self, phase, present_load) result(load)

@@ -24,13 +24,14 @@ module simulation
    use schedule, only : next_row, planned_row_type, schedule_type
    use solver_result, only : solver_result_type
    use steady_step, only : new_steady_step, steady_step_type
+   use starting_steps, only : part_sums_type, split_start
    use stick_slip_watch, only : stick_slip_watch_type, watch_slip
    use surface, only : new_height
    use tangential_state, only : new_tangential_state
    use text_tools, only : to_text
    use viscoelastic_energy, only : book_step, new_books
-   use zener, only : commit_history, destroy_history, finish_step, history_field, is_elastic, &
-      new_history, new_products, new_zener, products_type, restart_order, start_jump, &
+   use zener, only : commit_history, destroy_history, extrapolates, finish_step, history_field, &
+      is_elastic, needs_start, new_history, new_products, new_zener, products_type, restart_order, start_jump, &
       start_relaxed, start_step
    implicit none
    private
@@ -133,13 +134,39 @@ contains
       class(simulation_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
       type(planned_row_type) :: plan
-      type(solver_result_type) :: outcome, rubbing
-      real(dp) :: level
-      integer(int64) :: start, now, rate
+      type(planned_row_type), allocatable :: parts(:)
+      type(part_sums_type) :: sums
+      integer :: k
 
       call next_row(self%schedule, self%case%phases, &
          [self%row%pressure, self%row%force, self%row%displacement], plan, self%finished)
       if (self%finished) return
+      call split_start(plan, needs_start(self%material) .or. plan%new_speed .or. plan%new_rate, &
+         extrapolates(self%material), [self%row%road_x, self%row%road_y], parts)
+      do k = 1, size(parts)
+         call take_step(self, parts(k), error)
+         if (allocated(error)) return
+         if (size(parts) == 1) exit
+         call sums%add(parts(k)%dt, self%row)
+         if (self%frictional) call sums%add_slip(self%tangential%slip)
+         if (.not. self%converged) exit
+      end do
+      if (size(parts) > 1) then
+         call sums%hand_out(self%row)
+         if (self%frictional) call sums%hand_out_slip(self%tangential%slip)
+      end if
+      self%finished = self%schedule%phase > size(self%case%phases)
+   end subroutine advance
+
+   !> One step of a row, its history row included.
+   subroutine take_step(self, plan, error)
+      type(simulation_type), intent(inout) :: self
+      type(planned_row_type), intent(inout) :: plan      !! a steady row finds the place of the road
+      type(error_type), allocatable, intent(out) :: error
+      type(solver_result_type) :: outcome, rubbing
+      real(dp) :: level
+      integer(int64) :: start, now, rate
+
       call begin_step(self, plan, error)
       if (allocated(error)) return
       call system_clock(start, rate)
@@ -178,8 +205,7 @@ contains
       outcome%seconds = real(now - start, dp)/real(rate, dp)
       call watch_edge(self, plan)
       call fill_row(self, plan, outcome, rubbing, level)
-      self%finished = self%schedule%phase > size(self%case%phases)
-   end subroutine advance
+   end subroutine take_step
 
    !> A row of steady sliding: its state, and what the arms remember of it where time goes on.
    subroutine slide_for_ever(self, plan, outcome, rubbing, level)
@@ -344,7 +370,8 @@ contains
       type(planned_row_type), intent(in) :: plan
       type(error_type), allocatable, intent(out) :: error
 
-      if (plan%new_speed) call restart_order(self%material)
+      if (plan%new_speed .or. plan%new_rate) call restart_order(self%material)
+      if (plan%new_speed .and. self%frictional) self%tangential%block%fresh = .true.
       if (plan%relaxed) then
          call start_relaxed(self%material, error)
       else if (plan%instantaneous) then
@@ -375,7 +402,7 @@ contains
       type(history_row_type) :: row
       real(dp), allocatable :: rows(:, :)
       logical, allocatable :: touching(:)
-      real(dp) :: sums(7), cells, area, force(2), outside(2)
+      real(dp) :: sums(7), cells, area, force(2), outside(2), inertia(2)
       integer :: j
 
       allocate (rows(7, self%grid%ny), source=0.0_dp)
@@ -418,7 +445,9 @@ contains
       row%energy_elastic = self%books%stored
       row%dissipated_viscous = self%books%dissipated
       row%dissipated_numerical = self%books%numerical
+      inertia = 0.0_dp
       if (self%frictional) then
+         inertia = self%tangential%block%inertia
          outside = -sums(6:7)*self%grid%dx*self%grid%dy
          call add_friction(self, plan, rubbing, outside, force, row)
          call watch_stick_slip(self, plan, row%sliding_speed)
@@ -439,7 +468,7 @@ contains
       end if
       row%ffts = real(outcome%ffts + rubbing%ffts, dp)
       row%seconds = outcome%seconds
-      call book_outside(self%row, self%drive_force, force, plan%steady .or. (plan%instantaneous .and. &
+      call book_outside(self%row, self%drive_force, force, inertia, plan%steady .or. (plan%instantaneous .and. &
          .not. plan%ramped), self%side%adhesive, row)
       self%drive_force = force
       self%row = row
@@ -464,18 +493,18 @@ contains
       row%sliding_speed = 0.0_dp
       if (plan%dt > 0.0_dp) then
          row%sliding_speed = dot_product(slip, self%direction)/plan%dt
-      else if (self%tangential%mass > 0.0_dp) then
+      else if (self%tangential%block%mass > 0.0_dp) then
          ! The mass moves on through a jump of the load.
-         row%sliding_speed = -dot_product(self%tangential%speed, self%direction)
+         row%sliding_speed = -dot_product(self%tangential%block%speed, self%direction)
       end if
-      row%work_tangential = self%tangential%books%work + self%tangential%work_mass &
+      row%work_tangential = self%tangential%books%work + self%tangential%block%work &
          + self%tangential%lost_friction
       row%energy_elastic = row%energy_elastic + self%tangential%books%stored
-      row%energy_kinetic = self%tangential%kinetic()
+      row%energy_kinetic = self%tangential%block%kinetic()
       row%dissipated_viscous = row%dissipated_viscous + self%tangential%books%dissipated &
-         + self%tangential%lost_mass
+         + self%tangential%block%lost
       row%dissipated_numerical = row%dissipated_numerical + self%tangential%books%numerical &
-         + self%tangential%lost_mass
+         + self%tangential%block%lost
       row%dissipated_friction = self%tangential%lost_friction
       row%iterations_tangential = rubbing%iterations
       row%residual_tangential = rubbing%residual

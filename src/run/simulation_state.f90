@@ -109,6 +109,8 @@ contains
          call table%add('schedule/held_control', s%held_control, 'what is held so far')
          call table%add('schedule/held_load', s%held_load, '1', &
             'load held so far, in the units of its control')
+         call table%add('schedule/held_rate', s%held_rate, '1/s', &
+            'rate of the load in the last step, in the units of its control')
          call table%add('schedule/velocity_x', s%velocity_x, 'm/s', 'velocity of the road so far')
          call table%add('schedule/velocity_y', s%velocity_y, 'm/s', 'velocity of the road so far')
          call table%add('schedule/speed_changed', s%speed_changed, &
@@ -177,11 +179,13 @@ contains
       type(state_table_type), intent(inout) :: table
 
       call table%add('tangential/moved', t%moved, 'the road has moved: friction acts')
-      call table%add('tangential/speed', t%speed, 'm/s', 'speed of the mass over the road')
+      call table%add('tangential/block/fresh', t%block%fresh, 'the acceleration of the block is not known')
+      call table%add('tangential/block/speed', t%block%speed, 'm/s', 'speed of the mass over the road')
+      call table%add('tangential/block/acceleration', t%block%acceleration, 'm/s2', 'acceleration of the mass')
       call table%add('tangential/rate', t%rate, 'm/s', 'mean speed of the surface in the contact')
       call table%add('tangential/pace', t%pace, 's', 'length of the last step, 0 after a jump')
-      call table%add('tangential/work_mass', t%work_mass, 'J', 'work done on the mass')
-      call table%add('tangential/lost_mass', t%lost_mass, 'J', 'energy that the mass lost')
+      call table%add('tangential/block/work', t%block%work, 'J', 'work done on the mass')
+      call table%add('tangential/block/lost', t%block%lost, 'J', 'energy that the rule of its motion lost')
       call table%add('tangential/lost_friction', t%lost_friction, 'J', 'energy lost by friction')
       call table%add('tangential/traction', t%traction, 'Pa', 'tangential traction')
       call table%add('tangential/before', t%before, 'Pa', 'tangential traction of the step before')

@@ -2,13 +2,9 @@
 !> driven over a road, with the block's viscoelasticity and the inertia of its mean motion.
 !>
 !> Slip of a step: r = DX - U', DX = U + (D' - D), U' = A(T + T_h)/Q with the traction T_h of the
-!> history. The solver works with Q r = DX' - A(T + T_h), DX' = Q DX. The mean mode of a block of
-!> thickness h and mass m an area follows backward Euler (thesis, eq. 3.18, 3.19):
-!>
-!>    (Q + h m/dt^2) U' = h (T + T_h) + h m ((U - dU_top)/dt^2 + v/dt),    v' = (U' - U + dU_top)/dt
-!>
-!> with v the speed of the interface over the road, dU_top = -(D' - D) the motion of the block's top
-!> against it. What of the mean traction moves the mass does not strain the rubber.
+!> history. The solver works with Q r = DX' - A(T + T_h), DX' = Q DX. The mean of a block
+!> with mass moves by the rule of module block_motion; the part of the mean traction that accelerates the
+!> mass does not strain the rubber.
 !>
 !> The loss by friction is that of the mean traction over the step, second order in its length.
 !>
@@ -16,6 +12,7 @@
 !> the step before at the rubber's own points, DX', T_h; those of the solver; the history (S, S - S_old,
 !> one field per arm).
 module tangential_state
+   use block_motion, only : block_motion_type
    use case_settings, only : case_type
    use contact_rule, only : touches
    use errors, only : error_type
@@ -42,8 +39,7 @@ module tangential_state
       type(friction_law_type) :: law
       logical :: adhesive = .false.                   !! the contact has an adhesive potential
       logical :: moved = .false.                      !! the road has moved: friction acts
-      real(dp) :: thickness = 0.0_dp                  !! h, m
-      real(dp) :: mass = 0.0_dp                       !! m, kg/m2
+      type(block_motion_type) :: block                !! mean motion of the block
       real(dp), allocatable :: traction(:, :, :)      !! T, Pa [nx, ny, 2]
       real(dp), allocatable :: before(:, :, :)        !! T of the step before, seen from where T is, Pa
       real(dp) :: pace = 0.0_dp                       !! length of the step that led from it to T, s; 0: none
@@ -55,10 +51,7 @@ module tangential_state
       integer(int8), allocatable :: rubbed(:, :)      !! the same at the end of the last step
       type(history_type) :: history
       type(energy_books_type) :: books                !! of the strain of the rubber
-      real(dp) :: speed(2) = 0.0_dp                   !! v, m/s
       real(dp) :: rate(2) = 0.0_dp                    !! mean speed of the surface in the contact, m/s
-      real(dp) :: work_mass = 0.0_dp                  !! done on the mass, J
-      real(dp) :: lost_mass = 0.0_dp                  !! by backward Euler in its motion, J
       real(dp) :: lost_friction = 0.0_dp              !! J
       type(convolution_type), private :: operator
       type(friction_solver_type), private :: solver
@@ -74,7 +67,6 @@ module tangential_state
       procedure :: solve
       procedure :: take_steady
       procedure :: commit
-      procedure :: kinetic
       procedure :: sums
       procedure :: destroy
    end type tangential_state_type
@@ -99,9 +91,10 @@ contains
       self%law = new_friction_law(trim(case%friction%law), case%friction%coefficient, &
          case%friction%shear_strength, adhesive, case%friction%slope_effect, &
          case%solver%slip_law == 'physical')
-      self%thickness = case%material%thickness
-      self%mass = 0.5_dp*case%material%density*case%material%thickness
-      call new_tangential_operator(self%operator, self%grid, case%material%poisson, self%thickness, &
+      self%block%height = case%material%thickness
+      self%block%mass = 0.5_dp*case%material%density*case%material%thickness
+      self%block%area = self%grid%lx*self%grid%ly
+      call new_tangential_operator(self%operator, self%grid, case%material%poisson, self%block%height, &
          error)
       if (allocated(error)) return
       call new_friction_solver(self%solver, self%grid, case%material%poisson, self%operator, error)
@@ -123,7 +116,7 @@ contains
       type(zener_type), intent(in) :: material
       real(dp), intent(in) :: motion(2)               !! D' - D, m
       real(dp), intent(in) :: dt                      !! s; 0: instantaneous
-      real(dp) :: stiffness, known, shift
+      real(dp) :: height, shift(2)
       integer :: c, j
 
       self%motion = motion
@@ -136,30 +129,24 @@ contains
       if (.not. dt > 0.0_dp) self%pace = 0.0_dp
       call history_field(self%history, material, self%past)
       self%past_mean = means(self, self%past)
+      height = self%block%height
+      shift = self%q*motion
+      if (self%block%inert(dt)) then
+         ! A mass makes the mean stiffer: like a lower block, moved by what is known of the mass.
+         height = self%q*height/(self%q + self%block%resistance(dt))
+         shift = shift - height*self%block%known(means(self, self%displacement), motion, dt)
+      else if (self%block%mass > 0.0_dp) then
+         ! A mass does not move in no time: the mean of the surface stays.
+         height = 0.0_dp
+         shift = shift - self%q*means(self, self%displacement)
+      end if
       do c = 1, 2
-         shift = self%q*motion(c)
-         if (self%mass > 0.0_dp .and. .not. dt > 0.0_dp) then
-            ! A mass does not move in no time: the mean of the surface stays.
-            shift = shift - self%q*mean_of(self, c)
-         else if (self%mass > 0.0_dp) then
-            stiffness = self%q + self%thickness*self%mass/dt**2
-            known = self%thickness*(self%past_mean(c) + self%mass*((mean_of(self, c) + motion(c))/dt**2 &
-               + self%speed(c)/dt))/stiffness
-            ! The solver's own mean of A T_h, by the compliance set below, is put right here.
-            shift = shift + self%q*self%thickness/stiffness*self%past_mean(c) - self%q*known
-         end if
          !$omp parallel do default(none) shared(self, c, shift) private(j)
          do j = 1, self%grid%ny
-            self%drive(:, j, c) = self%q*self%displacement(:, j, c) + shift
+            self%drive(:, j, c) = self%q*self%displacement(:, j, c) + shift(c)
          end do
       end do
-      if (self%mass > 0.0_dp .and. .not. dt > 0.0_dp) then
-         call set_thickness(self, 0.0_dp)
-      else if (self%mass > 0.0_dp) then
-         call set_thickness(self, self%q*self%thickness/(self%q + self%thickness*self%mass/dt**2))
-      else
-         call set_thickness(self, self%thickness)
-      end if
+      call set_thickness(self, height)
    end subroutine begin
 
    !> Start the step's traction from the change of the last step going on. To be called when the road
@@ -192,17 +179,6 @@ contains
 
       if (self%grid%boundary == boundary_periodic) call set_mean_compliance(self%operator, thickness)
    end subroutine set_thickness
-
-   !> Mean displacement along a direction.
-   function mean_of(self, c) result(mean)
-      type(tangential_state_type), intent(in) :: self
-      integer, intent(in) :: c
-      real(dp) :: mean
-      real(dp) :: both(2)
-
-      both = means(self, self%displacement)
-      mean = both(c)
-   end function mean_of
 
    !> Means of a vector field over the grid.
    function means(self, field) result(mean)
@@ -274,12 +250,13 @@ contains
       real(dp) :: slope(2), star(2), before
       integer :: i, j
 
-      before = self%kinetic()
+      before = self%block%kinetic()
       self%moved = .true.
       self%pace = 0.0_dp
       self%rate = 0.0_dp
-      self%speed = -velocity
-      if (self%mass > 0.0_dp) self%work_mass = self%work_mass + self%kinetic() - before
+      self%block%speed = -velocity
+      self%block%fresh = .true.
+      self%block%work = self%block%work + self%block%kinetic() - before
       !$omp parallel do default(none) shared(self, found) private(i, j, slope, star)
       do j = 1, self%grid%ny
          do i = 1, self%grid%nx
@@ -309,23 +286,16 @@ contains
       real(dp), intent(in) :: pressure(:, :)
       real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)
       type(products_type) :: products
-      real(dp) :: carried(2), before(2), after(2), top(2), speed(2), area
+      real(dp) :: carried(2), before(2), after(2)
 
       if (.not. self%moved) return
-      area = self%grid%lx*self%grid%ly
       products = new_products(material)
       carried = 0.0_dp
-      if (self%mass > 0.0_dp) then
+      if (self%block%mass > 0.0_dp) then
          before = means(self, self%displacement)
          after = means(self, self%trial)
-         carried = means(self, self%traction) + self%past_mean - self%q*after/self%thickness
-         if (self%dt > 0.0_dp) then
-            top = -self%motion
-            speed = (after - before + top)/self%dt
-            self%work_mass = self%work_mass + area*dot_product(carried, after - before + top)
-            self%lost_mass = self%lost_mass + 0.5_dp*self%mass*area*sum((speed - self%speed)**2)
-            self%speed = speed
-         end if
+         carried = means(self, self%traction) + self%past_mean - self%q*after/self%block%height
+         call self%block%finish(after - before - self%motion, carried, self%dt)
       end if
       call commit_history(self%history, material, self%traction, self%displacement, self%trial, &
          products, carried)
@@ -384,14 +354,6 @@ contains
       first = dot_product(before, slip)
       if (first >= 0.0_dp .and. .not. stuck) loss = 0.5_dp*(first + loss)
    end function rubbed_off
-
-   !> Kinetic energy of the mass, J.
-   function kinetic(self) result(energy)
-      class(tangential_state_type), intent(in) :: self
-      real(dp) :: energy
-
-      energy = 0.5_dp*self%mass*sum(self%speed**2)*self%grid%lx*self%grid%ly
-   end function kinetic
 
    !> Means of the traction, part of the grid that sticks, mean slip of the step.
    subroutine sums(self, traction, stick, slip)

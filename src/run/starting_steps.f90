@@ -1,0 +1,144 @@
+!> The first step after a kink, in parts.
+!>
+!> The scheme exponential2 takes the curvature of the motion in a step from the step before. After a
+!> jump, or where the rate of the load or the speed of the road changes, there is no such step: the motion is taken
+!> for linear, which is coarse just where fast arms make it bend most. The step is therefore solved in
+!> three parts, a quarter, a quarter and a half: linear, then with the curvature that the first has
+!> shown. Two solves more, once per kink. In a point with five arms over four decades, eight steps per
+!> ramp, this leaves a quarter of the error of one linear step; more and finer parts gain nothing.
+!>
+!> The parts make one row of the history: works and energies are cumulative, all else is that of the end,
+!> but for what `part_sums_type` adds up.
+module starting_steps
+   use history_row, only : history_row_type
+   use precision, only : dp
+   use schedule, only : planned_row_type
+   implicit none
+   private
+
+   public :: part_sums_type, split_start
+
+   real(dp), parameter :: ends(3) = [0.25_dp, 0.5_dp, 1.0_dp]   !! of the parts, over the step
+
+   !> What the row of a step in parts has from all of them.
+   type :: part_sums_type
+      private
+      integer :: iterations_normal = 0
+      integer :: iterations_tangential = 0
+      integer :: passes = 0
+      real(dp) :: residual_coupling = 0.0_dp       !! largest
+      real(dp) :: ffts = 0.0_dp
+      real(dp) :: seconds = 0.0_dp                 !! s
+      real(dp) :: time = 0.0_dp                    !! s
+      real(dp) :: slid = 0.0_dp                    !! time times sliding speed, m
+      real(dp) :: lost_viscous = 0.0_dp            !! time times power_viscous, J
+      real(dp) :: lost_friction = 0.0_dp           !! time times power_friction, J
+      real(dp) :: residual_normal = 0.0_dp         !! largest
+      real(dp) :: residual_tangential = 0.0_dp     !! largest
+      real(dp), allocatable :: slip(:, :, :)       !! m
+   contains
+      procedure :: add
+      procedure :: add_slip
+      procedure :: hand_out
+      procedure :: hand_out_slip
+   end type part_sums_type
+
+contains
+
+   !> The parts of a step, or the step itself where it needs none.
+   pure subroutine split_start(plan, starts, extrapolates, road, parts)
+      type(planned_row_type), intent(in) :: plan
+      logical, intent(in) :: starts                !! there is no step before that tells the curvature
+      logical, intent(in) :: extrapolates          !! the scheme takes the curvature from the step before
+      real(dp), intent(in) :: road(2)              !! displacement of the road before the step, m
+      type(planned_row_type), allocatable, intent(out) :: parts(:)
+      real(dp) :: rest
+      integer :: k
+
+      if (.not. starts .or. .not. extrapolates .or. plan%instantaneous .or. .not. plan%dt > 0.0_dp) then
+         allocate (parts(1), source=plan)
+         return
+      end if
+      allocate (parts(size(ends)), source=plan)
+      do k = 1, size(ends)
+         rest = 1.0_dp - ends(k)
+         parts(k)%dt = ends(k)*plan%dt
+         if (k > 1) parts(k)%dt = (ends(k) - ends(k - 1))*plan%dt
+         if (k > 1) parts(k)%new_speed = .false.
+         if (k > 1) parts(k)%new_rate = .false.
+         if (k == size(ends)) exit                 ! it ends exactly where the step does
+         parts(k)%time = plan%time - rest*plan%dt
+         parts(k)%load = plan%load - rest*(plan%load - plan%load_before)
+         parts(k)%road_x = plan%road_x - rest*(plan%road_x - road(1))
+         parts(k)%road_y = plan%road_y - rest*(plan%road_y - road(2))
+      end do
+   end subroutine split_start
+
+   !> Add the row of a part.
+   pure subroutine add(self, dt, row)
+      class(part_sums_type), intent(inout) :: self
+      real(dp), intent(in) :: dt                   !! of the part, s
+      type(history_row_type), intent(in) :: row
+
+      self%iterations_normal = self%iterations_normal + row%iterations_normal
+      self%iterations_tangential = self%iterations_tangential + row%iterations_tangential
+      self%passes = self%passes + row%passes
+      self%residual_coupling = max(self%residual_coupling, row%residual_coupling)
+      self%ffts = self%ffts + row%ffts
+      self%seconds = self%seconds + row%seconds
+      self%time = self%time + dt
+      self%slid = self%slid + dt*row%sliding_speed
+      self%lost_viscous = self%lost_viscous + dt*row%power_viscous
+      self%lost_friction = self%lost_friction + dt*row%power_friction
+      self%residual_normal = max(self%residual_normal, row%residual_normal)
+      self%residual_tangential = max(self%residual_tangential, row%residual_tangential)
+   end subroutine add
+
+   !> Add the slip of a part.
+   subroutine add_slip(self, slip)
+      class(part_sums_type), intent(inout) :: self
+      real(dp), intent(in) :: slip(:, :, :)        !! m
+      integer :: j
+
+      if (.not. allocated(self%slip)) then
+         allocate (self%slip, source=slip)
+         return
+      end if
+      !$omp parallel do default(none) shared(self, slip) private(j)
+      do j = 1, size(slip, 2)
+         self%slip(:, j, :) = self%slip(:, j, :) + slip(:, j, :)
+      end do
+   end subroutine add_slip
+
+   !> Put the sums into the row of the step.
+   pure subroutine hand_out(self, row)
+      class(part_sums_type), intent(in) :: self
+      type(history_row_type), intent(inout) :: row
+
+      row%iterations_normal = self%iterations_normal
+      row%iterations_tangential = self%iterations_tangential
+      row%passes = self%passes
+      row%residual_coupling = self%residual_coupling
+      row%ffts = self%ffts
+      row%seconds = self%seconds
+      row%sliding_speed = self%slid/self%time
+      row%power_viscous = self%lost_viscous/self%time
+      row%power_friction = self%lost_friction/self%time
+      row%residual_normal = self%residual_normal
+      row%residual_tangential = self%residual_tangential
+   end subroutine hand_out
+
+   !> Put the slip of all parts into that of the step.
+   subroutine hand_out_slip(self, slip)
+      class(part_sums_type), intent(in) :: self
+      real(dp), intent(inout) :: slip(:, :, :)     !! m
+      integer :: j
+
+      if (.not. allocated(self%slip)) return
+      !$omp parallel do default(none) shared(self, slip) private(j)
+      do j = 1, size(slip, 2)
+         slip(:, j, :) = self%slip(:, j, :)
+      end do
+   end subroutine hand_out_slip
+
+end module starting_steps
