@@ -321,8 +321,9 @@ contains
          end associate
          call check_books(record, 'works')
       end do
-      call check_that(difference(2) < 0.5_dp*difference(1) .and. difference(3) < 0.5_dp*difference(2) &
-         .and. difference(3) < 0.02_dp, 'works from outside: '//to_text(difference(1))//', '// &
+      ! The start in parts leaves so little in coarse steps that the first two are not yet ordered.
+      call check_that(maxval(difference(:2)) < 0.012_dp .and. difference(3) < 0.5_dp*difference(2) &
+         .and. difference(3) < 0.005_dp, 'works from outside: '//to_text(difference(1))//', '// &
          to_text(difference(2))//', '//to_text(difference(3)))
    end subroutine test_works
 

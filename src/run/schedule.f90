@@ -187,12 +187,12 @@ contains
       type(schedule_type), intent(inout) :: self
       type(phase_settings_type), intent(in) :: phase
       type(planned_row_type), intent(inout) :: row
-      real(dp), parameter :: same = 1e-9_dp        !! relative difference of rates that are one
+      real(dp), parameter :: kink = 0.25_dp        !! relative change of a rate that is more than the bend of a curve
       real(dp) :: rate
 
       rate = 0.0_dp
       if (phase%linear) rate = (phase%target - self%start_load)/phase%duration
-      row%new_rate = abs(rate - self%held_rate) > same*max(abs(rate), abs(self%held_rate))
+      row%new_rate = abs(rate - self%held_rate) > kink*max(abs(rate), abs(self%held_rate))
       if (self%held_control /= phase%control(:12)) row%new_rate = .true.
       self%held_rate = rate
    end subroutine note_rate
