@@ -22,6 +22,8 @@ contains
       call test_derivatives('exponential', -energy/range)
       call test_derivatives('gauss', 0.0_dp)
       call test_derivatives('maugis_dugdale', -energy/range)
+      call test_derivatives('maugis_dugdale', -energy/range, edge=0.4_dp*range)
+      call test_derivatives('maugis_dugdale', -energy/range, edge=range)
       call new_adhesion_potential(potential, 'maugis_dugdale', energy, range, error)
       call check_close(adhesive_slope(potential, 0.999_dp*range), energy/range, 0.0_dp, 'inside')
       call check_close(adhesive_slope(potential, 1.001_dp*range), 0.0_dp, 0.0_dp, 'outside')
@@ -37,15 +39,16 @@ contains
    end subroutine run_adhesion_potential
 
    !> e' and e'' against central differences, the values at contact, and the area under e'.
-   subroutine test_derivatives(name, release)
+   subroutine test_derivatives(name, release, edge)
       character(*), intent(in) :: name
       real(dp), intent(in) :: release          !! -e'(0+), Pa
+      real(dp), intent(in), optional :: edge   !! m
       type(adhesion_potential_type) :: potential
       type(error_type), allocatable :: error
       real(dp) :: gap, h, e, slope, curvature, work
       integer :: k, n
 
-      call new_adhesion_potential(potential, name, energy, range, error)
+      call new_adhesion_potential(potential, name, energy, range, error, edge)
       call check_no_error(error, name)
       h = 1e-4_dp*range
       do k = 0, 12

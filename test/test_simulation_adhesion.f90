@@ -145,7 +145,8 @@ contains
 
    !> A Maugis-Dugdale sphere pulled off by its displacement: smooth, and the largest pull is that of
    !> theory, -1.95059 pi gamma_0 R for lambda = 0.1 and -1.60073 for 1 (lambda = sigma_0
-   !> (9 R/(2 pi gamma_0 E*^2))^(1/3)). The grid pins the edge of the attraction where it is narrow.
+   !> (9 R/(2 pi gamma_0 E*^2))^(1/3)), to 2 % with cells of 0.13 E* range^2/energy and to 3 % with cells
+   !> of twice that: the width of the edge of the attraction frees it from the grid.
    subroutine test_pull_off()
       real(dp) :: pulls(3)
 
@@ -153,9 +154,8 @@ contains
       call check_close(pulls(1), -1.95059_dp, 0.03_dp, 'pull-off force, lambda = 0.1')
       call pull_off('32', '36e-6', 1.0_dp, '0.1e-6', '-0.9e-6', '-1.3e-6', pulls(2))
       call pull_off('64', '36e-6', 1.0_dp, '0.1e-6', '-0.9e-6', '-1.3e-6', pulls(3))
-      call check_close(pulls(3), -1.60073_dp, 0.1_dp, 'pull-off force, lambda = 1')
-      call check_that(abs(pulls(3) + 1.60073_dp) < 0.65_dp*abs(pulls(2) + 1.60073_dp), &
-         'pull-off force: converges with the mesh: '//to_text(pulls(2))//', '//to_text(pulls(3)))
+      call check_close(pulls(3), -1.60073_dp, 0.02_dp*1.6_dp, 'pull-off force, lambda = 1')
+      call check_close(pulls(2), -1.60073_dp, 0.03_dp*1.6_dp, 'pull-off force, lambda = 1, coarse')
    end subroutine test_pull_off
 
    !> Pull a sphere off; the largest pull in pi gamma_0 R.

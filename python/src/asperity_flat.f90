@@ -234,7 +234,7 @@ contains
       potential, energy, range_, approach, load, start, thesis, tolerance, max_iterations, old_level, &
       level, energy_adhesive, contact_area, iterations, ffts, residual, seconds, converged, reason, &
       status, message)
-      use adhesion_potential, only : adhesion_potential_type, adhesive_slope, new_adhesion_potential
+      use adhesion_potential, only : adhesive_slope
       use case_settings, only : case_type
       use contact_rule, only : touches
       use errors, only : error_type
@@ -269,7 +269,6 @@ contains
       integer(c_int), intent(out) :: status
       character(len=2000), intent(out) :: message
       type(error_type), allocatable :: error
-      type(adhesion_potential_type) :: law
       type(case_type) :: case
       type(normal_step_type) :: side
       type(planned_row_type) :: plan
@@ -281,7 +280,9 @@ contains
       energy_adhesive = 0.0_dp
       contact_area = 0.0_dp
       case%grid = grid_of(nx, ny, lx, ly, is_free)
-      case%material%poisson = 0.0_dp                         ! E* is all that matters
+      case%material%poisson = 0.0_dp                         ! E* = 2 G is all that matters
+      case%material%shear_modulus = 0.5_dp*modulus
+      allocate (case%material%prony_g(0), case%material%prony_tau(0), case%phases(0))
       case%solver%method = 'fast'
       if (thesis == 1) case%solver%method = 'thesis'
       case%solver%precision = 'double'
@@ -295,14 +296,13 @@ contains
       plan%control = 'pressure'
       if (approach == 1) plan%control = 'displacement'
       plan%load = load
-      call new_adhesion_potential(law, potential, energy, range_, error)
-      if (.not. allocated(error)) call new_normal_step(side, case, height, error)
+      call new_normal_step(side, case, height, error)
       if (.not. allocated(error)) then
          call side%solve(plan, 0.5_dp*modulus, start /= 2, height, pressure, gap, level, outcome)
          energy_adhesive = side%energy(gap)
          contact_area = count(touches(side%adhesive, pressure, gap))/real(size(gap), dp)
          do j = 1, ny
-            attraction(:, j) = -adhesive_slope(law, gap(:, j))
+            attraction(:, j) = -adhesive_slope(side%potential, gap(:, j))
          end do
          call side%destroy()
       end if

@@ -184,3 +184,42 @@ def test_masked_points_are_refused():
             call()
     with pytest.raises(ValueError, match="pressure = '1e4': must be a finite number > 0"):
         asperity.solve_normal(np.eye(4), 1.0, 1.0, 1e6, pressure="1e4")
+
+
+def test_contact_of_one_cell_grows():
+    # The first state touches in one cell, where the residual and so the direction are exactly 0:
+    # that cell was taken for one outside the contact, and the step did not keep the load.
+    height = [[0.002, 0.0, 0.002, 0.002, 0.0]]
+    contact = asperity.solve_normal(height, 1, 1, 1, pressure=1.543077062748773e-05)
+    assert contact.mean_pressure == pytest.approx(1.543077062748773e-05, rel=1e-9)
+    # By symmetry two pressures, p1 and p2 twice; their displacements are equal. Plane waves:
+    k = np.arange(1, 5)
+    q = 2 * np.pi * np.minimum(k, 5 - k)
+    kernel = np.array([(2 / q * np.cos(2 * np.pi * k * j / 5)).sum() / 5 for j in range(5)])
+    rows = np.array([[kernel[0], kernel[2] + kernel[3]],
+                     [kernel[2], kernel[0] + kernel[1]]])
+    p1, p2 = np.linalg.solve(np.vstack([rows[0] - rows[1], [1, 2]]),
+                             [0.0, 5 * 1.543077062748773e-05])
+    np.testing.assert_allclose(contact.pressure[0], [p1, 0, p2, p2, 0], rtol=1e-4)
+
+
+def test_small_grids_all_converge():
+    rng = np.random.default_rng(5)
+    for _ in range(400):
+        nx, ny = (int(n) for n in rng.integers(2, 9, 2))
+        height = 0.01 * np.round(rng.standard_normal((ny, nx)))
+        given = {"pressure": 10.0 ** rng.uniform(-7, -2)}
+        if rng.random() < 0.3:
+            given = {"displacement": 0.02 * rng.random(), "boundary": "free"}
+        contact = asperity.solve_normal(height, 1.0, float(ny / nx), 1.0, tolerance=1e-9, **given)
+        assert contact.converged
+
+
+def test_tiny_loads_are_met():
+    rng = np.random.default_rng(6)
+    for _ in range(150):
+        height = 10.0 ** rng.uniform(-4, -1) * rng.standard_normal((7, 9)) + rng.uniform(-1, 1)
+        pressure = 1e6 * 10.0 ** rng.uniform(-22, -11)
+        contact = asperity.solve_normal(height, 1.0, 0.8, 1e6, pressure=pressure, tolerance=1e-8)
+        assert contact.mean_pressure == pytest.approx(pressure, rel=1e-8)
+        assert contact.pressure.ravel().argmax() == height.ravel().argmax()

@@ -24,7 +24,7 @@ def stiffness(nx, ny, lx, ly):
     return row[(iy[:, None] - iy[None, :]) % ny, (ix[:, None] - ix[None, :]) % nx]
 
 
-def attraction(potential, energy, length, gap):
+def attraction(potential, energy, length, gap, cell):
     """Slope and curvature of the potential, written down once more."""
     x = gap / length
     if potential == "exponential":
@@ -32,10 +32,13 @@ def attraction(potential, energy, length, gap):
     if potential == "gauss":
         return (2 * energy / length * x * np.exp(-x**2),
                 2 * energy / length**2 * (1 - 2 * x**2) * np.exp(-x**2))
-    return energy / length * (x < 1), np.zeros_like(x)
+    edge = min(energy / length * cell / MODULUS, length)
+    ramp = (length + edge - gap) / (2 * edge)
+    return (energy / length * np.clip(ramp, 0, 1),
+            np.where((ramp > 0) & (ramp < 1), -energy / length / (2 * edge), 0.0))
 
 
-def certified(matrix, height, start, pressure, potential, energy, length):
+def certified(matrix, height, start, pressure, potential, energy, length, cell):
     """Is there an exact solution that touches just where ``start`` does? (None: undecided.)
 
     Newton's method on the open cells alone, to round-off; then gaps must be positive in all of
@@ -46,15 +49,15 @@ def certified(matrix, height, start, pressure, potential, energy, length):
     open_ = gap != 0.0
 
     def wall():
-        return (matrix @ (height + gap) + attraction(potential, energy, length, gap)[0]
-                + pressure)
+        return (matrix @ (height + gap) + pressure
+                + attraction(potential, energy, length, gap, cell)[0])
 
     scale = max(energy / length, pressure)
     for _ in range(30):
         excess = wall()
         if np.abs(excess[open_]).max(initial=0.0) < 1e-12 * scale:
             break
-        curvature = attraction(potential, energy, length, gap)[1]
+        curvature = attraction(potential, energy, length, gap, cell)[1]
         jacobian = matrix[np.ix_(open_, open_)] + np.diag(curvature[open_])
         gap[open_] -= np.linalg.solve(jacobian, excess[open_])
     else:
@@ -99,7 +102,7 @@ def test_contact_area_is_that_of_an_exact_solution(rough):
             continue
         assert contact.contact_area == np.mean(contact.gap == 0.0)
         verdict = certified(stiffness(nx, ny, 1.0, ly or 1.0), height, contact.gap, pressure,
-                            potential, energy, length)
+                            potential, energy, length, 1.0 / nx)
         decided += verdict is not None
         wrong += verdict is False
     assert wrong == 0

@@ -3,12 +3,19 @@
 !> (Thesis, eq. 2.20 and 2.21.)
 !>     exponential        e = -gamma_0 exp(-g/z_0)
 !>     gauss              e = -gamma_0 exp(-(g/z_0)^2)
-!>     maugis_dugdale     e = -gamma_0 (1 - g/z_0) for g < z_0, else 0
+!>     maugis_dugdale     e = -gamma_0 (1 - g/z_0) for g < z_0, else 0: a constant attraction that
+!>                        ends at the edge of the range
 !> The adhesive pressure is -e'(g). A point in contact lets go where its pressure falls below
 !> -e'(0+): -gamma_0/z_0 for the exponential and Maugis-Dugdale potentials, 0 for Gauss.
 !>
-!> The derivative of maugis_dugdale jumps at g = z_0; its value there is 0. That kink bends the energy
-!> down, so no minimum lies on it.
+!> The attraction of maugis_dugdale jumps at g = z_0 (its value there is 0). On a grid such a jump pins
+!> the contact: when one cell leaves the range, it springs back by about 1.1 gamma_0/z_0 dx/E*, and if
+!> that is more than the change of the gap from cell to cell, the edge of the range cannot move on. With
+!> `edge` > 0 the attraction falls linearly from z_0 - edge to z_0 + edge instead, as the mean over a
+!> cell does while the edge of the range passes through that cell:
+!>     e = -gamma_0/z_0 (z_0 + edge - g)^2/(4 edge)        for |g - z_0| < edge.
+!> The work of separation, and all else, stays what it is. `edge_of_cells` is the least width that frees
+!> the contact.
 module adhesion_potential
    use errors, only : add_fault, error_input, error_type
    use precision, only : dp
@@ -16,30 +23,33 @@ module adhesion_potential
    private
 
    public :: adhesion_potential_type, adhesive_curvature, adhesive_energy, adhesive_slope, &
-      adhesive_terms, new_adhesion_potential, release_pressure
+      adhesive_terms, edge_of_cells, new_adhesion_potential, release_pressure
 
    integer, parameter, public :: potential_none = 0
    integer, parameter, public :: potential_exponential = 1
    integer, parameter, public :: potential_gauss = 2
    integer, parameter, public :: potential_maugis_dugdale = 3
 
+   real(dp), parameter :: edge_width = 1.0_dp  !! half width of the edge in gamma_0/z_0 dx/E*
    real(dp), parameter :: far = 40.0_dp        !! exp(-far) is nothing beside 1
 
    type :: adhesion_potential_type
       integer :: kind = potential_none
       real(dp) :: energy = 0.0_dp              !! gamma_0, J/m2, >= 0
       real(dp) :: range = 0.0_dp               !! z_0, m, > 0 (0 for 'none')
+      real(dp) :: edge = 0.0_dp                !! half width of the edge, m, 0 to z_0; maugis_dugdale
    end type adhesion_potential_type
 
 contains
 
    !> Make a potential from its name.
-   subroutine new_adhesion_potential(self, name, energy, range, error)
+   subroutine new_adhesion_potential(self, name, energy, range, error, edge)
       type(adhesion_potential_type), intent(out) :: self
       character(*), intent(in) :: name         !! 'none', 'exponential', 'gauss', 'maugis_dugdale'
       real(dp), intent(in) :: energy           !! gamma_0, J/m2, >= 0; ignored for 'none'
       real(dp), intent(in) :: range            !! z_0, m, > 0; ignored for 'none'
       type(error_type), allocatable, intent(out) :: error
+      real(dp), intent(in), optional :: edge   !! m; 0 if absent; no more than the range is taken
       character(120) :: text
 
       select case (name)
@@ -65,6 +75,8 @@ contains
       end if
       self%energy = energy
       self%range = range
+      if (self%kind /= potential_maugis_dugdale .or. .not. present(edge)) return
+      self%edge = min(edge, range)
    end subroutine new_adhesion_potential
 
    !> e(g), J/m2.
@@ -72,7 +84,7 @@ contains
       type(adhesion_potential_type), intent(in) :: self
       real(dp), intent(in) :: gap              !! m, >= 0
       real(dp) :: value
-      real(dp) :: x
+      real(dp) :: x, slope, curvature
 
       value = 0.0_dp
       if (gap >= far*self%range) return
@@ -83,7 +95,7 @@ contains
       case (potential_gauss)
          value = -self%energy*exp(-x**2)
       case (potential_maugis_dugdale)
-         if (x < 1.0_dp) value = -self%energy*(1.0_dp - x)
+         call constant_terms(self, gap, value, slope, curvature)
       end select
    end function adhesive_energy
 
@@ -92,7 +104,7 @@ contains
       type(adhesion_potential_type), intent(in) :: self
       real(dp), intent(in) :: gap
       real(dp) :: value
-      real(dp) :: x
+      real(dp) :: x, energy, curvature
 
       value = 0.0_dp
       if (gap >= far*self%range) return
@@ -103,7 +115,7 @@ contains
       case (potential_gauss)
          value = 2.0_dp*self%energy/self%range*x*exp(-x**2)
       case (potential_maugis_dugdale)
-         if (x < 1.0_dp) value = self%energy/self%range
+         call constant_terms(self, gap, energy, value, curvature)
       end select
    end function adhesive_slope
 
@@ -112,7 +124,7 @@ contains
       type(adhesion_potential_type), intent(in) :: self
       real(dp), intent(in) :: gap
       real(dp) :: value
-      real(dp) :: x
+      real(dp) :: x, energy, slope
 
       value = 0.0_dp
       if (gap >= far*self%range) return
@@ -122,6 +134,8 @@ contains
          value = -self%energy/self%range**2*exp(-x)
       case (potential_gauss)
          value = 2.0_dp*self%energy/self%range**2*(1.0_dp - 2.0_dp*x**2)*exp(-x**2)
+      case (potential_maugis_dugdale)
+         call constant_terms(self, gap, energy, slope, value)
       end select
    end function adhesive_curvature
 
@@ -150,12 +164,42 @@ contains
          slope = x*y
          curvature = (1.0_dp - 2.0_dp*x**2)*y/self%range
       case (potential_maugis_dugdale)
-         if (x < 1.0_dp) then
-            energy = -self%energy*(1.0_dp - x)
-            slope = self%energy/self%range
-         end if
+         call constant_terms(self, gap, energy, slope, curvature)
       end select
    end subroutine adhesive_terms
+
+   !> The same of maugis_dugdale: a constant attraction, and the edge of its range.
+   pure subroutine constant_terms(self, gap, energy, slope, curvature)
+      type(adhesion_potential_type), intent(in) :: self
+      real(dp), intent(in) :: gap              !! m, >= 0
+      real(dp), intent(out) :: energy, slope, curvature
+      real(dp) :: attraction, left
+
+      energy = 0.0_dp
+      slope = 0.0_dp
+      curvature = 0.0_dp
+      attraction = self%energy/self%range
+      left = self%range + self%edge - gap
+      if (left <= 0.0_dp) return
+      if (left >= 2.0_dp*self%edge) then
+         energy = -self%energy*(1.0_dp - gap/self%range)
+         slope = attraction
+      else
+         slope = attraction*left/(2.0_dp*self%edge)
+         energy = -0.5_dp*slope*left
+         curvature = -attraction/(2.0_dp*self%edge)
+      end if
+   end subroutine constant_terms
+
+   !> Half width of the edge of maugis_dugdale that frees a contact from the cells, m.
+   pure function edge_of_cells(energy, range, modulus, cell) result(edge)
+      real(dp), intent(in) :: energy, range    !! gamma_0, J/m2, and z_0, m
+      real(dp), intent(in) :: modulus          !! E*, Pa
+      real(dp), intent(in) :: cell             !! length of a cell, the longer one, m
+      real(dp) :: edge
+
+      edge = min(edge_width*energy/range*cell/modulus, range)
+   end function edge_of_cells
 
    !> The least pressure that a point in contact can bear, -e'(0+), Pa.
    elemental function release_pressure(self) result(value)

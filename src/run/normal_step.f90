@@ -4,7 +4,9 @@
 !> solution without adhesion, or from full contact; later ones from the state before.
 module normal_step
    use adhesion_cg, only : adhesion_solver_type, new_adhesion_solver
-   use adhesion_potential, only : adhesion_potential_type, adhesive_energy, new_adhesion_potential
+   use adhesion_advice, only : adhesion_edge
+   use adhesion_potential, only : adhesion_potential_type, adhesive_energy, &
+      new_adhesion_potential
    use adhesion_state, only : adhesion_problem_type
    use case_settings, only : case_type
    use errors, only : error_input, error_type, fail
@@ -28,7 +30,7 @@ module normal_step
       real(dp) :: summit = 0.0_dp                  !! highest point of the original map, m
       real(dp) :: rms_height = 0.0_dp              !! of the original map about its mean, m
       type(normal_solver_type) :: normal
-      type(adhesion_potential_type), private :: potential
+      type(adhesion_potential_type) :: potential
       type(adhesion_solver_type), private :: sticky
       logical, private :: thesis = .false.
       logical, private :: full_contact = .false.
@@ -67,7 +69,7 @@ contains
          return
       end if
       call new_adhesion_potential(self%potential, trim(case%adhesion%potential), case%adhesion%energy, &
-         case%adhesion%range, error)
+         case%adhesion%range, error, edge=adhesion_edge(case))
       if (allocated(error)) return
       call new_adhesion_solver(self%sticky, self%grid, case%material%poisson, error, &
          trim(case%solver%method))

@@ -7,13 +7,16 @@
 !> A row in which friction acts is made of passes: module `coupled_passes`. The state and what solves
 !> it: module `contact_state`. How the road moves at the start of a row: module `road_motion`.
 module simulation
+   use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use case_settings, only : case_type
    use contact_rule, only : touches
+   use contact_size, only : cells_across, watch_contact_size
    use contact_state, only : contact_state_type, solve_normal
    use coupled_passes, only : coupled_passes_type, new_coupled_passes
    use coupling_advice, only : advice_on_passes
    use errors, only : error_type
-   use history_row, only : history_row_type
+   use finite_fields, only : reason_overflow
+   use history_row, only : history_row_type, row_values
    use interpolation, only : new_interpolation
    use map_edge, only : edge_clear, look_at_edge
    use normal_step, only : new_normal_step
@@ -54,6 +57,7 @@ module simulation
       character(:), allocatable :: warnings         !! new ones, a line each; the caller clears them
       real(dp) :: drive_force(2) = 0.0_dp           !! horizontal force on the rubber, N
       type(stick_slip_watch_type) :: watch          !! what has been seen of the mean slip
+      real(dp) :: widest = 0.0_dp                   !! cells across a patch of contact, at the end of a phase
       integer :: edge = edge_clear                  !! worst found at the edge of a free map
       type(coupled_passes_type), private :: passes
       type(steady_step_type) :: steady              !! rows of steady sliding, where the case has any
@@ -155,6 +159,8 @@ contains
          call sums%hand_out(self%row)
          if (self%frictional) call sums%hand_out_slip(self%tangential%slip)
       end if
+      call watch_cells(self, plan)
+      call look_for_overflow(self)
       self%finished = self%schedule%phase > size(self%case%phases)
    end subroutine advance
 
@@ -337,6 +343,27 @@ contains
          plan%road_y - self%row%road_y, self%rms_height, self%edge, message)
       call add_warning(self, plan, message)
    end subroutine watch_edge
+
+   !> Look at the size of the patches of contact where a phase ends.
+   subroutine watch_cells(self, plan)
+      type(simulation_type), intent(inout) :: self
+      type(planned_row_type), intent(in) :: plan
+      character(:), allocatable :: message
+
+      if (self%schedule%phase == plan%phase) return
+      call watch_contact_size(self%grid, cells_across(self%grid, self%side%adhesive, self%pressure, &
+         self%gap), self%schedule%phase > size(self%case%phases), self%widest, message)
+      call add_warning(self, plan, message)
+   end subroutine watch_cells
+
+   !> A row with a number that is not finite did not converge.
+   subroutine look_for_overflow(self)
+      type(simulation_type), intent(inout) :: self
+
+      if (all(ieee_is_finite(row_values(self%row)))) return
+      self%converged = .false.
+      self%reason = reason_overflow
+   end subroutine look_for_overflow
 
    !> Warn where the scheme makes the block stick and slip in turn.
    subroutine watch_stick_slip(self, plan, slip_speed)

@@ -66,6 +66,7 @@ contains
       call table%add('velocity', sim%velocity, 'm/s', 'velocity of the road in the last step')
       call table%add('drifted', sim%drifted, 'm', 'sum of the expected motions of the surface')
       call table%add('moved_cells', sim%moved_cells, 'cells by which the pressure has been shifted')
+      call table%add('widest', sim%widest, '1', 'most cells across a patch of contact where a phase ended')
       call table%add('edge', sim%edge, 'worst that was found at the edge of a free map')
       call table%add('stick_slip/reported', sim%watch%reported, 'stick-slip has been warned of')
       call table%add('stick_slip/speed', sim%watch%speed, 'm/s', 'mean slip speed')

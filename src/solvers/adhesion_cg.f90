@@ -6,8 +6,10 @@ module adhesion_cg
    use adhesion_cg_free, only : adhesion_free_type, new_adhesion_free
    use adhesion_cg_periodic, only : adhesion_periodic_type, new_adhesion_periodic
    use adhesion_cg_thesis, only : adhesion_thesis_type, new_adhesion_thesis
-   use adhesion_state, only : adhesion_problem_type
+   use adhesion_state, only : adhesion_problem_type, control_approach
+   use finite_fields, only : reject_overflow
    use errors, only : error_input, error_type, fail
+   use parallel, only : global_max, thread_count
    use precision, only : dp
    use regular_grid, only : boundary_periodic, grid_type
    use solver_result, only : solver_result_type
@@ -75,15 +77,23 @@ contains
       real(dp), intent(inout) :: level                 !! U - H where the gap is zero, m
       type(solver_result_type), intent(out) :: outcome
       real(dp), intent(in), optional :: history(:, :)  !! P_h, Pa
+      type(adhesion_problem_type) :: task
 
+      task = problem
+      task%datum = global_max(maxval(height))
+      if (problem%control == control_approach) task%target = problem%target + task%datum
+      level = level + task%datum
       select case (self%kind)
       case (kind_periodic)
-         call self%periodic%solve(problem, height, gap, pressure, level, outcome, history)
+         call self%periodic%solve(task, height, gap, pressure, level, outcome, history)
       case (kind_free)
-         call self%free%solve(problem, height, gap, pressure, level, outcome, history)
+         call self%free%solve(task, height, gap, pressure, level, outcome, history)
       case (kind_thesis)
-         call self%thesis%solve(problem, height, gap, pressure, level, outcome, history)
+         call self%thesis%solve(task, height, gap, pressure, level, outcome, history)
       end select
+      call reject_overflow(outcome, gap, pressure, thread_count())
+      level = level - task%datum
+      if (problem%control == control_approach) level = problem%target
    end subroutine solve
 
    !> Free plans and memory.

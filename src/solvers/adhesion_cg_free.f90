@@ -20,7 +20,7 @@ module adhesion_cg_free
    use adhesion_preconditioner, only : adhesion_preconditioner_type, new_adhesion_preconditioner
    use adhesion_state, only : adhesion_problem_type, choose_step, clipped_step, close_gaps, &
       collect_step, control_approach, control_pressure, diagonal_scaling, form_step_row, reason_converged, &
-      reason_detached, reason_limit, reason_stalled, row_total, step_sums_type, stepped_gap, &
+      reason_detached, reason_limit, reason_stalled, resolved_traction, row_total, step_sums_type, stepped_gap, &
       traction_scale
    use errors, only : error_input, error_type, fail
    use fft_conv, only : columns_apply, convolution_type, new_normal_operator, new_symbol_operator
@@ -158,6 +158,8 @@ contains
       self%residual = 0.0_dp
       length = problem%potential%range
       if (length <= 0.0_dp) length = max(maxval(height) - minval(height), tiny(1.0_dp))
+      length = max(length, 20.0_dp*epsilon(1.0_dp)*(abs(level) + problem%datum - minval(height)) &
+         /problem%tolerance)
       call start_state(self, problem, height, gap, pressure, level, problem%tolerance*length, history)
       call evaluate_traction(self, problem, height, level, history)
       fresh = .true.
@@ -169,6 +171,8 @@ contains
       missing = 0.0_dp
       scale = traction_scale(problem%potential, max(maxval(abs(self%traction)), &
          problem%modulus*self%longest*(maxval(height) - minval(height)), tiny(1.0_dp)))
+      scale = max(scale, resolved_traction(problem, maxval(abs(self%traction)), self%nyquist, &
+         problem%datum - minval(height)))
       limit = problem%tolerance
       do
          missing_old = missing
@@ -224,7 +228,7 @@ contains
          if (.not. fresh) call evaluate_traction(self, problem, height, level, history)
          outcome%residual = true_residual(self, problem, height, level, length, scale, force, &
             history)
-         if (outcome%reason == reason_stalled .and. outcome%residual <= problem%tolerance) then
+         if (outcome%reason /= reason_detached .and. outcome%residual <= problem%tolerance) then
             outcome%converged = .true.
             outcome%reason = reason_converged
          end if
@@ -300,12 +304,14 @@ contains
       real(dp), intent(inout) :: level
       real(dp), intent(in) :: closed                   !! gaps up to this count as none, m
       real(dp), intent(in), optional :: history(:, :)
+      real(dp) :: mean
       integer :: i, j
 
       if (problem%full_contact) then
-         if (problem%control /= control_approach) level = -sum(height)/size(height)
+         mean = sum(height)/size(height) - problem%datum
+         if (problem%control /= control_approach) level = -mean
          do j = 1, self%my
-            self%state(:, j) = (level + sum(height)/size(height))*self%psi(:, j)
+            self%state(:, j) = (level + mean)*self%psi(:, j)
          end do
          do j = 1, self%ny
             self%state(1:self%nx, j) = max(gap(:, j), 0.0_dp)
@@ -323,7 +329,7 @@ contains
          self%state(:, j) = self%state(:, j)/problem%modulus
          if (j > self%ny) cycle
          do i = 1, self%nx
-            self%state(i, j) = self%state(i, j) - height(i, j) - level
+            self%state(i, j) = self%state(i, j) - (height(i, j) - problem%datum) - level
             if (self%state(i, j) <= closed) self%state(i, j) = 0.0_dp
          end do
       end do
@@ -342,13 +348,13 @@ contains
       integer :: j
 
       remembers = present(history)
-      !$omp parallel default(none) shared(self, height, level) private(j, row) &
+      !$omp parallel default(none) shared(self, problem, height, level) private(j, row) &
       !$omp num_threads(self%stiffness%threads)
       allocate (row(self%mx))
       !$omp do
       do j = 1, self%my
          row(:) = self%state(:, j)
-         if (j <= self%ny) row(1:self%nx) = row(1:self%nx) + height(:, j) + level
+         if (j <= self%ny) row(1:self%nx) = row(1:self%nx) + (height(:, j) - problem%datum) + level
          call self%stiffness%forward_row(1, j, row)
       end do
       !$omp end do
@@ -608,7 +614,7 @@ contains
          call self%operator%backward_row(1, j, row)
          worst = 0.0_dp
          do i = 1, self%nx
-            g = row(i)/problem%modulus - height(i, j) - level
+            g = row(i)/problem%modulus - (height(i, j) - problem%datum) - level
             worst = max(worst, abs(min(g/length, (self%traction(i, j) &
                + adhesive_slope(problem%potential, max(g, 0.0_dp)))/scale)))
          end do

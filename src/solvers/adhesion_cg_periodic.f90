@@ -128,7 +128,7 @@ contains
       before = self%stiffness%ffts
       transforms_before = self%preconditioner%transforms()
       cells = real(self%grid%nx, dp)*self%grid%ny
-      mean_height = field_sum(self%stiffness, self%rows, height)/cells
+      mean_height = field_sum(self%stiffness, self%rows, height)/cells - problem%datum
       load = 0.0_dp
       if (problem%control == control_pressure) load = problem%target
       total = -cells*(problem%target + mean_height)
@@ -202,10 +202,10 @@ contains
             history)
          call evaluate_gradient(self, problem, gap, pressure, length, scale, load, &
             outcome%residual, least)
-         if (outcome%reason == reason_stalled .and. outcome%residual <= problem%tolerance) then
-            outcome%converged = .true.
-            outcome%reason = reason_converged
-         end if
+      end if
+      if (outcome%reason /= reason_detached .and. outcome%residual <= problem%tolerance) then
+         outcome%converged = .true.
+         outcome%reason = reason_converged
       end if
       call finish(self%stiffness, self%rows, problem, load, total, gap, pressure, outcome)
       level = -mean_height - field_sum(self%stiffness, self%rows, gap)/cells

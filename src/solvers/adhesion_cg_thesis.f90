@@ -96,7 +96,7 @@ contains
       outcome%seconds = omp_get_wtime()
       before = self%stiffness%ffts
       cells = real(size(gap), dp)
-      mean_height = field_sum(self%stiffness, self%rows, height)/cells
+      mean_height = field_sum(self%stiffness, self%rows, height)/cells - problem%datum
       load = 0.0_dp
       if (problem%control == control_pressure) load = problem%target
       total = -cells*(problem%target + mean_height)

@@ -1,8 +1,8 @@
 !> What the two methods for adhesive contact in periodic mode share: start, traction, end, measures.
 module adhesion_periodic_state
    use adhesion_potential, only : adhesive_slope
-   use adhesion_state, only : adhesion_problem_type, control_approach, control_pressure, row_total, &
-      stepped_gap, sum_shift, traction_scale
+   use adhesion_state, only : adhesion_problem_type, control_approach, control_pressure, &
+      resolved_traction, row_total, stepped_gap, sum_shift, traction_scale
    use fft_conv, only : columns_apply, convolution_type
    use parallel, only : global_max
    use precision, only : dp
@@ -57,10 +57,10 @@ contains
       remembers = present(history)
       mean = 0.0_dp
       if (remembers) mean = field_sum(stiffness, rows, history)/real(size(gap), dp)
-      !$omp parallel do default(none) shared(stiffness, height, gap) private(j) &
+      !$omp parallel do default(none) shared(stiffness, problem, height, gap) private(j) &
       !$omp num_threads(stiffness%threads)
       do j = 1, size(gap, 2)
-         call stiffness%forward_row(1, j, height(:, j) + gap(:, j))
+         call stiffness%forward_row(1, j, (height(:, j) - problem%datum) + gap(:, j))
       end do
       call stiffness%columns(columns_apply, form)
       !$omp parallel do default(none) private(j) &
@@ -200,14 +200,16 @@ contains
       real(dp), intent(in) :: longest                  !! B at the least wave number, for G = 1
       real(dp), intent(out) :: length                  !! m
       real(dp), intent(out) :: scale                   !! Pa
-      real(dp) :: deviation
+      real(dp) :: deviation, greatest
 
       deviation = rms(stiffness, rows, height, &
          field_sum(stiffness, rows, height)/real(size(height), dp))
       length = problem%potential%range
       if (.not. length > 0.0_dp) length = deviation
-      scale = traction_scale(problem%potential, max(abs(load), &
-         largest(stiffness, rows, traction), problem%modulus*longest*deviation))
+      greatest = max(abs(load), largest(stiffness, rows, traction))
+      scale = max(resolved_traction(problem, greatest, &
+         0.5_dp*maxval(shape(height))*longest, deviation), &
+         traction_scale(problem%potential, max(greatest, problem%modulus*longest*deviation)))
    end subroutine residual_units
 
 end module adhesion_periodic_state

@@ -18,14 +18,15 @@ module adhesion_state
    private
 
    public :: adhesion_problem_type, choose_step, clipped_step, close_gaps, collect_step, &
-      control_approach, control_pressure, diagonal_scaling, form_step_row, row_total, &
+      control_approach, control_pressure, diagonal_scaling, form_step_row, resolved_traction, row_total, &
       step_sums_type, stepped_gap, sum_shift, traction_scale
 
    character(*), parameter, public :: reason_converged = 'converged'
    character(*), parameter, public :: reason_detached = 'detached'
    character(*), parameter, public :: reason_limit = 'the limit of iterations was reached'
    character(*), parameter, public :: reason_stalled = 'the energy can be lowered no further'
-   character(*), parameter, public :: reason_closed = 'the prescribed displacement leaves no gap'
+   character(*), parameter, public :: reason_closed = &
+      'full contact: the displacement leaves no gap'
 
    real(dp), parameter :: sharpness = 0.02_dp     !! what is left of the slope in a line search
 
@@ -40,6 +41,9 @@ module adhesion_state
       real(dp) :: tolerance = 1e-6_dp       !! of the natural residual max|min(g/z_0, G z_0/gamma_0)|
       integer :: max_iterations = 2000
       logical :: full_contact = .false.     !! start from full contact, not from what is handed in
+      !> Highest point of H, m, set by module adhesion_cg: the methods count heights and levels from it,
+      !> so that a map far from zero costs no digits.
+      real(dp) :: datum = 0.0_dp
    end type adhesion_problem_type
 
    !> What is known of E along the segment g + t s, 0 <= t.
@@ -97,12 +101,25 @@ contains
       end do
    end subroutine close_gaps
 
+   !> The least unit of traction whose product with the tolerance is still above round-off, Pa: that of
+   !> the largest traction, and that of the heights times the stiffness.
+   pure function resolved_traction(problem, largest, stiffness, spread) result(scale)
+      type(adhesion_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: largest              !! traction, Pa
+      real(dp), intent(in) :: stiffness            !! B at the Nyquist wave number, for G = 1
+      real(dp), intent(in) :: spread               !! of the heights, m
+      real(dp) :: scale
+
+      scale = epsilon(1.0_dp)*(20.0_dp*largest + 4.0_dp*problem%modulus*stiffness*spread) &
+         /problem%tolerance
+   end function resolved_traction
+
    !> Is e' continuous?
    pure function has_smooth_potential(potential) result(smooth)
       type(adhesion_potential_type), intent(in) :: potential
       logical :: smooth
 
-      smooth = potential%kind /= potential_maugis_dugdale
+      smooth = potential%kind /= potential_maugis_dugdale .or. potential%edge > 0.0_dp
    end function has_smooth_potential
 
    !> The traction in which the residual is measured: gamma_0/z_0, or `other` without adhesion.

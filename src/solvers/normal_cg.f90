@@ -31,6 +31,7 @@ module normal_cg
    use active_blocks, only : active_blocks_type, new_active_blocks
    use coarse_level, only : coarse_level_type, new_coarse_level, stencil_c0
    use errors, only : error_type
+   use finite_fields, only : reject_overflow
    use fft_conv, only : columns_apply, convolution_type, new_normal_operator
    use normal_state, only : combine_measures, control_pressure, evaluate_gap, first_pressure, &
       gap_measure_type, narrow_scale, normal_problem_type, prepare_problem, reason_converged, &
@@ -211,8 +212,10 @@ contains
       end if
       outcome%converged = determined .and. measure%error <= task%tolerance
       if (outcome%converged) outcome%reason = reason_converged
-      level = measure%weighted_level
-      call shift_gap(self, level, gap)
+      call shift_gap(self, measure%weighted_level, gap)
+      level = measure%weighted_level - task%datum
+      if (problem%control /= control_pressure) level = problem%target
+      call reject_overflow(outcome, pressure, gap, self%operator%threads)
       outcome%residual = measure%error
       outcome%load_error = measure%load_error
       outcome%ffts = self%operator%ffts + self%quick%ffts - before &
@@ -441,7 +444,7 @@ contains
       logical, intent(out) :: clipped
       real(dp), intent(out) :: slope, squares
       real(dp), allocatable :: column(:)
-      real(dp) :: shift, sums(2), least
+      real(dp) :: factor, shift, sums(2), least
       integer :: j, k, jb, n
 
       !$omp parallel do default(none) shared(self, pressure, alpha) &
@@ -459,10 +462,12 @@ contains
          self%rows(1:3, j) = [sums, least]
       end do
       clipped = global_min(minval(self%rows(3, :))) < 0.0_dp
+      factor = 1.0_dp
       shift = 0.0_dp
-      if (problem%control == control_pressure .and. clipped) call find_shift(self, problem, shift)
+      if (problem%control == control_pressure .and. clipped) &
+         call find_shift(self, problem, shift, factor)
 
-      !$omp parallel default(none) shared(self, pressure, gap, level, shift) &
+      !$omp parallel default(none) shared(self, pressure, gap, level, factor, shift) &
       !$omp private(j, k, jb, n, sums, column) num_threads(self%operator%threads)
       allocate (column(self%grid%nx))
       !$omp do schedule(dynamic)
@@ -473,7 +478,7 @@ contains
             do k = 1, self%active%runs(j)
                associate (first => self%active%first(k, j))
                   n = self%active%last(k, j) - first + 1
-                  call clip_cells(n, shift, level, pressure(first, j), gap(first, j), &
+                  call clip_cells(n, factor, shift, level, pressure(first, j), gap(first, j), &
                      self%step(first, j), column(first), sums)
                end associate
             end do
@@ -496,34 +501,40 @@ contains
    end subroutine clipped_step
 
    !> The shift t for which max(trial - t, 0) has the load's sum, by Newton's method from below; the
-   !> rows hold the sums for t = 0.
-   subroutine find_shift(self, problem, shift)
+   !> rows hold the sums for t = 0. A trial pressure far above the load leaves of that sum only what
+   !> round-off allows: a factor makes up for the rest.
+   subroutine find_shift(self, problem, shift, factor)
       type(normal_solver_type), intent(inout) :: self
       type(normal_problem_type), intent(in) :: problem
       real(dp), intent(inout) :: shift
-      real(dp) :: excess, load, cells, next, sums(2)
+      real(dp), intent(out) :: factor
+      real(dp) :: kept, load, cells, next, sums(2)
       integer :: j, k, n
 
       load = problem%target*self%grid%nx*self%grid%ny
+      factor = 1.0_dp
+      kept = load
+      next = shift
       do
          cells = row_sum(self, 2)
-         if (cells < 1.0_dp) exit
-         excess = row_sum(self, 1) - load
-         if (excess <= 1e-15_dp*load) exit
-         next = shift + excess/cells
-         if (next <= shift) exit                    ! all that round-off allows
+         if (cells < 1.0_dp) exit                   ! too far: what was kept before it is the best
          shift = next
-         !$omp parallel do default(none) shared(self, shift) private(j, k, n, sums) &
+         kept = row_sum(self, 1)
+         if (kept - load <= 1e-15_dp*load) exit
+         next = shift + (kept - load)/cells
+         if (next <= shift) exit                    ! all that round-off allows
+         !$omp parallel do default(none) shared(self, next) private(j, k, n, sums) &
          !$omp schedule(dynamic, 8) num_threads(self%operator%threads)
          do j = 1, self%grid%ny
             sums = 0.0_dp
             do k = 1, self%active%runs(j)
                n = self%active%last(k, j) - self%active%first(k, j) + 1
-               call above_cells(n, shift, self%step(self%active%first(k, j), j), sums)
+               call above_cells(n, next, self%step(self%active%first(k, j), j), sums)
             end do
             self%rows(1:2, j) = sums
          end do
       end do
+      if (abs(kept - load) > 1e-13_dp*load) factor = load/kept
    end subroutine find_shift
 
    !> The longest multiple of the step that leaves no pressure negative.

@@ -6,6 +6,7 @@
 !> The stopping criterion is that of module normal_cg.
 module normal_cg_thesis
    use fft_conv, only : convolution_type
+   use finite_fields, only : reject_overflow
    use normal_state, only : control_pressure, evaluate_gap, first_pressure, gap_measure_type, &
       measure_gap, narrow_scale, normal_problem_type, prepare_problem, reason_converged, &
       reason_iterations, reason_undetermined
@@ -80,11 +81,13 @@ contains
       end do
       outcome%converged = determined .and. measure%error <= task%tolerance
       if (outcome%converged) outcome%reason = reason_converged
-      level = measure%weighted_level
+      level = measure%weighted_level - task%datum
+      if (problem%control /= control_pressure) level = problem%target
       outcome%residual = measure%error
       outcome%load_error = measure%load_error
       outcome%ffts = operator%ffts - before
-      gap(:, :) = gap - level
+      gap(:, :) = gap - measure%weighted_level
+      call reject_overflow(outcome, pressure, gap, operator%threads)
       outcome%seconds = omp_get_wtime() - began
    end subroutine solve_normal_thesis
 

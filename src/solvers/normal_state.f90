@@ -14,7 +14,7 @@ module normal_state
    character(*), parameter, public :: reason_converged = 'converged'
    character(*), parameter, public :: reason_iterations = 'the limit of iterations was reached'
    character(*), parameter, public :: reason_undetermined = &
-      'the mean gap is 0 or less: no pressure is determined'
+      'full contact: the displacement leaves no gap'
 
    integer, parameter, public :: control_pressure = 1   !! the mean pressure is prescribed
    integer, parameter, public :: control_approach = 2   !! U - H where the gap is zero is prescribed
@@ -30,14 +30,15 @@ module normal_state
       integer :: max_iterations = 1000
       logical :: warm = .false.             !! the pressure handed in is a start
       real(dp) :: rms_height = 0.0_dp       !! of H about its mean, m; 0: not known yet
+      real(dp) :: datum = 0.0_dp            !! highest point of H; set here, m
       real(dp) :: scale = 0.0_dp            !! height that the duality gap is solved to; set here, m
       real(dp) :: least_scale = 0.0_dp      !! the least one that round-off allows; set here, m
    end type normal_problem_type
 
    !> How far a state is from the solution.
    type :: gap_measure_type
-      real(dp) :: level = 0.0_dp            !! mean of U - H over P > 0, or the prescribed one, m
-      real(dp) :: weighted_level = 0.0_dp   !! mean of U - H weighted by P, or the prescribed one, m
+      real(dp) :: level = 0.0_dp            !! mean of U - H + datum over P > 0, or the prescribed one, m
+      real(dp) :: weighted_level = 0.0_dp   !! the same weighted by P, or the prescribed one, m
       real(dp) :: load = 0.0_dp             !! sum of P over the cells, Pa
       real(dp) :: load_error = 0.0_dp       !! relative
       real(dp) :: duality_gap = 0.0_dp      !! mean of U - H weighted by P above its least, m
@@ -50,6 +51,10 @@ contains
    !> Complete a problem for its fields: a height to which errors are compared that round-off resolves
    !> (for a flat surface, what the load moves it by); and whether a pressure is determined: in periodic
    !> mode no approach may close the mean gap.
+   !>
+   !> The solvers count heights, gaps and levels from the highest point of the map. Under a small load
+   !> all that touches lies near that point, where these differences are then exact: the gap is not
+   !> the small difference of two large numbers.
    subroutine prepare_problem(problem, grid, threads, height, task, determined)
       type(normal_problem_type), intent(in) :: problem
       type(grid_type), intent(in) :: grid
@@ -71,6 +76,8 @@ contains
       mean = global_sum(sum(rows(3, :)))/(real(grid%nx, dp)*grid%ny)
 
       task = problem
+      task%datum = highest
+      if (problem%control == control_approach) task%target = problem%target + highest
       if (task%rms_height <= 0.0_dp) task%rms_height = rms_about_mean(height, threads)
       determined = .true.
       if (problem%control == control_pressure) then
@@ -79,7 +86,7 @@ contains
          moved = abs(problem%target + highest)
          if (grid%boundary == boundary_periodic) determined = problem%target < -mean
       end if
-      resolved = 10.0_dp*epsilon(1.0_dp)*(moved + max(abs(highest), abs(lowest)))
+      resolved = 10.0_dp*epsilon(1.0_dp)*(moved + highest - lowest)
       if (highest - lowest <= resolved) then
          task%rms_height = moved
       else
@@ -107,9 +114,9 @@ contains
 
       if (measure%load <= 0.0_dp) return
       allocate (rows(size(height, 2)))
-      !$omp parallel do default(none) shared(height, pressure, rows) private(j) num_threads(threads)
+      !$omp parallel do default(none) shared(height, pressure, rows, task) private(j) num_threads(threads)
       do j = 1, size(height, 2)
-         rows(j) = dot_product(height(:, j), pressure(:, j))
+         rows(j) = dot_product(height(:, j) - task%datum, pressure(:, j))
       end do
       displacement = global_sum(sum(rows))/measure%load + measure%weighted_level
       task%scale = task%rms_height
@@ -216,7 +223,7 @@ contains
       measure = combine_measures(problem, real(size(gap), dp), rows)
    end function measure_gap
 
-   !> gap = A(P + P_h)/modulus - H.
+   !> gap = A(P + P_h)/modulus - H, H counted from the datum.
    subroutine evaluate_gap(problem, operator, height, pressure, gap, history)
       type(normal_problem_type), intent(in) :: problem
       type(convolution_type), intent(inout) :: operator
@@ -241,7 +248,7 @@ contains
       !$omp parallel do default(none) shared(operator, height, gap, problem) private(j) &
       !$omp num_threads(operator%threads)
       do j = 1, operator%ny
-         gap(:, j) = -height(:, j)
+         gap(:, j) = problem%datum - height(:, j)
          call operator%add_backward_row(1, j, 1.0_dp/problem%modulus, gap(:, j))
       end do
    end subroutine evaluate_gap
@@ -275,7 +282,7 @@ contains
          if (problem%control == control_pressure) base = problem%target
       else
          factor = 2.0_dp*pi*problem%modulus/max(grid%lx, grid%ly)
-         pressure(:, :) = height
+         pressure(:, :) = height - problem%datum
          if (problem%control == control_approach) base = factor*problem%target
       end if
       !$omp parallel do default(none) shared(pressure, factor, base, operator) private(j) &

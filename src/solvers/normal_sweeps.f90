@@ -66,6 +66,8 @@ contains
       real(dp), intent(inout) :: column(n)          !! sums over the rows of a block
       real(dp), intent(inout) :: shares(n)          !! the same of 1 where it acts
       real(dp), intent(inout) :: sums(5)
+      ! Other passes take it that d acts where it is not 0: where it acts it must never be 0.
+      real(dp), parameter :: least = tiny(1.0_dp)
       real(dp) :: total, cells, product, residuals, square, z, d, inside
       integer :: i
 
@@ -80,7 +82,7 @@ contains
             - wy*(south(i) + north(i)) + correction(i)
          inside = positive(max(pressure(i), min(abs(residual(i)), z)))
          d = inside*(z + beta*(direction(i) &
-            - offset*positive(abs(direction(i)))))
+            - offset*positive(abs(direction(i)))) + least)
          direction(i) = d
          column(i) = column(i) + d
          shares(i) = shares(i) + inside
@@ -138,10 +140,11 @@ contains
       sums = sums + [total, cells]
    end subroutine above_cells
 
-   !> step = max(trial - shift, 0) - P, in the place of trial; sums of (level - gap) step and step^2.
-   pure subroutine clip_cells(n, shift, level, pressure, gap, step, column, sums)
+   !> step = factor max(trial - shift, 0) - P, in the place of trial; sums of (level - gap) step and
+   !> step^2.
+   pure subroutine clip_cells(n, factor, shift, level, pressure, gap, step, column, sums)
       integer, intent(in) :: n
-      real(dp), intent(in) :: shift, level
+      real(dp), intent(in) :: factor, shift, level
       real(dp), intent(in) :: pressure(n), gap(n)
       real(dp), intent(inout) :: step(n)
       real(dp), intent(inout) :: column(n)          !! sums over the rows of a block
@@ -153,7 +156,7 @@ contains
       square = 0.0_dp
       !$omp simd reduction(+:product, square)
       do i = 1, n
-         step(i) = max(step(i) - shift, 0.0_dp) - pressure(i)
+         step(i) = factor*max(step(i) - shift, 0.0_dp) - pressure(i)
          column(i) = column(i) + step(i)
          product = product + (level - gap(i))*step(i)
          square = square + step(i)**2

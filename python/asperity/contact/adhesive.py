@@ -80,8 +80,9 @@ def solve_adhesive(
     energy : float
         Work of adhesion, J/m2, >= 0.
     range : float
-        Range of the attraction, m. Cells should be smaller than 0.7 modulus range^2/energy, or
-        the edge of the contact sticks to the grid: a warning says so.
+        Range of the attraction, m. Cells should be smaller than 0.7 modulus range^2/energy
+        (maugis_dugdale: modulus range^2/energy), or the edge of the contact sticks to the grid:
+        a warning says so.
     pressure, force, displacement : float
         The load, one of: mean pressure, Pa; force, N; approach from the first touch, m. Negative
         values pull.
@@ -138,7 +139,7 @@ def solve_adhesive(
     if control == "force":
         load /= lx * ly
 
-    _look_at_cells(array.shape, lx, ly, modulus, energy, range)
+    _look_at_cells(array.shape, lx, ly, modulus, potential, energy, range)
     traction, gap, attraction = (np.zeros_like(array) for _ in "pga")
     level, origin = _start_from(start, shape, top, traction, gap)
     level, stuck, area, iterations, ffts, residual, seconds, converged, reason = _solve(
@@ -160,15 +161,19 @@ def solve_adhesive(
     return result
 
 
-def _look_at_cells(shape: tuple[int, int], lx: float, ly: float, modulus: float, energy: float,
-                   reach: float) -> None:
+def _look_at_cells(shape: tuple[int, int], lx: float, ly: float, modulus: float, potential: str,
+                   energy: float, reach: float) -> None:
     """Warn if the cells are too large for the range of the attraction."""
+    if energy <= 0.0:
+        return
     cell = lx / shape[1] if shape[0] == 1 else max(lx / shape[1], ly / shape[0])
-    if energy > 0.0 and cell > 0.7 * modulus * reach**2 / energy:
+    share, formula = (1.0, "") if potential == "maugis_dugdale" else (0.7, "0.7 ")
+    limit = share * modulus * reach**2 / energy
+    if cell > limit:
         warnings.warn(
-            f"cells of {cell:.4g} m are larger than 0.7 modulus range^2/energy ="
-            f" {0.7 * modulus * reach**2 / energy:.4g} m: the edge of the contact sticks to the"
-            " grid", UserWarning, stacklevel=3)
+            f"cells of {cell:.4g} m are larger than {formula}modulus range^2/energy ="
+            f" {limit:.4g} m: the edge of the contact sticks to the grid",
+            UserWarning, stacklevel=3)
 
 
 def _start_from(start: str | AdhesiveNormalContact, shape: tuple[int, ...], top: float,

@@ -1,0 +1,97 @@
+"""Contacts of too few cells are warned of, once a run; others are not."""
+
+import numpy as np
+import pytest
+
+import asperity
+
+WORDS = "cells across on average"
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def sphere(across, phases="&phase force = {force} /", more=""):
+    """A sphere of radius 1 m under the load for a Hertzian contact of so many cells across."""
+    radius = 0.5 * across / 32
+    return f"""
+&grid nx = 32, ny = 32, lx = 1., boundary = 'free' /
+&surface shape = 'paraboloid', radius = 1. /
+&material shear_modulus = 0.25, poisson = 0.5 /
+{phases.format(force=4 / 3 * radius**3)}
+{more}
+"""
+
+
+def warned(case):
+    return sum(WORDS in line for line in asperity.run(case, output="case.h5").warnings)
+
+
+@pytest.mark.parametrize(("across", "times"), [(0.6, 1), (2.0, 1), (4.0, 0), (8.0, 0)])
+def test_single_contact(across, times):
+    assert warned(sphere(across)) == times
+
+
+def test_small_on_the_way_to_large_is_no_fault():
+    ramp = "&phase force = {force}, duration = 1., steps = 64, ramp = 'linear' /"
+    assert warned(sphere(8.0, ramp)) == 0
+
+
+def test_once_a_run():
+    twice = "&phase force = {force} /\n&phase force = {force}, duration = 1., steps = 2 /"
+    assert warned(sphere(1.0, twice)) == 1
+
+
+def test_one_phase_with_large_patches_is_enough():
+    assert warned(sphere(8.0, "&phase force = {force} /\n&phase force = 1e-9 /")) == 0
+
+
+@pytest.mark.parametrize(("cells_a_wave", "times"), [(2.5, 1), (16, 0)])
+def test_rough_contact(cells_a_wave, times):
+    case = f"""
+&grid nx = 96, ny = 96, lx = 1. /
+&surface shape = 'self_affine', wavelength_long = 0.5, wavelength_short = {cells_a_wave / 96},
+  rms_slope = 0.1, hurst = 0.8, seed = 2 /
+&material shear_modulus = 0.25, poisson = 0.5 /
+&phase pressure = 0.0002 /
+"""
+    assert warned(case) == times
+
+
+def test_line_and_full_contact():
+    case = """
+&grid nx = 64, ny = 1, lx = 1. /
+&surface shape = 'sine', amplitude = 0.01, wavelength = 1. /
+&material shear_modulus = 0.25, poisson = 0.5 /
+&phase pressure = {} /
+"""
+    # A third of the wave, and all of it.
+    assert warned(case.format(0.01)) == 0
+    assert warned(case.format(1.0)) == 0
+    assert warned(case.format(1e-6)) == 1
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("method", ["fast", "thesis"])
+def test_overflow_is_not_converged(method):
+    height = 1e200 * np.cos(np.linspace(0, 6, 20))[None, :]
+    with pytest.raises(asperity.NotConverged):
+        asperity.solve_normal(height, 1e-150, 1e-150, 1.0, pressure=1e160, method=method)
+    with pytest.raises(asperity.NotConverged):
+        asperity.solve_adhesive(height, 1e-150, 1e-150, 1.0, pressure=1e160, method=method,
+                                energy=1e-100, range=1e-60)
+
+
+def test_full_contact_is_named_where_a_displacement_leaves_no_gap():
+    case = """
+&grid nx = 32, ny = 32, lx = 1. /
+&surface shape = 'hexagonal_wave', amplitude = 0.01, wavelength = 1. /
+&material shear_modulus = 0.25, poisson = 0.5 /
+&phase displacement = 1. /
+{}
+"""
+    for adhesion in ("", "&adhesion potential = 'exponential', energy = 1e-5, range = 1e-3 /"):
+        with pytest.raises(asperity.NotConverged, match="full contact"):
+            asperity.run(case.format(adhesion), output="case.h5")

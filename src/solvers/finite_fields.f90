@@ -1,0 +1,38 @@
+!> A solution that is not a number is no solution.
+!>
+!> Maxima and comparisons of Fortran pass over numbers that are not one (NaN), so that a measure of
+!> error may look small where fields have overflowed. The solvers look at the fields that they hand out.
+module finite_fields
+   use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
+   use parallel, only : global_sum
+   use precision, only : dp
+   use solver_result, only : solver_result_type
+   implicit none
+   private
+
+   public :: reject_overflow
+
+   character(*), parameter, public :: reason_overflow = 'numbers overflowed: a field is not finite'
+
+contains
+
+   !> A record of a solve whose fields are not finite everywhere says that it did not converge.
+   subroutine reject_overflow(outcome, one, other, threads)
+      type(solver_result_type), intent(inout) :: outcome
+      real(dp), intent(in) :: one(:, :), other(:, :)
+      integer, intent(in) :: threads
+      integer :: j, lost
+
+      lost = 0
+      !$omp parallel do default(none) shared(one, other) private(j) reduction(+:lost) &
+      !$omp num_threads(threads)
+      do j = 1, size(one, 2)
+         if (.not. (all(ieee_is_finite(one(:, j))) .and. all(ieee_is_finite(other(:, j))))) &
+            lost = lost + 1
+      end do
+      if (global_sum(lost) == 0) return
+      outcome%converged = .false.
+      outcome%reason = reason_overflow
+   end subroutine reject_overflow
+
+end module finite_fields

@@ -1,0 +1,152 @@
+"""Random contact problems, to be run by hand: what does not converge, and what small contacts cost.
+
+python tools/campaign_contact.py normal 200000      grids of up to 256 cells, all controls
+python tools/campaign_contact.py extreme 2000       tiny loads, displacements beyond full contact
+python tools/campaign_contact.py sizes              errors of contacts of few cells
+"""
+
+import argparse
+import math
+import warnings
+from collections import Counter
+
+import numpy as np
+
+import asperity
+
+
+def small_height(rng, nx, ny):
+    """Draw a map of some kind: noise, steps, one summit, a bowl, rounded noise, a wave."""
+    y, x = np.mgrid[:ny, :nx]
+    kind = rng.integers(6)
+    if kind == 0:
+        height = rng.standard_normal((ny, nx))
+    elif kind == 1:
+        height = (rng.random((ny, nx)) < 0.5) * 1.0
+    elif kind == 2:
+        height = np.zeros((ny, nx))
+        height[rng.integers(ny), rng.integers(nx)] = 1.0
+    elif kind == 3:
+        height = -1.0 * ((x - nx / 2) ** 2 + (y - ny / 2) ** 2)
+    elif kind == 4:
+        height = np.round(2 * rng.standard_normal((ny, nx))) / 2
+    else:
+        height = np.cos(2 * np.pi * (x / nx * rng.integers(3) + y / ny * rng.integers(3))
+                        + rng.uniform(0, 6))
+    return height * 10.0 ** rng.uniform(-5, -1)
+
+
+def normal_problem(rng):
+    """Draw a small convex problem; the arguments of `asperity.solve_normal`."""
+    most = int(rng.choice([8, 16, 64, 256]))
+    cells = 0
+    while not 2 <= cells <= most:
+        nx = int(rng.integers(1, 17 if rng.random() < 0.8 else 65))
+        ny = 1 if rng.random() < 0.3 else int(rng.integers(1, 17))
+        cells = nx * ny
+    free = ny > 1 and nx > 1 and rng.random() < 0.4
+    ly = None
+    if ny > 1:
+        ly = ny / nx * (math.exp(rng.uniform(-2, 2)) if rng.random() < 0.4 else 1.0)
+    height = small_height(rng, nx, ny)
+    span = np.ptp(height) or 1e-3
+    given = {"height": height, "lx": 1.0, "ly": ly, "modulus": 10.0 ** rng.uniform(-2, 2),
+             "boundary": "free" if free else "periodic", "tolerance": 10.0 ** rng.integers(-10, -4)}
+    control = rng.integers(3)
+    depth = height.max() - height.mean()
+    if control == 2 and free:
+        return given | {"displacement": span * rng.uniform(0.01, 1.5)}
+    if control == 2 and depth > 1e-9 * span and np.ptp(height) > 1e-12 * np.abs(height).max():
+        return given | {"displacement": depth * rng.uniform(0.001, 0.99)}
+    pressure = given["modulus"] * span / max(1.0, ly or 1.0) * 10.0 ** rng.uniform(-4, 1.5)
+    if control == 1:
+        return given | {"force": pressure * (ly or 1.0 / nx)}
+    return given | {"pressure": pressure}
+
+
+def extreme_problem(rng, adhesive):
+    """Draw a rough map far from zero under a tiny load, or far beyond full contact."""
+    nx, ny = (int(n) for n in rng.integers(4, 33, 2))
+    length = 10.0 ** rng.uniform(-4, 0)
+    height = length * 10.0 ** rng.uniform(-5, -1) * rng.standard_normal((ny, nx))
+    if rng.random() < 0.3:
+        height += rng.uniform(-1, 1) * length
+    modulus = 10.0 ** rng.uniform(0, 9)
+    given = {"height": height, "lx": length, "ly": length * ny / nx, "modulus": modulus,
+             "tolerance": 10.0 ** rng.integers(-9, -4)}
+    if rng.random() < 0.5:
+        given |= {"boundary": "free", "displacement": np.ptp(height) * 10.0 ** rng.uniform(0, 5)}
+    else:
+        given |= {"boundary": str(rng.choice(["free", "periodic"])),
+                  "pressure": modulus * 10.0 ** rng.uniform(-22, -11)}
+    if adhesive:
+        reach = np.ptp(height) * 10.0 ** rng.uniform(-2, 0.5)
+        energy = modulus * reach**2 / (length / nx) * 10.0 ** rng.uniform(-6, 0)
+        given |= {"range": reach, "energy": energy,
+                  "potential": str(rng.choice(["exponential", "gauss", "maugis_dugdale"]))}
+    return given
+
+
+def campaign(problems, solve):
+    """Solve all; print what did not converge."""
+    failures, iterations = Counter(), []
+    for problem in problems:
+        try:
+            iterations.append(solve(**problem).iterations)
+        except asperity.NotConverged as error:
+            failures[error.result.reason] += 1
+            if failures.total() <= 5:
+                print(problem)
+    print(f"{solve.__name__}: {failures.total()} of {failures.total() + len(iterations)} not"
+          f" converged; iterations: mean {np.mean(iterations):.1f}, most {max(iterations)}")
+    for reason, times in failures.items():
+        print(f"   {times} x {reason}")
+
+
+def sizes():
+    """Print the errors of a sphere of few cells, and of rough maps by cells across a patch."""
+    for across in (0.6, 1.0, 2.0, 3.0, 4.0, 6.0):
+        x = (np.arange(64) - 32) / 64
+        radius = across / 128
+        contact = asperity.solve_normal(
+            -(x**2 + x[:, None] ** 2) / 2, 1.0, None, 1.0, force=4 / 3 * radius**3,
+            boundary="free", tolerance=1e-9)
+        print(f"sphere, {across:g} cells across: approach"
+              f" {100 * (contact.displacement / radius**2 - 1):+.1f} %")
+    for pressure in (0.002, 0.01, 0.05, 0.2):
+        areas = {}
+        for n in (512, 256, 128, 64):
+            height = asperity.surface.self_affine(
+                n, n, 1.0, 1.0, wavelength_long=0.25, wavelength_short=1 / 16, rms_slope=1.0,
+                seed=3)
+            touching = asperity.solve_normal(height, 1.0, 1.0, 1.0, pressure=pressure).pressure > 0
+            chord = min(touching.sum() / (touching & ~np.roll(touching, 1, axis)).sum()
+                        for axis in (0, 1))
+            areas[n] = touching.mean()
+            print(f"rough, p = {pressure:g} E* h'rms, {n // 16} cells in the shortest wave:"
+                  f" {4 / np.pi * chord:.1f} cells across a patch, area"
+                  f" {100 * (areas[n] / areas[512] - 1):+.1f} % of that of 512 x 512 cells")
+
+
+def main():
+    """Run the campaign that was asked for."""
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=["normal", "extreme", "sizes"])
+    parser.add_argument("count", nargs="?", type=int, default=1000)
+    parser.add_argument("--seed", type=int, default=1)
+    given = parser.parse_args()
+    warnings.simplefilter("ignore")
+    rng = np.random.default_rng(given.seed)
+    if given.what == "sizes":
+        sizes()
+    elif given.what == "normal":
+        campaign((normal_problem(rng) for _ in range(given.count)), asperity.solve_normal)
+    else:
+        for solve in (asperity.solve_normal, asperity.solve_adhesive):
+            campaign((extreme_problem(rng, solve is asperity.solve_adhesive)
+                      for _ in range(given.count)), solve)
+
+
+if __name__ == "__main__":
+    main()
