@@ -1,7 +1,9 @@
 !> What the user typed, as a type; and the help texts.
 module command_line
    use errors, only : add_fault, error_input, error_type
+   use precision, only : dp
    use text_tools, only : nearest_name, ordinary
+   use time_limit, only : read_duration
    implicit none
    private
 
@@ -14,6 +16,8 @@ module command_line
       character(:), allocatable :: output      !! --output; not allocated if not given
       integer :: threads = -1                  !! --threads; -1 if not given
       logical :: restart = .false.             !! --restart
+      logical :: overwrite = .false.           !! --overwrite
+      real(dp) :: time_limit = -1.0_dp         !! --time-limit, s; below 0 if not given
       logical :: quiet = .false.               !! --quiet
       logical :: reference = .false.           !! --reference
       character(:), allocatable :: help_of     !! verb that help is asked for; '' for the program's
@@ -27,8 +31,8 @@ module command_line
    character(*), parameter :: verbs(10) = [own_verbs, python_verbs]
    character(*), parameter :: verbs_there = 'run, check, template, info, plot, report, watch, '// &
       'import, fit and friction are there'
-   character(*), parameter :: options(8) = [character(11) :: '--output', '--threads', '--restart', &
-      '--quiet', '--help', '--version', '--reference', '-h']
+   character(*), parameter :: options(10) = [character(12) :: '--output', '--threads', '--restart', &
+      '--overwrite', '--time-limit', '--quiet', '--help', '--version', '--reference', '-h']
 
 contains
 
@@ -63,7 +67,8 @@ contains
             name = argument
             if (index(argument, '--') == 1 .and. index(argument, '=') > 0) &
                name = argument(:index(argument, '=') - 1)
-            if (name /= argument .and. name /= '--output' .and. name /= '--threads') then
+            if (name /= argument .and. all(name /= [character(12) :: '--output', '--threads', &
+               '--time-limit'])) then
                if (any(options == name)) then
                   call refuse(name//' takes no value')
                   cycle
@@ -76,6 +81,10 @@ contains
                command%verb = 'version'
             case ('--restart')
                command%restart = .true.
+            case ('--overwrite')
+               command%overwrite = .true.
+            case ('--time-limit')
+               call take_time_limit()
             case ('--quiet')
                command%quiet = .true.
             case ('--reference')
@@ -165,6 +174,18 @@ contains
             ordinary(value, 60)//': must be an integer from 1 to 1024')
       end subroutine take_threads
 
+      !> --time-limit H:M:S
+      subroutine take_time_limit()
+         character(:), allocatable :: value
+         logical :: valid
+
+         call take_value(value)
+         if (.not. allocated(value)) return
+         call read_duration(value, command%time_limit, valid)
+         if (.not. valid) call refuse('--time-limit '//ordinary(value, 60)//': must be a duration such '// &
+            'as 90 (minutes), 1:30:00 (hours, minutes, seconds) or 2-12:00:00 (with days)')
+      end subroutine take_time_limit
+
    end subroutine read_command_line
 
    !> Do options and arguments fit the verb?
@@ -177,8 +198,12 @@ contains
          if (allocated(command%output)) call alien('--output')
          if (command%threads > 0) call alien('--threads')
          if (command%restart) call alien('--restart')
+         if (command%overwrite) call alien('--overwrite')
+         if (command%time_limit > 0.0_dp) call alien('--time-limit')
          if (command%quiet) call alien('--quiet')
       end if
+      if (command%restart .and. command%overwrite) call add_fault(error, error_input, 'asperity: '// &
+         '--restart and --overwrite are given together: give one of them')
       if (command%reference .and. command%verb /= 'template') call alien('--reference')
       select case (command%verb)
       case ('run', 'check')
@@ -229,13 +254,20 @@ contains
 
       select case (verb)
       case ('run')
-         text = 'asperity run CASE.nml [--output FILE.h5] [--threads N] [--restart] [--quiet]'//nl//nl// &
+         text = 'asperity run CASE.nml [--output FILE.h5] [--threads N] [--restart] [--overwrite]'//nl// &
+            '                     [--time-limit H:M:S] [--quiet]'//nl//nl// &
             'Run a case. The result is an HDF5 file, beside the input by default. To draw it:'//nl// &
             'asperity plot RESULT.h5'//nl//nl// &
             '  --output FILE.h5  write the result there'//nl// &
-            '  --threads N       use N threads; all processors by default'//nl// &
+            '  --threads N       use N threads; by default OMP_NUM_THREADS, SLURM_CPUS_PER_TASK,'//nl// &
+            '                    or all processors'//nl// &
             '  --restart         go on from the last checkpoint in the result'//nl// &
-            '  --quiet           show no progress'//nl//nl//statuses()
+            '  --overwrite       replace an unfinished run and its checkpoint'//nl// &
+            '  --time-limit T    stop in time, with a checkpoint: T is M, H:M:S or D-H:M:S; by'//nl// &
+            '                    default the end of the Slurm job, where there is one'//nl// &
+            '  --quiet           show no progress'//nl//nl// &
+            'SIGINT, SIGTERM, SIGHUP and SIGXCPU stop a run after the step in hand, with a checkpoint;'//nl// &
+            'SIGUSR1 writes a checkpoint and the run goes on.'//nl//nl//statuses()
       case ('check')
          text = 'asperity check CASE.nml'//nl//nl// &
             'Check an input without running it, and print every setting as it is understood, with'//nl// &
@@ -250,7 +282,8 @@ contains
             'Say what a result holds: case, grid, phases, last step, finished or not.'//nl
       case default
          text = 'Asperity: contact of a viscoelastic solid with a rough surface'//nl//nl// &
-            'asperity run CASE.nml [--output FILE.h5] [--threads N] [--restart] [--quiet]'//nl// &
+            'asperity run CASE.nml [--output FILE.h5] [--threads N] [--restart] [--overwrite]'//nl// &
+            '                      [--time-limit H:M:S] [--quiet]'//nl// &
             'asperity check CASE.nml      validate only: settings, time steps, memory'//nl// &
             'asperity template [NAME]     print an input to start from; without a name, list them'//nl// &
             'asperity info FILE.h5        what a result or a height map holds'//nl//nl// &
@@ -271,7 +304,8 @@ contains
       character(:), allocatable :: text
 
       text = 'Exit status: 0 done; 2 input or command line wrong; 3 a file cannot be read or written;'//nl// &
-         '4 a solver did not converge; 130 or 143 stopped by SIGINT or SIGTERM.'//nl
+         'or not enough memory; 4 a solver did not converge; 124 stopped by the time limit;'//nl// &
+         '128 + N stopped by signal N (130 SIGINT, 143 SIGTERM).'//nl
    end function statuses
 
 end module command_line

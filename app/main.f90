@@ -7,18 +7,22 @@ program main
    use case_templates, only : all_template_names, find_template, template_is_available, template_list, &
       template_text
    use command_line, only : command_type, help_text, read_command_line
-   use errors, only : error_input, error_type, fail
+   use errors, only : error_file, error_input, error_memory, error_type, fail
    use hand_over, only : become_python
    use input_reference, only : reference_markdown
    use progress, only : progress_type
    use result_summary, only : summarise_result
-   use signals, only : catch_signals, checkpoint_asked, forget_checkpoint, signal_interrupt, stop_signal
+   use signals, only : catch_signals, checkpoint_asked, forget_checkpoint, stop_signal, &
+      stop_signal_name
    use standard_streams, only : say, say_error
    use surface, only : check_files
+   use time_limit, only : time_limit_type
    use text_tools, only : nearest_name, ordinary, to_text
    use version, only : asperity_version
    use wait_policy, only : wait_passively
    implicit none
+
+   integer, parameter :: stopped_by_limit = 124       !! exit status, as that of timeout(1)
 
    type(command_type) :: command
    type(error_type), allocatable :: error
@@ -52,6 +56,7 @@ program main
    if (allocated(error)) then
       call say_error(error%message)
       status = error%status
+      if (status == error_memory) status = error_file
    end if
    stop status, quiet=.true.
 
@@ -125,32 +130,39 @@ contains
       call run_steps(case, error)
    end subroutine run
 
-   !> The steps of a run. A signal stops it after the step in hand, with a checkpoint.
+   !> The steps of a run. A signal, or the time limit, stops it after the step in hand, with a
+   !> checkpoint.
    subroutine run_steps(case, error)
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
       type(run_type) :: run
       type(progress_type) :: progress
+      type(time_limit_type) :: limit
       type(error_type), allocatable :: closing
 
-      call run%open(case, command%restart, error)
+      call limit%start(command%time_limit)
+      call run%open(case, command%restart, command%overwrite, error)
       if (.not. allocated(error)) then
          call progress%start(run%rows, max(run%sim%schedule%row + 1, 0), command%quiet)
          do while (.not. run%finished)
             call tell_warnings(run, progress)
             if (stop_signal() /= 0) then
-               call run%interrupt(error)
-               if (.not. allocated(error)) call fail(error, 128 + stop_signal(), 'asperity: stopped by '// &
-                  trim(merge('SIGINT ', 'SIGTERM', stop_signal() == signal_interrupt))// &
-                  ' after step '//to_text(run%sim%row%step)//'; --restart goes on from there')
+               call stop_run(run, 128 + stop_signal(), 'stopped by '//stop_signal_name(), error)
+               exit
+            else if (limit%is_near()) then
+               call stop_run(run, stopped_by_limit, 'the time limit is near: stopped', error)
                exit
             end if
             if (checkpoint_asked()) then
                call forget_checkpoint()
+               call limit%step_begins()
                call run%save(error)
                if (allocated(error)) exit
+               call limit%step_ends(.true.)
             end if
+            call limit%step_begins()
             call run%step(error)
+            call limit%step_ends(.false.)
             if (run%sim%schedule%row >= 0) call progress%update(run%sim%row)
             if (allocated(error)) exit
          end do
@@ -160,6 +172,24 @@ contains
       call run%close(closing)
       if (.not. allocated(error) .and. allocated(closing)) call move_alloc(closing, error)
    end subroutine run_steps
+
+   !> Stop a run so that it can go on; the error says with which status the program ends.
+   subroutine stop_run(run, status, reason, error)
+      type(run_type), intent(inout) :: run
+      integer, intent(in) :: status
+      character(*), intent(in) :: reason
+      type(error_type), allocatable, intent(out) :: error
+
+      call run%interrupt(error)
+      if (allocated(error)) return
+      if (run%sim%schedule%row < 0) then
+         call fail(error, status, 'asperity: '//reason//' before the first row: nothing was computed, '// &
+            'and there is no checkpoint')
+      else
+         call fail(error, status, 'asperity: '//reason//' after step '//to_text(run%sim%row%step)// &
+            '; --restart goes on from there')
+      end if
+   end subroutine stop_run
 
    !> New warnings of a run, on lines of their own.
    subroutine tell_warnings(run, progress)

@@ -112,28 +112,34 @@ contains
       type(error_type), allocatable :: error
       real(dp), allocatable :: field(:, :)
       real(dp) :: height(4, 2)
-      integer :: i
+      integer :: extent(2), i
 
       height = reshape([(real(i, dp), i=1, 8)], [4, 2])
       call file%open(path, 'create', error)
       call file%write('/surface', height, 'm', 'height', error)
       call file%write('/line', [1.0_dp], 'm', 'a line', error)
       call file%close(error)
-      call read_field(path, '', field, error)
+      extent = [4, 2]
+      call read_field(path, '', extent, field, error)
       call check_no_error(error, 'usual name')
       call check_that(all(shape(field) == [4, 2]) .and. all(same(field, height)), 'surface')
-      call read_field(path, 'heights', field, error)
+      call read_field(path, 'heights', extent, field, error)
       call check_error(error, 'there is no dataset "heights"; there are: line, surface', 'missing')
       call check_that(error%status == error_file, 'status of a missing dataset')
-      call read_field(path, 'line', field, error)
+      call read_field(path, 'line', extent, field, error)
       call check_error(error, 'has 1 dimensions, not 2', 'shape')
       call check_that(error%status == error_input, 'status of a wrong shape')
 
       call file%open(path, 'create', error)
       call file%write('/surface/height', 2*height, 'm', 'height', error)
       call file%close(error)
-      call read_field(path, '', field, error)
+      extent = [4, 2]
+      call read_field(path, '', extent, field, error)
       call check_that(all(same(field, 2*height)), 'surface/height')
+      extent = [2, 4]
+      call read_field(path, '', extent, field, error)
+      call check_no_error(error, 'another shape')
+      call check_that(.not. allocated(field) .and. all(extent == [4, 2]), 'is told and not read')
    end subroutine fields_are_read
 
    !> Columns grow over their first chunk, and after the file was closed.

@@ -8,7 +8,8 @@ module test_result_file
    use history_row, only : column_count, column_type, history_columns
    use precision, only : dp
    use regular_grid, only : boundary_free, new_grid
-   use result_file, only : result_file_type, sibling_path
+   use result_file, only : result_file_type
+   use result_names, only : sibling_path
    use result_writer, only : nx, ny, pressure_of, write_result
    implicit none
    private

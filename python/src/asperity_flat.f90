@@ -9,10 +9,10 @@ module asperity_flat
    implicit none
    private
 
-   public :: library_version, set_thread_count
+   public :: library_version, release_idle_threads, set_thread_count
    public :: surface_height, surface_psd, surface_radial_psd, surface_statistics
    public :: contact_adhesive, contact_normal
-   public :: input_check, input_groups, input_listed
+   public :: input_check, input_groups, input_listed, map_checksum
    public :: operator_apply, operator_close, operator_open, operator_symbol
    public :: run_close, run_field, run_interrupt, run_open, run_row, run_step, row_columns
    public :: simulation_close, simulation_load, simulation_open, simulation_save, simulation_steer, &
@@ -37,6 +37,42 @@ contains
       call set_threads(int(n))
       used = thread_count()
    end subroutine set_thread_count
+
+   !> End the idle threads, before the process is copied.
+   subroutine release_idle_threads()
+      use parallel, only : release_threads
+
+      call release_threads()
+   end subroutine release_idle_threads
+
+   !> Checksum of a height map, as a result names it in its attribute `height_maps`.
+   subroutine map_checksum(path, dataset, nx, ny, checksum_text, status, message)
+      use checksum, only : checksum_of_field, hexadecimal
+      use errors, only : error_input, error_type, fail
+      use hdf5_file, only : read_field
+      use precision, only : dp
+      character(len=*), intent(in) :: path
+      character(len=*), intent(in) :: dataset              !! blank: the usual names
+      integer(c_int), intent(in) :: nx, ny                 !! of the grid that the map is for
+      character(len=16), intent(out) :: checksum_text
+      integer(c_int), intent(out) :: status
+      character(len=2000), intent(out) :: message
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: map(:, :)
+      integer :: extent(2)
+
+      checksum_text = ''
+      extent = [int(nx), int(ny)]
+      call read_field(trim(path), trim(dataset), extent, map, error)
+      if (.not. allocated(error)) then
+         if (allocated(map)) then
+            checksum_text = hexadecimal(checksum_of_field(map))
+         else
+            call fail(error, error_input, trim(path)//': has another shape')
+         end if
+      end if
+      call report(error, status, message)
+   end subroutine map_checksum
 
    !> Height of one term of a surface.
    subroutine surface_height(nx, ny, lx, ly, is_free, shape_name, radius, amplitude, wavelength, &
@@ -68,6 +104,11 @@ contains
       integer :: i, j
 
       grid = grid_of(nx, ny, lx, ly, is_free)
+      call see_memory(grid, 4, 'the surface', error)
+      if (allocated(error)) then
+         call report(error, status, message)
+         return
+      end if
       term(1) = default_surface(grid)
       term(1)%shape = shape_name
       term(1)%radius = radius
@@ -106,7 +147,9 @@ contains
       character(len=2000), intent(out) :: message
       type(error_type), allocatable :: error
 
-      call height_psd(grid_of(nx, ny, lx, ly, 0_c_int), height, psd, error)
+      call see_memory(grid_of(nx, ny, lx, ly, 0_c_int), 4, 'the spectrum', error)
+      if (.not. allocated(error)) &
+         call height_psd(grid_of(nx, ny, lx, ly, 0_c_int), height, psd, error)
       call report(error, status, message)
    end subroutine surface_psd
 
@@ -130,8 +173,9 @@ contains
       integer, allocatable :: ring_modes(:)
 
       rings = 0
-      call radial_psd(grid_of(nx, ny, lx, ly, 0_c_int), height, ring_wave_numbers, ring_psd, &
-         ring_modes, error)
+      call see_memory(grid_of(nx, ny, lx, ly, 0_c_int), 4, 'the spectrum', error)
+      if (.not. allocated(error)) call radial_psd(grid_of(nx, ny, lx, ly, 0_c_int), height, &
+         ring_wave_numbers, ring_psd, ring_modes, error)
       if (.not. allocated(error)) then
          rings = size(ring_psd)
          if (rings > most) then
@@ -159,7 +203,9 @@ contains
       type(error_type), allocatable :: error
       type(roughness_type) :: found
 
-      call height_statistics(grid_of(nx, ny, lx, ly, is_free), height, found, error)
+      call see_memory(grid_of(nx, ny, lx, ly, is_free), 4, 'the statistics', error)
+      if (.not. allocated(error)) &
+         call height_statistics(grid_of(nx, ny, lx, ly, is_free), height, found, error)
       values = [found%mean, found%lowest, found%highest, found%rms_height, found%skewness, &
          found%kurtosis, found%rms_slope, found%rms_slope_differences, found%rms_curvature, &
          found%nayak]
@@ -207,8 +253,9 @@ contains
 
       level = 0.0_dp
       grid = grid_of(nx, ny, lx, ly, is_free)
+      call see_memory(grid, 12, 'the contact', error)
       ! E* = 2 G/(1 - nu) is all that the normal problem knows of the material: take nu = 0.
-      call new_normal_solver(solver, grid, 0.0_dp, error)
+      if (.not. allocated(error)) call new_normal_solver(solver, grid, 0.0_dp, error)
       if (.not. allocated(error)) then
          problem%modulus = 0.5_dp*modulus
          problem%control = merge(control_approach, control_pressure, approach == 1)
@@ -296,7 +343,8 @@ contains
       plan%control = 'pressure'
       if (approach == 1) plan%control = 'displacement'
       plan%load = load
-      call new_normal_step(side, case, height, error)
+      call see_memory(case%grid, 20, 'the contact', error)
+      if (.not. allocated(error)) call new_normal_step(side, case, height, error)
       if (.not. allocated(error)) then
          call side%solve(plan, 0.5_dp*modulus, start /= 2, height, pressure, gap, level, outcome)
          energy_adhesive = side%energy(gap)
@@ -311,8 +359,8 @@ contains
    end subroutine contact_adhesive
 
    !> Read a case and prepare its run: the handle is for the calls that follow.
-   subroutine run_open(path, text, output, threads, restart, handle, rows, first, result_path, &
-      warnings, status, message)
+   subroutine run_open(path, text, output, threads, restart, overwrite, handle, rows, first, &
+      result_path, warnings, status, message)
       use case_input, only : overwritten_file, parse_case, read_case
       use case_run, only : run_type
       use case_settings, only : case_type
@@ -323,6 +371,7 @@ contains
       character(len=*), intent(in) :: output               !! of the result; blank: what the case says
       integer(c_int), intent(in) :: threads                !! 0: what the case says
       integer(c_int), intent(in) :: restart                !! 1: go on from the checkpoint
+      integer(c_int), intent(in) :: overwrite              !! 1: replace an unfinished run
       integer(c_int), intent(out) :: handle
       integer(c_int), intent(out) :: rows                  !! rows of the whole history
       integer(c_int), intent(out) :: first                 !! rows done before
@@ -362,7 +411,7 @@ contains
             call fail(error, error_input, 'too many runs are open: close some')
          else
             run => run_of(number)
-            call run%open(case, restart == 1, error)
+            call run%open(case, restart == 1, overwrite == 1, error)
             if (allocated(error)) then
                call run%close(closing)
                call free_run(number)
@@ -960,6 +1009,23 @@ contains
 
       grid = new_grid(int(nx), int(ny), lx, ly, merge(boundary_free, boundary_periodic, is_free == 1))
    end function grid_of
+
+   !> See that there is memory for some fields of a grid.
+   subroutine see_memory(grid, fields, task, error)
+      use errors, only : error_type
+      use memory_limits, only : need_memory
+      use precision, only : dp
+      use regular_grid, only : boundary_free, grid_type
+      type(grid_type), intent(in) :: grid
+      integer, intent(in) :: fields                        !! doubles per cell; a free grid is padded
+      character(len=*), intent(in) :: task
+      type(error_type), allocatable, intent(out) :: error
+      real(dp) :: cells
+
+      cells = real(grid%nx, dp)*grid%ny
+      if (grid%boundary == boundary_free) cells = 1.6_dp*cells
+      call need_memory(8.0_dp*fields*cells, task, error)
+   end subroutine see_memory
 
    !> What a solve was, in the arguments of a call.
    subroutine tell(outcome, iterations, ffts, residual, seconds, converged, reason)

@@ -78,7 +78,7 @@ def test_killed_at_any_moment(program: str, tmp_path: Path, reference: Path) -> 
     for _ in range(60):
         restart = case.with_suffix(".checkpoint.h5").exists()
         before = vc.count(result) if restart else 0
-        process = vc.start(program, case, *(["--restart"] if restart else []))
+        process = vc.start(program, case, "--restart" if restart else "--overwrite")
         if kills < 12:
             if restart:
                 vc.wait_for_rows(process, result, max(before - 3, 1))

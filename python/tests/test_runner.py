@@ -140,7 +140,7 @@ def test_a_run_that_fails_closes_no_other_run(case, tmp_path, monkeypatch):
     assert len(opened) == 2 and opened[0] != opened[1]
     assert closed == opened
     # an old handle means no run, also while another one is open
-    handle = begin(b"case.nml", SLIDING.encode(), b"%s" % str(tmp_path / "a.h5").encode(), 1, 0)[0]
+    handle = begin(b"case.nml", SLIDING.encode(), bytes(tmp_path / "a.h5"), 1, 0, 0)[0]
     close(opened[0])
     assert runner._step(handle)[1] == 0
     close(handle)

@@ -16,7 +16,7 @@ from asperity import runner
 
 def go(case: Path, rows: int | None = None, *, restart: bool = False) -> list[str]:
     """Do so many rows and stop as a signal does, or go to the end; return the warnings."""
-    handle, _, _, _, told = runner._open(os.fsencode(case), b"", b"", 1, int(restart))
+    handle, _, _, _, told = runner._open(os.fsencode(case), b"", b"", 1, int(restart), 0)
     lines = [told]
     finished, done = False, 0
     while not finished and done != rows:

@@ -6,10 +6,13 @@ module errors
 
    public :: error_type, fail, add_fault
 
-   !> What went wrong; the values are the exit statuses of the program.
+   !> What went wrong; but for the last, the values are the exit statuses of the program.
    integer, parameter, public :: error_input = 2          !! the user's input is wrong
    integer, parameter, public :: error_file = 3           !! a file cannot be read or written
    integer, parameter, public :: error_convergence = 4    !! a solver did not converge
+   !> There is not enough memory. The program ends with the status of `error_file`, Python raises
+   !> MemoryError.
+   integer, parameter, public :: error_memory = 5
 
    !> An error: a message that says what, where, the value found and what is allowed.
    type :: error_type
@@ -22,7 +25,7 @@ contains
    !> Set an error.
    pure subroutine fail(error, status, message)
       type(error_type), allocatable, intent(out) :: error
-      integer, intent(in) :: status              !! error_input, error_file or error_convergence
+      integer, intent(in) :: status              !! one of the parameters above
       character(*), intent(in) :: message
 
       allocate (error)

@@ -9,12 +9,17 @@
 !> moment is said in `hdf5_tree`.
 module hdf5_file
    use, intrinsic :: iso_c_binding, only : c_char, c_loc, c_null_char, c_null_ptr, c_ptr
-   use errors, only : error_file, error_input, error_type, fail
-   use hdf5_library, only : h5aexists_f, h5oclose_f, h5oopen_f, hid_t
+   use errors, only : error_file, error_input, error_memory, error_type, fail
+   use file_system, only : file_exists, folder_of
+   use hdf5_library, only : h5aexists_f, h5oclose_f, h5oopen_f, hid_t, hsize_t
    use hdf5_tree, only : hdf5_tree_type, most_expected, name_length
    use hdf5_values, only : get_number, get_reals, get_text, kind_int8, kind_integer, kind_real, &
       kind_text, new_column, new_dataset, put_attribute, put_rows, shape_of_dataset
+   use hdf5_virtual, only : list_sources, source_type
+   use memory_limits, only : memory_text
    use precision, only : dp, int8
+   use text_tools, only : to_text
+   use trial_process, only : trial_type
    implicit none
    private
 
@@ -333,6 +338,7 @@ contains
       integer, allocatable, intent(out) :: extent(:)
       type(error_type), allocatable, intent(out) :: error
       integer(hid_t) :: dataset
+      integer(hsize_t), allocatable :: long_extent(:)
       integer :: status, ignored
 
       allocate (extent(0))
@@ -343,9 +349,17 @@ contains
       end if
       call self%open_object(path, dataset, error)
       if (allocated(error)) return
-      call shape_of_dataset(dataset, extent, status)
+      call shape_of_dataset(dataset, long_extent, status)
       call self%checked(status, 'the dataset cannot be read', path, error)
-      if (.not. allocated(error)) call h5oclose_f(dataset, ignored)
+      if (allocated(error)) return
+      call h5oclose_f(dataset, ignored)
+      if (all(long_extent <= huge(1))) then
+         extent = int(long_extent)
+      else
+         call fail(error, error_input, self%path//': '//trim(path)//': has '// &
+            to_text(maxval(long_extent))//' values along one side: at most '//to_text(huge(1))// &
+            ' are allowed')
+      end if
    end subroutine dataset_shape
 
    !> Find a dataset's shape and see that it has the wanted number of dimensions.
@@ -380,10 +394,64 @@ contains
 
       call self%open_object(path, dataset, error)
       if (allocated(error)) return
-      call get_reals(dataset, buffer, status)
-      call self%checked(status, 'the dataset cannot be read', path, error)
+      call check_sources(self, path, dataset, error)
+      if (.not. allocated(error)) then
+         call get_reals(dataset, buffer, status)
+         call self%checked(status, 'the dataset cannot be read', path, error)
+      end if
       call h5oclose_f(dataset, ignored)
    end subroutine load
+
+   !> See that nothing is missing of what a virtual dataset is put together from.
+   subroutine check_sources(self, path, dataset, error)
+      class(hdf5_file_type), intent(in) :: self
+      character(*), intent(in) :: path
+      integer(hid_t), intent(in) :: dataset
+      type(error_type), allocatable, intent(out) :: error
+      type(source_type), allocatable :: sources(:)
+      type(hdf5_file_type) :: file
+      type(error_type), allocatable :: closing
+      character(:), allocatable :: fault, name
+      logical :: complete
+      integer :: i
+
+      call list_sources(dataset, sources, complete)
+      fault = ''
+      if (.not. complete) fault = 'parts of it have no source'
+      do i = 1, size(sources)
+         if (fault /= '') exit
+         name = sources(i)%file
+         if (name == '.') cycle
+         if (index(name//sources(i)%dataset, '%') > 0) then
+            fault = 'its sources are named by a pattern, "'//name//'"'
+            exit
+         end if
+         if (name(1:1) /= '/' .and. file_exists(folder_of(self%path)//'/'//name)) &
+            name = folder_of(self%path)//'/'//name
+         call file%open(name, 'read', error)
+         if (allocated(error)) then
+            fault = 'its source "'//sources(i)%file//'" cannot be opened'
+         else if (.not. file%has_dataset(sources(i)%dataset)) then
+            fault = 'its source "'//sources(i)%file//'" has no dataset "'//sources(i)%dataset//'"'
+         end if
+         call file%close(closing)
+      end do
+      if (allocated(error)) deallocate (error)
+      if (fault /= '') call fail(error, error_file, self%path//': '//trim(path)// &
+         ': is a virtual dataset, and '//fault//': copy the values into a dataset of their own')
+   end subroutine check_sources
+
+   !> An error where memory for a dataset could not be had.
+   subroutine see_memory(self, path, extent, status, error)
+      class(hdf5_file_type), intent(in) :: self
+      character(*), intent(in) :: path
+      integer, intent(in) :: extent(:)
+      integer, intent(in) :: status         !! of the allocation
+      type(error_type), allocatable, intent(out) :: error
+
+      if (status /= 0) call fail(error, error_memory, self%path//': '//trim(path)// &
+         ': not enough memory: the values take '//memory_text(8.0_dp*product(real(extent, dp))))
+   end subroutine see_memory
 
    !> Read a single real.
    subroutine read_real_0(self, path, value, error)
@@ -406,11 +474,13 @@ contains
       character(*), intent(in) :: path
       real(dp), allocatable, intent(out), target :: values(:)
       type(error_type), allocatable, intent(out) :: error
-      integer :: extent(1)
+      integer :: extent(1), status
 
       call wanted_shape(self, path, 1, extent, error)
       if (allocated(error)) return
-      allocate (values(extent(1)))
+      allocate (values(extent(1)), stat=status)
+      call see_memory(self, path, extent, status, error)
+      if (allocated(error)) return
       if (size(values) > 0) call self%load(path, c_loc(values), error)
    end subroutine read_real_1
 
@@ -420,11 +490,13 @@ contains
       character(*), intent(in) :: path
       real(dp), allocatable, intent(out), target :: values(:, :)
       type(error_type), allocatable, intent(out) :: error
-      integer :: extent(2)
+      integer :: extent(2), status
 
       call wanted_shape(self, path, 2, extent, error)
       if (allocated(error)) return
-      allocate (values(extent(1), extent(2)))
+      allocate (values(extent(1), extent(2)), stat=status)
+      call see_memory(self, path, extent, status, error)
+      if (allocated(error)) return
       if (size(values) > 0) call self%load(path, c_loc(values), error)
    end subroutine read_real_2
 
@@ -434,23 +506,48 @@ contains
       character(*), intent(in) :: path
       real(dp), allocatable, intent(out), target :: values(:, :, :)
       type(error_type), allocatable, intent(out) :: error
-      integer :: extent(3)
+      integer :: extent(3), status
 
       call wanted_shape(self, path, 3, extent, error)
       if (allocated(error)) return
-      allocate (values(extent(1), extent(2), extent(3)))
+      allocate (values(extent(1), extent(2), extent(3)), stat=status)
+      call see_memory(self, path, extent, status, error)
+      if (allocated(error)) return
       if (size(values) > 0) call self%load(path, c_loc(values), error)
    end subroutine read_real_3
 
-   !> Read one field of a file, such as a height map.
-   subroutine read_field(path, dataset, field, error)
+   !> Read one field of a file that anyone may have written, such as a height map: first in a
+   !> process of its own, which may crash.
+   subroutine read_field(path, dataset, extent, field, error)
       character(*), intent(in) :: path      !! name of the file
       character(*), intent(in) :: dataset   !! '': 'surface/height', or else 'surface'
+      !> In: the wanted shape. Out: that of the dataset; the field is not read where it is another.
+      integer, intent(inout) :: extent(2)
       real(dp), allocatable, intent(out) :: field(:, :)  !! [nx, ny] from a dataset (ny, nx)
+      type(error_type), allocatable, intent(out) :: error
+      real(dp), parameter :: slowest = 2.0e6_dp          !! bytes/s from the slowest disk
+      type(trial_type) :: trial
+
+      call trial%start(60 + int(min(8.0_dp*product(real(extent, dp))/slowest, 1.0e6_dp)))
+      if (trial%is_copy) then
+         call load_field(path, dataset, extent, field, error)
+         call trial%leave()
+      end if
+      call trial%verdict(path, error)
+      if (.not. allocated(error)) call load_field(path, dataset, extent, field, error)
+   end subroutine read_field
+
+   !> The same without a trial.
+   subroutine load_field(path, dataset, extent, field, error)
+      character(*), intent(in) :: path
+      character(*), intent(in) :: dataset
+      integer, intent(inout) :: extent(2)
+      real(dp), allocatable, intent(out) :: field(:, :)
       type(error_type), allocatable, intent(out) :: error
       type(hdf5_file_type) :: file
       type(error_type), allocatable :: closing
       character(:), allocatable :: name
+      integer :: found(2)
 
       call file%open(path, 'read', error)
       if (allocated(error)) return
@@ -461,9 +558,11 @@ contains
             if (file%has_dataset('surface')) name = 'surface'
          end if
       end if
-      call file%read(name, field, error)
+      call wanted_shape(file, name, 2, found, error)
+      if (.not. allocated(error) .and. all(found == extent)) call file%read(name, field, error)
+      extent = found
       call file%close(closing)
-   end subroutine read_field
+   end subroutine load_field
 
    !> The datasets of a file, for messages.
    function listing(self) result(text)

@@ -195,7 +195,7 @@ contains
    !> Shape of a dataset in Fortran's order; of size 0 for a single value.
    subroutine shape_of_dataset(dataset, extent, status)
       integer(hid_t), intent(in) :: dataset
-      integer, allocatable, intent(out) :: extent(:)
+      integer(hsize_t), allocatable, intent(out) :: extent(:)
       integer, intent(out) :: status
       integer(hid_t) :: space
       integer(hsize_t) :: dims(32), most(32)
@@ -206,7 +206,7 @@ contains
       if (status >= 0) call h5sget_simple_extent_ndims_f(space, rank, status)
       if (status >= 0 .and. rank > 0) then
          call h5sget_simple_extent_dims_f(space, dims(:rank), most(:rank), status)
-         if (status >= 0) extent = int(dims(:rank))
+         if (status >= 0) extent = dims(:rank)
       end if
       if (status >= 0) call h5sclose_f(space, ignored)
    end subroutine shape_of_dataset

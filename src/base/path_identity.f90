@@ -4,7 +4,7 @@ module path_identity
    implicit none
    private
 
-   public :: same_file
+   public :: real_path, same_file
 
    integer, parameter :: longest_path = 4096      !! PATH_MAX of Linux; macOS has less
 
@@ -30,6 +30,14 @@ contains
       call resolve(trim(second), b)
       same_file = a == b
    end function same_file
+
+   !> The path without links and dots, or as it is where there is no such file.
+   function real_path(path) result(resolved)
+      character(*), intent(in) :: path
+      character(:), allocatable :: resolved
+
+      call resolve(trim(path), resolved)
+   end function real_path
 
    !> The path without links and dots, or as it is where there is no such file.
    subroutine resolve(path, resolved)

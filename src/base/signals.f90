@@ -1,18 +1,22 @@
 !> Signals as flags that a run looks at between its steps.
 !>
-!> SIGINT and SIGTERM ask a run to stop after the step in hand, SIGUSR1 for a checkpoint; SIGXFSZ (a
-!> file larger than allowed) is ignored, so that the write that met it fails and says so.
+!> SIGINT, SIGTERM, SIGHUP (the terminal is gone) and SIGXCPU (the batch system's limit is near) ask
+!> a run to stop after the step in hand; SIGUSR1 asks for a checkpoint. SIGXFSZ (a file larger than
+!> allowed) is ignored, so that the write that met it fails and says so.
 module signals
    use, intrinsic :: iso_c_binding, only : c_funloc, c_funptr, c_int, c_intptr_t
    implicit none
    private
 
-   public :: catch_signals, checkpoint_asked, forget_checkpoint, stop_signal
+   public :: catch_signals, checkpoint_asked, forget_checkpoint, stop_signal, stop_signal_name
 
-   integer(c_int), parameter, public :: signal_interrupt = 2     !! SIGINT
-   integer(c_int), parameter, public :: signal_terminate = 15    !! SIGTERM
-   integer(c_int), parameter :: signal_file_size = 25            !! SIGXFSZ
-   integer(c_int), parameter :: signal_user = 10                 !! SIGUSR1
+   integer(c_int), parameter :: signal_hang_up = 1        !! SIGHUP
+   integer(c_int), parameter :: signal_interrupt = 2      !! SIGINT
+   integer(c_int), parameter :: signal_user = 10          !! SIGUSR1
+   integer(c_int), parameter :: signal_terminate = 15     !! SIGTERM
+   integer(c_int), parameter :: signal_time = 24          !! SIGXCPU
+   integer(c_int), parameter :: signal_file_size = 25     !! SIGXFSZ
+   integer(c_intptr_t), parameter :: ignored = 1          !! SIG_IGN
 
    integer(c_int), volatile :: caught = 0
    logical, volatile :: asked = .false.
@@ -27,14 +31,18 @@ module signals
 
 contains
 
-   !> Catch the signals from here on.
+   !> Catch the signals from here on. A SIGHUP that is ignored at the start stays ignored, as nohup
+   !> wants it.
    subroutine catch_signals()
       type(c_funptr) :: before, ignore
 
       before = c_signal(signal_interrupt, c_funloc(note_stop))
       before = c_signal(signal_terminate, c_funloc(note_stop))
+      before = c_signal(signal_time, c_funloc(note_stop))
+      before = c_signal(signal_hang_up, c_funloc(note_stop))
+      if (transfer(before, 0_c_intptr_t) == ignored) before = c_signal(signal_hang_up, before)
       before = c_signal(signal_user, c_funloc(note_checkpoint))
-      ignore = transfer(1_c_intptr_t, ignore)
+      ignore = transfer(ignored, ignore)
       before = c_signal(signal_file_size, ignore)
    end subroutine catch_signals
 
@@ -44,6 +52,22 @@ contains
 
       number = caught
    end function stop_signal
+
+   !> Its name.
+   function stop_signal_name() result(name)
+      character(:), allocatable :: name
+
+      select case (caught)
+      case (signal_hang_up)
+         name = 'SIGHUP'
+      case (signal_interrupt)
+         name = 'SIGINT'
+      case (signal_time)
+         name = 'SIGXCPU'
+      case default
+         name = 'SIGTERM'
+      end select
+   end function stop_signal_name
 
    !> Has a checkpoint been asked for?
    function checkpoint_asked() result(yes)
@@ -57,7 +81,7 @@ contains
       asked = .false.
    end subroutine forget_checkpoint
 
-   !> Handler of SIGINT and SIGTERM.
+   !> Handler of the signals that ask to stop.
    subroutine note_stop(number) bind(c)
       integer(c_int), value :: number
 

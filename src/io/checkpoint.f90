@@ -16,6 +16,7 @@ module checkpoint
    use file_system, only : file_exists, remove_file, rename_file, sync_file
    use hdf5_file, only : hdf5_file_type
    use precision, only : dp, int64, int8
+   use result_names, only : sibling_path
    use state_table, only : state_piece_type, state_table_type
    use text_tools, only : to_text
    implicit none
@@ -58,13 +59,8 @@ contains
    pure function checkpoint_path(result_path) result(path)
       character(*), intent(in) :: result_path
       character(:), allocatable :: path
-      integer :: length
 
-      length = len_trim(result_path)
-      if (length > 3) then
-         if (result_path(length - 2:length) == '.h5') length = length - 3
-      end if
-      path = result_path(:length)//'.checkpoint.h5'
+      path = sibling_path(result_path, '.checkpoint.h5')
    end function checkpoint_path
 
    !> Remove a result's checkpoint, and what a killed run left of an unfinished one.

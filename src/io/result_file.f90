@@ -5,11 +5,13 @@
 !> A snapshot appears whole (see `hdf5_tree`), and then in the XDMF file beside the result.
 module result_file
    use errors, only : error_file, error_input, error_type, fail
-   use file_system, only : folder_of, is_folder, name_of, remove_file, rename_file
+   use file_system, only : name_of, remove_file, rename_file
    use hdf5_file, only : hdf5_file_type
    use history_row, only : column_count, column_type, history_columns, history_row_type, row_values
    use precision, only : dp, int8
    use random_id, only : new_id
+   use result_names, only : sibling_path
+   use result_target, only : check_place
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use utc_clock, only : utc_time
    use version, only : asperity_version
@@ -17,7 +19,7 @@ module result_file
    implicit none
    private
 
-   public :: result_file_type, sibling_path
+   public :: result_file_type
 
    character(*), parameter :: stop_mark = 'at_stop'   !! attribute of a snapshot that a stop wrote
 
@@ -79,20 +81,6 @@ module result_file
 
 contains
 
-   !> Name of a file that belongs to a result: FILE without '.h5', with another ending.
-   pure function sibling_path(path, ending) result(sibling)
-      character(*), intent(in) :: path      !! name of the result
-      character(*), intent(in) :: ending    !! such as '.xdmf'
-      character(:), allocatable :: sibling
-      integer :: length
-
-      length = len_trim(path)
-      if (length > 3) then
-         if (path(length - 2:length) == '.h5') length = length - 3
-      end if
-      sibling = path(:length)//ending
-   end function sibling_path
-
    !> Start a result; one of the same name is replaced, and its checkpoint removed.
    subroutine create_result(self, path, title, input, settings, grid, height, expected_rows, &
       expected_snapshots, compression, error)
@@ -120,15 +108,8 @@ contains
       if (allocated(self%snapshots)) deallocate (self%snapshots)
       allocate (self%snapshots(0))
 
-      if (is_folder(self%path)) then
-         call fail(error, error_file, self%path//': is a folder, not a file')
-         return
-      end if
-      if (.not. is_folder(folder_of(self%path))) then
-         call fail(error, error_file, self%path//': cannot be written: there is no folder "'// &
-            folder_of(self%path)//'"')
-         return
-      end if
+      call check_place(self%path, error)
+      if (allocated(error)) return
       temporary = self%path//'.new'
       ! The group that grows is made first, in pages of its own.
       call self%file%open(temporary, 'create', error, alignment=4096)

@@ -12,6 +12,7 @@ module case_input
    use input_values, only : default_group, read_groups
    use path_identity, only : same_file
    use precision, only : dp
+   use result_names, only : side_file, side_files
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use surface_warnings, only : find_warnings, warning_length
    use text_tools, only : to_text
@@ -376,20 +377,35 @@ contains
       case%output = output
    end subroutine resolve_output
 
-   !> What the result would be written over: the input, a height map, or '' for neither.
+   !> What the result, or a file that is written beside it, would be written over: the input, a
+   !> height map, or '' for neither.
    function overwritten_file(case) result(what)
       type(case_type), intent(in) :: case
+      character(:), allocatable :: what
+      integer :: n
+
+      what = ''
+      if (case%output%file == '') return
+      what = used_file(case, trim(case%output%file))
+      do n = 1, side_files
+         if (what == '') what = used_file(case, side_file(case%output%file, n))
+      end do
+   end function overwritten_file
+
+   !> What a case reads from a file of this name: the input, a height map, or '' for nothing.
+   function used_file(case, name) result(what)
+      type(case_type), intent(in) :: case
+      character(*), intent(in) :: name
       character(:), allocatable :: what
       integer :: i
 
       what = ''
-      if (case%output%file == '') return
-      if (same_file(case%output%file, case%path)) what = 'the input'
+      if (same_file(name, case%path)) what = 'the input'
       do i = 1, size(case%surfaces)
          if (case%surfaces(i)%file == '') cycle
-         if (same_file(case%output%file, case%surfaces(i)%file)) what = 'the height map of a &surface'
+         if (same_file(name, case%surfaces(i)%file)) what = 'the height map of a &surface'
       end do
-   end function overwritten_file
+   end function used_file
 
    !> Is this a field of friction?
    elemental logical function is_tangential(field)

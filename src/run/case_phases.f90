@@ -17,6 +17,7 @@ module case_phases
    public :: resolve_phases
 
    real(dp), parameter :: most_steps = 1.0e9_dp
+   real(dp), parameter :: most_rows = 2.0e9_dp                  !! of all phases: below 2^31
    character(*), parameter :: one_cell = 'for one cell a step'   !! where a step comes from
    character(*), parameter :: loads(3) = [character(12) :: 'pressure', 'force', 'displacement']
 
@@ -31,8 +32,10 @@ contains
       type(phase_settings_type), allocatable, intent(out) :: phases(:)
       type(faults_type), intent(inout) :: faults
       character(:), allocatable, intent(inout) :: warnings    !! a line each
+      real(dp) :: rows
       integer :: i
 
+      rows = 0.0_dp
       allocate (phases(size(groups)))
       do i = 1, size(groups)
          associate (group => groups(i), phase => phases(i))
@@ -57,6 +60,10 @@ contains
             if (phase%steady) call check_steady(group, phase, grid, material, adhesive, faults)
             call resolve_steps(group, phase, grid, material, faults)
             call warn_of_steps(i, phase, grid, material, warnings)
+            rows = rows + phase%steps + 1.0_dp
+            if (rows > most_rows .and. rows - phase%steps - 1.0_dp <= most_rows) &
+               call group%group_fault('the phases up to this one have '//to_text(rows)// &
+               ' rows: at most 2e9 are allowed', faults)
          end associate
       end do
    end subroutine resolve_phases

@@ -3,6 +3,7 @@ module case_report
    use adhesion_advice, only : adhesion_notes
    use case_settings, only : case_type, phase_settings_type
    use case_time, only : duration_text, seconds_needed
+   use memory_limits, only : memory_limit, memory_text
    use precision, only : dp
    use regular_grid, only : boundary_free
    use text_tools, only : exact_text, to_text
@@ -50,8 +51,10 @@ contains
       type(case_type), intent(in) :: case
       character(:), allocatable :: text
       character(:), allocatable :: unit
-      real(dp) :: memory
+      character(:), allocatable :: whose
+      real(dp) :: limit, memory
 
+      limit = memory_limit(whose)
       memory = memory_needed(case)/1.0e6_dp
       unit = ' MB'
       if (memory >= 1.0e3_dp) then
@@ -64,6 +67,8 @@ contains
          counted(sum(case%phases%steps, mask=.not. case%phases%static), 'time step')//' in '// &
          to_text(sum(case%phases%duration))//' s'//nl
       text = text//'! memory: about '//to_text(real(nint(memory*10.0_dp), dp)/10.0_dp)//unit//nl
+      if (memory_needed(case) > limit) text = text//'! warning: '//whose//' '//memory_text(limit)// &
+         ' of memory: the run needs more'//nl
       text = text//'! time: '//duration_text(seconds_needed(case))//' here, within a factor of three or so'//nl
       text = text//marked('! ', adhesion_notes(case))//marked('! warning: ', case%warnings)
    end function case_summary

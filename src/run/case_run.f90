@@ -3,16 +3,23 @@
 !> The program and the Python package drive it alike: `open`, `step` until `finished`, `close`. A stop
 !> between two steps writes a checkpoint; a failing solver keeps all there is in the result.
 module case_run
+   use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use case_identity, only : identity_of
-   use case_report, only : resolved_input
+   use case_report, only : memory_needed, resolved_input
    use case_settings, only : case_type
    use checkpoint, only : checkpoint_path, checkpoint_reader_type, checkpoint_writer_type, &
       remove_checkpoint
    use checksum, only : hexadecimal
    use errors, only : error_convergence, error_input, error_type, fail
+   use file_lock, only : file_lock_type
+   use history_row, only : row_values
+   use memory_limits, only : need_memory
    use parallel, only : set_threads
+   use path_identity, only : real_path
    use precision, only : dp, int64, int8
    use result_file, only : result_file_type
+   use result_names, only : sibling_path
+   use result_target, only : check_place, check_replaced, damage_of_result
    use schedule, only : count_rows
    use steady_losses, only : longest_wave
    use simulation, only : new_simulation, simulation_type
@@ -31,6 +38,7 @@ module case_run
       character(:), allocatable :: warnings        !! new ones, a line each; the caller clears them
       character(:), allocatable, private :: told   !! all of them
       type(result_file_type), private :: result
+      type(file_lock_type), private :: lock        !! no other run writes this result meanwhile
       character(:), allocatable, private :: path   !! of the result
       character(:), allocatable, private :: settings   !! every resolved setting, one per line
       character(:), allocatable, private :: identity   !! what must agree for a restart
@@ -48,10 +56,11 @@ module case_run
 contains
 
    !> Prepare a run and its result, or take an interrupted one up again.
-   subroutine open_run(self, case, restart, error)
+   subroutine open_run(self, case, restart, overwrite, error)
       class(run_type), intent(inout) :: self
       type(case_type), intent(in) :: case
       logical, intent(in) :: restart               !! go on from the checkpoint of the result
+      logical, intent(in) :: overwrite             !! replace an unfinished run and its checkpoint
       type(error_type), allocatable, intent(out) :: error
 
       call set_threads(case%solver%threads)
@@ -63,6 +72,10 @@ contains
       self%next_time = 1
       self%last_snapshot = -1
       call system_clock(self%saved_at)
+      call take_place(self, restart, overwrite, error)
+      if (allocated(error)) return
+      call need_memory(memory_needed(case), 'the run', error)
+      if (allocated(error)) return
       call new_simulation(self%sim, case, error)
       if (allocated(error)) return
       self%settings = resolved_input(self%sim%case)
@@ -74,6 +87,27 @@ contains
       end if
       call collect_warnings(self)
    end subroutine open_run
+
+   !> See that the result can be written where the case wants it, that no other run writes it, and
+   !> that nothing is lost by it.
+   subroutine take_place(self, restart, overwrite, error)
+      type(run_type), intent(inout) :: self
+      logical, intent(in) :: restart, overwrite
+      type(error_type), allocatable, intent(out) :: error
+      logical :: exists
+
+      call check_place(self%path, error)
+      if (allocated(error)) return
+      ! A link to a result has the lock of the result.
+      call self%lock%acquire(sibling_path(real_path(self%path), '.lock'), self%path, error)
+      if (allocated(error)) return
+      if (restart) then
+         inquire (file=self%path, exist=exists)
+         if (exists) call damage_of_result(self%path, error)
+      else if (.not. overwrite) then
+         call check_replaced(self%path, error)
+      end if
+   end subroutine take_place
 
    !> A new result with all that is known before the first row.
    subroutine create_result(self, error)
@@ -214,6 +248,10 @@ contains
 
       call self%sim%advance(error)
       if (allocated(error)) return
+      if (.not. all(ieee_is_finite(row_values(self%sim%row)))) then
+         self%sim%converged = .false.
+         self%sim%reason = 'a value is not a finite number'
+      end if
       self%finished = self%sim%finished
       call collect_warnings(self)
       call self%result%append_row(self%sim%row, error)
@@ -351,9 +389,12 @@ contains
       if (self%sim%row%step > self%last_snapshot .and. self%sim%schedule%row >= 0) &
          call write_snapshot(self, error, at_stop=.true.)
       if (allocated(error)) return
+      if (self%sim%schedule%row < 0) then
+         call leave_word(self, 'stopped before the first row', error)
+         return
+      end if
       call leave_word(self, 'stopped after step '//to_text(self%sim%row%step), error)
-      if (allocated(error)) return
-      if (self%sim%schedule%row >= 0) call self%save(error)
+      if (.not. allocated(error)) call self%save(error)
    end subroutine interrupt_run
 
    !> Close the result and free everything.
@@ -363,6 +404,7 @@ contains
 
       call self%result%close(error)
       call self%sim%destroy()
+      call self%lock%release()
    end subroutine close_run
 
    !> New warnings of the simulation, for the caller.

@@ -8,6 +8,7 @@ module result_summary
    use errors, only : error_type
    use hdf5_file, only : hdf5_file_type
    use precision, only : dp
+   use result_target, only : damage_of_result
    use text_tools, only : ordinary, to_text
    implicit none
    private
@@ -27,6 +28,8 @@ contains
       type(error_type), allocatable :: ignored
 
       text = ''
+      call damage_of_result(path, error)
+      if (allocated(error)) return
       call file%open(path, 'read', error)
       if (allocated(error)) return
       call describe(file, path, text, error)

@@ -12,11 +12,13 @@
 !>
 !> Sums are gathered by rows, so that the number of threads changes no bit.
 module roughness
+   use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use errors, only : error_input, error_type, fail
    use precision, only : dp, pi
    use real_transform, only : destroy_real_transform, new_real_transform, real_transform_type, &
       to_spectrum
    use regular_grid, only : boundary_periodic, grid_type
+   use text_tools, only : to_text
    use wave_vectors, only : is_nyquist, wave_number
    implicit none
    private
@@ -112,12 +114,17 @@ contains
       real(dp), allocatable :: k_sum(:), power_sum(:)
       integer, allocatable :: counted(:)
 
-      call transformed(grid, height, 0.0_dp, transform, error)
-      if (allocated(error)) return
       width = 2.0_dp*pi/grid%lx
       if (grid%ny > 1) width = max(width, 2.0_dp*pi/grid%ly)
       k = pi/grid%dx
       if (grid%ny > 1) k = hypot(k, pi/grid%dy)
+      if (.not. ieee_is_finite(k) .or. .not. width > 0.0_dp) then
+         call fail(error, error_input, 'roughness: the wave numbers of a map of '//to_text(grid%lx)// &
+            ' m by '//to_text(grid%ly)//' m cannot be represented')
+         return
+      end if
+      call transformed(grid, height, 0.0_dp, transform, error)
+      if (allocated(error)) return
       rings = nint(k/width) + 1
       allocate (k_sum(0:rings), power_sum(0:rings), source=0.0_dp)
       allocate (counted(0:rings), source=0)

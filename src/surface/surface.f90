@@ -229,16 +229,17 @@ contains
       real(dp), allocatable, intent(out) :: map(:, :)         !! as in the file, not scaled
       type(error_type), allocatable, intent(out) :: error
       character(160) :: text
-      integer :: faulty, i, j
+      integer :: extent(2), faulty, i, j
 
-      call read_field(trim(term%file), trim(term%dataset), map, error)
+      extent = [grid%nx, grid%ny]
+      call read_field(trim(term%file), trim(term%dataset), extent, map, error)
       if (allocated(error)) then
          error%message = map_fault(term, error%message)
          return
       end if
-      if (size(map, 1) /= grid%nx .or. size(map, 2) /= grid%ny) then
-         write (text, '(4(a, i0), a)') 'the height map has the shape (', size(map, 2), ', ', &
-            size(map, 1), '): must be (ny, nx) = (', grid%ny, ', ', grid%nx, ')'
+      if (any(extent /= [grid%nx, grid%ny])) then
+         write (text, '(4(a, i0), a)') 'the height map has the shape (', extent(2), ', ', &
+            extent(1), '): must be (ny, nx) = (', grid%ny, ', ', grid%nx, ')'
          call fail(error, error_input, map_fault(term, trim(text)))
          return
       end if

@@ -35,5 +35,6 @@ def raise_for_status(status: int, message: bytes | str) -> None:
     if status == 0:
         return
     text = (message.decode(errors="replace") if isinstance(message, bytes) else message).strip()
-    kinds: dict[int, type[Exception]] = {2: ValueError, 3: OSError, 4: NotConverged}
+    kinds: dict[int, type[Exception]] = {2: ValueError, 3: OSError, 4: NotConverged,
+                                         5: MemoryError}
     raise kinds.get(status, RuntimeError)(text)

@@ -26,6 +26,21 @@ __all__ = ["bare", "call", "check_depth", "contact_map", "flag_of_boundary", "he
 _lock = threading.Lock()
 
 
+def _before_fork() -> None:
+    """Wait for the call in hand and end idle threads.
+
+    A copy of the process has only the thread that made it. Its calls would wait for ever for the
+    other threads of OpenMP, or for a lock that another thread held.
+    """
+    _lock.acquire()
+    asperity_flat.release_idle_threads()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(before=_before_fork, after_in_parent=_lock.release,
+                        after_in_child=_lock.release)
+
+
 def call(name: str) -> Callable[..., tuple[Any, ...]]:
     """Return a routine of the library that raises instead of returning a status.
 
@@ -66,7 +81,8 @@ def set_threads(number: int = 0) -> int:
     Parameters
     ----------
     number : int
-        Number of threads; 0 takes all processors.
+        Number of threads; 0 takes what the environment variables OMP_NUM_THREADS or
+        SLURM_CPUS_PER_TASK say, or else all processors.
 
     Returns
     -------

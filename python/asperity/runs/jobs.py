@@ -6,6 +6,7 @@ each with a checkpoint.
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import tempfile
@@ -16,13 +17,15 @@ from pathlib import Path
 from types import FrameType
 from typing import IO, Any
 
-from ..base.library import version
+from ..base.library import call, version
 from ..results import Run, open_result
 from . import namelists
 from .case import Case
 from .progress import Progress
 
 __all__ = ["Job", "Stops", "found_result", "is_done", "run_here", "text_of", "write_input"]
+
+_map_checksum = call("map_checksum")
 
 _POLL = 0.02            # s between two looks at the processes
 _ECHO = 0.3             # s within which a signal to us and to our group is one
@@ -59,7 +62,26 @@ def found_result(job: Job) -> Run | None:
         run = open_result(job.path)
     except OSError:
         return None
-    return run if run.input == text_of(job) else None
+    return run if run.input == text_of(job) and _has_the_same_maps(run, job) else None
+
+
+def _has_the_same_maps(run: Run, job: Job) -> bool:
+    """Return whether the height maps that are files hold what the result was computed with."""
+    assert job.case is not None
+    case = job.case.copy()
+    case._follow(job.path.parent)
+    found = []
+    for term in case.surface:
+        if str(term.shape or "").lower() != "file":
+            continue
+        path, dataset = job.path.parent / str(term.file), str(term.dataset or " ")
+        try:
+            (checksum,) = _map_checksum(os.fsencode(path), namelists.encode(dataset),
+                                        run.grid.nx, run.grid.ny)
+        except (OSError, ValueError):
+            return False
+        found.append(checksum.decode())
+    return " ".join(found) == run.attributes.get("height_maps", "")
 
 
 def text_of(job: Job) -> str:
@@ -163,14 +185,12 @@ class Stops:
 def _start(job: Job, command: str, threads: int, restart: bool) -> None:
     """Write the input and start the program, in a session of its own: Ctrl-C is passed on by us."""
     path = write_input(job)
-    if not restart:
-        job.path.unlink(missing_ok=True)  # the program replaces no result that is unfinished
     job.restarted = restart
     job.started = time.monotonic()
     job.process = None
     job.output = tempfile.TemporaryFile()  # noqa: SIM115 - closed where the process ends
     words = [command, "run", path.name, "--output", job.path.name, "--threads", str(threads),
-             "--quiet"] + ["--restart"] * restart
+             "--quiet", "--restart" if restart else "--overwrite"]
     job.process = subprocess.Popen(words, cwd=path.parent, stdin=subprocess.DEVNULL,
                                    stdout=subprocess.DEVNULL, stderr=job.output,
                                    start_new_session=True)

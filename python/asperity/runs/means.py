@@ -121,12 +121,10 @@ def run_file(path: str, threads: int, restart: bool) -> tuple[int, str]:
     result = file.with_suffix(".h5")
     words = [program(), "run", file.name, "--output", result.name, "--threads", str(threads),
              "--quiet"]
-    for more in ([["--restart"]] if restart else []) + [[]]:
-        if not more:
-            result.unlink(missing_ok=True)
-        done = subprocess.run([*words, *more], cwd=file.parent, stdin=subprocess.DEVNULL,
+    for more in ["--restart", "--overwrite"] if restart else ["--overwrite"]:
+        done = subprocess.run([*words, more], cwd=file.parent, stdin=subprocess.DEVNULL,
                               capture_output=True, start_new_session=True, check=False)
-        if not more or done.returncode not in (2, 3):
+        if done.returncode not in (2, 3):
             break
     return done.returncode, done.stderr.decode(errors="replace").strip()
 
@@ -175,10 +173,12 @@ _SCRIPT = """#!/bin/sh
 cd {folder} || exit 1
 name=$(sed -n "$((SLURM_ARRAY_TASK_ID + 1))p" {names})
 if [ -f "$name.h5" ]; then
-  {program} run "$name.nml" --output "$name.h5" --threads {threads} --quiet --restart && exit 0
-  rm -f "$name.h5"
+  {program} run "$name.nml" --output "$name.h5" --threads {threads} --quiet --restart
+  status=$?
+  # 2 and 3: there is no checkpoint that fits; the case is run from its start.
+  [ $status = 2 ] || [ $status = 3 ] || exit $status
 fi
-{program} run "$name.nml" --output "$name.h5" --threads {threads} --quiet
+{program} run "$name.nml" --output "$name.h5" --threads {threads} --quiet --overwrite
 """
 
 

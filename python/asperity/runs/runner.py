@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
+import threading
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from types import FrameType
 from typing import Any, Protocol
 
 from ..base import library
@@ -42,13 +45,16 @@ def run(
     output: str | os.PathLike[str] | None = None,
     threads: int | None = None,
     restart: bool = False,
+    overwrite: bool = False,
     quiet: bool = True,
     callback: Callable[[Row, RunView], Any] | None = None,
 ) -> Run:
     """Run a case in this process, as the command ``asperity run`` does, and open its result.
 
     Ctrl-C finishes the step in hand, writes a checkpoint and raises KeyboardInterrupt;
-    ``restart=True`` goes on from there to the same numbers.
+    ``restart=True`` goes on from there to the same numbers. SIGTERM, SIGHUP and SIGXCPU do the same
+    in the main thread, unless the script handles them itself, and then end the process as they
+    would have without the run.
 
     Parameters
     ----------
@@ -62,6 +68,8 @@ def run(
         Number of threads; what the case says if left out.
     restart : bool
         Go on from the checkpoint of an interrupted run.
+    overwrite : bool
+        Replace an unfinished run and its checkpoint, which is refused otherwise.
     quiet : bool
         Do not tell the progress on stderr.
     callback : callable, optional
@@ -80,7 +88,10 @@ def run(
     ValueError
         If the input is wrong; all faults are named.
     OSError
-        If a file cannot be read or written.
+        If a file cannot be read or written, if another run is writing the result, or if the result
+        holds an unfinished run and neither `restart` nor `overwrite` is given.
+    MemoryError
+        If the case needs more memory than there is.
     NotConverged
         If a solver fails; its ``result`` is the opened result, with all steps up to that one.
 
@@ -102,23 +113,25 @@ def run(
         case = case.kept_in((Path(output) if output else case.result).parent)
     path, text = namelists.source(case)
     handle, rows, first, result, told = _open(os.fsencode(path), namelists.encode(text), target,
-                                              threads or 0, int(restart))
+                                              threads or 0, int(restart), int(overwrite))
     failure: NotConverged | None = None
     view: RunView | None = None
+    stops = _Stops()
     try:
         _warn(told)
         finished = first >= rows
-        while not finished:
+        while not finished and not stops.asked:
             finished, step, time, area, friction, told = _step(handle)
             _warn(told)
             if callback is not None:
                 view = view or RunView(handle, rows, _shape(result))
                 if callback(view.row, view) is False and not finished:
-                    _interrupt(handle)
                     break
             if not quiet:
                 print(f"step {step} of {rows - 1}, t = {time:.6g} s, contact area {area:.4g},"
                       f" friction {friction:.4g}", file=sys.stderr)
+        if not finished:
+            _interrupt(handle)
     except KeyboardInterrupt:
         _interrupt(handle)
         raise
@@ -126,6 +139,7 @@ def run(
         failure = error
     finally:
         _close(handle)
+        stops.end()
     opened = Run(os.fsdecode(result.rstrip()))
     if failure is not None:
         raise NotConverged(str(failure), opened) from None
@@ -136,6 +150,34 @@ def _shape(result: bytes) -> tuple[int, int]:
     """Return the shape of the fields of a result."""
     grid = Run(os.fsdecode(result.rstrip())).grid
     return grid.ny, grid.nx
+
+
+class _Stops:
+    """Signals that ask to stop, as a number to look at between two steps.
+
+    Only those whose action is still that of the system are taken: a script that handles them itself
+    keeps its handlers. `end` puts the system's action back and lets a signal that came take it.
+    """
+
+    def __init__(self) -> None:
+        self.asked = 0
+        self._taken: list[int] = []
+        if threading.current_thread() is not threading.main_thread():
+            return
+        for name in ("SIGTERM", "SIGHUP", "SIGXCPU"):
+            number = getattr(signal, name, None)
+            if number is not None and signal.getsignal(number) == signal.SIG_DFL:
+                signal.signal(number, self._note)
+                self._taken.append(number)
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        self.asked = number
+
+    def end(self) -> None:
+        for number in self._taken:
+            signal.signal(number, signal.SIG_DFL)
+        if self.asked:
+            signal.raise_signal(self.asked)
 
 
 def _warn(told: bytes) -> None:

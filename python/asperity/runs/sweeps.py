@@ -51,7 +51,8 @@ def sweep(
     Each case is a process of the program. Its input and its result lie in `folder` under a name
     made of the values: ``velocity_x=0.1.nml`` and ``velocity_x=0.1.h5``; ``sweep.json`` lists them.
     A sweep that was stopped goes on where it was: finished results of the same input and version
-    are kept, others are taken up from their checkpoint or run anew. More values can be added later.
+    are kept, unless the contents of a height map have changed; others are taken up from their
+    checkpoint or run again. More values can be added later.
 
     Parameters
     ----------

@@ -1,0 +1,175 @@
+"""Files that are damaged, crafted or changed meanwhile: an error in words, never a crash."""
+
+from __future__ import annotations
+
+import random
+import subprocess
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import viscoelastic_case as vc
+
+import asperity
+
+ELASTIC = """
+&grid nx = 12, ny = 16, lx = 1 /
+&surface shape = 'file', file = 'map.h5' /
+&material shear_modulus = 1e6 /
+&phase pressure = 1e3 /
+"""
+
+
+@pytest.fixture
+def case(tmp_path: Path) -> Path:
+    """Return the input of a static contact with a map from a file, which is not there yet."""
+    path = tmp_path / "y.nml"
+    path.write_text(ELASTIC)
+    return path
+
+
+def call(program: str, *words: str | Path) -> subprocess.CompletedProcess[str]:
+    """Run the program."""
+    return subprocess.run([program, *map(str, words)], capture_output=True, text=True,
+                          errors="replace", timeout=120, check=False)
+
+
+def test_declared_size_beyond_32_bits(program: str, case: Path, tmp_path: Path) -> None:
+    """A map whose declared size is that of the grid modulo 2^32 is not taken for one that fits."""
+    for shape in ((16, 2**32 + 12), (2**32 + 16, 12), (2**32 + 16, 2**32 + 12)):
+        with h5py.File(tmp_path / "map.h5", "w") as file:
+            file.create_dataset("surface/height", shape, dtype="f8", chunks=(16, 12))
+        for verb in ("check", "run"):
+            done = call(program, verb, case)
+            assert done.returncode == 2, done.stderr
+            assert f"{max(shape)} values along one side" in done.stderr
+
+
+def test_virtual_map_without_its_source(program: str, case: Path, tmp_path: Path) -> None:
+    """A virtual dataset reads as zeros where its source is missing: that is no flat road."""
+    heights = np.random.default_rng(2).standard_normal((16, 12)) * 1e-4
+    (tmp_path / "part").mkdir()
+
+    def write_source(name: str, dataset: str = "heights") -> None:
+        with h5py.File(tmp_path / "part" / name, "w") as file:
+            file[dataset] = heights[:8]
+
+    def write_map(rows: int) -> None:
+        layout = h5py.VirtualLayout((16, 12), "f8")
+        for k, name in enumerate(("a.h5", "b.h5")):
+            layout[8 * k:8 * k + rows] = h5py.VirtualSource(
+                f"part/{name}", "heights", (8, 12))[:rows]
+        with h5py.File(tmp_path / "map.h5", "w") as file:
+            file.create_virtual_dataset("surface/height", layout)
+
+    write_map(8)
+    for name in ("a.h5", "b.h5"):
+        write_source(name)
+    done = call(program, "run", case)
+    assert done.returncode == 0, done.stderr
+    np.testing.assert_array_equal(asperity.open(tmp_path / "y.h5").height[8:], heights[:8])
+    write_source("b.h5", "other")
+    done = call(program, "run", case)
+    assert done.returncode == 3 and 'has no dataset "heights"' in done.stderr, done.stderr
+    (tmp_path / "part" / "b.h5").unlink()
+    done = call(program, "run", case)
+    assert done.returncode == 3 and 'its source "part/b.h5" cannot be opened' in done.stderr
+    write_source("b.h5")
+    write_map(7)
+    done = call(program, "run", case)
+    assert done.returncode == 3 and "parts of it have no source" in done.stderr, done.stderr
+
+
+def test_dangling_links_are_named(program: str, case: Path, tmp_path: Path) -> None:
+    """The list of what a file holds has whole names where links lead nowhere."""
+    with h5py.File(tmp_path / "map.h5", "w") as file:
+        file["group/gone"] = h5py.SoftLink("/nowhere")
+        file["group/far"] = h5py.ExternalLink("missing.h5", "/x")
+        file["group/there"] = np.zeros(3)
+    done = call(program, "check", case)
+    assert done.returncode == 3
+    assert "there are: group/far, group/gone, group/there" in done.stderr
+    assert done.stderr.isprintable() or done.stderr.replace("\n", "").isprintable()
+
+
+def test_too_many_rows(program: str, tmp_path: Path) -> None:
+    """Numbers of rows beyond 32 bits are an error, not negative."""
+    case = tmp_path / "y.nml"
+    phase = "&phase pressure = 1e3, duration = 1, steps = 900000000 /\n"
+    case.write_text("&grid nx = 8, ny = 8, lx = 1 /\n&surface shape = 'flat' /\n"
+                    "&material shear_modulus = 1e6 /\n" + 3 * phase)
+    done = call(program, "check", case)
+    assert done.returncode == 2, done.stdout
+    assert "rows: at most 2e9 are allowed" in done.stderr
+    case.write_text(case.read_text().replace(3 * phase, 2 * phase))
+    done = call(program, "check", case)
+    assert done.returncode == 0
+    assert "1800000000 time steps" in done.stdout
+
+
+def test_spectrum_of_a_tiny_map() -> None:
+    """Lengths whose wave numbers overflow are an error."""
+    with pytest.raises(ValueError, match="cannot be represented"):
+        asperity.surface.psd(np.ones((8, 8)), 1e-308, 1.0)
+
+
+def test_overflow_is_no_success(program: str, tmp_path: Path) -> None:
+    """Numbers that overflow in a run end it with status 4."""
+    case = tmp_path / "y.nml"
+    case.write_text(
+        "&grid nx = 16, ny = 16, lx = 1e150 /\n"
+        "&surface shape = 'sine', amplitude = 1e149, wavelength = 1e150 /\n"
+        "&material shear_modulus = 1e200, prony_g = 1e200, prony_tau = 1 /\n"
+        "&phase pressure = 1e200, duration = 1, steps = 3 /\n")
+    done = call(program, "run", case)
+    assert done.returncode in (2, 4), (done.returncode, done.stderr)
+    if done.returncode == 4:
+        assert not asperity.open(tmp_path / "y.h5").finished
+
+
+def test_damaged_results(program: str, tmp_path: Path) -> None:
+    """Flipped bits and zeroed blocks in a result: `info` and a restart end with a status."""
+    case = tmp_path / "y.nml"
+    case.write_text(vc.text(size=24, steps=4, output="checkpoint_every = 4, snapshot_every = 3"))
+    done = subprocess.run([program, "run", case, "--quiet"], check=False, capture_output=True,
+                          env={"SLURM_JOB_END_TIME": "1"})
+    assert done.returncode == 124
+    done = vc.run(program, case)
+    result = case.with_suffix(".h5")
+    whole = result.read_bytes()
+    chance = random.Random(5)
+    for trial in range(40):
+        damaged = bytearray(whole)
+        place = chance.randrange(len(whole))
+        if trial % 4 == 0:
+            damaged[place:place + 512] = bytes(min(512, len(whole) - place))
+        else:
+            damaged[place] ^= 1 << chance.randrange(8)
+        result.write_bytes(damaged)
+        done = call(program, "info", result)
+        assert done.returncode in (0, 3), (trial, place, done.returncode, done.stderr)
+
+
+def test_sweep_sees_a_changed_map(tmp_path: Path) -> None:
+    """A result that was computed with another map of the same name is not taken again."""
+    case = asperity.Case.read(ELASTIC)
+    heights = np.random.default_rng(3).standard_normal((16, 12)) * 1e-4
+
+    def areas() -> list[float]:
+        folder = tmp_path / "sweep"
+        table = asperity.sweep(case, {"phase.pressure": [1e3, 2e3]}, folder=folder, quiet=True)
+        return table["contact_area"].tolist()
+
+    case.surface[0].file = str(tmp_path / "map.h5")
+    with h5py.File(tmp_path / "map.h5", "w") as file:
+        file["surface/height"] = heights
+    first = areas()
+    kept = {path: path.stat().st_mtime_ns for path in (tmp_path / "sweep").glob("*.h5")}
+    assert areas() == first
+    assert kept == {path: path.stat().st_mtime_ns for path in (tmp_path / "sweep").glob("*.h5")}
+    with h5py.File(tmp_path / "map.h5", "w") as file:
+        file["surface/height"] = 3 * heights
+    second = areas()
+    assert second != first
+    assert all(b < a for a, b in zip(first, second, strict=True))

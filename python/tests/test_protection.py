@@ -1,0 +1,370 @@
+"""What a run leaves alone: inputs, other files, unfinished runs, and results that others write."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import stat
+import subprocess
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import viscoelastic_case as vc
+from conftest import PATIENCE
+
+import asperity
+
+
+@pytest.fixture
+def case(tmp_path: Path) -> Path:
+    """Return the input of a run of some rows."""
+    path = tmp_path / "y.nml"
+    path.write_text(vc.text(size=24, steps=400))
+    return path
+
+
+def stopped(program: str, case: Path, rows: int = 3) -> Path:
+    """Stop a run after some rows; return its result."""
+    result = case.with_suffix(".h5")
+    process = vc.start(program, case)
+    vc.wait_for_rows(process, result, rows, signal.SIGTERM)
+    process.communicate(timeout=PATIENCE)
+    assert process.returncode == 143
+    return result
+
+
+def test_unfinished_run_is_kept(program: str, case: Path) -> None:
+    """Without --restart or --overwrite an unfinished run, or its checkpoint alone, stays."""
+    result = stopped(program, case)
+    before = result.read_bytes()
+    done = vc.run(program, case)
+    assert done.returncode == 3
+    assert "y.h5: holds an unfinished run: --restart goes on" in done.stderr
+    assert result.read_bytes() == before
+    with pytest.raises(OSError, match="unfinished run"):
+        asperity.run(case)
+    result.unlink()
+    done = vc.run(program, case)
+    assert done.returncode == 3
+    assert "y.checkpoint.h5: there is a checkpoint of an unfinished run" in done.stderr
+    assert case.with_suffix(".checkpoint.h5").exists()
+    case.write_text(vc.text(size=24, steps=2))
+    assert vc.run(program, case, "--overwrite").returncode == 0
+    assert asperity.open(result).finished
+    assert not case.with_suffix(".checkpoint.h5").exists()
+    assert vc.run(program, case).returncode == 0  # a finished run is replaced
+    done = vc.run(program, case, "--overwrite", "--restart")
+    assert done.returncode == 2 and "give one of them" in done.stderr
+
+
+def test_overwrite_in_python(program: str, case: Path) -> None:
+    """`asperity.run` has the same switch."""
+    result = stopped(program, case)
+    case.write_text(vc.text(size=24, steps=2))
+    assert asperity.run(case, overwrite=True).finished
+    assert asperity.open(result).finished
+
+
+def test_result_in_use(program: str, case: Path) -> None:
+    """A second run on the same result ends at once and says who has it; the first goes on."""
+    result = case.with_suffix(".h5")
+    process = vc.start(program, case)
+    vc.wait_for_rows(process, result, 2)
+    link = case.with_name("link.h5")
+    link.symlink_to(result)
+    for arguments in ([], ["--restart"], ["--overwrite"], ["--overwrite", "--output", str(link)],
+                      ["--output", str(case.parent / "y")]):
+        done = vc.run(program, case, *arguments)
+        assert done.returncode == 3, done.stderr
+        assert re.search(rf"is in use by process {process.pid} on \S+ since 20", done.stderr)
+    with pytest.raises(OSError, match=rf"in use by process {process.pid} "):
+        asperity.run(case, overwrite=True)
+    process.terminate()
+    process.communicate(timeout=PATIENCE)
+    assert process.returncode == 143
+    assert not case.with_suffix(".lock").exists()
+    assert asperity.open(result).history["step"].tolist() == list(range(vc.count(result)))
+
+
+def test_dead_process_has_no_lock(program: str, case: Path) -> None:
+    """What a killed run leaves of its lock does not stop the next one."""
+    result = case.with_suffix(".h5")
+    process = vc.start(program, case)
+    vc.wait_for_rows(process, result, 2, signal.SIGKILL)
+    process.communicate(timeout=PATIENCE)
+    assert case.with_suffix(".lock").exists()
+    case.write_text(vc.text(size=24, steps=2))
+    done = vc.run(program, case, "--overwrite")
+    assert done.returncode == 0, done.stderr
+    assert not case.with_suffix(".lock").exists()
+
+
+def test_many_at_once(program: str, case: Path) -> None:
+    """Of several runs that start together one writes the result, and the others say so."""
+    case.write_text(vc.text(size=24, steps=10))
+    processes = [vc.start(program, case) for _ in range(6)]
+    messages = [process.communicate(timeout=PATIENCE)[1] for process in processes]
+    codes = [process.returncode for process in processes]
+    assert set(codes) <= {0, 3} and 0 in codes, messages
+    for code, message in zip(codes, messages, strict=True):
+        assert code == 0 or "in use" in message or "unfinished" in message
+    assert asperity.open(case.with_suffix(".h5")).finished
+
+
+@pytest.mark.parametrize("name", ["y.checkpoint.h5", "y.xdmf", "y.h5.new", "y.checkpoint.h5.new",
+                                  "y.xdmf.new", "y.lock"])
+def test_files_of_others_stay(program: str, case: Path, name: str) -> None:
+    """A file that a run would write beside its result is replaced only if Asperity wrote it."""
+    other = case.with_name(name)
+    other.write_text("a diary, four years long")
+    done = vc.run(program, case, "--overwrite")
+    assert done.returncode == 3, done.stderr
+    assert name in done.stderr
+    assert other.read_text() == "a diary, four years long"
+    other.unlink()
+    other.mkdir()
+    done = vc.run(program, case, "--overwrite")
+    assert done.returncode == 3 and name in done.stderr
+    assert other.is_dir()
+
+
+@pytest.mark.parametrize("name", ["y.checkpoint.h5", "y.xdmf", "y.h5.new", "y.lock", "y.h5"])
+def test_height_map_stays(program: str, tmp_path: Path, name: str) -> None:
+    """A height map with the name of a file of the run is an error of the input."""
+    with h5py.File(tmp_path / name, "w") as file:
+        file["surface/height"] = np.zeros((8, 8))
+    before = (tmp_path / name).read_bytes()
+    (tmp_path / "y.nml").write_text(
+        f"&grid nx = 8, ny = 8, lx = 1 /\n&surface shape = 'file', file = '{name}' /\n"
+        "&material shear_modulus = 1e6 /\n&phase pressure = 1 /\n")
+    done = vc.run(program, tmp_path / "y.nml", "--overwrite")
+    assert done.returncode == 2, done.stderr
+    assert "the height map of a &surface" in done.stderr
+    assert (tmp_path / name).read_bytes() == before
+
+
+def test_other_hdf5_file_stays(program: str, case: Path) -> None:
+    """Neither is an HDF5 file that is no result replaced, nor anything that is no HDF5 file."""
+    result = case.with_suffix(".h5")
+    with h5py.File(result, "w") as file:
+        file["precious"] = 1.0
+    for _ in range(2):
+        before = result.read_bytes()
+        done = vc.run(program, case)
+        assert done.returncode == 3, done.stderr
+        assert "y.h5: is not a result of Asperity" in done.stderr
+        assert result.read_bytes() == before
+        result.write_text("a letter")
+
+
+def test_devices_and_pipes_stay(program: str, case: Path, tmp_path: Path) -> None:
+    """What is not a regular file is not replaced by one."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    dangling = tmp_path / "dangling.h5"
+    dangling.symlink_to(tmp_path / "nowhere.h5")
+    for target, word in ((pipe, "not a regular file"), (dangling, "leads to no file")):
+        done = vc.run(program, case, "--output", str(target), "--overwrite")
+        assert done.returncode == 3, done.stderr
+        assert word in done.stderr
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+    assert dangling.is_symlink()
+    done = vc.run(program, case, "--output", "/dev/null")
+    assert done.returncode == 3, done.stderr
+    assert stat.S_ISCHR(Path("/dev/null").stat().st_mode)
+
+
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGXCPU])
+def test_other_signals_leave_a_checkpoint(program: str, case: Path, number: signal.Signals) -> None:
+    """A terminal that is gone and a batch system's warning stop a run as SIGTERM does."""
+    process = vc.start(program, case)
+    vc.wait_for_rows(process, case.with_suffix(".h5"), 3, number)
+    _, message = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 128 + number, message
+    assert number.name in message
+    assert case.with_suffix(".checkpoint.h5").exists()
+
+
+def test_nohup(program: str, case: Path) -> None:
+    """A hang-up that is ignored at the start stays ignored."""
+    case.write_text(vc.text(size=24, steps=30))
+    process = vc.start(program, case,
+                       preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
+    vc.wait_for_rows(process, case.with_suffix(".h5"), 3, signal.SIGHUP)
+    _, message = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, message
+
+
+def test_time_limit(program: str, tmp_path: Path) -> None:
+    """A run stops before its limit, given or of the Slurm job, with a checkpoint to go on from."""
+    case = tmp_path / "y.nml"
+    case.write_text(vc.text(size=96, steps=20000))
+    result = case.with_suffix(".h5")
+    start = time.monotonic()
+    done = vc.run(program, case, "--time-limit", "0:03")
+    assert done.returncode == 124, done.stderr
+    assert time.monotonic() - start < 30.0  # the whole run takes minutes
+    assert "the time limit is near: stopped after step" in done.stderr
+    rows = vc.count(result)
+    environment = dict(os.environ, SLURM_JOB_END_TIME=str(int(time.time()) + 5))
+    done = vc.run(program, case, "--restart", env=environment)
+    assert done.returncode == 124, done.stderr
+    assert vc.count(result) > rows
+
+
+@pytest.mark.parametrize("text", ["", "x", "1:2:3:4", "0", "-1", "1-", "1.5", ":", "99999999999"])
+def test_time_limit_is_checked(program: str, case: Path, text: str) -> None:
+    """What is no duration is an error of the command line."""
+    done = vc.run(program, case, f"--time-limit={text}")
+    assert done.returncode == 2, done.stderr
+    assert "--time-limit" in done.stderr
+
+
+def test_stop_before_the_first_row_promises_nothing(program: str, tmp_path: Path) -> None:
+    """Without a row there is no checkpoint, and the message says so; the run can start again."""
+    case = tmp_path / "y.nml"
+    case.write_text(vc.text(size=24))
+    done = vc.run(program, case, "--time-limit", "1",
+                  env=dict(os.environ, SLURM_JOB_END_TIME="1"))
+    assert done.returncode == 0  # what is given counts
+    case.with_suffix(".h5").unlink()
+    done = vc.run(program, case, env=dict(os.environ, SLURM_JOB_END_TIME="1"))
+    assert done.returncode == 124
+    assert "before the first row" in done.stderr and "--restart" not in done.stderr
+    assert asperity.open(case.with_suffix(".h5")).outcome == "stopped before the first row"
+    assert vc.run(program, case).returncode == 0
+
+
+def test_python_stops_as_the_program_does(case: Path) -> None:
+    """SIGTERM to a script that runs a case leaves a checkpoint and ends the script."""
+    script = f"import asperity; asperity.run({str(case)!r}, threads=1)"
+    process = subprocess.Popen([os.sys.executable, "-c", script], stderr=subprocess.PIPE, text=True)
+    vc.wait_for_rows(process, case.with_suffix(".h5"), 3, signal.SIGTERM)
+    _, message = process.communicate(timeout=PATIENCE)
+    assert process.returncode == -signal.SIGTERM, message
+    assert case.with_suffix(".checkpoint.h5").exists()
+    assert "stopped after step" in asperity.open(case.with_suffix(".h5")).outcome
+
+
+def test_threads_of_the_environment() -> None:
+    """Where no number is given, OMP_NUM_THREADS counts, then Slurm's, then the processors."""
+    script = "import asperity; print(asperity.set_threads(0))"
+
+    def used(**variables: str) -> int:
+        environment = {name: value for name, value in os.environ.items()
+                       if name not in ("OMP_NUM_THREADS", "SLURM_CPUS_PER_TASK")}
+        told = subprocess.run([os.sys.executable, "-c", script], env=environment | variables,
+                              capture_output=True, text=True, check=True)
+        return int(told.stdout)
+
+    processors = len(os.sched_getaffinity(0))
+    assert used() == processors
+    assert used(OMP_NUM_THREADS="3") == 3
+    assert used(OMP_NUM_THREADS="5,2") == 5
+    assert used(SLURM_CPUS_PER_TASK="7") == 7
+    assert used(OMP_NUM_THREADS="3", SLURM_CPUS_PER_TASK="7") == 3
+    assert used(OMP_NUM_THREADS="many") == processors
+
+
+FORK = """
+import asperity, multiprocessing, numpy as np
+asperity.set_threads(2)
+height = np.random.default_rng(1).standard_normal((96, 96))
+
+def solve(scale):
+    return asperity.solve_normal(height, 1.0, 1.0, scale, pressure=0.1).contact_area
+
+wanted = [solve(scale) for scale in (1.0, 2.0, 3.0)]
+with multiprocessing.get_context("fork").Pool(2) as pool:
+    found = pool.map_async(solve, (1.0, 2.0, 3.0)).get(timeout=120)
+assert found == wanted == [solve(scale) for scale in (1.0, 2.0, 3.0)], (found, wanted)
+print("done")
+"""
+
+
+def test_fork_after_a_call() -> None:
+    """Copies of a process that has used threads can use the library."""
+    done = subprocess.run([os.sys.executable, "-c", FORK], capture_output=True, text=True,
+                          timeout=PATIENCE, check=False)
+    assert done.stdout == "done\n", done.stderr
+
+
+MEMORY = """
+import asperity, numpy as np, resource
+height = np.zeros((2000, 2000)); height[::2] = 1e-3
+def size():
+    return int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+for room in (120e6, 350e6):
+    resource.setrlimit(resource.RLIMIT_AS, (size() + int(room), resource.RLIM_INFINITY))
+    for call in (lambda: asperity.solve_normal(height, 1.0, 1.0, 1.0, pressure=0.1),
+                 lambda: asperity.solve_adhesive(height, 1.0, 1.0, 1.0, pressure=0.1, energy=1.0,
+                                                 range=1.0),
+                 lambda: asperity.run(CASE)):
+        try:
+            call()
+        except MemoryError as error:
+            print(error)
+        else:
+            print("no error")
+    resource.setrlimit(resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+print("done")
+"""
+
+
+def test_memory_error(tmp_path: Path) -> None:
+    """Too little memory is MemoryError, and the interpreter lives."""
+    case = tmp_path / "y.nml"
+    case.write_text(LARGE.replace("20000", "2500"))
+    done = subprocess.run([os.sys.executable, "-c", MEMORY.replace("CASE", repr(str(case)))],
+                          capture_output=True, text=True, timeout=PATIENCE, check=False)
+    lines = done.stdout.splitlines()
+    assert lines[-1:] == ["done"], done.stderr
+    assert len(lines) == 7
+    assert all("not enough memory" in line or "llocate" in line for line in lines[:-1]), lines
+
+
+LARGE = """
+&grid nx = 20000, ny = 20000, lx = 1 /
+&surface shape = 'sine', amplitude = 1e-3, wavelength = 1 /
+&material shear_modulus = 1e6 /
+&phase pressure = 1 /
+"""
+
+
+def test_out_of_memory(program: str, tmp_path: Path) -> None:
+    """Whatever the limit, a run that does not fit ends with one message and status 3."""
+    case = tmp_path / "y.nml"
+    case.write_text(LARGE)
+    done = vc.run(program, case, preexec_fn=lambda: set_address_space(2_000_000_000))
+    assert done.returncode == 3, done.stderr
+    assert "not enough memory: the run needs about" in done.stderr
+    case.write_text(LARGE.replace("20000", "600"))
+    seen = set()
+    for limit in range(100, 700, 60):
+        done = vc.run(program, case, "--threads", "1", "--overwrite",
+                      preexec_fn=lambda limit=limit: set_address_space(limit * 1_000_000))
+        assert done.returncode in (0, 3), (limit, done.returncode, done.stderr)
+        assert done.returncode == 0 or "not enough memory" in done.stderr, (limit, done.stderr)
+        seen.add(done.returncode)
+    assert seen == {0, 3}
+
+
+def set_address_space(limit: int) -> None:
+    """Limit the memory of this process, as ulimit -v does."""
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+
+
+def test_check_knows_the_machine(program: str, tmp_path: Path) -> None:
+    """`asperity check` warns of a case that is larger than the machine."""
+    case = tmp_path / "y.nml"
+    case.write_text(LARGE.replace("20000", "40000"))
+    done = subprocess.run([program, "check", str(case)], capture_output=True, text=True, check=True)
+    assert re.search(r"! warning: .* of memory: the run needs more", done.stdout)
+    done = vc.run(program, case)
+    assert done.returncode == 3 and "not enough memory" in done.stderr

@@ -1,0 +1,134 @@
+!> A lock on a name: one process at a time has it, and one that dies does not keep it.
+!>
+!> The lock is flock(2) on a small file beside the files that it protects. The system gives it back
+!> when the process ends, however it ends. The file holds a line about the process that has the
+!> lock, for the message that others get; it is removed when the lock is given back, and a file that
+!> a dead process left behind does no harm. On a file system without locks there is no protection.
+module file_lock
+   use, intrinsic :: iso_c_binding, only : c_int
+   use errors, only : error_file, error_type, fail
+   use file_kind, only : file_start, is_other_than_file, same_inode
+   use file_system, only : remove_file
+   use utc_clock, only : utc_time
+   implicit none
+   private
+
+   public :: file_lock_type
+
+   integer(c_int), parameter :: exclusive_at_once = 6      !! LOCK_EX + LOCK_NB of every Unix
+   integer(c_int), parameter :: unlock = 8                 !! LOCK_UN
+   integer, parameter :: would_block(2) = [11, 35]         !! EWOULDBLOCK of Linux and of macOS
+   integer, parameter :: attempts = 20                     !! to find a file that nobody removes
+   character(*), parameter :: mark = 'asperity process '   !! how our own files begin
+
+   !> A lock. Not to be copied.
+   type :: file_lock_type
+      private
+      integer :: unit = 0                                  !! 0: no file is open
+      character(:), allocatable :: path
+   contains
+      procedure :: acquire
+      procedure :: release
+   end type file_lock_type
+
+   interface
+      function c_flock(descriptor, operation) bind(c, name='flock') result(status)
+         import :: c_int
+         integer(c_int), value :: descriptor, operation
+         integer(c_int) :: status
+      end function c_flock
+
+      function c_getpid() bind(c, name='getpid') result(number)
+         import :: c_int
+         integer(c_int) :: number
+      end function c_getpid
+   end interface
+
+contains
+
+   !> Take the lock, or say at once who has it.
+   subroutine acquire(self, path, protected, error)
+      class(file_lock_type), intent(inout) :: self
+      character(*), intent(in) :: path                !! of the lock's own file
+      character(*), intent(in) :: protected           !! what the lock protects, for the message
+      type(error_type), allocatable, intent(out) :: error
+      character(200) :: reason, host
+      character(:), allocatable :: holder
+      integer :: status, try
+
+      if (is_other_than_file(path)) then
+         call fail(error, error_file, path//': is needed as a lock, and is not a regular file')
+         return
+      end if
+      holder = file_start(path, 200)
+      if (holder /= '' .and. index(holder, mark) /= 1) then
+         call fail(error, error_file, path//': is needed as a lock, and is not a file of Asperity')
+         return
+      end if
+      do try = 1, attempts
+         open (newunit=self%unit, file=path, action='readwrite', status='unknown', iostat=status, &
+            iomsg=reason)
+         if (status /= 0) then
+            self%unit = 0
+            ! The runtime opens no file twice: then this process has the lock.
+            if (index(reason, 'already opened') > 0) then
+               call fail(error, error_file, protected//': is in use by another run of this process')
+            else
+               call fail(error, error_file, protected//': cannot be written: '//trim(reason))
+            end if
+            return
+         end if
+         if (c_flock(int(fnum(self%unit), c_int), exclusive_at_once) /= 0) then
+            if (any(ierrno() == would_block)) then
+               holder = first_line(self%unit)
+               close (self%unit)
+               self%unit = 0
+               call fail(error, error_file, protected//': is in use by '//holder// &
+                  ': wait for it, or choose another --output')
+               return
+            end if
+         end if
+         ! Who had the lock before may have removed the file after it was opened here.
+         if (same_inode(path, self%unit)) exit
+         close (self%unit)
+         self%unit = 0
+      end do
+      if (self%unit == 0) then
+         call fail(error, error_file, path//': cannot be locked')
+         return
+      end if
+      self%path = path
+      call hostnm(host)
+      rewind (self%unit)
+      write (self%unit, '(a, i0, a)', iostat=status) mark, c_getpid(), ' on '//trim(host)// &
+         ' since '//utc_time()
+      flush (self%unit, iostat=status)
+   end subroutine acquire
+
+   !> Who has the lock, as the file says.
+   function first_line(unit) result(text)
+      integer, intent(in) :: unit
+      character(:), allocatable :: text
+      character(200) :: line
+      integer :: status
+
+      rewind (unit)
+      read (unit, '(a)', iostat=status) line
+      text = 'another process'
+      if (status == 0 .and. index(line, mark) == 1) text = trim(line(len('asperity ') + 1:))
+   end function first_line
+
+   !> Give the lock back; without one nothing is done.
+   subroutine release(self)
+      class(file_lock_type), intent(inout) :: self
+      integer(c_int) :: status
+
+      if (self%unit == 0) return
+      call remove_file(self%path)
+      ! Not only by closing: a child of this process may have the file open, too.
+      status = c_flock(int(fnum(self%unit), c_int), unlock)
+      close (self%unit)
+      self%unit = 0
+   end subroutine release
+
+end module file_lock

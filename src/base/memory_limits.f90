@@ -1,0 +1,159 @@
+!> How much memory there is, and a clear error where it is not enough.
+!>
+!> The machine's memory with its swap space, the limit of the control group (containers, batch
+!> jobs), and the limit on the address space (ulimit -v) are read from the files of Linux; where
+!> these are missing there is no limit.
+module memory_limits
+   use errors, only : error_memory, error_type, fail
+   use precision, only : dp, int64
+   use text_tools, only : to_text
+   implicit none
+   private
+
+   public :: memory_limit, memory_text, need_memory
+
+   !> Address space beside the fields, bytes: stacks and heaps of threads, libraries.
+   real(dp), parameter :: address_reserve = 256.0e6_dp
+
+contains
+
+   !> An error if a task needs more memory than this process can get.
+   subroutine need_memory(bytes, task, error)
+      real(dp), intent(in) :: bytes
+      character(*), intent(in) :: task              !! such as 'the run'
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: what
+      real(dp) :: limit
+
+      limit = memory_limit(what)
+      if (bytes > limit) then
+         call fail(error, error_memory, 'not enough memory: '//task//' needs about '// &
+            memory_text(bytes)//', '//what//' '//memory_text(limit))
+         return
+      end if
+      limit = address_space()
+      if (bytes + address_reserve > limit) call fail(error, error_memory, 'not enough memory: '//task// &
+         ' needs about '//memory_text(bytes)//', and the limit on the address space (ulimit -v) '// &
+         'leaves '//memory_text(max(0.0_dp, limit - address_reserve)))
+   end subroutine need_memory
+
+   !> Memory that this process can have at most, bytes.
+   function memory_limit(what) result(limit)
+      character(:), allocatable, intent(out) :: what    !! whose limit it is, with a verb
+      real(dp) :: limit
+      real(dp) :: group
+
+      what = 'this machine has'
+      limit = field_of('/proc/meminfo', 'MemTotal:') + field_of('/proc/meminfo', 'SwapTotal:')
+      limit = 1024.0_dp*limit
+      if (.not. limit > 0.0_dp) limit = huge(1.0_dp)
+      group = group_limit()
+      if (group < limit) then
+         limit = group
+         what = 'the control group (container or job) allows'
+      end if
+   end function memory_limit
+
+   !> Limit of the control group, version 2 or 1, and of those above it.
+   function group_limit() result(limit)
+      real(dp) :: limit
+      character(512) :: line
+      character(:), allocatable :: path
+      integer :: unit, status, colon
+
+      limit = min(number_in('/sys/fs/cgroup/memory.max'), &
+         number_in('/sys/fs/cgroup/memory/memory.limit_in_bytes'))
+      open (newunit=unit, file='/proc/self/cgroup', status='old', action='read', iostat=status)
+      if (status /= 0) return
+      do
+         read (unit, '(a)', iostat=status) line
+         if (status /= 0) exit
+         colon = index(line, ':/', back=.true.)
+         if (colon == 0) cycle
+         path = trim(line(colon + 1:))
+         do while (len(path) > 1)
+            if (index(line, '0::') == 1) then
+               limit = min(limit, number_in('/sys/fs/cgroup'//path//'/memory.max'))
+            else if (index(line, ':memory:') > 0) then
+               limit = min(limit, number_in('/sys/fs/cgroup/memory'//path//'/memory.limit_in_bytes'))
+            else
+               exit
+            end if
+            path = path(:index(path, '/', back=.true.) - 1)
+         end do
+      end do
+      close (unit)
+   end function group_limit
+
+   !> Address space that is left, bytes.
+   function address_space() result(left)
+      real(dp) :: left
+      character(200) :: line
+      real(dp) :: limit
+      integer :: unit, status
+
+      left = huge(1.0_dp)
+      open (newunit=unit, file='/proc/self/limits', status='old', action='read', iostat=status)
+      if (status /= 0) return
+      do
+         read (unit, '(a)', iostat=status) line
+         if (status /= 0) exit
+         if (index(line, 'Max address space') /= 1) cycle
+         read (line(len('Max address space') + 1:), *, iostat=status) limit
+         if (status == 0) left = max(0.0_dp, limit - 1024.0_dp*field_of('/proc/self/status', 'VmSize:'))
+         exit
+      end do
+      close (unit)
+   end function address_space
+
+   !> The number after a name in a file of lines; 0 where there is none.
+   function field_of(path, name) result(value)
+      character(*), intent(in) :: path, name
+      real(dp) :: value
+      character(200) :: line
+      integer :: unit, status
+
+      value = 0.0_dp
+      open (newunit=unit, file=path, status='old', action='read', iostat=status)
+      if (status /= 0) return
+      do
+         read (unit, '(a)', iostat=status) line
+         if (status /= 0) exit
+         if (index(line, name) /= 1) cycle
+         read (line(len(name) + 1:), *, iostat=status) value
+         if (status /= 0) value = 0.0_dp
+         exit
+      end do
+      close (unit)
+   end function field_of
+
+   !> The number that a file holds; huge where there is none ("max") or no file.
+   function number_in(path) result(value)
+      character(*), intent(in) :: path
+      real(dp) :: value
+      integer(int64) :: number
+      integer :: unit, status
+
+      value = huge(1.0_dp)
+      open (newunit=unit, file=path, status='old', action='read', iostat=status)
+      if (status /= 0) return
+      read (unit, *, iostat=status) number
+      if (status == 0 .and. number > 0) value = real(number, dp)
+      close (unit)
+   end function number_in
+
+   !> A number of bytes for a message.
+   function memory_text(bytes) result(text)
+      real(dp), intent(in) :: bytes
+      character(:), allocatable :: text
+
+      if (bytes < 1.0e9_dp) then
+         text = to_text(anint(bytes/1.0e5_dp)/10.0_dp)//' MB'
+      else if (bytes < 1.0e15_dp) then
+         text = to_text(anint(bytes/1.0e8_dp)/10.0_dp)//' GB'
+      else
+         text = 'more than a million GB'
+      end if
+   end function memory_text
+
+end module memory_limits

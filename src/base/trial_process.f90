@@ -1,0 +1,124 @@
+!> A trial in a process of its own: what may crash or hang is tried there first.
+!>
+!> HDF5 may crash, or never return, when it reads a damaged file. So a copy of this process (fork)
+!> reads the file before this one does:
+!>
+!>     call trial%start(seconds)
+!>     if (trial%is_copy) then
+!>        ... read ...
+!>        call trial%leave()
+!>     end if
+!>     call trial%verdict(path, error)
+!>
+!> Ordinary errors in the copy are ignored: they will be found, and reported, here. The copy must
+!> neither print nor use OpenMP. Where no copy can be made, there is no trial.
+module trial_process
+   use, intrinsic :: iso_c_binding, only : c_int, c_intptr_t
+   use errors, only : error_file, error_type, fail
+   use text_tools, only : to_text
+   implicit none
+   private
+
+   public :: trial_type
+
+   integer(c_intptr_t), parameter :: default_action = 0        !! SIG_DFL
+   integer(c_int), parameter :: alarm_signal = 14              !! SIGALRM
+   !> Signals for which the runtime library or the host program may have handlers that print:
+   !> SIGILL, SIGABRT, SIGBUS (Linux), SIGFPE, SIGBUS (macOS), SIGSEGV, SIGALRM, SIGTERM, SIGINT.
+   integer(c_int), parameter :: signals(9) = [4, 6, 7, 8, 10, 11, 14, 15, 2]
+
+   !> A trial.
+   type :: trial_type
+      integer(c_int), private :: process = -1                  !! number of the copy
+      logical :: is_copy = .false.                             !! this is the copy
+   contains
+      procedure :: start
+      procedure :: leave
+      procedure :: verdict
+   end type trial_type
+
+   interface
+      function c_fork() bind(c, name='fork') result(process)
+         import :: c_int
+         integer(c_int) :: process
+      end function c_fork
+
+      function c_waitpid(process, status, options) bind(c, name='waitpid') result(found)
+         import :: c_int
+         integer(c_int), value :: process
+         integer(c_int), intent(out) :: status
+         integer(c_int), value :: options
+         integer(c_int) :: found
+      end function c_waitpid
+
+      function c_alarm(seconds) bind(c, name='alarm') result(left)
+         import :: c_int
+         integer(c_int), value :: seconds
+         integer(c_int) :: left
+      end function c_alarm
+
+      function c_signal(number, action) bind(c, name='signal') result(old)
+         import :: c_int, c_intptr_t
+         integer(c_int), value :: number
+         integer(c_intptr_t), value :: action
+         integer(c_intptr_t) :: old
+      end function c_signal
+
+      subroutine c_exit_at_once(status) bind(c, name='_exit')
+         import :: c_int
+         integer(c_int), value :: status
+      end subroutine c_exit_at_once
+   end interface
+
+contains
+
+   !> Make the copy. It is ended after some time, so that nothing waits for ever.
+   subroutine start(self, seconds)
+      class(trial_type), intent(inout) :: self
+      integer, intent(in) :: seconds
+      integer(c_intptr_t) :: old
+      integer(c_int) :: left
+      integer :: i
+
+      self%process = c_fork()
+      self%is_copy = self%process == 0
+      if (.not. self%is_copy) return
+      do i = 1, size(signals)
+         old = c_signal(signals(i), default_action)
+      end do
+      left = c_alarm(int(seconds, c_int))
+   end subroutine start
+
+   !> End the copy.
+   subroutine leave(self)
+      class(trial_type), intent(in) :: self
+
+      if (self%is_copy) call c_exit_at_once(0_c_int)
+   end subroutine leave
+
+   !> Wait for the copy; an error where it crashed or did not come to an end.
+   subroutine verdict(self, path, error)
+      class(trial_type), intent(inout) :: self
+      character(*), intent(in) :: path                         !! of the file that was tried
+      type(error_type), allocatable, intent(out) :: error
+      integer(c_int) :: status, found
+      integer :: number, try
+
+      if (self%process <= 0) return
+      status = 0
+      do try = 1, 1000                                         ! a signal may interrupt the wait
+         found = c_waitpid(self%process, status, 0_c_int)
+         if (found == self%process) exit
+      end do
+      self%process = -1
+      number = iand(int(status), 127)
+      if (found < 0 .or. number == 0) return
+      if (number == alarm_signal) then
+         call fail(error, error_file, path//': the file is damaged: reading it comes to no end')
+      else
+         call fail(error, error_file, path//': the file is damaged: HDF5 crashes when it reads it '// &
+            '(signal '//to_text(number)//')')
+      end if
+   end subroutine verdict
+
+end module trial_process
