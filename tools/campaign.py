@@ -127,7 +127,8 @@ def random_case(chance, *, rows=12, largest=40, threads=1):
     material = f"&material shear_modulus = {modulus:.6e}"
     if arms:
         taus = sorted(10 ** chance.uniform(-4, 0) for _ in range(arms))
-        material += (f", prony_g = {', '.join(f'{modulus * chance.uniform(0.1, 3):.5e}' for _ in taus)}"
+        moduli = [modulus * chance.uniform(0.1, 3) for _ in taus]
+        material += (f", prony_g = {', '.join(f'{g:.5e}' for g in moduli)}"
                      f", prony_tau = {', '.join(f'{tau:.5e}' for tau in taus)}")
     if friction and not free:
         material += f", thickness = {lx * chance.uniform(1, 30):.5e}"
@@ -169,7 +170,7 @@ def random_case(chance, *, rows=12, largest=40, threads=1):
 # --- trials ------------------------------------------------------------------------------------
 
 def try_problem(chance, folder):
-    """A random elastic contact: the conditions of contact, with displacements by NumPy's FFT."""
+    """Solve a random elastic contact and check its conditions with displacements by NumPy."""
     ny, nx = chance.choice([(1, 5), (1, 40), (7, 9), (16, 16), (33, 20), (64, 48)])
     numbers = np.random.default_rng(chance.randrange(2**32))
     height = numbers.standard_normal((ny, nx)) * 10 ** chance.uniform(-9, -2)
@@ -205,7 +206,7 @@ def try_problem(chance, folder):
 
 
 def try_run(chance, folder):
-    """A random case: finite numbers, closed books."""
+    """Run a random case: numbers must be finite and the books of energy closed."""
     (folder / "case.nml").write_text(random_case(chance))
     done = call("run", "case.nml", "--quiet", cwd=folder, statuses=(0, 4))
     with h5py.File(folder / "case.h5") as file:
@@ -231,7 +232,7 @@ def try_run(chance, folder):
 
 
 def try_input(chance, folder):
-    """An input with letters, words or lines changed, lost or doubled."""
+    """Try an input with letters, words or lines changed, lost or doubled."""
     text = bytearray(random_case(chance).encode())
     words = [b"NaN", b"-1", b"1e999", b"0", b"''", b"&", b"/", b"=", b"2147483648", b"1e-320",
              b"'", b"\n", b"\x00", b"\xff", b"*", b"9" * 400, b"&phase", b"!"]

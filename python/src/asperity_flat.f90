@@ -587,10 +587,11 @@ contains
       message)
       use case_identity, only : identity_of
       use case_input, only : parse_case, read_case
-      use case_report, only : resolved_input
+      use case_report, only : memory_needed, resolved_input
       use case_run, only : map_lines
       use case_settings, only : case_type
       use errors, only : error_input, error_type, fail
+      use memory_limits, only : need_memory
       use parallel, only : set_threads
       use run_handles, only : driven_of, driven_type, free_driven, new_driven
       use schedule, only : count_rows
@@ -632,7 +633,9 @@ contains
          call set_threads(case%solver%threads)
          warnings = case%warnings
          driven => driven_of(number)
-         call new_simulation(driven%sim, case, error, movable=.not. all(case%phases%static))
+         call need_memory(memory_needed(case), 'the simulation', error)
+         if (.not. allocated(error)) call new_simulation(driven%sim, case, error, &
+            movable=.not. all(case%phases%static))
          if (allocated(error)) then
             call free_driven(number)
          else
