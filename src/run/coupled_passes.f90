@@ -40,7 +40,7 @@ module coupled_passes
 
    public :: carry, coupled_passes_type, new_coupled_passes
 
-   integer, parameter, public :: most_passes = 100      !! where the case leaves the number open
+   integer, parameter, public :: most_passes = 200      !! where the case leaves the number open
 
    !> Slopes in the contact count as at least this part of the rms slope of the map.
    real(dp), parameter :: least_slope = 0.1_dp
@@ -170,7 +170,7 @@ contains
       integer :: c
 
       if (control%best_yet) self%best_place(:, :, :) = self%place
-      if (control%forget) call self%mixing%start()
+      if (control%forget .or. control%plain) call self%mixing%start()
       if (control%go_back) then
          self%place(:, :, :) = self%best_place
          return

@@ -33,7 +33,8 @@ contains
       else if (self%case%solver%passes > 0) then
          advice = 'Allow more passes (passes = 0 goes on until they settle)'
       else
-         advice = 'Take shorter steps or a finer mesh'
+         advice = 'A mass (density) may help, shorter steps seldom do; a limit, such as passes = 30, goes on '// &
+            'with what remains and tells it in residual_coupling'
       end if
    end function advice_on_passes
 

@@ -11,7 +11,9 @@
 !> * An extrapolation goes astray. Where the mismatch is ten times the least so far, the
 !>   acceleration forgets what it has seen.
 !> * The passes go round in circles. Where the mismatch has not been halved in `stalled` passes, they
-!>   go back to the best place, and from then on take shorter steps.
+!>   go back to the best place, and on in short steps without acceleration; after the next stall with
+!>   acceleration again and shorter steps. Cells that let go make differences of residuals that the
+!>   acceleration is led astray by, while short plain steps settle.
 module pass_control
    use precision, only : dp
    implicit none
@@ -29,7 +31,7 @@ module pass_control
    real(dp), parameter :: astray = 10.0_dp
    real(dp), parameter :: shorter = 0.3_dp, shortest = 0.05_dp    !! steps after a stall
    integer, parameter :: patience = 2
-   integer, parameter :: stalled = 15
+   integer, parameter :: stalled = 15, stalled_plain = 60
 
    !> What the passes of a step have shown.
    type :: pass_control_type
@@ -37,6 +39,7 @@ module pass_control
       real(dp) :: damping = 1.0_dp                  !! of the step to the next place
       logical :: forget = .false.                   !! the acceleration starts anew
       logical :: go_back = .false.                  !! to the best place so far
+      logical :: plain = .false.                    !! the steps are not accelerated
       logical :: best_yet = .false.                 !! the last pass was the best
       real(dp), private :: tolerance = 0.0_dp
       real(dp), private :: share = usual_share
@@ -71,7 +74,7 @@ contains
 
       self%seen = self%seen + 1
       self%damping = self%length
-      if (self%seen > 2 .and. mismatch > slow*self%last) self%damping = slow_damping*self%length
+      if (self%seen > 2 .and. mismatch > slow*self%last .and. .not. self%plain) self%damping = slow_damping*self%length
       self%last = mismatch
 
       self%idle = self%idle + 1
@@ -92,11 +95,12 @@ contains
          self%milestone = mismatch
          self%since = 0
       end if
-      self%go_back = self%since >= stalled
+      self%go_back = self%since >= merge(stalled_plain, stalled, self%plain)
       if (self%go_back) then
          self%forget = .true.
          self%since = 0
-         self%length = max(shorter*self%length, shortest)
+         self%plain = .not. self%plain
+         if (self%plain) self%length = max(shorter*self%length, shortest)
          self%damping = self%length
       end if
    end subroutine judge

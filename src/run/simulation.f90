@@ -42,7 +42,7 @@ module simulation
    public :: new_simulation, simulation_type
 
    !> What remains of the coupling where the case limits the passes: above this a warning tells of it.
-   real(dp), parameter :: large_mismatch = 1.0e-4_dp
+   real(dp), parameter :: large_mismatch = 1.0e-2_dp
 
    !> A run in hand. Not to be copied.
    type, extends(contact_state_type) :: simulation_type
