@@ -157,9 +157,8 @@ def _losses(plan: CurvePlan, lost: list[tuple[Piece, int, Run]]
     count = np.zeros(axes)
     octave = np.zeros(0)
     for piece, rows, run in lost:
-        known = getattr(run, "losses", {})
         for row in range(rows):
-            found = known.get(int(run.history["step"][row]))
+            found = run.losses.get(int(run.history["step"][row]))
             if found is None:
                 continue
             octave = found.wavelength
