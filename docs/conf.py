@@ -54,8 +54,9 @@ html_math_renderer = "mathml"
 
 ORDER = {
     "Start": ["docs/install", "docs/first_run", "docs/model"],
-    "Guide": ["docs/choosing", "docs/measured_data", "docs/friction_curves", "docs/sweeps", "docs/driving",
-              "docs/long_runs", "docs/results", "docs/troubleshooting", "docs/coming_from"],
+    "Guide": ["docs/choosing", "docs/measured_data", "docs/friction_curves", "docs/sweeps",
+              "docs/driving", "docs/long_runs", "docs/results", "docs/troubleshooting",
+              "docs/coming_from"],
     "Reference": ["docs/input_reference", "docs/result_file", "docs/api/python",
                   "docs/api/python_models", "docs/api/python_tools", "docs/api/fortran",
                   "docs/glossary"],
