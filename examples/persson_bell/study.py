@@ -114,7 +114,6 @@ def check(data: dict[str, Any], quick: bool) -> None:
             assert (friction < wide["cuts"][number - 1]).all(), "more scales, less friction"
             assert (area > wide["areas"][number - 1]).all(), "more scales, more contact"
     assert (wide["uncorrected"] > wide["cuts"][0]).all(), "the factor S is not below 1"
-    # The steady theory is exact in full contact. Eight cells in the shortest wave cost 1.3 % of the
     # The steady theory is exact in full contact. With eight cells in the shortest wave the friction
     # is 2.9 % too high, because a step of one cell is then long for the arms that relax within it;
     # with 16 cells 0.4 %, with 32 -0.2 %, which are the few directions of the waves.
