@@ -35,6 +35,9 @@ contains
       call test_mindlin_exact()
       call test_mindlin_poisson()
       call test_unloading()
+      call test_pulled_sphere()
+      call test_pulled_rough()
+      call test_pulled_off()
       call test_products()
       call test_limits()
       call test_isotropy()
@@ -211,6 +214,125 @@ contains
       call check_close(sqrt(area/pi), stick, 0.5_dp*self%grid%dx, 'Mindlin, radius of stick')
       call end_case(self)
    end subroutine test_mindlin_exact
+
+   !> Mindlin's sphere under a prescribed total force, oblique, from rest each time: the total to the
+   !> tolerance, the place of the road, the radius of stick; nu = 0, so that the solution is exact.
+   subroutine test_pulled_sphere()
+      type(case_type) :: self
+      real(dp), parameter :: mu = 0.4_dp, angle = 0.7_dp
+      real(dp), parameter :: part(6) = [0.1_dp, 0.3_dp, 0.5_dp, 0.7_dp, 0.9_dp, 0.99_dp]
+      real(dp) :: load, delta, area
+      integer :: k
+
+      call new_case(self, 128, 128, 2.5_dp, 2.5_dp, boundary_free, 0.0_dp, 0.0_dp)
+      call set_hertz(self)
+      self%law = new_friction_law('coulomb', mu, 0.0_dp, 0.0_dp, .false., .true.)
+      load = sum(self%p)
+      self%solver%pulled = .true.
+      do k = 1, size(part)
+         self%tx = 0.0_dp
+         self%ty = 0.0_dp
+         self%drive_x = 0.0_dp
+         self%drive_y = 0.0_dp
+         self%solver%pull = part(k)*mu*load/(128*128)*[cos(angle), sin(angle)]
+         self%solver%offset = 0.0_dp
+         call run_pulled(self, 'pulled sphere', 1e-8_dp)
+         call check_close(hypot(sum(self%tx), sum(self%ty))/(mu*load*part(k)), 1.0_dp, 1e-8_dp, &
+            'pulled sphere, force')
+         call check_close(sum(self%ty)/sum(self%tx), tan(angle), 1e-8_dp, 'pulled sphere, direction')
+         delta = (1.0_dp - (1.0_dp - part(k))**(2.0_dp/3.0_dp))*full_slip(self, mu, 0.0_dp)
+         call check_close(norm2(self%solver%offset)/delta, 1.0_dp, 1e-3_dp, 'pulled sphere, place')
+         area = count(self%contact == contact_stick)*self%grid%dx*self%grid%dy
+         call check_close(sqrt(area/pi), (1.0_dp - part(k))**(1.0_dp/3.0_dp), 0.5_dp*self%grid%dx, &
+            'pulled sphere, radius of stick')
+      end do
+      call end_case(self)
+   end subroutine test_pulled_sphere
+
+   !> Solve with a prescribed total, and prove the result as that of a road at the place found.
+   subroutine run_pulled(self, what, accuracy)
+      type(case_type), intent(inout) :: self
+      character(*), intent(in) :: what
+      real(dp), intent(in) :: accuracy
+
+      where (self%contact /= contact_open) self%contact = contact_stick
+      call self%solver%solve(self%operator, self%law, self%p, self%hx, self%hy, self%drive_x, &
+         self%drive_y, self%contact, self%tx, self%ty, self%rx, self%ry, self%result)
+      call check_that(self%result%converged, what//': converged, '//trim(self%result%reason))
+      self%drive_x = self%drive_x + self%solver%offset(1)
+      self%drive_y = self%drive_y + self%solver%offset(2)
+      call prove(self, what, accuracy)
+      self%drive_x = self%drive_x - self%solver%offset(1)
+      self%drive_y = self%drive_y - self%solver%offset(2)
+   end subroutine run_pulled
+
+   !> Rough roads, flat and with slope, thin and thick blocks and half-spaces, periodic and free: the
+   !> place found by a pull is that whose road pulls so; also with one direction pulled only.
+   subroutine test_pulled_rough()
+      type(case_type) :: self
+      real(dp), parameter :: thickness(4) = [0.0_dp, 0.05_dp, 2.0_dp, 50.0_dp]
+      real(dp), allocatable :: tx(:, :), ty(:, :)
+      real(dp) :: limit, scale
+      integer :: k, n, boundary, iterations
+      logical :: slope, both(2)
+
+      do n = 1, 16
+         slope = mod(n, 2) == 0
+         boundary = merge(boundary_free, boundary_periodic, n > 12)
+         call new_case(self, 48, 40, 1.0_dp, 0.9_dp, boundary, 0.3_dp, &
+            merge(0.0_dp, thickness(1 + mod(n - 1, 8)/2), n > 12))
+         call set_rough(self, 40 + n, 0.3_dp, 0.4_dp)
+         self%law = new_friction_law('coulomb', 0.6_dp, 0.0_dp, 0.0_dp, slope, .true.)
+         both = [.true., n <= 8]
+         self%solver%pulled = both
+         limit = 0.6_dp*sum(self%p)/(48*40)
+         self%solver%tolerance = 1e-8_dp
+         iterations = 0
+         do k = 1, 5
+            ! forth, nearly off, and back
+            self%solver%pull = limit*min(0.2_dp*k, 1.1_dp - 0.2_dp*k)*[0.8_dp, 0.3_dp]
+            self%drive_y = merge(0.0_dp, 1e-3_dp*k, both(2))
+            call run_pulled(self, 'pulled rough', 1e-6_dp)
+            iterations = iterations + self%result%iterations
+            call check_close(sum(self%tx)/(48*40)/self%solver%pull(1), 1.0_dp, 1e-6_dp, &
+               'pulled rough, force')
+         end do
+         ! The same by the place.
+         allocate (tx, ty, source=self%tx)
+         tx = self%tx
+         ty = self%ty
+         scale = sqrt(sum(tx**2 + ty**2))
+         self%solver%pulled = .false.
+         self%drive_x = self%drive_x + self%solver%offset(1)
+         self%drive_y = self%drive_y + self%solver%offset(2)
+         call run_case(self, 'placed rough', 1e-6_dp)
+         call check_close(sqrt(sum((tx - self%tx)**2 + (ty - self%ty)**2))/scale, 0.0_dp, 1e-5_dp, &
+            'pulled rough, as placed')
+         deallocate (tx, ty)
+         call end_case(self)
+      end do
+   end subroutine test_pulled_rough
+
+   !> A pull beyond the friction is reported, with all contact at its limit.
+   subroutine test_pulled_off()
+      type(case_type) :: self
+      integer :: boundary
+
+      do boundary = boundary_periodic, boundary_free
+         call new_case(self, 48, 40, 2.5_dp, 2.5_dp, boundary, 0.0_dp, 0.0_dp)
+         call set_hertz(self)
+         where (self%p <= 0.0_dp) self%contact = contact_open
+         self%law = new_friction_law('coulomb', 0.4_dp, 0.0_dp, 0.0_dp, .false., .true.)
+         self%solver%pulled = .true.
+         self%solver%pull = 1.02_dp*0.4_dp*sum(self%p)/(48*40)*[0.6_dp, 0.8_dp]
+         call self%solver%solve(self%operator, self%law, self%p, self%hx, self%hy, self%drive_x, &
+            self%drive_y, self%contact, self%tx, self%ty, self%rx, self%ry, self%result)
+         call check_that(.not. self%result%converged .and. self%solver%slides_off, 'pulled off')
+         call check_that(self%result%reason == 'the pull is more than the friction', 'pulled off, reason')
+         call check_close(hypot(sum(self%tx), sum(self%ty))/sum(self%p), 0.4_dp, 1e-8_dp, 'pulled off, limit')
+         call end_case(self)
+      end do
+   end subroutine test_pulled_off
 
    !> nu = 0.42 and 0.5: Mindlin's solution leaves out the slip across the load. That is an effect
    !> of second order in nu/(2-nu), the ratio of the two kernels: 1.05e-3 of full slip for 0.42 and

@@ -91,6 +91,7 @@ contains
          end if
          slipping = problem%slipping > 0
          call operator%columns(merge(columns_form, columns_apply, slipping), form)
+         call problem%add_spring(dx, dy, form)
          if (.not. (slope > 0.0_dp .and. form + curvature > 0.0_dp)) return
          alpha = slope/(form + curvature)
          call take_step(problem, operator, alpha, dx, dy, slipping, .false., returned)
@@ -125,7 +126,7 @@ contains
       logical, intent(in) :: again                 !! instead of the last step
       integer, intent(out) :: returned
 
-      if (problem%mean_compliance > 0.0_dp) then
+      if (any(problem%mean_compliance > 0.0_dp)) then
          call problem%move_total(operator, step, dx, dy, returned, again)
          if (fresh .or. returned > 0) call problem%transform_tractions(operator)
       else
@@ -168,7 +169,7 @@ contains
          call unscale_row(problem, preconditioner, mean, c, j, zx(:, j), zy(:, j))
       end do
       sums = problem%totals(5)
-      shift = c - matmul(inverse, matmul(coupling, sums(2:3)) + sums(4:5))
+      shift = c - matmul(inverse, matmul(transpose(coupling), sums(2:3)) + sums(4:5))
       rho = sums(1) + dot_product(problem%weighted_residual, shift)
    end subroutine precondition
 
@@ -181,8 +182,9 @@ contains
 
       inverse = 0.0_dp
       coupling = 0.0_dp
-      if (problem%mean_compliance <= 0.0_dp) return
-      coupling = problem%mean_compliance*problem%weighted_tangent
+      if (.not. any(problem%mean_compliance > 0.0_dp)) return
+      coupling(1, :) = problem%mean_compliance(1)*problem%weighted_tangent(1, :)
+      coupling(2, :) = problem%mean_compliance(2)*problem%weighted_tangent(2, :)
       k = matmul(problem%weighted_tangent, coupling) + problem%curved_tangent
       inverse = pseudo_inverse(k(1, 1), 0.5_dp*(k(1, 2) + k(2, 1)), k(2, 2), 1.0e-12_dp)
    end subroutine mean_mode

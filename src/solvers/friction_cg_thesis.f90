@@ -48,6 +48,7 @@ contains
             call new_direction(problem, operator, 0.0_dp, gx, gy, dx, dy, tx, ty, ascent, bend)
          end if
          call operator%columns(columns_form, form)
+         call problem%add_spring(tx, ty, form)
          if (.not. (form > 0.0_dp .and. abs(ascent) > 0.0_dp)) return
          ! The bound bends towards the solution or away: keep the step positive and finite.
          alpha = ascent/max(form - bend, 0.1_dp*form)

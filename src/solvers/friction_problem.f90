@@ -10,6 +10,14 @@
 !>
 !> so that g = 0 everywhere is the solution: stick, direction of slip and no reversed slip.
 !>
+!> The total of T can be prescribed, along x, y or both. Then the place c of the road along this
+!> direction is unknown too: r = DX + c - A (T + T_h). The road hangs on a spring of compliance kappa,
+!>
+!>     c = X - kappa (sum(T) - F)
+!>
+!> which makes sum(T) = F where X = c (method of multipliers: `hang_anew` moves X there). A spring much
+!> softer than the contact needs few such moves. A mass in the place of a spring needs none.
+!>
 !> Each pass over the fields is one loop over rows, fused with the transforms of its row. Sums are
 !> formed by row and added up in order: the results do not depend on the number of threads.
 module friction_problem
@@ -40,7 +48,16 @@ module friction_problem
       integer :: nx = 0, ny = 0
       integer :: threads = 1
       real(dp) :: compliance = 0.0_dp        !! a_0: displacement of a cell under its own unit traction
-      real(dp) :: mean_compliance = 0.0_dp   !! of the mean mode where it is stiff, by cells; else 0
+      !> Of the mean mode along x and y where it is soft, over the number of cells; else 0.
+      real(dp) :: mean_compliance(2) = 0.0_dp
+      ! A prescribed total, see the header.
+      logical :: pulled(2) = .false.         !! the total along this direction is prescribed
+      real(dp) :: pull(2) = 0.0_dp           !! F: the sum of T over the cells that is prescribed, Pa
+      real(dp) :: spring(2) = 0.0_dp         !! kappa: compliance of the spring, m/Pa of the sum
+      real(dp) :: spring_end(2) = 0.0_dp     !! X: where the spring would leave the road under F, m
+      real(dp) :: total(2) = 0.0_dp          !! sum of T, Pa
+      real(dp) :: offset(2) = 0.0_dp         !! c: how far the road is, m
+      real(dp), private :: offset_step(2) = 0.0_dp   !! change of c that r still lacks, m
       real(dp), pointer, contiguous :: p(:, :) => null()
       real(dp), pointer, contiguous :: hx(:, :) => null(), hy(:, :) => null()
       real(dp), pointer, contiguous :: drive_x(:, :) => null(), drive_y(:, :) => null()
@@ -85,6 +102,8 @@ module friction_problem
       procedure :: transform_tractions
       procedure :: solved
       procedure :: totals
+      procedure :: hang_anew
+      procedure :: add_spring
    end type friction_problem_type
 
 contains
@@ -201,6 +220,7 @@ contains
       real(dp) :: form
 
       self%fresh = .true.
+      call follow_total(self)
       call operator%columns(columns_apply, form)
       call slip_pass(self, operator, 1.0_dp)
    end subroutine update_slip
@@ -212,6 +232,7 @@ contains
       real(dp), intent(in) :: step
 
       self%fresh = .false.
+      call follow_total(self)
       call slip_pass(self, operator, step)
    end subroutine advance_slip
 
@@ -243,15 +264,15 @@ contains
 
       call operator%backward_row(1, j, u)
       if (self%fresh) then
-         self%rx(:, j) = self%drive_x(:, j) - u
+         self%rx(:, j) = self%drive_x(:, j) + self%offset(1) - u
       else
-         self%rx(:, j) = self%rx(:, j) - factor*u
+         self%rx(:, j) = self%rx(:, j) + self%offset_step(1) - factor*u
       end if
       call operator%backward_row(2, j, u)
       if (self%fresh) then
-         self%ry(:, j) = self%drive_y(:, j) - u
+         self%ry(:, j) = self%drive_y(:, j) + self%offset(2) - u
       else
-         self%ry(:, j) = self%ry(:, j) - factor*u
+         self%ry(:, j) = self%ry(:, j) + self%offset_step(2) - factor*u
       end if
    end subroutine slip_row
 
@@ -262,16 +283,73 @@ contains
       integer :: j
 
       self%fresh = .true.
+      call follow_total(self)
       largest = 0.0_dp
       !$omp parallel do default(none) shared(self) private(j) &
       !$omp reduction(max: largest) num_threads(self%threads)
       do j = 1, self%ny
-         self%rx(:, j) = self%drive_x(:, j)
-         self%ry(:, j) = self%drive_y(:, j)
+         self%rx(:, j) = self%drive_x(:, j) + self%offset(1)
+         self%ry(:, j) = self%drive_y(:, j) + self%offset(2)
          call measure_row(self, j, largest)
       end do
       call finish_measure(self, largest)
    end subroutine start_from_rest
+
+   !> The total of T where it is prescribed, and where the road then is.
+   subroutine follow_total(self)
+      class(friction_problem_type), intent(inout) :: self
+      real(dp) :: before(2)
+
+      if (.not. any(self%pulled)) return
+      before = self%offset
+      self%total = sum_of(self, self%tx, self%ty)
+      where (self%pulled) self%offset = self%spring_end - self%spring*(self%total - self%pull)
+      self%offset_step = self%offset - before
+   end subroutine follow_total
+
+   !> Sums of a vector field, by rows in order.
+   function sum_of(self, x, y) result(total)
+      class(friction_problem_type), intent(inout) :: self
+      real(dp), intent(in) :: x(:, :), y(:, :)
+      real(dp) :: total(2)
+      integer :: j
+
+      !$omp parallel do default(none) shared(self, x, y) private(j) num_threads(self%threads)
+      do j = 1, self%ny
+         self%row_sums(1, j) = sum(x(:, j))
+         self%row_sums(2, j) = sum(y(:, j))
+      end do
+      total = self%totals(2)
+   end function sum_of
+
+   !> Add the part of the spring to the form d.A d of a direction.
+   subroutine add_spring(self, dx, dy, form)
+      class(friction_problem_type), intent(inout) :: self
+      real(dp), intent(in) :: dx(:, :), dy(:, :)
+      real(dp), intent(inout) :: form
+
+      if (any(self%pulled)) form = form + sum(self%spring*sum_of(self, dx, dy)**2, self%pulled)
+   end subroutine add_spring
+
+   !> Move the free end of the spring by `way`, and the road with it; then measure.
+   subroutine hang_anew(self, way)
+      class(friction_problem_type), intent(inout) :: self
+      real(dp), intent(in) :: way(2)               !! m
+      real(dp) :: largest
+      integer :: j
+
+      self%spring_end = self%spring_end + way
+      self%offset = self%offset + way
+      largest = 0.0_dp
+      !$omp parallel do default(none) shared(self, way) private(j) &
+      !$omp reduction(max: largest) num_threads(self%threads)
+      do j = 1, self%ny
+         self%rx(:, j) = self%rx(:, j) + way(1)
+         self%ry(:, j) = self%ry(:, j) + way(2)
+         call measure_row(self, j, largest)
+      end do
+      call finish_measure(self, largest)
+   end subroutine hang_anew
 
    !> Release the points of a row that slip against their traction, and sum its residuals.
    subroutine measure_row(self, j, largest)
@@ -309,7 +387,7 @@ contains
       self%weighted_tangent = reshape([sums(7), sums(8), sums(8), sums(9)], [2, 2])
       self%curved_tangent = reshape([sums(10), sums(11), sums(11), sums(12)], [2, 2])
       self%gain_left = sums(13)
-      scale = max(sqrt(max(sums(3), sums(4))/max(self%cells, 1)), self%least_scale)
+      scale = max(sqrt(max(sums(3), sums(4))/max(self%cells, 1)), self%least_scale, norm2(self%offset))
       self%residual = sqrt(global_max(largest))
       if (scale > 0.0_dp) self%residual = self%residual/scale
       self%scale = merge(scale, 1.0_dp, scale > 0.0_dp)
@@ -348,7 +426,7 @@ contains
 
       call move_rows(self, operator, step, [0.0_dp, 0.0_dp], dx, dy, again, .false., sums)
       c = 0.0_dp
-      allowed = negligible*self%residual*self%scale/self%mean_compliance
+      allowed = negligible*self%residual*self%scale/maxval(self%mean_compliance)
       trial = 0
       do while (trial < corrections .and. norm2(sums(4:5)) > allowed)
          missed = sums(4:5)
