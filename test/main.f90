@@ -31,6 +31,7 @@ program main
    use test_normal_cg, only : run_normal_cg
    use test_simulation, only : run_simulation
    use test_simulation_adhesion, only : run_simulation_adhesion
+   use test_simulation_pull, only : run_simulation_pull
    use test_simulation_sliding, only : run_simulation_sliding
    use test_steady, only : run_steady
    use test_simulation_friction, only : run_simulation_friction
@@ -62,6 +63,7 @@ program main
    if (wanted('simulation_sliding')) call run_simulation_sliding()
    if (wanted('steady')) call run_steady()
    if (wanted('coupled_passes')) call run_coupled_passes()
+   if (wanted('simulation_pull')) call run_simulation_pull()
    if (wanted('simulation_friction')) call run_simulation_friction()
    if (wanted('simulation_adhesion')) call run_simulation_adhesion()
    if (wanted('starting_steps')) call run_starting_steps()

@@ -228,20 +228,20 @@ contains
       call set_hertz(self)
       self%law = new_friction_law('coulomb', mu, 0.0_dp, 0.0_dp, .false., .true.)
       load = sum(self%p)
-      self%solver%pulled = .true.
+      self%solver%pull%along = .true.
       do k = 1, size(part)
          self%tx = 0.0_dp
          self%ty = 0.0_dp
          self%drive_x = 0.0_dp
          self%drive_y = 0.0_dp
-         self%solver%pull = part(k)*mu*load/(128*128)*[cos(angle), sin(angle)]
-         self%solver%offset = 0.0_dp
+         self%solver%pull%traction = part(k)*mu*load/(128*128)*[cos(angle), sin(angle)]
+         self%solver%pull%offset = 0.0_dp
          call run_pulled(self, 'pulled sphere', 1e-8_dp)
          call check_close(hypot(sum(self%tx), sum(self%ty))/(mu*load*part(k)), 1.0_dp, 1e-8_dp, &
             'pulled sphere, force')
          call check_close(sum(self%ty)/sum(self%tx), tan(angle), 1e-8_dp, 'pulled sphere, direction')
          delta = (1.0_dp - (1.0_dp - part(k))**(2.0_dp/3.0_dp))*full_slip(self, mu, 0.0_dp)
-         call check_close(norm2(self%solver%offset)/delta, 1.0_dp, 1e-3_dp, 'pulled sphere, place')
+         call check_close(norm2(self%solver%pull%offset)/delta, 1.0_dp, 1e-3_dp, 'pulled sphere, place')
          area = count(self%contact == contact_stick)*self%grid%dx*self%grid%dy
          call check_close(sqrt(area/pi), (1.0_dp - part(k))**(1.0_dp/3.0_dp), 0.5_dp*self%grid%dx, &
             'pulled sphere, radius of stick')
@@ -259,11 +259,11 @@ contains
       call self%solver%solve(self%operator, self%law, self%p, self%hx, self%hy, self%drive_x, &
          self%drive_y, self%contact, self%tx, self%ty, self%rx, self%ry, self%result)
       call check_that(self%result%converged, what//': converged, '//trim(self%result%reason))
-      self%drive_x = self%drive_x + self%solver%offset(1)
-      self%drive_y = self%drive_y + self%solver%offset(2)
+      self%drive_x = self%drive_x + self%solver%pull%offset(1)
+      self%drive_y = self%drive_y + self%solver%pull%offset(2)
       call prove(self, what, accuracy)
-      self%drive_x = self%drive_x - self%solver%offset(1)
-      self%drive_y = self%drive_y - self%solver%offset(2)
+      self%drive_x = self%drive_x - self%solver%pull%offset(1)
+      self%drive_y = self%drive_y - self%solver%pull%offset(2)
    end subroutine run_pulled
 
    !> Rough roads, flat and with slope, thin and thick blocks and half-spaces, periodic and free: the
@@ -284,17 +284,17 @@ contains
          call set_rough(self, 40 + n, 0.3_dp, 0.4_dp)
          self%law = new_friction_law('coulomb', 0.6_dp, 0.0_dp, 0.0_dp, slope, .true.)
          both = [.true., n <= 8]
-         self%solver%pulled = both
+         self%solver%pull%along = both
          limit = 0.6_dp*sum(self%p)/(48*40)
          self%solver%tolerance = 1e-8_dp
          iterations = 0
          do k = 1, 5
             ! forth, nearly off, and back
-            self%solver%pull = limit*min(0.2_dp*k, 1.1_dp - 0.2_dp*k)*[0.8_dp, 0.3_dp]
+            self%solver%pull%traction = limit*min(0.2_dp*k, 1.1_dp - 0.2_dp*k)*[0.8_dp, 0.3_dp]
             self%drive_y = merge(0.0_dp, 1e-3_dp*k, both(2))
             call run_pulled(self, 'pulled rough', 1e-6_dp)
             iterations = iterations + self%result%iterations
-            call check_close(sum(self%tx)/(48*40)/self%solver%pull(1), 1.0_dp, 1e-6_dp, &
+            call check_close(sum(self%tx)/(48*40)/self%solver%pull%traction(1), 1.0_dp, 1e-6_dp, &
                'pulled rough, force')
          end do
          ! The same by the place.
@@ -302,9 +302,9 @@ contains
          tx = self%tx
          ty = self%ty
          scale = sqrt(sum(tx**2 + ty**2))
-         self%solver%pulled = .false.
-         self%drive_x = self%drive_x + self%solver%offset(1)
-         self%drive_y = self%drive_y + self%solver%offset(2)
+         self%solver%pull%along = .false.
+         self%drive_x = self%drive_x + self%solver%pull%offset(1)
+         self%drive_y = self%drive_y + self%solver%pull%offset(2)
          call run_case(self, 'placed rough', 1e-6_dp)
          call check_close(sqrt(sum((tx - self%tx)**2 + (ty - self%ty)**2))/scale, 0.0_dp, 1e-5_dp, &
             'pulled rough, as placed')
@@ -323,11 +323,11 @@ contains
          call set_hertz(self)
          where (self%p <= 0.0_dp) self%contact = contact_open
          self%law = new_friction_law('coulomb', 0.4_dp, 0.0_dp, 0.0_dp, .false., .true.)
-         self%solver%pulled = .true.
-         self%solver%pull = 1.02_dp*0.4_dp*sum(self%p)/(48*40)*[0.6_dp, 0.8_dp]
+         self%solver%pull%along = .true.
+         self%solver%pull%traction = 1.02_dp*0.4_dp*sum(self%p)/(48*40)*[0.6_dp, 0.8_dp]
          call self%solver%solve(self%operator, self%law, self%p, self%hx, self%hy, self%drive_x, &
             self%drive_y, self%contact, self%tx, self%ty, self%rx, self%ry, self%result)
-         call check_that(.not. self%result%converged .and. self%solver%slides_off, 'pulled off')
+         call check_that(.not. self%result%converged .and. self%solver%pull%slides_off, 'pulled off')
          call check_that(self%result%reason == 'the pull is more than the friction', 'pulled off, reason')
          call check_close(hypot(sum(self%tx), sum(self%ty))/sum(self%p), 0.4_dp, 1e-8_dp, 'pulled off, limit')
          call end_case(self)

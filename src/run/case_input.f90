@@ -122,6 +122,7 @@ contains
       call pick(groups, 'adhesion', group)
       call resolve_phases(pack_phases(groups), case%grid, case%material, &
          case%adhesion%potential /= 'none' .or. group%bad('potential'), case%phases, faults, case%warnings)
+      call check_pulls(pack_phases(groups), case, faults)
       call pick(groups, 'solver', group)
       call resolve_solver(group, case, faults)
       call pick(groups, 'output', group)
@@ -223,6 +224,23 @@ contains
          phases(n) = groups(i)
       end do
    end function pack_phases
+
+   !> A road that is pulled by a force needs friction to hold it.
+   subroutine check_pulls(groups, case, faults)
+      type(group_values_type), intent(in) :: groups(:)   !! the phases
+      type(case_type), intent(in) :: case
+      type(faults_type), intent(inout) :: faults
+      character(*), parameter :: names(4) = [character(10) :: 'traction_x', 'traction_y', 'force_x', 'force_y']
+      integer :: i, k
+
+      if (case%friction%law /= 'none') return
+      do k = 1, size(groups)
+         do i = 1, size(names)
+            if (groups(k)%given(trim(names(i)))) call groups(k)%fault(trim(names(i)), &
+               'needs &friction with a law: nothing else holds the road', faults)
+         end do
+      end do
+   end subroutine check_pulls
 
    !> `&grid`
    subroutine resolve_grid(group, grid, known, faults)

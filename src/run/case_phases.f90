@@ -50,6 +50,7 @@ contains
             phase%steady = group%logical_value('steady')
             phase%velocity_x = group%real_value('velocity_x')
             phase%velocity_y = group%real_value('velocity_y')
+            call resolve_pull(group, grid, phase, faults)
             if (i == 1) then
                call resolve_load(group, phase, faults)
             else
@@ -120,6 +121,39 @@ contains
             'one of them', faults)
       end if
    end subroutine resolve_load
+
+   !> The force on the road along each direction where it takes the place of the velocity.
+   subroutine resolve_pull(group, grid, phase, faults)
+      type(group_values_type), intent(in) :: group
+      type(grid_type), intent(in) :: grid
+      type(phase_settings_type), intent(inout) :: phase
+      type(faults_type), intent(inout) :: faults
+      character(*), parameter :: axes(2) = ['x', 'y']
+      character(:), allocatable :: force, name, traction, velocity
+      integer :: c
+
+      phase%pulled = .false.
+      phase%pull = 0.0_dp
+      do c = 1, 2
+         traction = 'traction_'//axes(c)
+         force = 'force_'//axes(c)
+         velocity = 'velocity_'//axes(c)
+         if (.not. (group%given(traction) .or. group%given(force))) cycle
+         name = traction
+         if (group%given(force)) name = force
+         phase%pulled(c) = .true.
+         if (group%given(traction) .and. group%given(force)) call group%group_fault(traction//' and '// &
+            force//' are given together: give one of them', faults)
+         if (group%given(velocity)) call group%fault(name, 'excludes '//velocity//': a force prescribes '// &
+            'how the road is pulled, and where it goes is found', faults)
+         if (phase%relaxed) call group%fault(name, 'excludes relaxed = .true.: let the pull rest for a '// &
+            'phase that is longer than the relaxation times', faults)
+         if (phase%steady) call group%fault(name, 'excludes steady = .true., which needs a velocity', faults)
+         if (group%bad(name)) cycle
+         phase%pull(c) = group%real_value(name)
+         if (name == force .and. grid%nx > 0) phase%pull(c) = phase%pull(c)/(grid%lx*grid%ly)
+      end do
+   end subroutine resolve_pull
 
    !> Without adhesion a load must press.
    subroutine check_load(group, phase, adhesive, faults)

@@ -1,7 +1,7 @@
 !> A case in words: every resolved setting as an input of its own, time steps and memory.
 module case_report
    use adhesion_advice, only : adhesion_notes
-   use case_settings, only : case_type, phase_settings_type
+   use case_settings, only : case_type, phase_settings_type, road_moves
    use case_time, only : duration_text, seconds_needed
    use memory_limits, only : memory_limit, memory_text
    use precision, only : dp
@@ -109,7 +109,7 @@ contains
       fields = 10.0_dp + arms
       buffers = 1.0_dp
       if (arms > 0) fields = fields + 3.0_dp
-      if (any(abs(case%phases%velocity_x) + abs(case%phases%velocity_y) > 0.0_dp)) fields = fields + 4.0_dp
+      if (road_moves(case%phases)) fields = fields + 4.0_dp
       if (case%adhesion%potential /= 'none') then
          fields = fields + 6.0_dp
          buffers = buffers + 1.0_dp
@@ -192,10 +192,23 @@ contains
             control_units(phase%control)//nl
       end if
       text = text//string('ramp', merge('linear', 'step  ', phase%linear))//truth('relaxed', phase%relaxed)// &
-         truth('steady', phase%steady)//number('velocity_x', phase%velocity_x, 'm/s')// &
-         number('velocity_y', phase%velocity_y, 'm/s')// &
-         '/'//nl
+         truth('steady', phase%steady)//drive_text('x', phase%velocity_x, phase%pulled(1), phase%pull(1))// &
+         drive_text('y', phase%velocity_y, phase%pulled(2), phase%pull(2))//'/'//nl
    end function phase_text
+
+   !> The velocity of the road along an axis, or the traction that pulls it.
+   function drive_text(axis, velocity, pulled, pull) result(text)
+      character, intent(in) :: axis
+      real(dp), intent(in) :: velocity, pull
+      logical, intent(in) :: pulled
+      character(:), allocatable :: text
+
+      if (pulled) then
+         text = number('traction_'//axis, pull, 'Pa')
+      else
+         text = number('velocity_'//axis, velocity, 'm/s')
+      end if
+   end function drive_text
 
    !> `&solver` and `&output`
    function solver_text(case) result(text)

@@ -11,7 +11,7 @@ module case_settings
 
    public :: adhesion_settings_type, case_type, friction_settings_type, material_settings_type, &
       output_settings_type, path_length, phase_settings_type, solver_settings_type, &
-      surface_settings_type, word_length
+      road_moves, surface_settings_type, word_length
 
    !> `&material`, with Zener branches already turned into Prony arms.
    type :: material_settings_type
@@ -57,6 +57,8 @@ module case_settings
       logical :: relaxed
       logical :: steady                             !! the first row is a state of steady sliding
       real(dp) :: velocity_x, velocity_y            !! of the road, m/s
+      logical :: pulled(2)                          !! the road hangs on a force along x, y
+      real(dp) :: pull(2)                           !! that force at the end, over the cell, Pa; 0 where it does not
    end type phase_settings_type
 
    !> `&solver`
@@ -98,5 +100,20 @@ module case_settings
       type(output_settings_type) :: output
       character(:), allocatable :: warnings         !! one line each; empty if there are none
    end type case_type
+
+contains
+
+   !> Does some phase move or pull the road?
+   pure function road_moves(phases) result(yes)
+      type(phase_settings_type), intent(in) :: phases(:)
+      logical :: yes
+      integer :: k
+
+      yes = .false.
+      do k = 1, size(phases)
+         yes = yes .or. abs(phases(k)%velocity_x) > 0.0_dp .or. abs(phases(k)%velocity_y) > 0.0_dp .or. &
+            any(phases(k)%pulled)
+      end do
+   end function road_moves
 
 end module case_settings

@@ -7,7 +7,7 @@
 !> transforms depends on the road, the load and the tolerance: the estimate says whether to wait or
 !> to come back tomorrow, within a factor of about three.
 module case_time
-   use case_settings, only : case_type
+   use case_settings, only : case_type, road_moves
    use errors, only : error_type
    use parallel, only : processor_count
    use precision, only : dp
@@ -42,7 +42,7 @@ contains
          associate (phase => case%phases(k))
             jumps = jumps - phase%steps
             step = 0.3_dp*solve                    ! a step starts from the solution before it
-            if (abs(phase%velocity_x) + abs(phase%velocity_y) > 0.0_dp) then
+            if (road_moves([phase])) then
                step = 0.7_dp*solve
                ! Passes over normal and tangential contact, each with its own solves.
                if (case%friction%law /= 'none') step = 4.0_dp*solve

@@ -215,7 +215,14 @@ contains
             'Start as if the road had slid for ever under this load at this velocity.'), &
          row('phase', 'velocity_x', kind_real, '0.0', 'm/s', 'any', &
             'Velocity of the road relative to the top of the block, along x.'), &
-         row('phase', 'velocity_y', kind_real, '0.0', 'm/s', 'any', 'The same along y.')]
+         row('phase', 'velocity_y', kind_real, '0.0', 'm/s', 'any', 'The same along y.'), &
+         row('phase', 'traction_x', kind_real, '(none)', 'Pa', 'any', &
+            'Instead of velocity_x: the force that pulls the road along x, at the end, over the area of '// &
+            'the cell. How far the road moves is found. By ramp, as the load. Needs &friction.'), &
+         row('phase', 'traction_y', kind_real, '(none)', 'Pa', 'any', 'The same along y.'), &
+         row('phase', 'force_x', kind_real, '(none)', 'N', 'any', &
+            'That force itself, traction_x lx ly: give one of them.'), &
+         row('phase', 'force_y', kind_real, '(none)', 'N', 'any', 'The same along y.')]
    end function phase
 
    pure function solver_and_output() result(rows)

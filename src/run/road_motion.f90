@@ -7,6 +7,7 @@ module road_motion
    use contact_state, only : contact_state_type
    use interpolation, only : displaced, shifted
    use precision, only : dp, int8
+   use pulled_road, only : drive_direction
    use regular_grid, only : boundary_free
    use schedule, only : planned_row_type
    implicit none
@@ -23,8 +24,7 @@ contains
       integer :: cells(2)
       real(dp) :: drift(2), seen(2)
 
-      if (abs(plan%velocity_x) > 0.0_dp .or. abs(plan%velocity_y) > 0.0_dp) &
-         self%direction = [plan%velocity_x, plan%velocity_y]/hypot(plan%velocity_x, plan%velocity_y)
+      call drive_direction(plan, self%direction)
       if (.not. self%slides) return
       drift = 0.0_dp
       if (self%rubs()) then

@@ -31,6 +31,9 @@ module schedule
       real(dp) :: road_y = 0.0_dp
       real(dp) :: velocity_x = 0.0_dp             !! of the road, m/s
       real(dp) :: velocity_y = 0.0_dp
+      logical :: pulled(2) = .false.              !! the road hangs on a force along x, y
+      real(dp) :: pull(2) = 0.0_dp                !! that force, Pa
+      real(dp) :: pull_before(2) = 0.0_dp         !! the same at the start of the step, Pa
    end type planned_row_type
 
    !> Where a run stands. Plain numbers, so that a checkpoint can hold them.
@@ -48,6 +51,9 @@ module schedule
       real(dp) :: held_rate = 0.0_dp              !! rate of the load in the last step, over s
       real(dp) :: velocity_x = 0.0_dp             !! of the road so far, m/s
       real(dp) :: velocity_y = 0.0_dp
+      logical :: held_pulled(2) = .false.         !! the road hung on a force so far
+      real(dp) :: held_pull(2) = 0.0_dp           !! that force, Pa
+      real(dp) :: start_pull(2) = 0.0_dp          !! force on the road at the start of the phase, Pa
       logical :: speed_changed = .false.          !! by `change_velocity`, since the last row
    end type schedule_type
 
@@ -58,39 +64,49 @@ contains
       type(phase_settings_type), intent(in) :: phases(:)
       integer :: rows
       integer :: k
-      character(12) :: control
-      real(dp) :: load
+      type(schedule_type) :: held
 
       rows = 0
-      control = ''
-      load = 0.0_dp
       do k = 1, size(phases)
          rows = rows + phases(k)%steps
-         if (begins_with_row(phases(k), control, load)) rows = rows + 1
-         control = phases(k)%control(:12)
-         load = phases(k)%target
+         if (begins_with_row(phases(k), held)) rows = rows + 1
+         call hold(held, phases(k))
       end do
    end function count_rows
 
-   !> Does a phase begin with a row of its own, for a load that jumps?
-   pure function begins_with_row(phase, control, load) result(begins)
+   !> Hold what a phase ends with.
+   pure subroutine hold(self, phase)
+      type(schedule_type), intent(inout) :: self
       type(phase_settings_type), intent(in) :: phase
-      character(12), intent(in) :: control         !! of the load held so far
-      real(dp), intent(in) :: load
+
+      self%held_control = phase%control(:12)
+      self%held_load = phase%target
+      self%held_pulled = phase%pulled
+      self%held_pull = phase%pull
+   end subroutine hold
+
+   !> Does a phase begin with a row of its own, for a load or a pull that jumps?
+   pure function begins_with_row(phase, held) result(begins)
+      type(phase_settings_type), intent(in) :: phase
+      type(schedule_type), intent(in) :: held      !! with the load and the pull held so far
       logical :: begins
 
       begins = .false.
       if (phase%static) return
-      begins = control == '' .or. phase%relaxed .or. phase%steady
-      if (.not. phase%linear) begins = begins .or. control /= phase%control(:12) .or. &
-         abs(load - phase%target) > 0.0_dp
+      begins = held%held_control == '' .or. phase%relaxed .or. phase%steady
+      if (phase%linear) return
+      begins = begins .or. held%held_control /= phase%control(:12) .or. &
+         abs(held%held_load - phase%target) > 0.0_dp
+      begins = begins .or. any(phase%pulled .and. (.not. held%held_pulled .or. &
+         abs(held%held_pull - phase%pull) > 0.0_dp))
    end function begins_with_row
 
    !> The next row, and the schedule behind it; `finished` where there is none.
-   subroutine next_row(self, phases, present_load, row, finished)
+   subroutine next_row(self, phases, present_load, present_pull, row, finished)
       type(schedule_type), intent(inout) :: self
       type(phase_settings_type), intent(in) :: phases(:)
       real(dp), intent(in) :: present_load(3)      !! pressure, force and displacement now
+      real(dp), intent(in) :: present_pull(2)      !! horizontal force of the road on the rubber now, Pa
       type(planned_row_type), intent(out) :: row
       logical, intent(out) :: finished
       real(dp) :: part
@@ -100,7 +116,9 @@ contains
       associate (phase => phases(self%phase))
          if (self%step == 0 .and. .not. self%entered) then
             row%new_speed = abs(phase%velocity_x - self%velocity_x) > 0.0_dp .or. &
-               abs(phase%velocity_y - self%velocity_y) > 0.0_dp
+               abs(phase%velocity_y - self%velocity_y) > 0.0_dp .or. &
+               any(phase%pulled .neqv. self%held_pulled)
+            self%start_pull = merge(self%held_pull, present_pull, self%held_pulled)
             self%start_load = load_at_start(self, phase, present_load)
             self%velocity_x = phase%velocity_x
             self%velocity_y = phase%velocity_y
@@ -111,12 +129,15 @@ contains
          row%control = phase%control(:12)
          row%velocity_x = phase%velocity_x
          row%velocity_y = phase%velocity_y
+         row%pulled = phase%pulled
+         row%pull = phase%pull
 
-         if (.not. self%entered .and. begins_with_row(phase, self%held_control, self%held_load)) then
+         if (.not. self%entered .and. begins_with_row(phase, self)) then
             part = 0.0_dp
             row%instantaneous = .true.
             row%load = self%start_load
             if (.not. phase%linear) row%load = phase%target
+            if (phase%linear) row%pull = merge(self%start_pull, 0.0_dp, phase%pulled)
          else
             self%step = self%step + 1
             part = real(self%step, dp)/phase%steps
@@ -124,11 +145,21 @@ contains
             row%dt = phase%dt
             row%load = phase%target
             if (phase%linear) row%load = self%start_load + part*(phase%target - self%start_load)
-            if (self%step == phase%steps) row%load = phase%target
+            row%pull_before = row%pull
+            if (phase%linear) then
+               row%pull = merge(self%start_pull + part*(phase%pull - self%start_pull), 0.0_dp, phase%pulled)
+               row%pull_before = merge(self%start_pull + real(self%step - 1, dp)/phase%steps &
+                  *(phase%pull - self%start_pull), 0.0_dp, phase%pulled)
+            end if
+            if (self%step == phase%steps) then
+               row%load = phase%target
+               row%pull = phase%pull
+            end if
             row%load_before = phase%target
             if (phase%linear) row%load_before = self%start_load &
                + real(self%step - 1, dp)/phase%steps*(phase%target - self%start_load)
             if (self%step == 1 .and. .not. phase%static) call note_rate(self, phase, row)
+            if (self%step == 1 .and. phase%linear .and. any(phase%pulled)) row%new_rate = .not. phase%static
          end if
          row%ramped = phase%linear .and. self%step > 0 .and. self%row >= 0
          self%entered = .true.
@@ -147,8 +178,7 @@ contains
             self%start_time = row%time
             self%start_x = row%road_x
             self%start_y = row%road_y
-            self%held_control = row%control
-            self%held_load = phase%target
+            call hold(self, phase)
             self%phase = self%phase + 1
             self%step = 0
             self%entered = .false.
@@ -179,6 +209,8 @@ contains
       do k = self%phase, size(phases)
          phases(k)%velocity_x = velocity(1)
          phases(k)%velocity_y = velocity(2)
+         phases(k)%pulled = .false.
+         phases(k)%pull = 0.0_dp
       end do
    end subroutine change_velocity
 

@@ -8,7 +8,7 @@
 !> it: module `contact_state`. How the road moves at the start of a row: module `road_motion`.
 module simulation
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
-   use case_settings, only : case_type
+   use case_settings, only : case_type, road_moves
    use contact_rule, only : touches
    use contact_size, only : cells_across, watch_contact_size
    use contact_state, only : contact_state_type, solve_normal
@@ -23,6 +23,7 @@ module simulation
    use outside_balance, only : book_outside
    use parallel, only : global_sum
    use precision, only : dp, int64, int8
+   use pulled_road, only : guess_road, pull_outcome, take_road
    use road_motion, only : move_road, place_road
    use schedule, only : next_row, planned_row_type, schedule_type
    use solver_result, only : solver_result_type
@@ -86,7 +87,7 @@ contains
       self%warnings = ''
       nx = self%grid%nx
       ny = self%grid%ny
-      self%slides = any(abs(case%phases%velocity_x) > 0.0_dp .or. abs(case%phases%velocity_y) > 0.0_dp)
+      self%slides = road_moves(case%phases)
       if (present(movable)) self%slides = self%slides .or. movable
       call new_height(self%grid, case%surfaces, self%height, error, self%map_checksums)
       if (allocated(error)) return
@@ -143,7 +144,8 @@ contains
       integer :: k
 
       call next_row(self%schedule, self%case%phases, &
-         [self%row%pressure, self%row%force, self%row%displacement], plan, self%finished)
+         [self%row%pressure, self%row%force, self%row%displacement], &
+         self%drive_force/(self%grid%lx*self%grid%ly), plan, self%finished)
       if (self%finished) return
       call split_start(plan, needs_start(self%material) .or. plan%new_speed .or. plan%new_rate, &
          extrapolates(self%material), [self%row%road_x, self%row%road_y], parts)
@@ -173,13 +175,14 @@ contains
       real(dp) :: level
       integer(int64) :: start, now, rate
 
+      call guess_road(plan, [self%row%road_x, self%row%road_y], self%velocity)
       call begin_step(self, plan, error)
       if (allocated(error)) return
       call system_clock(start, rate)
       if (.not. plan%steady) then
          if (.not. is_elastic(self%material)) call history_field(self%history, self%material, self%past)
          if (self%frictional) call self%tangential%begin(self%material, &
-            [plan%road_x - self%row%road_x, plan%road_y - self%row%road_y], plan%dt)
+            [plan%road_x - self%row%road_x, plan%road_y - self%row%road_y], plan%dt, plan%pulled, plan%pull)
          call move_road(self, plan)
       end if
 
@@ -202,7 +205,10 @@ contains
          self%residual = rubbing%residual
          if (rubbing%residual <= self%case%solver%tolerance) &
             self%reason = trim(self%reason)//' before the tractions settled'
+         if (self%tangential%slides_off) self%reason = pull_outcome(plan, self%tangential)
       end if
+      if (self%frictional) call take_road(plan, self%schedule, self%tangential, &
+         [self%row%road_x, self%row%road_y], self%velocity)
 
       if (self%rubs() .and. .not. plan%steady) call look_at_passes(self, plan)
       if (.not. plan%steady) call commit_step(self, level)

@@ -114,6 +114,11 @@ contains
             'rate of the load in the last step, in the units of its control')
          call table%add('schedule/velocity_x', s%velocity_x, 'm/s', 'velocity of the road so far')
          call table%add('schedule/velocity_y', s%velocity_y, 'm/s', 'velocity of the road so far')
+         call table%add('schedule/pulled_x', s%held_pulled(1), 'the road hung on a force along x so far')
+         call table%add('schedule/pulled_y', s%held_pulled(2), 'the road hung on a force along y so far')
+         call table%add('schedule/held_pull', s%held_pull, 'Pa', 'force on the road so far, over the cell')
+         call table%add('schedule/start_pull', s%start_pull, 'Pa', &
+            'force on the road at the start of the phase, over the cell')
          call table%add('schedule/speed_changed', s%speed_changed, &
             'the velocity was changed since the last row')
       end associate

@@ -69,6 +69,7 @@ contains
          if (k == size(ends)) exit                 ! it ends exactly where the step does
          parts(k)%time = plan%time - rest*plan%dt
          parts(k)%load = plan%load - rest*(plan%load - plan%load_before)
+         parts(k)%pull = plan%pull - rest*(plan%pull - plan%pull_before)
          parts(k)%road_x = plan%road_x - rest*(plan%road_x - road(1))
          parts(k)%road_y = plan%road_y - rest*(plan%road_y - road(2))
       end do

@@ -57,7 +57,14 @@ module tangential_state
       type(friction_solver_type), private :: solver
       real(dp), allocatable, private :: drive(:, :, :)    !! DX'
       real(dp), allocatable, private :: past(:, :, :)     !! T_h
-      real(dp), private :: motion(2) = 0.0_dp             !! D' - D of the step in hand, m
+      logical :: pulled(2) = .false.                  !! the road hangs on a force along x, y
+      real(dp) :: pull(2) = 0.0_dp                    !! that force, over the cell, Pa
+      logical :: slides_off = .false.                 !! it is more than the friction holds,
+      real(dp) :: held(2) = 0.0_dp                    !! which is this, Pa
+      real(dp), private :: motion(2) = 0.0_dp             !! D' - D of the step in hand, m; a guess where pulled
+      real(dp), private :: found(2) = 0.0_dp              !! D' - D as found by the last solve, m
+      real(dp), private :: mass_place(2) = 0.0_dp         !! of a pulled mass, in the units of DX'
+      real(dp), private :: mass_yields = 0.0_dp           !! a pulled mass yields to T - F by this
       real(dp), private :: dt = 0.0_dp
       real(dp), private :: q = 0.0_dp
       real(dp), private :: past_mean(2) = 0.0_dp
@@ -66,6 +73,7 @@ module tangential_state
       procedure :: extrapolate
       procedure :: solve
       procedure :: take_steady
+      procedure :: take_motion
       procedure :: commit
       procedure :: sums
       procedure :: destroy
@@ -111,21 +119,27 @@ contains
    end subroutine new_tangential_state
 
    !> Begin a step: what the road's motion and the past ask for. The material's step has begun.
-   subroutine begin(self, material, motion, dt)
+   subroutine begin(self, material, motion, dt, pulled, pull)
       class(tangential_state_type), intent(inout) :: self
       type(zener_type), intent(in) :: material
-      real(dp), intent(in) :: motion(2)               !! D' - D, m
+      real(dp), intent(in) :: motion(2)               !! D' - D, m; a guess where pulled
       real(dp), intent(in) :: dt                      !! s; 0: instantaneous
+      logical, intent(in) :: pulled(2)                !! the road hangs on a force along x, y
+      real(dp), intent(in) :: pull(2)                 !! that force, over the cell, Pa
       real(dp) :: height, shift(2)
       integer :: c, j
 
       self%motion = motion
       self%dt = dt
       self%q = material%q
-      self%moved = self%moved .or. any(abs(motion) > 0.0_dp)
+      self%pulled = pulled
+      self%pull = pull
+      self%found = motion
+      self%slides_off = .false.
+      self%moved = self%moved .or. any(abs(motion) > 0.0_dp) .or. any(pulled .and. abs(pull) > 0.0_dp)
       if (.not. self%moved) return
       ! A road that goes back where it began leaves displacements of round-off.
-      self%solver%least_scale = self%q*norm2(motion)
+      self%solver%least_scale = self%q*norm2(merge(0.0_dp, motion, pulled))
       if (.not. dt > 0.0_dp) self%pace = 0.0_dp
       call history_field(self%history, material, self%past)
       self%past_mean = means(self, self%past)
@@ -140,6 +154,7 @@ contains
          height = 0.0_dp
          shift = shift - self%q*means(self, self%displacement)
       end if
+      where (pulled) shift = 0.0_dp
       do c = 1, 2
          !$omp parallel do default(none) shared(self, c, shift) private(j)
          do j = 1, self%grid%ny
@@ -147,7 +162,107 @@ contains
          end do
       end do
       call set_thickness(self, height)
+      if (any(pulled) .and. self%block%mass > 0.0_dp) call place_mass(self)
    end subroutine begin
+
+   !> A pulled mass: the rubber carries the pull F from its top to the mass, which T brakes. Means:
+   !>
+   !>    U' = h (F + T_h)/Q,   T - F = f' = R (U' - (D' - D))/h - k
+   !>
+   !> with the force f' on the mass, its resistance R and what is known of it, k, by module
+   !> `block_motion`. So Q (D' - D) - Q U' = -Q h/R (k + T - F): a spring for the solver, whose operator
+   !> needs no mean mode. In no time the mass does not move.
+   subroutine place_mass(self)
+      type(tangential_state_type), intent(inout) :: self
+      integer :: c
+
+      if (self%block%inert(self%dt)) then
+         self%mass_yields = self%q*self%block%height/self%block%resistance(self%dt)
+         self%mass_place = -self%mass_yields &
+            *self%block%known(means(self, self%displacement), [0.0_dp, 0.0_dp], self%dt)
+      else
+         self%mass_yields = tiny(1.0_dp)
+         self%mass_place = -self%q*means(self, self%displacement)
+      end if
+      do c = 1, 2
+         if (self%pulled(c)) self%operator%symbol(0, 0, c) = 0.0_dp
+      end do
+   end subroutine place_mass
+
+   !> Tell the solver what pulls the road. The rest of the horizontal force is not in T: without
+   !> `slope_effect` that of all slopes, else that of the slopes which attraction pulls at outside the
+   !> contact.
+   subroutine hang_road(self, pressure, slope_x, slope_y)
+      type(tangential_state_type), intent(inout) :: self
+      real(dp), intent(in) :: pressure(:, :), slope_x(:, :), slope_y(:, :)
+
+      associate (pull => self%solver%pull)
+         pull%along = self%pulled
+         if (.not. any(self%pulled)) return
+         pull%traction = self%pull - outside_force(self, pressure, slope_x, slope_y)
+         if (self%block%mass > 0.0_dp) then
+            pull%offset = self%mass_place
+            pull%yielding = self%mass_yields
+         else
+            pull%offset = self%q*self%found
+            pull%yielding = 0.0_dp
+         end if
+      end associate
+   end subroutine hang_road
+
+   !> How far the pulled road has moved, from what the solver has found.
+   subroutine find_motion(self)
+      type(tangential_state_type), intent(inout) :: self
+
+      if (.not. any(self%pulled)) return
+      associate (pull => self%solver%pull)
+         if (self%block%mass > 0.0_dp) pull%offset = pull%offset + &
+            self%block%height*(pull%traction + self%past_mean)
+         self%found = merge(pull%offset/self%q, self%motion, self%pulled)
+         self%slides_off = pull%slides_off
+         if (self%slides_off) self%held = merge(means(self, self%traction) + self%pull - pull%traction, 0.0_dp, &
+            self%pulled)
+      end associate
+   end subroutine find_motion
+
+   !> Mean horizontal force of the road on the rubber that T does not hold, Pa.
+   function outside_force(self, pressure, slope_x, slope_y) result(force)
+      type(tangential_state_type), intent(in) :: self
+      real(dp), intent(in) :: pressure(:, :), slope_x(:, :), slope_y(:, :)
+      real(dp) :: force(2)
+      real(dp), allocatable :: rows(:, :)
+      logical, allocatable :: counts(:)
+      integer :: j
+
+      force = 0.0_dp
+      if (self%law%slope .and. .not. self%adhesive) return
+      allocate (rows(2, self%grid%ny))
+      !$omp parallel do default(none) shared(self, pressure, slope_x, slope_y, rows) private(j, counts)
+      do j = 1, self%grid%ny
+         counts = self%contact(:, j) == 0_int8 .or. .not. self%law%slope
+         rows(1, j) = sum(pressure(:, j)*slope_x(:, j), counts)
+         rows(2, j) = sum(pressure(:, j)*slope_y(:, j), counts)
+      end do
+      force = -global_sum([sum(rows(1, :)), sum(rows(2, :))])/(real(self%grid%nx, dp)*self%grid%ny)
+   end function outside_force
+
+   !> The step is solved: take over how far the pulled road has moved, which the displacements were
+   !> reckoned without.
+   subroutine take_motion(self, motion)
+      class(tangential_state_type), intent(inout) :: self
+      real(dp), intent(out) :: motion(2)              !! of the road in the step, m
+      integer :: c, j
+
+      motion = self%found
+      do c = 1, 2
+         if (.not. self%pulled(c)) cycle
+         !$omp parallel do default(none) shared(self, c) private(j)
+         do j = 1, self%grid%ny
+            self%trial(:, j, c) = self%trial(:, j, c) + (self%found(c) - self%motion(c))
+         end do
+      end do
+      self%motion = self%found
+   end subroutine take_motion
 
    !> Start the step's traction from the change of the last step going on. To be called when the road
    !> has moved, once a step.
@@ -197,7 +312,9 @@ contains
       mean = global_sum([sum(rows(1, :)), sum(rows(2, :))])/(real(self%grid%nx, dp)*self%grid%ny)
    end function means
 
-   !> Solve for the traction under a pressure: T, the trial displacement, the slip.
+   !> Solve for the traction under a pressure: T, the trial displacement, the slip. Where the road is
+   !> pulled, the trial displacement is reckoned as if the road had moved by the guess: U - (D' - D) is
+   !> right, and the road is read by that. `take_motion` ends this.
    subroutine solve(self, pressure, gap, slope_x, slope_y, tolerance, settle, outcome)
       class(tangential_state_type), intent(inout) :: self
       real(dp), intent(in), contiguous, target :: pressure(:, :)
@@ -211,9 +328,11 @@ contains
       self%solver%tolerance = tolerance
       self%solver%settle = settle
       call mark_contact(self, pressure, gap)
+      call hang_road(self, pressure, slope_x, slope_y)
       call self%solver%solve(self%operator, self%law, pressure, slope_x, slope_y, self%drive(:, :, 1), &
          self%drive(:, :, 2), self%contact, self%traction(:, :, 1), self%traction(:, :, 2), &
          self%slip(:, :, 1), self%slip(:, :, 2), outcome, self%past(:, :, 1), self%past(:, :, 2))
+      call find_motion(self)
       do c = 1, 2
          !$omp parallel do default(none) shared(self, c) private(j)
          do j = 1, self%grid%ny

@@ -29,11 +29,11 @@ module friction_cg
    use friction_cg_fast, only : iterate_fast
    use friction_cg_gradient, only : iterate_gradient
    use friction_cg_thesis, only : iterate_thesis
-   use friction_law, only : contact_open, friction_law_type
+   use friction_law, only : friction_law_type
    use friction_problem, only : friction_problem_type
+   use friction_pull, only : friction_pull_type
    use influence, only : tangential_symbol
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
-   use parallel, only : global_sum
    use omp_lib, only : omp_get_wtime
    use precision, only : dp, int8, pi
    use regular_grid, only : boundary_periodic, grid_type
@@ -48,9 +48,8 @@ module friction_cg
    integer, parameter, public :: friction_gradient = 3
 
    integer, parameter :: gradient_steps = 100    !! at a time, when the fast method stalls
-   real(dp), parameter :: softer = 100.0_dp      !! the spring of a pull against the contact
    integer, parameter :: hangings = 60           !! of the spring, at most
-   integer, parameter :: stuck_hangings = 3      !! that do not bring a contact in full slip nearer
+   integer, parameter :: idle_hangings = 3       !! in full slip, after which nothing helps
    !> Mean compliance over the length of the cell from where the fast method treats it apart. Below,
    !> that costs iterations, above it saves them.
    real(dp), parameter :: thick = 0.2_dp
@@ -67,15 +66,7 @@ module friction_cg
       !> them up, where these may cancel.
       real(dp) :: least_scale = 0.0_dp
       logical :: near = .false.                  !! T starts near the solution, as in a step like the last
-      !> The mean of T over the grid is prescribed along this direction, `pull`, and how far the road
-      !> is, `offset`, is found: r = DX' + offset - A (T + T_h).
-      logical :: pulled(2) = .false.
-      real(dp) :: pull(2) = 0.0_dp               !! Pa
-      real(dp) :: offset(2) = 0.0_dp             !! in: a guess; out: found where pulled, else 0; units of DX'
-      !> More than 0: the mean of T may differ from the pull, which then moves the road by
-      !> offset = (its value for a mean T of `pull`, given) - yielding*(mean T - pull).
-      real(dp) :: yielding(2) = 0.0_dp           !! m for G = 1 Pa
-      logical :: slides_off = .false.            !! out: the pull is more than the friction can hold
+      type(friction_pull_type) :: pull           !! a total of T that is prescribed, and the road's place
       type(convolution_type), private :: preconditioner
       logical, private :: periodic = .true.
       real(dp), private :: length = 0.0_dp       !! of the longer side, m
@@ -190,7 +181,7 @@ contains
       !> none.
       real(dp), intent(in), contiguous, target, optional :: past_x(:, :), past_y(:, :)
       type(friction_problem_type) :: problem
-      real(dp) :: start_time, cells, mean_mode(2)
+      real(dp) :: start_time, cells
       logical :: moving, converged
 
       start_time = omp_get_wtime()
@@ -226,7 +217,7 @@ contains
       if (self%periodic .and. operator%symbol(0, 0, 1)*cells > thick*self%length) then
          problem%mean_compliance = operator%symbol(0, 0, 1)
       end if
-      call hang_road(self, problem, operator, mean_mode)
+      call self%pull%hang(problem, operator, thick*self%length)
       call set_mean_stiffness(self, operator)
 
       call problem%start(operator, moving)
@@ -238,7 +229,7 @@ contains
       do
          if (problem%residual > self%tolerance) call iterate(self, problem, operator, result%iterations)
          converged = problem%solved(self%tolerance)
-         if (converged .and. any(self%pulled)) then
+         if (converged .and. any(self%pull%along)) then
             call meet_pull(self, problem, operator, result%iterations, converged)
          end if
          if (problem%fresh .or. .not. converged) exit
@@ -247,8 +238,8 @@ contains
          if (problem%residual <= self%tolerance) exit
       end do
 
-      call take_off_road(self, problem, operator, mean_mode)
-      result%load_error = pull_missed(self, problem)
+      result%load_error = self%pull%missed(problem)
+      call self%pull%take_off(problem, operator)
       result%residual = problem%residual
       result%converged = converged
       result%ffts = result%ffts + operator%ffts + self%preconditioner%ffts
@@ -256,7 +247,7 @@ contains
          result%reason = 'no contact'
       else if (converged) then
          result%reason = 'converged'
-      else if (self%slides_off) then
+      else if (self%pull%slides_off) then
          result%reason = 'the pull is more than the friction'
       else if (.not. ieee_is_finite(problem%residual)) then
          result%reason = 'not a number'
@@ -268,122 +259,43 @@ contains
       result%seconds = omp_get_wtime() - start_time
    end subroutine solve
 
-   !> Hang the road on springs along the directions in which the total of T is prescribed. What the
-   !> mean mode of the operator adds to the displacement is known there but for the road's place: the
-   !> operator is left without it, and is as stiff as the contact alone.
-   subroutine hang_road(self, problem, operator, mean_mode)
-      type(friction_solver_type), intent(inout) :: self
-      type(friction_problem_type), intent(inout) :: problem
-      type(convolution_type), intent(inout) :: operator
-      real(dp), intent(out) :: mean_mode(2)         !! symbols that were taken out
-      real(dp) :: cells, touching, soft
-      integer :: c
-
-      self%slides_off = .false.
-      mean_mode = 0.0_dp
-      if (.not. any(self%pulled)) return
-      cells = real(operator%nx, dp)*operator%ny
-      touching = max(1.0_dp, real(count(problem%contact /= contact_open), dp))
-      ! a patch of n cells is as stiff as sqrt(n) cells side by side
-      soft = softer*self%compliance/sqrt(touching)
-      problem%pulled = self%pulled
-      do c = 1, 2
-         if (.not. self%pulled(c)) cycle
-         mean_mode(c) = operator%symbol(0, 0, c)
-         operator%symbol(0, 0, c) = 0.0_dp
-         problem%pull(c) = self%pull(c)*cells
-         problem%spring(c) = soft
-         if (self%yielding(c) > 0.0_dp) problem%spring(c) = self%yielding(c)/cells
-         problem%spring_end(c) = self%offset(c) - mean_mode(c)*(problem%pull(c) + past_total(problem, c))
-         problem%mean_compliance(c) = problem%spring(c)
-      end do
-   end subroutine hang_road
-
-   !> Give the operator its mean mode back, which makes part of the road's place.
-   subroutine take_off_road(self, problem, operator, mean_mode)
-      type(friction_solver_type), intent(inout) :: self
-      type(friction_problem_type), intent(in) :: problem
-      type(convolution_type), intent(inout) :: operator
-      real(dp), intent(in) :: mean_mode(2)
-      integer :: c
-
-      self%offset = 0.0_dp
-      do c = 1, 2
-         if (.not. self%pulled(c)) cycle
-         operator%symbol(0, 0, c) = mean_mode(c)
-         self%offset(c) = problem%offset(c) + mean_mode(c)*(problem%total(c) + past_total(problem, c))
-      end do
-   end subroutine take_off_road
-
-   !> Sum of T_h along a direction.
-   function past_total(problem, c) result(total)
-      type(friction_problem_type), intent(in) :: problem
-      integer, intent(in) :: c
-      real(dp) :: total
-      integer :: j
-
-      total = 0.0_dp
-      if (.not. associated(problem%past_x)) return
-      do j = 1, problem%ny
-         if (c == 1) total = total + sum(problem%past_x(:, j))
-         if (c == 2) total = total + sum(problem%past_y(:, j))
-      end do
-      total = global_sum(total)
-   end function past_total
-
-   !> What a total lacks, over the largest of the pull, relative; 0 where a mass yields.
-   function pull_missed(self, problem) result(missed)
-      type(friction_solver_type), intent(in) :: self
-      type(friction_problem_type), intent(in) :: problem
-      real(dp) :: missed
-      real(dp) :: size
-
-      missed = 0.0_dp
-      if (.not. any(self%pulled .and. .not. self%yielding > 0.0_dp)) return
-      size = max(norm2(problem%pull), norm2(problem%total))
-      missed = norm2(lacking_pull(self, problem))
-      if (size > 0.0_dp) missed = missed/size
-   end function pull_missed
-
-   !> What the total of T lacks of the pull, Pa; 0 along a direction that has none or yields.
-   pure function lacking_pull(self, problem) result(lacking)
-      type(friction_solver_type), intent(in) :: self
-      type(friction_problem_type), intent(in) :: problem
-      real(dp) :: lacking(2)
-
-      lacking = merge(problem%pull - problem%total, 0.0_dp, self%pulled .and. .not. self%yielding > 0.0_dp)
-   end function lacking_pull
-
-   !> Hang the springs anew until the total of T is the pull. The totals near their limit follow ever
-   !> less: a way is lengthened by what the last one has brought.
+   !> Move the ends of the springs until the total of T is the pull. Near full slip the total follows ever
+   !> less: each way is lengthened by what the last one has brought.
    subroutine meet_pull(self, problem, operator, iterations, converged)
       type(friction_solver_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
       integer, intent(inout) :: iterations
       logical, intent(out) :: converged
-      real(dp) :: lacking(2), before(2), factor, gained
+      real(dp) :: before(2), factor, first(2), gained
       integer :: k, idle
 
+      self%pull%slides_off = problem%cells == 0 .and. self%pull%missed(problem) > 0.0_dp
+      converged = .not. self%pull%slides_off
+      if (problem%cells == 0) return
+      first = problem%spring_end
       factor = 1.0_dp
       idle = 0
       do k = 1, hangings
          converged = problem%solved(self%tolerance)
          if (.not. converged) return
-         if (pull_missed(self, problem) <= self%tolerance) return
+         if (self%pull%missed(problem) <= self%tolerance) return
          converged = .false.
-         before = lacking_pull(self, problem)
+         before = self%pull%lacking(problem)
          call problem%hang_anew(factor*problem%spring*before)
          if (problem%residual > self%tolerance) call iterate(self, problem, operator, iterations)
          if (.not. problem%fresh) then
             call problem%transform_tractions(operator)
             call problem%update_slip(operator)
          end if
-         lacking = lacking_pull(self, problem)
-         gained = dot_product(before, before - lacking)/max(dot_product(before, before), tiny(1.0_dp))
+         gained = dot_product(before, before - self%pull%lacking(problem)) &
+            /max(dot_product(before, before), tiny(1.0_dp))
          idle = merge(idle + 1, 0, problem%slipping == problem%cells .and. gained < 0.01_dp)
-         self%slides_off = idle >= stuck_hangings
-         if (self%slides_off) return
+         self%pull%slides_off = idle >= idle_hangings
+         if (self%pull%slides_off) then
+            call problem%hang_anew(first - problem%offset)
+            return
+         end if
          factor = max(1.0_dp, min(10.0_dp*factor, factor/max(gained, 0.01_dp)))
       end do
    end subroutine meet_pull

@@ -1,0 +1,85 @@
+!> A road that is pulled by a force instead of driven at a velocity: where a row expects it, and where
+!> it has been found.
+!>
+!> The tangential solver finds how far the road has moved in a row (modules `friction_pull`,
+!> `tangential_state`). Until then the row is reckoned with a guess, the motion of the last step. The
+!> guess changes no result beyond the tolerance: heights are read at U_T - D, which the tangential
+!> solver returns without the guess.
+module pulled_road
+   use precision, only : dp
+   use schedule, only : planned_row_type, schedule_type
+   use tangential_state, only : tangential_state_type
+   use text_tools, only : to_text
+   implicit none
+   private
+
+   public :: drive_direction, guess_road, pull_outcome, take_road
+
+contains
+
+   !> The direction in which a row drives the road: that of its velocity, or of the pull where it is only
+   !> pulled. Where neither acts the direction stays as it was.
+   pure subroutine drive_direction(plan, direction)
+      type(planned_row_type), intent(in) :: plan
+      real(dp), intent(inout) :: direction(2)
+      real(dp) :: drive(2)
+
+      drive = merge(0.0_dp, [plan%velocity_x, plan%velocity_y], plan%pulled)
+      if (.not. any(abs(drive) > 0.0_dp)) drive = merge(plan%pull, 0.0_dp, plan%pulled)
+      if (any(abs(drive) > 0.0_dp)) direction = drive/norm2(drive)
+   end subroutine drive_direction
+
+   !> Let the road of a row go on as in the last step along the directions in which it is pulled.
+   subroutine guess_road(plan, road, velocity)
+      type(planned_row_type), intent(inout) :: plan
+      real(dp), intent(in) :: road(2)               !! displacement of the road at the last row, m
+      real(dp), intent(in) :: velocity(2)           !! of the road in the last step, m/s
+
+      if (plan%pulled(1)) then
+         plan%velocity_x = merge(velocity(1), 0.0_dp, plan%dt > 0.0_dp)
+         plan%road_x = road(1) + plan%dt*plan%velocity_x
+      end if
+      if (plan%pulled(2)) then
+         plan%velocity_y = merge(velocity(2), 0.0_dp, plan%dt > 0.0_dp)
+         plan%road_y = road(2) + plan%dt*plan%velocity_y
+      end if
+   end subroutine guess_road
+
+   !> Take over where the road has been found.
+   subroutine take_road(plan, schedule, tangential, road, velocity)
+      type(planned_row_type), intent(inout) :: plan
+      type(schedule_type), intent(inout) :: schedule
+      type(tangential_state_type), intent(inout) :: tangential
+      real(dp), intent(in) :: road(2)               !! displacement of the road at the last row, m
+      real(dp), intent(inout) :: velocity(2)        !! of the road in the step, m/s
+      real(dp) :: motion(2)
+
+      if (.not. any(plan%pulled)) return
+      motion = 0.0_dp
+      if (tangential%moved) call tangential%take_motion(motion)
+      if (plan%pulled(1)) then
+         plan%road_x = road(1) + motion(1)
+         schedule%start_x = plan%road_x
+         if (plan%dt > 0.0_dp) velocity(1) = motion(1)/plan%dt
+         plan%velocity_x = velocity(1)
+      end if
+      if (plan%pulled(2)) then
+         plan%road_y = road(2) + motion(2)
+         schedule%start_y = plan%road_y
+         if (plan%dt > 0.0_dp) velocity(2) = motion(2)/plan%dt
+         plan%velocity_y = velocity(2)
+      end if
+   end subroutine take_road
+
+   !> Why a row whose pull the friction does not hold has no solution.
+   function pull_outcome(plan, tangential) result(reason)
+      type(planned_row_type), intent(in) :: plan
+      type(tangential_state_type), intent(in) :: tangential
+      character(:), allocatable :: reason
+
+      reason = 'the road is pulled by '//to_text(norm2(merge(plan%pull, 0.0_dp, plan%pulled)))// &
+         ' Pa over the cell, and the friction holds at most '//to_text(norm2(tangential%held))// &
+         ' Pa: nothing is in balance. A block with density would move on'
+   end function pull_outcome
+
+end module pulled_road

@@ -1,0 +1,134 @@
+!> A prescribed total of the traction, for the tangential solver.
+!>
+!> Along x, y or both the mean of T over the grid can be prescribed. How far the road is, `offset`, is
+!> then found: r = DX' + offset - A (T + T_h). The road hangs on springs (module `friction_problem`) that
+!> are much softer than the contact, and their ends are moved until the total is right.
+!>
+!> The mean mode of the operator adds a uniform displacement that only the road's place depends on. It
+!> is taken out of the operator for the solve, so that the springs have to be softer than the contact
+!> alone, and given back to the offset afterwards. On a free map the symbol at zero wave number adds such
+!> a uniform displacement, too.
+!>
+!> With a mass between the pull and the contact the total of T may differ from the pull. It then moves
+!> the road by offset = (offset given) - yielding (mean T - traction), which is a spring of its own.
+module friction_pull
+   use fft_conv, only : convolution_type
+   use friction_law, only : contact_open
+   use friction_problem, only : friction_problem_type
+   use parallel, only : global_sum
+   use precision, only : dp
+   implicit none
+   private
+
+   public :: friction_pull_type
+
+   real(dp), parameter :: softer = 100.0_dp      !! the spring against the contact
+
+   !> What is prescribed, and what comes of it.
+   type :: friction_pull_type
+      logical :: along(2) = .false.              !! the mean of T is prescribed along x, y
+      real(dp) :: traction(2) = 0.0_dp           !! that mean, Pa
+      !> In: a guess, or the place of a mass whose T has the mean prescribed. Out: found; 0 where nothing
+      !> is prescribed. In the units of DX'.
+      real(dp) :: offset(2) = 0.0_dp
+      real(dp) :: yielding(2) = 0.0_dp           !! m for G = 1 Pa; 0: the total is met
+      logical :: slides_off = .false.            !! out: the pull is more than the friction can hold
+      real(dp), private :: mean_mode(2) = 0.0_dp !! symbols taken out of the operator
+   contains
+      procedure :: hang
+      procedure :: take_off
+      procedure :: missed
+      procedure :: lacking
+   end type friction_pull_type
+
+contains
+
+   !> Hang the road on its springs.
+   subroutine hang(self, problem, operator, soft)
+      class(friction_pull_type), intent(inout) :: self
+      type(friction_problem_type), intent(inout) :: problem
+      type(convolution_type), intent(inout) :: operator
+      real(dp), intent(in) :: soft               !! from this compliance on the mean mode is treated apart, m
+      real(dp) :: cells, touching
+      integer :: c
+
+      self%slides_off = .false.
+      if (.not. any(self%along)) return
+      cells = real(operator%nx, dp)*operator%ny
+      touching = max(1.0_dp, real(count(problem%contact /= contact_open), dp))
+      problem%pulled = self%along
+      do c = 1, 2
+         if (.not. self%along(c)) cycle
+         self%mean_mode(c) = operator%symbol(0, 0, c)
+         operator%symbol(0, 0, c) = 0.0_dp
+         problem%pull(c) = self%traction(c)*cells
+         ! A patch of n cells is about as stiff as sqrt(n) cells side by side.
+         problem%spring(c) = softer*problem%compliance/sqrt(touching)
+         if (self%yielding(c) > 0.0_dp) problem%spring(c) = self%yielding(c)/cells
+         problem%spring_end(c) = self%offset(c) &
+            - self%mean_mode(c)*(problem%pull(c) + past_total(problem, c))
+         problem%mean_compliance(c) = merge(problem%spring(c), 0.0_dp, problem%spring(c)*cells > soft)
+      end do
+      ! What the pull moves the road by at least. Where all sticks without strain there is no other measure.
+      problem%least_scale = max(problem%least_scale, norm2(self%mean_mode*problem%pull), &
+         problem%compliance/sqrt(touching)*norm2(problem%pull))
+   end subroutine hang
+
+   !> Give the operator its mean mode back, which is part of the road's place.
+   subroutine take_off(self, problem, operator)
+      class(friction_pull_type), intent(inout) :: self
+      type(friction_problem_type), intent(in) :: problem
+      type(convolution_type), intent(inout) :: operator
+      integer :: c
+
+      self%offset = 0.0_dp
+      do c = 1, 2
+         if (.not. self%along(c)) cycle
+         operator%symbol(0, 0, c) = self%mean_mode(c)
+         self%offset(c) = problem%offset(c) &
+            + self%mean_mode(c)*(problem%total(c) + past_total(problem, c))
+      end do
+   end subroutine take_off
+
+   !> Sum of T_h along a direction, Pa.
+   function past_total(problem, c) result(total)
+      type(friction_problem_type), intent(in) :: problem
+      integer, intent(in) :: c
+      real(dp) :: total
+      integer :: j
+
+      total = 0.0_dp
+      if (.not. associated(problem%past_x)) return
+      do j = 1, problem%ny
+         if (c == 1) total = total + sum(problem%past_x(:, j))
+         if (c == 2) total = total + sum(problem%past_y(:, j))
+      end do
+      total = global_sum(total)
+   end function past_total
+
+   !> What the total of T lacks of the pull, Pa; 0 along a direction that has none or yields.
+   pure function lacking(self, problem) result(difference)
+      class(friction_pull_type), intent(in) :: self
+      type(friction_problem_type), intent(in) :: problem
+      real(dp) :: difference(2)
+
+      difference = merge(problem%pull - problem%total, 0.0_dp, &
+         self%along .and. .not. self%yielding > 0.0_dp)
+   end function lacking
+
+   !> The same, relative: over the pull or the total, whichever is larger. A pull of zero is met as well as
+   !> the displacements are.
+   pure function missed(self, problem) result(part)
+      class(friction_pull_type), intent(in) :: self
+      type(friction_problem_type), intent(in) :: problem
+      real(dp) :: part
+      real(dp) :: size
+
+      part = norm2(self%lacking(problem))
+      size = max(norm2(problem%pull), norm2(problem%total))
+      if (any(problem%spring > 0.0_dp) .and. .not. norm2(problem%pull) > 0.0_dp) &
+         size = max(size, softer*problem%scale/maxval(problem%spring))
+      if (size > 0.0_dp) part = part/size
+   end function missed
+
+end module friction_pull

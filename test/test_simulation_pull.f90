@@ -1,0 +1,226 @@
+!> Tests of a road that is pulled by a force: known solutions, and the same runs driven at a velocity.
+module test_simulation_pull
+   use case_input, only : parse_case
+   use case_settings, only : case_type
+   use check, only : begin_suite, check_close, check_error, check_no_error, check_that
+   use errors, only : error_type
+   use precision, only : dp, pi
+   use simulation, only : new_simulation, simulation_type
+   use simulation_runs, only : check_books, last, nl, record_type, run_case
+   use text_tools, only : exact_text
+   implicit none
+   private
+
+   public :: run_simulation_pull
+
+contains
+
+   subroutine run_simulation_pull()
+      call begin_suite('simulation_pull')
+      call test_mindlin_cycle()
+      call test_creep()
+      call test_as_driven('.true.')
+      call test_as_driven('.false.')
+      call test_beyond()
+      call test_mass()
+      call test_faults()
+   end subroutine run_simulation_pull
+
+   !> Mindlin and Deresiewicz's sphere, nu = 0, under a force that goes there and back: the way of the
+   !> road, and a loop that closes.
+   subroutine test_mindlin_cycle()
+      type(record_type) :: record
+      real(dp), parameter :: mu = 0.4_dp, modulus = 200e6_dp, radius = 50e-3_dp, load = 10.6667_dp
+      real(dp), parameter :: part = 0.9_dp
+      real(dp) :: a, way, full, q
+      integer :: k
+
+      call run_case('&grid nx = 64, ny = 64, lx = 2.5e-3, boundary = ''free'' /'//nl// &
+         '&surface shape = ''paraboloid'', radius = 50e-3 /'//nl// &
+         '&material shear_modulus = 200e6, poisson = 0.0 /'//nl// &
+         '&friction law = ''coulomb'', coefficient = 0.4, slope_effect = .false. /'//nl// &
+         '&phase force = 10.6667 /'//nl// &
+         '&phase force_x = 3.840012, ramp = ''linear'', steps = 6 /'//nl// &
+         '&phase force_x = -3.840012, ramp = ''linear'', steps = 12 /'//nl// &
+         '&phase force_x = 3.840012, ramp = ''linear'', steps = 12 /'//nl// &
+         '&solver tolerance = 1e-8 /', 'Mindlin', record)
+      a = (0.75_dp*load*radius/(2.0_dp*modulus))**(1.0_dp/3.0_dp)
+      full = 3.0_dp*mu*load*2.0_dp/(16.0_dp*modulus*a)
+      do k = 1, 18
+         if (k <= 6) then
+            q = part*k/6
+            way = full*(1.0_dp - (1.0_dp - q)**(2.0_dp/3.0_dp))
+         else
+            q = part*(1.0_dp - (k - 6)/6.0_dp)
+            way = full*(2.0_dp*(1.0_dp - 0.5_dp*(part - q))**(2.0_dp/3.0_dp) &
+               - (1.0_dp - part)**(2.0_dp/3.0_dp) - 1.0_dp)
+         end if
+         call check_close(record%drag(1, k), q*mu*load, 1e-6_dp*mu*load, 'Mindlin: the force asked for')
+         call check_close(record%rows(k)%road_x, way, 2e-3_dp*full, 'Mindlin: the way of the road')
+      end do
+      call check_close(record%rows(30)%road_x, record%rows(6)%road_x, 1e-6_dp*full, 'Mindlin: a closed loop')
+      call check_close(maxval(abs(record%rows%road_y)), 0.0_dp, 1e-12_dp*full, 'Mindlin: no way along y')
+      call check_books(record, 'Mindlin')
+   end subroutine test_mindlin_cycle
+
+   !> A block that sticks all over creeps by the creep function of its shear, and recovers when the pull
+   !> ends.
+   subroutine test_creep()
+      type(record_type) :: record
+      real(dp), parameter :: relaxed = 1e6_dp, glassy = 4e6_dp, thickness = 2e-3_dp, pull = 3e4_dp
+      real(dp), parameter :: creep_time = 1e-2_dp*glassy/relaxed, hold = 0.08_dp
+      real(dp) :: expected, step
+      integer :: k
+
+      step = thickness*pull
+      call run_case('&grid nx = 8, ny = 6, lx = 1e-3 /'//nl//'&surface shape = ''flat'' /'//nl// &
+         '&material shear_modulus = 1e6, prony_g = 3e6, prony_tau = 1e-2, thickness = 2e-3 /'//nl// &
+         '&friction law = ''coulomb'', coefficient = 1 /'//nl//'&phase pressure = 1e5 /'//nl// &
+         '&phase traction_x = 3e4, duration = 0.08, steps = 160 /'//nl// &
+         '&phase traction_x = 0, duration = 0.08, steps = 160 /'//nl//'&solver tolerance = 1e-10 /', &
+         'creep', record)
+      do k = 1, last(record)
+         expected = step*compliance(record%rows(k)%time)
+         if (record%rows(k)%phase == 3) expected = expected - step*compliance(record%rows(k)%time - hold)
+         call check_close(record%rows(k)%road_x, expected, 2e-4_dp*step/relaxed, 'creep of a block')
+         call check_close(record%rows(k)%stick_area, 1.0_dp, 0.0_dp, 'creep: all sticks')
+      end do
+      call check_books(record, 'creep')
+
+   contains
+
+      !> J(t), 1/Pa.
+      pure real(dp) function compliance(time)
+         real(dp), intent(in) :: time
+
+         compliance = 1.0_dp/relaxed - (1.0_dp/relaxed - 1.0_dp/glassy)*exp(-time/creep_time)
+      end function compliance
+
+   end subroutine test_creep
+
+   !> A rough road in partial slip, pulled obliquely by steps and ramps: driven by the velocities that
+   !> were found it takes the forces that were asked for.
+   subroutine test_as_driven(slope_effect)
+      character(*), intent(in) :: slope_effect
+      type(record_type) :: driven, pulled
+      character(*), parameter :: body = '&grid nx = 36, ny = 30, lx = 1e-3, ly = 0.9e-3 /'//nl// &
+         '&surface shape = ''self_affine'', hurst = 0.8, rms_slope = 0.1, wavelength_long = 0.5e-3, '// &
+         'wavelength_short = 0.2e-3 /'//nl// &
+         '&material shear_modulus = 1e6, prony_g = 2e6, 1e6, prony_tau = 1e-3, 1e-2, thickness = 1e-3 /'
+      character(*), parameter :: phases(4) = [character(90) :: &
+         'traction_x = 2e4, traction_y = -1e4, ramp = ''linear'', ', &
+         'traction_x = 3.5e4, velocity_y = -1e-3, ramp = ''linear'', ', &
+         'traction_x = 1e4, traction_y = -2e4, ramp = ''linear'', ', &
+         'traction_x = 1e4, traction_y = -1e4, ramp = ''linear'', ']
+      real(dp), parameter :: pull(2, 4) = reshape([2e4_dp, -1e4_dp, 3.5e4_dp, 0.0_dp, 1e4_dp, -2e4_dp, &
+         1e4_dp, -1e4_dp], [2, 4]), dt = 2e-3_dp, area = 0.9e-6_dp
+      character(:), allocatable :: start, text
+      integer :: k
+
+      start = body//nl//'&friction law = ''coulomb'', coefficient = 0.6, slope_effect = '//slope_effect// &
+         ' /'//nl//'&phase pressure = 1e5, duration = 1e-3, steps = 1 /'//nl
+      text = start
+      do k = 1, 4
+         text = text//'&phase '//trim(phases(k))//' duration = 2e-3, steps = 1 /'//nl
+      end do
+      call run_case(text//'&solver tolerance = 1e-8, passes = 60, time_scheme = ''exponential'' /', 'pulled', pulled)
+      call check_that(last(pulled) == 5, 'pulled: ramps have no row of their own')
+      text = start
+      do k = 2, 5
+         text = text//'&phase velocity_x = '//exact_text((pulled%rows(k)%road_x - pulled%rows(k - 1)%road_x)/dt) &
+            //', velocity_y = '//exact_text((pulled%rows(k)%road_y - pulled%rows(k - 1)%road_y)/dt)// &
+            ', duration = 2e-3, steps = 1 /'//nl
+      end do
+      call run_case(text//'&solver tolerance = 1e-8, passes = 60, time_scheme = ''exponential'' /', 'driven', driven)
+      do k = 2, 5
+         call check_close(pulled%drag(1, k)/area, pull(1, k - 1), 1e-2_dp, 'pulled: the force along x')
+         if (k /= 3) call check_close(pulled%drag(2, k)/area, pull(2, k - 1), 1e-2_dp, 'pulled: the force along y')
+         call check_close(driven%drag(1, k), pulled%drag(1, k), 1e-5_dp*3.5e4_dp*area, 'as driven: force along x')
+         call check_close(driven%drag(2, k), pulled%drag(2, k), 1e-5_dp*3.5e4_dp*area, 'as driven: force along y')
+         call check_close(driven%rows(k)%contact_area, pulled%rows(k)%contact_area, 2e-3_dp, 'as driven: area')
+      end do
+      call check_close(pulled%rows(3)%road_y - pulled%rows(2)%road_y, -1e-3_dp*dt, 1e-18_dp, &
+         'pulled along x only: the road goes on along y')
+      call check_that(pulled%rows(4)%stick_area < pulled%rows(4)%contact_area, 'pulled: something slips')
+   end subroutine test_as_driven
+
+   !> More than the friction holds: a row that has not converged, and a reason with the limit.
+   subroutine test_beyond()
+      type(case_type) :: case
+      type(simulation_type) :: sim
+      type(error_type), allocatable :: error
+      integer :: k
+
+      call parse_case('&grid nx = 16, ny = 12, lx = 1e-3 /'//nl//'&surface shape = ''flat'' /'//nl// &
+         '&material shear_modulus = 1e6, thickness = 1e-3 /'//nl// &
+         '&friction law = ''coulomb'', coefficient = 0.35 /'//nl//'&phase pressure = 1e5 /'//nl// &
+         '&phase traction_x = 2.4e4, traction_y = 3.2e4, ramp = ''linear'', duration = 1, steps = 4 /', &
+         'test.nml', case, error)
+      call check_no_error(error, 'beyond: input')
+      call new_simulation(sim, case, error)
+      do k = 0, 3
+         call sim%advance(error)
+         call check_that(sim%converged, 'beyond: still held')
+      end do
+      call sim%advance(error)
+      call check_that(.not. sim%converged, 'beyond: not converged')
+      call check_that(index(sim%reason, 'pulled by 40000 Pa') > 0 .and. &
+         index(sim%reason, 'holds at most 35000 Pa') > 0, 'beyond: the reason: '//trim(sim%reason))
+      call check_close(sim%row%traction_y/sim%row%traction_x, 4.0_dp/3.0_dp, 1e-6_dp, 'beyond: the direction')
+      call sim%destroy()
+   end subroutine test_beyond
+
+   !> A block with mass that is pulled off at once: m a = F - mu p, and the strain of its rubber at once.
+   subroutine test_mass()
+      type(record_type) :: record
+      real(dp), parameter :: acceleration = 2e4_dp, strained = 6e-5_dp
+      integer :: k
+
+      call run_case('&grid nx = 8, ny = 8, lx = 1e-3 /'//nl//'&surface shape = ''flat'' /'//nl// &
+         '&material shear_modulus = 1e6, thickness = 1e-3, density = 1000 /'//nl// &
+         '&friction law = ''coulomb'', coefficient = 0.5 /'//nl//'&phase pressure = 1e5 /'//nl// &
+         '&phase traction_x = 6e4, duration = 1e-3, steps = 400 /'//nl// &
+         '&phase traction_x = 5e4, duration = 1e-4, steps = 40 /', 'mass', record)
+      call check_close(record%rows(1)%road_x, strained, 1e-9_dp*strained, 'mass: the strain comes at once')
+      do k = 2, 401
+         associate (row => record%rows(k))
+            call check_close(row%road_x - strained, 0.5_dp*acceleration*row%time**2, &
+               0.01_dp*acceleration*1e-3_dp*row%time, 'mass: way')
+            call check_close(row%sliding_speed, acceleration*row%time, 0.01_dp*acceleration*1e-3_dp, 'mass: speed')
+         end associate
+      end do
+      call check_close(record%rows(last(record))%sliding_speed, record%rows(401)%sliding_speed, 0.1_dp, &
+         'mass: a pull as large as the friction keeps the speed')
+   end subroutine test_mass
+
+   !> What a pull excludes and needs.
+   subroutine test_faults()
+      character(*), parameter :: start = '&grid nx = 8, ny = 8, lx = 1e-3 /'//nl//'&surface shape = ''flat'' /'// &
+         nl//'&material shear_modulus = 1e6 /'//nl
+      character(*), parameter :: rubs = '&friction law = ''coulomb'', coefficient = 0.5 /'//nl
+
+      call fails(start//'&phase pressure = 1e5 /'//nl//'&phase traction_x = 1, duration = 1 /', 'needs &friction')
+      call fails(start//rubs//'&phase pressure = 1e5, force_y = 1, velocity_y = 0, duration = 1 /', &
+         'excludes velocity_y')
+      call fails(start//rubs//'&phase pressure = 1e5, force_x = 1, traction_x = 2, duration = 1 /', &
+         'traction_x and force_x')
+      call fails(start//rubs//'&phase pressure = 1e5, traction_y = 2, relaxed = T, duration = 1 /', &
+         'excludes relaxed')
+      call fails(start//rubs//'&phase pressure = 1e5, traction_y = 2, steady = T, duration = 1 /', &
+         'excludes steady')
+
+   contains
+
+      !> The input is refused with this in the message.
+      subroutine fails(text, message)
+         character(*), intent(in) :: text, message
+         type(case_type) :: case
+         type(error_type), allocatable :: error
+
+         call parse_case(text, 'test.nml', case, error)
+         call check_error(error, message, message)
+      end subroutine fails
+
+   end subroutine test_faults
+
+end module test_simulation_pull
