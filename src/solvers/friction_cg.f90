@@ -267,7 +267,7 @@ contains
       type(convolution_type), intent(inout) :: operator
       integer, intent(inout) :: iterations
       logical, intent(out) :: converged
-      real(dp) :: before(2), factor, first(2), gained
+      real(dp) :: before(2), allowed, factor, first(2), gained, way(2)
       integer :: k, idle
 
       self%pull%slides_off = problem%cells == 0 .and. self%pull%missed(problem) > 0.0_dp
@@ -282,8 +282,13 @@ contains
          if (self%pull%missed(problem) <= self%tolerance) return
          converged = .false.
          before = self%pull%lacking(problem)
-         call problem%hang_anew(factor*problem%spring*before)
+         way = factor*problem%spring*before
+         call problem%hang_anew(way)
+         ! The contact has to follow a way that is within its tolerance, too.
+         allowed = self%tolerance
+         self%tolerance = max(1.0e-3_dp*allowed, min(allowed, 0.1_dp*norm2(way)/problem%scale))
          if (problem%residual > self%tolerance) call iterate(self, problem, operator, iterations)
+         self%tolerance = allowed
          if (.not. problem%fresh) then
             call problem%transform_tractions(operator)
             call problem%update_slip(operator)

@@ -116,19 +116,19 @@ contains
          self%along .and. .not. self%yielding > 0.0_dp)
    end function lacking
 
-   !> The same, relative: over the pull or the total, whichever is larger. A pull of zero is met as well as
-   !> the displacements are.
+   !> The same, relative: over the pull, the total, or the force that displaces road and contact by as much
+   !> as they are displaced, whichever is largest.
    pure function missed(self, problem) result(part)
       class(friction_pull_type), intent(in) :: self
       type(friction_problem_type), intent(in) :: problem
       real(dp) :: part
-      real(dp) :: size
+      real(dp) :: compliance, size
 
       part = norm2(self%lacking(problem))
-      size = max(norm2(problem%pull), norm2(problem%total))
-      if (any(problem%spring > 0.0_dp) .and. .not. norm2(problem%pull) > 0.0_dp) &
-         size = max(size, softer*problem%scale/maxval(problem%spring))
-      if (size > 0.0_dp) part = part/size
+      if (.not. part > 0.0_dp) return
+      compliance = maxval(problem%spring)/softer + maxval(self%mean_mode)
+      size = max(norm2(problem%pull), norm2(problem%total), problem%scale/compliance)
+      part = part/size
    end function missed
 
 end module friction_pull
