@@ -72,15 +72,19 @@ contains
       phases%relaxed = .false.
       phases%steady = .false.
       phases%velocity_x = 0.0_dp
+      do k = 1, size(phases)
+         phases(k)%pulled = .false.
+         phases(k)%pull = 0.0_dp
+      end do
       phases%velocity_y = 0.0_dp
       phases%linear = [.true., .true., .true., .false., .true.]
       phases%target = [1.0_dp, 2.0_dp, 1.5_dp, 1.5_dp, 1.5_dp]
       expected = .false.
       expected([1, 5, 7]) = .true.
-      call next_row(schedule, phases, [0.0_dp, 0.0_dp, 0.0_dp], row, finished)
+      call next_row(schedule, phases, [0.0_dp, 0.0_dp, 0.0_dp], [0.0_dp, 0.0_dp], row, finished)
       call check_that(row%instantaneous, 'the first row is a jump')
       do k = 1, 10
-         call next_row(schedule, phases, [0.0_dp, 0.0_dp, 0.0_dp], row, finished)
+         call next_row(schedule, phases, [0.0_dp, 0.0_dp, 0.0_dp], [0.0_dp, 0.0_dp], row, finished)
          call check_that(row%new_rate .eqv. expected(k), 'new rate in step '//to_text(k))
       end do
       call check_that(finished .or. schedule%phase > 5, 'all rows are done')
