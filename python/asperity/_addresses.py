@@ -59,7 +59,11 @@ NAMES = {
 
 #: Functions that draw, write or show data, by name; see `asperity.base.presenters`.
 PRESENTERS = {
+    "case_html": "views.html",
+    "contact_html": "views.html",
+    "fit_html": "views.html",
     "history_html": "views.html",
+    "road_html": "views.html",
     "plot_dma_fit": "views.plot_material",
     "plot_field": "views.plot",
     "plot_friction_curve": "views.plot_curve",
@@ -67,6 +71,7 @@ PRESENTERS = {
     "plot_overview": "views.plot",
     "plot_prony": "views.plot_material",
     "run_html": "views.html",
+    "run_to_xarray": "views.export",
     "snapshot_html": "views.html",
     "table_html": "views.html",
     "to_vtk": "views.export",

@@ -5,7 +5,7 @@
 module result_summary
    use case_input, only : parse_case
    use case_settings, only : case_type
-   use errors, only : error_type
+   use errors, only : error_file, error_type, fail
    use hdf5_file, only : hdf5_file_type
    use precision, only : dp
    use result_target, only : damage_of_result
@@ -32,9 +32,58 @@ contains
       if (allocated(error)) return
       call file%open(path, 'read', error)
       if (allocated(error)) return
-      call describe(file, path, text, error)
+      if (file%has_attribute('/', 'finished') .or. .not. file%has_dataset('/surface/height')) then
+         call describe(file, path, text, error)
+      else
+         call describe_map(file, path, text, error)
+      end if
       call file%close(ignored)
    end subroutine summarise_result
+
+   !> The summary of a height map, as `asperity import` and `asperity.surface.save` write it.
+   subroutine describe_map(file, path, text, error)
+      type(hdf5_file_type), intent(inout) :: file
+      character(*), intent(in) :: path
+      character(:), allocatable, intent(inout) :: text
+      type(error_type), allocatable, intent(out) :: error
+      integer, allocatable :: extent(:)
+      character(:), allocatable :: words
+      real(dp) :: lx, ly
+      real(dp), allocatable :: height(:, :)
+
+      call file%dataset_shape('/surface/height', extent, error)
+      if (allocated(error)) return
+      if (size(extent) /= 2) then
+         call fail(error, error_file, path//': /surface/height: is no map: it has '// &
+            to_text(size(extent))//' dimensions')
+         return
+      end if
+      allocate (height(extent(1), extent(2)))
+      call file%read('/surface/height', height, error)
+      if (allocated(error)) return
+      text = 'file        '//path//nl//'holds       a height map'//nl
+      if (file%has_attribute('/', 'title')) then
+         call file%read_attribute('/', 'title', words, error)
+         if (allocated(error)) return
+         if (words /= '') text = text//'title       '//ordinary(words, 200)//nl
+      end if
+      text = text//'grid        '//to_text(extent(1))//' x '//to_text(extent(2))//' cells'
+      if (file%has_attribute('/grid', 'lx') .and. file%has_attribute('/grid', 'ly')) then
+         call file%read_attribute('/grid', 'lx', lx, error)
+         if (.not. allocated(error)) call file%read_attribute('/grid', 'ly', ly, error)
+         if (.not. allocated(error)) call file%read_attribute('/grid', 'boundary', words, error)
+         if (allocated(error)) return
+         text = text//', '//to_text(lx)//' m x '//to_text(ly)//' m, '//ordinary(words, 40)
+      end if
+      text = text//nl//'heights     '//to_text(minval(height))//' m to '//to_text(maxval(height))// &
+         ' m, rms '//to_text(sqrt(sum((height - sum(height)/size(height))**2)/size(height)))//' m'//nl
+      if (file%has_attribute('/', 'steps_text')) then
+         call file%read_attribute('/', 'steps_text', words, error)
+         if (allocated(error)) return
+         if (words /= '') text = text//'done to it  '//ordinary(words, 400)//nl
+      end if
+      text = text//'to use it   &surface shape = ''file'', file = '''//path//''' /'//nl
+   end subroutine describe_map
 
    !> The summary of an open file.
    subroutine describe(file, path, text, error)

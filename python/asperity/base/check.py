@@ -3,13 +3,33 @@
 from __future__ import annotations
 
 import math
+import reprlib
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["array_of", "choice", "exactly_one", "no_masked", "number", "poisson_ratio",
-           "positive", "whole"]
+           "positive", "shown", "whole"]
+
+
+_short = reprlib.Repr()
+_short.maxstring = _short.maxother = 120
+
+
+def shown(value: object) -> str:
+    """Return a value for a message: as Python writes it, but short.
+
+    Examples
+    --------
+    >>> shown(2.5), shown("free"), shown(list(range(1000)))
+    ('2.5', "'free'", '[0, 1, 2, 3, 4, 5, ...]')
+    >>> shown(np.zeros((512, 512)))
+    'array of shape (512, 512)'
+    """
+    if isinstance(value, np.ndarray) and value.size > 6:
+        return f"array of shape {value.shape}"
+    return _short.repr(value)
 
 
 def number(
@@ -58,10 +78,10 @@ def number(
             raise TypeError
         result = float(value)
     except (TypeError, ValueError):
-        raise ValueError(f"{name} = {value!r}: must be {allowed}") from None
+        raise ValueError(f"{name} = {shown(value)}: must be {allowed}") from None
     bad = not math.isfinite(result) or result < low or result > high
     if bad or (low_open and result == low) or (high_open and result == high):
-        raise ValueError(f"{name} = {value!r}: must be {allowed}")
+        raise ValueError(f"{name} = {shown(value)}: must be {allowed}")
     return result
 
 
@@ -86,7 +106,7 @@ def whole(name: str, value: float) -> int:
         value = value.item()
     good = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
     if not good or not 1 <= value < 2**31 or int(value) != value:
-        raise ValueError(f"{name} = {value!r}: must be a positive integer")
+        raise ValueError(f"{name} = {shown(value)}: must be a positive integer")
     return int(value)
 
 
@@ -124,7 +144,7 @@ def array_of(
             raise TypeError
         result = np.array(values, dtype=float)
     except (TypeError, ValueError):
-        raise ValueError(f"{name} = {values!r}: must be real numbers") from None
+        raise ValueError(f"{name} = {shown(values)}: must be real numbers") from None
     if ndim is not None and result.ndim != ndim:
         raise ValueError(f"{name}: has {result.ndim} dimensions, must have {ndim}")
     bad = ~np.isfinite(result) | (result < low)
@@ -168,7 +188,7 @@ def no_masked(name: str, values: object) -> None:
 def choice(name: str, value: str, allowed: Sequence[str]) -> str:
     """Return `value` if it is one of `allowed`."""
     if value not in allowed:
-        raise ValueError(f"{name} = {value!r}: must be one of {', '.join(map(repr, allowed))}")
+        raise ValueError(f"{name} = {shown(value)}: must be one of {', '.join(map(repr, allowed))}")
     return value
 
 

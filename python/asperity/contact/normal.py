@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..base import library
 from ..base.check import choice, exactly_one, positive, whole
 from ..base.errors import NotConverged
+from ..base.presenters import present
 
 __all__ = ["NormalContact", "solve_normal"]
 
@@ -63,6 +64,9 @@ class NormalContact:
     seconds: float
     converged: bool
     reason: str
+
+    def _repr_html_(self) -> str:
+        return present("contact_html", self)
 
 
 def solve_normal(

@@ -14,6 +14,7 @@ from .standing import note_of, rows_of, standing
 from .steady import SteadyMean, steady_mean
 
 if TYPE_CHECKING:
+    import xarray
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -176,6 +177,17 @@ class Run(ResultFile):
             If it would overwrite a result.
         """
         return present("write_report", self, path)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the history and all snapshots as one data set of xarray, which must be installed.
+
+        Returns
+        -------
+        xarray.Dataset
+            The columns of the history along `step`; the fields with the dimensions
+            (snapshot, y, x); see `asperity.export.run_to_xarray`.
+        """
+        return present("run_to_xarray", self)
 
     def _repr_html_(self) -> str:
         return present("run_html", self)

@@ -73,6 +73,14 @@ def _open(path: Path) -> Any:
             if re.search("is not a text file|no table of numbers", str(fault)):
                 raise OSError(f"{path}: is of no format that SurfaceTopography knows") from None
             raise
+    try:
+        empty = not reader.channels
+    except Exception as error:  # readers of damaged files raise what they meet
+        raise OSError(f"{path}: cannot be read as a topography: {_reason(error)}") from None
+    if empty:
+        raise OSError(f"{path}: was read as the format {reader.format()!r} and holds no heights:"
+                      " an instrument's own file is needed, or a table of numbers; the grey values"
+                      " of a picture have no unit")
     if _is_doubtful(reader, path):
         try:
             found = text_map(path)

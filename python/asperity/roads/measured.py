@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ..base.check import choice, number
 from ..base.library import version
+from ..base.presenters import present
 from .instrument_files import UNITS, channels, read_map, to_metres
 from .map_work import MapWork, fit_terms, polynomial
 from .statistics import statistics
@@ -110,6 +111,9 @@ class MeasuredSurface:
             *(f"note        {note}" for note in self.notes),
         ]
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return present("road_html", self)
 
     def save(self, path: str | Path) -> Path:
         """Write the HDF5 file that ``&surface shape = 'file'`` takes.

@@ -84,6 +84,9 @@ class DmaFit:
         """Lowest and highest angular frequency of the data at the reference temperature, rad/s."""
         return float(self.omega[0]), float(self.omega[-1])
 
+    def _repr_html_(self) -> str:
+        return present("fit_html", self)
+
     def summary(self) -> str:
         """Return a few lines on the fit, its error and its range."""
         low, high = self.valid_range

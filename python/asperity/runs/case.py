@@ -9,6 +9,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..base.presenters import present
 from ..roads.held_maps import keep_beside, map_of_file
 from . import namelists
 from .groups import Group, Groups, UnknownVariableError, entry_of
@@ -330,6 +331,9 @@ class Case:
             elif group or entry_of(name).is_required:
                 blocks.append(str(group))
         return "".join(f"{block}\n" for block in blocks)
+
+    def _repr_html_(self) -> str:
+        return present("case_html", self)
 
     def __repr__(self) -> str:
         return f"! {self._name if self.path else 'a case without a file'}\n{self}"

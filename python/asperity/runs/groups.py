@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, MutableMapping, MutableSequence
 from typing import Any, overload
 
+from ..base.check import shown
 from ..base.names import UnknownNameError, unknown_name
 from ..roads.held_maps import held_map, is_map
 from . import namelists
@@ -75,7 +76,7 @@ class Group(MutableMapping[str, Any]):
         object.__setattr__(self, "_entry", entry_of(name))
         object.__setattr__(self, "_values", {})
         if values is not None and not isinstance(values, Mapping):
-            raise ValueError(f"&{name}: {values!r}: must be a dict of variables")
+            raise ValueError(f"&{name}: {shown(values)}: must be a dict of variables")
         if isinstance(values, Group) and values._entry is self._entry:
             self._values.update({name: list(value) if isinstance(value, list) else value
                                  for name, value in values.items()})

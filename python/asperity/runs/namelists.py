@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..base import library
+from ..base.check import shown
 
 __all__ = ["GroupEntry", "Variable", "check_text", "decode", "encode", "fault_of", "format_value",
            "is_text", "listed", "source", "table"]
@@ -217,4 +218,4 @@ def format_value(value: object) -> str:
         items = list(value)
         if not any(isinstance(item, list | tuple | dict | np.ndarray) for item in items):
             return ", ".join(map(format_value, items))
-    raise ValueError(f"{value!r}: must be a number, a logical, a string, or a list of them")
+    raise ValueError(f"{shown(value)}: must be a number, a logical, a string, or a list of them")

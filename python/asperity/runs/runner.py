@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
 import threading
 import warnings
 from collections.abc import Callable
@@ -17,6 +16,7 @@ from ..base.check import whole
 from ..base.errors import NotConverged
 from ..results import Run
 from . import namelists
+from .progress import Progress
 from .row import Row
 from .simulation import RunView
 
@@ -71,7 +71,8 @@ def run(
     overwrite : bool
         Replace an unfinished run and its checkpoint, which is refused otherwise.
     quiet : bool
-        Do not tell the progress on stderr.
+        Do not show the progress: a bar in a notebook, elsewhere a line on stderr every two
+        seconds.
     callback : callable, optional
         Called after each row as ``callback(row, sim)``, with the row (its columns are attributes)
         and a view of the run with ``row``, ``rows`` and ``fields``. Where it returns False, the run
@@ -117,6 +118,7 @@ def run(
     failure: NotConverged | None = None
     view: RunView | None = None
     stops = _Stops()
+    progress = None if quiet else Progress(rows)
     try:
         _warn(told)
         finished = first >= rows
@@ -127,9 +129,8 @@ def run(
                 view = view or RunView(handle, rows, _shape(result))
                 if callback(view.row, view) is False and not finished:
                     break
-            if not quiet:
-                print(f"step {step} of {rows - 1}, t = {time:.6g} s, contact area {area:.4g},"
-                      f" friction {friction:.4g}", file=sys.stderr)
+            if progress is not None:
+                progress.show(step, time, area, friction)
         if not finished:
             _interrupt(handle)
     except KeyboardInterrupt:

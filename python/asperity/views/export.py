@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     import xarray
 
-    from ..results import Snapshot
+    from ..results import Run, Snapshot
 
-__all__ = ["to_vtk", "to_xarray"]
+__all__ = ["run_to_xarray", "to_vtk", "to_xarray"]
 
 KINDS = {"f8": "Float64", "f4": "Float32", "i1": "Int8", "i4": "Int32", "i8": "Int64"}
 VECTORS = ("displacement", "traction", "slip")
@@ -62,6 +62,59 @@ def to_xarray(snapshot: Snapshot) -> xarray.Dataset:
         attrs={"title": run.title, "phase": snapshot.phase, "boundary": grid.boundary,
                "lx": grid.lx, "ly": grid.ly, "source": f"{run.program} {run.version}",
                "file": str(run.path)})
+
+
+def run_to_xarray(run: Run) -> xarray.Dataset:
+    """Return the history and all snapshots of a run as one data set of xarray.
+
+    Parameters
+    ----------
+    run : Run
+        All its fields are read into memory.
+
+    Returns
+    -------
+    xarray.Dataset
+        The columns of the history along `step`, with the coordinates `time` and `phase`; the fields
+        with the dimensions (snapshot, y, x), where `snapshot` is the step they belong to and
+        `snapshot_time` its time; the road before any sliding as `height` (y, x). Columns that have
+        the name of a field are means: `mean_pressure`, `mean_traction_x`, `mean_traction_y`.
+
+    Raises
+    ------
+    ImportError
+        If xarray is not installed.
+    """
+    try:
+        import xarray
+    except ImportError as error:
+        raise ImportError("to_xarray needs xarray: python -m pip install xarray") from error
+    grid, history = run.grid, run.history
+    stored = list(run.snapshots)
+    names = [name for name in (stored[0].fields if stored else ())
+             if all(name in snapshot for snapshot in stored)]
+    columns = {(f"mean_{name}" if name in names else name): (
+        "step", history[name], {"units": history.units(name), "long_name": history.long_name(name)})
+        for name in history if name not in ("step", "time", "phase")}
+    fields = {name: (("snapshot", "y", "x"), np.stack([snapshot[name] for snapshot in stored]),
+                     {"units": stored[0].units(name), "long_name": stored[0].long_name(name)})
+              for name in names}
+    metres = {"units": "m"}
+    coordinates: dict[str, Any] = {
+        "step": ("step", history["step"].astype(int), {"long_name": "number of the row"}),
+        "time": ("step", history["time"], {"units": "s", "long_name": "time"}),
+        "phase": ("step", history["phase"].astype(int), {"long_name": "number of the phase"}),
+        "x": ("x", grid.x, metres | {"long_name": "centres of the cells along x"}),
+        "y": ("y", grid.y, metres | {"long_name": "centres of the cells along y"}),
+        "snapshot": ("snapshot", np.array([snapshot.step for snapshot in stored], dtype=int),
+                     {"long_name": "step of the snapshot"}),
+        "snapshot_time": ("snapshot", np.array([snapshot.time for snapshot in stored]),
+                          {"units": "s", "long_name": "time of the snapshot"})}
+    road = {"height": (("y", "x"), run.height, metres | {"long_name": "height of the road"})}
+    return xarray.Dataset(
+        columns | fields | road, coords=coordinates,
+        attrs={"title": run.title, "boundary": grid.boundary, "lx": grid.lx, "ly": grid.ly,
+               "source": f"{run.program} {run.version}", "file": str(run.path)})
 
 
 def to_vtk(snapshot: Snapshot, path: str | os.PathLike[str]) -> Path:

@@ -8,10 +8,23 @@ from typing import TYPE_CHECKING, Any
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
+from matplotlib.patches import Patch
 
 from ..results.derived import has_friction
 from .plot_fields import field_style, frame_of, state_style, without_open_cells
-from .style import COLOURS, DOUBLE_COLUMN, LABELS, axis_text, label_of, print_style, si_scale, when
+from .style import (
+    COLOURS,
+    DOUBLE_COLUMN,
+    LABELS,
+    NO_CONTACT,
+    SLIP,
+    STICK,
+    axis_text,
+    label_of,
+    print_style,
+    si_scale,
+    when,
+)
 
 if TYPE_CHECKING:
     from ..results import Run
@@ -82,6 +95,11 @@ def _animation(run: Run, field: str) -> tuple[FuncAnimation, Any]:
     if field == "contact":
         image = panel.imshow(snapshots[0][field], origin="lower", extent=edges,
                              interpolation="nearest", **state_style(run))
+        names = (((NO_CONTACT, "open"), (STICK, "stick"), (SLIP, "slip")) if has_friction(run)
+                 else ((NO_CONTACT, "open"), (STICK, "contact")))
+        figure.legend(handles=[Patch(facecolor=colour, edgecolor="#888888", linewidth=0.5,
+                                     label=name) for colour, name in names],
+                      loc="outside lower center", ncols=3, frameon=False)
     else:
         fields = [snapshot[field] for snapshot in snapshots]
         factor, scale_unit, style = field_style(np.stack(fields), field,

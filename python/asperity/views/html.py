@@ -14,7 +14,8 @@ from .style import si_scale
 if TYPE_CHECKING:
     from ..results import History, Run, Snapshot
 
-__all__ = ["history_html", "run_html", "snapshot_html", "table_html"]
+__all__ = ["case_html", "contact_html", "fit_html", "history_html", "road_html", "run_html",
+           "snapshot_html", "table_html"]
 
 CELL = "text-align:left;padding:0.1em 0.8em 0.1em 0"
 POINTS = 120  # of a small curve
@@ -107,3 +108,48 @@ def run_html(run: Run) -> str:
         rows.append(("warnings", "<br>".join(map(escape, run.warnings))))
     return table_html((), rows, f"<b>{escape(run.title or 'untitled run')}</b>"
                                 f" <code>{escape(str(run.path))}</code>")
+
+
+_CONTACT = {"mean_pressure": "Pa", "force": "N", "displacement": "m", "contact_area": "1",
+            "iterations": "1", "ffts": "1", "residual": "1", "energy_adhesive": "J"}
+
+
+def contact_html(contact: Any) -> str:
+    """Return a solved contact as a table of its numbers."""
+    rows = [(f"<code>{name}</code>", shown(getattr(contact, name), units))
+            for name, units in _CONTACT.items() if hasattr(contact, name)]
+    ny, nx = contact.pressure.shape
+    rows.append(("largest pressure", shown(contact.pressure.max(), "Pa")))
+    state = "converged" if contact.converged else f"not converged: {contact.reason}"
+    return table_html((), rows, f"<b>Contact</b> of {nx} × {ny} cells, {escape(state)}")
+
+
+def road_html(road: Any) -> str:
+    """Return a measured road as a table: what it is and what was done."""
+    lines = [line.partition("  ") for line in road.summary().splitlines()]
+    rows = [(escape(name), escape(rest.strip())) for name, _, rest in lines]
+    return table_html((), rows, "<b>Road</b>")
+
+
+def fit_html(fit: Any) -> str:
+    """Return a fit of a Prony series as a table of its arms under its errors."""
+    material = fit.material
+    rows = [(str(number), shown(g, "Pa"), escape(f"{tau:.4g} s"))
+            for number, (g, tau) in enumerate(zip(material.g, material.tau, strict=True), 1)]
+    told = "<br>".join(map(escape, fit.summary().splitlines()))
+    return table_html(("arm", "modulus", "relaxation time"), rows, f"<b>Fit</b><br>{told}")
+
+
+def case_html(case: Any) -> str:
+    """Return a case as a table of the variables that are given."""
+    rows = []
+    for name in case._groups:
+        found = case[name]
+        groups = list(found) if not hasattr(found, "items") else [found]
+        for number, group in enumerate(groups, 1):
+            head = f"&{name}" if len(groups) == 1 else f"&{name} {number}"
+            given = ", ".join(f"{variable} = {value!r}" for variable, value in group.items())
+            if given:
+                rows.append((f"<code>{escape(head)}</code>", f"<code>{escape(given)}</code>"))
+    where = f" <code>{escape(str(case.path))}</code>" if case.path else ""
+    return table_html((), rows, f"<b>Case</b>{where}")

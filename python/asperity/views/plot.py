@@ -141,7 +141,18 @@ def plot_overview(run: Run) -> Figure:
             if other.get_subplotspec() == panel.get_subplotspec() and count > 1:
                 other.set_box_aspect(max(ratio, 0.6))  # as tall as the maps
         _headline(run, figure)
-        return figure
+        return shown_once(figure)
+
+
+def shown_once(figure: Figure) -> Figure:
+    """Return a figure that a notebook shows once.
+
+    The inline backend shows all open figures at the end of a cell, and a figure that is the value
+    of the cell a second time: closed, it is shown as the value only.
+    """
+    if "inline" in plt.get_backend().lower():
+        plt.close(figure)
+    return figure
 
 
 def _frictional_overview(run: Run) -> Figure:
@@ -168,7 +179,7 @@ def _frictional_overview(run: Run) -> Figure:
             panel.set_title("Stick and slip" if name == "contact" else LABELS[name],
                             pad=15.0 if name == "contact" and grid.ny > 1 else None)
     _headline(run, figure)
-    return figure
+    return shown_once(figure)
 
 
 def _draw(run: Run, name: str, along: NDArray[Any], axes: Axes, style: dict[str, Any]) -> None:

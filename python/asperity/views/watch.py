@@ -195,7 +195,7 @@ def watch(path: str | os.PathLike[str], *, every: float = 1.0, once: bool = Fals
     out = sys.stdout if stream is None else stream
     live = not once and out.isatty() and os.environ.get("TERM", "") != "dumb"
     encoding = (getattr(out, "encoding", None) or "ascii").lower().replace("-", "")
-    unicode = encoding.startswith("utf")
+    unicode = encoding.startswith("utf") and not _posix_locale()
     pace = Pace()
     drawn: list[str] = []
     told: Any = None
@@ -206,13 +206,16 @@ def watch(path: str | os.PathLike[str], *, every: float = 1.0, once: bool = Fals
             if live or once:
                 size = shutil.get_terminal_size((100, 24))
                 lines = picture(run, pace, max(size.columns - 1, 40), unicode)[: size.lines - 1]
+                if not unicode:
+                    lines = [_ascii(line) for line in lines]
                 if live:
                     _over(out, drawn, lines)
                 else:
                     out.write("\n".join(lines) + "\n")
                 drawn = lines
             elif (now := _news(run)) != told:
-                out.write(f"{state_of(run, pace)}: {last_row(run)}\n")
+                line = f"{state_of(run, pace)}: {last_row(run)}\n"
+                out.write(line if unicode else _ascii(line))
                 told = now
             out.flush()
             if run.finished or once or run.outcome != "running":
@@ -229,6 +232,29 @@ def watch(path: str | os.PathLike[str], *, every: float = 1.0, once: bool = Fals
         if stream is None:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+
+
+def _posix_locale() -> bool:
+    """Return whether the user has asked for the POSIX locale, whose terminals show ASCII only.
+
+    Python itself writes UTF-8 there.
+    """
+    given = {name: os.environ[name] for name in ("LC_ALL", "LC_CTYPE", "LANG")
+             if os.environ.get(name)}
+    if "LANG" in given and given.get("LC_CTYPE") in ("C.UTF-8", "C.utf8", "UTF-8"):
+        del given["LC_CTYPE"]  # Python itself sets it where LANG is POSIX
+    return next(iter(given.values()), "") in ("C", "POSIX")
+
+
+def _ascii(text: str) -> str:
+    """Return a text in ASCII.
+
+    Examples
+    --------
+    >>> _ascii("t = 5 \u00b5s, Stra\u00dfe")
+    't = 5 us, Stra?e'
+    """
+    return text.replace("\u00b5", "u").encode("ascii", "replace").decode()
 
 
 def _news(run: Run) -> tuple[Any, ...]:
