@@ -12,7 +12,7 @@ import pytest
 
 import asperity
 from asperity.__main__ import main
-from asperity.runs.progress import Progress
+from asperity.runs.run_progress import Progress
 
 
 def test_contacts_and_cases_show_themselves_in_notebooks():
@@ -65,7 +65,7 @@ def test_a_run_as_a_data_set(road):
 
 def test_progress_is_throttled(monkeypatch):
     now = [0.0]
-    monkeypatch.setattr("asperity.runs.progress.clock.monotonic", lambda: now[0])
+    monkeypatch.setattr("asperity.runs.run_progress.clock.monotonic", lambda: now[0])
     stream = io.StringIO()
     progress = Progress(1000, stream)
     for step in range(1000):
@@ -87,7 +87,7 @@ def test_progress_in_a_notebook_is_a_bar(monkeypatch):
         shown.append(bar)
         return Handle()
 
-    monkeypatch.setattr("asperity.runs.progress._notebook_display", lambda: display)
+    monkeypatch.setattr("asperity.runs.run_progress._notebook_display", lambda: display)
     progress = Progress(3)
     for step in range(3):
         progress.show(step, 0.0, 0.1, 0.5)

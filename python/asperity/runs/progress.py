@@ -1,83 +1,92 @@
-"""How a run in this process shows its progress: a bar in a notebook, else a line now and then."""
+"""What many runs tell on stderr while they go on."""
 
 from __future__ import annotations
 
 import sys
-import time as clock
-from html import escape
-from typing import Any, TextIO
+import time
+from typing import TextIO
 
 __all__ = ["Progress"]
 
-_EVERY = 2.0           # seconds between two lines
-_EVERY_IN_NOTEBOOK = 0.2
-
-
-def _notebook_display() -> Any:
-    """Return IPython's `display` in a notebook, None elsewhere."""
-    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
-    if shell is None or type(shell).__name__ != "ZMQInteractiveShell":
-        return None
-    from IPython.display import display
-
-    return display
-
 
 class Progress:
-    """The progress of a run.
+    """What is told on stderr: a line that is rewritten in a terminal, else one line a case."""
 
-    Parameters
-    ----------
-    rows : int
-        Number of rows of the whole run.
-    stream : text file, optional
-        Where lines go; stderr if left out.
+    def __init__(self, what: str, total: int, waiting: int, quiet: bool,
+                 stream: TextIO | None = None) -> None:
+        self._what = what
+        self._stream = sys.stderr if stream is None else stream
+        self._quiet = quiet
+        self._terminal = self._stream.isatty()
+        self._total = total
+        self._kept = total - waiting
+        self._waiting = waiting
+        self._done = self._failed = 0
+        self._start = time.monotonic()
+        self._width = 0
+        if self._kept and not quiet:
+            self._line(f"{self._what}: {self._kept} of {total} results are there already")
+
+    def _line(self, text: str) -> None:
+        """Write a line of its own."""
+        if self._width:
+            self._stream.write("\r" + " " * self._width + "\r")
+            self._width = 0
+        self._stream.write(text + "\n")
+        self._stream.flush()
+
+    def show(self, running: int) -> None:
+        """Rewrite the line of a terminal."""
+        if self._quiet or not self._terminal:
+            return
+        text = f"{self._what}: {self._state()}, {running} running{self._left()}"
+        self._stream.write("\r" + text.ljust(self._width))
+        self._stream.flush()
+        self._width = len(text)
+
+    def _state(self) -> str:
+        """Return how far it is."""
+        failed = f", {self._failed} failed" if self._failed else ""
+        return f"{self._kept + self._done} of {self._total} done{failed}"
+
+    def _left(self) -> str:
+        """Return the time left, by the mean of the cases that are done."""
+        left = self._waiting - self._done
+        if not self._done or not left:
+            return ""
+        seconds = (time.monotonic() - self._start) / self._done * left
+        return f", about {_duration(seconds)} left"
+
+    def done(self, name: str, fault: str | None, seconds: float, running: int) -> None:
+        """Count a case; `fault` is None unless it failed."""
+        self._done += 1
+        self._failed += fault is not None
+        if self._quiet:
+            return
+        if fault is not None or not self._terminal:
+            how = f"done in {_duration(seconds)}" if fault is None else f"FAILED: {fault}"
+            self._line(f"{self._what}: {self._state()}{self._left()}: {name}: {how}")
+        self.show(running)
+
+    def end(self) -> None:
+        """Leave the line of a terminal."""
+        if self._width:
+            self._stream.write("\n")
+            self._stream.flush()
+            self._width = 0
+
+
+def _duration(seconds: float) -> str:
+    """Return a time in words.
+
+    Examples
+    --------
+    >>> _duration(3.21), _duration(75), _duration(7320)
+    ('3.2 s', '1 min 15 s', '2 h 02 min')
     """
-
-    def __init__(self, rows: int, stream: TextIO | None = None) -> None:
-        self.rows = rows
-        self._stream = stream
-        self._display = _notebook_display() if stream is None else None
-        self._handle: Any = None
-        self._start = self._last = clock.monotonic()
-        self._first_step: int | None = None
-
-    def show(self, step: int, time: float, contact_area: float, friction: float) -> None:
-        """Show a row, if it is the first or the last one, or the last shown is some time ago."""
-        now = clock.monotonic()
-        every = _EVERY if self._display is None else _EVERY_IN_NOTEBOOK
-        is_first = self._first_step is None
-        if is_first:
-            self._first_step = step
-        if not is_first and step < self.rows - 1 and now - self._last < every:
-            return
-        self._last = now
-        left = ""
-        done = step - (self._first_step or 0)
-        if done > 0 and step < self.rows - 1:
-            seconds = (now - self._start) / done * (self.rows - 1 - step)
-            left = f", {seconds:.0f} s left"
-        text = (f"step {step} of {self.rows - 1}, t = {time:.6g} s, contact area"
-                f" {contact_area:.4g}, friction {friction:.4g}{left}")
-        if self._display is None:
-            print(text, file=self._stream or sys.stderr)
-            return
-        shown = _Bar(step + 1, self.rows, text)
-        if self._handle is None:
-            self._handle = self._display(shown, display_id=True)
-        else:
-            self._handle.update(shown)
-
-
-class _Bar:
-    """A bar with its text, as a notebook shows it."""
-
-    def __init__(self, done: int, rows: int, text: str) -> None:
-        self._done, self._rows, self._text = done, rows, text
-
-    def _repr_html_(self) -> str:
-        return (f'<progress value="{self._done}" max="{self._rows}" style="width:20em">'
-                f"</progress> {escape(self._text)}")
-
-    def __repr__(self) -> str:
-        return self._text
+    if seconds < 60:
+        return f"{seconds:.1f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    if minutes < 60:
+        return f"{minutes} min {rest:02d} s"
+    return f"{minutes // 60} h {minutes % 60:02d} min"

@@ -16,8 +16,8 @@ from ..base.check import whole
 from ..base.errors import NotConverged
 from ..results import Run
 from . import namelists
-from .progress import Progress
 from .row import Row
+from .run_progress import Progress
 from .simulation import RunView
 
 __all__ = ["run"]

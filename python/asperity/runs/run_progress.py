@@ -1,0 +1,83 @@
+"""How a run in this process shows its progress: a bar in a notebook, else a line now and then."""
+
+from __future__ import annotations
+
+import sys
+import time as clock
+from html import escape
+from typing import Any, TextIO
+
+__all__ = ["Progress"]
+
+_EVERY = 2.0           # seconds between two lines
+_EVERY_IN_NOTEBOOK = 0.2
+
+
+def _notebook_display() -> Any:
+    """Return IPython's `display` in a notebook, None elsewhere."""
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    if shell is None or type(shell).__name__ != "ZMQInteractiveShell":
+        return None
+    from IPython.display import display
+
+    return display
+
+
+class Progress:
+    """The progress of a run.
+
+    Parameters
+    ----------
+    rows : int
+        Number of rows of the whole run.
+    stream : text file, optional
+        Where lines go; stderr if left out.
+    """
+
+    def __init__(self, rows: int, stream: TextIO | None = None) -> None:
+        self.rows = rows
+        self._stream = stream
+        self._display = _notebook_display() if stream is None else None
+        self._handle: Any = None
+        self._start = self._last = clock.monotonic()
+        self._first_step: int | None = None
+
+    def show(self, step: int, time: float, contact_area: float, friction: float) -> None:
+        """Show a row, if it is the first or the last one, or the last shown is some time ago."""
+        now = clock.monotonic()
+        every = _EVERY if self._display is None else _EVERY_IN_NOTEBOOK
+        is_first = self._first_step is None
+        if is_first:
+            self._first_step = step
+        if not is_first and step < self.rows - 1 and now - self._last < every:
+            return
+        self._last = now
+        left = ""
+        done = step - (self._first_step or 0)
+        if done > 0 and step < self.rows - 1:
+            seconds = (now - self._start) / done * (self.rows - 1 - step)
+            left = f", {seconds:.0f} s left"
+        text = (f"step {step} of {self.rows - 1}, t = {time:.6g} s, contact area"
+                f" {contact_area:.4g}, friction {friction:.4g}{left}")
+        if self._display is None:
+            print(text, file=self._stream or sys.stderr)
+            return
+        shown = _Bar(step + 1, self.rows, text)
+        if self._handle is None:
+            self._handle = self._display(shown, display_id=True)
+        else:
+            self._handle.update(shown)
+
+
+class _Bar:
+    """A bar with its text, as a notebook shows it."""
+
+    def __init__(self, done: int, rows: int, text: str) -> None:
+        self._done, self._rows, self._text = done, rows, text
+
+    def _repr_html_(self) -> str:
+        return (f'<progress value="{self._done}" max="{self._rows}" style="width:20em">'
+                f"</progress> {escape(self._text)}")
+
+    def __repr__(self) -> str:
+        return self._text
