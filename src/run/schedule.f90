@@ -10,7 +10,7 @@ module schedule
    implicit none
    private
 
-   public :: change_velocity, count_rows, next_row, planned_row_type, schedule_type
+   public :: change_load, change_velocity, count_rows, next_row, planned_row_type, schedule_type
 
    !> What a row asks for.
    type :: planned_row_type
@@ -55,6 +55,8 @@ module schedule
       real(dp) :: held_pull(2) = 0.0_dp           !! that force, Pa
       real(dp) :: start_pull(2) = 0.0_dp          !! force on the road at the start of the phase, Pa
       logical :: speed_changed = .false.          !! by `change_velocity`, since the last row
+      logical :: load_changed = .false.           !! by `change_load`, since the last row
+      logical :: load_has_changed = .false.       !! by `change_load`, before the last row
    end type schedule_type
 
 contains
@@ -159,6 +161,7 @@ contains
             if (phase%linear) row%load_before = self%start_load &
                + real(self%step - 1, dp)/phase%steps*(phase%target - self%start_load)
             if (self%step == 1 .and. .not. phase%static) call note_rate(self, phase, row)
+            if (.not. phase%static) call note_change(self, present_load, row)
             if (self%step == 1 .and. phase%linear .and. any(phase%pulled)) row%new_rate = .not. phase%static
          end if
          row%ramped = phase%linear .and. self%step > 0 .and. self%row >= 0
@@ -185,6 +188,41 @@ contains
          end if
       end associate
    end subroutine next_row
+
+   !> A load that was changed within a phase is a ramp over one step: a kink at its start and its end.
+   subroutine note_change(self, present_load, row)
+      type(schedule_type), intent(inout) :: self
+      real(dp), intent(in) :: present_load(3)
+      type(planned_row_type), intent(inout) :: row
+
+      if (.not. (self%load_changed .or. self%load_has_changed)) return
+      if (self%load_changed) row%load_before = load_in(row%control, present_load)
+      call compare_rate(self, (row%load - row%load_before)/row%dt, row)
+      self%load_has_changed = self%load_changed
+      self%load_changed = .false.
+   end subroutine note_change
+
+   !> Prescribe another load from the last row on: in the phase in hand and all later.
+   subroutine change_load(self, phases, control, load)
+      type(schedule_type), intent(inout) :: self
+      type(phase_settings_type), intent(inout) :: phases(:)
+      character(*), intent(in) :: control          !! 'pressure' | 'force' | 'displacement'
+      real(dp), intent(in) :: load                 !! Pa, N or m
+      integer :: k
+
+      if (self%phase > size(phases)) return
+      if (self%entered) then
+         self%load_changed = .true.
+         ! The rate of another quantity says nothing of that of the new one.
+         if (phases(self%phase)%control /= control) self%held_rate = huge(1.0_dp)
+      end if
+      do k = self%phase, size(phases)
+         phases(k)%control = control
+         phases(k)%target = load
+         phases(k)%given = .true.
+         phases(k)%linear = .false.
+      end do
+   end subroutine change_load
 
    !> Let the road move with another velocity from the last row on: in the phase in hand and all later.
    subroutine change_velocity(self, phases, velocity, road)
@@ -219,15 +257,24 @@ contains
       type(schedule_type), intent(inout) :: self
       type(phase_settings_type), intent(in) :: phase
       type(planned_row_type), intent(inout) :: row
-      real(dp), parameter :: kink = 0.25_dp        !! relative change of a rate that is more than the bend of a curve
       real(dp) :: rate
 
       rate = 0.0_dp
       if (phase%linear) rate = (phase%target - self%start_load)/phase%duration
-      row%new_rate = abs(rate - self%held_rate) > kink*max(abs(rate), abs(self%held_rate))
+      call compare_rate(self, rate, row)
       if (self%held_control /= phase%control(:12)) row%new_rate = .true.
-      self%held_rate = rate
    end subroutine note_rate
+
+   !> Say whether the rate of the load has a kink, and keep the new rate.
+   pure subroutine compare_rate(self, rate, row)
+      type(schedule_type), intent(inout) :: self
+      real(dp), intent(in) :: rate                 !! of the step in hand, over s
+      type(planned_row_type), intent(inout) :: row
+      real(dp), parameter :: kink = 0.25_dp        !! relative change of a rate that is more than the bend of a curve
+
+      row%new_rate = abs(rate - self%held_rate) > kink*max(abs(rate), abs(self%held_rate))
+      self%held_rate = rate
+   end subroutine compare_rate
 
    !> The load from which a phase's ramp starts, in the phase's control.
    pure function load_at_start(self, phase, present_load) result(load)
@@ -241,9 +288,17 @@ contains
       else if (self%held_control == '') then
          load = 0.0_dp
       else
-         load = present_load(findloc([character(12) :: 'pressure', 'force', 'displacement'], &
-            phase%control(:12), dim=1))
+         load = load_in(phase%control(:12), present_load)
       end if
    end function load_at_start
+
+   !> The load as a quantity has it.
+   pure function load_in(control, present_load) result(load)
+      character(12), intent(in) :: control
+      real(dp), intent(in) :: present_load(3)      !! pressure, force and displacement
+      real(dp) :: load
+
+      load = present_load(findloc([character(12) :: 'pressure', 'force', 'displacement'], control, dim=1))
+   end function load_in
 
 end module schedule

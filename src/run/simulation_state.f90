@@ -119,6 +119,10 @@ contains
          call table%add('schedule/held_pull', s%held_pull, 'Pa', 'force on the road so far, over the cell')
          call table%add('schedule/start_pull', s%start_pull, 'Pa', &
             'force on the road at the start of the phase, over the cell')
+         call table%add('schedule/load_changed', s%load_changed, &
+            'the load was changed since the last row')
+         call table%add('schedule/load_has_changed', s%load_has_changed, &
+            'the load was changed before the last row')
          call table%add('schedule/speed_changed', s%speed_changed, &
             'the velocity was changed since the last row')
       end associate

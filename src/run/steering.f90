@@ -9,7 +9,7 @@ module steering
    use errors, only : error_input, error_type, fail
    use precision, only : dp
    use prony, only : wlf_shift
-   use schedule, only : change_velocity
+   use schedule, only : change_load, change_velocity
    use simulation, only : simulation_type
    use text_tools, only : to_text
    implicit none
@@ -25,7 +25,6 @@ contains
       character(*), intent(in) :: control             !! 'pressure' | 'force' | 'displacement'
       real(dp), intent(in) :: load                    !! Pa, N or m
       type(error_type), allocatable, intent(out) :: error
-      integer :: k
 
       if (.not. ieee_is_finite(load)) then
          call fail(error, error_input, control//' = '//to_text(load)//': must be a finite number')
@@ -35,12 +34,7 @@ contains
             ': must be positive without adhesion')
       end if
       if (allocated(error)) return
-      do k = sim%schedule%phase, size(sim%case%phases)
-         sim%case%phases(k)%control = control
-         sim%case%phases(k)%target = load
-         sim%case%phases(k)%given = .true.
-         sim%case%phases(k)%linear = .false.
-      end do
+      call change_load(sim%schedule, sim%case%phases, control, load)
    end subroutine steer_load
 
    !> Let the road move with a velocity.

@@ -81,6 +81,8 @@ class Row(NamedValues):
     iterations_tangential: int
     residual_normal: float
     residual_tangential: float
+    passes: int
+    residual_coupling: float
     ffts: float
     seconds: float
 
