@@ -100,6 +100,8 @@ def _add_modules(app, name, source):
         if address in AT_THE_TOP or f"automodule:: {module}\n" in named:
             continue
         source[0] += f"\n{module}\n{'-' * len(module)}\n\n.. automodule:: {module}\n   :members:\n"
+        if address == "measured":  # what asperity.surface shows already
+            source[0] += "   :exclude-members: MeasuredSurface, import_topography, load\n"
 
 
 def _prepare_docstring(app, what, name, thing, options, lines):

@@ -28,8 +28,8 @@ module friction_pull
    type :: friction_pull_type
       logical :: along(2) = .false.              !! the mean of T is prescribed along x, y
       real(dp) :: traction(2) = 0.0_dp           !! that mean, Pa
-      !> In: a guess, or the place of a mass whose T has the mean prescribed. Out: found; 0 where nothing
-      !> is prescribed. In the units of DX'.
+      !> Before a solve this is a guess, or the place of a mass whose T has the mean prescribed; after it
+      !> what was found, 0 where nothing is prescribed. In the units of DX'.
       real(dp) :: offset(2) = 0.0_dp
       real(dp) :: yielding(2) = 0.0_dp           !! m for G = 1 Pa; 0: the total is met
       logical :: slides_off = .false.            !! out: the pull is more than the friction can hold

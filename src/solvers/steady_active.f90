@@ -25,7 +25,7 @@ contains
    pure function affordable(cells_in_contact, cells) result(cheap)
       integer, intent(in) :: cells_in_contact, cells
       logical :: cheap
-      real(dp), parameter :: transforms = 300.0_dp   !! measured: this many operations a cell and level
+      real(dp), parameter :: transforms = 300.0_dp   !! measured (operations per cell and level)
 
       cheap = real(cells_in_contact, dp)**3 <= transforms*cells*log(real(max(cells, 2), dp))/log(2.0_dp)
    end function affordable
