@@ -624,15 +624,16 @@ def block() -> Chapter:
                          f" steps = {4 * steps} /\n" for f in frictions)
         result = run(f"""&grid nx = 4, ny = 2, lx = 2e-3 /
 &surface shape = 'flat' /
-&material shear_modulus = {modulus}, prony_g = 0.3e6, 0.2e6, prony_tau = {tau[0]!r}, {tau[1]!r},
+&material shear_modulus = {modulus}, prony_g = 0.3e6, 0.2e6, prony_tau = {float(tau[0])!r}, {float(tau[1])!r},
           thickness = {height}, density = {density} /
 &friction law = 'coulomb', coefficient = 0.5 /
-&output snapshot_every = 1 /
 &solver tolerance = 1e-10, passes = 4 /
 {phases}""")
         h = result.history
         timed = np.flatnonzero(np.diff(h["time"], prepend=-1.0) > 0)[1:]
-        found = np.array([result.snapshots[int(k)].displacement_x.mean() for k in timed])
+        # the whole block slides as one: what the road has moved less what it has slid
+        slid = np.cumsum(h["sliding_speed"][timed] * np.diff(h["time"][timed], prepend=0.0))
+        found = h["road_x"][timed] - slid
         known = exact(h["time"][timed])
         kinetic = np.sqrt(2 * h["energy_kinetic"][timed] / (mass * result.grid.lx * result.grid.ly))
         errors = [np.sqrt(np.mean((a - b) ** 2) / np.mean(b ** 2))
