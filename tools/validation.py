@@ -624,7 +624,8 @@ def block() -> Chapter:
                          f" steps = {4 * steps} /\n" for f in frictions)
         result = run(f"""&grid nx = 4, ny = 2, lx = 2e-3 /
 &surface shape = 'flat' /
-&material shear_modulus = {modulus}, prony_g = 0.3e6, 0.2e6, prony_tau = {float(tau[0])!r}, {float(tau[1])!r},
+&material shear_modulus = {modulus}, prony_g = 0.3e6, 0.2e6,
+          prony_tau = {float(tau[0])!r}, {float(tau[1])!r},
           thickness = {height}, density = {density} /
 &friction law = 'coulomb', coefficient = 0.5 /
 &solver tolerance = 1e-10, passes = 4 /
