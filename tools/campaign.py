@@ -114,14 +114,18 @@ def random_case(chance, *, rows=12, largest=40, threads=1):
         lines.append(f"&surface shape = 'paraboloid', radius = {lx**2 / amplitude:.6e} /")
         load = f"force = {0.02 * pressure * lx * ly:.6e}"
     else:
+        longest = 0.8 * min(lx, ly if ny > 1 else lx)
+        shortest = 3 * max(lx / nx, ly / ny if ny > 1 else 0.0)
         shape = chance.choice(["sine", "self_affine", "self_affine"])
+        if shortest > 0.4 * longest:
+            shape = "sine"
         if shape == "sine":
             lines.append(f"&surface shape = 'sine', amplitude = {amplitude:.6e},"
                          f" wavelength = {lx:.6e} /")
         else:
             lines.append(f"&surface shape = 'self_affine', hurst = {chance.uniform(0.4, 1):.3f},"
-                         f" wavelength_long = {0.8 * min(lx, ly if ny > 1 else lx):.6e},"
-                         f" wavelength_short = {3 * lx / nx:.6e}, rms_height = {amplitude:.6e},"
+                         f" wavelength_long = {longest:.6e},"
+                         f" wavelength_short = {shortest:.6e}, rms_height = {amplitude:.6e},"
                          f" seed = {chance.randrange(1000)} /")
         load = f"pressure = {pressure:.6e}"
     material = f"&material shear_modulus = {modulus:.6e}"
