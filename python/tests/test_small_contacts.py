@@ -94,4 +94,4 @@ def test_full_contact_is_named_where_a_displacement_leaves_no_gap():
 """
     for adhesion in ("", "&adhesion potential = 'exponential', energy = 1e-5, range = 1e-3 /"):
         with pytest.raises(asperity.NotConverged, match="full contact"):
-            asperity.run(case.format(adhesion), output="case.h5")
+            asperity.run(case.format(adhesion), output=f"case{len(adhesion)}.h5")
