@@ -36,7 +36,7 @@ LONG_WAVES = "is not below the side of"
 #: Cells too wide for the range of adhesion.
 WIDE_CELLS = "the edge of the contact sticks to the grid"
 #: Passes of a coupled step that swing between two states.
-UNSETTLED = "the passes of a step do not settle"
+UNSETTLED = "the passes of the step did not settle"
 #: Numerical stick-slip.
 STICK_SLIP = "the mean slip rises and falls from step to step"
 

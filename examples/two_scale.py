@@ -108,9 +108,7 @@ def case(nx: int, road: str, *, speed: float = SPEED, pressure: float = PRESSURE
                              ("onset", 0.1 * travel + WIDER, {"dt": 0.5 * cell / speed}),
                              ("slide", distance - WIDER, {"dt": fine * cell / speed})):
         made.phase.append(name=name, velocity_x=speed, duration=way / speed, **steps)
-    # Two passes, the default, leave stick-slip from step to step where contact is nearly full;
-    # linear interpolation of so coarse a road makes the ripples of the short wave lower.
-    made.solver.update(tolerance=1e-5, passes=6, interpolation="cubic")
+    made.solver.update(tolerance=1e-5)
     return made
 
 

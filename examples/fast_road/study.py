@@ -41,8 +41,9 @@ def check(data: dict[str, Any], quick: bool) -> None:
     for found in (slow, fast):
         road.check_slope(found)
     # The stiffer block slips after a shorter travel of the drive: that of plain shear up to the
-    # friction, 0.1 mm against 0.28 mm, but for the edges of the contacts, which slip before.
-    travel = [data[name]["road_x"][(data[name]["stick_area"] < 1e-3)
+    # friction, 0.1 mm against 0.28 mm, but for the edges of the contacts, which slip before, and
+    # for a few cells, less than a hundredth of the grid, which hold longer.
+    travel = [data[name]["road_x"][(data[name]["stick_area"] < 1e-2)
                                    & (data[name]["road_x"] > 0.0)][0] for name in ("slow", "fast")]
     for way, speed, found in zip(travel, (SLOW, FAST), (slow, fast), strict=True):
         known = road.drive_to_slip(found["plateau"] * road.PRESSURE, speed)

@@ -185,10 +185,11 @@ def check(data: dict[str, Any], quick: bool) -> None:
         assert 0.9 * low[name] < value < 1.1 * high[name], \
             f"{name} {value}, theory {low[name]} to {high[name]}"
     # What the drive does above the loss is stored, or lifts the load: as seen from outside, within
-    # the error of the steps, a cell each.
+    # the error of the steps. At one cell a step and 6 to 8 cells in the shortest wave the
+    # trapezoidal rule for the work on the road is 2 to 4 % off with slopes that are exact.
     energy = {name: values.sum() for name, values in jump["energies"].items()}
     balance = energy["drive"] - energy["load"] - energy["elastic"] - energy["loss"]
-    assert abs(balance) < 0.03 * energy["drive"], f"balance open by {balance / energy['drive']:.3f}"
+    assert abs(balance) < 0.04 * energy["drive"], f"balance open by {balance / energy['drive']:.3f}"
     first = {name: values[:peak + 1].sum() for name, values in jump["energies"].items()}
     assert first["load"] > first["elastic"] > 0, "the maximum does not lift the load"
     # A jump of the load while sliding: the theory has each wave in full contact and so no memory of

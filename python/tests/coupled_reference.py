@@ -85,18 +85,14 @@ class Block:
         self.level, self.rubs = 0.0, False
 
     def coefficients(self, dt: float) -> list[tuple[float, float, float]]:
-        """Return alpha, b1 and b2 of each arm (second-order exponential, or a jump)."""
+        """Return alpha, b1 and b2 of each arm (exponential, or a jump)."""
         found = []
         for g, tau in self.arms:
             x = dt / tau
             if dt == 0:
                 found.append((1.0, g, 0.0))
-                continue
-            chi = 0.0
-            w = 2 * dt / (dt + self.dt_old) if self.dt_old > 0 else 0.0
-            chi = (1 + np.exp(-x)) / (2 * x) - (1 - np.exp(-x)) / x**2
-            ratio = dt / self.dt_old if self.dt_old > 0 else 0.0
-            found.append((np.exp(-x), g * ((1 - np.exp(-x)) / x + w * chi), -g * w * chi * ratio))
+            else:
+                found.append((np.exp(-x), g * (1 - np.exp(-x)) / x, 0.0))
         return found
 
     def step(self, pressure: float, motion: tuple[float, float], dt: float,

@@ -26,7 +26,7 @@ INPUT = """&grid nx = 40, ny = 25, lx = 1.0e-3, ly = 0.7e-3 /
 &phase velocity_x = 4e-3, velocity_y = -2.6e-3, duration = 4e-3, steps = 16 /
 &phase velocity_x = -2e-3, velocity_y = -3.6e-3, duration = 3e-3, steps = 12 /
 &solver threads = 1, tolerance = 1e-8, passes = 30, slip_law = '{slip_law}', max_iterations = 3000,
-   interpolation = '{interpolation}' /
+   interpolation = '{interpolation}', time_scheme = 'exponential' /
 &output file = '{file}', snapshot_every = 1 /
 """
 
