@@ -1,6 +1,7 @@
 """Try the program with what nobody thought of: random problems, broken inputs, flips, kills.
 
-    python tools/campaign.py [--minutes 60] [--seed 1] [--keep FOLDER] [KIND ...]
+    python tools/campaign.py --minutes 60 [--seed 1] [--keep FOLDER] [KIND ...]
+    python tools/campaign.py --seed 17 --trials 1 flips
 
 Kinds: problems, runs, inputs, flips, kills, twins, memory; without a name all of them in turn.
 Every trial has its own seed, which is printed where something is wrong; `--seed N --trials 1 KIND`
