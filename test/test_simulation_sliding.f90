@@ -60,7 +60,11 @@ contains
          to_text(steps)//' /'//nl//'&solver tolerance = 1e-7, time_scheme = '''//scheme//''' /', &
          'Hunter', record)
       friction = record%rows(last(record))%friction
-      call check_that(maxval(record%rows%iterations_normal) < 60, 'Hunter: iterations of a step')
+      ! The first step is solved in three parts, whose iterations are added.
+      call check_that(record%rows(lbound(record%rows, 1) + 1)%iterations_normal < 3*60, &
+         'Hunter: iterations of the first step')
+      call check_that(maxval(record%rows(lbound(record%rows, 1) + 2:)%iterations_normal) < 60, &
+         'Hunter: iterations of a step')
       call check_books(record, 'Hunter, '//scheme)
    end function cylinder_friction
 
