@@ -1,7 +1,7 @@
 !> What the user typed, as a type; and the help texts.
 module command_line
-   use errors, only : add_fault, error_input, error_type
-   use precision, only : dp
+   use asperity_errors, only : add_fault, error_input, error_type
+   use asperity_precision, only : dp
    use text_tools, only : nearest_name, ordinary
    use time_limit, only : read_duration
    implicit none

@@ -2,7 +2,7 @@
 !> `python3 -m asperity plot ...` where it finds a Python that has the package.
 module hand_over
    use command_line, only : argument_text
-   use errors, only : error_file, error_type, fail
+   use asperity_errors, only : error_file, error_type, fail
    use, intrinsic :: iso_c_binding, only : c_char, c_int, c_loc, c_null_char, c_null_ptr, c_ptr, &
       c_size_t
    implicit none

@@ -7,18 +7,18 @@ program main
    use case_templates, only : all_template_names, find_template, template_is_available, template_list, &
       template_text
    use command_line, only : command_type, help_text, read_command_line
-   use errors, only : error_file, error_input, error_memory, error_type, fail
+   use asperity_errors, only : error_file, error_input, error_memory, error_type, fail
    use hand_over, only : become_python
    use input_reference, only : reference_markdown
-   use progress, only : progress_type
+   use asperity_progress, only : progress_type
    use result_summary, only : summarise_result
-   use signals, only : catch_signals, checkpoint_asked, forget_checkpoint, stop_signal, &
+   use asperity_signals, only : catch_signals, checkpoint_asked, forget_checkpoint, stop_signal, &
       stop_signal_name
    use standard_streams, only : say, say_error
-   use surface, only : check_files
+   use asperity_surface, only : check_files
    use time_limit, only : time_limit_type
    use text_tools, only : nearest_name, ordinary, to_text
-   use version, only : asperity_version
+   use asperity_version, only : version_number
    use wait_policy, only : wait_passively
    implicit none
 
@@ -35,7 +35,7 @@ program main
       case ('help')
          call say(help_text(command%help_of), error)
       case ('version')
-         call say('asperity '//asperity_version//new_line('a'), error)
+         call say('asperity '//version_number//new_line('a'), error)
       case ('template')
          call template(error)
       case ('check')

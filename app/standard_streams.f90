@@ -1,6 +1,6 @@
 !> Standard output and standard error, written by the system's own call, which tells when it fails.
 module standard_streams
-   use errors, only : error_file, error_type, fail
+   use asperity_errors, only : error_file, error_type, fail
    use, intrinsic :: iso_c_binding, only : c_char, c_int, c_size_t
    implicit none
    private

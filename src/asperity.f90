@@ -19,26 +19,26 @@ module asperity
    use case_input, only : parse_case, read_case
    use case_run, only : run_type
    use case_settings, only : case_type
-   use errors, only : error_convergence, error_file, error_input, error_type
+   use asperity_errors, only : error_convergence, error_file, error_input, error_type
    use fft_conv, only : convolution_type, new_normal_operator, new_tangential_operator
    use friction_cg, only : friction_solver_type, new_friction_solver
    use friction_law, only : friction_law_type, new_friction_law
    use history_row, only : history_row_type
-   use interpolation, only : displaced, interpolation_type, new_interpolation, shifted
+   use asperity_interpolation, only : displaced, interpolation_type, new_interpolation, shifted
    use normal_cg, only : new_normal_solver, normal_solver_type
    use normal_cg_thesis, only : solve_normal_thesis
    use normal_state, only : control_approach, control_pressure, normal_problem_type
-   use parallel, only : set_threads, thread_count
-   use precision, only : dp, sp
+   use asperity_parallel, only : set_threads, thread_count
+   use asperity_precision, only : dp, sp
    use prony, only : complex_modulus, creep_compliance, relaxation_modulus, wlf_shift, zener_to_prony
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use roughness, only : height_psd, height_statistics, radial_psd, roughness_type
-   use schedule, only : count_rows
-   use simulation, only : new_simulation, simulation_type
+   use asperity_schedule, only : count_rows
+   use asperity_simulation, only : new_simulation, simulation_type
    use solver_result, only : solver_result_type
-   use surface, only : new_height
+   use asperity_surface, only : new_height
    use surface_settings, only : default_surface, surface_settings_type
-   use version, only : asperity_version
+   use asperity_version, only : version_number
    use viscoelastic_energy, only : book_step, energy_books_type, new_books
    use zener, only : commit_history, finish_step, history_field, history_type, new_history, &
       new_products, new_zener, products_type, start_jump, start_relaxed, start_step, zener_type

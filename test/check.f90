@@ -2,8 +2,8 @@
 module check
    use, intrinsic :: iso_fortran_env, only : error_unit, output_unit
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
-   use errors, only : error_type
-   use precision, only : dp
+   use asperity_errors, only : error_type
+   use asperity_precision, only : dp
    implicit none
    private
 

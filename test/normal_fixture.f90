@@ -1,16 +1,16 @@
 !> What the tests of normal contact share: problems solved in one call, and errors recomputed.
 module normal_fixture
    use check, only : check_no_error, check_that
-   use errors, only : error_type
+   use asperity_errors, only : error_type
    use fft_conv, only : convolution_type, new_normal_operator
    use normal_cg, only : new_normal_solver, normal_solver_type
    use normal_cg_thesis, only : solve_normal_thesis
    use normal_state, only : control_pressure, normal_problem_type
-   use parallel, only : set_threads, thread_count
-   use precision, only : dp, pi
+   use asperity_parallel, only : set_threads, thread_count
+   use asperity_precision, only : dp, pi
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
-   use surface, only : new_height
+   use asperity_surface, only : new_height
    use surface_settings, only : default_surface, surface_settings_type
    implicit none
    private

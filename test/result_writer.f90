@@ -1,10 +1,10 @@
 !> A small run that writes a result and nothing else: tests kill it, fill its disk, read it.
 module result_writer
    use, intrinsic :: iso_fortran_env, only : error_unit
-   use checkpoint, only : checkpoint_reader_type, checkpoint_writer_type
-   use errors, only : error_type
+   use asperity_checkpoint, only : checkpoint_reader_type, checkpoint_writer_type
+   use asperity_errors, only : error_type
    use history_row, only : history_row_type
-   use precision, only : dp, int8
+   use asperity_precision, only : dp, int8
    use regular_grid, only : boundary_periodic, grid_type, new_grid
    use result_file, only : result_file_type
    use state_table, only : state_table_type

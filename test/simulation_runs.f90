@@ -3,12 +3,12 @@ module simulation_runs
    use case_input, only : parse_case
    use case_settings, only : case_type
    use check, only : check_close, check_no_error, check_that
-   use errors, only : error_type
+   use asperity_errors, only : error_type
    use hdf5_file, only : hdf5_file_type
    use history_row, only : history_row_type
-   use precision, only : dp
-   use schedule, only : count_rows
-   use simulation, only : new_simulation, simulation_type
+   use asperity_precision, only : dp
+   use asperity_schedule, only : count_rows
+   use asperity_simulation, only : new_simulation, simulation_type
    implicit none
    private
 

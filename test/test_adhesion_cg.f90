@@ -6,10 +6,10 @@ module test_adhesion_cg
    use adhesion_state, only : adhesion_problem_type, control_approach, control_pressure, &
       reason_closed, reason_detached
    use check, only : begin_suite, check_close, check_error, check_no_error, check_that
-   use errors, only : error_type
+   use asperity_errors, only : error_type
    use fft_conv, only : convolution_type, new_symbol_operator
-   use parallel, only : set_threads
-   use precision, only : dp, pi
+   use asperity_parallel, only : set_threads
+   use asperity_precision, only : dp, pi
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use solver_result, only : solver_result_type
    implicit none

@@ -3,8 +3,8 @@ module test_adhesion_potential
    use adhesion_potential, only : adhesion_potential_type, adhesive_curvature, adhesive_energy, &
       adhesive_slope, adhesive_terms, new_adhesion_potential, release_pressure
    use check, only : begin_suite, check_close, check_error, check_no_error, check_that
-   use errors, only : error_type
-   use precision, only : dp
+   use asperity_errors, only : error_type
+   use asperity_precision, only : dp
    implicit none
    private
 

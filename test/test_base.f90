@@ -1,10 +1,10 @@
 !> Tests of the ground floor.
 module test_base
    use check, only : begin_suite, check_close, check_error, check_that
-   use errors, only : add_fault, error_file, error_input, error_type, fail
-   use precision, only : dp
+   use asperity_errors, only : add_fault, error_file, error_input, error_type, fail
+   use asperity_precision, only : dp
    use regular_grid, only : boundary_free, grid_type, new_grid
-   use version, only : asperity_version
+   use asperity_version, only : version_number
    implicit none
    private
 
@@ -25,7 +25,7 @@ contains
       call check_close(grid%dx, 0.5_dp, 0.0_dp, 'dx')
       call check_close(grid%dy, 0.25_dp, 0.0_dp, 'dy')
       call check_that(grid%first_row == 1 .and. grid%last_row == 4, 'all rows are here')
-      call check_that(verify(asperity_version, '0123456789.abcrdev') == 0, 'the version is a number')
+      call check_that(verify(version_number, '0123456789.abcrdev') == 0, 'the version is a number')
    end subroutine run_base
 
 end module test_base

@@ -5,9 +5,9 @@ module test_block_motion
    use case_input, only : parse_case
    use case_settings, only : case_type
    use check, only : begin_suite, check_close, check_no_error, check_that
-   use errors, only : error_type
-   use precision, only : dp, pi
-   use simulation, only : new_simulation, simulation_type
+   use asperity_errors, only : error_type
+   use asperity_precision, only : dp, pi
+   use asperity_simulation, only : new_simulation, simulation_type
    use simulation_runs, only : check_books, nl, record_type, run_case
    use text_tools, only : exact_text, to_text
    implicit none

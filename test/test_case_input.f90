@@ -5,8 +5,8 @@ module test_case_input
    use case_settings, only : case_type
    use case_templates, only : all_template_names, template_is_available, template_list, template_text
    use check, only : begin_suite, check_close, check_error, check_no_error, check_that
-   use errors, only : error_file, error_input, error_type
-   use precision, only : dp
+   use asperity_errors, only : error_file, error_input, error_type
+   use asperity_precision, only : dp
    use regular_grid, only : boundary_free
    implicit none
    private

@@ -3,12 +3,12 @@
 module test_checkpoint
    use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use check, only : begin_suite, check_close, check_error, check_no_error, check_that
-   use checkpoint, only : checkpoint_path, checkpoint_reader_type, checkpoint_writer_type, &
+   use asperity_checkpoint, only : checkpoint_path, checkpoint_reader_type, checkpoint_writer_type, &
       remove_checkpoint
-   use checksum, only : checksum_of_field, checksum_of_file, checksum_of_text, hexadecimal
-   use errors, only : error_convergence, error_file, error_input, error_type
+   use asperity_checksum, only : checksum_of_field, checksum_of_file, checksum_of_text, hexadecimal
+   use asperity_errors, only : error_convergence, error_file, error_input, error_type
    use file_system, only : file_exists
-   use precision, only : dp, int64, int8
+   use asperity_precision, only : dp, int64, int8
    use state_table, only : state_table_type
    implicit none
    private

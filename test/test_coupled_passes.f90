@@ -4,7 +4,7 @@ module test_coupled_passes
    use check, only : begin_suite, check_close, check_that
    use coupled_passes, only : carry
    use pass_control, only : pass_control_type
-   use precision, only : dp
+   use asperity_precision, only : dp
    use simulation_runs, only : check_books, nl, record_type, run_case
    implicit none
    private

@@ -1,6 +1,6 @@
 !> The library as another program sees it: everything through the one module.
 module test_facade
-   use asperity, only : asperity_version, boundary_free, dp, default_surface, error_type, grid_type, &
+   use asperity, only : version_number, boundary_free, dp, default_surface, error_type, grid_type, &
       new_grid, new_height, new_normal_solver, normal_problem_type, normal_solver_type, &
       solver_result_type, surface_settings_type
    use check, only : begin_suite, check_close, check_no_error, check_that
@@ -38,7 +38,7 @@ contains
       call check_that(outcome%converged, outcome%reason)
       ! E* = 2 G/(1 - nu) = 344.828 MPa gives an approach of 20 um; the mesh error is of order (dx/a)^2.
       call check_close(level + maxval(height), 20e-6_dp, 2e-8_dp, 'Hertz approach')
-      call check_that(len(asperity_version) > 0, 'version')
+      call check_that(len(version_number) > 0, 'version')
       call solver%destroy()
    end subroutine run_facade
 

@@ -1,11 +1,11 @@
 !> Tests of the influence coefficients and of the convolution operator.
 module test_fft_conv
    use check, only : begin_suite, check_close, check_no_error, check_that
-   use errors, only : error_type
+   use asperity_errors, only : error_type
    use fft_conv, only : convolution_type, new_normal_operator, new_symbol_operator, &
       new_tangential_operator
    use influence, only : love_normal, love_tangential, transform_length
-   use precision, only : dp, pi
+   use asperity_precision, only : dp, pi
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    implicit none
    private

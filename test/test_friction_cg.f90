@@ -1,14 +1,14 @@
 !> Tests of the tangential solver.
 module test_friction_cg
    use check, only : begin_suite, check_close, check_no_error, check_that
-   use errors, only : error_type
+   use asperity_errors, only : error_type
    use fft_conv, only : convolution_type, new_tangential_operator
    use friction_cg, only : friction_fast, friction_gradient, friction_solver_type, friction_thesis, &
       new_friction_solver, set_mean_compliance
    use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type, &
       largest_excess, new_friction_law, return_tractions
-   use parallel, only : set_threads, thread_count
-   use precision, only : dp, int8, pi
+   use asperity_parallel, only : set_threads, thread_count
+   use asperity_precision, only : dp, int8, pi
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use solver_result, only : solver_result_type
    implicit none

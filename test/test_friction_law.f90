@@ -3,7 +3,7 @@ module test_friction_law
    use check, only : begin_suite, check_close, check_that
    use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type, &
       largest_excess, new_friction_law, return_tractions, unbounded
-   use precision, only : dp, int8
+   use asperity_precision, only : dp, int8
    implicit none
    private
 

@@ -1,10 +1,10 @@
 !> Tests of the HDF5 files: what is written is read back, and every failure says what it is.
 module test_hdf5_file
    use check, only : begin_suite, check_close, check_error, check_no_error, check_that
-   use errors, only : error_file, error_input, error_type
+   use asperity_errors, only : error_file, error_input, error_type
    use file_system, only : remove_file
    use hdf5_file, only : hdf5_file_type, read_field
-   use precision, only : dp, int8
+   use asperity_precision, only : dp, int8
    implicit none
    private
 

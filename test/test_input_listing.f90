@@ -2,10 +2,10 @@
 module test_input_listing
    use, intrinsic :: iso_fortran_env, only : int64
    use check, only : begin_suite, check_error, check_no_error, check_that
-   use errors, only : error_type
+   use asperity_errors, only : error_type
    use input_listing, only : field_separator, input_table, list_values
    use input_reference, only : group_entries, variable_entries
-   use precision, only : dp
+   use asperity_precision, only : dp
    implicit none
    private
 

@@ -2,10 +2,10 @@
 module test_interpolation
    use check, only : begin_suite, check_close, check_error, check_no_error, check_that
    use counter_random, only : normal_number, row_key
-   use errors, only : error_type
-   use interpolation, only : displaced, interpolation_type, new_interpolation, shifted
+   use asperity_errors, only : error_type
+   use asperity_interpolation, only : displaced, interpolation_type, new_interpolation, shifted
    use omp_lib, only : omp_get_max_threads, omp_set_num_threads
-   use precision, only : dp, pi
+   use asperity_precision, only : dp, pi
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use surface_slopes, only : central_slopes, spectral_slopes
    implicit none

@@ -4,7 +4,7 @@ module test_mixed
    use normal_fixture, only : check_threads, distance, duality_gap, rough_problem, run_problem, &
       solution_type, unit_modulus
    use normal_state, only : control_approach, normal_problem_type
-   use precision, only : dp
+   use asperity_precision, only : dp
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use simulation_runs, only : check_same_rows, last, nl, record_type, run_case
    use text_tools, only : to_text

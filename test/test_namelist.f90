@@ -7,7 +7,7 @@ module test_namelist
       variable_entries, variable_entry_type
    use input_values, only : default_group
    use namelist_file, only : namelists_type, scan_namelists, shown_tokens
-   use precision, only : dp
+   use asperity_precision, only : dp
    use text_tools, only : exact_text, lower, nearest_name, ordinary, to_text
    implicit none
    private

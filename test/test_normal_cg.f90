@@ -1,12 +1,12 @@
 !> Tests of normal contact against known solutions. E* = 1 Pa throughout.
 module test_normal_cg
    use check, only : begin_suite, check_close, check_no_error, check_that
-   use errors, only : error_type
+   use asperity_errors, only : error_type
    use fft_conv, only : convolution_type, new_normal_operator
    use normal_fixture, only : duality_gap, poisson, rms, rough_height, rough_problem, &
       run_problem, solution_type, unit_modulus
    use normal_state, only : control_approach, control_pressure, normal_problem_type
-   use precision, only : dp, pi
+   use asperity_precision, only : dp, pi
    use projection, only : project_simplex
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    implicit none

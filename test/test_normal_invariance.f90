@@ -1,12 +1,12 @@
 !> Tests of normal contact: what must not change a solution, or changes it in a known way.
 module test_normal_invariance
    use check, only : begin_suite, check_close, check_no_error, check_that
-   use errors, only : error_type
+   use asperity_errors, only : error_type
    use fft_conv, only : convolution_type, new_normal_operator
    use normal_fixture, only : check_threads, distance, poisson, rms, rough_problem, run_problem, &
       solution_type, unit_modulus
    use normal_state, only : control_approach, normal_problem_type
-   use precision, only : dp
+   use asperity_precision, only : dp
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    implicit none
    private

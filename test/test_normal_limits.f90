@@ -1,13 +1,13 @@
 !> Tests of normal contact where it is hardest or degenerate: few cells, flat, no load, odd shapes.
 module test_normal_limits
    use check, only : begin_suite, check_close, check_no_error, check_that
-   use errors, only : error_type
+   use asperity_errors, only : error_type
    use fft_conv, only : convolution_type, new_normal_operator
    use normal_cg, only : new_normal_solver, normal_solver_type
    use normal_fixture, only : duality_gap, poisson, rms, rough_height, rough_problem, run_problem, &
       solution_type, unit_modulus
    use normal_state, only : control_approach, control_pressure, normal_problem_type
-   use precision, only : dp, pi
+   use asperity_precision, only : dp, pi
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use solver_result, only : solver_result_type
    implicit none

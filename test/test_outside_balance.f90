@@ -3,7 +3,7 @@ module test_outside_balance
    use check, only : begin_suite, check_close, check_that
    use history_row, only : history_row_type
    use outside_balance, only : book_outside
-   use precision, only : dp, pi
+   use asperity_precision, only : dp, pi
    use simulation_runs, only : check_books, last, nl, record_type, run_case
    use text_tools, only : exact_text, to_text
    implicit none

@@ -2,8 +2,8 @@
 module test_progress
    use check, only : begin_suite, check_that
    use history_row, only : history_row_type
-   use precision, only : dp
-   use progress, only : duration_text, progress_line
+   use asperity_precision, only : dp
+   use asperity_progress, only : duration_text, progress_line
    implicit none
    private
 

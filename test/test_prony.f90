@@ -1,7 +1,7 @@
 !> Tests of the material functions.
 module test_prony
    use check, only : begin_suite, check_close, check_that
-   use precision, only : dp
+   use asperity_precision, only : dp
    use prony, only : complex_modulus, creep_compliance, instantaneous_modulus, &
       relaxation_modulus, retardation_spectrum, wlf_shift, zener_to_prony
    implicit none

@@ -1,12 +1,12 @@
 !> Tests of the result: the layout, rows and snapshots, going on after a given row, a full disk.
 module test_result_file
    use check, only : begin_suite, check_close, check_error, check_no_error, check_that
-   use checkpoint, only : checkpoint_path
-   use errors, only : error_file, error_type
+   use asperity_checkpoint, only : checkpoint_path
+   use asperity_errors, only : error_file, error_type
    use file_system, only : file_exists, remove_file
    use hdf5_file, only : hdf5_file_type
    use history_row, only : column_count, column_type, history_columns
-   use precision, only : dp
+   use asperity_precision, only : dp
    use regular_grid, only : boundary_free, new_grid
    use result_file, only : result_file_type
    use result_names, only : sibling_path

@@ -2,8 +2,8 @@
 module test_roughness
    use check, only : begin_suite, check_close, check_error, check_no_error, check_that
    use counter_random, only : normal_number, row_key
-   use errors, only : error_type
-   use precision, only : dp, pi
+   use asperity_errors, only : error_type
+   use asperity_precision, only : dp, pi
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use roughness, only : height_psd, height_statistics, radial_psd, roughness_type
    implicit none

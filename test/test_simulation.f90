@@ -1,7 +1,7 @@
 !> Tests of the step loop without sliding: creep, ramps, jumps, energies, schemes.
 module test_simulation
    use check, only : begin_suite, check_close, check_that
-   use precision, only : dp, pi
+   use asperity_precision, only : dp, pi
    use simulation_runs, only : check_books, check_same_rows, creep_compliance, last, nl, record_type, &
       run_case
    use text_tools, only : to_text

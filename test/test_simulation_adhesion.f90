@@ -4,12 +4,12 @@ module test_simulation_adhesion
    use case_input, only : parse_case
    use case_settings, only : case_type
    use check, only : begin_suite, check_close, check_no_error, check_that
-   use errors, only : error_type
+   use asperity_errors, only : error_type
    use history_row, only : history_row_type
-   use precision, only : dp, pi
-   use simulation, only : new_simulation, simulation_type
+   use asperity_precision, only : dp, pi
+   use asperity_simulation, only : new_simulation, simulation_type
    use simulation_runs, only : check_books, check_same_rows, last, nl, record_type, run_case
-   use surface, only : new_height
+   use asperity_surface, only : new_height
    use text_tools, only : exact_text, to_text
    implicit none
    private

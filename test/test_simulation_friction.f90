@@ -3,11 +3,11 @@ module test_simulation_friction
    use case_input, only : parse_case
    use case_settings, only : case_type
    use check, only : begin_suite, check_close, check_no_error, check_that
-   use errors, only : error_type
+   use asperity_errors, only : error_type
    use friction_law, only : largest_excess
-   use parallel, only : set_threads
-   use precision, only : dp, int8, pi
-   use simulation, only : new_simulation, simulation_type
+   use asperity_parallel, only : set_threads
+   use asperity_precision, only : dp, int8, pi
+   use asperity_simulation, only : new_simulation, simulation_type
    use simulation_runs, only : check_books, check_same_rows, last, nl, record_type, run_case
    use text_tools, only : exact_text, to_text
    use stick_slip_watch, only : stick_slip_watch_type, watch_slip

@@ -3,9 +3,9 @@ module test_simulation_pull
    use case_input, only : parse_case
    use case_settings, only : case_type
    use check, only : begin_suite, check_close, check_error, check_no_error, check_that
-   use errors, only : error_type
-   use precision, only : dp, pi
-   use simulation, only : new_simulation, simulation_type
+   use asperity_errors, only : error_type
+   use asperity_precision, only : dp, pi
+   use asperity_simulation, only : new_simulation, simulation_type
    use simulation_runs, only : check_books, last, nl, record_type, run_case
    use text_tools, only : exact_text
    implicit none

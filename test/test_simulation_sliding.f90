@@ -1,9 +1,9 @@
 !> Tests of the step loop with a moving road: known solutions, invariances, free boundaries.
 module test_simulation_sliding
    use check, only : begin_suite, check_close, check_that
-   use errors, only : error_type
-   use parallel, only : set_threads
-   use precision, only : dp, pi
+   use asperity_errors, only : error_type
+   use asperity_parallel, only : set_threads
+   use asperity_precision, only : dp, pi
    use real_transform, only : destroy_real_transform, new_real_transform, real_transform_type, &
       to_spectrum
    use simulation_runs, only : check_books, check_same_rows, last, nl, record_type, run_case, write_map

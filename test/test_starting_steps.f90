@@ -3,9 +3,9 @@
 module test_starting_steps
    use case_settings, only : phase_settings_type
    use check, only : begin_suite, check_close, check_that
-   use precision, only : dp
+   use asperity_precision, only : dp
    use prony, only : retardation_spectrum
-   use schedule, only : next_row, planned_row_type, schedule_type
+   use asperity_schedule, only : next_row, planned_row_type, schedule_type
    use simulation_runs, only : check_books, last, nl, record_type, run_case, write_map
    use starting_steps, only : split_start
    use text_tools, only : exact_text, to_text

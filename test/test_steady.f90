@@ -3,17 +3,17 @@ module test_steady
    use case_input, only : parse_case
    use case_settings, only : case_type
    use check, only : begin_suite, check_close, check_no_error, check_that
-   use errors, only : error_type
-   use interpolation, only : interpolation_type, new_interpolation
-   use parallel, only : set_threads, thread_count
-   use precision, only : dp, pi
+   use asperity_errors, only : error_type
+   use asperity_interpolation, only : interpolation_type, new_interpolation
+   use asperity_parallel, only : set_threads, thread_count
+   use asperity_precision, only : dp, pi
    use prony, only : complex_modulus
-   use schedule, only : planned_row_type
-   use simulation, only : new_simulation, simulation_type
+   use asperity_schedule, only : planned_row_type
+   use asperity_simulation, only : new_simulation, simulation_type
    use simulation_runs, only : check_books, last, nl, record_type, run_case, write_map
    use solver_result, only : solver_result_type
    use steady_step, only : new_steady_step, steady_step_type
-   use surface, only : new_height
+   use asperity_surface, only : new_height
    use text_tools, only : exact_text, to_text
    implicit none
    private

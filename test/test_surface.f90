@@ -3,13 +3,13 @@ module test_surface
    use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use check, only : begin_suite, check_close, check_error, check_no_error, check_that
    use counter_random, only : mix, normal_number, row_key, uniform_number
-   use errors, only : error_file, error_input, error_type
+   use asperity_errors, only : error_file, error_input, error_type
    use hdf5_file, only : hdf5_file_type
    use omp_lib, only : omp_get_max_threads, omp_set_num_threads
-   use precision, only : dp, int64, pi
+   use asperity_precision, only : dp, int64, pi
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use roughness, only : height_psd, height_statistics, roughness_type
-   use surface, only : check_terms, new_height, rim_height
+   use asperity_surface, only : check_terms, new_height, rim_height
    use surface_warnings, only : find_warnings, warning_length
    use surface_settings, only : default_surface, surface_settings_type
    implicit none

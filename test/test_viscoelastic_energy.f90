@@ -1,8 +1,8 @@
 !> Tests of the energy books: closure, and each term against an independent computation.
 module test_viscoelastic_energy
    use check, only : begin_suite, check_close, check_that
-   use errors, only : error_type
-   use precision, only : dp
+   use asperity_errors, only : error_type
+   use asperity_precision, only : dp
    use prony, only : zener_to_prony
    use viscoelastic_energy, only : book_step, &
       energy_books_type, new_books

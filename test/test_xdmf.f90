@@ -1,9 +1,9 @@
 !> Tests of the XDMF file: its places, extents and names, and that it appears whole.
 module test_xdmf
    use check, only : begin_suite, check_error, check_no_error, check_that
-   use errors, only : error_type
+   use asperity_errors, only : error_type
    use file_system, only : file_exists, remove_file
-   use precision, only : dp
+   use asperity_precision, only : dp
    use regular_grid, only : boundary_periodic, grid_type, new_grid
    use xdmf, only : snapshot_name, snapshot_type, write_xdmf
    implicit none

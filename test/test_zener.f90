@@ -1,9 +1,9 @@
 !> Tests of the time schemes and the history fields.
 module test_zener
    use check, only : begin_suite, check_close, check_error, check_no_error, check_that
-   use errors, only : error_type
-   use parallel, only : set_threads, thread_count
-   use precision, only : dp
+   use asperity_errors, only : error_type
+   use asperity_parallel, only : set_threads, thread_count
+   use asperity_precision, only : dp
    use prony, only : creep_compliance, relaxation_modulus, retardation_spectrum, zener_to_prony
    use relaxation_functions, only : mean_decay, mean_rise, parabola_work, slope_response, &
       steady_loss

@@ -22,15 +22,15 @@ contains
 
    !> Version of the library.
    subroutine library_version(text)
-      use version, only : asperity_version
+      use asperity_version, only : version_number
       character(len=32), intent(out) :: text
 
-      text = asperity_version
+      text = version_number
    end subroutine library_version
 
    !> Use `n` threads from here on, all processors for 0; tell how many that are.
    subroutine set_thread_count(n, used)
-      use parallel, only : set_threads, thread_count
+      use asperity_parallel, only : set_threads, thread_count
       integer(c_int), intent(in) :: n
       integer(c_int), intent(out) :: used
 
@@ -40,17 +40,17 @@ contains
 
    !> End the idle threads, before the process is copied.
    subroutine release_idle_threads()
-      use parallel, only : release_threads
+      use asperity_parallel, only : release_threads
 
       call release_threads()
    end subroutine release_idle_threads
 
    !> Checksum of a height map, as a result names it in its attribute `height_maps`.
    subroutine map_checksum(path, dataset, nx, ny, checksum_text, status, message)
-      use checksum, only : checksum_of_field, hexadecimal
-      use errors, only : error_input, error_type, fail
+      use asperity_checksum, only : checksum_of_field, hexadecimal
+      use asperity_errors, only : error_input, error_type, fail
       use hdf5_file, only : read_field
-      use precision, only : dp
+      use asperity_precision, only : dp
       character(len=*), intent(in) :: path
       character(len=*), intent(in) :: dataset              !! blank: the usual names
       integer(c_int), intent(in) :: nx, ny                 !! of the grid that the map is for
@@ -78,10 +78,10 @@ contains
    subroutine surface_height(nx, ny, lx, ly, is_free, shape_name, radius, amplitude, wavelength, &
       hurst, wavelength_long, wavelength_rolloff, wavelength_short, rms_height, rms_slope, seed, &
       generator, centre_x, centre_y, height, status, message)
-      use errors, only : error_type
-      use precision, only : dp
+      use asperity_errors, only : error_type
+      use asperity_precision, only : dp
       use regular_grid, only : grid_type
-      use surface, only : new_height
+      use asperity_surface, only : new_height
       use surface_settings, only : default_surface, surface_settings_type
       integer(c_int), intent(in) :: nx, ny
       real(c_double), intent(in) :: lx, ly
@@ -137,7 +137,7 @@ contains
 
    !> Power spectral density of all modes, in the order of an FFT.
    subroutine surface_psd(height, nx, ny, lx, ly, psd, status, message)
-      use errors, only : error_type
+      use asperity_errors, only : error_type
       use roughness, only : height_psd
       integer(c_int), intent(in) :: nx, ny
       real(c_double), intent(in) :: height(nx, ny)
@@ -156,8 +156,8 @@ contains
    !> Radially averaged power spectral density; `most` rings have room, `rings` are found.
    subroutine surface_radial_psd(height, nx, ny, lx, ly, most, wave_numbers, psd, modes, rings, &
       status, message)
-      use errors, only : error_input, error_type, fail
-      use precision, only : dp
+      use asperity_errors, only : error_input, error_type, fail
+      use asperity_precision, only : dp
       use roughness, only : radial_psd
       integer(c_int), intent(in) :: nx, ny
       real(c_double), intent(in) :: height(nx, ny)
@@ -191,7 +191,7 @@ contains
 
    !> Statistics in the order of `roughness_type`.
    subroutine surface_statistics(height, nx, ny, lx, ly, is_free, values, status, message)
-      use errors, only : error_type
+      use asperity_errors, only : error_type
       use roughness, only : height_statistics, roughness_type
       integer(c_int), intent(in) :: nx, ny
       real(c_double), intent(in) :: height(nx, ny)
@@ -216,13 +216,13 @@ contains
    subroutine contact_normal(height, pressure, gap, nx, ny, lx, ly, is_free, modulus, approach, &
       target, warm, thesis, tolerance, max_iterations, level, iterations, ffts, residual, seconds, &
       converged, reason, status, message)
-      use errors, only : error_type
+      use asperity_errors, only : error_type
       use normal_cg, only : new_normal_solver, normal_solver_type
       use normal_cg_thesis, only : solve_normal_thesis
       use normal_state, only : control_approach, control_pressure, normal_problem_type, &
          rms_about_mean
-      use parallel, only : thread_count
-      use precision, only : dp
+      use asperity_parallel, only : thread_count
+      use asperity_precision, only : dp
       use regular_grid, only : grid_type
       use solver_result, only : solver_result_type
       integer(c_int), intent(in) :: nx, ny
@@ -284,10 +284,10 @@ contains
       use adhesion_potential, only : adhesive_slope
       use case_settings, only : case_type
       use contact_rule, only : touches
-      use errors, only : error_type
+      use asperity_errors, only : error_type
       use normal_step, only : new_normal_step, normal_step_type
-      use precision, only : dp
-      use schedule, only : planned_row_type
+      use asperity_precision, only : dp
+      use asperity_schedule, only : planned_row_type
       use solver_result, only : solver_result_type
       integer(c_int), intent(in) :: nx, ny
       real(c_double), intent(in) :: height(nx, ny)           !! m
@@ -364,7 +364,7 @@ contains
       use case_input, only : overwritten_file, parse_case, read_case
       use case_run, only : run_type
       use case_settings, only : case_type
-      use errors, only : error_input, error_type, fail
+      use asperity_errors, only : error_input, error_type, fail
       use run_handles, only : free_run, new_run, run_of
       character(len=*), intent(in) :: path
       character(len=*), intent(in) :: text                 !! the input; empty: what the file holds
@@ -431,7 +431,7 @@ contains
    subroutine run_step(handle, finished, step, time, contact_area, friction, warnings, status, &
       message)
       use case_run, only : run_type
-      use errors, only : error_input, error_type, fail
+      use asperity_errors, only : error_input, error_type, fail
       use run_handles, only : run_of
       integer(c_int), intent(in) :: handle
       integer(c_int), intent(out) :: finished              !! 1: no row is left
@@ -469,7 +469,7 @@ contains
    !> Write a snapshot and a checkpoint of where a run stands.
    subroutine run_interrupt(handle, status, message)
       use case_run, only : run_type
-      use errors, only : error_input, error_type, fail
+      use asperity_errors, only : error_input, error_type, fail
       use run_handles, only : run_of
       integer(c_int), intent(in) :: handle
       integer(c_int), intent(out) :: status
@@ -489,7 +489,7 @@ contains
    !> Close a run; a handle that is not in use is no error.
    subroutine run_close(handle, status, message)
       use case_run, only : run_type
-      use errors, only : error_type
+      use asperity_errors, only : error_type
       use run_handles, only : free_run, run_of
       integer(c_int), intent(in) :: handle
       integer(c_int), intent(out) :: status
@@ -524,10 +524,10 @@ contains
 
    !> The last row of a run or a simulation, in the order of `row_columns`.
    subroutine run_row(handle, n, values, status, message)
-      use errors, only : error_input, error_type, fail
+      use asperity_errors, only : error_input, error_type, fail
       use history_row, only : column_count, row_values
       use run_handles, only : sim_of
-      use simulation, only : simulation_type
+      use asperity_simulation, only : simulation_type
       integer(c_int), intent(in) :: handle
       integer(c_int), intent(in) :: n                          !! the number of columns
       real(c_double), intent(inout) :: values(n)
@@ -550,10 +550,10 @@ contains
    !> A field of a run or a simulation, as a snapshot would hold it; 'height' is the road under the
    !> rubber.
    subroutine run_field(handle, name, nx, ny, values, status, message)
-      use errors, only : error_input, error_type, fail
-      use precision, only : dp, int8
+      use asperity_errors, only : error_input, error_type, fail
+      use asperity_precision, only : dp, int8
       use run_handles, only : sim_of
-      use simulation, only : simulation_type
+      use asperity_simulation, only : simulation_type
       integer(c_int), intent(in) :: handle
       character(len=*), intent(in) :: name
       integer(c_int), intent(in) :: nx, ny
@@ -590,12 +590,12 @@ contains
       use case_report, only : memory_needed, resolved_input
       use case_run, only : map_lines
       use case_settings, only : case_type
-      use errors, only : error_input, error_type, fail
+      use asperity_errors, only : error_input, error_type, fail
       use memory_limits, only : need_memory
-      use parallel, only : set_threads
+      use asperity_parallel, only : set_threads
       use run_handles, only : driven_of, driven_type, free_driven, new_driven
-      use schedule, only : count_rows
-      use simulation, only : new_simulation
+      use asperity_schedule, only : count_rows
+      use asperity_simulation, only : new_simulation
       character(len=*), intent(in) :: path
       character(len=*), intent(in) :: text                 !! the input; empty: what the file holds
       integer(c_int), intent(in) :: threads                !! 0: what the case says
@@ -674,7 +674,7 @@ contains
 
    !> Do a row. Where a solver did not converge, the state reached is kept and the status says so.
    subroutine simulation_step(handle, finished, warnings, status, message)
-      use errors, only : error_convergence, error_input, error_type, fail
+      use asperity_errors, only : error_convergence, error_input, error_type, fail
       use run_handles, only : driven_of, driven_type
       use text_tools, only : to_text
       integer(c_int), intent(in) :: handle
@@ -709,7 +709,7 @@ contains
 
    !> Set a load, the velocity or the temperature, from the next row on.
    subroutine simulation_steer(handle, what, first, second, status, message)
-      use errors, only : error_input, error_type, fail
+      use asperity_errors, only : error_input, error_type, fail
       use run_handles, only : driven_of, driven_type
       use steering, only : steer_load, steer_temperature, steer_velocity
       integer(c_int), intent(in) :: handle
@@ -738,8 +738,8 @@ contains
 
    !> Write the state of a simulation, as a checkpoint of `path`.
    subroutine simulation_save(handle, path, status, message)
-      use checkpoint, only : checkpoint_writer_type
-      use errors, only : error_input, error_type, fail
+      use asperity_checkpoint, only : checkpoint_writer_type
+      use asperity_errors, only : error_input, error_type, fail
       use run_handles, only : driven_of, driven_type
       use simulation_state, only : save_state
       integer(c_int), intent(in) :: handle
@@ -763,8 +763,8 @@ contains
 
    !> Take the state of a simulation from the checkpoint of `path`, written by `simulation_save`.
    subroutine simulation_load(handle, path, finished, status, message)
-      use checkpoint, only : checkpoint_reader_type
-      use errors, only : error_input, error_type, fail
+      use asperity_checkpoint, only : checkpoint_reader_type
+      use asperity_errors, only : error_input, error_type, fail
       use run_handles, only : driven_of, driven_type
       use simulation_state, only : load_state
       integer(c_int), intent(in) :: handle
@@ -794,7 +794,7 @@ contains
 
    !> Free a simulation; a handle that is not in use is no error.
    subroutine simulation_close(handle, status, message)
-      use errors, only : error_type
+      use asperity_errors, only : error_type
       use run_handles, only : driven_of, driven_type, free_driven
       integer(c_int), intent(in) :: handle
       integer(c_int), intent(out) :: status
@@ -811,7 +811,7 @@ contains
    !> Prepare an operator: the displacements that tractions cause.
    subroutine operator_open(tangential, nx, ny, lx, ly, is_free, modulus, poisson, thickness, handle, &
       mx, my, status, message)
-      use errors, only : error_input, error_type, fail
+      use asperity_errors, only : error_input, error_type, fail
       use fft_conv, only : new_normal_operator, new_tangential_operator
       use operator_handles, only : free_operator, new_operator, operator_of, operator_type
       integer(c_int), intent(in) :: tangential                 !! 1: tangential, 0: normal
@@ -857,7 +857,7 @@ contains
 
    !> Displacements of tractions; the fields along y are for a tangential operator only.
    subroutine operator_apply(handle, nx, ny, px, py, ux, uy, status, message)
-      use errors, only : error_input, error_type, fail
+      use asperity_errors, only : error_input, error_type, fail
       use operator_handles, only : operator_of, operator_type
       integer(c_int), intent(in) :: handle
       integer(c_int), intent(in) :: nx, ny
@@ -887,9 +887,9 @@ contains
    !> One part of an operator's symbol, for a field and its transform without factors: the first
    !> half of the wave numbers along both directions.
    subroutine operator_symbol(handle, part, columns, rows, values, status, message)
-      use errors, only : error_input, error_type, fail
+      use asperity_errors, only : error_input, error_type, fail
       use operator_handles, only : operator_of, operator_type
-      use precision, only : dp
+      use asperity_precision, only : dp
       integer(c_int), intent(in) :: handle
       integer(c_int), intent(in) :: part                       !! 1; of a tangential one 1: xx, 2: yy, 3: xy
       integer(c_int), intent(in) :: columns, rows              !! mx/2 + 1 and my/2 + 1
@@ -913,7 +913,7 @@ contains
 
    !> Free an operator; a handle that is not in use is no error.
    subroutine operator_close(handle, status, message)
-      use errors, only : error_type
+      use asperity_errors, only : error_type
       use operator_handles, only : free_operator
       integer(c_int), intent(in) :: handle
       integer(c_int), intent(out) :: status
@@ -936,7 +936,7 @@ contains
 
    !> The values of a text of namelists, as `list_values` writes them.
    subroutine input_listed(text, path, most, buffer, length, status, message)
-      use errors, only : error_type
+      use asperity_errors, only : error_type
       use input_listing, only : list_values
       character(len=*), intent(in) :: text
       character(len=*), intent(in) :: path                     !! for messages
@@ -959,8 +959,8 @@ contains
       use case_input, only : parse_case
       use case_report, only : case_summary, resolved_input
       use case_settings, only : case_type
-      use errors, only : error_type
-      use surface, only : check_files
+      use asperity_errors, only : error_type
+      use asperity_surface, only : check_files
       character(len=*), intent(in) :: text
       character(len=*), intent(in) :: path                     !! where paths start, and for messages
       integer(c_int), intent(in) :: files                      !! 1: look into the height maps, too
@@ -1015,9 +1015,9 @@ contains
 
    !> See that there is memory for some fields of a grid.
    subroutine see_memory(grid, fields, task, error)
-      use errors, only : error_type
+      use asperity_errors, only : error_type
       use memory_limits, only : need_memory
-      use precision, only : dp
+      use asperity_precision, only : dp
       use regular_grid, only : boundary_free, grid_type
       type(grid_type), intent(in) :: grid
       integer, intent(in) :: fields                        !! doubles per cell; a free grid is padded
@@ -1032,7 +1032,7 @@ contains
 
    !> What a solve was, in the arguments of a call.
    subroutine tell(outcome, iterations, ffts, residual, seconds, converged, reason)
-      use precision, only : dp
+      use asperity_precision, only : dp
       use solver_result, only : solver_result_type
       type(solver_result_type), intent(in) :: outcome
       integer(c_int), intent(out) :: iterations
@@ -1050,7 +1050,7 @@ contains
 
    !> Turn an error into a status and a message.
    subroutine report(error, status, message)
-      use errors, only : error_type
+      use asperity_errors, only : error_type
       type(error_type), allocatable, intent(in) :: error
       integer(c_int), intent(out) :: status
       character(len=*), intent(out) :: message

@@ -1,7 +1,7 @@
 !> Operators in hand, known to Python by a number. Not seen by f2py, which has no derived types.
 module operator_handles
    use fft_conv, only : convolution_type
-   use precision, only : dp
+   use asperity_precision, only : dp
    implicit none
    private
 

@@ -2,8 +2,8 @@
 !> types. A run writes files; a driven simulation is advanced row by row and writes none.
 module run_handles
    use case_run, only : run_type
-   use precision, only : dp
-   use simulation, only : simulation_type
+   use asperity_precision, only : dp
+   use asperity_simulation, only : simulation_type
    implicit none
    private
 

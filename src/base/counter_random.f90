@@ -4,7 +4,7 @@
 !> The mixing function is that of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014). Sums and products
 !> modulo 2^64 are put together from 32-bit halves: Fortran's integers must not overflow.
 module counter_random
-   use precision, only : dp, int64, pi
+   use asperity_precision, only : dp, int64, pi
    implicit none
    private
 

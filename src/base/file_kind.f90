@@ -1,6 +1,6 @@
 !> What stands under a name in the file system, and the identity of a file.
 module file_kind
-   use precision, only : int64
+   use asperity_precision, only : int64
    implicit none
    private
 

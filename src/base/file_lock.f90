@@ -6,7 +6,7 @@
 !> a dead process left behind does no harm. On a file system without locks there is no protection.
 module file_lock
    use, intrinsic :: iso_c_binding, only : c_int
-   use errors, only : error_file, error_type, fail
+   use asperity_errors, only : error_file, error_type, fail
    use file_kind, only : file_start, is_other_than_file, same_inode
    use file_system, only : remove_file
    use utc_clock, only : utc_time

@@ -1,8 +1,8 @@
 !> What Fortran lacks to handle files: rename, remove, write through to the disk, look at folders.
 module file_system
    use, intrinsic :: iso_c_binding, only : c_char, c_int, c_int64_t, c_intptr_t, c_null_char
-   use errors, only : error_file, error_type, fail
-   use precision, only : int64
+   use asperity_errors, only : error_file, error_type, fail
+   use asperity_precision, only : int64
    implicit none
    private
 

@@ -2,7 +2,7 @@
 module hdf5_errors
    use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_f_pointer, c_funloc, c_funptr, &
       c_int, c_int64_t, c_null_ptr, c_ptr, c_size_t
-   use errors, only : error_file, error_type, fail
+   use asperity_errors, only : error_file, error_type, fail
    use file_system, only : let_size_limit_be_an_error
    use hdf5_library, only : h5dont_atexit_f, h5eset_auto_f, h5open_f
    implicit none

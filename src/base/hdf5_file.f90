@@ -9,7 +9,7 @@
 !> moment is said in `hdf5_tree`.
 module hdf5_file
    use, intrinsic :: iso_c_binding, only : c_char, c_loc, c_null_char, c_null_ptr, c_ptr
-   use errors, only : error_file, error_input, error_memory, error_type, fail
+   use asperity_errors, only : error_file, error_input, error_memory, error_type, fail
    use file_system, only : file_exists, folder_of
    use hdf5_library, only : h5aexists_f, h5oclose_f, h5oopen_f, hid_t, hsize_t
    use hdf5_tree, only : hdf5_tree_type, most_expected, name_length
@@ -17,7 +17,7 @@ module hdf5_file
       kind_text, new_column, new_dataset, put_attribute, put_rows, shape_of_dataset
    use hdf5_virtual, only : list_sources, source_type
    use memory_limits, only : memory_text
-   use precision, only : dp, int8
+   use asperity_precision, only : dp, int8
    use text_tools, only : to_text
    use trial_process, only : trial_type
    implicit none

@@ -19,7 +19,7 @@
 !> Paths within a file start with '/'.
 module hdf5_tree
    use, intrinsic :: iso_c_binding, only : c_bool, c_int, c_int64_t
-   use errors, only : error_file, error_type, fail
+   use asperity_errors, only : error_file, error_type, fail
    use file_system, only : file_exists, folder_of, is_folder, lengthen_file
    use hdf5_library, only : H5F_ACC_RDONLY_F, H5F_ACC_RDWR_F, H5F_ACC_TRUNC_F, &
       H5F_CLOSE_STRONG_F, H5F_LIBVER_V18_F, H5F_SCOPE_LOCAL_F, h5fclose_f, h5fcreate_f, &
@@ -32,7 +32,7 @@ module hdf5_tree
       h5pset_link_phase_change_f, h5pset_meta_block_size_f, h5pset_small_data_block_size_f, &
       h5pset_userblock_f, hid_t, hsize_t
    use hdf5_errors, only : last_reason, start_hdf5
-   use precision, only : int64
+   use asperity_precision, only : int64
    implicit none
    private
 

@@ -17,7 +17,7 @@ module hdf5_values
       h5tcopy_f, h5tget_size_f, h5tis_variable_str_f, h5tset_cset_f, h5tset_strpad_f, hid_t, &
       hsize_t, size_t
    use hdf5_errors, only : text_of
-   use precision, only : dp
+   use asperity_precision, only : dp
    implicit none
    private
 

@@ -4,8 +4,8 @@
 !> jobs), and the limit on the address space (ulimit -v) are read from the files of Linux; where
 !> these are missing there is no limit.
 module memory_limits
-   use errors, only : error_memory, error_type, fail
-   use precision, only : dp, int64
+   use asperity_errors, only : error_memory, error_type, fail
+   use asperity_precision, only : dp, int64
    use text_tools, only : to_text
    implicit none
    private

@@ -1,8 +1,8 @@
 !> An identity for a file: digits that no other file has.
 module random_id
    use, intrinsic :: iso_c_binding, only : c_int
-   use checksum, only : checksum_of_text, hexadecimal
-   use precision, only : int64
+   use asperity_checksum, only : checksum_of_text, hexadecimal
+   use asperity_precision, only : int64
    use utc_clock, only : utc_time
    implicit none
    private

@@ -1,7 +1,7 @@
 !> The regular grid of cells on which everything lives.
 module regular_grid
-   use parallel, only : local_rows
-   use precision, only : dp
+   use asperity_parallel, only : local_rows
+   use asperity_precision, only : dp
    implicit none
    private
 

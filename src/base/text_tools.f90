@@ -1,6 +1,6 @@
 !> Small helpers for words and numbers in messages.
 module text_tools
-   use precision, only : dp, int64
+   use asperity_precision, only : dp, int64
    implicit none
    private
 

@@ -14,7 +14,7 @@
 !> neither print nor use OpenMP. Where no copy can be made, there is no trial.
 module trial_process
    use, intrinsic :: iso_c_binding, only : c_int, c_intptr_t
-   use errors, only : error_file, error_type, fail
+   use asperity_errors, only : error_file, error_type, fail
    use text_tools, only : to_text
    implicit none
    private

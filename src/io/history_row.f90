@@ -2,7 +2,7 @@
 !>
 !> Lengths, works and energies are those of the whole cell lx by ly; works and energies are cumulative.
 module history_row
-   use precision, only : dp
+   use asperity_precision, only : dp
    implicit none
    private
 

@@ -4,17 +4,17 @@
 !> rows in it. A row counts when all columns have it: readers take the shortest column.
 !> A snapshot appears whole (see `hdf5_tree`), and then in the XDMF file beside the result.
 module result_file
-   use errors, only : error_file, error_input, error_type, fail
+   use asperity_errors, only : error_file, error_input, error_type, fail
    use file_system, only : name_of, remove_file, rename_file
    use hdf5_file, only : hdf5_file_type
    use history_row, only : column_count, column_type, history_columns, history_row_type, row_values
-   use precision, only : dp, int8
+   use asperity_precision, only : dp, int8
    use random_id, only : new_id
    use result_names, only : sibling_path
    use result_target, only : check_place
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use utc_clock, only : utc_time
-   use version, only : asperity_version
+   use asperity_version, only : version_number
    use xdmf, only : snapshot_name, snapshot_type, write_xdmf
    implicit none
    private
@@ -171,7 +171,7 @@ contains
       if (allocated(error)) return
       call self%file%write_attribute('/', 'program', 'asperity', error)
       if (allocated(error)) return
-      call self%file%write_attribute('/', 'version', asperity_version, error)
+      call self%file%write_attribute('/', 'version', version_number, error)
       if (allocated(error)) return
       call self%file%write_attribute('/', 'created', utc_time(), error)
       if (allocated(error)) return

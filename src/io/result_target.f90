@@ -4,7 +4,7 @@
 !> with rows, a checkpoint, and whatever is not of Asperity stay, unless `overwrite` allows it.
 !> The files beside a result (see `result_names`) are replaced only if Asperity wrote them.
 module result_target
-   use errors, only : error_file, error_type, fail
+   use asperity_errors, only : error_file, error_type, fail
    use file_kind, only : file_start, is_dangling_link, is_other_than_file
    use file_system, only : file_exists, folder_of, is_folder
    use hdf5_file, only : hdf5_file_type

@@ -8,7 +8,7 @@
 !> table is in use. Pieces that are not allocated or empty in a case are left out of the table.
 module state_table
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
-   use precision, only : dp, int8
+   use asperity_precision, only : dp, int8
    implicit none
    private
 

@@ -4,9 +4,9 @@
 !> snapshot is a regular grid whose nodes are the centres of the cells: the values belong to points.
 !> XDMF gives numbers in the order of the arrays in the file: z, y, x.
 module xdmf
-   use errors, only : error_file, error_type, fail
+   use asperity_errors, only : error_file, error_type, fail
    use file_system, only : name_of, remove_file, rename_file
-   use precision, only : dp
+   use asperity_precision, only : dp
    use regular_grid, only : grid_type
    implicit none
    private

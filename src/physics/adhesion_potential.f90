@@ -17,8 +17,8 @@
 !> The work of separation, and all else, stays what it is. `edge_of_cells` is the least width that frees
 !> the contact.
 module adhesion_potential
-   use errors, only : add_fault, error_input, error_type
-   use precision, only : dp
+   use asperity_errors, only : add_fault, error_input, error_type
+   use asperity_precision, only : dp
    implicit none
    private
 

@@ -9,7 +9,7 @@
 !> in which the solver measures its residual; the solvers for adhesion apply it to the state that they
 !> hand out. After that a comparison with 0 is exact.
 module contact_rule
-   use precision, only : dp
+   use asperity_precision, only : dp
    implicit none
    private
 

@@ -22,7 +22,7 @@
 !> which is the same as r parallel to D - n (n.D): the physical law. The thesis (eq. 3.16) asks for
 !> r parallel to D.
 module friction_law
-   use precision, only : dp, int8
+   use asperity_precision, only : dp, int8
    implicit none
    private
 

@@ -5,7 +5,7 @@
 !> dashpot eta (thesis, section 2.1.3), is exactly a spring and an arm; its creep time eta/G_1 is
 !> not tau. WLF: Williams, Landel and Ferry (1955).
 module prony
-   use precision, only : dp
+   use asperity_precision, only : dp
    implicit none
    private
 

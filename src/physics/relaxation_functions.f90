@@ -4,7 +4,7 @@
 !> the rate dU + K (s - 1/2), a parabola. Each function is a power series for small x and a closed
 !> form above, both to a few units of round-off for any x >= 0.
 module relaxation_functions
-   use precision, only : dp
+   use asperity_precision, only : dp
    implicit none
    private
 

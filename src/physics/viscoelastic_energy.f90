@@ -15,7 +15,7 @@
 !> The work holds the product P'.dU of the fields, the stored energy the product U.S, the loss
 !> the products with the arms: that the three agree is a check of the fields, not an identity.
 module viscoelastic_energy
-   use precision, only : dp
+   use asperity_precision, only : dp
    use relaxation_functions, only : mean_decay, mean_rise, parabola_work, slope_response, &
       steady_loss
    use zener, only : is_elastic, products_type, scheme_backward_euler, step_regular, &

@@ -23,9 +23,9 @@
 !> Memory: S and one field an arm; one more (S - S_old) for exponential2; none for an elastic body.
 !> Results do not depend on the number of threads: sums are formed block by block.
 module zener
-   use errors, only : add_fault, error_input, error_type, fail
-   use parallel, only : global_sum
-   use precision, only : dp
+   use asperity_errors, only : add_fault, error_input, error_type, fail
+   use asperity_parallel, only : global_sum
+   use asperity_precision, only : dp
    use relaxation_functions, only : mean_decay, slope_response
    implicit none
    private

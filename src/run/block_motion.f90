@@ -24,7 +24,7 @@
 !> exactly. The left side is booked as work on the mass: the second term is a state's and adds up to
 !> nothing. The last term, never negative, is what the rule loses.
 module block_motion
-   use precision, only : dp
+   use asperity_precision, only : dp
    implicit none
    private
 

@@ -7,22 +7,22 @@ module case_run
    use case_identity, only : identity_of
    use case_report, only : memory_needed, resolved_input
    use case_settings, only : case_type
-   use checkpoint, only : checkpoint_path, checkpoint_reader_type, checkpoint_writer_type, &
+   use asperity_checkpoint, only : checkpoint_path, checkpoint_reader_type, checkpoint_writer_type, &
       remove_checkpoint
-   use checksum, only : hexadecimal
-   use errors, only : error_convergence, error_input, error_type, fail
+   use asperity_checksum, only : hexadecimal
+   use asperity_errors, only : error_convergence, error_input, error_type, fail
    use file_lock, only : file_lock_type
    use history_row, only : row_values
    use memory_limits, only : need_memory
-   use parallel, only : set_threads
+   use asperity_parallel, only : set_threads
    use path_identity, only : real_path
-   use precision, only : dp, int64, int8
+   use asperity_precision, only : dp, int64, int8
    use result_file, only : result_file_type
    use result_names, only : sibling_path
    use result_target, only : check_place, check_replaced, damage_of_result
-   use schedule, only : count_rows
+   use asperity_schedule, only : count_rows
    use steady_losses, only : longest_wave
-   use simulation, only : new_simulation, simulation_type
+   use asperity_simulation, only : new_simulation, simulation_type
    use simulation_state, only : load_state, save_state
    use text_tools, only : to_text
    implicit none

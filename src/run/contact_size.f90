@@ -9,8 +9,8 @@
 !> counts.
 module contact_size
    use contact_rule, only : touches
-   use parallel, only : global_sum
-   use precision, only : dp, int64, pi
+   use asperity_parallel, only : global_sum
+   use asperity_precision, only : dp, int64, pi
    use regular_grid, only : boundary_periodic, grid_type
    use text_tools, only : to_text
    implicit none

@@ -9,12 +9,12 @@
 module contact_state
    use case_settings, only : case_type
    use contact_rule, only : touches
-   use interpolation, only : interpolation_type
+   use asperity_interpolation, only : interpolation_type
    use normal_step, only : normal_step_type
-   use parallel, only : global_sum
-   use precision, only : dp
+   use asperity_parallel, only : global_sum
+   use asperity_precision, only : dp
    use regular_grid, only : grid_type
-   use schedule, only : planned_row_type
+   use asperity_schedule, only : planned_row_type
    use solver_result, only : solver_result_type
    use tangential_state, only : tangential_state_type
    use viscoelastic_energy, only : energy_books_type

@@ -28,12 +28,12 @@
 module coupled_passes
    use anderson_mixing, only : mixing_type
    use contact_state, only : contact_mean, contact_state_type, solve_normal
-   use interpolation, only : displaced
-   use parallel, only : global_sum
+   use asperity_interpolation, only : displaced
+   use asperity_parallel, only : global_sum
    use pass_control, only : pass_control_type
-   use precision, only : dp
+   use asperity_precision, only : dp
    use regular_grid, only : boundary_free
-   use schedule, only : planned_row_type
+   use asperity_schedule, only : planned_row_type
    use solver_result, only : solver_result_type
    implicit none
    private

@@ -2,8 +2,8 @@
 module coupling_advice
    use contact_state, only : contact_state_type
    use friction_law, only : law_constant_shear
-   use parallel, only : global_sum
-   use precision, only : dp
+   use asperity_parallel, only : global_sum
+   use asperity_precision, only : dp
    use text_tools, only : to_text
    implicit none
    private

@@ -6,8 +6,8 @@
 !> rms height is enough, too; but that of a long map on which a summit travels says nothing.)
 module map_edge
    use contact_rule, only : touches
-   use parallel, only : global_min, global_sum
-   use precision, only : dp
+   use asperity_parallel, only : global_min, global_sum
+   use asperity_precision, only : dp
    use regular_grid, only : boundary_free, grid_type
    use text_tools, only : to_text
    implicit none

@@ -9,14 +9,14 @@ module normal_step
       new_adhesion_potential
    use adhesion_state, only : adhesion_problem_type
    use case_settings, only : case_type
-   use errors, only : error_input, error_type, fail
+   use asperity_errors, only : error_input, error_type, fail
    use normal_cg, only : new_normal_solver, normal_solver_type
    use normal_cg_thesis, only : solve_normal_thesis
    use normal_state, only : control_approach, control_pressure, normal_problem_type, rms_about_mean
-   use parallel, only : global_max, global_sum
-   use precision, only : dp
+   use asperity_parallel, only : global_max, global_sum
+   use asperity_precision, only : dp
    use regular_grid, only : boundary_free, grid_type
-   use schedule, only : planned_row_type
+   use asperity_schedule, only : planned_row_type
    use solver_result, only : solver_result_type
    implicit none
    private

@@ -14,7 +14,7 @@
 !> work by more, no path of equilibria explains the excess, and all of it counts as radiated.
 module outside_balance
    use history_row, only : history_row_type
-   use precision, only : dp
+   use asperity_precision, only : dp
    implicit none
    private
 

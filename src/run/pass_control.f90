@@ -15,7 +15,7 @@
 !>   acceleration again and shorter steps. Cells that let go make differences of residuals that the
 !>   acceleration is led astray by, while short plain steps settle.
 module pass_control
-   use precision, only : dp
+   use asperity_precision, only : dp
    implicit none
    private
 

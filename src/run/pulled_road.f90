@@ -6,8 +6,8 @@
 !> guess changes no result beyond the tolerance: heights are read at U_T - D, which the tangential
 !> solver returns without the guess.
 module pulled_road
-   use precision, only : dp
-   use schedule, only : planned_row_type, schedule_type
+   use asperity_precision, only : dp
+   use asperity_schedule, only : planned_row_type, schedule_type
    use tangential_state, only : tangential_state_type
    use text_tools, only : to_text
    implicit none

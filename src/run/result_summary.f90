@@ -5,9 +5,9 @@
 module result_summary
    use case_input, only : parse_case
    use case_settings, only : case_type
-   use errors, only : error_file, error_type, fail
+   use asperity_errors, only : error_file, error_type, fail
    use hdf5_file, only : hdf5_file_type
-   use precision, only : dp
+   use asperity_precision, only : dp
    use result_target, only : damage_of_result
    use text_tools, only : ordinary, to_text
    implicit none

@@ -5,11 +5,11 @@
 !> rubber's surface is expected to move on as in the step before.
 module road_motion
    use contact_state, only : contact_state_type
-   use interpolation, only : displaced, shifted
-   use precision, only : dp, int8
+   use asperity_interpolation, only : displaced, shifted
+   use asperity_precision, only : dp, int8
    use pulled_road, only : drive_direction
    use regular_grid, only : boundary_free
-   use schedule, only : planned_row_type
+   use asperity_schedule, only : planned_row_type
    implicit none
    private
 

@@ -3,12 +3,12 @@
 !> `list_state` is the only place that names the pieces of the state. A new state variable is one
 !> line there; the checkpoint and the restart follow.
 module simulation_state
-   use checkpoint, only : checkpoint_reader_type, checkpoint_writer_type
-   use errors, only : error_type
+   use asperity_checkpoint, only : checkpoint_reader_type, checkpoint_writer_type
+   use asperity_errors, only : error_type
    use history_row, only : column_count, column_type, history_columns, row_from_values, row_values
-   use precision, only : dp
+   use asperity_precision, only : dp
    use road_motion, only : place_road
-   use simulation, only : simulation_type
+   use asperity_simulation, only : simulation_type
    use state_table, only : state_table_type
    use steady_step, only : steady_start_type
    use tangential_state, only : tangential_state_type

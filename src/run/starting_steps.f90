@@ -11,8 +11,8 @@
 !> but for what `part_sums_type` adds up.
 module starting_steps
    use history_row, only : history_row_type
-   use precision, only : dp
-   use schedule, only : planned_row_type
+   use asperity_precision, only : dp
+   use asperity_schedule, only : planned_row_type
    implicit none
    private
 

@@ -5,8 +5,8 @@
 !> step dt earlier a field was the same, moved back by V dt: S_old = rho S with rho = exp(i q.V dt), so
 !> that the first step in time has a step before it.
 module steady_memory
-   use parallel, only : global_sum
-   use precision, only : dp
+   use asperity_parallel, only : global_sum
+   use asperity_precision, only : dp
    use steady_losses, only : elastic_forms
    use steady_operator, only : steady_operator_type
    use steady_symbols, only : medium_type, mode_waves, steady_modulus

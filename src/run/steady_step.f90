@@ -17,14 +17,14 @@
 !> which tends to -mean(P dH/ds)/mean P. What friction loses is mean((T - T*).r) |V|.
 module steady_step
    use case_settings, only : case_type
-   use errors, only : error_type
+   use asperity_errors, only : error_type
    use friction_law, only : friction_law_type, new_friction_law
-   use interpolation, only : interpolation_type, shifted
+   use asperity_interpolation, only : interpolation_type, shifted
    use normal_state, only : normal_problem_type
-   use parallel, only : global_sum
-   use precision, only : dp, int8
+   use asperity_parallel, only : global_sum
+   use asperity_precision, only : dp, int8
    use regular_grid, only : grid_type
-   use schedule, only : planned_row_type
+   use asperity_schedule, only : planned_row_type
    use solver_result, only : solver_result_type
    use steady_friction, only : new_steady_friction, steady_contact_type, steady_friction_type
    use steady_losses, only : steady_losses_type, sum_losses

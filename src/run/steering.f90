@@ -6,11 +6,11 @@
 !> `ramp = 'step'` does.
 module steering
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
-   use errors, only : error_input, error_type, fail
-   use precision, only : dp
+   use asperity_errors, only : error_input, error_type, fail
+   use asperity_precision, only : dp
    use prony, only : wlf_shift
-   use schedule, only : change_load, change_velocity
-   use simulation, only : simulation_type
+   use asperity_schedule, only : change_load, change_velocity
+   use asperity_simulation, only : simulation_type
    use text_tools, only : to_text
    implicit none
    private

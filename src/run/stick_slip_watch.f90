@@ -4,7 +4,7 @@
 !> rises and falls in turn, step by step, by a good part of the road's speed, it is the scheme that
 !> swings (thesis, section 3.6): pressure and traction answer each other one pass late.
 module stick_slip_watch
-   use precision, only : dp
+   use asperity_precision, only : dp
    use text_tools, only : to_text
    implicit none
    private

@@ -15,13 +15,13 @@ module tangential_state
    use block_motion, only : block_motion_type
    use case_settings, only : case_type
    use contact_rule, only : touches
-   use errors, only : error_type
+   use asperity_errors, only : error_type
    use fft_conv, only : convolution_type, new_tangential_operator
    use friction_cg, only : friction_fast, friction_solver_type, friction_thesis, new_friction_solver, &
       set_mean_compliance
    use friction_law, only : friction_law_type, new_friction_law
-   use parallel, only : global_sum
-   use precision, only : dp, int64, int8
+   use asperity_parallel, only : global_sum
+   use asperity_precision, only : dp, int64, int8
    use regular_grid, only : boundary_periodic, grid_type
    use solver_result, only : solver_result_type
    use steady_friction, only : steady_contact_type

@@ -6,7 +6,7 @@
 !> checkpoint, and a twentieth of the limit, at most half a minute.
 module time_limit
    use, intrinsic :: iso_c_binding, only : c_long
-   use precision, only : dp, int64
+   use asperity_precision, only : dp, int64
    implicit none
    private
 

@@ -3,7 +3,7 @@
 !> A block is active where a cell of it has pressure or a gap below a level. Work fields are zero
 !> elsewhere, so that passes over the runs are passes over the whole.
 module active_blocks
-   use precision, only : dp
+   use asperity_precision, only : dp
    implicit none
    private
 

@@ -8,9 +8,9 @@ module adhesion_cg
    use adhesion_cg_thesis, only : adhesion_thesis_type, new_adhesion_thesis
    use adhesion_state, only : adhesion_problem_type, control_approach
    use finite_fields, only : reject_overflow
-   use errors, only : error_input, error_type, fail
-   use parallel, only : global_max, thread_count
-   use precision, only : dp
+   use asperity_errors, only : error_input, error_type, fail
+   use asperity_parallel, only : global_max, thread_count
+   use asperity_precision, only : dp
    use regular_grid, only : boundary_periodic, grid_type
    use solver_result, only : solver_result_type
    implicit none

@@ -22,12 +22,12 @@ module adhesion_cg_free
       collect_step, control_approach, control_pressure, diagonal_scaling, form_step_row, reason_converged, &
       reason_detached, reason_limit, reason_stalled, resolved_traction, row_total, step_sums_type, stepped_gap, &
       traction_scale
-   use errors, only : error_input, error_type, fail
+   use asperity_errors, only : error_input, error_type, fail
    use fft_conv, only : columns_apply, convolution_type, new_normal_operator, new_symbol_operator
    use influence, only : normal_symbol
    use omp_lib, only : omp_get_wtime
-   use parallel, only : global_max, global_min
-   use precision, only : dp, int64, pi
+   use asperity_parallel, only : global_max, global_min
+   use asperity_precision, only : dp, int64, pi
    use regular_grid, only : boundary_free, grid_type
    use solver_result, only : solver_result_type
    implicit none

@@ -27,11 +27,11 @@ module adhesion_cg_periodic
       collect_step, control_approach, control_pressure, diagonal_scaling, form_step_row, reason_closed, &
       reason_converged, reason_detached, reason_limit, reason_stalled, row_total, step_sums_type, &
       stepped_gap, sum_shift
-   use errors, only : error_input, error_type, fail
+   use asperity_errors, only : error_input, error_type, fail
    use fft_conv, only : columns_apply, convolution_type, new_symbol_operator
    use omp_lib, only : omp_get_wtime
-   use parallel, only : global_max, global_min
-   use precision, only : dp, int64, pi
+   use asperity_parallel, only : global_max, global_min
+   use asperity_precision, only : dp, int64, pi
    use regular_grid, only : boundary_periodic, grid_type
    use solver_result, only : solver_result_type
    implicit none

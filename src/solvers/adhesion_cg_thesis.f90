@@ -17,11 +17,11 @@ module adhesion_cg_thesis
    use adhesion_state, only : adhesion_problem_type, close_gaps, control_approach, control_pressure, &
       reason_closed, reason_converged, reason_detached, reason_limit, reason_stalled, row_total, &
       stepped_gap, sum_shift
-   use errors, only : error_input, error_type, fail
+   use asperity_errors, only : error_input, error_type, fail
    use fft_conv, only : convolution_type, new_symbol_operator
    use omp_lib, only : omp_get_wtime
-   use parallel, only : global_max, global_min
-   use precision, only : dp, int64, pi
+   use asperity_parallel, only : global_max, global_min
+   use asperity_precision, only : dp, int64, pi
    use regular_grid, only : boundary_periodic, grid_type
    use solver_result, only : solver_result_type
    implicit none

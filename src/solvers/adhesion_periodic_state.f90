@@ -4,8 +4,8 @@ module adhesion_periodic_state
    use adhesion_state, only : adhesion_problem_type, control_approach, control_pressure, &
       resolved_traction, row_total, stepped_gap, sum_shift, traction_scale
    use fft_conv, only : columns_apply, convolution_type
-   use parallel, only : global_max
-   use precision, only : dp
+   use asperity_parallel, only : global_max
+   use asperity_precision, only : dp
    use solver_result, only : solver_result_type
    implicit none
    private

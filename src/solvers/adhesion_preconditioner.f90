@@ -15,9 +15,9 @@
 !>
 !> Memory: a spectrum and a symbol for 'full'; 1/4 of a field for 'coarse' and for the estimate.
 module adhesion_preconditioner
-   use errors, only : error_input, error_type, fail
+   use asperity_errors, only : error_input, error_type, fail
    use fft_conv, only : columns_apply, convolution_type, new_symbol_operator
-   use precision, only : dp, pi
+   use asperity_precision, only : dp, pi
    implicit none
    private
 

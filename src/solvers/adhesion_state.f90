@@ -12,8 +12,8 @@ module adhesion_state
       adhesive_terms, potential_maugis_dugdale, potential_none
    use contact_rule, only : is_closed
    use normal_state, only : control_approach, control_pressure
-   use parallel, only : global_max, global_min, global_sum
-   use precision, only : dp
+   use asperity_parallel, only : global_max, global_min, global_sum
+   use asperity_precision, only : dp
    implicit none
    private
 

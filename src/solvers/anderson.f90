@@ -16,8 +16,8 @@
 !> Memory: for each pair two fields of single precision a component, which is enough because the
 !> residual itself is never taken from them; and two fields of doubles a component.
 module anderson
-   use parallel, only : global_sum, thread_count
-   use precision, only : dp, sp
+   use asperity_parallel, only : global_sum, thread_count
+   use asperity_precision, only : dp, sp
    implicit none
    private
 

@@ -11,8 +11,8 @@
 !> Memory: the last z and f, and two vector fields per difference, allocated when first needed.
 !> Sums are formed by row and added in order: results do not depend on the number of threads.
 module anderson_mixing
-   use parallel, only : global_sum
-   use precision, only : dp
+   use asperity_parallel, only : global_sum
+   use asperity_precision, only : dp
    implicit none
    private
 

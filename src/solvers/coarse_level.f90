@@ -8,9 +8,9 @@
 !> Restriction (block sums over the mean block size) and prolongation (piecewise constant) are adjoint
 !> up to a factor, so that the preconditioner stays symmetric for any numbers of cells.
 module coarse_level
-   use errors, only : error_type
+   use asperity_errors, only : error_type
    use fft_conv, only : convolution_type, new_normal_operator, new_symbol_operator
-   use precision, only : dp, pi
+   use asperity_precision, only : dp, pi
    use regular_grid, only : grid_type, new_grid
    implicit none
    private

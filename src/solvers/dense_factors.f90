@@ -4,7 +4,7 @@
 !> By blocks of columns: the diagonal block and the panel below it are factored, then the rest is updated
 !> by matrix products. Threads share the columns of the rest, so results do not depend on their number.
 module dense_factors
-   use precision, only : dp
+   use asperity_precision, only : dp
    implicit none
    private
 

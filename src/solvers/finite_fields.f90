@@ -4,8 +4,8 @@
 !> error may look small where fields have overflowed. The solvers look at the fields that they hand out.
 module finite_fields
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
-   use parallel, only : global_sum
-   use precision, only : dp
+   use asperity_parallel, only : global_sum
+   use asperity_precision, only : dp
    use solver_result, only : solver_result_type
    implicit none
    private

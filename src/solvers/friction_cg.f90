@@ -24,7 +24,7 @@
 !> There is no proof of convergence where the slope counts. Cones steeper than 1/mu have no bound
 !> uphill; where many points jam so, a solution may not be found, or not be there.
 module friction_cg
-   use errors, only : error_type
+   use asperity_errors, only : error_type
    use fft_conv, only : convolution_type, new_tensor_symbol_operator
    use friction_cg_fast, only : iterate_fast
    use friction_cg_gradient, only : iterate_gradient
@@ -35,7 +35,7 @@ module friction_cg
    use influence, only : tangential_symbol
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use omp_lib, only : omp_get_wtime
-   use precision, only : dp, int8, pi
+   use asperity_precision, only : dp, int8, pi
    use regular_grid, only : boundary_periodic, grid_type
    use solver_result, only : solver_result_type
    implicit none

@@ -42,7 +42,7 @@ module friction_cg_fast
    use fft_conv, only : columns_apply, columns_form, convolution_type
    use friction_problem, only : friction_problem_type, pseudo_inverse
    use friction_rows, only : turned_row, scaled_row, unscaled_row
-   use precision, only : dp
+   use asperity_precision, only : dp
    implicit none
    private
 

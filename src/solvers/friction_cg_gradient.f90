@@ -11,7 +11,7 @@ module friction_cg_gradient
    use fft_conv, only : convolution_type
    use friction_law, only : contact_open, contact_stick
    use friction_problem, only : friction_problem_type
-   use precision, only : dp
+   use asperity_precision, only : dp
    implicit none
    private
 

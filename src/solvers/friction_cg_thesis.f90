@@ -17,7 +17,7 @@ module friction_cg_thesis
    use fft_conv, only : columns_form, convolution_type
    use friction_law, only : contact_open, contact_slip
    use friction_problem, only : friction_problem_type
-   use precision, only : dp
+   use asperity_precision, only : dp
    implicit none
    private
 

@@ -26,8 +26,8 @@ module friction_problem
       law_constant_shear, law_coulomb_orowan
    use friction_rows, only : bound_row, measured_row, measures, moved_row, moves, &
       row_constants_type
-   use parallel, only : global_max, global_sum
-   use precision, only : dp, int8
+   use asperity_parallel, only : global_max, global_sum
+   use asperity_precision, only : dp, int8
    implicit none
    private
 

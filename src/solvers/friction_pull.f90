@@ -15,8 +15,8 @@ module friction_pull
    use fft_conv, only : convolution_type
    use friction_law, only : contact_open
    use friction_problem, only : friction_problem_type
-   use parallel, only : global_sum
-   use precision, only : dp
+   use asperity_parallel, only : global_sum
+   use asperity_precision, only : dp
    implicit none
    private
 

@@ -11,7 +11,7 @@
 !> one where nothing but T* is allowed, v = 0, w = 0. Z a = a - v (v.a) then takes the part along v
 !> from all of them.
 module friction_rows
-   use precision, only : dp
+   use asperity_precision, only : dp
    implicit none
    private
 

@@ -30,7 +30,7 @@
 module normal_cg
    use active_blocks, only : active_blocks_type, new_active_blocks
    use coarse_level, only : coarse_level_type, new_coarse_level, stencil_c0
-   use errors, only : error_type
+   use asperity_errors, only : error_type
    use finite_fields, only : reject_overflow
    use fft_conv, only : columns_apply, convolution_type, new_normal_operator
    use normal_state, only : combine_measures, control_pressure, evaluate_gap, first_pressure, &
@@ -39,8 +39,8 @@ module normal_cg
    use normal_sweeps, only : above_cells, clip_cells, coupling_cells, direction_cells, load_cells, &
       longest_cells, residual_cells, trial_cells
    use omp_lib, only : omp_get_wtime
-   use parallel, only : global_min, global_sum
-   use precision, only : dp, int64
+   use asperity_parallel, only : global_min, global_sum
+   use asperity_precision, only : dp, int64
    use projection, only : project_simplex
    use regular_grid, only : boundary_periodic, grid_type
    use solver_result, only : solver_result_type

@@ -11,8 +11,8 @@ module normal_cg_thesis
       measure_gap, narrow_scale, normal_problem_type, prepare_problem, reason_converged, &
       reason_iterations, reason_undetermined
    use omp_lib, only : omp_get_wtime
-   use parallel, only : global_sum
-   use precision, only : dp, int64
+   use asperity_parallel, only : global_sum
+   use asperity_precision, only : dp, int64
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
    implicit none

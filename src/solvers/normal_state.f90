@@ -1,8 +1,8 @@
 !> What the methods for normal contact share: the problem, the start, the gap, the measure of error.
 module normal_state
    use fft_conv, only : columns_apply, convolution_type
-   use parallel, only : global_max, global_min, global_sum
-   use precision, only : dp, pi
+   use asperity_parallel, only : global_max, global_min, global_sum
+   use asperity_precision, only : dp, pi
    use projection, only : project_simplex
    use regular_grid, only : boundary_periodic, grid_type
    implicit none

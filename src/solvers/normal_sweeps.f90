@@ -3,7 +3,7 @@
 !> Each is one loop without branches, so that it runs in vector registers. The contact set S needs
 !> no field of its own: the residual is not zero in S alone, and the direction where it acts alone.
 module normal_sweeps
-   use precision, only : dp
+   use asperity_precision, only : dp
    implicit none
    private
 

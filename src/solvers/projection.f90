@@ -1,7 +1,7 @@
 !> Projections of fields on what a solution must satisfy.
 module projection
-   use parallel, only : global_sum, thread_count
-   use precision, only : dp
+   use asperity_parallel, only : global_sum, thread_count
+   use asperity_precision, only : dp
    implicit none
    private
 

@@ -1,6 +1,6 @@
 !> What a solver tells its caller: an outcome, not an error.
 module solver_result
-   use precision, only : dp, int64
+   use asperity_precision, only : dp, int64
    implicit none
    private
 

@@ -9,7 +9,7 @@
 module steady_active
    use dense_factors, only : factor, solve_factors
    use normal_state, only : gap_measure_type, measure_gap, narrow_scale, normal_problem_type
-   use precision, only : dp
+   use asperity_precision, only : dp
    use steady_operator, only : steady_operator_type
    implicit none
    private

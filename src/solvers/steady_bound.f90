@@ -14,8 +14,8 @@
 !> With the thesis's direction of slip r is parallel to D, and D is w - T* shortened to the bound.
 module steady_bound
    use friction_law, only : friction_law_type, law_constant_shear
-   use parallel, only : thread_count
-   use precision, only : dp
+   use asperity_parallel, only : thread_count
+   use asperity_precision, only : dp
    implicit none
    private
 

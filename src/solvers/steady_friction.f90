@@ -21,11 +21,11 @@
 module steady_friction
    use anderson, only : anderson_type, new_anderson
    use friction_law, only : friction_law_type, law_constant_shear
-   use interpolation, only : displaced, interpolation_type
+   use asperity_interpolation, only : displaced, interpolation_type
    use normal_state, only : gap_measure_type, measure_gap, normal_problem_type, prepare_problem, &
       reason_converged, reason_iterations
-   use parallel, only : global_sum
-   use precision, only : dp, int64
+   use asperity_parallel, only : global_sum
+   use asperity_precision, only : dp, int64
    use projection, only : project_simplex
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type

@@ -7,8 +7,8 @@
 !> and an arm's part of it is g omega tau/(1 + (omega tau)^2) over Im G*(omega). No further solve is
 !> needed. An octave holds the wavelengths 2 pi/|q| in (L/2^k, L/2^(k-1)], L the longest of the cell.
 module steady_losses
-   use parallel, only : global_sum
-   use precision, only : dp, pi
+   use asperity_parallel, only : global_sum
+   use asperity_precision, only : dp, pi
    use regular_grid, only : grid_type
    use steady_symbols, only : medium_type, mode_waves, steady_modulus
    implicit none

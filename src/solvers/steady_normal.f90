@@ -21,8 +21,8 @@ module steady_normal
    use anderson, only : anderson_type, new_anderson
    use normal_state, only : combine_measures, gap_measure_type, measure_gap, narrow_scale, &
       normal_problem_type, prepare_problem, reason_converged, reason_iterations
-   use parallel, only : global_sum
-   use precision, only : dp, int64
+   use asperity_parallel, only : global_sum
+   use asperity_precision, only : dp, int64
    use projection, only : project_simplex
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type

@@ -12,10 +12,10 @@
 !> field (a whole one in free mode) for each symbol. An operator made with `single` takes half of that,
 !> works in single precision, and is used in the same way.
 module fft_conv
-   use errors, only : error_input, error_type, fail
+   use asperity_errors, only : error_input, error_type, fail
    use influence, only : normal_symbol, tangential_symbol, transform_length
-   use parallel, only : global_sum, thread_count
-   use precision, only : dp, int64, sp
+   use asperity_parallel, only : global_sum, thread_count
+   use asperity_precision, only : dp, int64, sp
    use regular_grid, only : boundary_periodic, grid_type
    use row_column_double, only : new_row_column_double => new_row_column, &
       row_column_double_type => row_column_type

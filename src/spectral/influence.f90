@@ -8,9 +8,9 @@
 !> the plane is stored, tables (0:mx/2, 0:my/2).
 module influence
    use, intrinsic :: iso_c_binding, only : c_f_pointer, c_int, c_loc, c_ptr, c_size_t
-   use fftw, only : fftw_alloc_real, fftw_destroy_plan, fftw_estimate, fftw_execute_r2r, &
+   use asperity_fftw, only : fftw_alloc_real, fftw_destroy_plan, fftw_estimate, fftw_execute_r2r, &
       fftw_free, fftw_plan_r2r_2d, fftw_redft00, fftw_rodft00
-   use precision, only : dp, pi
+   use asperity_precision, only : dp, pi
    use regular_grid, only : boundary_periodic, grid_type
    implicit none
    private

@@ -6,10 +6,10 @@
 module real_transform
    use, intrinsic :: iso_c_binding, only : c_associated, c_f_pointer, c_int, c_null_ptr, c_ptr, &
       c_size_t
-   use errors, only : error_input, error_type, fail
-   use fftw, only : fftw_alloc_real, fftw_destroy_plan, fftw_estimate, fftw_execute_dft_c2r, &
+   use asperity_errors, only : error_input, error_type, fail
+   use asperity_fftw, only : fftw_alloc_real, fftw_destroy_plan, fftw_estimate, fftw_execute_dft_c2r, &
       fftw_execute_dft_r2c, fftw_free, fftw_plan_many_dft_c2r, fftw_plan_many_dft_r2c
-   use precision, only : dp
+   use asperity_precision, only : dp
    implicit none
    private
 

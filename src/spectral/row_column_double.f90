@@ -2,7 +2,7 @@
 module row_column_double
    use, intrinsic :: iso_c_binding, only : c_associated, c_f_pointer, c_int, c_loc, c_null_ptr, c_ptr, &
       c_size_t
-   use fftw, only : fft_alloc => fftw_alloc_real, fft_backward => fftw_backward, &
+   use asperity_fftw, only : fft_alloc => fftw_alloc_real, fft_backward => fftw_backward, &
       fft_destroy_plan => fftw_destroy_plan, fft_execute_dft => fftw_execute_dft, &
       fft_execute_dft_c2r => fftw_execute_dft_c2r, fft_execute_dft_r2c => fftw_execute_dft_r2c, &
       fft_forward => fftw_forward, fft_free => fftw_free, &
@@ -10,7 +10,7 @@ module row_column_double
       fft_plan_many_dft_c2r => fftw_plan_many_dft_c2r, &
       fft_plan_many_dft_r2c => fftw_plan_many_dft_r2c
    use omp_lib, only : omp_get_thread_num
-   use precision, only : dp, wp => dp
+   use asperity_precision, only : dp, wp => dp
    use wisdom, only : from_measuring, from_memory, planning_flag, save_wisdom
    implicit none
    private

@@ -7,7 +7,7 @@
 module row_column_single
    use, intrinsic :: iso_c_binding, only : c_associated, c_f_pointer, c_int, c_loc, c_null_ptr, c_ptr, &
       c_size_t
-   use fftw, only : fft_alloc => fftwf_alloc_real, fft_backward => fftw_backward, &
+   use asperity_fftw, only : fft_alloc => fftwf_alloc_real, fft_backward => fftw_backward, &
       fft_destroy_plan => fftwf_destroy_plan, fft_execute_dft => fftwf_execute_dft, &
       fft_execute_dft_c2r => fftwf_execute_dft_c2r, fft_execute_dft_r2c => fftwf_execute_dft_r2c, &
       fft_forward => fftw_forward, fft_free => fftwf_free, &
@@ -15,7 +15,7 @@ module row_column_single
       fft_plan_many_dft_c2r => fftwf_plan_many_dft_c2r, &
       fft_plan_many_dft_r2c => fftwf_plan_many_dft_r2c
    use omp_lib, only : omp_get_thread_num
-   use precision, only : dp, wp => sp
+   use asperity_precision, only : dp, wp => sp
    use wisdom, only : from_measuring, from_memory, planning_flag, save_wisdom
    implicit none
    private

@@ -9,9 +9,9 @@
 !> Memory: one field for the spectrum of the normal side and four for that of the tangential one; the
 !> symbols take one field, and six more with friction; the resolvent one.
 module steady_operator
-   use errors, only : error_input, error_type, fail
-   use parallel, only : thread_count
-   use precision, only : dp, int64
+   use asperity_errors, only : error_input, error_type, fail
+   use asperity_parallel, only : thread_count
+   use asperity_precision, only : dp, int64
    use regular_grid, only : grid_type
    use row_column_double, only : multiplier_type, new_row_column, row_column_type
    use steady_symbols, only : steady_symbols_type

@@ -21,7 +21,7 @@
 !> Tables run over (0:last, 0:ny-1), negative wave numbers along y behind the positive ones, and are
 !> zero beyond nx/2.
 module steady_symbols
-   use precision, only : dp, pi
+   use asperity_precision, only : dp, pi
    use prony, only : complex_modulus
    use regular_grid, only : grid_type
    use relaxation_functions, only : mean_decay, slope_response

@@ -1,6 +1,6 @@
 !> Wave vectors of the modes of a real FFT on a grid.
 module wave_vectors
-   use precision, only : dp, pi
+   use asperity_precision, only : dp, pi
    implicit none
    private
 

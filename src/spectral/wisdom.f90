@@ -7,7 +7,7 @@
 !> The folder is $XDG_CACHE_HOME/asperity or $HOME/.cache/asperity.
 module wisdom
    use, intrinsic :: iso_c_binding, only : c_char, c_int, c_null_char
-   use fftw, only : fftw_estimate, fftw_export_wisdom_to_filename, &
+   use asperity_fftw, only : fftw_estimate, fftw_export_wisdom_to_filename, &
       fftw_import_wisdom_from_filename, fftw_measure, fftw_wisdom_only, &
       fftwf_export_wisdom_to_filename, fftwf_import_wisdom_from_filename
    implicit none

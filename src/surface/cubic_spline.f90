@@ -9,7 +9,7 @@
 !>
 !> Cells count from 0 here; coefficients reach from -1 to n + 1.
 module cubic_spline
-   use precision, only : dp
+   use asperity_precision, only : dp
    implicit none
    private
 

@@ -13,8 +13,8 @@
 !> Sums are gathered by rows, so that the number of threads changes no bit.
 module roughness
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
-   use errors, only : error_input, error_type, fail
-   use precision, only : dp, pi
+   use asperity_errors, only : error_input, error_type, fail
+   use asperity_precision, only : dp, pi
    use real_transform, only : destroy_real_transform, new_real_transform, real_transform_type, &
       to_spectrum
    use regular_grid, only : boundary_periodic, grid_type

@@ -18,8 +18,8 @@
 !> Memory: one field beside the height.
 module surface_self_affine
    use counter_random, only : normal_number, row_key, uniform_number
-   use errors, only : error_input, error_type, fail
-   use precision, only : dp, int64, pi
+   use asperity_errors, only : error_input, error_type, fail
+   use asperity_precision, only : dp, int64, pi
    use real_transform, only : destroy_real_transform, new_real_transform, real_transform_type, &
       to_space, to_spectrum
    use regular_grid, only : grid_type

@@ -1,6 +1,6 @@
 !> The checked settings of one `&surface` group: one term of the sum of heights.
 module surface_settings
-   use precision, only : dp
+   use asperity_precision, only : dp
    use regular_grid, only : grid_type
    implicit none
    private

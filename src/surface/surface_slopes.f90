@@ -1,7 +1,7 @@
 !> Slopes of a height map at its cells: by central differences or spectrally.
 module surface_slopes
-   use errors, only : error_input, error_type, fail
-   use precision, only : dp
+   use asperity_errors, only : error_input, error_type, fail
+   use asperity_precision, only : dp
    use real_transform, only : destroy_real_transform, new_real_transform, real_transform_type, &
       to_space, to_spectrum
    use regular_grid, only : boundary_periodic, grid_type

@@ -2,9 +2,9 @@
 !> not hold (thesis, 4.1), waves that do not close on a period, waves of few cells, height maps that
 !> say of themselves that they are of another size or unit.
 module surface_warnings
-   use errors, only : error_type
+   use asperity_errors, only : error_type
    use hdf5_file, only : hdf5_file_type
-   use precision, only : dp
+   use asperity_precision, only : dp
    use regular_grid, only : boundary_periodic, grid_type
    use surface_settings, only : surface_settings_type
    implicit none

@@ -9,16 +9,16 @@
 !> single precision and the processor time of one; peak memory in fields of N x N doubles. With FOLDER,
 !> the height and the pressure are written there as raw doubles.
 program bench_normal
-   use errors, only : error_type
+   use asperity_errors, only : error_type
    use fft_conv, only : convolution_type
    use normal_cg, only : new_normal_solver, normal_solver_type
    use normal_state, only : normal_problem_type, rms_about_mean
    use omp_lib, only : omp_get_wtime
-   use parallel, only : set_threads
-   use precision, only : dp, int64
+   use asperity_parallel, only : set_threads
+   use asperity_precision, only : dp, int64
    use regular_grid, only : boundary_periodic, grid_type, new_grid
    use solver_result, only : solver_result_type
-   use surface, only : new_height
+   use asperity_surface, only : new_height
    use surface_settings, only : default_surface, surface_settings_type
    implicit none
 

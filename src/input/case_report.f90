@@ -4,7 +4,7 @@ module case_report
    use case_settings, only : case_type, phase_settings_type, road_moves
    use case_time, only : duration_text, seconds_needed
    use memory_limits, only : memory_limit, memory_text
-   use precision, only : dp
+   use asperity_precision, only : dp
    use regular_grid, only : boundary_free
    use text_tools, only : exact_text, to_text
    implicit none

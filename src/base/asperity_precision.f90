@@ -1,5 +1,5 @@
 !> Kinds of the numbers used throughout.
-module precision
+module asperity_precision
    use, intrinsic :: iso_fortran_env, only : int8, int64, real32, real64
    implicit none
    private
@@ -11,4 +11,4 @@ module precision
 
    real(dp), parameter, public :: pi = 3.14159265358979323846_dp
 
-end module precision
+end module asperity_precision

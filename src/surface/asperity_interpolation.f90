@@ -22,10 +22,10 @@
 !> and the slope fall from their values at the rim to these.
 !>
 !> Memory: the map, and for 'cubic' one field of coefficients. Every process holds the whole map.
-module interpolation
+module asperity_interpolation
    use cubic_spline, only : spline_coefficients, spline_height, spline_map
-   use errors, only : error_input, error_type, fail
-   use precision, only : dp
+   use asperity_errors, only : error_input, error_type, fail
+   use asperity_precision, only : dp
    use regular_grid, only : boundary_periodic, grid_type
    use surface_slopes, only : central_slopes, neighbours
    implicit none
@@ -369,4 +369,4 @@ contains
       if (weight < 1.0_dp) mixed = lowest + weight*(h - lowest)
    end function blend
 
-end module interpolation
+end module asperity_interpolation

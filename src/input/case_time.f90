@@ -8,13 +8,13 @@
 !> to come back tomorrow, within a factor of about three.
 module case_time
    use case_settings, only : case_type, road_moves
-   use errors, only : error_type
-   use parallel, only : processor_count
-   use precision, only : dp
+   use asperity_errors, only : error_type
+   use asperity_parallel, only : processor_count
+   use asperity_precision, only : dp
    use real_transform, only : destroy_real_transform, new_real_transform, real_transform_type, to_space, &
       to_spectrum
    use regular_grid, only : boundary_free
-   use schedule, only : count_rows
+   use asperity_schedule, only : count_rows
    use text_tools, only : to_text
    implicit none
    private

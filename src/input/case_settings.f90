@@ -3,7 +3,7 @@
 !> `case_input` fills them from a file; `simulation` reads them. Choices are kept as the words of the
 !> input file, already checked, in lower case. The defaults stand in `case_input`.
 module case_settings
-   use precision, only : dp
+   use asperity_precision, only : dp
    use regular_grid, only : grid_type
    use surface_settings, only : path_length, surface_settings_type, word_length
    implicit none

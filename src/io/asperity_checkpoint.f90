@@ -10,12 +10,12 @@
 !> line of text with the length of the file and the checksum of all bytes behind the block. Both are
 !> compared before HDF5 sees the file, because HDF5 may crash or hang on a damaged file, or read
 !> wrong numbers from it.
-module checkpoint
-   use checksum, only : checksum_of_file, hexadecimal
-   use errors, only : add_fault, error_convergence, error_file, error_input, error_type, fail
+module asperity_checkpoint
+   use asperity_checksum, only : checksum_of_file, hexadecimal
+   use asperity_errors, only : add_fault, error_convergence, error_file, error_input, error_type, fail
    use file_system, only : file_exists, remove_file, rename_file, sync_file
    use hdf5_file, only : hdf5_file_type
-   use precision, only : dp, int64, int8
+   use asperity_precision, only : dp, int64, int8
    use result_names, only : sibling_path
    use state_table, only : state_piece_type, state_table_type
    use text_tools, only : to_text
@@ -464,4 +464,4 @@ contains
       call self%file%close(error)
    end subroutine close_checkpoint
 
-end module checkpoint
+end module asperity_checkpoint

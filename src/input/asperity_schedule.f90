@@ -4,9 +4,9 @@
 !> one held so far and is not ramped, or where it starts relaxed or steady; then come its steps.
 !> A steady phase at rest is a relaxed one. A phase
 !> without a duration is static: one instantaneous solve, or a series of them up to its load.
-module schedule
+module asperity_schedule
    use case_settings, only : phase_settings_type
-   use precision, only : dp
+   use asperity_precision, only : dp
    implicit none
    private
 
@@ -301,4 +301,4 @@ contains
       load = present_load(findloc([character(12) :: 'pressure', 'force', 'displacement'], control, dim=1))
    end function load_in
 
-end module schedule
+end module asperity_schedule

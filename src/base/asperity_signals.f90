@@ -3,7 +3,7 @@
 !> SIGINT, SIGTERM, SIGHUP (the terminal is gone) and SIGXCPU (the batch system's limit is near) ask
 !> a run to stop after the step in hand; SIGUSR1 asks for a checkpoint. SIGXFSZ (a file larger than
 !> allowed) is ignored, so that the write that met it fails and says so.
-module signals
+module asperity_signals
    use, intrinsic :: iso_c_binding, only : c_funloc, c_funptr, c_int, c_intptr_t
    implicit none
    private
@@ -95,4 +95,4 @@ contains
       asked = number == signal_user
    end subroutine note_checkpoint
 
-end module signals
+end module asperity_signals

@@ -8,7 +8,7 @@ module case_phases
    use case_settings, only : material_settings_type, phase_settings_type
    use input_faults, only : faults_type
    use input_group, only : group_values_type
-   use precision, only : dp
+   use asperity_precision, only : dp
    use regular_grid, only : boundary_periodic, grid_type
    use text_tools, only : to_text
    implicit none

@@ -10,7 +10,7 @@ module input_values
       variable_entries, variable_entry_type, word_is_allowed
    use namelist_file, only : assignment_type, namelists_type, scan_namelists, shown_tokens, &
       token_broken, token_comma, token_equals, token_string, token_type, token_word, tokenise
-   use precision, only : dp
+   use asperity_precision, only : dp
    use text_tools, only : lower, nearest_name, to_text
    implicit none
    private

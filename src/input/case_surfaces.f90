@@ -3,7 +3,7 @@ module case_surfaces
    use case_settings, only : path_length, surface_settings_type
    use input_faults, only : faults_type
    use input_group, only : group_values_type
-   use precision, only : dp
+   use asperity_precision, only : dp
    use regular_grid, only : grid_type
    use text_tools, only : to_text
    implicit none

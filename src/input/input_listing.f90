@@ -1,13 +1,13 @@
 !> The input for other programs: the table of its groups and variables, and the values of a text of
 !> namelists, as plain lines whose fields are parted by the control character 31, which no input may hold.
 module input_listing
-   use errors, only : error_type
+   use asperity_errors, only : error_type
    use input_faults, only : faults_type
    use input_group, only : group_values_type, item_type
    use input_reference, only : group_entries, group_entry_type, kind_integer, kind_logical, kind_real, &
       kind_reals, variable_entries, variable_entry_type
    use input_values, only : read_groups
-   use precision, only : dp
+   use asperity_precision, only : dp
    use text_tools, only : to_text
    implicit none
    private

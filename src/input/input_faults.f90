@@ -1,6 +1,6 @@
 !> The faults of an input file: all are gathered, each as `file: &group: what is wrong`.
 module input_faults
-   use errors, only : add_fault, error_input, error_type
+   use asperity_errors, only : add_fault, error_input, error_type
    implicit none
    private
 

@@ -4,7 +4,7 @@ module case_material
    use case_settings, only : material_settings_type
    use input_faults, only : faults_type
    use input_group, only : group_values_type
-   use precision, only : dp
+   use asperity_precision, only : dp
    use prony, only : wlf_shift, zener_to_prony
    use regular_grid, only : boundary_free, grid_type
    use text_tools, only : to_text

@@ -1,6 +1,6 @@
 !> Errors as values: every procedure that can fail has a last argument
 !> `type(error_type), allocatable, intent(out) :: error`, left unallocated on success.
-module errors
+module asperity_errors
    implicit none
    private
 
@@ -49,4 +49,4 @@ contains
       end if
    end subroutine add_fault
 
-end module errors
+end module asperity_errors

@@ -2,7 +2,7 @@
 !>
 !> Written from the FFTW manual. Plans are executed only by the new-array routines, on buffers of
 !> `fftw_alloc_*`, so that their alignment is that of the planning.
-module fftw
+module asperity_fftw
    use, intrinsic :: iso_c_binding, only : c_char, c_int, c_ptr, c_size_t
    implicit none
    public
@@ -181,4 +181,4 @@ module fftw
 
    end interface
 
-end module fftw
+end module asperity_fftw

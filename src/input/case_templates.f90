@@ -3,7 +3,7 @@
 module case_templates
    use case_input, only : parse_case
    use case_settings, only : case_type
-   use errors, only : error_type
+   use asperity_errors, only : error_type
    use input_reference, only : kind_word, variable_entries, variable_entry_type
    implicit none
    private

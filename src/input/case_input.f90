@@ -5,13 +5,13 @@ module case_input
    use case_phases, only : resolve_phases
    use case_settings, only : case_type, output_settings_type, path_length, word_length
    use case_surfaces, only : resolve_path, resolve_surfaces
-   use errors, only : error_file, error_type, fail
+   use asperity_errors, only : error_file, error_type, fail
    use input_faults, only : faults_type
    use input_group, only : group_values_type
    use input_reference, only : group_entries, group_entry_type
    use input_values, only : default_group, read_groups
    use path_identity, only : same_file
-   use precision, only : dp
+   use asperity_precision, only : dp
    use result_names, only : side_file, side_files
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use surface_warnings, only : find_warnings, warning_length

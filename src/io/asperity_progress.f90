@@ -1,9 +1,9 @@
 !> How far a run is: a line written over on a terminal, plain lines now and then elsewhere.
-module progress
+module asperity_progress
    use, intrinsic :: iso_fortran_env, only : error_unit
    use file_system, only : is_terminal
    use history_row, only : history_row_type
-   use precision, only : dp, int64
+   use asperity_precision, only : dp, int64
    implicit none
    private
 
@@ -152,4 +152,4 @@ contains
       seconds = real(count, dp)/real(rate, dp)
    end function clock
 
-end module progress
+end module asperity_progress

@@ -22,7 +22,7 @@
 module adhesion_advice
    use adhesion_potential, only : edge_of_cells
    use case_settings, only : case_type, surface_settings_type
-   use precision, only : dp, pi
+   use asperity_precision, only : dp, pi
    use prony, only : instantaneous_modulus, relaxation_modulus
    use text_tools, only : to_text
    implicit none

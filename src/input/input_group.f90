@@ -3,7 +3,7 @@ module input_group
    use case_settings, only : path_length
    use input_faults, only : faults_type
    use input_reference, only : variable_entry_type
-   use precision, only : dp
+   use asperity_precision, only : dp
    use text_tools, only : to_text
    implicit none
    private

@@ -6,7 +6,7 @@
 !>
 !> A row in which friction acts is made of passes: module `coupled_passes`. The state and what solves
 !> it: module `contact_state`. How the road moves at the start of a row: module `road_motion`.
-module simulation
+module asperity_simulation
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use case_settings, only : case_type, road_moves
    use contact_rule, only : touches
@@ -14,23 +14,23 @@ module simulation
    use contact_state, only : contact_state_type, solve_normal
    use coupled_passes, only : coupled_passes_type, new_coupled_passes
    use coupling_advice, only : advice_on_passes
-   use errors, only : error_type
+   use asperity_errors, only : error_type
    use finite_fields, only : reason_overflow
    use history_row, only : history_row_type, row_values
-   use interpolation, only : new_interpolation
+   use asperity_interpolation, only : new_interpolation
    use map_edge, only : edge_clear, look_at_edge
    use normal_step, only : new_normal_step
    use outside_balance, only : book_outside
-   use parallel, only : global_sum
-   use precision, only : dp, int64, int8
+   use asperity_parallel, only : global_sum
+   use asperity_precision, only : dp, int64, int8
    use pulled_road, only : guess_road, pull_outcome, take_road
    use road_motion, only : move_road, place_road
-   use schedule, only : next_row, planned_row_type, schedule_type
+   use asperity_schedule, only : next_row, planned_row_type, schedule_type
    use solver_result, only : solver_result_type
    use steady_step, only : new_steady_step, steady_step_type
    use starting_steps, only : part_sums_type, split_start
    use stick_slip_watch, only : stick_slip_watch_type, watch_slip
-   use surface, only : new_height
+   use asperity_surface, only : new_height
    use tangential_state, only : new_tangential_state
    use text_tools, only : to_text
    use viscoelastic_energy, only : book_step, new_books
@@ -599,4 +599,4 @@ contains
       if (self%has_steady) call self%steady%destroy()
    end subroutine destroy
 
-end module simulation
+end module asperity_simulation

@@ -2,7 +2,7 @@
 !> values and meaning. The reader checks against it, templates take their comments from it, and the
 !> documentation prints it.
 module input_reference
-   use precision, only : dp
+   use asperity_precision, only : dp
    use text_tools, only : to_text
    implicit none
    private

@@ -2,10 +2,10 @@
 !>
 !> A run is one process today. Everything that sums, compares or splits over the whole grid goes
 !> through here, so that a slab decomposition in rows changes this module and not its users.
-module parallel
+module asperity_parallel
    use omp_lib, only : omp_get_max_threads, omp_get_num_procs, omp_pause_hard, &
       omp_pause_resource_all, omp_set_num_threads
-   use precision, only : dp
+   use asperity_precision, only : dp
    implicit none
    private
 
@@ -130,4 +130,4 @@ contains
       n = omp_get_num_procs()
    end function processor_count
 
-end module parallel
+end module asperity_parallel

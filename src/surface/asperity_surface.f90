@@ -7,12 +7,12 @@
 !> along y.
 !>
 !> Memory: the height, and one field more while a file is read or a random surface made.
-module surface
+module asperity_surface
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
-   use checksum, only : checksum_of_field
-   use errors, only : add_fault, error_input, error_type, fail
+   use asperity_checksum, only : checksum_of_field
+   use asperity_errors, only : add_fault, error_input, error_type, fail
    use hdf5_file, only : read_field
-   use precision, only : dp, int64, pi
+   use asperity_precision, only : dp, int64, pi
    use regular_grid, only : boundary_periodic, grid_type
    use surface_self_affine, only : add_self_affine
    use surface_settings, only : surface_settings_type
@@ -352,4 +352,4 @@ contains
       end if
    end function circular_cap
 
-end module surface
+end module asperity_surface

@@ -5,9 +5,9 @@
 !> error within 64 neighbouring bits for certain, and any other one but for a chance of 2^-64.
 !> Eight bytes are taken at once by eight tables (Intel's "slicing by 8"). Only shifts and
 !> exclusive ors are used, so that no integer overflows.
-module checksum
-   use errors, only : error_file, error_type, fail
-   use precision, only : dp, int64, int8
+module asperity_checksum
+   use asperity_errors, only : error_file, error_type, fail
+   use asperity_precision, only : dp, int64, int8
    implicit none
    private
 
@@ -154,4 +154,4 @@ contains
       filled = .true.
    end subroutine fill_table
 
-end module checksum
+end module asperity_checksum
