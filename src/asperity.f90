@@ -6,8 +6,9 @@
 !>
 !> * grids (`new_grid`) and surfaces (`new_height`, `height_statistics`, `height_psd`);
 !> * operators (`new_normal_operator`, `new_tangential_operator`): displacements from tractions;
-!> * solvers: normal contact (`new_normal_solver`), adhesion (`new_adhesion_solver`), friction
-!>   (`new_friction_solver`); each returns a record (`solver_result_type`);
+!> * solvers: normal contact (`new_normal_solver`, or `new_contact_solver` by the name of a method),
+!>   adhesion (`new_adhesion_solver`), friction (`new_friction_solver`); each returns a record
+!>   (`solver_result_type`);
 !> * the material in time (`new_zener`, `new_history`, `history_field`, `commit_history`) and its energy
 !>   books (`new_books`, `book_step`).
 !>
@@ -19,6 +20,7 @@ module asperity
    use case_input, only : parse_case, read_case
    use case_run, only : run_type
    use case_settings, only : case_type
+   use contact_solver, only : contact_solver_type
    use asperity_errors, only : error_convergence, error_file, error_input, error_type
    use fft_conv, only : convolution_type, new_normal_operator, new_tangential_operator
    use friction_cg, only : friction_solver_type, new_friction_solver
@@ -26,7 +28,7 @@ module asperity
    use history_row, only : history_row_type
    use asperity_interpolation, only : displaced, interpolation_type, new_interpolation, shifted
    use normal_cg, only : new_normal_solver, normal_solver_type
-   use normal_cg_thesis, only : solve_normal_thesis
+   use normal_solvers, only : new_contact_solver
    use normal_state, only : control_approach, control_pressure, normal_problem_type
    use asperity_parallel, only : set_threads, thread_count
    use asperity_precision, only : dp, sp

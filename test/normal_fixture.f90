@@ -3,8 +3,8 @@ module normal_fixture
    use check, only : check_no_error, check_that
    use asperity_errors, only : error_type
    use fft_conv, only : convolution_type, new_normal_operator
-   use normal_cg, only : new_normal_solver, normal_solver_type
-   use normal_cg_thesis, only : solve_normal_thesis
+   use contact_solver, only : contact_solver_type
+   use normal_solvers, only : new_contact_solver
    use normal_state, only : control_pressure, normal_problem_type
    use asperity_parallel, only : set_threads, thread_count
    use asperity_precision, only : dp, pi
@@ -41,13 +41,13 @@ contains
       real(dp), intent(in), optional :: history(:, :)
       real(dp), intent(in), optional :: start(:, :)
       logical, intent(in), optional :: mixed           !! in mixed precision
-      type(normal_solver_type) :: solver
+      class(contact_solver_type), allocatable :: solver
       type(normal_problem_type) :: task
       type(error_type), allocatable :: error
-      logical :: by_thesis
+      character(:), allocatable :: method
 
-      by_thesis = .false.
-      if (present(thesis)) by_thesis = thesis
+      method = 'fast'
+      if (present(thesis)) method = trim(merge('thesis', 'fast  ', thesis))
       task = problem
       if (task%rms_height <= 0.0_dp) task%rms_height = rms(height)
       allocate (solution%pressure(grid%nx, grid%ny), solution%gap(grid%nx, grid%ny))
@@ -57,15 +57,10 @@ contains
          solution%pressure = start
          task%warm = .true.
       end if
-      call new_normal_solver(solver, grid, poisson, error, mixed)
+      call new_contact_solver(solver, method, grid, poisson, error, mixed)
       call check_no_error(error, 'a solver')
-      if (by_thesis) then
-         call solve_normal_thesis(grid, solver%operator, task, height, solution%pressure, &
-            solution%gap, solution%level, solution%outcome, history)
-      else
-         call solver%solve(task, height, solution%pressure, solution%gap, solution%level, &
-            solution%outcome, history)
-      end if
+      call solver%solve(task, height, solution%pressure, solution%gap, solution%level, &
+         solution%outcome, history)
       call solver%destroy()
    end subroutine run_problem
 

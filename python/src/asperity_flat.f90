@@ -217,8 +217,8 @@ contains
       target, warm, thesis, tolerance, max_iterations, level, iterations, ffts, residual, seconds, &
       converged, reason, status, message)
       use asperity_errors, only : error_type
-      use normal_cg, only : new_normal_solver, normal_solver_type
-      use normal_cg_thesis, only : solve_normal_thesis
+      use contact_solver, only : contact_solver_type
+      use normal_solvers, only : new_contact_solver
       use normal_state, only : control_approach, control_pressure, normal_problem_type, &
          rms_about_mean
       use asperity_parallel, only : thread_count
@@ -247,7 +247,7 @@ contains
       type(error_type), allocatable :: error
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
-      type(normal_solver_type) :: solver
+      class(contact_solver_type), allocatable :: solver
       type(solver_result_type) :: outcome
 !f2py threadsafe
 
@@ -255,7 +255,8 @@ contains
       grid = grid_of(nx, ny, lx, ly, is_free)
       call see_memory(grid, 12, 'the contact', error)
       ! E* = 2 G/(1 - nu) is all that the normal problem knows of the material: take nu = 0.
-      if (.not. allocated(error)) call new_normal_solver(solver, grid, 0.0_dp, error)
+      if (.not. allocated(error)) call new_contact_solver(solver, trim(merge('thesis', 'fast  ', thesis == 1)), &
+         grid, 0.0_dp, error)
       if (.not. allocated(error)) then
          problem%modulus = 0.5_dp*modulus
          problem%control = merge(control_approach, control_pressure, approach == 1)
@@ -264,12 +265,7 @@ contains
          problem%max_iterations = max_iterations
          problem%warm = warm == 1
          problem%rms_height = rms_about_mean(height, thread_count())
-         if (thesis == 1) then
-            call solve_normal_thesis(grid, solver%operator, problem, height, pressure, gap, level, &
-               outcome)
-         else
-            call solver%solve(problem, height, pressure, gap, level, outcome)
-         end if
+         call solver%solve(problem, height, pressure, gap, level, outcome)
          call solver%destroy()
       end if
       call tell(outcome, iterations, ffts, residual, seconds, converged, reason)

@@ -10,8 +10,8 @@ module normal_step
    use adhesion_state, only : adhesion_problem_type
    use case_settings, only : case_type
    use asperity_errors, only : error_input, error_type, fail
-   use normal_cg, only : new_normal_solver, normal_solver_type
-   use normal_cg_thesis, only : solve_normal_thesis
+   use contact_solver, only : contact_solver_type
+   use normal_solvers, only : new_contact_solver
    use normal_state, only : control_approach, control_pressure, normal_problem_type, rms_about_mean
    use asperity_parallel, only : global_max, global_sum
    use asperity_precision, only : dp
@@ -29,10 +29,9 @@ module normal_step
       logical :: adhesive = .false.
       real(dp) :: summit = 0.0_dp                  !! highest point of the original map, m
       real(dp) :: rms_height = 0.0_dp              !! of the original map about its mean, m
-      type(normal_solver_type) :: normal
+      class(contact_solver_type), allocatable :: normal
       type(adhesion_potential_type) :: potential
       type(adhesion_solver_type), private :: sticky
-      logical, private :: thesis = .false.
       logical, private :: full_contact = .false.
       real(dp) :: tolerance = 1e-6_dp              !! of the next solve
       integer, private :: max_iterations = 1000
@@ -52,18 +51,17 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       self%grid = case%grid
-      self%thesis = case%solver%method == 'thesis'
       self%tolerance = case%solver%tolerance
       self%max_iterations = case%solver%max_iterations
       self%adhesive = case%adhesion%potential /= 'none'
       self%summit = global_max(maxval(height))
-      call new_normal_solver(self%normal, self%grid, case%material%poisson, error, &
-         mixed=case%solver%precision == 'mixed')
+      call new_contact_solver(self%normal, trim(case%solver%method), self%grid, case%material%poisson, &
+         error, mixed=case%solver%precision == 'mixed')
       if (allocated(error)) return
       self%rms_height = rms_about_mean(height, self%normal%operator%threads)
       if (.not. self%adhesive) return
       self%full_contact = case%adhesion%start == 'full_contact'
-      if (self%thesis .and. self%grid%boundary == boundary_free) then
+      if (case%solver%method == 'thesis' .and. self%grid%boundary == boundary_free) then
          call fail(error, error_input, '&solver: method = ''thesis'' with &adhesion: needs boundary = '// &
             '''periodic''; ''fast'' serves both')
          return
@@ -174,12 +172,7 @@ contains
       problem%rms_height = self%rms_height
       problem%warm = warm
       call load_of(self, plan, problem%control, problem%target)
-      if (self%thesis) then
-         call solve_normal_thesis(self%grid, self%normal%operator, problem, height, pressure, gap, level, &
-            outcome, past)
-      else
-         call self%normal%solve(problem, height, pressure, gap, level, outcome, past)
-      end if
+      call self%normal%solve(problem, height, pressure, gap, level, outcome, past)
    end subroutine solve_bare
 
    !> Energy of adhesion of a gap over the whole cell, J.

@@ -5,7 +5,9 @@
 !> pressure is clipped and rescaled to the load; the contact is where P > 0 or the surfaces overlap.
 !> The stopping criterion is that of module normal_cg.
 module normal_cg_thesis
-   use fft_conv, only : convolution_type
+   use contact_solver, only : contact_solver_type
+   use asperity_errors, only : error_type
+   use fft_conv, only : new_normal_operator
    use finite_fields, only : reject_overflow
    use normal_state, only : control_pressure, evaluate_gap, first_pressure, gap_measure_type, &
       measure_gap, narrow_scale, normal_problem_type, prepare_problem, reason_converged, &
@@ -18,66 +20,68 @@ module normal_cg_thesis
    implicit none
    private
 
-   public :: solve_normal_thesis
+   public :: new_thesis_solver, thesis_solver_type
+
+   !> The solver with its operator. Not to be copied.
+   type, extends(contact_solver_type) :: thesis_solver_type
+   contains
+      procedure :: solve
+   end type thesis_solver_type
 
 contains
 
-   !> Solve a contact problem; arguments as those of `normal_solver_type%solve`.
-   subroutine solve_normal_thesis(grid, operator, problem, height, pressure, gap, level, outcome, &
-      history)
+   !> Make a solver for a grid.
+   subroutine new_thesis_solver(self, grid, poisson, error)
+      type(thesis_solver_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
-      type(convolution_type), intent(inout) :: operator
+      real(dp), intent(in) :: poisson                  !! -1 < nu <= 0.5
+      type(error_type), allocatable, intent(out) :: error
+
+      self%grid = grid
+      call new_normal_operator(self%operator, grid, poisson, error)
+      if (allocated(error)) return
+      allocate (self%step(grid%nx, grid%ny), source=0.0_dp)
+   end subroutine new_thesis_solver
+
+   !> Solve a contact problem.
+   subroutine solve(self, problem, height, pressure, gap, level, outcome, history)
+      class(thesis_solver_type), intent(inout), target :: self
       type(normal_problem_type), intent(in) :: problem
-      real(dp), intent(in) :: height(:, :)             !! H, [nx, ny], m
-      real(dp), intent(inout) :: pressure(:, :)        !! P, Pa
-      real(dp), intent(inout) :: gap(:, :)             !! U - H - level, m
-      real(dp), intent(out) :: level                   !! m
+      real(dp), contiguous, intent(in) :: height(:, :)           !! H, [nx, ny], m
+      real(dp), contiguous, intent(inout) :: pressure(:, :)      !! P, Pa
+      real(dp), contiguous, intent(inout) :: gap(:, :)           !! U - H - level, m
+      real(dp), intent(out) :: level                             !! m
       type(solver_result_type), intent(out) :: outcome
-      real(dp), intent(in), optional :: history(:, :)  !! P_h, Pa
+      real(dp), intent(in), optional :: history(:, :)            !! P_h, Pa
       type(normal_problem_type) :: task
       type(gap_measure_type) :: measure
       real(dp), allocatable :: residual(:, :), previous(:, :), direction(:, :)
-      real(dp) :: alpha, beta, form, slope, change, began
+      real(dp) :: alpha, form, began
       integer(int64) :: before
-      logical :: determined, held
+      logical :: determined
 
       began = omp_get_wtime()
-      allocate (residual(grid%nx, grid%ny), previous(grid%nx, grid%ny), source=0.0_dp)
-      allocate (direction(grid%nx, grid%ny), source=0.0_dp)
-      before = operator%ffts
+      before = self%operator%ffts
+      allocate (residual(self%grid%nx, self%grid%ny), source=0.0_dp)
+      allocate (previous, direction, source=residual)
       alpha = 0.0_dp
       form = 0.0_dp
-      call prepare_problem(problem, grid, operator%threads, height, task, determined)
-      call first_pressure(task, grid, operator, height, pressure, history)
+      call prepare_problem(problem, self%grid, self%operator%threads, height, task, determined)
+      call first_pressure(task, self%grid, self%operator, height, pressure, history)
       outcome%reason = reason_iterations
       if (.not. determined) outcome%reason = reason_undetermined
       do
-         call evaluate_gap(task, operator, height, pressure, gap, history)
-         measure = measure_gap(task, pressure, gap, operator%threads)
-         if (.not. determined) exit
-         if (measure%error <= task%tolerance) &
-            call narrow_scale(task, height, pressure, operator%threads, measure)
-         if (measure%strict <= task%tolerance) exit
+         call evaluate_gap(task, self%operator, height, pressure, gap, history)
+         measure = measure_gap(task, pressure, gap, self%operator%threads)
+         if (measure%error <= task%tolerance .and. determined) &
+            call narrow_scale(task, height, pressure, self%operator%threads, measure)
+         if (.not. determined .or. measure%strict <= task%tolerance) exit
          if (outcome%iterations == task%max_iterations) exit
          outcome%iterations = outcome%iterations + 1
-
-         call new_residual(task, measure%level, pressure, gap, residual, previous, slope, change)
-         beta = 0.0_dp
-         if (form > 0.0_dp) beta = max(change/(alpha*form), 0.0_dp)     ! eq. 2.7
-         call turn(beta, residual, direction, slope)
-         if (slope <= 0.0_dp) call turn(0.0_dp, residual, direction, slope)
-         call operator%quadratic_form(direction, form)
-         form = form/task%modulus
-         if (slope <= 0.0_dp .or. form <= 0.0_dp) then
-            outcome%reason = 'no direction of descent is left'
-            exit
-         end if
-         alpha = slope/form                                              ! eq. 2.6
-         call move(task, alpha, direction, pressure, held)
-         if (.not. held) then
-            outcome%reason = 'a step emptied the contact'
-            exit
-         end if
+         call choose_direction()
+         if (outcome%reason /= reason_iterations) exit
+         call move(task, alpha, direction, pressure, outcome)
+         if (outcome%reason /= reason_iterations) exit
       end do
       outcome%converged = determined .and. measure%error <= task%tolerance
       if (outcome%converged) outcome%reason = reason_converged
@@ -85,11 +89,32 @@ contains
       if (problem%control /= control_pressure) level = problem%target
       outcome%residual = measure%error
       outcome%load_error = measure%load_error
-      outcome%ffts = operator%ffts - before
+      outcome%ffts = self%operator%ffts - before
       gap(:, :) = gap - measure%weighted_level
-      call reject_overflow(outcome, pressure, gap, operator%threads)
+      call reject_overflow(outcome, pressure, gap, self%operator%threads)
       outcome%seconds = omp_get_wtime() - began
-   end subroutine solve_normal_thesis
+
+   contains
+
+      !> The direction by Polak and Ribiere, and the length of the step along it.
+      subroutine choose_direction()
+         real(dp) :: beta, slope, change
+
+         call new_residual(task, measure%level, pressure, gap, residual, previous, slope, change)
+         beta = 0.0_dp
+         if (form > 0.0_dp) beta = max(change/(alpha*form), 0.0_dp)     ! eq. 2.7
+         call turn(beta, residual, direction, slope)
+         if (slope <= 0.0_dp) call turn(0.0_dp, residual, direction, slope)
+         call self%operator%quadratic_form(direction, form)
+         form = form/task%modulus
+         if (slope <= 0.0_dp .or. form <= 0.0_dp) then
+            outcome%reason = 'no direction of descent is left'
+         else
+            alpha = slope/form                                           ! eq. 2.6
+         end if
+      end subroutine choose_direction
+
+   end subroutine solve
 
    !> residual = H - U less its mean, on the contact; residual.(residual - previous).
    subroutine new_residual(problem, level, pressure, gap, residual, previous, slope, change)
@@ -151,27 +176,28 @@ contains
    end subroutine turn
 
    !> P = P + alpha direction, clipped, and rescaled where the load is prescribed.
-   subroutine move(problem, alpha, direction, pressure, held)
+   subroutine move(problem, alpha, direction, pressure, outcome)
       type(normal_problem_type), intent(in) :: problem
       real(dp), intent(in) :: alpha
       real(dp), intent(in) :: direction(:, :)
       real(dp), intent(inout) :: pressure(:, :)
-      logical, intent(out) :: held                     !! false: left alone, nothing would be loaded
+      type(solver_result_type), intent(inout) :: outcome   !! gets a reason if nothing is left loaded
       real(dp), allocatable :: rows(:)
       real(dp) :: factor, load
       integer :: j
 
       allocate (rows(size(pressure, 2)))
       factor = 1.0_dp
-      held = .true.
       if (problem%control == control_pressure) then
          !$omp parallel do default(none) shared(alpha, direction, pressure, rows) private(j)
          do j = 1, size(pressure, 2)
             rows(j) = sum(max(pressure(:, j) + alpha*direction(:, j), 0.0_dp))
          end do
          load = global_sum(sum(rows))
-         held = load > 0.0_dp
-         if (.not. held) return
+         if (load <= 0.0_dp) then
+            outcome%reason = 'a step emptied the contact'
+            return
+         end if
          factor = problem%target*size(pressure)/load
       end if
       !$omp parallel do default(none) shared(alpha, direction, pressure, factor) private(j)

@@ -3,6 +3,7 @@ module normal_state
    use fft_conv, only : columns_apply, convolution_type
    use asperity_parallel, only : global_max, global_min, global_sum
    use asperity_precision, only : dp, pi
+   use normal_sums, only : state_sums_type, total
    use projection, only : project_simplex
    use regular_grid, only : boundary_periodic, grid_type
    implicit none
@@ -144,11 +145,11 @@ contains
       extent = [highest, lowest, total]
    end function row_extent
 
-   !> Sums over cells of a row: P, P g, g where P > 0, the number of those, P |g - level|.
+   !> The sums of a row of a state, without its least gap.
    function row_measure(pressure, gap, level) result(sums)
       real(dp), intent(in) :: pressure(:), gap(:)
-      real(dp), intent(in) :: level
-      real(dp) :: sums(5)
+      real(dp), intent(in) :: level                !! the prescribed one, m
+      type(state_sums_type) :: sums
       real(dp) :: load, work, touched, cells, distance
       integer :: i
 
@@ -165,39 +166,36 @@ contains
          touched = touched + merge(gap(i), 0.0_dp, pressure(i) > 0.0_dp)
          cells = cells + merge(1.0_dp, 0.0_dp, pressure(i) > 0.0_dp)
       end do
-      sums = [load, work, touched, cells, distance]
+      sums%load = load
+      sums%work = work
+      sums%touched = touched
+      sums%cells = cells
+      sums%distance = distance
    end function row_measure
 
-   !> The measure of a state from the sums of its rows.
-   function combine_measures(problem, cells, rows) result(measure)
+   !> The measure of a state from its sums over the grid.
+   pure function combine_measures(problem, cells, sums) result(measure)
       type(normal_problem_type), intent(in) :: problem
       real(dp), intent(in) :: cells                !! number of cells of the whole grid
-      real(dp), intent(in) :: rows(:, :)           !! [6, ny]: `row_measure` and the least gap
+      type(state_sums_type), intent(in) :: sums
       type(gap_measure_type) :: measure
-      real(dp) :: sums(5), least
-      integer :: j
 
-      sums = 0.0_dp
-      do j = 1, size(rows, 2)
-         sums = sums + rows(1:5, j)
-      end do
-      sums = global_sum(sums)
-      least = global_min(minval(rows(6, :)))
-      measure%load = sums(1)
+      measure%load = sums%load
       if (problem%control == control_approach) then
          measure%level = problem%target
          measure%weighted_level = problem%target
-         measure%duality_gap = max(measure%level - least, 0.0_dp)
-         if (sums(1) > 0.0_dp) measure%duality_gap = max(measure%duality_gap, sums(5)/sums(1))
-      else if (sums(1) > 0.0_dp) then
-         measure%level = sums(3)/sums(4)
-         measure%weighted_level = sums(2)/sums(1)
-         measure%load_error = abs(sums(1)/(cells*problem%target) - 1.0_dp)
-         measure%duality_gap = measure%weighted_level - least
+         measure%duality_gap = max(measure%level - sums%least, 0.0_dp)
+         if (sums%load > 0.0_dp) &
+            measure%duality_gap = max(measure%duality_gap, sums%distance/sums%load)
+      else if (sums%load > 0.0_dp) then
+         measure%level = sums%touched/sums%cells
+         measure%weighted_level = sums%work/sums%load
+         measure%load_error = abs(sums%load/(cells*problem%target) - 1.0_dp)
+         measure%duality_gap = measure%weighted_level - sums%least
       else
          ! No load, and none is wanted: the surfaces just touch.
-         measure%level = least
-         measure%weighted_level = least
+         measure%level = sums%least
+         measure%weighted_level = sums%least
          measure%load_error = merge(1.0_dp, 0.0_dp, problem%target > 0.0_dp)
       end if
       measure%error = max(measure%duality_gap/problem%rms_height, measure%load_error)
@@ -210,17 +208,17 @@ contains
       real(dp), intent(in) :: pressure(:, :), gap(:, :)
       integer, intent(in) :: threads
       type(gap_measure_type) :: measure
-      real(dp), allocatable :: rows(:, :)
+      type(state_sums_type), allocatable :: rows(:)
       integer :: j
 
-      allocate (rows(6, size(gap, 2)))
+      allocate (rows(size(gap, 2)))
       !$omp parallel do default(none) shared(problem, pressure, gap, rows) private(j) &
       !$omp num_threads(threads)
       do j = 1, size(gap, 2)
-         rows(1:5, j) = row_measure(pressure(:, j), gap(:, j), problem%target)
-         rows(6, j) = minval(gap(:, j))
+         rows(j) = row_measure(pressure(:, j), gap(:, j), problem%target)
+         rows(j)%least = minval(gap(:, j))
       end do
-      measure = combine_measures(problem, real(size(gap), dp), rows)
+      measure = combine_measures(problem, real(size(gap), dp), total(rows))
    end function measure_gap
 
    !> gap = A(P + P_h)/modulus - H, H counted from the datum.

@@ -1,8 +1,11 @@
 !> The passes of module normal_cg over neighbouring cells of one row.
 !>
-!> Each is one loop without branches, so that it runs in vector registers. The contact set S needs
-!> no field of its own: the residual is not zero in S alone, and the direction where it acts alone.
+!> Each is one loop without branches, so that it runs in vector registers. No masks are stored: a cell
+!> is in the contact set S if the residual is not 0, and the direction acts where it is not 0.
+!> The loops take many arguments because passing them costs less than looking them up in records.
 module normal_sweeps
+   use normal_sums, only : direction_sums_type, residual_sums_type, state_sums_type, step_sums_type, &
+      trial_sums_type
    use asperity_precision, only : dp
    implicit none
    private
@@ -13,13 +16,13 @@ module normal_sweeps
 contains
 
    !> The residual level - gap on S = {P > 0 or gap < level}, zero elsewhere; the sum of its square.
-   pure subroutine residual_cells(n, level, pressure, gap, residual, column, square)
+   pure subroutine residual_cells(n, level, pressure, gap, residual, column, sums)
       integer, intent(in) :: n
       real(dp), intent(in) :: level
       real(dp), intent(in) :: pressure(n), gap(n)
       real(dp), intent(inout) :: residual(n)
       real(dp), intent(inout) :: column(n)          !! sums over the rows of a block
-      real(dp), intent(inout) :: square
+      type(residual_sums_type), intent(inout) :: sums
       real(dp) :: total, r
       integer :: i
 
@@ -31,7 +34,7 @@ contains
          column(i) = column(i) + r
          total = total + r**2
       end do
-      square = square + total
+      sums%square = sums%square + total
    end subroutine residual_cells
 
    !> Sum of r (wx r_west + wy r_south).
@@ -51,8 +54,8 @@ contains
       sum = sum + total
    end subroutine coupling_cells
 
-   !> direction = z + beta (direction - offset), z = M r, where it acts: on S but for empty cells that z
-   !> would empty further. Sums: of it, of 1, of r times it, of r, of its square.
+   !> direction = z + beta (direction - offset), z = M r, where it acts: on S, except in empty cells that
+   !> z would empty further.
    pure subroutine direction_cells(n, wx, wy, centre, south, residual, north, correction, &
       beta, offset, pressure, direction, column, shares, sums)
       integer, intent(in) :: n
@@ -65,8 +68,8 @@ contains
       real(dp), intent(inout) :: direction(n)
       real(dp), intent(inout) :: column(n)          !! sums over the rows of a block
       real(dp), intent(inout) :: shares(n)          !! the same of 1 where it acts
-      real(dp), intent(inout) :: sums(5)
-      ! Other passes take it that d acts where it is not 0: where it acts it must never be 0.
+      type(direction_sums_type), intent(inout) :: sums
+      ! Other passes assume that d acts where it is not 0, so it must not be 0 where it acts.
       real(dp), parameter :: least = tiny(1.0_dp)
       real(dp) :: total, cells, product, residuals, square, z, d, inside
       integer :: i
@@ -92,23 +95,26 @@ contains
          residuals = residuals + residual(i)*inside
          square = square + d**2
       end do
-      sums = sums + [total, cells, product, residuals, square]
+      sums%value = sums%value + total
+      sums%cells = sums%cells + cells
+      sums%slope = sums%slope + product
+      sums%residual = sums%residual + residuals
+      sums%square = sums%square + square
    end subroutine direction_cells
 
-   !> trial = P + alpha (direction - offset); the sum and number of what is positive, the least.
-   pure subroutine trial_cells(n, alpha, offset, pressure, direction, trial, sums, least)
+   !> trial = P + alpha (direction - offset), and its sums above the limit 0.
+   pure subroutine trial_cells(n, alpha, offset, pressure, direction, trial, sums)
       integer, intent(in) :: n
       real(dp), intent(in) :: alpha, offset
       real(dp), intent(in) :: pressure(n), direction(n)
       real(dp), intent(inout) :: trial(n)
-      real(dp), intent(inout) :: sums(2)
-      real(dp), intent(inout) :: least
+      type(trial_sums_type), intent(inout) :: sums
       real(dp) :: total, cells, lowest
       integer :: i
 
       total = 0.0_dp
       cells = 0.0_dp
-      lowest = least
+      lowest = sums%least
       !$omp simd reduction(+:total, cells) reduction(min:lowest)
       do i = 1, n
          trial(i) = pressure(i) + alpha*(direction(i) &
@@ -117,8 +123,9 @@ contains
          cells = cells + positive(trial(i))
          lowest = min(lowest, trial(i))
       end do
-      sums = sums + [total, cells]
-      least = lowest
+      sums%above = sums%above + total
+      sums%cells = sums%cells + cells
+      sums%least = lowest
    end subroutine trial_cells
 
    !> Sum of what is above a limit, and the number of such values.
@@ -126,7 +133,7 @@ contains
       integer, intent(in) :: n
       real(dp), intent(in) :: limit
       real(dp), intent(in) :: values(n)
-      real(dp), intent(inout) :: sums(2)            !! of (value - limit) and of 1
+      type(trial_sums_type), intent(inout) :: sums
       real(dp) :: total, cells
       integer :: i
 
@@ -137,18 +144,18 @@ contains
          total = total + max(values(i) - limit, 0.0_dp)
          cells = cells + positive(values(i) - limit)
       end do
-      sums = sums + [total, cells]
+      sums%above = sums%above + total
+      sums%cells = sums%cells + cells
    end subroutine above_cells
 
-   !> step = factor max(trial - shift, 0) - P, in the place of trial; sums of (level - gap) step and
-   !> step^2.
+   !> step = factor max(trial - shift, 0) - P; the trial pressure is in `step` before.
    pure subroutine clip_cells(n, factor, shift, level, pressure, gap, step, column, sums)
       integer, intent(in) :: n
       real(dp), intent(in) :: factor, shift, level
       real(dp), intent(in) :: pressure(n), gap(n)
       real(dp), intent(inout) :: step(n)
       real(dp), intent(inout) :: column(n)          !! sums over the rows of a block
-      real(dp), intent(inout) :: sums(2)
+      type(step_sums_type), intent(inout) :: sums
       real(dp) :: product, square
       integer :: i
 
@@ -161,7 +168,8 @@ contains
          product = product + (level - gap(i))*step(i)
          square = square + step(i)**2
       end do
-      sums = sums + [product, square]
+      sums%slope = sums%slope + product
+      sums%square = sums%square + square
    end subroutine clip_cells
 
    !> The longest multiple of the step that leaves no pressure negative, if less than `longest`.
@@ -184,14 +192,14 @@ contains
       positive = 0.5_dp - sign(0.5_dp, 0.0_dp - x)
    end function positive
 
-   !> P = P + alpha step; sums as those of `row_measure`.
+   !> P = P + alpha step, and the sums of the new state without its least gap.
    pure subroutine load_cells(n, alpha, target, gap, step, pressure, sums)
       integer, intent(in) :: n
       real(dp), intent(in) :: alpha
       real(dp), intent(in) :: target                !! prescribed level
       real(dp), intent(in) :: gap(n), step(n)
       real(dp), intent(inout) :: pressure(n)
-      real(dp), intent(inout) :: sums(5)
+      type(state_sums_type), intent(inout) :: sums
       real(dp) :: load, work, touched, cells, distance, p, inside
       integer :: i
 
@@ -212,7 +220,11 @@ contains
          touched = touched + inside*gap(i)
          cells = cells + inside
       end do
-      sums = sums + [load, work, touched, cells, distance]
+      sums%load = sums%load + load
+      sums%work = sums%work + work
+      sums%touched = sums%touched + touched
+      sums%cells = sums%cells + cells
+      sums%distance = sums%distance + distance
    end subroutine load_cells
 
 end module normal_sweeps

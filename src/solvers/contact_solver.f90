@@ -1,0 +1,51 @@
+!> What every solver of normal contact without adhesion has in common, whatever its method.
+!>
+!> Module normal_solvers chooses one by the name of its method.
+module contact_solver
+   use fft_conv, only : convolution_type
+   use normal_state, only : normal_problem_type
+   use asperity_precision, only : dp
+   use regular_grid, only : grid_type
+   use solver_result, only : solver_result_type
+   implicit none
+   private
+
+   public :: contact_solver_type
+
+   !> A solver with its operator, kept from step to step. Not to be copied.
+   type, abstract :: contact_solver_type
+      type(grid_type) :: grid
+      type(convolution_type) :: operator           !! A for the shear modulus 1 Pa
+      real(dp), allocatable :: step(:, :)          !! work field [nx, ny], free between solves
+   contains
+      procedure(solve_contact), deferred :: solve
+      procedure :: destroy
+   end type contact_solver_type
+
+   abstract interface
+      !> Find the pressure P >= 0 under which gap >= 0 and P gap = 0.
+      !>
+      !> Not converging is an outcome, not an error: the state reached is handed out.
+      subroutine solve_contact(self, problem, height, pressure, gap, level, outcome, history)
+         import :: contact_solver_type, dp, normal_problem_type, solver_result_type
+         class(contact_solver_type), intent(inout), target :: self
+         type(normal_problem_type), intent(in) :: problem
+         real(dp), contiguous, intent(in) :: height(:, :)        !! H, [nx, ny], m
+         real(dp), contiguous, intent(inout) :: pressure(:, :)   !! P, Pa; in: a start if problem%warm
+         real(dp), contiguous, intent(inout) :: gap(:, :)        !! U - H - level, m
+         real(dp), intent(out) :: level                          !! U - H where the gap is zero, m
+         type(solver_result_type), intent(out) :: outcome
+         real(dp), intent(in), optional :: history(:, :)         !! P_h, traction of the past, Pa
+      end subroutine solve_contact
+   end interface
+
+contains
+
+   !> Free plans and memory.
+   subroutine destroy(self)
+      class(contact_solver_type), intent(inout) :: self
+
+      call self%operator%destroy()
+   end subroutine destroy
+
+end module contact_solver

@@ -1,0 +1,98 @@
+!> How far the gap of an iteration can be trusted, and when it must be computed from the pressure again.
+!>
+!> An iteration adds the displacement of its step to the gap. The errors of these sums grow: slowly
+!> with products in double precision, faster with products in single precision. So the gap is replaced
+!> by a fresh product of the whole pressure, always in double precision, after some number of steps, and
+!> whenever the sums say that the problem is solved. The comparison of the two tells whether steps in
+!> single precision are still of use.
+module gap_watch
+   use asperity_precision, only : dp
+   implicit none
+   private
+
+   public :: gap_watch_type, new_gap_watch
+
+   integer, parameter :: longest_age = 40      !! steps between fresh gaps
+   integer, parameter :: mixed_age = 20        !! the same in mixed precision
+   integer, parameter :: careful_age = 10      !! the same for a tolerance below `careful`
+   real(dp), parameter :: careful = 1e-7_dp
+
+   !> What is known of the gap.
+   type :: gap_watch_type
+      logical :: fresh = .false.               !! it is the product of the whole pressure
+      logical :: single = .false.              !! the products of steps are in single precision
+      integer, private :: age = 0              !! steps since the last fresh gap
+      integer, private :: oldest = longest_age
+      real(dp), private :: expected = huge(1.0_dp)  !! error by the sums before the last fresh gap
+      real(dp), private :: before = huge(1.0_dp)    !! error of the last fresh gap but one
+   contains
+      procedure :: is_due
+      procedure :: note_step
+      procedure :: expect
+      procedure :: note_fresh
+      procedure :: judge
+   end type gap_watch_type
+
+contains
+
+   !> Begin to watch.
+   subroutine new_gap_watch(self, mixed, tolerance)
+      type(gap_watch_type), intent(out) :: self
+      logical, intent(in) :: mixed             !! the products of steps start in single precision
+      real(dp), intent(in) :: tolerance        !! of the solver
+
+      self%single = mixed
+      if (mixed) self%oldest = merge(careful_age, mixed_age, tolerance < careful)
+   end subroutine new_gap_watch
+
+   !> Must the gap be computed again before anything is concluded from it?
+   pure function is_due(self, solved) result(due)
+      class(gap_watch_type), intent(in) :: self
+      logical, intent(in) :: solved            !! the problem is solved by the gap as it stands
+      logical :: due
+
+      due = .not. self%fresh .and. (solved .or. self%age >= self%oldest)
+   end function is_due
+
+   !> A step was added to the gap.
+   subroutine note_step(self)
+      class(gap_watch_type), intent(inout) :: self
+
+      self%fresh = .false.
+      self%age = self%age + 1
+   end subroutine note_step
+
+   !> The gap will be computed again; remember the error that the sums give.
+   subroutine expect(self, error)
+      class(gap_watch_type), intent(inout) :: self
+      real(dp), intent(in) :: error
+
+      self%expected = error
+   end subroutine expect
+
+   !> The gap was computed again.
+   subroutine note_fresh(self)
+      class(gap_watch_type), intent(inout) :: self
+
+      self%fresh = .true.
+      self%age = 0
+   end subroutine note_fresh
+
+   !> Compare the error of a fresh gap with the expected one.
+   !>
+   !> If the sums have drifted, residuals before and after do not make conjugate directions. If the drift
+   !> exceeds the progress since the last fresh gap, the steps continue in double precision.
+   subroutine judge(self, error, drifted)
+      class(gap_watch_type), intent(inout) :: self
+      real(dp), intent(in) :: error            !! of the gap
+      logical, intent(out) :: drifted          !! start the direction again
+
+      drifted = .false.
+      if (.not. (self%fresh .and. self%single)) return
+      drifted = error > 2.0_dp*self%expected
+      if (drifted) self%single = error <= 0.5_dp*self%before
+      self%before = error
+      self%expected = huge(1.0_dp)
+   end subroutine judge
+
+end module gap_watch

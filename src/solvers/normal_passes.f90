@@ -1,0 +1,369 @@
+!> The passes of module normal_cg over the whole grid, row by row.
+!>
+!> They visit the active blocks only (module active_blocks), except the pass that updates the gap. The
+!> work fields are zero elsewhere. The innermost loops are in module normal_sweeps.
+module normal_passes
+   use active_blocks, only : active_blocks_type, new_active_blocks
+   use coarse_level, only : coarse_level_type, new_coarse_level, stencil_c0
+   use asperity_errors, only : error_type
+   use fft_conv, only : convolution_type
+   use normal_state, only : row_measure
+   use normal_sums, only : direction_sums_type, residual_sums_type, state_sums_type, step_sums_type, &
+      total, trial_sums_type
+   use normal_sweeps, only : above_cells, clip_cells, coupling_cells, direction_cells, load_cells, &
+      longest_cells, residual_cells, trial_cells
+   use asperity_parallel, only : global_min
+   use asperity_precision, only : dp
+   use regular_grid, only : boundary_periodic, grid_type
+   implicit none
+   private
+
+   public :: clip_step, clip_type, find_clip, form_residual, longest_multiple, new_direction, &
+      new_normal_work, normal_work_type, survey, try_pressure, update_state
+
+   !> The work fields of a solver, and what belongs to them.
+   type :: normal_work_type
+      type(grid_type) :: grid
+      integer :: threads = 1
+      type(coarse_level_type) :: coarse
+      type(active_blocks_type) :: active             !! where residual, direction and step are not 0
+      real(dp), allocatable :: residual(:, :)        !! with a rim: (0:nx+1, 0:ny+1), m
+      real(dp), allocatable :: direction(:, :)       !! [nx, ny]
+      real(dp) :: offset = 0.0_dp                    !! to be subtracted from the direction where it acts
+      type(state_sums_type), allocatable :: state(:)   !! of each row of the present state, [ny]
+   end type normal_work_type
+
+   !> How a trial pressure is put back on what is allowed: factor max(trial - shift, 0).
+   type :: clip_type
+      logical :: clipped = .false.                   !! some trial pressure is negative
+      real(dp) :: shift = 0.0_dp                     !! Pa
+      real(dp) :: factor = 1.0_dp
+   end type clip_type
+
+contains
+
+   !> Allocate the work fields.
+   subroutine new_normal_work(self, grid, poisson, threads, error)
+      type(normal_work_type), intent(out) :: self
+      type(grid_type), intent(in) :: grid
+      real(dp), intent(in) :: poisson
+      integer, intent(in) :: threads
+      type(error_type), allocatable, intent(out) :: error
+
+      self%grid = grid
+      self%threads = threads
+      call new_coarse_level(self%coarse, grid, poisson, error)
+      if (allocated(error)) return
+      allocate (self%residual(0:grid%nx + 1, 0:grid%ny + 1), source=0.0_dp)
+      allocate (self%direction(grid%nx, grid%ny), source=0.0_dp)
+      call new_active_blocks(self%active, grid%nx, grid%ny, threads)
+      allocate (self%state(grid%ny))
+   end subroutine new_normal_work
+
+   !> Find which blocks hold pressure, the least gap of each, and the sums of the state.
+   subroutine survey(self, prescribed, pressure, gap)
+      type(normal_work_type), intent(inout) :: self
+      real(dp), intent(in) :: prescribed             !! level, m
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny), gap(self%grid%nx, self%grid%ny)
+      integer :: j
+
+      !$omp parallel do default(none) shared(self, prescribed, pressure, gap) private(j) &
+      !$omp num_threads(self%threads)
+      do j = 1, self%grid%ny
+         self%state(j) = row_measure(pressure(:, j), gap(:, j), prescribed)
+         call self%active%survey_row(.true., j, pressure(:, j), gap(:, j), self%state(j)%least)
+      end do
+   end subroutine survey
+
+   !> The residual r = level - gap on S = {P > 0 or gap < level}, its rim and block means; the coarse
+   !> correction; and the product r.z, where z = M r is the sum of the stencil and the correction.
+   subroutine form_residual(self, level, pressure, gap, rz)
+      type(normal_work_type), intent(inout) :: self
+      real(dp), intent(in) :: level
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny), gap(self%grid%nx, self%grid%ny)
+      real(dp), intent(out) :: rz
+      type(residual_sums_type), allocatable :: rows(:)
+      type(residual_sums_type) :: sums
+      real(dp), allocatable :: column(:)
+      real(dp) :: wx, wy
+      integer :: j, k, jb, n, nx, ny
+      logical :: periodic
+
+      allocate (rows(self%grid%ny))
+      wx = self%coarse%wx
+      wy = self%coarse%wy
+      nx = self%grid%nx
+      ny = self%grid%ny
+      periodic = self%grid%boundary == boundary_periodic
+      !$omp parallel default(none) shared(self, pressure, gap, level, wx, wy, nx, periodic, rows) &
+      !$omp private(j, k, jb, n, column, sums) num_threads(self%threads)
+      allocate (column(nx))
+      !$omp do schedule(dynamic)
+      do jb = 1, self%coarse%ny
+         column(:) = 0.0_dp
+         do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
+            sums = residual_sums_type()
+            do k = 1, self%active%runs(j)
+               associate (first => self%active%first(k, j))
+                  n = self%active%last(k, j) - first + 1
+                  call residual_cells(n, level, pressure(first, j), gap(first, j), &
+                     self%residual(first, j), column(first), sums)
+               end associate
+            end do
+            if (periodic) then
+               self%residual(0, j) = self%residual(nx, j)
+               self%residual(nx + 1, j) = self%residual(1, j)
+            end if
+            if (j > self%coarse%first_y(jb)) call couple_row(self, wx, wy, j, sums%coupling)
+            rows(j) = sums
+         end do
+         call self%coarse%set_means(jb, column)
+      end do
+      !$omp end parallel
+      if (periodic) then
+         self%residual(1:nx, 0) = self%residual(1:nx, ny)
+         self%residual(1:nx, ny + 1) = self%residual(1:nx, 1)
+      end if
+      ! The first row of a block needs a row that another thread may have formed.
+      do jb = 1, self%coarse%ny
+         j = self%coarse%first_y(jb)
+         call couple_row(self, wx, wy, j, rows(j)%coupling)
+      end do
+      call self%coarse%precondition()
+      sums = total(rows)
+      rz = (stencil_c0 + 2.0_dp*(wx + wy))*sums%square - 2.0_dp*sums%coupling &
+         + self%coarse%cells*sum(self%coarse%mean*self%coarse%correction)
+   end subroutine form_residual
+
+   !> Add the products of a row's residuals with those west and south of them.
+   subroutine couple_row(self, wx, wy, j, coupling)
+      type(normal_work_type), intent(in) :: self
+      real(dp), intent(in) :: wx, wy
+      integer, intent(in) :: j
+      real(dp), intent(inout) :: coupling
+      integer :: k
+
+      do k = 1, self%active%runs(j)
+         associate (first => self%active%first(k, j))
+            call coupling_cells(self%active%last(k, j) - first + 1, wx, wy, self%residual(first - 1, j), &
+               self%residual(first, j - 1), coupling)
+         end associate
+      end do
+   end subroutine couple_row
+
+   !> direction = z + beta direction where it acts: on S, except in empty cells that z would empty
+   !> further. The constant that makes sum(direction) zero is kept in `offset` and not subtracted; the
+   !> products and block means are those with it subtracted.
+   subroutine new_direction(self, fixed_load, preconditioned, beta, pressure, slope, square)
+      type(normal_work_type), intent(inout) :: self
+      logical, intent(in) :: fixed_load              !! the direction may not change the load
+      logical, intent(in) :: preconditioned          !! z = M r, else z = r
+      real(dp), intent(in) :: beta
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny)
+      real(dp), intent(out) :: slope                 !! r.d
+      real(dp), intent(out) :: square                !! d.d
+      type(direction_sums_type), allocatable :: rows(:)
+      type(direction_sums_type) :: sums
+      real(dp), allocatable :: correction(:), column(:), shares(:)
+      real(dp) :: wx, wy, centre
+      integer :: j, k, jb, n
+
+      allocate (rows(self%grid%ny))
+      wx = merge(self%coarse%wx, 0.0_dp, preconditioned)
+      wy = merge(self%coarse%wy, 0.0_dp, preconditioned)
+      centre = merge(stencil_c0, 1.0_dp, preconditioned) + 2.0_dp*(wx + wy)
+      !$omp parallel default(none) shared(self, preconditioned, wx, wy, centre, beta, pressure, rows) &
+      !$omp private(j, k, jb, n, sums, correction, column, shares) &
+      !$omp num_threads(self%threads)
+      allocate (correction(self%grid%nx), column(self%grid%nx), shares(self%grid%nx))
+      !$omp do
+      do jb = 1, self%coarse%ny
+         correction(:) = 0.0_dp
+         if (preconditioned) correction(:) = self%coarse%correction(self%coarse%block_x, jb)
+         column(:) = 0.0_dp
+         shares(:) = 0.0_dp
+         do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
+            sums = direction_sums_type()
+            do k = 1, self%active%runs(j)
+               associate (first => self%active%first(k, j))
+                  n = self%active%last(k, j) - first + 1
+                  call direction_cells(n, wx, wy, centre, self%residual(first, j - 1), &
+                     self%residual(first - 1, j), self%residual(first, j + 1), correction(first), &
+                     beta, self%offset, pressure(first, j), self%direction(first, j), &
+                     column(first), shares(first), sums)
+               end associate
+            end do
+            rows(j) = sums
+         end do
+         call self%coarse%set_means(jb, column)
+         call self%coarse%set_shares(jb, shares)
+      end do
+      !$omp end parallel
+      sums = total(rows)
+      self%offset = 0.0_dp
+      if (fixed_load) self%offset = sums%value/max(sums%cells, 1.0_dp)
+      slope = sums%slope - self%offset*sums%residual
+      square = sums%square - self%offset*sums%value
+      if (fixed_load) self%coarse%mean(:, :) = self%coarse%mean - self%offset*self%coarse%share
+   end subroutine new_direction
+
+   !> step = trial pressure P + alpha (direction - offset), and its sums above 0.
+   subroutine try_pressure(self, alpha, pressure, step, sums)
+      type(normal_work_type), intent(in) :: self
+      real(dp), intent(in) :: alpha
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny)
+      real(dp), intent(inout) :: step(self%grid%nx, self%grid%ny)
+      type(trial_sums_type), intent(out) :: sums
+      type(trial_sums_type), allocatable :: rows(:)
+      integer :: j, k, n
+
+      allocate (rows(self%grid%ny))
+      !$omp parallel do default(none) shared(self, alpha, pressure, step, rows) &
+      !$omp private(j, k, n, sums) schedule(dynamic, 8) num_threads(self%threads)
+      do j = 1, self%grid%ny
+         sums = trial_sums_type()
+         do k = 1, self%active%runs(j)
+            associate (first => self%active%first(k, j))
+               n = self%active%last(k, j) - first + 1
+               call trial_cells(n, alpha, self%offset, pressure(first, j), self%direction(first, j), &
+                  step(first, j), sums)
+            end associate
+         end do
+         rows(j) = sums
+      end do
+      sums = total(rows)
+   end subroutine try_pressure
+
+   !> How the trial pressure in `step` is put back on what is allowed. Where the load is given, that is the
+   !> shift t for which max(trial - t, 0) has the load's sum, by Newton's method from below. A trial
+   !> pressure far above the load leaves of that sum only what round-off allows, and a factor makes up
+   !> for the rest.
+   subroutine find_clip(self, fixed_load, load, step, sums, clip)
+      type(normal_work_type), intent(in) :: self
+      logical, intent(in) :: fixed_load
+      real(dp), intent(in) :: load                   !! sum of P over the cells, Pa
+      real(dp), intent(in) :: step(self%grid%nx, self%grid%ny)
+      type(trial_sums_type), intent(in) :: sums      !! of the trial pressure above 0
+      type(clip_type), intent(out) :: clip
+      type(trial_sums_type), allocatable :: rows(:)
+      type(trial_sums_type) :: above
+      real(dp) :: kept, next
+      integer :: j, k, n
+
+      clip%clipped = sums%least < 0.0_dp
+      if (.not. (fixed_load .and. clip%clipped)) return
+      allocate (rows(self%grid%ny))
+      above = sums
+      kept = load
+      next = 0.0_dp
+      do
+         if (above%cells < 1.0_dp) exit                   ! too far: what was kept before it is the best
+         clip%shift = next
+         kept = above%above
+         if (kept - load <= 1e-15_dp*load) exit
+         next = clip%shift + (kept - load)/above%cells
+         if (next <= clip%shift) exit                    ! all that round-off allows
+         !$omp parallel do default(none) shared(self, step, next, rows) private(j, k, n) &
+         !$omp schedule(dynamic, 8) num_threads(self%threads)
+         do j = 1, self%grid%ny
+            rows(j) = trial_sums_type()
+            do k = 1, self%active%runs(j)
+               n = self%active%last(k, j) - self%active%first(k, j) + 1
+               call above_cells(n, next, step(self%active%first(k, j), j), rows(j))
+            end do
+         end do
+         above = total(rows)
+      end do
+      if (abs(kept - load) > 1e-13_dp*load) clip%factor = load/kept
+   end subroutine find_clip
+
+   !> step = (trial pressure put back on what is allowed) - P, its sums and block means. Its rows are
+   !> transformed at once.
+   subroutine clip_step(self, operator, clip, level, pressure, gap, step, sums)
+      type(normal_work_type), intent(inout) :: self
+      type(convolution_type), intent(inout) :: operator
+      type(clip_type), intent(in) :: clip
+      real(dp), intent(in) :: level                  !! m
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny), gap(self%grid%nx, self%grid%ny)
+      real(dp), intent(inout) :: step(self%grid%nx, self%grid%ny)
+      type(step_sums_type), intent(out) :: sums
+      type(step_sums_type), allocatable :: rows(:)
+      real(dp), allocatable :: column(:)
+      integer :: j, k, jb, n
+
+      allocate (rows(self%grid%ny))
+      !$omp parallel default(none) shared(self, operator, clip, level, pressure, gap, step, rows) &
+      !$omp private(j, k, jb, n, sums, column) num_threads(self%threads)
+      allocate (column(self%grid%nx))
+      !$omp do schedule(dynamic)
+      do jb = 1, self%coarse%ny
+         column(:) = 0.0_dp
+         do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
+            sums = step_sums_type()
+            do k = 1, self%active%runs(j)
+               associate (first => self%active%first(k, j))
+                  n = self%active%last(k, j) - first + 1
+                  call clip_cells(n, clip%factor, clip%shift, level, pressure(first, j), gap(first, j), &
+                     step(first, j), column(first), sums)
+               end associate
+            end do
+            rows(j) = sums
+            if (self%active%runs(j) == 0) then
+               call operator%forward_zero_row(1, j)
+            else
+               call operator%forward_row(1, j, step(:, j))
+            end if
+         end do
+         call self%coarse%set_means(jb, column)
+      end do
+      !$omp end parallel
+      sums = total(rows)
+   end subroutine clip_step
+
+   !> The longest multiple of the step that leaves no pressure negative.
+   function longest_multiple(self, pressure, step) result(longest)
+      type(normal_work_type), intent(in) :: self
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny), step(self%grid%nx, self%grid%ny)
+      real(dp) :: longest
+      integer :: j, k
+
+      longest = huge(1.0_dp)
+      do j = 1, self%grid%ny
+         do k = 1, self%active%runs(j)
+            call longest_cells(self%active%last(k, j) - self%active%first(k, j) + 1, &
+               pressure(self%active%first(k, j), j), step(self%active%first(k, j), j), longest)
+         end do
+      end do
+      longest = global_min(longest)
+   end function longest_multiple
+
+   !> P = P + alpha step, gap = gap + factor A step, and the survey of the new state.
+   subroutine update_state(self, operator, prescribed, factor, alpha, step, pressure, gap)
+      type(normal_work_type), intent(inout) :: self
+      type(convolution_type), intent(inout) :: operator   !! holds the columns of A step
+      real(dp), intent(in) :: prescribed             !! level, m
+      real(dp), intent(in) :: factor, alpha
+      real(dp), intent(in) :: step(self%grid%nx, self%grid%ny)
+      real(dp), intent(inout) :: pressure(self%grid%nx, self%grid%ny)
+      real(dp), intent(inout) :: gap(self%grid%nx, self%grid%ny)
+      type(state_sums_type) :: sums
+      integer :: j, k, n
+
+      !$omp parallel do default(none) shared(self, operator, prescribed, factor, alpha, step, pressure, gap) &
+      !$omp private(j, k, n, sums) schedule(dynamic, 8) num_threads(self%threads)
+      do j = 1, self%grid%ny
+         call operator%add_backward_row(1, j, factor, gap(:, j))
+         sums = state_sums_type()
+         do k = 1, self%active%runs(j)
+            associate (first => self%active%first(k, j))
+               n = self%active%last(k, j) - first + 1
+               call load_cells(n, alpha, prescribed, gap(first, j), step(first, j), &
+                  pressure(first, j), sums)
+            end associate
+         end do
+         call self%active%survey_row(.false., j, pressure(:, j), gap(:, j), sums%least)
+         self%state(j) = sums
+      end do
+   end subroutine update_state
+
+end module normal_passes

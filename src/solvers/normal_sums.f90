@@ -1,0 +1,125 @@
+!> The sums that the passes of the normal solver take over the cells of a row.
+!>
+!> A pass fills one record per row, whichever thread works on the row. `total` adds the records in
+!> the order of the rows, so that a result does not depend on the number of threads.
+module normal_sums
+   use asperity_parallel, only : global_min, global_sum
+   use asperity_precision, only : dp
+   implicit none
+   private
+
+   public :: direction_sums_type, residual_sums_type, state_sums_type, step_sums_type, total, &
+      trial_sums_type
+
+   !> Of the residual r = level - gap on the contact set.
+   type :: residual_sums_type
+      real(dp) :: square = 0.0_dp           !! r^2, m^2
+      real(dp) :: coupling = 0.0_dp         !! r times its weighted western and southern neighbours, m^2
+   end type residual_sums_type
+
+   !> Of a direction d before its offset is taken off.
+   type :: direction_sums_type
+      real(dp) :: value = 0.0_dp            !! d
+      real(dp) :: cells = 0.0_dp            !! number of cells where d acts
+      real(dp) :: slope = 0.0_dp            !! r d
+      real(dp) :: residual = 0.0_dp         !! r where d acts
+      real(dp) :: square = 0.0_dp           !! d^2
+   end type direction_sums_type
+
+   !> Of a trial pressure above a limit.
+   type :: trial_sums_type
+      real(dp) :: above = 0.0_dp            !! what lies above the limit, Pa
+      real(dp) :: cells = 0.0_dp            !! number of cells above the limit
+      real(dp) :: least = 0.0_dp            !! least trial pressure, at most 0, Pa
+   end type trial_sums_type
+
+   !> Of a step s.
+   type :: step_sums_type
+      real(dp) :: slope = 0.0_dp            !! (level - gap) s
+      real(dp) :: square = 0.0_dp           !! s^2
+   end type step_sums_type
+
+   !> Of a state (pressure P and gap g).
+   type :: state_sums_type
+      real(dp) :: load = 0.0_dp             !! P, Pa
+      real(dp) :: work = 0.0_dp             !! P g, Pa m
+      real(dp) :: touched = 0.0_dp          !! g where P > 0, m
+      real(dp) :: cells = 0.0_dp            !! number of cells with P > 0
+      real(dp) :: distance = 0.0_dp         !! P |g - prescribed level|, Pa m
+      real(dp) :: least = huge(1.0_dp)      !! least g, m
+   end type state_sums_type
+
+   !> The sums of all rows, added in their order.
+   interface total
+      module procedure :: total_residual, total_direction, total_trial, total_step, total_state
+   end interface total
+
+contains
+
+   !> Sums of the residual over the grid.
+   pure function total_residual(rows) result(sums)
+      type(residual_sums_type), intent(in) :: rows(:)      !! [ny]
+      type(residual_sums_type) :: sums
+
+      sums%square = ordered(rows%square)
+      sums%coupling = ordered(rows%coupling)
+   end function total_residual
+
+   !> Sums of a direction over the grid.
+   pure function total_direction(rows) result(sums)
+      type(direction_sums_type), intent(in) :: rows(:)
+      type(direction_sums_type) :: sums
+
+      sums%value = ordered(rows%value)
+      sums%cells = ordered(rows%cells)
+      sums%slope = ordered(rows%slope)
+      sums%residual = ordered(rows%residual)
+      sums%square = ordered(rows%square)
+   end function total_direction
+
+   !> Sums of a trial pressure over the grid.
+   pure function total_trial(rows) result(sums)
+      type(trial_sums_type), intent(in) :: rows(:)
+      type(trial_sums_type) :: sums
+
+      sums%above = ordered(rows%above)
+      sums%cells = ordered(rows%cells)
+      sums%least = global_min(minval(rows%least))
+   end function total_trial
+
+   !> Sums of a step over the grid.
+   pure function total_step(rows) result(sums)
+      type(step_sums_type), intent(in) :: rows(:)
+      type(step_sums_type) :: sums
+
+      sums%slope = ordered(rows%slope)
+      sums%square = ordered(rows%square)
+   end function total_step
+
+   !> Sums of a state over the grid.
+   pure function total_state(rows) result(sums)
+      type(state_sums_type), intent(in) :: rows(:)
+      type(state_sums_type) :: sums
+
+      sums%load = ordered(rows%load)
+      sums%work = ordered(rows%work)
+      sums%touched = ordered(rows%touched)
+      sums%cells = ordered(rows%cells)
+      sums%distance = ordered(rows%distance)
+      sums%least = global_min(minval(rows%least))
+   end function total_state
+
+   !> The sum of the rows' values, in their order.
+   pure function ordered(values) result(sum)
+      real(dp), intent(in) :: values(:)
+      real(dp) :: sum
+      integer :: j
+
+      sum = 0.0_dp
+      do j = 1, size(values)
+         sum = sum + values(j)
+      end do
+      sum = global_sum(sum)
+   end function ordered
+
+end module normal_sums
