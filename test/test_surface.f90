@@ -1,17 +1,19 @@
 !> Tests of the surfaces.
 module test_surface
-   use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
+   use, intrinsic :: ieee_arithmetic, only : ieee_is_finite, ieee_quiet_nan, ieee_value
    use check, only : begin_suite, check_close, check_error, check_no_error, check_that
    use counter_random, only : mix, normal_number, row_key, uniform_number
    use asperity_errors, only : error_file, error_input, error_type
    use hdf5_file, only : hdf5_file_type
+   use input_reference, only : kind_real, variable_entries, variable_entry_type
    use omp_lib, only : omp_get_max_threads, omp_set_num_threads
    use asperity_precision, only : dp, int64, pi
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use roughness, only : height_psd, height_statistics, roughness_type
    use asperity_surface, only : check_terms, new_height, rim_height
    use surface_warnings, only : find_warnings, warning_length
-   use surface_settings, only : default_surface, surface_settings_type
+   use surface_settings, only : default_surface, real_variable, surface_settings_type
+   use surface_shapes, only : all_shapes, shape_type
    implicit none
    private
 
@@ -31,6 +33,7 @@ contains
       call test_threads()
       call test_noise_is_gaussian()
       call test_faults()
+      call every_shape_can_be_checked_and_listed()
       call test_file()
       call test_warnings()
       call test_map_warnings()
@@ -331,6 +334,41 @@ contains
       call check_close(statistics%kurtosis, 3.0_dp, 0.3_dp, 'kurtosis')
    end subroutine test_noise_is_gaussian
 
+   !> Each variable in the table of shapes is a variable of `&surface` in the reference, and one that
+   !> is real can be read by its name. The variables that a shape needs belong to it.
+   subroutine every_shape_can_be_checked_and_listed()
+      type(surface_settings_type) :: term
+      type(shape_type), allocatable :: shapes(:)
+      type(variable_entry_type), allocatable :: entries(:)
+      character(:), allocatable :: name, label
+      integer :: i, n, row
+      logical :: known
+
+      allocate (shapes, source=all_shapes())
+      allocate (entries, source=variable_entries())
+      term = default_surface(new_grid(16, 16, 1.0_dp, 1.0_dp, boundary_periodic))
+      do n = 1, size(shapes)
+         do i = 1, size(shapes(n)%variables)
+            name = trim(shapes(n)%variables(i))
+            if (name == '') exit
+            label = trim(shapes(n)%name)//': '//name
+            known = .false.
+            do row = 1, size(entries)
+               if (entries(row)%group /= 'surface' .or. entries(row)%name /= name) cycle
+               known = .true.
+               if (entries(row)%kind == kind_real) &
+                  call check_that(ieee_is_finite(real_variable(term, name)), label//' can be read')
+            end do
+            call check_that(known, label//' is in the reference of the input')
+         end do
+         do i = 1, size(shapes(n)%required)
+            if (shapes(n)%required(i) == '') exit
+            call check_that(any(shapes(n)%variables == shapes(n)%required(i)), &
+               trim(shapes(n)%name)//' needs only variables that belong to it')
+         end do
+      end do
+   end subroutine every_shape_can_be_checked_and_listed
+
    !> Wrong numbers are named, all at once.
    subroutine test_faults()
       type(grid_type) :: grid
@@ -528,9 +566,9 @@ contains
       call file%close(error)
       call find_warnings(grid, [term], warnings)
       call check_that(size(warnings) == 3, 'size, unit and edges are doubted')
-      call check_that(index(warnings(1), '&surface: file = ''told_map.h5'': the map says that it is '// &
-         '2.5000E-01 m by 6.0000E-01 m, the grid is 5.0000E-01 m by') == 1, 'another length')
-      call check_that(index(warnings(2), 'its unit is um') > 0, 'another unit')
+      call check_that(index(warnings(1), '&surface: file = ''told_map.h5'': according to the file '// &
+         'the map is 2.5000E-01 m by 6.0000E-01 m, but the grid is 5.0000E-01 m by') == 1, 'another length')
+      call check_that(index(warnings(2), 'the unit of the map is um') > 0, 'another unit')
       call check_that(index(warnings(3), 'not periodic') > 0, 'edges that do not fit')
       term%scale = 1.0e-6_dp
       grid = new_grid(5, 3, 0.25_dp, 0.6_dp, boundary_free)

@@ -6,6 +6,8 @@ module case_report
    use memory_limits, only : memory_limit, memory_text
    use asperity_precision, only : dp
    use regular_grid, only : boundary_free
+   use surface_settings, only : real_variable, surface_settings_type
+   use surface_shapes, only : find_shape, shape_type
    use text_tools, only : exact_text, to_text
    implicit none
    private
@@ -130,33 +132,44 @@ contains
       type(case_type), intent(in) :: case
       integer, intent(in) :: i
       character(:), allocatable :: text
+      type(shape_type) :: shape
+      integer :: n
 
-      associate (term => case%surfaces(i))
-         text = '&surface'//nl//string('shape', term%shape)
-         select case (term%shape)
-         case ('sphere', 'paraboloid', 'cylinder')
-            text = text//number('radius', term%radius, 'm')
-         case ('sine', 'hexagonal_wave')
-            text = text//number('amplitude', term%amplitude, 'm')//number('wavelength', term%wavelength, 'm')
-         case ('self_affine')
-            text = text//number('hurst', term%hurst, '')// &
-               number('wavelength_long', term%wavelength_long, 'm')// &
-               number('wavelength_rolloff', term%wavelength_rolloff, 'm')// &
-               number('wavelength_short', term%wavelength_short, 'm')
-            if (term%rms_height > 0.0_dp) text = text//number('rms_height', term%rms_height, 'm')
-            if (term%rms_slope > 0.0_dp) text = text//number('rms_slope', term%rms_slope, '')
-            text = text//whole('seed', term%seed)//string('generator', term%generator)
-         case ('file')
-            text = text//string('file', term%file)//string('dataset', term%dataset)// &
-               number('scale', term%scale, '')
-         case default                                  ! flat
-            continue
-         end select
-         if (term%shape /= 'self_affine' .and. term%shape /= 'file') &
-            text = text//number('centre_x', term%centre_x, 'm')//number('centre_y', term%centre_y, 'm')
-         text = text//'/'//nl
-      end associate
+      shape = find_shape(case%surfaces(i)%shape)
+      text = '&surface'//nl//string('shape', case%surfaces(i)%shape)
+      do n = 1, size(shape%variables)
+         text = text//surface_variable(case%surfaces(i), trim(shape%variables(n)))
+      end do
+      text = text//'/'//nl
    end function surface_text
+
+   !> One variable of a `&surface`; nothing for a blank name.
+   function surface_variable(term, name) result(text)
+      type(surface_settings_type), intent(in) :: term
+      character(*), intent(in) :: name
+      character(:), allocatable :: text
+
+      select case (name)
+      case ('')
+         text = ''
+      case ('seed')
+         text = whole(name, term%seed)
+      case ('generator')
+         text = string(name, term%generator)
+      case ('file')
+         text = string(name, term%file)
+      case ('dataset')
+         text = string(name, term%dataset)
+      case ('hurst', 'scale')
+         text = number(name, real_variable(term, name), '')
+      case ('rms_height', 'rms_slope')            ! one of the two is given
+         text = ''
+         if (real_variable(term, name) > 0.0_dp) &
+            text = number(name, real_variable(term, name), merge('m', ' ', name == 'rms_height'))
+      case default
+         text = number(name, real_variable(term, name), 'm')
+      end select
+   end function surface_variable
 
    !> `&adhesion` and `&friction`
    function laws_text(case) result(text)

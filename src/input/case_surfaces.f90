@@ -5,6 +5,7 @@ module case_surfaces
    use input_group, only : group_values_type
    use asperity_precision, only : dp
    use regular_grid, only : grid_type
+   use surface_shapes, only : find_shape, shape_type
    use text_tools, only : to_text
    implicit none
    private
@@ -40,9 +41,7 @@ contains
       logical, intent(in) :: grid_known
       type(surface_settings_type), intent(out) :: term
       type(faults_type), intent(inout) :: faults
-      character(:), allocatable :: belongs, name
       real(dp) :: side
-      integer :: i
 
       term%shape = group%text_value('shape')
       side = merge(grid%lx, min(grid%lx, grid%ly), grid%ny == 1)
@@ -66,36 +65,31 @@ contains
       term%place = path//': &surface'
       term%line = group%line
 
+      call check_belonging(group, find_shape(term%shape), faults)
+      if (term%shape == 'self_affine') call check_rough(group, term, grid_known, faults)
+      if (term%shape == 'file') call resolve_path(group, path, term%file, faults)
+   end subroutine resolve_surface
+
+   !> A shape needs some variables; those that do not belong to it are faults.
+   subroutine check_belonging(group, shape, faults)
+      type(group_values_type), intent(in) :: group
+      type(shape_type), intent(in) :: shape
+      type(faults_type), intent(inout) :: faults
+      character(:), allocatable :: name
+      integer :: i
+
       call group%demand('shape', faults)
-      belongs = ' shape '
-      select case (term%shape)
-      case ('sphere', 'paraboloid', 'cylinder')
-         belongs = belongs//'radius centre_x centre_y '
-         call group%demand('radius', faults, trim(term%shape))
-      case ('sine', 'hexagonal_wave')
-         belongs = belongs//'amplitude wavelength centre_x centre_y '
-         call group%demand('amplitude', faults, trim(term%shape))
-         call group%demand('wavelength', faults, trim(term%shape))
-      case ('self_affine')
-         belongs = belongs//'hurst wavelength_long wavelength_rolloff wavelength_short rms_height '// &
-            'rms_slope seed generator '
-         call group%demand('hurst', faults, 'self_affine')
-         call check_rough(group, term, grid_known, faults)
-      case ('file')
-         belongs = belongs//'file dataset scale '
-         call group%demand('file', faults, 'shape = ''file''')
-         call resolve_path(group, path, term%file, faults)
-      case ('flat')
-         belongs = belongs//'centre_x centre_y '
-      case default
-         return
-      end select
+      if (shape%name == '') return                   ! the word itself is reported elsewhere
+      do i = 1, size(shape%required)
+         if (shape%required(i) /= '') &
+            call group%demand(trim(shape%required(i)), faults, trim(shape%name))
+      end do
       do i = 1, size(group%values)
          name = trim(group%values(i)%entry%name)
-         if (.not. group%given(name) .or. index(belongs, ' '//name//' ') > 0) cycle
-         call group%fault(name, 'does not belong to shape = '''//trim(term%shape)//'''', faults)
+         if (name == 'shape' .or. .not. group%given(name) .or. any(shape%variables == name)) cycle
+         call group%fault(name, 'does not belong to shape = '''//trim(shape%name)//'''', faults)
       end do
-   end subroutine resolve_surface
+   end subroutine check_belonging
 
    !> The parameters of a rough surface among each other.
    subroutine check_rough(group, term, grid_known, faults)

@@ -3,6 +3,7 @@
 !> documentation prints it.
 module input_reference
    use asperity_precision, only : dp
+   use surface_shapes, only : all_shapes, shape_type, shape_words
    use text_tools, only : to_text
    implicit none
    private
@@ -101,11 +102,8 @@ contains
       type(variable_entry_type), allocatable :: rows(:)
 
       rows = [ &
-         row('surface', 'shape', kind_word, '(required)', '', &
-            '''flat'' | ''sphere'' | ''paraboloid'' | ''cylinder'' | ''sine'' | ''hexagonal_wave'' | '// &
-            '''self_affine'' | ''file''', &
-            'Shape of the road: nothing, exact cap, -r^2/(2R), exact arc with its axis along y, one wave along x, '// &
-            'three crossed waves, rough, or a height map.'), &
+         row('surface', 'shape', kind_word, '(required)', '', shape_words(' | '), &
+            'Shape of the road: '//shape_meanings()//'.'), &
          row('surface', 'radius', kind_real, '(required)', 'm', 'positive', &
             'Radius of sphere, paraboloid or cylinder.'), &
          row('surface', 'amplitude', kind_real, '(required)', 'm', 'any', 'Amplitude of a wave.'), &
@@ -134,6 +132,20 @@ contains
             'Where the summit lies; the default falls on a cell.'), &
          row('surface', 'centre_y', kind_real, '((ny/2) ly/ny)', 'm', 'any', 'The same along y.')]
    end function surface
+
+   !> What each word of `shape` means.
+   pure function shape_meanings() result(text)
+      character(:), allocatable :: text
+      type(shape_type), allocatable :: shapes(:)
+      integer :: n
+
+      allocate (shapes, source=all_shapes())
+      text = ''
+      do n = 1, size(shapes)
+         if (n > 1) text = text//'; '
+         text = text//''''//trim(shapes(n)%name)//''' is '//trim(shapes(n)%meaning)
+      end do
+   end function shape_meanings
 
    pure function material() result(rows)
       type(variable_entry_type), allocatable :: rows(:)

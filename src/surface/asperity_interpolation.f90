@@ -1,25 +1,28 @@
-!> The height map at displaced places: H(X) = H_0(X + s(X) - D), always from the original map H_0.
+!> The height map of the road after the road and the rubber have moved: H(X) = H_0(X + s(X) - D).
 !>
-!> D is the road's displacement, s the rubber's tangential displacement. The slopes are those of the
-!> road at the displaced place, grad H_0 at X + s - D (thesis, 3.5), not the gradient of H(X).
+!> D is the displacement of the road and s the tangential displacement of the rubber. The height is
+!> always computed from the original map H_0, so that errors do not add up from step to step. The
+!> slopes are those of the road at the displaced place, grad H_0 at X + s - D (thesis, 3.5), and not
+!> the gradient of H(X).
 !>
-!> 'cubic', the default of the program, is the cubic B-spline surface through the map with its own
-!> slopes (module `cubic_spline`): fourth order in the height and in the slopes at the cells, third
-!> order in the slopes between them. Because the slopes are the exact gradient of the heights that
-!> are used, sum(P grad H) is the exact derivative of the elastic energy with respect to D: a rubber
-!> without loss does no net work on a road that returns. At the cells, the slope of a wave with
-!> theta = k dx is too low by the factor 3 sin(theta)/(theta (2 + cos(theta))), 0.2 % at 8 cells a wave.
-!> Next to a jump of the map the spline overshoots between the cells by 11 % of the jump.
+!> 'cubic', the default of the program, reads the height and the slopes from the cubic B-spline
+!> surface through the map (module `cubic_spline`). Because the slopes are the exact gradient of the
+!> heights that are used, sum(P grad H) is the exact derivative of the elastic energy with respect
+!> to D: a rubber without loss does no net work on a road that returns to its place. At the cells
+!> the slope of a wave with theta = k dx is multiplied by 3 sin(theta)/(theta (2 + cos(theta))),
+!> which is 0.2 % too low if the wave has 8 cells. Next to a jump of the map the spline overshoots
+!> between the cells by 11 % of the jump.
 !>
-!> 'linear' is bilinear in the height; its slopes are bilinear between the central differences at the
-!> cells. Both are continuous and of second order and never overshoot, but the slope of a wave is too
-!> low by the factor sin(theta)/theta, 10 % at 8 cells a wave, and it is not the gradient of the
-!> heights.
+!> 'linear' interpolates the heights bilinearly, and the slopes bilinearly between the central
+!> differences at the cells. Both are continuous and of second order and never overshoot. The slope
+!> of a wave is multiplied by sin(theta)/theta, which is 10 % too low if the wave has 8 cells, and
+!> it is not the gradient of the interpolated heights.
 !>
-!> A map moved by whole cells keeps its heights bit for bit; a shift within 1e-9 of a cell of whole
-!> cells counts as whole. Periodic maps wrap. Outside a free map (whose rim are its outermost cells)
-!> the height is the lowest of the map and the slope 0; over the one cell beyond the rim the height
-!> and the slope fall from their values at the rim to these.
+!> A map that is moved by whole cells keeps its heights bit for bit; a shift that differs from whole
+!> cells by less than 1e-9 of a cell counts as whole. Periodic maps repeat. Outside a free map,
+!> whose rim consists of its outermost cells, the height is the lowest of the map and the slope is
+!> 0. Over a width of one cell beyond the rim, the height and the slope fall linearly from the
+!> values at the rim to these.
 !>
 !> Memory: the map, and for 'cubic' one field of coefficients. Every process holds the whole map.
 module asperity_interpolation
@@ -35,7 +38,7 @@ module asperity_interpolation
 
    real(dp), parameter :: whole_within = 1.0e-9_dp    !! cells
 
-   !> A height map that can be read between its cells.
+   !> A height map that can be evaluated between its cells.
    type :: interpolation_type
       type(grid_type) :: grid
       real(dp), allocatable :: height(:, :)           !! the original map H_0, m, shape [nx, ny]
@@ -45,12 +48,12 @@ module asperity_interpolation
       real(dp), allocatable, private :: coefficients(:, :)
    end type interpolation_type
 
-   !> The map under a uniform displacement D of the road: H, or H and both slopes.
+   !> The map after a uniform displacement D of the road: H, or H and both slopes.
    interface shifted
       module procedure :: shifted_height, shifted_map
    end interface shifted
 
-   !> The map under a displacement D of the road and displacements s of the rubber: H, or H and both
+   !> The map after a displacement D of the road and displacements s of the rubber: H, or H and both
    !> slopes.
    interface displaced
       module procedure :: displaced_height, displaced_map
@@ -58,7 +61,7 @@ module asperity_interpolation
 
 contains
 
-   !> Take a map.
+   !> Copy a map and prepare what its interpolation needs.
    subroutine new_interpolation(self, grid, height, method, error)
       type(interpolation_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
@@ -140,7 +143,7 @@ contains
       call split(self%periodic, self%grid%ny, shift_y/self%grid%dy, whole_y, part_y)
       if (self%periodic .and. .not. self%cubic &
          .and. .not. (abs(part_x) > 0.0_dp .or. abs(part_y) > 0.0_dp)) then
-         ! Moving by whole cells and taking differences may change places.
+         ! For whole cells, the differences of the moved map are the moved differences of the map.
          call shifted_height(self, shift_x, shift_y, height)
          call central_slopes(self%grid, height, slope_x, slope_y)
          return
@@ -153,7 +156,7 @@ contains
                height(i, j), slope_x(i, j), slope_y(i, j))
          end do
       end do
-      ! whole cells: the heights themselves, bit for bit
+      ! For whole cells take the heights themselves, because the spline gives them with round-off.
       if (.not. (abs(part_x) > 0.0_dp .or. abs(part_y) > 0.0_dp)) &
          call shifted_height(self, shift_x, shift_y, height)
    end subroutine shifted_map
@@ -229,20 +232,21 @@ contains
       end if
    end subroutine split
 
-   !> Find the place `start + q` along a direction of `n` cells: cell, fraction, and the weight of
-   !> the map against its lowest value (1 but outside a free map).
+   !> Find the place `start + q` along a direction of `n` cells: its cell, its fraction of a cell,
+   !> and the weight of the map, which is below 1 outside a free map; the lowest height has the
+   !> rest.
    elemental subroutine locate(periodic, n, start, q, cell, u, weight)
       logical, intent(in) :: periodic
       integer, intent(in) :: n
-      integer, intent(in) :: start              !! any integer, cells from 0
+      integer, intent(in) :: start              !! cell from 0; may lie outside the map
       real(dp), intent(in) :: q                 !! cells
-      integer, intent(out) :: cell              !! 0 to n - 1; to n - 2 on a bounded map
+      integer, intent(out) :: cell              !! 0 to n - 1, or to n - 2 on a bounded map
       real(dp), intent(out) :: u                !! 0 to 1
       real(dp), intent(out) :: weight           !! 0 to 1
       integer :: below
 
       weight = 1.0_dp
-      if (n == 1) then                          ! nothing changes along this direction
+      if (n == 1) then                          ! the map is constant along this direction
          cell = 0
          u = 0.0_dp
          return
@@ -263,7 +267,7 @@ contains
       end if
    end subroutine locate
 
-   !> Height of a cell, from 1; outside a free map its lowest value.
+   !> Height of cell (i, j), from 1; the lowest height of the map outside a free map.
    pure function cell_height(self, i, j) result(h)
       type(interpolation_type), intent(in) :: self
       integer, intent(in) :: i, j
@@ -274,7 +278,7 @@ contains
       h = self%height(i, j)
    end function cell_height
 
-   !> Height at cells (i + p, j + q).
+   !> Height at the place (i + p, j + q), in cells from 0.
    pure function height_at(self, i, j, p, q) result(h)
       type(interpolation_type), intent(in) :: self
       integer, intent(in) :: i, j
@@ -297,7 +301,7 @@ contains
       if (.not. self%periodic) h = blend(h, self%lowest, weight_x*weight_y)
    end function height_at
 
-   !> Height and slopes at cells (i + p, j + q).
+   !> Height and slopes at the place (i + p, j + q), in cells from 0.
    pure subroutine map_at(self, i, j, p, q, h, h_x, h_y)
       type(interpolation_type), intent(in) :: self
       integer, intent(in) :: i, j
@@ -323,7 +327,8 @@ contains
       end if
    end subroutine map_at
 
-   !> Bilinear height and slopes per cell in the square of cells that begins with (i, j), from 1.
+   !> Bilinear height, and its slopes per cell, in the square between the centres of the cells (i,
+   !> j) and (i + 1, j + 1), from 1.
    pure subroutine linear_map(self, i, j, u, v, h, h_u, h_v)
       type(interpolation_type), intent(in) :: self
       integer, intent(in) :: i, j
@@ -351,7 +356,8 @@ contains
       end associate
    end subroutine linear_map
 
-   !> The cell, from 1, behind cell `cell`, from 0, of `n`.
+   !> The number from 1 of the cell that follows the cell with the number `cell` from 0; the first
+   !> cell follows the last.
    elemental function next(cell, n) result(i)
       integer, intent(in) :: cell, n
       integer :: i
@@ -360,7 +366,7 @@ contains
       if (i > n) i = 1
    end function next
 
-   !> h with this weight, the lowest value with the rest.
+   !> Mean of h with this weight and the lowest height with the rest.
    elemental function blend(h, lowest, weight) result(mixed)
       real(dp), intent(in) :: h, lowest, weight
       real(dp) :: mixed

@@ -1,29 +1,23 @@
 !> The height map H(x, y) of the road: a sum of analytic shapes, random surfaces and files.
 !>
-!> z points up into the rubber, so that summits are the largest values; lengths in m. The sphere,
-!> the paraboloid and the cylinder have their summit at height 0. In periodic mode they and their
-!> distances repeat with the cell, so that a shape off the middle is the same shape moved.
-!> The hexagonal wave (thesis, eq. 4.6) repeats after a wavelength along x and wavelength/sqrt(3)
-!> along y.
+!> z points up into the rubber, so that summits are the largest values; lengths are in m. The table
+!> in `surface_shapes` names the shapes and holds the formulas of the analytic ones.
 !>
-!> Memory: the height, and one field more while a file is read or a random surface made.
+!> Memory: the height, and one field more while a file is read or a random surface is made.
 module asperity_surface
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use asperity_checksum, only : checksum_of_field
    use asperity_errors, only : add_fault, error_input, error_type, fail
    use hdf5_file, only : read_field
-   use asperity_precision, only : dp, int64, pi
-   use regular_grid, only : boundary_periodic, grid_type
+   use asperity_precision, only : dp, int64
+   use regular_grid, only : grid_type
    use surface_self_affine, only : add_self_affine
-   use surface_settings, only : surface_settings_type
+   use surface_settings, only : real_variable, surface_settings_type
+   use surface_shapes, only : find_shape, height_formula, place_at, shape_type, shape_words
    implicit none
    private
 
    public :: check_files, check_terms, new_height, rim_height
-
-   !> Shapes that are a function of the position alone.
-   character(*), parameter :: analytic_shapes(*) = [character(16) :: 'flat', 'sphere', &
-      'paraboloid', 'cylinder', 'sine', 'hexagonal_wave']
 
 contains
 
@@ -33,7 +27,8 @@ contains
       type(surface_settings_type), intent(in) :: terms(:)          !! none: flat
       real(dp), allocatable, intent(out) :: height(:, :)           !! m, shape [nx, ny]
       type(error_type), allocatable, intent(out) :: error
-      !> Checksums of the maps that are read from files, by the number of the term; 0 for other terms
+      !> Checksums of the maps that are read from files, by the number of the term; 0 for other
+      !> terms
       integer(int64), allocatable, intent(out), optional :: map_checksums(:)
       integer(int64) :: map_checksum
       integer :: i, j, n
@@ -50,8 +45,6 @@ contains
       end do
       do n = 1, size(terms)
          select case (terms(n)%shape)
-         case ('flat')
-            cycle
          case ('self_affine')
             call add_self_affine(grid, terms(n), height, error)
          case ('file')
@@ -64,7 +57,7 @@ contains
       end do
    end subroutine new_height
 
-   !> Highest value on the outermost cells: what a free surface lets leave or enter when it slides.
+   !> Highest value on the outermost cells, which leave or enter a free map when the road slides.
    pure function rim_height(height) result(rim)
       real(dp), intent(in) :: height(:, :)      !! m, shape [nx, ny]
       real(dp) :: rim
@@ -80,37 +73,40 @@ contains
    subroutine check_terms(terms, error)
       type(surface_settings_type), intent(in) :: terms(:)
       type(error_type), allocatable, intent(out) :: error
-      integer :: n
+      type(shape_type) :: shape
+      integer :: i, n
 
       do n = 1, size(terms)
-         associate (term => terms(n))
-            select case (term%shape)
-            case ('flat')
-               continue
-            case ('sphere', 'paraboloid', 'cylinder')
-               call must_be_positive('radius', term%radius, error)
-               call must_be_finite('centre_x', term%centre_x, error)
-               call must_be_finite('centre_y', term%centre_y, error)
-            case ('sine', 'hexagonal_wave')
-               call must_be_positive('wavelength', term%wavelength, error)
-               call must_be_finite('amplitude', term%amplitude, error)
-               call must_be_finite('centre_x', term%centre_x, error)
-               call must_be_finite('centre_y', term%centre_y, error)
-            case ('self_affine')
-               call check_self_affine(term, error)
-            case ('file')
-               call must_be_finite('scale', term%scale, error)
-               if (term%file == '') call add_fault(error, error_input, &
-                  '&surface: file is missing: shape = ''file'' needs the name of an HDF5 file')
-            case default
-               call add_fault(error, error_input, '&surface: shape = '''//trim(term%shape) &
-                  //''': must be one of '//known_shapes())
-            end select
-         end associate
+         shape = find_shape(terms(n)%shape)
+         if (shape%name == '') call add_fault(error, error_input, '&surface: shape = ''' &
+            //trim(terms(n)%shape)//''': must be one of '//shape_words(', '))
+         do i = 1, size(shape%variables)
+            call check_variable(terms(n), trim(shape%variables(i)), error)
+         end do
+         if (shape%name == 'self_affine') call check_self_affine(terms(n), error)
       end do
    end subroutine check_terms
 
-   !> Faults of a self-affine term.
+   !> Faults of one variable of a term, as far as they do not depend on other variables.
+   subroutine check_variable(term, name, error)
+      type(surface_settings_type), intent(in) :: term
+      character(*), intent(in) :: name
+      type(error_type), allocatable, intent(inout) :: error
+
+      select case (name)
+      case ('radius', 'wavelength')
+         call must_be_positive(name, real_variable(term, name), error)
+      case ('amplitude', 'centre_x', 'centre_y', 'scale')
+         call must_be_finite(name, real_variable(term, name), error)
+      case ('file')
+         if (term%file == '') call add_fault(error, error_input, &
+            '&surface: file is missing: shape = ''file'' needs the name of an HDF5 file')
+      case default                                ! those of a rough surface depend on each other
+         continue
+      end select
+   end subroutine check_variable
+
+   !> Faults of a self-affine term, whose variables depend on each other.
    subroutine check_self_affine(term, error)
       type(surface_settings_type), intent(in) :: term
       type(error_type), allocatable, intent(inout) :: error
@@ -171,18 +167,6 @@ contains
       word = trim(adjustl(text))
    end function number
 
-   !> The shapes, quoted.
-   pure function known_shapes() result(list)
-      character(:), allocatable :: list
-      integer :: n
-
-      list = ''
-      do n = 1, size(analytic_shapes)
-         list = list//''''//trim(analytic_shapes(n))//''', '
-      end do
-      list = list//'''self_affine'', ''file'''
-   end function known_shapes
-
    !> Add a height map from a file, times its scale.
    subroutine add_file(grid, term, height, map_checksum, error)
       type(grid_type), intent(in) :: grid
@@ -205,7 +189,7 @@ contains
       end do
    end subroutine add_file
 
-   !> Read the maps of all terms that are files, only to see that they can be used; all faults are
+   !> Check that the maps of all terms that are files can be used, by reading them; all faults are
    !> reported at once.
    subroutine check_files(grid, terms, error)
       type(grid_type), intent(in) :: grid
@@ -222,7 +206,7 @@ contains
       end do
    end subroutine check_files
 
-   !> Read the map of a term and see that it has the grid's shape and holds numbers.
+   !> Read the map of a term, and check that it has the shape of the grid and only finite values.
    subroutine read_map(grid, term, map, error)
       type(grid_type), intent(in) :: grid
       type(surface_settings_type), intent(in) :: term         !! checked
@@ -257,7 +241,7 @@ contains
       end if
    end subroutine read_map
 
-   !> What is wrong with a map, after the place in the input that names its file.
+   !> The message about a map: first the place in the input that names its file, then what is wrong.
    pure function map_fault(term, message) result(fault)
       type(surface_settings_type), intent(in) :: term
       character(*), intent(in) :: message                     !! may start with the file's name
@@ -274,82 +258,24 @@ contains
       end if
    end function map_fault
 
-   !> Add an analytic shape.
+   !> Add an analytic shape; a plane has no formula and adds nothing.
    subroutine add_analytic(grid, term, height)
       type(grid_type), intent(in) :: grid
       type(surface_settings_type), intent(in) :: term         !! checked
       real(dp), intent(inout) :: height(:, :)
+      procedure(height_formula), pointer :: formula
+      type(shape_type) :: shape
       integer :: i, j
 
-      !$omp parallel do default(none) shared(grid, term, height) private(i)
+      shape = find_shape(term%shape)
+      if (.not. associated(shape%formula)) return
+      formula => shape%formula
+      !$omp parallel do default(none) shared(grid, term, height, formula) private(i)
       do j = 1, grid%ny
          do i = 1, grid%nx
-            height(i, j) = height(i, j) + analytic_height(grid, term, i, j)
+            height(i, j) = height(i, j) + formula(place_at(grid, term, i, j), term)
          end do
       end do
    end subroutine add_analytic
-
-   !> Height of an analytic shape at the centre of cell (i, j), from 1.
-   pure function analytic_height(grid, term, i, j) result(h)
-      type(grid_type), intent(in) :: grid
-      type(surface_settings_type), intent(in) :: term
-      integer, intent(in) :: i, j
-      real(dp) :: h
-      real(dp) :: k, x, y
-
-      x = (i - 1)*grid%dx - term%centre_x
-      y = (j - 1)*grid%dy - term%centre_y
-      select case (term%shape)
-      case ('sphere')
-         h = circular_cap(nearest_image(grid, x, grid%lx)**2 + distance_y(grid, y)**2, term%radius)
-      case ('cylinder')
-         h = circular_cap(nearest_image(grid, x, grid%lx)**2, term%radius)
-      case ('paraboloid')
-         h = -(nearest_image(grid, x, grid%lx)**2 + distance_y(grid, y)**2)/(2.0_dp*term%radius)
-      case ('sine')
-         h = term%amplitude*cos(2.0_dp*pi*x/term%wavelength)
-      case ('hexagonal_wave')                                 ! (thesis, eq. 4.6)
-         if (grid%ny == 1) y = 0.0_dp
-         k = 2.0_dp*pi/term%wavelength
-         h = term%amplitude*sin(k*(0.5_dp*x + sqrt(0.75_dp)*y)) &
-            *sin(k*(-0.5_dp*x + sqrt(0.75_dp)*y))*sin(k*x)
-      case default
-         h = 0.0_dp
-      end select
-   end function analytic_height
-
-   !> Distance to the nearest image in periodic mode; as it is in free mode.
-   elemental function nearest_image(grid, x, length) result(d)
-      type(grid_type), intent(in) :: grid
-      real(dp), intent(in) :: x
-      real(dp), intent(in) :: length
-      real(dp) :: d
-
-      d = x
-      if (grid%boundary == boundary_periodic) d = x - length*anint(x/length)
-   end function nearest_image
-
-   !> The distance along y, which a line contact (ny = 1) does not know.
-   elemental function distance_y(grid, y) result(d)
-      type(grid_type), intent(in) :: grid
-      real(dp), intent(in) :: y
-      real(dp) :: d
-
-      d = 0.0_dp
-      if (grid%ny > 1) d = nearest_image(grid, y, grid%ly)
-   end function distance_y
-
-   !> sqrt(R^2 - r^2) - R without cancellation; -R beyond the radius.
-   elemental function circular_cap(r_squared, radius) result(h)
-      real(dp), intent(in) :: r_squared      !! m2
-      real(dp), intent(in) :: radius         !! m
-      real(dp) :: h
-
-      if (r_squared < radius**2) then
-         h = -r_squared/(radius + sqrt(radius**2 - r_squared))
-      else
-         h = -radius
-      end if
-   end function circular_cap
 
 end module asperity_surface

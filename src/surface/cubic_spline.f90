@@ -1,13 +1,15 @@
-!> The cubic B-spline surface through a height map: twice continuously differentiable, exact at the
-!> cells, fourth order in the height and third in the slope (fourth at the cells).
+!> The cubic B-spline surface through a height map. It is twice continuously differentiable and
+!> passes through the heights of the cells. Its height is of fourth order; its slopes are of third
+!> order between the cells and of fourth order at the cells.
 !>
-!> H(x, y) = sum of c_ij B(x - i) B(y - j). The coefficients c follow from the map once, by lines
-!> along x and along y: on a period by the recursive filter with the pole z = sqrt(3) - 2 (Unser,
-!> Aldroubi and Eden, IEEE Trans. Signal Process. 41, 1993), on a bounded map from the tridiagonal
-!> system with the second derivative at its ends from one-sided differences, which keeps cubics
-!> exact up to the rim.
+!> H(x, y) = sum of c_ij B(x - i) B(y - j), where B is the cubic B-spline. The coefficients c are
+!> computed once from the map, line by line, first along x and then along y. A line of a periodic
+!> map goes through the recursive filter with the pole z = sqrt(3) - 2 (Unser, Aldroubi and Eden,
+!> IEEE Trans. Signal Process. 41, 1993). A line of a bounded map is the solution of a tridiagonal
+!> system; the second derivatives at its two ends are one-sided differences, so that the spline
+!> reproduces cubic polynomials up to the rim.
 !>
-!> Cells count from 0 here; coefficients reach from -1 to n + 1.
+!> Cells are numbered from 0 in this module, and coefficients from -1 to n + 1.
 module cubic_spline
    use asperity_precision, only : dp
    implicit none
@@ -15,15 +17,15 @@ module cubic_spline
 
    public :: spline_coefficients, spline_height, spline_map
 
-   integer, parameter :: block = 16             !! lines that are filtered side by side
-   integer, parameter :: terms = 60             !! |z|^60 < 1e-34
+   integer, parameter :: block = 16             !! lines that are filtered at the same time
+   integer, parameter :: terms = 60             !! of a geometric series in z; |z|^60 < 1e-34
 
 contains
 
    !> Coefficients of the spline through a map.
    subroutine spline_coefficients(height, periodic, c)
       real(dp), intent(in) :: height(0:, 0:)               !! m, shape [nx, ny]
-      logical, intent(in) :: periodic                      !! else the map ends at its rim
+      logical, intent(in) :: periodic                      !! otherwise the map ends at its rim
       real(dp), allocatable, intent(out) :: c(:, :)        !! m, bounds [-1:nx+1, -1:ny+1]
       real(dp), allocatable :: lines(:, :)
       integer :: first, i, j, last, nx, ny
@@ -51,6 +53,7 @@ contains
          end do
       end do
       deallocate (lines)
+
       allocate (lines(block, -1:ny + 1))
       lines = 0.0_dp
       !$omp do
@@ -72,7 +75,7 @@ contains
       !$omp end parallel
    end subroutine spline_coefficients
 
-   !> Turn samples on 0..n-1 into coefficients on -1..n+1.
+   !> Replace heights at 0..n-1 by coefficients at -1..n+1.
    pure subroutine filter_lines(periodic, n, lines)
       logical, intent(in) :: periodic
       integer, intent(in) :: n
@@ -85,7 +88,9 @@ contains
       end if
    end subroutine filter_lines
 
-   !> The recursive filter, forth and back, with the sums over the whole past in closed form.
+   !> The recursive filter for periodic lines. It runs forwards and then backwards. The value that
+   !> each direction starts from is a geometric series over all periods, which is summed in closed
+   !> form.
    pure subroutine filter_periodic(n, lines)
       integer, intent(in) :: n
       real(dp), intent(inout) :: lines(:, -1:)
@@ -114,7 +119,8 @@ contains
       lines(:, n + 1) = lines(:, modulo(1, n))
    end subroutine filter_periodic
 
-   !> The tridiagonal system (c(k-1) + 4 c(k) + c(k+1))/6 = f(k), by elimination.
+   !> Solve the tridiagonal system (c(k-1) + 4 c(k) + c(k+1))/6 = f(k) of bounded lines by
+   !> elimination.
    pure subroutine filter_bounded(n, lines)
       integer, intent(in) :: n
       real(dp), intent(inout) :: lines(:, -1:)
@@ -169,13 +175,13 @@ contains
       end do
    end function spline_height
 
-   !> Height and slopes, per cell, at (i + u, j + v).
+   !> Height at (i + u, j + v), and its slopes per cell (not per metre).
    pure subroutine spline_map(c, i, j, u, v, h, h_u, h_v)
       real(dp), intent(in) :: c(-1:, -1:)       !! coefficients
       integer, intent(in) :: i, j               !! cell, from 0
       real(dp), intent(in) :: u, v              !! 0 to 1
       real(dp), intent(out) :: h                !! m
-      real(dp), intent(out) :: h_u, h_v         !! m a cell
+      real(dp), intent(out) :: h_u, h_v         !! m per cell
       real(dp) :: a(4), a_u(4), b(4), b_v(4), row, row_u
       integer :: m
 
@@ -197,7 +203,7 @@ contains
       end do
    end subroutine spline_map
 
-   !> The cubic B-splines of the four cells about a point.
+   !> Values of the cubic B-splines of the four nearest cells, at the fraction u of a cell.
    pure function weights(u) result(w)
       real(dp), intent(in) :: u
       real(dp) :: w(4)
@@ -209,7 +215,7 @@ contains
       w(4) = sixth*u**3
    end function weights
 
-   !> Their derivatives.
+   !> Derivatives of `weights` with respect to u.
    pure function weight_slopes(u) result(w)
       real(dp), intent(in) :: u
       real(dp) :: w(4)

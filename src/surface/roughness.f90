@@ -1,16 +1,17 @@
 !> Statistics and spectra of height maps.
 !>
-!> Power spectral density (thesis, eq. 1.5): Phi(k) = |h_hat(k)|^2/A with h_hat = integral of
-!> h exp(-i k x), here dx dy times the discrete sum, and A = lx ly. With the mode spacings
-!> 2 pi/lx and 2 pi/ly, exactly for every map,
+!> The power spectral density (thesis, eq. 1.5) is Phi(k) = |h_hat(k)|^2/A, where A = lx ly and
+!> h_hat is the integral of h exp(-i k x), here dx dy times the discrete sum. With the mode spacings
+!> dk_x = 2 pi/lx and dk_y = 2 pi/ly, the following holds exactly for every map:
 !>
-!>     sum of Phi dk_x dk_y/(2 pi)^2 = mean(h^2),   with weight |k|^2: the mean of |grad h|^2.
+!>     sum of Phi dk_x dk_y/(2 pi)^2 = mean(h^2)
+!>     sum of |k|^2 Phi dk_x dk_y/(2 pi)^2 = mean(|grad h|^2)
 !>
 !> For a profile (ny = 1) Phi(k) = |h_hat(k)|^2/lx, in m3, and sum of Phi dk_x/(2 pi) = mean(h^2).
-!> Spectral measures take the map as periodic; on a map that is not, they hold the step at its
-!> edges.
+!> Spectral quantities treat the map as periodic. If it is not, they contain the step at its edges.
 !>
-!> Sums are gathered by rows, so that the number of threads changes no bit.
+!> Each row is summed by one thread, and the sums of the rows are added in order, so that the
+!> results do not depend on the number of threads.
 module roughness
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use asperity_errors, only : error_input, error_type, fail
@@ -25,16 +26,16 @@ module roughness
 
    public :: height_psd, height_statistics, radial_psd, roughness_type
 
-   !> Statistics of a height map; moments of the height are about its mean.
+   !> Statistics of a height map. Moments of the height are those about its mean.
    type :: roughness_type
       real(dp) :: mean                    !! m
       real(dp) :: lowest                  !! m
       real(dp) :: highest                 !! m
       real(dp) :: rms_height              !! m
-      real(dp) :: skewness                !! mean (h/rms)^3; 0 of a flat map
-      real(dp) :: kurtosis                !! mean (h/rms)^4; 3: Gaussian; 0 of a flat map
+      real(dp) :: skewness                !! mean (h/rms)^3; 0 for a flat map
+      real(dp) :: kurtosis                !! mean (h/rms)^4; 3 if Gaussian, 0 for a flat map
       real(dp) :: rms_slope               !! sqrt(mean |grad h|^2), spectral
-      real(dp) :: rms_slope_differences   !! the same from forward differences, wrapped if periodic
+      real(dp) :: rms_slope_differences   !! the same from forward differences
       real(dp) :: rms_curvature           !! 1/m: rms of (h_xx + h_yy)/2 (profile: h_xx)
       real(dp) :: nayak                   !! m0 m4/m2^2, see height_statistics
    end type roughness_type
@@ -43,9 +44,9 @@ contains
 
    !> Statistics of a map.
    !>
-   !> Nayak's parameter is m0 m4/m2^2 with the moments of a profile of an isotropic surface:
-   !> m0 = <h^2>, m2 = <|grad h|^2>/2, m4 = 3/8 <(h_xx + h_yy)^2>; those of the profile for ny = 1.
-   !> It is 0 for a flat map.
+   !> Nayak's parameter is m0 m4/m2^2. For a map, m0, m2 and m4 are the moments of a profile that is
+   !> cut through an isotropic surface: m0 = <h^2>, m2 = <|grad h|^2>/2, m4 = 3/8 <(h_xx + h_yy)^2>.
+   !> For ny = 1 they are the moments of the profile itself. The parameter is 0 for a flat map.
    subroutine height_statistics(grid, height, statistics, error)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: height(:, :)                    !! m, shape [nx, ny]
@@ -67,8 +68,8 @@ contains
       if (grid%ny > 1) statistics%nayak = 1.5_dp*statistics%nayak
    end subroutine height_statistics
 
-   !> The two-dimensional power spectral density of all modes, in the order of an FFT: modes 0, 1,
-   !> ..., then the negative ones; the mean is mode 0.
+   !> The two-dimensional power spectral density of all modes, in the order of an FFT: the modes 0,
+   !> 1, ... come first, then the negative ones. Mode (0, 0) is the mean of the map.
    subroutine height_psd(grid, height, psd, error)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: height(:, :)                    !! m, shape [nx, ny]
@@ -98,15 +99,15 @@ contains
 
    !> The radially averaged power spectral density, without the mean.
    !>
-   !> Ring b holds the modes with (b - 1/2) d <= |k| < (b + 1/2) d, d the wider of the two mode
-   !> spacings, out to the corners of the plane; empty rings are left out. Hence
-   !> sum of psd modes dk_x dk_y/(2 pi)^2 = the variance of the height.
+   !> Ring b contains the modes with (b - 1/2) d <= |k| < (b + 1/2) d, where d is the larger of the
+   !> two mode spacings. The rings reach out to the corners of the plane of wave numbers, and empty
+   !> rings are left out. Hence sum of psd modes dk_x dk_y/(2 pi)^2 = the variance of the height.
    subroutine radial_psd(grid, height, wave_numbers, psd, modes, error)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: height(:, :)                    !! m, shape [nx, ny]
-      real(dp), allocatable, intent(out) :: wave_numbers(:)   !! mean |k| of a ring, rad/m, rising
+      real(dp), allocatable, intent(out) :: wave_numbers(:)   !! mean |k|, rad/m, in rising order
       real(dp), allocatable, intent(out) :: psd(:)            !! mean Phi, m4 (m3 for ny = 1)
-      integer, allocatable, intent(out) :: modes(:)           !! number of modes of a ring
+      integer, allocatable, intent(out) :: modes(:)           !! number of modes
       type(error_type), allocatable, intent(out) :: error
       type(real_transform_type) :: transform
       integer :: b, i, j, rings, weight
@@ -145,7 +146,7 @@ contains
       psd = psd_factor(grid)*pack(power_sum, counted > 0)/modes
    end subroutine radial_psd
 
-   !> Refuse a map of another shape than its grid.
+   !> An error if the map does not have the shape of its grid.
    subroutine check_shape(grid, height, error)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: height(:, :)
@@ -155,7 +156,7 @@ contains
          call fail(error, error_input, 'roughness: the map does not have the shape of its grid')
    end subroutine check_shape
 
-   !> Transform a map less its mean.
+   !> Transform a map after subtracting `mean`.
    subroutine transformed(grid, height, mean, transform, error)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: height(:, :)
@@ -257,7 +258,8 @@ contains
       end if
    end subroutine height_moments
 
-   !> rms slope from forward differences; a free map has none across its edges.
+   !> rms slope from forward differences. On a periodic map the last cell and the first are
+   !> neighbours.
    function difference_slope(grid, height) result(slope)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: height(:, :)
@@ -287,7 +289,7 @@ contains
          + sum(row_sums(2, :))/grid%dy**2/(real(y_pairs, dp)*grid%nx))
    end function difference_slope
 
-   !> From |discrete sum|^2 to Phi.
+   !> The factor that turns |discrete sum|^2 into Phi.
    pure function psd_factor(grid) result(factor)
       type(grid_type), intent(in) :: grid
       real(dp) :: factor
@@ -296,7 +298,8 @@ contains
       if (grid%ny > 1) factor = factor*grid%dy**2/grid%ly
    end function psd_factor
 
-   !> How many modes the half spectrum's column `i` stands for.
+   !> Number of modes that an entry in column `i` of the half spectrum stands for: itself and, if
+   !> that is another mode, the conjugate one.
    elemental function mode_weight(i, nx) result(weight)
       integer, intent(in) :: i, nx
       integer :: weight

@@ -1,21 +1,23 @@
 !> Self-affine random surfaces with a roll-off (thesis, eq. 1.6).
 !>
 !> The power spectral density is constant for k_l <= |k| <= k_r, falls as (|k|/k_r)^(-2 (1 + H)) up
-!> to k_s, and is 0 elsewhere, with k_l, k_r, k_s = 2 pi over the long, roll-off and short wavelengths.
-!> A profile (ny = 1) has the exponent -(1 + 2 H), that of a line cut through such a surface.
-!> The ends of the band belong to it. The mean mode and the Nyquist modes are left out.
+!> to k_s, and is 0 elsewhere. k_l, k_r and k_s are 2 pi over the long, the roll-off and the short
+!> wavelength. A profile (ny = 1) has the exponent -(1 + 2 H), which is that of a line cut through
+!> such a surface. The ends of the band belong to it. The mean mode and the Nyquist modes are left
+!> out.
 !>
-!> 'random_phase': every mode has exactly the amplitude of the spectrum and a random phase, which
-!> depends on the mode and the seed only: a finer grid keeps the modes of the coarser one.
-!> 'filtered_noise': Gaussian white noise, one number a cell, through the filter of the square root
-!> of the spectrum (after Hu and Tonder, Int. J. Mach. Tools Manufact. 32, 1992): the amplitudes
-!> scatter, too, as those of a measured surface do.
+!> 'random_phase' gives every mode exactly the amplitude of the spectrum and a random phase, which
+!> depends only on the mode and the seed. A finer grid therefore keeps the modes of a coarser one.
+!> 'filtered_noise' multiplies the spectrum of Gaussian white noise, one number per cell, by the
+!> square root of the power spectral density (after Hu and Tonder, Int. J. Mach. Tools Manufact. 32,
+!> 1992). The amplitudes then scatter as well, as those of a measured surface do.
 !>
-!> Either way the surface is scaled to have exactly the rms height asked for (over the cells), or
-!> the rms slope: the sum of |k|^2 |c_k|^2 over its modes c_k, the mean of |grad h|^2 of the surface
-!> that they describe. It does not depend on the number of threads, in no bit.
+!> Finally the surface is scaled to exactly the requested rms height over the cells, or to the
+!> requested rms slope. The square of the rms slope is the sum of |k|^2 |c_k|^2 over the modes c_k,
+!> which is the mean of |grad h|^2 of the surface that they describe. The surface is the same to the
+!> last bit for any number of threads.
 !>
-!> Memory: one field beside the height.
+!> Memory: one field in addition to the height.
 module surface_self_affine
    use counter_random, only : normal_number, row_key, uniform_number
    use asperity_errors, only : error_input, error_type, fail
@@ -30,7 +32,9 @@ module surface_self_affine
 
    public :: add_self_affine, self_affine_psd
 
-   real(dp), parameter :: edge = 1.0e-9_dp   !! a mode this near to an end of the band, relative, belongs to it
+   !> A mode whose wave number differs from an end of the band by less than this, relatively,
+   !> belongs to the band.
+   real(dp), parameter :: edge = 1.0e-9_dp
 
 contains
 
@@ -69,11 +73,11 @@ contains
       call destroy_real_transform(transform)
    end subroutine add_self_affine
 
-   !> The shape of the power spectral density, 1 between k_l and k_r.
+   !> The power spectral density relative to its value between k_l and k_r.
    elemental function self_affine_psd(term, k, profile) result(psd)
       type(surface_settings_type), intent(in) :: term
       real(dp), intent(in) :: k              !! |k|, rad/m
-      logical, intent(in) :: profile         !! of a profile, not of a surface
+      logical, intent(in) :: profile         !! whether it is that of a profile and not of a surface
       real(dp) :: psd
       real(dp) :: exponent, k_rolloff
 
@@ -105,7 +109,7 @@ contains
          wave_number(j, grid%ny, grid%ly)), grid%ny == 1))
    end function amplitude
 
-   !> Fill the spectrum with the amplitudes and phases that belong to the modes.
+   !> Fill the spectrum with the amplitudes of the modes and with random phases.
    subroutine random_phases(grid, term, spectrum)
       type(grid_type), intent(in) :: grid
       type(surface_settings_type), intent(in) :: term
@@ -168,7 +172,8 @@ contains
       end do
    end subroutine filter
 
-   !> Sum of |c|^2, or of |k|^2 |c|^2, over all modes; by rows, so that threads change no bit.
+   !> Sum of |c|^2, or of |k|^2 |c|^2, over all modes. Rows are summed first and then added in
+   !> order, so that the result does not depend on the number of threads.
    function weighted_sum(grid, spectrum, slope) result(total)
       type(grid_type), intent(in) :: grid
       complex(dp), intent(in) :: spectrum(:, :)
@@ -205,7 +210,7 @@ contains
       end do
    end subroutine scale
 
-   !> The message for a band that holds no mode of the grid.
+   !> The message for a band in which no mode of the grid lies.
    pure function no_modes(term) result(message)
       type(surface_settings_type), intent(in) :: term
       character(:), allocatable :: message

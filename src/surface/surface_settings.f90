@@ -1,11 +1,12 @@
 !> The checked settings of one `&surface` group: one term of the sum of heights.
 module surface_settings
+   use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use asperity_precision, only : dp
    use regular_grid, only : grid_type
    implicit none
    private
 
-   public :: default_surface, surface_settings_type
+   public :: default_surface, real_variable, surface_settings_type
 
    integer, parameter, public :: word_length = 32       !! of a choice
    integer, parameter, public :: path_length = 1024     !! of a file's path
@@ -29,13 +30,13 @@ module surface_settings
       real(dp) :: scale
       real(dp) :: centre_x, centre_y                !! m
       character(path_length) :: place = '&surface'  !! for messages: 'road.nml: &surface'
-      integer :: line = 0                           !! of the group in the input; 0: not of a file
+      integer :: line = 0                           !! of the group in the input; 0 without an input
    end type surface_settings_type
 
 contains
 
-   !> A flat term whose numbers are unset (0), centred on the grid: a start for callers that name
-   !> only what their shape needs.
+   !> A flat term, centred on the grid, with its other numbers unset (0). Callers start from it and
+   !> set only what their shape needs.
    pure function default_surface(grid) result(term)
       type(grid_type), intent(in) :: grid
       type(surface_settings_type) :: term
@@ -58,5 +59,41 @@ contains
       term%centre_x = (grid%nx/2)*grid%dx
       term%centre_y = (grid%ny/2)*grid%dy
    end function default_surface
+
+   !> The value of a real variable by its name.
+   pure function real_variable(term, name) result(value)
+      type(surface_settings_type), intent(in) :: term
+      character(*), intent(in) :: name            !! NaN if it is not one of those below
+      real(dp) :: value
+
+      select case (name)
+      case ('radius')
+         value = term%radius
+      case ('amplitude')
+         value = term%amplitude
+      case ('wavelength')
+         value = term%wavelength
+      case ('hurst')
+         value = term%hurst
+      case ('wavelength_long')
+         value = term%wavelength_long
+      case ('wavelength_rolloff')
+         value = term%wavelength_rolloff
+      case ('wavelength_short')
+         value = term%wavelength_short
+      case ('rms_height')
+         value = term%rms_height
+      case ('rms_slope')
+         value = term%rms_slope
+      case ('scale')
+         value = term%scale
+      case ('centre_x')
+         value = term%centre_x
+      case ('centre_y')
+         value = term%centre_y
+      case default
+         value = ieee_value(value, ieee_quiet_nan)
+      end select
+   end function real_variable
 
 end module surface_settings

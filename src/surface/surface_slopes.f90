@@ -1,4 +1,4 @@
-!> Slopes of a height map at its cells: by central differences or spectrally.
+!> Slopes of a height map at the centres of its cells, by central differences or from its spectrum.
 module surface_slopes
    use asperity_errors, only : error_input, error_type, fail
    use asperity_precision, only : dp
@@ -13,7 +13,8 @@ module surface_slopes
 
 contains
 
-   !> Slopes by central differences, second order; a free map has one-sided ones on its rim.
+   !> Slopes by central differences, which are of second order. On the rim of a free map the
+   !> differences are one-sided.
    subroutine central_slopes(grid, height, slope_x, slope_y)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: height(:, :)        !! m, shape [nx, ny]
@@ -36,7 +37,8 @@ contains
       end do
    end subroutine central_slopes
 
-   !> The cells of a difference about cell `i` of `n`, and one over their distance in cells.
+   !> The two cells from which the slope at cell `i` of `n` is taken, and one over their distance in
+   !> cells.
    elemental subroutine neighbours(periodic, n, i, before, behind, per_distance)
       logical, intent(in) :: periodic
       integer, intent(in) :: n
@@ -58,8 +60,9 @@ contains
       end if
    end subroutine neighbours
 
-   !> Slopes of the trigonometric polynomial through a periodic map: exact for a surface without
-   !> waves shorter than two cells; rings about kinks. Nyquist modes have no slope at the cells.
+   !> Slopes of the trigonometric polynomial through a periodic map. They are exact for a surface
+   !> without waves shorter than two cells, and oscillate around kinks. Nyquist modes have no slope
+   !> at the cells.
    subroutine spectral_slopes(grid, height, slope_x, slope_y, error)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: height(:, :)        !! m, shape [nx, ny]
@@ -79,7 +82,7 @@ contains
       call destroy_real_transform(transform)
    end subroutine spectral_slopes
 
-   !> One derivative.
+   !> The derivative along one direction, by multiplying the spectrum with i k.
    subroutine derivative(grid, height, along_x, transform, slope)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: height(:, :)

@@ -1,12 +1,13 @@
-!> What is doubtful in a surface, though not wrong: cut-offs of a random surface that its grid does
-!> not hold (thesis, 4.1), waves that do not close on a period, waves of few cells, height maps that
-!> say of themselves that they are of another size or unit.
+!> Warnings about a surface that is allowed but doubtful: a random surface with wavelengths that its
+!> grid does not hold (thesis, 4.1), waves that do not close on the period of the grid, waves with
+!> too few cells, and height maps whose files state another size, unit or boundary than the input.
 module surface_warnings
    use asperity_errors, only : error_type
    use hdf5_file, only : hdf5_file_type
    use asperity_precision, only : dp
    use regular_grid, only : boundary_periodic, grid_type
    use surface_settings, only : surface_settings_type
+   use surface_shapes, only : find_shape, shape_type
    implicit none
    private
 
@@ -18,7 +19,7 @@ module surface_warnings
 
 contains
 
-   !> One warning a doubt, with numbers; size 0 if all is well.
+   !> One warning, with its numbers, for each thing that is doubtful; none if all is well.
    subroutine find_warnings(grid, terms, warnings)
       type(grid_type), intent(in) :: grid
       type(surface_settings_type), intent(in) :: terms(:)      !! checked
@@ -32,26 +33,34 @@ contains
             call check_long_waves(grid, terms(n), warnings)
             call check_short_waves(grid, 'wavelength_short', terms(n)%wavelength_short, 1.0_dp, &
                .false., warnings)
-         case ('sine')
-            call check_period('lx', grid%lx, 'wavelength', terms(n)%wavelength, grid, warnings)
-            call check_short_waves(grid, 'wavelength', terms(n)%wavelength, 1.0_dp, .true., &
-               warnings)
-         case ('hexagonal_wave')
-            call check_period('lx', grid%lx, 'wavelength', terms(n)%wavelength, grid, warnings)
-            if (grid%ny > 1) call check_period('ly', grid%ly, 'wavelength/sqrt(3)', &
-               terms(n)%wavelength/sqrt(3.0_dp), grid, warnings)
-            call check_short_waves(grid, 'wavelength', terms(n)%wavelength, 2.0_dp, .false., &
-               warnings)
          case ('file')
             call check_map(grid, terms(n), warnings)
          case default
-            continue                     ! the other shapes leave nothing to doubt
+            call check_wave(grid, terms(n), warnings)
          end select
       end do
    end subroutine find_warnings
 
-   !> What a map's file says of its lengths, unit and edges must agree with the input. A file that
-   !> cannot be read, or says nothing, leaves nothing to doubt here.
+   !> An analytic wave must close on the period of the grid and have enough cells. Shapes without
+   !> waves have nothing to check.
+   subroutine check_wave(grid, term, warnings)
+      type(grid_type), intent(in) :: grid
+      type(surface_settings_type), intent(in) :: term
+      character(warning_length), allocatable, intent(inout) :: warnings(:)
+      type(shape_type) :: shape
+
+      shape = find_shape(term%shape)
+      if (.not. shape%shortest_wave > 0.0_dp) return
+      call check_period('lx', grid%lx, shape%period_x*term%wavelength, grid, warnings)
+      if (grid%ny > 1) &
+         call check_period('ly', grid%ly, shape%period_y*term%wavelength, grid, warnings)
+      call check_short_waves(grid, 'wavelength', term%wavelength, shape%shortest_wave, &
+         .not. shape%period_y > 0.0_dp, warnings)
+   end subroutine check_wave
+
+   !> The lengths, the unit and the boundary that the file of a map states must agree with the
+   !> input. No warning is given about a file that states none of them, or that cannot be read:
+   !> reading the map itself reports that as an error.
    subroutine check_map(grid, term, warnings)
       type(grid_type), intent(in) :: grid
       type(surface_settings_type), intent(in) :: term
@@ -71,17 +80,17 @@ contains
       ly = length_of(file, map, 'ly')
       if (grid%ny == 1) ly = 0.0_dp
       if (differs(lx, grid%lx) .or. differs(ly, grid%ly)) then
-         write (text, '(4(a, es10.4), a)') start//'the map says that it is ', lx, ' m by ', &
-            merge(ly, grid%ly, ly > 0.0_dp), ' m, the grid is ', grid%lx, ' m by ', grid%ly, &
-            ' m: its slopes change with that'
+         write (text, '(4(a, es10.4), a)') start//'according to the file the map is ', lx, &
+            ' m by ', merge(ly, grid%ly, ly > 0.0_dp), ' m, but the grid is ', grid%lx, &
+            ' m by ', grid%ly, ' m: this changes its slopes'
          call append(warnings, text)
       end if
       if (file%has_attribute(map, 'units') .and. abs(term%scale - 1.0_dp) <= 0.0_dp) then
          call file%read_attribute(map, 'units', units, error)
          if (.not. allocated(error)) then
             if (all(trim(units) /= [character(5) :: 'm', '1', '', 'metre', 'meter'])) then
-               text = start//'the map says that its unit is '//trim(units)// &
-                  ': its heights are taken as metres; scale changes that'
+               text = start//'according to the file the unit of the map is '//trim(units)// &
+                  ', but its heights are read as metres; set scale to convert them'
                call append(warnings, text)
             end if
          end if
@@ -91,8 +100,8 @@ contains
          call file%read_attribute('/grid', 'boundary', boundary, error)
          if (.not. allocated(error)) then
             if (boundary == 'free') then
-               text = start//'the map says that it is not periodic: where opposite edges do not '// &
-                  'fit, the periodic surface has a step'
+               text = start//'according to the file the map is not periodic: the periodic '// &
+                  'surface has a step where opposite edges do not fit'
                call append(warnings, text)
             end if
          end if
@@ -100,7 +109,7 @@ contains
       call file%close(error)
    end subroutine check_map
 
-   !> A length that a map or its file's grid says of itself; 0 where they say none.
+   !> A length that the attributes of a map, or of the grid in its file, state; 0 if there is none.
    function length_of(file, map, name) result(length)
       type(hdf5_file_type), intent(inout) :: file
       character(*), intent(in) :: map             !! the dataset
@@ -117,9 +126,9 @@ contains
       if (allocated(error)) length = 0.0_dp
    end function length_of
 
-   !> Is a length that is known another one than the grid's?
+   !> Is a length that the file states different from that of the grid?
    pure logical function differs(length, side)
-      real(dp), intent(in) :: length              !! m; 0: not known
+      real(dp), intent(in) :: length              !! m; 0 if the file states none
       real(dp), intent(in) :: side                !! m
 
       differs = length > 0.0_dp .and. abs(length - side) > 1.0e-6_dp*side
@@ -133,7 +142,7 @@ contains
       name = trim(path(index(path, '/', back=.true.) + 1:))
    end function last_of
 
-   !> The longest waves must be short against the side.
+   !> The longest waves of a random surface must be shorter than the side.
    subroutine check_long_waves(grid, term, warnings)
       type(grid_type), intent(in) :: grid
       type(surface_settings_type), intent(in) :: term
@@ -150,20 +159,20 @@ contains
       call append(warnings, text)
    end subroutine check_long_waves
 
-   !> The shortest waves must be resolved; above the Nyquist wave number there are none.
-   subroutine check_short_waves(grid, name, wavelength, factor, along_x, warnings)
+   !> The grid must resolve the shortest waves; it does not hold waves of less than two cells.
+   subroutine check_short_waves(grid, name, wavelength, shortest, along_x, warnings)
       type(grid_type), intent(in) :: grid
       character(*), intent(in) :: name
       real(dp), intent(in) :: wavelength
-      real(dp), intent(in) :: factor              !! the shortest wave is wavelength/factor
-      logical, intent(in) :: along_x              !! a wave along x only
+      real(dp), intent(in) :: shortest            !! the shortest wave, in units of `wavelength`
+      logical, intent(in) :: along_x              !! the wave varies along x only
       character(warning_length), allocatable, intent(inout) :: warnings(:)
       character(warning_length) :: text
       real(dp) :: cell, cells
 
       cell = max(grid%dx, grid%dy)
       if (along_x .or. grid%ny == 1) cell = grid%dx
-      cells = wavelength/factor/cell
+      cells = shortest*wavelength/cell
       if (cells >= cells_a_wave*(1.0_dp - round_off)) return
       if (cells > 2.0_dp) then
          write (text, '(a, es9.3, a, f0.1, a)') '&surface: '//name//' = ', wavelength, &
@@ -176,24 +185,26 @@ contains
       call append(warnings, text)
    end subroutine check_short_waves
 
-   !> On a period a wave must close.
-   subroutine check_period(side_name, side, name, wavelength, grid, warnings)
-      character(*), intent(in) :: side_name, name
-      real(dp), intent(in) :: side, wavelength
+   !> The side of a periodic grid must be a whole number of periods of the wave.
+   subroutine check_period(side_name, side, period, grid, warnings)
+      character(*), intent(in) :: side_name
+      real(dp), intent(in) :: side                !! m
+      real(dp), intent(in) :: period              !! of the wave along this side, m; 0: none
       type(grid_type), intent(in) :: grid
       character(warning_length), allocatable, intent(inout) :: warnings(:)
       character(warning_length) :: text
       real(dp) :: waves
 
-      if (grid%boundary /= boundary_periodic) return
-      waves = side/wavelength
+      if (grid%boundary /= boundary_periodic .or. .not. period > 0.0_dp) return
+      waves = side/period
       if (abs(waves - anint(waves)) <= 1.0e-6_dp*max(1.0_dp, waves)) return
-      write (text, '(a, es11.5, a, f0.4, a)') '&surface: '//side_name//' = ', side, ' m is ', &
-         waves, ' times '//name//': the periodic surface has a step at its edge'
+      write (text, '(2(a, es11.5), a, f0.4, a)') '&surface: '//side_name//' = ', side, &
+         ' m and the period of the wave along it, ', period, ' m, make ', waves, &
+         ' waves: the periodic surface has a step at its edge'
       call append(warnings, text)
    end subroutine check_period
 
-   !> One more warning.
+   !> Append a warning to the list.
    subroutine append(warnings, text)
       character(warning_length), allocatable, intent(inout) :: warnings(:)
       character(warning_length), intent(in) :: text
