@@ -1,6 +1,6 @@
 !> Tests of the passes of a row with friction: acceleration, control, and what they settle.
 module test_coupled_passes
-   use anderson_mixing, only : mixing_type
+   use anderson, only : anderson_type, new_anderson
    use check, only : begin_suite, check_close, check_that
    use coupled_passes, only : carry
    use pass_control, only : pass_control_type
@@ -49,37 +49,38 @@ contains
    !> one that depends on a field nonlinearly.
    subroutine test_mixing()
       integer, parameter :: nx = 8, ny = 5
-      type(mixing_type) :: mixing
-      real(dp) :: gain(nx, ny, 2), answer(nx, ny, 2), z(nx, ny, 2), f(nx, ny, 2), first
+      type(anderson_type) :: mixing
+      real(dp), parameter :: even(2) = 1.0_dp
+      real(dp) :: gain(nx, 2, ny), answer(nx, 2, ny), z(nx, 2, ny), f(nx, 2, ny), first
       integer :: i, j, pass
 
       do j = 1, ny
          do i = 1, nx
-            gain(i, j, :) = [-2.5_dp + 0.8_dp*mod(i, 3), 0.5_dp*mod(j, 3) + 0.5_dp*mod(i, 2)]
-            answer(i, j, :) = [sin(1.3_dp*i*j), cos(0.7_dp*i + j)]
+            gain(i, :, j) = [-2.5_dp + 0.8_dp*mod(i, 3), 0.5_dp*mod(j, 3) + 0.5_dp*mod(i, 2)]
+            answer(i, :, j) = [sin(1.3_dp*i*j), cos(0.7_dp*i + j)]
          end do
       end do
       gain = merge(1.5_dp, gain, abs(gain - 1.0_dp) < 0.1_dp)
       z = 0.0_dp
-      call mixing%start()
+      call new_anderson(mixing, nx, 2, ny, 6)
       do pass = 1, 40
          f = (gain - 1.0_dp)*(z - answer)
          if (pass == 1) first = norm2(f)
-         call mixing%next(f, 0.5_dp, z)
+         call mixing%step(even, f, z, plain=.false., damping=0.5_dp)
       end do
       call check_that(norm2(f) < 1.0e-9_dp*first, 'a linear map')
       z = 0.7_dp*answer
       gain = min(gain, 0.5_dp)                  ! as those of roads: plain iteration flips
-      call mixing%start()
+      call mixing%forget()
       do pass = 1, 60
          f = (gain - 1.0_dp)*(z - answer) + 0.3_dp*sin(z - answer)*cos(cshift(z, 1) - cshift(answer, 1))
          if (pass == 1) first = norm2(f)
-         call mixing%next(f, 0.5_dp, z)
+         call mixing%step(even, f, z, plain=.false., damping=0.5_dp)
       end do
       call check_that(norm2(f) < 1.0e-8_dp*first, 'a nonlinear map')
-      call mixing%next(0.0_dp*f, 1.0_dp, z)
+      call mixing%step(even, 0.0_dp*f, z, plain=.false.)
       f = z
-      call mixing%next(0.0_dp*f, 1.0_dp, z)
+      call mixing%step(even, 0.0_dp*f, z, plain=.false.)
       call check_close(maxval(abs(z - f)), 0.0_dp, 0.0_dp, 'a place that is found stays')
    end subroutine test_mixing
 

@@ -86,7 +86,7 @@ contains
    !> Mean of a vector field over the contact.
    function contact_mean(self, field) result(mean)
       class(contact_state_type), intent(in) :: self
-      real(dp), intent(in) :: field(:, :, :)        !! [nx, ny, 2]
+      real(dp), intent(in) :: field(:, :, :)        !! [nx, 2, ny]
       real(dp) :: mean(2)
       real(dp), allocatable :: rows(:, :)
       logical, allocatable :: touching(:)
@@ -96,8 +96,8 @@ contains
       !$omp parallel do default(none) shared(self, field, rows) private(j, touching)
       do j = 1, self%grid%ny
          touching = touches(self%side%adhesive, self%pressure(:, j), self%gap(:, j))
-         rows(1, j) = sum(field(:, j, 1), touching)
-         rows(2, j) = sum(field(:, j, 2), touching)
+         rows(1, j) = sum(field(:, 1, j), touching)
+         rows(2, j) = sum(field(:, 2, j), touching)
          rows(3, j) = count(touching)
       end do
       mean = global_sum([sum(rows(1, :)), sum(rows(2, :))])/max(global_sum(sum(rows(3, :))), 1.0_dp)

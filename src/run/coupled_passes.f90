@@ -10,7 +10,7 @@
 !> and the row is solved where U_T = z: pressure, traction, heights and slopes then belong together.
 !> The fixed point need not attract: T holds -P grad H, which gives a pass the gain -(1..2) |grad H|^2,
 !> friction adds mu |grad H|, and a thick block multiplies the mean of both by its compliance. The
-!> passes therefore use Anderson acceleration on the whole field z (module `anderson_mixing`);
+!> passes therefore use Anderson acceleration on the whole field z (module `anderson`);
 !> `pass_control` says how accurate their solves are and how long their steps.
 !>
 !> The strains around the contact come with tractions that were found before the pass moved the
@@ -26,7 +26,7 @@
 !> Fields of doubles: two components each for the place, its residual and the best place; height and
 !> slopes of the check; and those of the acceleration.
 module coupled_passes
-   use anderson_mixing, only : mixing_type
+   use anderson, only : anderson_type, new_anderson
    use contact_state, only : contact_mean, contact_state_type, solve_normal
    use asperity_interpolation, only : displaced
    use asperity_parallel, only : global_sum
@@ -42,6 +42,9 @@ module coupled_passes
 
    integer, parameter, public :: most_passes = 200      !! where the case leaves the number open
 
+   integer, parameter :: pairs = 6                      !! of the acceleration
+   real(dp), parameter :: largest_factor = 1.0e3_dp     !! of the acceleration; a larger one is round-off
+
    !> Slopes in the contact count as at least this part of the rms slope of the map.
    real(dp), parameter :: least_slope = 0.1_dp
 
@@ -49,12 +52,12 @@ module coupled_passes
    type :: coupled_passes_type
       integer :: passes = 0                             !! done in the last row
       real(dp) :: residual = 0.0_dp                     !! mismatch that the last row left
-      real(dp), allocatable, private :: place(:, :, :)      !! z, m [nx, ny, 2]
+      real(dp), allocatable, private :: place(:, :, :)      !! z, m [nx, 2, ny]
       real(dp), allocatable, private :: residuals(:, :, :)  !! U_T, carried, less z, m
       real(dp), allocatable, private :: best_place(:, :, :) !! z of the least mismatch, m
       real(dp), allocatable, private :: height(:, :)        !! of the road at U_T, m
       real(dp), allocatable, private :: slope_x(:, :), slope_y(:, :)
-      type(mixing_type), private :: mixing
+      type(anderson_type), private :: mixing
    contains
       procedure :: solve
    end type coupled_passes_type
@@ -66,9 +69,11 @@ contains
       type(coupled_passes_type), intent(out) :: self
       integer, intent(in) :: nx, ny
 
-      allocate (self%place(nx, ny, 2), source=0.0_dp)
+      allocate (self%place(nx, 2, ny), source=0.0_dp)
       allocate (self%residuals, self%best_place, source=self%place)
       allocate (self%height(nx, ny), self%slope_x(nx, ny), self%slope_y(nx, ny), source=0.0_dp)
+      call new_anderson(self%mixing, nx, 2, ny, pairs)
+      self%mixing%largest = largest_factor
    end subroutine new_coupled_passes
 
    !> Solve a row. The road has moved, and the tangential step has begun.
@@ -87,7 +92,7 @@ contains
       tolerance = state%case%solver%tolerance
       most = state%case%solver%passes
       if (most == 0) most = most_passes
-      call self%mixing%start()
+      call self%mixing%forget()
       call predict(self, state, motion)
       unlike = plan%instantaneous .or. plan%new_speed
       call control%start(tolerance, merge(1.0_dp, state%first_mismatch, unlike))
@@ -121,7 +126,7 @@ contains
       type(solver_result_type), intent(inout) :: normal, rubbing
       type(solver_result_type) :: part
 
-      call displaced(state%road, plan%road_x, plan%road_y, self%place(:, :, 1), self%place(:, :, 2), &
+      call displaced(state%road, plan%road_x, plan%road_y, self%place(:, 1, :), self%place(:, 2, :), &
          state%height, state%slope_x, state%slope_y)
       call solve_normal(state, plan, accuracy, part)
       call add_result(normal, part)
@@ -156,8 +161,8 @@ contains
       do c = 1, 2
          call carry(state%tangential%displacement(:, :, c), state%drift - motion, &
             [state%grid%dx, state%grid%dy], state%grid%boundary /= boundary_free, &
-            self%place(:, :, c))
-         self%place(:, :, c) = self%place(:, :, c) + state%drift(c)
+            self%place(:, c, :))
+         self%place(:, c, :) = self%place(:, c, :) + state%drift(c)
       end do
    end subroutine predict
 
@@ -167,21 +172,29 @@ contains
       class(contact_state_type), intent(in) :: state
       type(pass_control_type), intent(in) :: control
       real(dp) :: motion(2)
-      integer :: c
+      integer :: c, j
 
       if (control%best_yet) self%best_place(:, :, :) = self%place
-      if (control%forget .or. control%plain) call self%mixing%start()
+      if (control%forget .or. control%plain) call self%mixing%forget()
       if (control%go_back) then
          self%place(:, :, :) = self%best_place
          return
       end if
-      motion = contact_mean(state, state%tangential%trial) - contact_mean(state, self%place)
+      !$omp parallel do default(none) shared(self, state) private(j)
+      do j = 1, state%grid%ny
+         self%residuals(:, :, j) = state%tangential%trial(:, j, :) - self%place(:, :, j)
+      end do
+      motion = contact_mean(state, self%residuals)
       do c = 1, 2
          call carry(state%tangential%trial(:, :, c), motion, [state%grid%dx, state%grid%dy], &
-            state%grid%boundary /= boundary_free, self%residuals(:, :, c))
-         self%residuals(:, :, c) = self%residuals(:, :, c) - self%place(:, :, c)
+            state%grid%boundary /= boundary_free, self%residuals(:, c, :))
       end do
-      call self%mixing%next(self%residuals, control%damping, self%place)
+      !$omp parallel do default(none) shared(self, state) private(j)
+      do j = 1, state%grid%ny
+         self%residuals(:, :, j) = self%residuals(:, :, j) - self%place(:, :, j)
+      end do
+      call self%mixing%step([1.0_dp, 1.0_dp], self%residuals, self%place, plain=.false., &
+         damping=control%damping)
    end subroutine choose_place
 
    !> What remains of the coupling: by how much the road at U_T differs from the road solved on. The

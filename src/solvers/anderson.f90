@@ -1,20 +1,21 @@
-!> Anderson acceleration of a fixed-point iteration x = g(x) for fields (Anderson 1965; type II).
+!> Anderson acceleration of a fixed-point iteration x = g(x) for fields.
 !>
-!> With the residual f = g(x) - x and the differences df_i, dg_i of f and of g(x) between successive
+!> With the residual f = g(x) - x and the differences dx_i, df_i of x and of f between successive
 !> iterates, the next iterate is
 !>
-!>     g(x) - sum gamma_i dg_i,   gamma minimises |f - sum gamma_i df_i|
+!>     x + b f - sum gamma_i (dx_i + b df_i),   gamma minimises |f - sum gamma_i df_i|
 !>
-!> For linear g this is GMRES in another form. It may overshoot where g has kinks: the caller decides
-!> when to accelerate, and calls `forget` where the old differences no longer apply.
+!> with the damping b (type II: D. G. Anderson, J. ACM 12 (1965) 547; H. F. Walker, P. Ni, SIAM J. Numer.
+!> Anal. 49 (2011) 1715). For linear g this is GMRES in another form. It may overshoot where g has kinks:
+!> the caller decides when to accelerate, and calls `forget` where the old differences no longer apply.
 !>
 !> A state has one or more components, each with a weight in the norm; a component of weight zero is
 !> carried along by the same gamma. The least squares problem is solved by its normal equations on
 !> columns of unit length, newest column first; a column that depends on newer ones to single precision
 !> is left out. Sums are added row by row in a fixed order: results do not depend on the threads.
 !>
-!> Memory: for each pair two fields of single precision a component, which is enough because the
-!> residual itself is never taken from them; and two fields of doubles a component.
+!> Memory: for each pair two fields of single precision per component, which is enough because the
+!> residual itself is never taken from them; and two fields of doubles per component.
 module anderson
    use asperity_parallel, only : global_sum, thread_count
    use asperity_precision, only : dp, sp
@@ -30,6 +31,7 @@ module anderson
       integer :: nx = 0, components = 0, ny = 0
       integer :: pairs = 0                           !! that are kept at most
       integer :: used = 0                            !! pairs there are
+      real(dp) :: largest = huge(1.0_dp)             !! where a gamma is as large, none is believed
       integer, private :: newest = 0
       integer, private :: threads = 1
       logical, private :: begun = .false.            !! there is a last iterate
@@ -69,29 +71,35 @@ contains
       self%begun = .false.
    end subroutine forget
 
-   !> The next iterate from x and its residual; `plain` takes g(x) itself but learns all the same.
-   subroutine step(self, weights, f, x, plain)
+   !> The next iterate from x and its residual; `plain` takes x + b f itself but learns all the same.
+   subroutine step(self, weights, f, x, plain, damping)
       class(anderson_type), intent(inout) :: self
       real(dp), intent(in) :: weights(self%components)              !! of the components in the norm
       real(dp), intent(in) :: f(self%nx, self%components, self%ny)  !! g(x) - x
       real(dp), intent(inout) :: x(self%nx, self%components, self%ny)   !! in: x; out: the next
       logical, intent(in) :: plain
+      real(dp), intent(in), optional :: damping                     !! b, from 0 to 1 (default)
       real(dp), allocatable :: gamma(:)
+      real(dp) :: left
       integer :: j
 
       allocate (gamma(self%pairs), source=0.0_dp)
       call learn(self, weights, f, x, gamma)
-      if (plain) gamma = 0.0_dp
-      !$omp parallel do default(none) shared(self, f, x, gamma) private(j) num_threads(self%threads)
+      if (plain .or. .not. all(abs(gamma) < self%largest)) gamma = 0.0_dp
+      left = 0.0_dp
+      if (present(damping)) left = 1.0_dp - damping
+      !$omp parallel do default(none) shared(self, f, x, gamma, left) private(j) &
+      !$omp num_threads(self%threads)
       do j = 1, self%ny
-         call combine_row(self, gamma, j, f(:, :, j), x(:, :, j))
+         call combine_row(self, gamma, left, j, f(:, :, j), x(:, :, j))
       end do
    end subroutine step
 
-   !> A row of the next iterate.
-   subroutine combine_row(self, gamma, j, f, x)
+   !> A row of the next iterate, with g = x + f: g - left f - sum gamma (dg - left df).
+   subroutine combine_row(self, gamma, left, j, f, x)
       class(anderson_type), intent(inout) :: self
       real(dp), intent(in) :: gamma(:)
+      real(dp), intent(in) :: left                   !! 1 - b
       integer, intent(in) :: j
       real(dp), intent(in) :: f(self%nx, self%components)
       real(dp), intent(inout) :: x(self%nx, self%components)
@@ -100,8 +108,11 @@ contains
       self%last_f(:, :, j) = f
       x = x + f
       self%last_g(:, :, j) = x
+      if (left > 0.0_dp) x = x - left*f
       do k = 1, self%used
-         if (abs(gamma(k)) > 0.0_dp) x = x - gamma(k)*self%dg(:, :, j, k)
+         if (.not. abs(gamma(k)) > 0.0_dp) cycle
+         x = x - gamma(k)*self%dg(:, :, j, k)
+         if (left > 0.0_dp) x = x + gamma(k)*left*self%df(:, :, j, k)
       end do
    end subroutine combine_row
 
