@@ -23,7 +23,7 @@ module adhesion_potential
    private
 
    public :: adhesion_potential_type, adhesive_curvature, adhesive_energy, adhesive_slope, &
-      adhesive_terms, edge_of_cells, new_adhesion_potential, release_pressure
+      adhesive_terms, has_smooth_potential, edge_of_cells, new_adhesion_potential, release_pressure
 
    integer, parameter, public :: potential_none = 0
    integer, parameter, public :: potential_exponential = 1
@@ -78,6 +78,14 @@ contains
       if (self%kind /= potential_maugis_dugdale .or. .not. present(edge)) return
       self%edge = min(edge, range)
    end subroutine new_adhesion_potential
+
+   !> Is e' continuous?
+   pure function has_smooth_potential(self) result(smooth)
+      type(adhesion_potential_type), intent(in) :: self
+      logical :: smooth
+
+      smooth = self%kind /= potential_maugis_dugdale .or. self%edge > 0.0_dp
+   end function has_smooth_potential
 
    !> e(g), J/m2.
    elemental function adhesive_energy(self, gap) result(value)

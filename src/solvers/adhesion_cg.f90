@@ -1,33 +1,25 @@
 !> Adhesive contact: one solver for periodic and free grids, fast and by the thesis's method.
 !>
-!> Module adhesion_state has the problem and its equations, adhesion_cg_periodic and adhesion_cg_free
-!> the fast method, adhesion_cg_thesis the thesis's.
+!> Module adhesion_state has the problem, its equations and what a method is; adhesion_patch what differs
+!> between the grids; adhesion_cg_fast the fast method, adhesion_cg_thesis the thesis's.
 module adhesion_cg
-   use adhesion_cg_free, only : adhesion_free_type, new_adhesion_free
-   use adhesion_cg_periodic, only : adhesion_periodic_type, new_adhesion_periodic
+   use adhesion_cg_fast, only : adhesion_fast_type, new_adhesion_fast
    use adhesion_cg_thesis, only : adhesion_thesis_type, new_adhesion_thesis
-   use adhesion_state, only : adhesion_problem_type, control_approach
+   use adhesion_state, only : adhesion_method_type, adhesion_problem_type, control_approach
    use finite_fields, only : reject_overflow
    use asperity_errors, only : error_input, error_type, fail
    use asperity_parallel, only : global_max, thread_count
    use asperity_precision, only : dp
-   use regular_grid, only : boundary_periodic, grid_type
+   use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
    implicit none
    private
 
    public :: adhesion_solver_type, new_adhesion_solver
 
-   integer, parameter :: kind_periodic = 1
-   integer, parameter :: kind_free = 2
-   integer, parameter :: kind_thesis = 3
-
    !> The solver with its operators and work fields, kept from step to step. Not to be copied.
    type :: adhesion_solver_type
-      integer, private :: kind = kind_periodic
-      type(adhesion_periodic_type), private :: periodic
-      type(adhesion_free_type), private :: free
-      type(adhesion_thesis_type), private :: thesis
+      class(adhesion_method_type), allocatable, private :: method
    contains
       procedure :: solve
       procedure :: destroy
@@ -49,18 +41,21 @@ contains
       if (present(method)) name = method
       form = 'coarse'
       if (present(preconditioner)) form = preconditioner
-      if (name == 'thesis') then
-         self%kind = kind_thesis
-         call new_adhesion_thesis(self%thesis, grid, poisson, error)
-      else if (name /= 'fast') then
+      select case (name)
+      case ('fast')
+         allocate (adhesion_fast_type :: self%method)
+      case ('thesis')
+         allocate (adhesion_thesis_type :: self%method)
+      case default
          call fail(error, error_input, "method = '"//trim(name)//"': must be 'fast' or 'thesis'")
-      else if (grid%boundary == boundary_periodic) then
-         self%kind = kind_periodic
-         call new_adhesion_periodic(self%periodic, grid, poisson, trim(form), error)
-      else
-         self%kind = kind_free
-         call new_adhesion_free(self%free, grid, poisson, trim(form), error)
-      end if
+         return
+      end select
+      select type (chosen => self%method)
+      type is (adhesion_fast_type)
+         call new_adhesion_fast(chosen, grid, poisson, trim(form), error)
+      type is (adhesion_thesis_type)
+         call new_adhesion_thesis(chosen, grid, poisson, error)
+      end select
    end subroutine new_adhesion_solver
 
    !> Solve an adhesive contact problem. Not converging is an outcome, with its reason by name: the
@@ -71,26 +66,19 @@ contains
    subroutine solve(self, problem, height, gap, pressure, level, outcome, history)
       class(adhesion_solver_type), intent(inout) :: self
       type(adhesion_problem_type), intent(in) :: problem
-      real(dp), intent(in) :: height(:, :)             !! H, [nx, ny], m
-      real(dp), intent(inout) :: gap(:, :)             !! g >= 0, 0 in contact, m
-      real(dp), intent(inout) :: pressure(:, :)        !! P, attraction included, Pa
+      real(dp), intent(in), contiguous, target :: height(:, :)       !! H, [nx, ny], m
+      real(dp), intent(inout), contiguous, target :: gap(:, :)       !! g >= 0, 0 in contact, m
+      real(dp), intent(inout), contiguous, target :: pressure(:, :)  !! P, attraction included, Pa
       real(dp), intent(inout) :: level                 !! U - H where the gap is zero, m
       type(solver_result_type), intent(out) :: outcome
-      real(dp), intent(in), optional :: history(:, :)  !! P_h, Pa
+      real(dp), intent(in), target, optional :: history(:, :)  !! P_h, Pa
       type(adhesion_problem_type) :: task
 
       task = problem
       task%datum = global_max(maxval(height))
       if (problem%control == control_approach) task%target = problem%target + task%datum
       level = level + task%datum
-      select case (self%kind)
-      case (kind_periodic)
-         call self%periodic%solve(task, height, gap, pressure, level, outcome, history)
-      case (kind_free)
-         call self%free%solve(task, height, gap, pressure, level, outcome, history)
-      case (kind_thesis)
-         call self%thesis%solve(task, height, gap, pressure, level, outcome, history)
-      end select
+      call self%method%solve(task, height, gap, pressure, level, outcome, history)
       call reject_overflow(outcome, gap, pressure, thread_count())
       level = level - task%datum
       if (problem%control == control_approach) level = problem%target
@@ -100,9 +88,7 @@ contains
    subroutine destroy(self)
       class(adhesion_solver_type), intent(inout) :: self
 
-      call self%periodic%destroy()
-      call self%free%destroy()
-      call self%thesis%destroy()
+      if (allocated(self%method)) call self%method%destroy()
    end subroutine destroy
 
 end module adhesion_cg

@@ -54,23 +54,21 @@ module adhesion_preconditioner
 contains
 
    !> Make one from the symbols of M and B on the grid.
-   subroutine new_adhesion_preconditioner(self, kind, nx, ny, m_symbol, b_symbol, theta, &
-      fine_symbol, error)
+   subroutine new_adhesion_preconditioner(self, kind, nx, ny, m_symbol, b_symbol, nyquist, error)
       type(adhesion_preconditioner_type), intent(out) :: self
       character(*), intent(in) :: kind              !! 'full' or 'coarse'
       integer, intent(in) :: nx, ny
       real(dp), intent(in) :: m_symbol(0:, 0:)      !! M, (0:nx/2, 0:ny/2), > 0
       real(dp), intent(in) :: b_symbol(0:, 0:)      !! B, the same
-      real(dp), intent(in) :: theta                 !! M of the wave numbers off the coarse grid, > 0
-      real(dp), intent(in) :: fine_symbol           !! B of those, > 0
+      real(dp), intent(in) :: nyquist               !! B at the Nyquist wave number, > 0
       type(error_type), allocatable, intent(out) :: error
       real(dp), allocatable :: low(:, :)
       integer :: i, j
 
       self%nx = nx
       self%ny = ny
-      self%theta = theta
-      self%fine_symbol = fine_symbol
+      self%theta = 1.4_dp/nyquist
+      self%fine_symbol = 0.5_dp*nyquist
       self%mx = max(1, nint(nx/ratio))
       self%my = max(1, nint(ny/ratio))
       self%cells = real(nx, dp)*ny/(real(self%mx, dp)*self%my)

@@ -1,4 +1,4 @@
-!> What the methods for adhesive contact share: the problem, the line searches, sums in order.
+!> What the methods for adhesive contact share: the problem, its equations, and what a method is.
 !>
 !> The energy of a state with the gap g >= 0 (equations for one cell area; modulus Q, traction history
 !> P_h of a viscoelastic material, mean pressure p; elastic: Q = G and P_h = 0)
@@ -6,20 +6,20 @@
 !> has the gradient G = Q B(H+g) - P_h + e'(g) + p; a solution has G = 0 where g > 0 and G >= 0 where
 !> g = 0. The contact pressure, attraction included, is P = p + Q B(H+g) - P_h = G - e'(g).
 !>
-!> Sums are made row by row and then in the order of the rows: they do not depend on the threads.
+!> The module adhesion_patch has what differs between periodic and free grids, adhesion_steps how far to
+!> go along a direction.
 module adhesion_state
    use adhesion_potential, only : adhesion_potential_type, adhesive_curvature, adhesive_slope, &
-      adhesive_terms, potential_maugis_dugdale, potential_none
+      potential_none
    use contact_rule, only : is_closed
    use normal_state, only : control_approach, control_pressure
-   use asperity_parallel, only : global_max, global_min, global_sum
    use asperity_precision, only : dp
+   use solver_result, only : solver_result_type
    implicit none
    private
 
-   public :: adhesion_problem_type, choose_step, clipped_step, close_gaps, collect_step, &
-      control_approach, control_pressure, diagonal_scaling, form_step_row, resolved_traction, row_total, &
-      step_sums_type, stepped_gap, sum_shift, traction_scale
+   public :: adhesion_method_type, adhesion_problem_type, close_gaps, control_approach, &
+      control_pressure, diagonal_scaling, resolved_traction, traction_scale
 
    character(*), parameter, public :: reason_converged = 'converged'
    character(*), parameter, public :: reason_detached = 'detached'
@@ -27,8 +27,6 @@ module adhesion_state
    character(*), parameter, public :: reason_stalled = 'the energy can be lowered no further'
    character(*), parameter, public :: reason_closed = &
       'full contact: the displacement leaves no gap'
-
-   real(dp), parameter :: sharpness = 0.02_dp     !! what is left of the slope in a line search
 
    !> An adhesive contact problem but for its fields.
    type :: adhesion_problem_type
@@ -46,32 +44,42 @@ module adhesion_state
       real(dp) :: datum = 0.0_dp
    end type adhesion_problem_type
 
-   !> What is known of E along the segment g + t s, 0 <= t.
-   type :: step_sums_type
-      real(dp) :: slope = 0.0_dp            !! G.s
-      real(dp) :: form = 0.0_dp             !! Q s.B s
-      real(dp) :: adhesive_slope = 0.0_dp   !! s.e'(g)
-      real(dp) :: curvature = 0.0_dp        !! s.e''(g) s
-      real(dp) :: energy = 0.0_dp           !! sum e(g)
-      real(dp) :: longest = huge(1.0_dp)    !! t at which the first gap closes
-      logical :: clipped = .false.          !! gaps were closed to make s: t <= 1
-   end type step_sums_type
+   !> A method for adhesive contact with its operators and work fields, kept from step to step. Not to
+   !> be copied. To add a method: extend this type, and make it in `new_adhesion_solver`.
+   type, abstract :: adhesion_method_type
+   contains
+      procedure(solve_contact), deferred :: solve
+      procedure(free_memory), deferred :: destroy
+   end type adhesion_method_type
+
+   abstract interface
+
+      !> Solve an adhesive contact problem. Not converging is an outcome: the state reached, lowest in
+      !> energy so far, is handed out.
+      subroutine solve_contact(self, problem, height, gap, pressure, level, outcome, history)
+         import :: adhesion_method_type, adhesion_problem_type, dp, solver_result_type
+         implicit none
+         class(adhesion_method_type), intent(inout), target :: self
+         type(adhesion_problem_type), intent(in) :: problem
+         real(dp), intent(in), contiguous, target :: height(:, :)      !! H, [nx, ny], m
+         real(dp), intent(inout), contiguous, target :: gap(:, :)      !! g, m: a start in periodic mode
+         real(dp), intent(inout), contiguous, target :: pressure(:, :) !! P, Pa: a start in free mode
+         real(dp), intent(inout) :: level                              !! m: a start in free mode
+         type(solver_result_type), intent(out) :: outcome
+         !> P_h, Pa. Not contiguous: gfortran 12 would pack it even where it is absent.
+         real(dp), intent(in), target, optional :: history(:, :)
+      end subroutine solve_contact
+
+      !> Free plans and memory.
+      subroutine free_memory(self)
+         import :: adhesion_method_type
+         implicit none
+         class(adhesion_method_type), intent(inout) :: self
+      end subroutine free_memory
+
+   end interface
 
 contains
-
-   !> Sum of the k-th row sums, in order.
-   function row_total(rows, k) result(total)
-      real(dp), intent(in) :: rows(:, :)    !! [sums, rows]
-      integer, intent(in) :: k
-      real(dp) :: total
-      integer :: j
-
-      total = 0.0_dp
-      do j = 1, size(rows, 2)
-         total = total + rows(k, j)
-      end do
-      total = global_sum(total)
-   end function row_total
 
    !> Scaling of the preconditioner at a cell, from both sides: (1 + max(e'', 0)/k)^(-1/2).
    pure function diagonal_scaling(problem, gap, stiffness) result(scaling)
@@ -114,14 +122,6 @@ contains
          /problem%tolerance
    end function resolved_traction
 
-   !> Is e' continuous?
-   pure function has_smooth_potential(potential) result(smooth)
-      type(adhesion_potential_type), intent(in) :: potential
-      logical :: smooth
-
-      smooth = potential%kind /= potential_maugis_dugdale .or. potential%edge > 0.0_dp
-   end function has_smooth_potential
-
    !> The traction in which the residual is measured: gamma_0/z_0, or `other` without adhesion.
    pure function traction_scale(potential, other) result(scale)
       type(adhesion_potential_type), intent(in) :: potential
@@ -132,289 +132,5 @@ contains
       if (potential%kind == potential_none) return
       if (potential%energy > 0.0_dp) scale = potential%energy/potential%range
    end function traction_scale
-
-   !> Length of the step along d, gaps closed on the way: the first root of
-   !>     -r.d + a form + sum d (e'(max(g + a d, 0)) - e'(g)).
-   !> It need not be sharp: `choose_step` follows.
-   function clipped_step(problem, gap, direction, slope, form, rows, threads) result(alpha)
-      type(adhesion_problem_type), intent(in) :: problem
-      real(dp), intent(in) :: gap(:, :)
-      real(dp), intent(in) :: direction(:, :)
-      real(dp), intent(in) :: slope                !! -r.d, < 0
-      real(dp), intent(in) :: form                 !! estimate of Q d.B d, > 0
-      real(dp), intent(inout) :: rows(:, :)        !! work, at least [2, rows]
-      integer, intent(in) :: threads
-      real(dp) :: alpha
-      real(dp) :: base, value, lower, upper, stiffness, low_value, high_value
-      integer :: pass
-
-      alpha = -slope/form
-      if (.not. has_smooth_potential(problem%potential)) return
-      call sums(0.0_dp, base, stiffness)
-      if (form + stiffness > 0.1_dp*form) alpha = -slope/(form + stiffness)
-      lower = 0.0_dp
-      low_value = slope
-      upper = huge(1.0_dp)
-      high_value = huge(1.0_dp)
-      do pass = 1, 6
-         call sums(alpha, value, stiffness)
-         value = slope + alpha*form + value - base
-         if (abs(value) <= 0.1_dp*abs(slope)) return
-         if (value < 0.0_dp) then
-            lower = alpha
-            low_value = value
-         else
-            upper = alpha
-            high_value = value
-         end if
-         if (upper < huge(1.0_dp)) then
-            alpha = chord_root(lower, low_value, upper, high_value, 0.1_dp)
-         else if (form + stiffness > 0.25_dp*form) then
-            alpha = alpha - value/(form + stiffness)
-         else
-            alpha = 2.0_dp*alpha
-         end if
-      end do
-
-   contains
-
-      !> Sum of d e' and of d e'' d at g + a d.
-      subroutine sums(a, first, second)
-         real(dp), intent(in) :: a
-         real(dp), intent(out) :: first, second
-         real(dp) :: x, e, e1, e2, s1, s2
-         integer :: i, j
-
-         !$omp parallel do default(none) shared(problem, gap, direction, rows, a) &
-         !$omp private(i, j, x, e, e1, e2, s1, s2) num_threads(threads)
-         do j = 1, size(gap, 2)
-            s1 = 0.0_dp
-            s2 = 0.0_dp
-            do i = 1, size(gap, 1)
-               if (direction(i, j) == 0.0_dp) cycle
-               x = gap(i, j) + a*direction(i, j)
-               call adhesive_terms(problem%potential, max(x, 0.0_dp), e, e1, e2)
-               s1 = s1 + direction(i, j)*e1
-               if (x > 0.0_dp) s2 = s2 + direction(i, j)**2*e2
-            end do
-            rows(1, j) = s1
-            rows(2, j) = s2
-         end do
-         first = row_total(rows(:, 1:size(gap, 2)), 1)
-         second = row_total(rows(:, 1:size(gap, 2)), 2)
-      end subroutine sums
-
-   end function clipped_step
-
-   !> How far to go along the segment s: t near the first minimum of the energy, never where the
-   !> energy is higher than at t = 0; 0 if there is no such t. With a clipped s, t = 1 closes gaps for
-   !> good, and is taken where the minimum is not much nearer.
-   function choose_step(known, problem, gap, direction, alpha, shift, rows, threads) result(t)
-      type(step_sums_type), intent(in) :: known
-      type(adhesion_problem_type), intent(in) :: problem
-      real(dp), intent(in) :: gap(:, :)            !! g, m
-      real(dp), intent(in) :: direction(:, :)      !! d; s = stepped_gap(g, d, alpha, shift) - g
-      real(dp), intent(in) :: alpha, shift
-      real(dp), intent(inout) :: rows(:, :)        !! work, at least [2, rows]
-      integer, intent(in) :: threads
-      real(dp) :: t
-      real(dp) :: longest, value, rise, lower, upper, low_value, high_value, noise, stiffness
-      integer :: pass
-      logical :: smooth
-
-      t = 0.0_dp
-      smooth = has_smooth_potential(problem%potential)
-      if (.not. known%slope < 0.0_dp) return
-      noise = 4.0_dp*epsilon(1.0_dp)*abs(known%energy)
-      longest = merge(1.0_dp, known%longest, known%clipped)
-      lower = 0.0_dp
-      low_value = known%slope
-      upper = huge(1.0_dp)
-      high_value = huge(1.0_dp)
-      stiffness = known%form
-      if (known%form + known%curvature > 0.1_dp*known%form) &
-         stiffness = known%form + known%curvature
-      t = min(-known%slope/stiffness, longest)
-      if (known%clipped .and. t > 0.55_dp) t = 1.0_dp
-      do pass = 1, merge(8, 1, smooth)
-         call try(t, value, rise)
-         if (rise <= noise) then
-            if (abs(value) <= sharpness*abs(known%slope)) return
-            if (known%clipped .and. t >= 1.0_dp .and. value <= 0.8_dp*abs(known%slope)) return
-            if (value < 0.0_dp .and. t >= longest) return
-            if (.not. smooth) return
-         end if
-         if (value > 0.0_dp .or. rise > noise) then
-            upper = t
-            high_value = max(value, 0.5_dp*abs(known%slope))
-         else
-            lower = t
-            low_value = value
-         end if
-         if (upper < huge(1.0_dp)) then
-            t = chord_root(lower, low_value, upper, high_value, 0.05_dp)
-         else
-            t = min(longest, 4.0_dp*t, merge(t*known%slope/(known%slope - value), 4.0_dp*t, &
-               value > 0.9_dp*known%slope))
-         end if
-      end do
-      do pass = 1, 20
-         call try(t, value, rise)
-         if (rise <= noise) return
-         t = 0.25_dp*t
-      end do
-      t = 0.0_dp
-
-   contains
-
-      !> Slope of the energy at t, and its rise from t = 0.
-      subroutine try(at, gradient, change)
-         real(dp), intent(in) :: at
-         real(dp), intent(out) :: gradient, change
-         real(dp) :: adhesive, energy
-
-         call segment(at, adhesive, energy)
-         gradient = known%slope + at*known%form + adhesive - known%adhesive_slope
-         change = at*(known%slope - known%adhesive_slope) + 0.5_dp*at**2*known%form &
-            + energy - known%energy
-      end subroutine try
-
-      !> Sum of s e'(g + t s) and of e(g + t s).
-      subroutine segment(at, slopes, energies)
-         real(dp), intent(in) :: at
-         real(dp), intent(out) :: slopes, energies
-         real(dp) :: s, e, e1, e2, s1, s2
-         integer :: i, j
-
-         !$omp parallel do default(none) shared(problem, gap, direction, alpha, shift, rows, at) &
-         !$omp private(i, j, s, e, e1, e2, s1, s2) num_threads(threads)
-         do j = 1, size(gap, 2)
-            s1 = 0.0_dp
-            s2 = 0.0_dp
-            do i = 1, size(gap, 1)
-               s = stepped_gap(gap(i, j), direction(i, j), alpha, shift) - gap(i, j)
-               call adhesive_terms(problem%potential, max(gap(i, j) + at*s, 0.0_dp), e, e1, e2)
-               s1 = s1 + s*e1
-               s2 = s2 + e
-            end do
-            rows(1, j) = s1
-            rows(2, j) = s2
-         end do
-         slopes = row_total(rows(:, 1:size(gap, 2)), 1)
-         energies = row_total(rows(:, 1:size(gap, 2)), 2)
-      end subroutine segment
-
-   end function choose_step
-
-   !> Where the chord between two ends of different sign is zero, kept off both ends.
-   pure function chord_root(lower, low_value, upper, high_value, margin) result(root)
-      real(dp), intent(in) :: lower, low_value     !! one end and the value there
-      real(dp), intent(in) :: upper, high_value    !! the other
-      real(dp), intent(in) :: margin               !! least distance from an end, over their distance
-      real(dp) :: root
-
-      root = lower - low_value*(upper - lower)/(high_value - low_value)
-      root = min(max(root, lower + margin*(upper - lower)), upper - margin*(upper - lower))
-   end function chord_root
-
-   !> The clipped step s of a row of cells, and its part of what is known without B s.
-   subroutine form_step_row(problem, gap, direction, residual, alpha, shift, s, sums)
-      type(adhesion_problem_type), intent(in) :: problem
-      real(dp), intent(in), contiguous :: gap(:)       !! g, m
-      real(dp), intent(in), contiguous :: direction(:) !! d
-      real(dp), intent(in), contiguous :: residual(:)  !! r, Pa
-      real(dp), intent(in) :: alpha, shift
-      real(dp), intent(out) :: s(:)                    !! m
-      real(dp), intent(out) :: sums(6)                 !! for `collect_step`
-      real(dp) :: slope, adhesive, curvature, energy, longest, e, e1, e2
-      integer :: i, clipped
-
-      slope = 0.0_dp
-      adhesive = 0.0_dp
-      curvature = 0.0_dp
-      energy = 0.0_dp
-      longest = huge(1.0_dp)
-      clipped = 0
-      do i = 1, size(gap)
-         s(i) = stepped_gap(gap(i), direction(i), alpha, shift) - gap(i)
-         call adhesive_terms(problem%potential, gap(i), e, e1, e2)
-         slope = slope - residual(i)*s(i)
-         adhesive = adhesive + s(i)*e1
-         curvature = curvature + s(i)**2*e2
-         energy = energy + e
-         if (s(i) < 0.0_dp) then
-            longest = min(longest, gap(i)/(-s(i)))
-            if (s(i) == -gap(i)) clipped = 1
-         end if
-      end do
-      sums = [slope, adhesive, curvature, energy, longest, real(clipped, dp)]
-   end subroutine form_step_row
-
-   !> What is known of a step, from the sums of its rows.
-   subroutine collect_step(rows, known)
-      real(dp), intent(in) :: rows(:, :)               !! (1:6, j): the sums of row j
-      type(step_sums_type), intent(out) :: known
-
-      known%slope = row_total(rows, 1)
-      known%adhesive_slope = row_total(rows, 2)
-      known%curvature = row_total(rows, 3)
-      known%energy = row_total(rows, 4)
-      known%longest = global_min(minval(rows(5, :)))
-      known%clipped = global_max(maxval(rows(6, :))) > 0.0_dp
-   end subroutine collect_step
-
-   !> The gap after a step along d, closed where it would be negative, less a shift that keeps its sum.
-   elemental function stepped_gap(gap, direction, alpha, shift) result(value)
-      real(dp), intent(in) :: gap, direction, alpha, shift
-      real(dp) :: value
-
-      value = gap + alpha*direction
-      if (value > 0.0_dp) then
-         value = max(value - shift, 0.0_dp)
-      else
-         value = 0.0_dp
-      end if
-   end function stepped_gap
-
-   !> The shift with which the stepped gaps have the sum `total`: Newton's steps rise to it.
-   function sum_shift(gap, direction, alpha, total, rows, threads) result(shift)
-      real(dp), intent(in) :: gap(:, :), direction(:, :)
-      real(dp), intent(in) :: alpha
-      real(dp), intent(in) :: total                !! m, > 0
-      real(dp), intent(inout) :: rows(:, :)        !! work, at least [2, rows]
-      integer, intent(in) :: threads
-      real(dp) :: shift
-      real(dp) :: above, next, x, s1
-      integer :: i, j, count, n
-
-      shift = 0.0_dp
-      do
-         !$omp parallel do default(none) shared(gap, direction, alpha, shift, rows) &
-         !$omp private(i, j, x, s1, n) num_threads(threads)
-         do j = 1, size(gap, 2)
-            s1 = 0.0_dp
-            n = 0
-            do i = 1, size(gap, 1)
-               x = gap(i, j) + alpha*direction(i, j)
-               if (x > max(shift, 0.0_dp)) then
-                  s1 = s1 + x
-                  n = n + 1
-               end if
-            end do
-            rows(1, j) = s1
-            rows(2, j) = real(n, dp)
-         end do
-         above = row_total(rows(:, 1:size(gap, 2)), 1)
-         count = nint(row_total(rows(:, 1:size(gap, 2)), 2))
-         if (count == 0) exit
-         next = (above - total)/count
-         if (next <= shift) then
-            ! Too small a sum: all that is open is lifted.
-            if (shift == 0.0_dp) shift = next
-            exit
-         end if
-         shift = next
-      end do
-   end function sum_shift
 
 end module adhesion_state

@@ -1,0 +1,486 @@
+!> The patch of an adhesive contact: what differs between periodic and free grids.
+!>
+!> The methods work on fields of one layout, the grid of the unknowns. Its cells from (1, 1) to (nx, ny)
+!> are the patch, where the unknown is the gap g. In periodic mode the patch is everything. B is the
+!> inverse of the periodic operator for G = 1; its mean mode is zero, and the mean of the traction, the
+!> load p, is kept as a number beside the field.
+!>
+!> In free mode the grid is doubled. The truncated operator of Love's coefficients has no symbol to
+!> invert. But on the doubled grid the wrapped coefficients have one, K, that is positive, and B = 1/K
+!> there. The padding has no adhesion, its surface is free, and the unknown there is the displacement u:
+!> minimised over it, the energy is that of the free operator on the patch (Schur complement). With
+!> u = g + H + level on the patch,
+!>
+!>     P = Q B u - P_h on the patch, 0 in the padding
+!>
+!> Where the load is prescribed the level is one more unknown. It moves with the mode psi, which is 1 on
+!> the patch and falls in the padding as the displacement of a uniform pressure does. A solution is
+!> checked with the displacement of its pressure by the true free operator: there the padding drops out.
+module adhesion_patch
+   use adhesion_potential, only : adhesive_slope
+   use adhesion_state, only : adhesion_problem_type, close_gaps, control_approach, control_pressure, &
+      resolved_traction, traction_scale
+   use adhesion_steps, only : stepped_gap, sum_shift
+   use asperity_errors, only : error_input, error_type, fail
+   use asperity_parallel, only : global_max, global_min, global_sum
+   use asperity_precision, only : dp, int64, pi
+   use fft_conv, only : columns_apply, convolution_type, new_normal_operator, new_symbol_operator
+   use influence, only : normal_symbol
+   use regular_grid, only : boundary_periodic, grid_type
+   implicit none
+   private
+
+   public :: adhesion_contact_type, adhesion_patch_type, evaluate_gradient, is_detached, natural_residual, &
+      new_adhesion_patch, residual_units_type
+
+   !> The units in which the natural residual is measured.
+   type :: residual_units_type
+      real(dp) :: length = 1.0_dp        !! z_0, or the rms height without adhesion, m
+      real(dp) :: traction = 1.0_dp      !! gamma_0/z_0, or the largest traction without adhesion, Pa
+   end type residual_units_type
+
+   !> The fields and numbers of a contact that is being solved.
+   type :: adhesion_contact_type
+      type(adhesion_problem_type) :: problem
+      real(dp), pointer, contiguous :: height(:, :) => null()    !! H on the patch, m
+      real(dp), pointer :: history(:, :) => null()               !! P_h on the patch, Pa; may be missing
+      real(dp), pointer, contiguous :: state(:, :) => null()     !! g on the patch, u in the padding, m
+      real(dp), pointer, contiguous :: traction(:, :) => null()  !! P; in periodic mode P - p, Pa
+      real(dp) :: load = 0.0_dp          !! p in periodic mode, Pa; else 0
+      real(dp) :: force = 0.0_dp         !! prescribed sum of P in free mode, Pa; else 0
+      real(dp) :: gap_sum = 0.0_dp       !! prescribed sum of g in periodic mode at a prescribed level, m
+      real(dp) :: level = 0.0_dp         !! U - H where the gap is zero, free mode, m
+      real(dp) :: mean_height = 0.0_dp   !! of the patch above the datum, m
+      real(dp) :: mean_history = 0.0_dp  !! what of the history does not matter, Pa
+      type(residual_units_type) :: units
+   end type adhesion_contact_type
+
+   !> A patch with its operators. Not to be copied.
+   type :: adhesion_patch_type
+      logical :: periodic = .true.
+      integer :: nx = 0, ny = 0                            !! cells of the patch
+      integer :: mx = 0, my = 0                            !! cells of the grid of the unknowns
+      integer :: threads = 1
+      real(dp) :: cells = 1.0_dp                           !! number of the patch's
+      type(convolution_type) :: stiffness                  !! B for G = 1
+      real(dp) :: nyquist = 0.0_dp                         !! B at the Nyquist wave number
+      real(dp) :: longest = 0.0_dp                         !! B at the least wave number
+      real(dp), allocatable :: psi(:, :)                   !! the mode of the level, free mode only
+      real(dp) :: psi_form = 0.0_dp                        !! psi.B psi
+      type(convolution_type), private :: operator          !! the true free operator
+   contains
+      procedure :: inner
+      procedure :: is_closed_up
+      procedure :: begin
+      procedure :: evaluate_traction
+      procedure :: true_residual
+      procedure :: hand_out
+      procedure :: transforms
+      procedure :: destroy
+   end type adhesion_patch_type
+
+contains
+
+   !> Make the patch of a grid, and its symbols for a preconditioner.
+   subroutine new_adhesion_patch(self, grid, poisson, stiffness, compliance, error)
+      type(adhesion_patch_type), intent(out) :: self
+      type(grid_type), intent(in) :: grid                      !! free grids: ny > 1
+      real(dp), intent(in) :: poisson
+      real(dp), allocatable, intent(out) :: stiffness(:, :)    !! B for G = 1, (0:mx/2, 0:my/2)
+      real(dp), allocatable, intent(out) :: compliance(:, :)   !! about its inverse, > 0
+      type(error_type), allocatable, intent(out) :: error
+
+      self%periodic = grid%boundary == boundary_periodic
+      self%nx = grid%nx
+      self%ny = grid%ny
+      self%cells = real(grid%nx, dp)*grid%ny
+      self%nyquist = pi/sqrt(grid%dx*merge(grid%dx, grid%dy, grid%ny == 1))/(1.0_dp - poisson)
+      self%longest = 2.0_dp*pi/max(grid%lx, merge(0.0_dp, grid%ly, grid%ny == 1))/(1.0_dp - poisson)
+      self%mx = merge(1, 2, self%periodic)*grid%nx
+      self%my = merge(1, 2, self%periodic)*grid%ny
+      allocate (stiffness(0:self%mx/2, 0:self%my/2), compliance(0:self%mx/2, 0:self%my/2))
+      if (self%periodic) then
+         call periodic_symbols(self, grid, poisson, stiffness, compliance)
+      else if (grid%ny < 2) then
+         call fail(error, error_input, 'adhesion_patch: a free grid must have ny > 1')
+         return
+      else
+         call normal_symbol(grid, poisson, self%mx, self%my, compliance)
+         if (minval(compliance) <= 0.0_dp) then
+            call fail(error, error_input, 'adhesion_patch: the symbol of this grid is not positive')
+            return
+         end if
+         stiffness = 1.0_dp/compliance
+         call new_normal_operator(self%operator, grid, poisson, error)
+         if (allocated(error)) return
+      end if
+      call new_symbol_operator(self%stiffness, self%mx, self%my, stiffness, error)
+      if (allocated(error)) return
+      self%threads = self%stiffness%threads
+      if (.not. self%periodic) call make_psi(self)
+   end subroutine new_adhesion_patch
+
+   !> B = |q|/(1 - nu), and the inverse of B kept finite at wave number zero.
+   subroutine periodic_symbols(self, grid, poisson, stiffness, compliance)
+      type(adhesion_patch_type), intent(in) :: self
+      type(grid_type), intent(in) :: grid
+      real(dp), intent(in) :: poisson
+      real(dp), intent(out) :: stiffness(0:, 0:), compliance(0:, 0:)
+      integer :: i, j
+
+      do j = 0, grid%ny/2
+         do i = 0, grid%nx/2
+            stiffness(i, j) = 2.0_dp*pi*hypot(i/grid%lx, j/grid%ly)/(1.0_dp - poisson)
+            compliance(i, j) = 1.0_dp/(stiffness(i, j) + self%longest)
+         end do
+      end do
+   end subroutine periodic_symbols
+
+   !> psi: the displacement of a uniform pressure on the patch over its least value there, at most 1.
+   subroutine make_psi(self)
+      type(adhesion_patch_type), intent(inout) :: self
+      real(dp), allocatable :: pressure(:, :)
+      real(dp) :: least
+      integer :: j
+
+      allocate (pressure(self%mx, self%my), self%psi(self%mx, self%my), source=0.0_dp)
+      pressure(1:self%nx, 1:self%ny) = 1.0_dp
+      call self%stiffness%apply_inverse(pressure, self%psi)
+      least = global_min(minval(self%psi(1:self%nx, 1:self%ny)))
+      do j = 1, self%my
+         self%psi(:, j) = min(self%psi(:, j)/least, 1.0_dp)
+      end do
+      call self%stiffness%quadratic_form(self%psi, self%psi_form)
+   end subroutine make_psi
+
+   !> How many cells of row j belong to the patch: the first ones.
+   pure function inner(self, j) result(n)
+      class(adhesion_patch_type), intent(in) :: self
+      integer, intent(in) :: j
+      integer :: n
+
+      n = merge(self%nx, 0, j <= self%ny)
+   end function inner
+
+   !> Does a prescribed level leave no gap at all? In free mode the solid can always bulge outside.
+   function is_closed_up(self, problem, height) result(closed)
+      class(adhesion_patch_type), intent(in) :: self
+      type(adhesion_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: height(:, :)
+      logical :: closed
+
+      closed = .false.
+      if (self%periodic .and. problem%control == control_approach) closed = .not. problem%target &
+         + (field_sum(height, self%threads)/self%cells - problem%datum) < 0.0_dp
+   end function is_closed_up
+
+   !> Put a contact at its start, in `gap` (periodic) or in `pressure` and `level` (free), or in full
+   !> contact; and settle the units of the residual.
+   subroutine begin(self, contact, gap, pressure)
+      class(adhesion_patch_type), intent(inout) :: self
+      class(adhesion_contact_type), intent(inout) :: contact    !! with its fields and the level set
+      real(dp), intent(in) :: gap(:, :), pressure(:, :)        !! of the patch; free mode only
+      real(dp) :: deviation, spread, round_off, greatest
+
+      contact%mean_height = field_sum(contact%height, self%threads)/self%cells - contact%problem%datum
+      deviation = rms(contact%height, contact%mean_height + contact%problem%datum, self%cells, self%threads)
+      spread = contact%problem%datum - global_min(minval(contact%height))
+      contact%units%length = contact%problem%potential%range
+      if (.not. contact%units%length > 0.0_dp) contact%units%length = deviation
+      if (self%periodic) then
+         call begin_periodic(self, contact)
+      else
+         round_off = 20.0_dp*epsilon(1.0_dp)*(abs(contact%level) + spread)
+         contact%units%length = max(contact%units%length, round_off/contact%problem%tolerance)
+         call begin_free(self, contact, gap, pressure)
+      end if
+      call self%evaluate_traction(contact)
+      greatest = max(abs(contact%load), largest(contact%traction, self%threads))
+      contact%units%traction = max(resolved_traction(contact%problem, greatest, self%nyquist, spread), &
+         traction_scale(contact%problem%potential, max(greatest, contact%problem%modulus*self%longest*deviation)))
+   end subroutine begin
+
+   !> The load or the sum of the gap that is prescribed, and the gap on what is allowed.
+   subroutine begin_periodic(self, contact)
+      type(adhesion_patch_type), intent(in) :: self
+      class(adhesion_contact_type), intent(inout) :: contact
+      real(dp) :: shift
+      integer :: j
+
+      contact%level = 0.0_dp
+      if (associated(contact%history)) &
+         contact%mean_history = field_sum(contact%history, self%threads)/self%cells
+      if (contact%problem%control == control_pressure) contact%load = contact%problem%target
+      !$omp parallel do default(none) shared(contact) private(j) num_threads(self%threads)
+      do j = 1, self%ny
+         contact%state(:, j) = max(contact%state(:, j), 0.0_dp)
+         if (contact%problem%full_contact) contact%state(:, j) = 0.0_dp
+      end do
+      if (contact%problem%control /= control_approach) return
+      contact%gap_sum = -self%cells*(contact%problem%target + contact%mean_height)
+      if (field_sum(contact%state, self%threads) > 0.0_dp) then
+         shift = sum_shift(contact%state, contact%state, 0.0_dp, contact%gap_sum, self%threads)
+         !$omp parallel do default(none) shared(contact, shift) private(j) num_threads(self%threads)
+         do j = 1, self%ny
+            contact%state(:, j) = stepped_gap(contact%state(:, j), 0.0_dp, 0.0_dp, shift)
+         end do
+      else
+         contact%state(:, :) = contact%gap_sum/self%cells
+      end if
+   end subroutine begin_periodic
+
+   !> The state of the pressure and the level handed in, or full contact. The gap of a pressure is not
+   !> sharp: gaps within the tolerance count as none, so that a contact that is handed in stays one.
+   subroutine begin_free(self, contact, gap, pressure)
+      type(adhesion_patch_type), intent(inout) :: self
+      class(adhesion_contact_type), intent(inout) :: contact
+      real(dp), intent(in) :: gap(:, :), pressure(:, :)
+      real(dp) :: g
+      integer :: i, j
+
+      if (contact%problem%control == control_pressure) contact%force = contact%problem%target*self%cells
+      if (contact%problem%full_contact) then
+         if (contact%problem%control /= control_approach) contact%level = -contact%mean_height
+         do j = 1, self%my
+            contact%state(:, j) = (contact%level + contact%mean_height)*self%psi(:, j)
+            if (j <= self%ny) contact%state(1:self%nx, j) = max(gap(:, j), 0.0_dp)
+         end do
+         return
+      end if
+      do j = 1, self%my
+         contact%traction(:, j) = 0.0_dp
+         if (j > self%ny) cycle
+         contact%traction(1:self%nx, j) = pressure(:, j)
+         if (associated(contact%history)) contact%traction(1:self%nx, j) = pressure(:, j) &
+            + contact%history(:, j)
+      end do
+      call self%stiffness%apply_inverse(contact%traction, contact%state)
+      do j = 1, self%my
+         contact%state(:, j) = contact%state(:, j)/contact%problem%modulus
+         do i = 1, self%inner(j)
+            g = contact%state(i, j) - (contact%height(i, j) - contact%problem%datum) - contact%level
+            contact%state(i, j) = merge(g, 0.0_dp, g > contact%problem%tolerance*contact%units%length)
+         end do
+      end do
+   end subroutine begin_free
+
+   !> The traction from the state by a product with B.
+   subroutine evaluate_traction(self, contact)
+      class(adhesion_patch_type), intent(inout) :: self
+      class(adhesion_contact_type), intent(inout) :: contact
+      real(dp), allocatable :: row(:)
+      real(dp) :: form
+      integer :: j
+
+      associate (nx => self%nx)
+         !$omp parallel default(none) shared(self, contact) private(j, row) num_threads(self%threads)
+         allocate (row(self%mx))
+         !$omp do
+         do j = 1, self%my
+            row(:) = contact%state(:, j)
+            if (j <= self%ny) row(1:nx) = row(1:nx) + (contact%height(:, j) - contact%problem%datum) + contact%level
+            call self%stiffness%forward_row(1, j, row)
+         end do
+         !$omp end do
+         !$omp end parallel
+         call self%stiffness%columns(columns_apply, form)
+         !$omp parallel do default(none) shared(self, contact) private(j) num_threads(self%threads)
+         do j = 1, self%my
+            call self%stiffness%backward_row(1, j, contact%traction(:, j))
+            contact%traction(:, j) = contact%problem%modulus*contact%traction(:, j)
+            if (j <= self%ny .and. associated(contact%history)) contact%traction(1:nx, j) = &
+               contact%traction(1:nx, j) - (contact%history(:, j) - contact%mean_history)
+         end do
+      end associate
+   end subroutine evaluate_traction
+
+   !> The gradient of the energy on the patch less the load p; and p, the mean multiplier over the open
+   !> cells, in periodic mode at a prescribed level.
+   subroutine evaluate_gradient(self, contact, gradient)
+      type(adhesion_patch_type), intent(in) :: self
+      class(adhesion_contact_type), intent(inout) :: contact
+      real(dp), intent(inout) :: gradient(:, :)        !! out: P + e'(g) on the patch, Pa
+      real(dp), allocatable :: sums(:)
+      integer, allocatable :: counts(:)
+      integer :: j
+
+      allocate (sums(self%ny), counts(self%ny))
+      associate (nx => self%nx)
+         !$omp parallel do default(none) shared(self, contact, gradient, sums, counts) private(j) &
+         !$omp num_threads(self%threads)
+         do j = 1, self%ny
+            gradient(1:nx, j) = contact%traction(1:nx, j) &
+               + adhesive_slope(contact%problem%potential, contact%state(1:nx, j))
+            sums(j) = sum(gradient(1:nx, j), contact%state(1:nx, j) > 0.0_dp)
+            counts(j) = count(contact%state(1:nx, j) > 0.0_dp)
+         end do
+      end associate
+      if (self%periodic .and. contact%problem%control == control_approach) &
+         contact%load = -global_sum(sum(sums))/global_sum(sum(counts))
+   end subroutine evaluate_gradient
+
+   !> Is the solid pulled, and are all gaps so wide that no cell attracts as much as the mean pull?
+   pure function is_detached(self, contact, least) result(detached)
+      type(adhesion_patch_type), intent(in) :: self
+      class(adhesion_contact_type), intent(in) :: contact
+      real(dp), intent(in) :: least                    !! least gap, m
+      logical :: detached
+      real(dp) :: pull
+
+      pull = -contact%load
+      if (.not. self%periodic) pull = -contact%force/self%cells
+      detached = contact%problem%control == control_pressure .and. pull > 0.0_dp .and. &
+         least > 3.0_dp*contact%problem%potential%range
+      if (detached) detached = adhesive_slope(contact%problem%potential, least) < pull
+   end function is_detached
+
+   !> Error of a cell: |min(g/z_0, G z_0/gamma_0)|.
+   elemental function natural_residual(units, gap, gradient) result(error)
+      type(residual_units_type), intent(in) :: units
+      real(dp), intent(in) :: gap           !! g, m
+      real(dp), intent(in) :: gradient      !! G, Pa
+      real(dp) :: error
+
+      error = abs(min(gap/units%length, gradient/units%traction))
+   end function natural_residual
+
+   !> The natural residual of a free patch with the displacement of its pressure by the true operator.
+   function true_residual(self, contact) result(natural)
+      class(adhesion_patch_type), intent(inout) :: self
+      class(adhesion_contact_type), intent(in) :: contact
+      real(dp) :: natural
+      real(dp), allocatable :: row(:)
+      real(dp) :: form, worst, load
+      integer :: j
+
+      !$omp parallel default(none) shared(self, contact) private(j, row) num_threads(self%operator%threads)
+      allocate (row(self%nx))
+      !$omp do
+      do j = 1, self%ny
+         row(:) = contact%traction(1:self%nx, j)
+         if (associated(contact%history)) row(:) = row + contact%history(:, j)
+         call self%operator%forward_row(1, j, row)
+      end do
+      !$omp end do
+      !$omp end parallel
+      call self%operator%columns(columns_apply, form)
+      worst = 0.0_dp
+      !$omp parallel default(none) shared(self, contact) private(j, row) &
+      !$omp reduction(max: worst) num_threads(self%operator%threads)
+      allocate (row(self%nx))
+      !$omp do
+      do j = 1, self%ny
+         call self%operator%backward_row(1, j, row)
+         row(:) = row/contact%problem%modulus - (contact%height(:, j) - contact%problem%datum) - contact%level
+         worst = max(worst, maxval(natural_residual(contact%units, row, contact%traction(1:self%nx, j) &
+            + adhesive_slope(contact%problem%potential, max(row, 0.0_dp)))))
+      end do
+      !$omp end do
+      !$omp end parallel
+      natural = global_max(worst)
+      if (contact%problem%control /= control_pressure) return
+      load = field_sum(contact%traction(1:self%nx, 1:self%ny), self%threads)
+      natural = max(natural, abs(load - contact%force)/max(abs(contact%force), contact%units%traction))
+   end function true_residual
+
+   !> Gap, pressure and level of the solution, with gaps of exactly zero where the wall carries the
+   !> cell; and the error of what was prescribed.
+   subroutine hand_out(self, contact, gap, pressure, level, load_error)
+      class(adhesion_patch_type), intent(in) :: self
+      class(adhesion_contact_type), intent(in) :: contact
+      real(dp), intent(inout), target :: gap(:, :)          !! in periodic mode the state itself
+      real(dp), intent(inout), target :: pressure(:, :)     !! in periodic mode the traction itself
+      real(dp), intent(inout) :: level                      !! m
+      real(dp), intent(out) :: load_error
+      real(dp) :: sum_of_gap, sum_of_pressure, scale
+      integer :: j
+
+      !$omp parallel do default(none) shared(self, contact, gap, pressure) private(j) num_threads(self%threads)
+      do j = 1, self%ny
+         gap(:, j) = contact%state(1:self%nx, j)
+         pressure(:, j) = contact%traction(1:self%nx, j) + contact%load
+      end do
+      load_error = 0.0_dp
+      sum_of_pressure = field_sum(pressure, self%threads)
+      if (self%periodic) then
+         sum_of_gap = field_sum(gap, self%threads)
+         level = -contact%mean_height - sum_of_gap/self%cells
+         scale = max(abs(contact%load), epsilon(1.0_dp)*largest(pressure, self%threads), tiny(1.0_dp))
+         load_error = abs(sum_of_pressure/self%cells - contact%load)/scale
+         if (contact%problem%control == control_approach) &
+            load_error = abs(sum_of_gap - contact%gap_sum)/contact%gap_sum
+      else
+         level = contact%level
+         if (contact%problem%control == control_pressure) load_error = abs(sum_of_pressure - contact%force) &
+            /max(abs(contact%force), contact%units%traction)
+      end if
+      call close_gaps(contact%problem, contact%units%length, contact%units%traction, self%threads, gap, pressure)
+   end subroutine hand_out
+
+   !> Transforms done so far.
+   pure function transforms(self) result(count)
+      class(adhesion_patch_type), intent(in) :: self
+      integer(int64) :: count
+
+      count = self%stiffness%ffts + self%operator%ffts
+   end function transforms
+
+   !> Sum of a field, by rows in order.
+   function field_sum(field, threads) result(total)
+      real(dp), intent(in) :: field(:, :)
+      integer, intent(in) :: threads
+      real(dp) :: total
+      real(dp), allocatable :: rows(:)
+      integer :: j
+
+      allocate (rows(size(field, 2)))
+      !$omp parallel do default(none) shared(rows, field) private(j) num_threads(threads)
+      do j = 1, size(field, 2)
+         rows(j) = sum(field(:, j))
+      end do
+      total = global_sum(sum(rows))
+   end function field_sum
+
+   !> Largest magnitude of a field.
+   function largest(field, threads) result(value)
+      real(dp), intent(in) :: field(:, :)
+      integer, intent(in) :: threads
+      real(dp) :: value
+      integer :: j
+
+      value = tiny(1.0_dp)
+      !$omp parallel do default(none) shared(field) private(j) reduction(max: value) num_threads(threads)
+      do j = 1, size(field, 2)
+         value = max(value, maxval(abs(field(:, j))))
+      end do
+      value = global_max(value)
+   end function largest
+
+   !> Root mean square of a field about its mean.
+   function rms(field, mean, cells, threads) result(value)
+      real(dp), intent(in) :: field(:, :)
+      real(dp), intent(in) :: mean
+      real(dp), intent(in) :: cells
+      integer, intent(in) :: threads
+      real(dp) :: value
+      real(dp), allocatable :: rows(:)
+      integer :: j
+
+      allocate (rows(size(field, 2)))
+      !$omp parallel do default(none) shared(rows, field, mean) private(j) num_threads(threads)
+      do j = 1, size(field, 2)
+         rows(j) = sum((field(:, j) - mean)**2)
+      end do
+      value = max(sqrt(global_sum(sum(rows))/cells), tiny(1.0_dp))
+   end function rms
+
+   !> Free plans and memory.
+   subroutine destroy(self)
+      class(adhesion_patch_type), intent(inout) :: self
+
+      call self%stiffness%destroy()
+      call self%operator%destroy()
+      if (allocated(self%psi)) deallocate (self%psi)
+   end subroutine destroy
+
+end module adhesion_patch
