@@ -23,7 +23,7 @@ module asperity
    use contact_solver, only : contact_solver_type
    use asperity_errors, only : error_convergence, error_file, error_input, error_type
    use fft_conv, only : convolution_type, new_normal_operator, new_tangential_operator
-   use friction_cg, only : friction_solver_type, new_friction_solver
+   use friction_cg, only : friction_fields_type, friction_solver_type, new_friction_solver
    use friction_law, only : friction_law_type, new_friction_law
    use history_row, only : history_row_type
    use asperity_interpolation, only : displaced, interpolation_type, new_interpolation, shifted

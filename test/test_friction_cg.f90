@@ -3,8 +3,8 @@ module test_friction_cg
    use check, only : begin_suite, check_close, check_no_error, check_that
    use asperity_errors, only : error_type
    use fft_conv, only : convolution_type, new_tangential_operator
-   use friction_cg, only : friction_fast, friction_gradient, friction_solver_type, friction_thesis, &
-      new_friction_solver, set_mean_compliance
+   use friction_cg, only : friction_fast, friction_fields_type, friction_gradient, &
+      friction_solver_type, friction_thesis, new_friction_solver, set_mean_compliance
    use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type, &
       largest_excess, new_friction_law, return_tractions
    use asperity_parallel, only : set_threads, thread_count
@@ -80,6 +80,34 @@ contains
       self%solver%tolerance = 1e-9_dp
    end subroutine new_case
 
+   !> Solve.
+   subroutine solve_case(self, past)
+      type(case_type), intent(inout), target :: self
+      real(dp), intent(in), contiguous, target, optional :: past(:, :, :)   !! T_h, [nx, ny, 2]
+      type(friction_fields_type) :: fields
+      real(dp), allocatable, target :: drive(:, :, :), traction(:, :, :), slip(:, :, :)
+
+      allocate (drive(self%grid%nx, self%grid%ny, 2))
+      allocate (traction, slip, mold=drive)
+      drive(:, :, 1) = self%drive_x
+      drive(:, :, 2) = self%drive_y
+      traction(:, :, 1) = self%tx
+      traction(:, :, 2) = self%ty
+      fields%pressure => self%p
+      fields%slope_x => self%hx
+      fields%slope_y => self%hy
+      fields%drive => drive
+      if (present(past)) fields%past => past
+      fields%traction => traction
+      fields%slip => slip
+      fields%contact => self%contact
+      call self%solver%solve(self%operator, self%law, fields, self%result)
+      self%tx = traction(:, :, 1)
+      self%ty = traction(:, :, 2)
+      self%rx = slip(:, :, 1)
+      self%ry = slip(:, :, 2)
+   end subroutine solve_case
+
    !> Solve, and prove the result without the solver: bound, stick, direction, no reversed slip, and
    !> the slip itself from another product.
    subroutine run_case(self, what, accuracy)
@@ -88,8 +116,7 @@ contains
       real(dp), intent(in) :: accuracy       !! of the law of slip, over the displacements
 
       where (self%contact /= contact_open) self%contact = contact_stick
-      call self%solver%solve(self%operator, self%law, self%p, self%hx, self%hy, self%drive_x, &
-         self%drive_y, self%contact, self%tx, self%ty, self%rx, self%ry, self%result)
+      call solve_case(self)
       call check_that(self%result%converged, what//': converged, '//trim(self%result%reason))
       call prove(self, what, accuracy)
    end subroutine run_case
@@ -256,8 +283,7 @@ contains
       real(dp), intent(in) :: accuracy
 
       where (self%contact /= contact_open) self%contact = contact_stick
-      call self%solver%solve(self%operator, self%law, self%p, self%hx, self%hy, self%drive_x, &
-         self%drive_y, self%contact, self%tx, self%ty, self%rx, self%ry, self%result)
+      call solve_case(self)
       call check_that(self%result%converged, what//': converged, '//trim(self%result%reason))
       self%drive_x = self%drive_x + self%solver%pull%offset(1)
       self%drive_y = self%drive_y + self%solver%pull%offset(2)
@@ -325,8 +351,7 @@ contains
          self%law = new_friction_law('coulomb', 0.4_dp, 0.0_dp, 0.0_dp, .false., .true.)
          self%solver%pull%along = .true.
          self%solver%pull%traction = 1.02_dp*0.4_dp*sum(self%p)/(48*40)*[0.6_dp, 0.8_dp]
-         call self%solver%solve(self%operator, self%law, self%p, self%hx, self%hy, self%drive_x, &
-            self%drive_y, self%contact, self%tx, self%ty, self%rx, self%ry, self%result)
+         call solve_case(self)
          call check_that(.not. self%result%converged .and. self%solver%pull%slides_off, 'pulled off')
          call check_that(self%result%reason == 'the pull is more than the friction', 'pulled off, reason')
          call check_close(hypot(sum(self%tx), sum(self%ty))/sum(self%p), 0.4_dp, 1e-8_dp, 'pulled off, limit')
@@ -418,8 +443,7 @@ contains
             self%ty = 0.0_dp
             self%solver%tolerance = tolerances(l)
             self%operator%ffts = 0
-            call self%solver%solve(self%operator, self%law, self%p, self%hx, self%hy, self%drive_x, &
-               self%drive_y, self%contact, self%tx, self%ty, self%rx, self%ry, self%result)
+            call solve_case(self)
             call check_that(self%result%converged, 'half slip: converged')
             call check_that(self%operator%ffts <= 4*most(l), 'half slip: products')
          end do
@@ -528,6 +552,7 @@ contains
       type(case_type) :: self
       real(dp), allocatable :: tx(:, :), ty(:, :)
       integer, parameter :: methods(3) = [friction_fast, friction_thesis, friction_gradient]
+      type(error_type), allocatable :: error
       real(dp) :: drive, bad
       integer :: k, l, boundary
 
@@ -539,10 +564,12 @@ contains
             drive = 0.1_dp*sum(self%p)/size(self%p)
             self%drive_x = drive
             self%drive_y = 0.5_dp*drive
-            self%solver%max_iterations = 5000
-            self%solver%tolerance = 1e-8_dp
             do k = 1, 3
-               self%solver%method = methods(k)
+               call self%solver%destroy()
+               call new_friction_solver(self%solver, self%grid, 0.4_dp, self%operator, error, methods(k))
+               call check_no_error(error, 'method')
+               self%solver%max_iterations = 5000
+               self%solver%tolerance = 1e-8_dp
                self%tx = 0.0_dp
                self%ty = 0.0_dp
                call run_case(self, 'method', 1e-8_dp)
@@ -766,8 +793,7 @@ contains
       past_x = 0.1_dp*self%p**2
       past_y = -0.05_dp*self%p
       allocate (ux, uy, mold=self%tx)
-      call self%solver%solve(self%operator, self%law, self%p, self%hx, self%hy, self%drive_x, &
-         self%drive_y, self%contact, self%tx, self%ty, self%rx, self%ry, self%result, past_x, past_y)
+      call solve_case(self, reshape([past_x, past_y], [36, 30, 2]))
       call check_that(self%result%converged, 'memory: converged')
       tx = self%tx
       ty = self%ty
@@ -803,8 +829,7 @@ contains
          self%p = cshift(self%p, -1, 1)
          self%drive_x = self%drive_x + merge(step, -step, k <= 50)
          where (self%contact /= contact_slip) self%contact = contact_stick
-         call self%solver%solve(self%operator, self%law, self%p, self%hx, self%hy, self%drive_x, &
-            self%drive_y, self%contact, self%tx, self%ty, self%rx, self%ry, self%result)
+         call solve_case(self)
          call check_that(self%result%converged, 'slide: converged')
          call prove(self, 'slide', 1e-7_dp)
          iterations = iterations + self%result%iterations

@@ -50,6 +50,9 @@ module friction_law
       procedure :: normal_traction
       procedure :: bound_ratio
       procedure :: bound_variation
+      procedure :: bound_row
+      procedure :: reach_coefficient
+      procedure :: strength_beside
       procedure :: return_to_bound
       procedure :: place_on_bound
       procedure :: slip_direction
@@ -123,6 +126,45 @@ contains
       end if
       if (self%law /= law_coulomb) s = min(s, ratio(self%shear_strength, m))
    end function bound_ratio
+
+   !> The bound of a row of cells for loops that must not branch: s = F/(m - mu n.D), or the smaller of
+   !> that and strength/m, with F of each cell, mu from `reach_coefficient` and the strength from
+   !> `strength_beside`.
+   pure subroutine bound_row(self, n, p, hx, hy, bound)
+      class(friction_law_type), intent(in) :: self
+      integer, intent(in) :: n
+      real(dp), intent(in) :: p(n)             !! pressure, Pa
+      real(dp), intent(in) :: hx(n), hy(n)     !! H_x, H_y; 0 without slope
+      real(dp), intent(out) :: bound(n, 2)     !! F, Pa, and N_z
+      real(dp) :: root, force
+      integer :: i
+
+      do i = 1, n
+         root = sqrt(1.0_dp + hx(i)**2 + hy(i)**2)
+         bound(i, 2) = 1.0_dp/root
+         force = self%coefficient*max(p(i)*root + self%adhesive_pressure*bound(i, 2), 0.0_dp)
+         if (self%law == law_constant_shear) force = self%shear_strength
+         bound(i, 1) = force
+      end do
+   end subroutine bound_row
+
+   !> mu in the reach m - mu n.D of the force F of `bound_row`.
+   pure function reach_coefficient(self) result(mu)
+      class(friction_law_type), intent(in) :: self
+      real(dp) :: mu
+
+      mu = self%coefficient
+      if (self%law == law_constant_shear) mu = 0.0_dp
+   end function reach_coefficient
+
+   !> The strength that counts beside the force F of `bound_row`, Pa; negative: none.
+   pure function strength_beside(self) result(strength)
+      class(friction_law_type), intent(in) :: self
+      real(dp) :: strength
+
+      strength = -1.0_dp
+      if (self%law == law_coulomb_orowan) strength = self%shear_strength
+   end function strength_beside
 
    !> force/reach; 1 where both vanish, unbounded where only the reach does or it is negative.
    pure function ratio(force, reach) result(s)

@@ -17,8 +17,8 @@ module tangential_state
    use contact_rule, only : touches
    use asperity_errors, only : error_type
    use fft_conv, only : convolution_type, new_tangential_operator
-   use friction_cg, only : friction_fast, friction_solver_type, friction_thesis, new_friction_solver, &
-      set_mean_compliance
+   use friction_cg, only : friction_fast, friction_fields_type, friction_solver_type, friction_thesis, &
+      new_friction_solver, set_mean_compliance
    use friction_law, only : friction_law_type, new_friction_law
    use asperity_parallel, only : global_sum
    use asperity_precision, only : dp, int64, int8
@@ -105,9 +105,9 @@ contains
       call new_tangential_operator(self%operator, self%grid, case%material%poisson, self%block%height, &
          error)
       if (allocated(error)) return
-      call new_friction_solver(self%solver, self%grid, case%material%poisson, self%operator, error)
+      call new_friction_solver(self%solver, self%grid, case%material%poisson, self%operator, error, &
+         merge(friction_thesis, friction_fast, case%solver%method == 'thesis'))
       if (allocated(error)) return
-      self%solver%method = merge(friction_thesis, friction_fast, case%solver%method == 'thesis')
       self%solver%max_iterations = case%solver%max_iterations
       allocate (self%traction(nx, ny, 2), source=0.0_dp)
       allocate (self%before, self%displacement, self%trial, self%slip, self%rubbing, self%drive, self%past, &
@@ -316,22 +316,29 @@ contains
    !> pulled, the trial displacement is reckoned as if the road had moved by the guess: U - (D' - D) is
    !> right, and the road is read by that. `take_motion` ends this.
    subroutine solve(self, pressure, gap, slope_x, slope_y, tolerance, settle, outcome)
-      class(tangential_state_type), intent(inout) :: self
+      class(tangential_state_type), intent(inout), target :: self
       real(dp), intent(in), contiguous, target :: pressure(:, :)
       real(dp), intent(in) :: gap(:, :)
       real(dp), intent(in), contiguous, target :: slope_x(:, :), slope_y(:, :)
       real(dp), intent(in) :: tolerance
       logical, intent(in) :: settle                   !! T has to settle too, not only the displacements
       type(solver_result_type), intent(out) :: outcome
+      type(friction_fields_type) :: fields
       integer :: j, c
 
       self%solver%tolerance = tolerance
       self%solver%settle = settle
       call mark_contact(self, pressure, gap)
       call hang_road(self, pressure, slope_x, slope_y)
-      call self%solver%solve(self%operator, self%law, pressure, slope_x, slope_y, self%drive(:, :, 1), &
-         self%drive(:, :, 2), self%contact, self%traction(:, :, 1), self%traction(:, :, 2), &
-         self%slip(:, :, 1), self%slip(:, :, 2), outcome, self%past(:, :, 1), self%past(:, :, 2))
+      fields%pressure => pressure
+      fields%slope_x => slope_x
+      fields%slope_y => slope_y
+      fields%drive => self%drive
+      fields%past => self%past
+      fields%traction => self%traction
+      fields%slip => self%slip
+      fields%contact => self%contact
+      call self%solver%solve(self%operator, self%law, fields, outcome)
       call find_motion(self)
       do c = 1, 2
          !$omp parallel do default(none) shared(self, c) private(j)

@@ -4,19 +4,26 @@
 !> the friction law such that the slip r = DX - A T is zero where T is inside its bound, and along D
 !> = T - T* where it is on it (thesis, eq. 3.1; modules `friction_law`, `friction_problem`).
 !>
+!> Which points stick is not known beforehand. A method (module `friction_method`) therefore guesses: the
+!> points on their bound slip along it, the others stick. Under this guess it takes a step towards r = 0
+!> on the sticking points and towards r along D on the slipping ones, puts back every T that has left its
+!> bound, which makes that point slip, and releases points whose slip has turned against their traction,
+!> which makes them stick. The problem is solved when the guess holds and the residual g of all points is
+!> small; module `friction_problem` defines g.
+!>
 !> The operator A is that of G = 1. For a scheme of time with the factor Q pass DX' = Q DX and the
 !> traction T_h of the memory: r = Q DX - A (T + T_h) is then Q times the slip, and the displacement
 !> is U = DX - r/Q, without another product. With inertia the mean mode of the operator differs from
 !> A(0): set it by `set_mean_compliance`.
 !>
-!> Methods: 'fast' (module `friction_cg_fast`, falling back on `friction_cg_gradient`), 'gradient'
+!> Methods: 'fast' (module `friction_cg_fast`, which falls back on `friction_cg_gradient`), 'gradient'
 !> (the fallback alone) and 'thesis' (`friction_cg_thesis`). Converged means both the criterion of
 !> the thesis, |T' - T|/|T'| <= tolerance (eq. 3.15), and the residual of all points: the largest
 !> slip of a sticking point, part of the slip across its traction, or slip against it, over the RMS
 !> of DX or of A T in the contact, or over the least scale, whichever is largest.
 !>
 !> Memory beside the caller's fields: eleven fields, the two of the operator's spectrum and the two
-!> of the preconditioner's with its symbols (3/4 of a field).
+!> of the preconditioner's with its symbols (3/4 of a field); four more once the fallback is needed.
 !>
 !> Iterations against the mesh: examples/friction_iterations and docs/benchmarks.md. An iteration of
 !> 'fast' takes one and a half products of the operator where points slip.
@@ -25,38 +32,36 @@
 !> uphill; where many points jam so, a solution may not be found, or not be there.
 module friction_cg
    use asperity_errors, only : error_type
-   use fft_conv, only : convolution_type, new_tensor_symbol_operator
-   use friction_cg_fast, only : iterate_fast
-   use friction_cg_gradient, only : iterate_gradient
-   use friction_cg_thesis, only : iterate_thesis
+   use asperity_precision, only : dp
+   use fft_conv, only : convolution_type
+   use friction_cg_fast, only : friction_fast_type, new_friction_fast
+   use friction_cg_gradient, only : friction_gradient_type
+   use friction_cg_thesis, only : friction_thesis_type
    use friction_law, only : friction_law_type
-   use friction_problem, only : friction_problem_type
+   use friction_method, only : friction_goal_type, friction_method_type
+   use friction_problem, only : friction_fields_type, friction_problem_type, friction_work_type
    use friction_pull, only : friction_pull_type
-   use influence, only : tangential_symbol
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use omp_lib, only : omp_get_wtime
-   use asperity_precision, only : dp, int8, pi
    use regular_grid, only : boundary_periodic, grid_type
    use solver_result, only : solver_result_type
    implicit none
    private
 
-   public :: friction_solver_type, new_friction_solver, set_mean_compliance
+   public :: friction_fields_type, friction_solver_type, new_friction_solver, set_mean_compliance
 
    integer, parameter, public :: friction_fast = 1
    integer, parameter, public :: friction_thesis = 2
    integer, parameter, public :: friction_gradient = 3
 
-   integer, parameter :: gradient_steps = 100    !! at a time, when the fast method stalls
    integer, parameter :: hangings = 60           !! of the spring, at most
    integer, parameter :: idle_hangings = 3       !! in full slip, after which nothing helps
    !> Mean compliance over the length of the cell from where the fast method treats it apart. Below,
    !> that costs iterations, above it saves them.
    real(dp), parameter :: thick = 0.2_dp
 
-   !> Work space and preconditioner for one operator.
+   !> The solver for one operator, kept from solve to solve. Not to be copied.
    type :: friction_solver_type
-      integer :: method = friction_fast
       real(dp) :: tolerance = 1.0e-6_dp
       integer :: max_iterations = 1000
       !> T has to settle too, |T' - T|/|T'| <= tolerance. Without it the displacements are good to the
@@ -67,13 +72,11 @@ module friction_cg
       real(dp) :: least_scale = 0.0_dp
       logical :: near = .false.                  !! T starts near the solution, as in a step like the last
       type(friction_pull_type) :: pull           !! a total of T that is prescribed, and the road's place
-      type(convolution_type), private :: preconditioner
+      class(friction_method_type), allocatable, private :: method
+      type(friction_work_type), private :: work
       logical, private :: periodic = .true.
       real(dp), private :: length = 0.0_dp       !! of the longer side, m
       real(dp), private :: compliance = 0.0_dp   !! a_0
-      real(dp), allocatable, private :: zx(:, :), zy(:, :), dx(:, :), dy(:, :)
-      real(dp), allocatable, private :: old_x(:, :), old_y(:, :), vx(:, :), vy(:, :)
-      real(dp), allocatable, private :: weight(:, :), force(:, :), nz(:, :)
    contains
       procedure :: solve
       procedure :: destroy
@@ -82,52 +85,48 @@ module friction_cg
 contains
 
    !> Make the solver for an operator of `new_tangential_operator`.
-   subroutine new_friction_solver(self, grid, poisson, operator, error)
+   subroutine new_friction_solver(self, grid, poisson, operator, error, method)
       type(friction_solver_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: poisson
       type(convolution_type), intent(in) :: operator
       type(error_type), allocatable, intent(out) :: error
-      real(dp), allocatable :: xx(:, :), yy(:, :), xy(:, :)
-      type(grid_type) :: periodic
-      real(dp) :: determinant, swap
-      integer :: i, j
+      integer, intent(in), optional :: method        !! friction_fast (default), _thesis or _gradient
 
       self%periodic = grid%boundary == boundary_periodic
       self%length = max(grid%lx, grid%ly)
-      periodic = grid
-      periodic%boundary = boundary_periodic
-      allocate (xx(0:grid%nx/2, 0:grid%ny/2))
-      allocate (yy, xy, mold=xx)
-      call tangential_symbol(periodic, poisson, self%length/pi, grid%nx, grid%ny, xx, yy, xy)
-      do j = 0, grid%ny/2
-         do i = 0, grid%nx/2
-            determinant = xx(i, j)*yy(i, j) - xy(i, j)**2
-            swap = xx(i, j)
-            xx(i, j) = yy(i, j)/determinant
-            yy(i, j) = swap/determinant
-            xy(i, j) = -xy(i, j)/determinant
-         end do
-      end do
-      call new_tensor_symbol_operator(self%preconditioner, grid%nx, grid%ny, xx, yy, xy, error)
-      if (allocated(error)) return
       self%compliance = self_compliance(operator, self%periodic)
       if (self%compliance <= 0.0_dp) self%compliance = self%length     ! one cell has no modes
-      allocate (self%zx(grid%nx, grid%ny))
-      allocate (self%zy, self%dx, self%dy, self%old_x, self%old_y, self%vx, self%vy, self%weight, &
-         self%force, self%nz, mold=self%zx)
-      self%zx = 0.0_dp
-      self%zy = 0.0_dp
-      self%dx = 0.0_dp
-      self%dy = 0.0_dp
-      self%old_x = 0.0_dp
-      self%old_y = 0.0_dp
-      self%vx = 0.0_dp
-      self%vy = 0.0_dp
-      self%weight = 0.0_dp
-      self%force = 0.0_dp
-      self%nz = 1.0_dp
+      allocate (self%work%bound(grid%nx, 2, grid%ny), self%work%tangent(grid%nx, 3, grid%ny), &
+         self%work%old(grid%nx, 2, grid%ny), self%work%level(grid%nx), source=0.0_dp)
+      if (present(method)) then
+         call choose_method(self, method, grid, poisson, error)
+      else
+         call choose_method(self, friction_fast, grid, poisson, error)
+      end if
    end subroutine new_friction_solver
+
+   !> Make the method that is asked for.
+   subroutine choose_method(self, method, grid, poisson, error)
+      type(friction_solver_type), intent(inout) :: self
+      integer, intent(in) :: method
+      type(grid_type), intent(in) :: grid
+      real(dp), intent(in) :: poisson
+      type(error_type), allocatable, intent(out) :: error
+
+      select case (method)
+      case (friction_thesis)
+         allocate (friction_thesis_type :: self%method)
+      case (friction_gradient)
+         allocate (friction_gradient_type :: self%method)
+      case default
+         allocate (friction_fast_type :: self%method)
+      end select
+      select type (chosen => self%method)
+      type is (friction_fast_type)
+         call new_friction_fast(chosen, grid, poisson, error)
+      end select
+   end subroutine choose_method
 
    !> a_0, the mean of the symbols over the whole spectrum; without the mean mode where periodic.
    pure function self_compliance(operator, periodic) result(compliance)
@@ -158,34 +157,51 @@ contains
    end subroutine set_mean_compliance
 
    !> Solve for T, starting from the T given.
-   subroutine solve(self, operator, law, p, slope_x, slope_y, drive_x, drive_y, contact, tx, ty, &
-      slip_x, slip_y, result, past_x, past_y)
+   subroutine solve(self, operator, law, fields, result)
       class(friction_solver_type), intent(inout), target :: self
       type(convolution_type), intent(inout) :: operator
       type(friction_law_type), intent(in) :: law
-      real(dp), intent(in), contiguous, target :: p(:, :)            !! [nx, ny] pressure, Pa
-      real(dp), intent(in), contiguous, target :: slope_x(:, :)      !! [nx, ny] H_x; any size without slope
-      real(dp), intent(in), contiguous, target :: slope_y(:, :)      !! [nx, ny] H_y
-      real(dp), intent(in), contiguous, target :: drive_x(:, :)      !! [nx, ny] DX', m
-      real(dp), intent(in), contiguous, target :: drive_y(:, :)      !! [nx, ny]
-      !> [nx, ny] In: 0 open, 1 in contact, 2 in contact and likely to slip, as it did in the step
-      !> before: its traction starts on the bound. Without adhesion a point with p <= 0 is taken as
-      !> open. Out: 0 open, 1 stick, 2 slip.
-      integer(int8), intent(inout), contiguous, target :: contact(:, :)
-      real(dp), intent(inout), contiguous, target :: tx(:, :)        !! [nx, ny] T_x, Pa; in: the start
-      real(dp), intent(inout), contiguous, target :: ty(:, :)        !! [nx, ny] T_y, Pa
-      real(dp), intent(inout), contiguous, target :: slip_x(:, :)    !! [nx, ny] out: r, everywhere, m
-      real(dp), intent(inout), contiguous, target :: slip_y(:, :)    !! [nx, ny]
+      type(friction_fields_type), intent(in) :: fields     !! its targets are changed: T, r and the states
       type(solver_result_type), intent(out) :: result
-      !> [nx, ny] T_h, a given traction, Pa: r = DX' - A (T + T_h) at no cost of a product. Both or
-      !> none.
-      real(dp), intent(in), contiguous, target, optional :: past_x(:, :), past_y(:, :)
       type(friction_problem_type) :: problem
-      real(dp) :: start_time, cells
-      logical :: moving, converged
+      type(friction_goal_type) :: goal
 
-      start_time = omp_get_wtime()
-      result%ffts = -operator%ffts - self%preconditioner%ffts
+      result%seconds = omp_get_wtime()
+      result%ffts = -operator%ffts - self%method%ffts
+      goal = friction_goal_type(tolerance=self%tolerance, most_iterations=self%max_iterations)
+      call set_problem(self, operator, law, fields, problem)
+      call problem%start(operator)
+      do
+         if (problem%residual > self%tolerance) &
+            call self%method%iterate(problem, operator, goal, result%iterations)
+         result%converged = problem%solved(self%tolerance)
+         if (result%converged .and. any(self%pull%along)) &
+            call meet_pull(self, problem, operator, result%iterations, result%converged)
+         if (problem%fresh .or. .not. result%converged) exit
+
+         ! A slip that was found by recurrence has gathered round-off and proves nothing.
+         call problem%refresh_slip(operator)
+         if (problem%residual <= self%tolerance) exit
+      end do
+      result%residual = problem%residual
+      result%load_error = self%pull%missed(problem)
+      result%reason = reason(self, problem, result)
+      call self%pull%take_off(problem, operator)
+      result%ffts = result%ffts + operator%ffts + self%method%ffts
+      result%seconds = omp_get_wtime() - result%seconds
+   end subroutine solve
+
+   !> The problem from what the caller gives, with the road on its springs if it is pulled.
+   subroutine set_problem(self, operator, law, fields, problem)
+      class(friction_solver_type), intent(inout), target :: self
+      type(convolution_type), intent(inout) :: operator
+      type(friction_law_type), intent(in) :: law
+      type(friction_fields_type), intent(in) :: fields
+      type(friction_problem_type), intent(out) :: problem
+      real(dp) :: cells
+
+      problem%friction_fields_type = fields
+      problem%work => self%work
       problem%law = law
       problem%nx = operator%nx
       problem%ny = operator%ny
@@ -194,70 +210,33 @@ contains
       problem%settle = self%settle
       problem%near = self%near
       problem%least_scale = self%least_scale
-      problem%p => p
-      problem%hx => slope_x
-      problem%hy => slope_y
-      problem%drive_x => drive_x
-      problem%drive_y => drive_y
-      problem%tx => tx
-      problem%ty => ty
-      problem%rx => slip_x
-      problem%ry => slip_y
-      problem%contact => contact
-      if (present(past_x)) problem%past_x => past_x
-      if (present(past_y)) problem%past_y => past_y
-      problem%vx => self%vx
-      problem%vy => self%vy
-      problem%weight => self%weight
-      problem%force => self%force
-      problem%nz => self%nz
-      problem%old_x => self%old_x
-      problem%old_y => self%old_y
       cells = real(operator%nx, dp)*operator%ny
-      if (self%periodic .and. operator%symbol(0, 0, 1)*cells > thick*self%length) then
+      if (self%periodic .and. operator%symbol(0, 0, 1)*cells > thick*self%length) &
          problem%mean_compliance = operator%symbol(0, 0, 1)
-      end if
       call self%pull%hang(problem, operator, thick*self%length)
-      call set_mean_stiffness(self, operator)
+   end subroutine set_problem
 
-      call problem%start(operator, moving)
-      if (moving) then
-         call problem%update_slip(operator)
-      else
-         call problem%start_from_rest()
-      end if
-      do
-         if (problem%residual > self%tolerance) call iterate(self, problem, operator, result%iterations)
-         converged = problem%solved(self%tolerance)
-         if (converged .and. any(self%pull%along)) then
-            call meet_pull(self, problem, operator, result%iterations, converged)
-         end if
-         if (problem%fresh .or. .not. converged) exit
-         call problem%transform_tractions(operator)       ! the residual of a recurrence proves nothing
-         call problem%update_slip(operator)
-         if (problem%residual <= self%tolerance) exit
-      end do
+   !> Why the solve ended.
+   function reason(self, problem, result) result(text)
+      class(friction_solver_type), intent(in) :: self
+      type(friction_problem_type), intent(in) :: problem
+      type(solver_result_type), intent(in) :: result
+      character(:), allocatable :: text
 
-      result%load_error = self%pull%missed(problem)
-      call self%pull%take_off(problem, operator)
-      result%residual = problem%residual
-      result%converged = converged
-      result%ffts = result%ffts + operator%ffts + self%preconditioner%ffts
       if (problem%cells == 0) then
-         result%reason = 'no contact'
-      else if (converged) then
-         result%reason = 'converged'
+         text = 'no contact'
+      else if (result%converged) then
+         text = 'converged'
       else if (self%pull%slides_off) then
-         result%reason = 'the pull is more than the friction'
+         text = 'the pull is more than the friction'
       else if (.not. ieee_is_finite(problem%residual)) then
-         result%reason = 'not a number'
+         text = 'not a number'
       else if (result%iterations >= self%max_iterations) then
-         result%reason = 'iteration limit'
+         text = 'iteration limit'
       else
-         result%reason = 'no direction of descent'
+         text = 'no direction of descent'
       end if
-      result%seconds = omp_get_wtime() - start_time
-   end subroutine solve
+   end function reason
 
    !> Move the ends of the springs until the total of T is the pull. Near full slip the total follows ever
    !> less: each way is lengthened by what the last one has brought.
@@ -267,7 +246,7 @@ contains
       type(convolution_type), intent(inout) :: operator
       integer, intent(inout) :: iterations
       logical, intent(out) :: converged
-      real(dp) :: before(2), allowed, factor, first(2), gained, way(2)
+      real(dp) :: before(2), factor, first(2), gained
       integer :: k, idle
 
       self%pull%slides_off = problem%cells == 0 .and. self%pull%missed(problem) > 0.0_dp
@@ -282,17 +261,7 @@ contains
          if (self%pull%missed(problem) <= self%tolerance) return
          converged = .false.
          before = self%pull%lacking(problem)
-         way = factor*problem%spring*before
-         call problem%hang_anew(way)
-         ! The contact has to follow a way that is within its tolerance, too.
-         allowed = self%tolerance
-         self%tolerance = max(1.0e-3_dp*allowed, min(allowed, 0.1_dp*norm2(way)/problem%scale))
-         if (problem%residual > self%tolerance) call iterate(self, problem, operator, iterations)
-         self%tolerance = allowed
-         if (.not. problem%fresh) then
-            call problem%transform_tractions(operator)
-            call problem%update_slip(operator)
-         end if
+         call move_springs(self, problem, operator, factor*problem%spring*before, iterations)
          gained = dot_product(before, before - self%pull%lacking(problem)) &
             /max(dot_product(before, before), tiny(1.0_dp))
          idle = merge(idle + 1, 0, problem%slipping == problem%cells .and. gained < 0.01_dp)
@@ -305,59 +274,31 @@ contains
       end do
    end subroutine meet_pull
 
-   !> Run the method that was asked for, and its fallback.
-   subroutine iterate(self, problem, operator, iterations)
+   !> Move the ends of the springs by a way, and let the contact follow.
+   subroutine move_springs(self, problem, operator, way, iterations)
       type(friction_solver_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
+      real(dp), intent(in) :: way(2)               !! m
       integer, intent(inout) :: iterations
-      real(dp), allocatable :: spare_x(:, :), spare_y(:, :)
-      integer :: limit
+      type(friction_goal_type) :: goal
 
-      limit = self%max_iterations
-      select case (self%method)
-      case (friction_thesis)
-         allocate (spare_x, spare_y, source=self%zx)
-         call iterate_thesis(problem, operator, self%tolerance, limit, self%zx, self%zy, &
-            self%dx, self%dy, spare_x, spare_y, iterations)
-      case (friction_gradient)
-         call iterate_gradient(problem, operator, self%tolerance, 0.0_dp, limit, self%zx, self%zy, &
-            self%dx, self%dy, iterations)
-      case default
-         do while (iterations < limit)
-            call iterate_fast(problem, operator, self%preconditioner, self%tolerance, limit, &
-               self%zx, self%zy, self%dx, self%dy, iterations)
-            if (problem%solved(self%tolerance)) return
-            if (.not. ieee_is_finite(problem%residual)) return
-            call iterate_gradient(problem, operator, self%tolerance, 0.1_dp, &
-               min(limit, iterations + gradient_steps), self%zx, self%zy, self%dx, self%dy, iterations)
-            if (problem%solved(self%tolerance)) return
-         end do
-      end select
-   end subroutine iterate
-
-   !> Let the preconditioner's mean mode be the inverse of the operator's.
-   subroutine set_mean_stiffness(self, operator)
-      class(friction_solver_type), intent(inout) :: self
-      type(convolution_type), intent(in) :: operator
-      real(dp) :: cells, mean
-
-      if (.not. self%periodic) return
-      cells = real(operator%nx, dp)*operator%ny
-      mean = operator%symbol(0, 0, 1)*cells
-      if (mean <= 0.0_dp) mean = self%length/pi
-      self%preconditioner%symbol(0, 0, 1:2) = 1.0_dp/(mean*cells)
-   end subroutine set_mean_stiffness
+      call problem%hang_anew(way)
+      ! The contact has to follow a way that is within its tolerance, too.
+      goal%tolerance = max(1.0e-3_dp*self%tolerance, &
+         min(self%tolerance, 0.1_dp*norm2(way)/problem%scale))
+      goal%most_iterations = self%max_iterations
+      if (problem%residual > goal%tolerance) call self%method%iterate(problem, operator, goal, iterations)
+      if (.not. problem%fresh) call problem%refresh_slip(operator)
+   end subroutine move_springs
 
    !> Free the preconditioner and the work space.
    subroutine destroy(self)
       class(friction_solver_type), intent(inout) :: self
 
-      call self%preconditioner%destroy()
-      if (allocated(self%zx)) then
-         deallocate (self%zx, self%zy, self%dx, self%dy, self%old_x, self%old_y, self%vx, self%vy, &
-            self%weight, self%force, self%nz)
-      end if
+      if (allocated(self%method)) call self%method%destroy()
+      if (allocated(self%work%old)) deallocate (self%work%bound, self%work%tangent, self%work%old, &
+         self%work%level)
    end subroutine destroy
 
 end module friction_cg

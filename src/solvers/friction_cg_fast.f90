@@ -35,18 +35,27 @@
 !>
 !> An iteration costs two operator products, of which the first needs no inverse transform where
 !> points slip, and one preconditioner. beta is formed with z_old (M is symmetric), so that no old g
-!> is kept: the work fields are z, d, T before the move, and the directions v.
+!> is kept: the work fields are z and d.
 !>
-!> There is no proof that it converges: `friction_cg` falls back on spectral projected gradients.
+!> There is no proof that this converges. Where it stalls, some steps of spectral projected gradients
+!> (module `friction_cg_gradient`) follow, and then it goes on.
 module friction_cg_fast
-   use fft_conv, only : columns_apply, columns_form, convolution_type
-   use friction_problem, only : friction_problem_type, pseudo_inverse
-   use friction_rows, only : turned_row, scaled_row, unscaled_row
-   use asperity_precision, only : dp
+   use asperity_errors, only : error_type
+   use asperity_parallel, only : global_sum
+   use asperity_precision, only : dp, pi
+   use fft_conv, only : columns_apply, columns_form, convolution_type, new_tensor_symbol_operator
+   use friction_cg_gradient, only : friction_gradient_type
+   use friction_method, only : friction_goal_type, friction_method_type
+   use friction_moves, only : move, move_total, pseudo_inverse
+   use friction_problem, only : friction_problem_type
+   use friction_rows, only : scaled_row, total_of, turned_row, uniform_type, unscaled_row, z_sums_type
+   use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
+   use influence, only : tangential_symbol
+   use regular_grid, only : boundary_periodic, grid_type
    implicit none
    private
 
-   public :: iterate_fast
+   public :: friction_fast_type, new_friction_fast
 
    integer, parameter :: patience = 30      !! iterations in which the residual has to fall tenfold
    integer, parameter :: trials = 2         !! of a shorter step
@@ -54,123 +63,240 @@ module friction_cg_fast
    !> step that goes on from another seldom, for that costs more than it gains.
    real(dp), parameter :: overshoot = 0.5_dp, overshoot_near = 2.0_dp
    integer, parameter :: near_steps = 15
+   integer, parameter :: gradient_steps = 100    !! of the fallback at a time
+
+   !> The method with its preconditioner and work fields.
+   type, extends(friction_method_type) :: friction_fast_type
+      type(friction_gradient_type), private :: fallback
+      type(convolution_type), private :: preconditioner        !! M
+      real(dp), private :: half_wave = 0.0_dp                  !! mean compliance where there is none, m
+      logical, private :: periodic = .true.
+      real(dp), allocatable, private :: z(:, :, :)             !! [nx, 2, ny]
+      real(dp), allocatable, private :: d(:, :, :)             !! [nx, 2, ny]
+   contains
+      procedure :: iterate
+      procedure :: destroy
+   end type friction_fast_type
+
+   !> Where an iteration stands.
+   type :: iteration_type
+      logical :: restart = .true.                !! d = z, without the direction before
+      real(dp) :: gz = 0.0_dp                    !! g.z
+      real(dp) :: old_gz = 0.0_dp                !! g.z in the iteration before
+      real(dp) :: cross = 0.0_dp                 !! g.z_old
+      real(dp) :: shift(2) = 0.0_dp              !! c: w Z c is still to be added to z
+      real(dp) :: slope = 0.0_dp                 !! g.d
+      real(dp) :: curvature = 0.0_dp             !! sum of lam |d|^2, the part of the bounds
+      real(dp) :: form = 0.0_dp                  !! d.A d
+      real(dp) :: milestone = 0.0_dp             !! residual some iterations ago
+      integer :: since = 0                       !! the iteration of the milestone
+      real(dp) :: excess = overshoot             !! overshoot that is allowed
+   end type iteration_type
 
 contains
 
-   !> Iterate until converged, stalled, or at the limit. On entry r belongs to T.
-   subroutine iterate_fast(problem, operator, preconditioner, tolerance, limit, zx, zy, dx, dy, &
-      iterations)
+   !> Make the method for a half-space.
+   subroutine new_friction_fast(self, grid, poisson, error)
+      type(friction_fast_type), intent(out) :: self
+      type(grid_type), intent(in) :: grid
+      real(dp), intent(in) :: poisson
+      type(error_type), allocatable, intent(out) :: error
+      real(dp), allocatable :: xx(:, :), yy(:, :), xy(:, :)
+      type(grid_type) :: periodic
+      real(dp) :: determinant, swap
+      integer :: i, j
+
+      self%periodic = grid%boundary == boundary_periodic
+      self%half_wave = max(grid%lx, grid%ly)/pi
+      periodic = grid
+      periodic%boundary = boundary_periodic
+      allocate (xx(0:grid%nx/2, 0:grid%ny/2))
+      allocate (yy, xy, mold=xx)
+      call tangential_symbol(periodic, poisson, self%half_wave, grid%nx, grid%ny, xx, yy, xy)
+      do j = 0, grid%ny/2
+         do i = 0, grid%nx/2
+            determinant = xx(i, j)*yy(i, j) - xy(i, j)**2
+            swap = xx(i, j)
+            xx(i, j) = yy(i, j)/determinant
+            yy(i, j) = swap/determinant
+            xy(i, j) = -xy(i, j)/determinant
+         end do
+      end do
+      call new_tensor_symbol_operator(self%preconditioner, grid%nx, grid%ny, xx, yy, xy, error)
+      if (allocated(error)) return
+      allocate (self%z(grid%nx, 2, grid%ny), self%d(grid%nx, 2, grid%ny), source=0.0_dp)
+   end subroutine new_friction_fast
+
+   !> Iterate, as `friction_method_type` says; where the conjugate gradients stall, with the fallback in
+   !> turns.
+   subroutine iterate(self, problem, operator, goal, iterations)
+      class(friction_fast_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
-      type(convolution_type), intent(inout) :: preconditioner
-      real(dp), intent(in) :: tolerance            !! of the residual and of the change of T
-      integer, intent(in) :: limit                 !! of `iterations`
-      real(dp), intent(inout) :: zx(:, :), zy(:, :), dx(:, :), dy(:, :)    !! work [nx, ny]
+      type(friction_goal_type), intent(in) :: goal
       integer, intent(inout) :: iterations
-      real(dp) :: rho, rho_old, cross, beta, slope, curvature, form, alpha, milestone, gain, fraction
-      real(dp) :: excess
-      real(dp) :: shift(2)
-      logical :: restart, slipping
-      integer :: returned, first, trial
+      type(friction_goal_type) :: some_steps
 
-      restart = .true.
-      rho_old = 0.0_dp
-      milestone = problem%residual
-      first = iterations
-      excess = merge(overshoot_near, overshoot, problem%near)
-      do while (iterations < limit)
+      call set_mean_stiffness(self, operator)
+      do while (iterations < goal%most_iterations)
+         call iterate_gradients(self, problem, operator, goal, iterations)
+         if (problem%solved(goal%tolerance) .or. .not. ieee_is_finite(problem%residual)) exit
+         some_steps = goal
+         some_steps%fall = 0.1_dp
+         some_steps%most_iterations = min(goal%most_iterations, iterations + gradient_steps)
+         call self%fallback%iterate(problem, operator, some_steps, iterations)
+         if (problem%solved(goal%tolerance)) exit
+      end do
+      self%ffts = self%preconditioner%ffts
+   end subroutine iterate
+
+   !> Let the preconditioner's mean mode be the inverse of the operator's.
+   subroutine set_mean_stiffness(self, operator)
+      type(friction_fast_type), intent(inout) :: self
+      type(convolution_type), intent(in) :: operator
+      real(dp) :: cells, mean
+
+      if (.not. self%periodic) return
+      cells = real(operator%nx, dp)*operator%ny
+      mean = operator%symbol(0, 0, 1)*cells
+      if (mean <= 0.0_dp) mean = self%half_wave
+      self%preconditioner%symbol(0, 0, 1:2) = 1.0_dp/(mean*cells)
+   end subroutine set_mean_stiffness
+
+   !> The conjugate gradients, until solved, stalled, or at the limit.
+   subroutine iterate_gradients(self, problem, operator, goal, iterations)
+      type(friction_fast_type), intent(inout) :: self
+      type(friction_problem_type), intent(inout) :: problem
+      type(convolution_type), intent(inout) :: operator
+      type(friction_goal_type), intent(in) :: goal
+      integer, intent(inout) :: iterations
+      type(iteration_type) :: now
+
+      now%milestone = problem%residual
+      now%since = iterations
+      do while (iterations < goal%most_iterations)
          iterations = iterations + 1
-         if (iterations > near_steps) excess = overshoot
-         call precondition(problem, preconditioner, restart, zx, zy, shift, cross, rho)
-         beta = 0.0_dp
-         if (.not. restart) beta = max(0.0_dp, (rho - cross)/rho_old)
-         call new_direction(problem, operator, beta, shift, zx, zy, dx, dy, slope, curvature)
-         if (slope <= 0.0_dp .and. beta > 0.0_dp) then
-            call new_direction(problem, operator, 0.0_dp, [0.0_dp, 0.0_dp], zx, zy, dx, dy, slope, &
-               curvature)
-         end if
-         slipping = problem%slipping > 0
-         call operator%columns(merge(columns_form, columns_apply, slipping), form)
-         call problem%add_spring(dx, dy, form)
-         if (.not. (slope > 0.0_dp .and. form + curvature > 0.0_dp)) return
-         alpha = slope/(form + curvature)
-         call take_step(problem, operator, alpha, dx, dy, slipping, .false., returned)
-         restart = .false.
-         gain = alpha*slope
-         do trial = 1, trials
-            if (problem%gain_left >= -excess*gain) exit
-            fraction = max(0.1_dp, gain/(gain - problem%gain_left))
-            alpha = fraction*alpha
-            call take_step(problem, operator, alpha, dx, dy, .true., .true., returned)
-            gain = fraction*gain
-            restart = .true.
-         end do
-         if (problem%solved(tolerance)) return
-         restart = restart .or. 10*problem%released > problem%cells
-         rho_old = rho
-         if (iterations - first == patience) then
-            if (problem%residual > 0.1_dp*milestone) return
-            milestone = problem%residual
-            first = iterations
+         now%excess = merge(overshoot_near, overshoot, problem%near .and. iterations <= near_steps)
+
+         call find_direction(self, problem, operator, now)
+         if (.not. (now%slope > 0.0_dp .and. now%form + now%curvature > 0.0_dp)) return
+         call take_step(self, problem, operator, now)       ! with the slip of the new T and its measures
+         if (problem%solved(goal%tolerance)) return
+
+         if (iterations - now%since == patience) then
+            if (problem%residual > 0.1_dp*now%milestone) return
+            now%milestone = problem%residual
+            now%since = iterations
          end if
       end do
-   end subroutine iterate_fast
+   end subroutine iterate_gradients
 
-   !> T' = T + step d, put back, and what it leaves.
-   subroutine take_step(problem, operator, step, dx, dy, fresh, again, returned)
+   !> The direction d = z + beta Z d, or d = z where that one does not descend, and its product: the
+   !> whole product where no point slips, which lets the slip follow by recurrence, else d.A d only.
+   subroutine find_direction(self, problem, operator, now)
+      type(friction_fast_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
-      real(dp), intent(in) :: step
-      real(dp), intent(in) :: dx(:, :), dy(:, :)
-      logical, intent(in) :: fresh                 !! not by recurrence, even if nothing is put back
-      logical, intent(in) :: again                 !! instead of the last step
-      integer, intent(out) :: returned
+      type(iteration_type), intent(inout) :: now
+      real(dp) :: beta
 
-      if (any(problem%mean_compliance > 0.0_dp)) then
-         call problem%move_total(operator, step, dx, dy, returned, again)
-         if (fresh .or. returned > 0) call problem%transform_tractions(operator)
-      else
-         call problem%move(operator, step, dx, dy, fresh, returned, again)
-         if (returned > 0 .and. .not. fresh) call problem%transform_tractions(operator)
+      call precondition(self, problem, now)
+      beta = 0.0_dp
+      if (.not. now%restart) beta = max(0.0_dp, (now%gz - now%cross)/now%old_gz)
+      now%old_gz = now%gz
+      call turn(self, problem, operator, beta, now)
+      if (now%slope <= 0.0_dp .and. beta > 0.0_dp) then
+         now%shift = 0.0_dp                                ! z holds it already
+         call turn(self, problem, operator, 0.0_dp, now)
       end if
-      if (fresh .or. returned > 0) then
-         call problem%update_slip(operator)
-      else
-         call problem%advance_slip(operator, step)
-      end if
+      call operator%columns(merge(columns_form, columns_apply, problem%slipping > 0), now%form)
+      call problem%add_spring(self%d, now%form)
+   end subroutine find_direction
+
+   !> T' = T + alpha d, put back, and the slip that it leaves. Where that has overshot, a shorter step.
+   subroutine take_step(self, problem, operator, now)
+      type(friction_fast_type), intent(inout) :: self
+      type(friction_problem_type), intent(inout) :: problem
+      type(convolution_type), intent(inout) :: operator
+      type(iteration_type), intent(inout) :: now
+      real(dp) :: alpha, gain, part
+      integer :: trial
+
+      alpha = now%slope/(now%form + now%curvature)
+      call move_to(self, problem, operator, alpha, by_product=problem%slipping > 0, again=.false.)
+      now%restart = .false.
+      gain = alpha*now%slope
+      do trial = 1, trials
+         if (problem%sums%gain >= -now%excess*gain) exit
+         part = max(0.1_dp, gain/(gain - problem%sums%gain))
+         alpha = part*alpha
+         call move_to(self, problem, operator, alpha, by_product=.true., again=.true.)
+         gain = part*gain
+         now%restart = .true.
+      end do
+      now%restart = now%restart .or. 10*problem%released > problem%cells
    end subroutine take_step
 
-   !> z from the residual; g.z and, unless at a start, g.z_old.
-   subroutine precondition(problem, preconditioner, restart, zx, zy, shift, cross, rho)
+   !> T' = T + alpha d, put back; the slip of T' from a product with T', or by recurrence from A d where
+   !> nothing was put back.
+   subroutine move_to(self, problem, operator, alpha, by_product, again)
+      type(friction_fast_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
-      type(convolution_type), intent(inout) :: preconditioner
-      logical, intent(in) :: restart
-      real(dp), intent(inout) :: zx(:, :), zy(:, :)
-      real(dp), intent(out) :: shift(2)            !! c: w Z c is still to be added to z
-      real(dp), intent(out) :: cross               !! g.z_old; 0 at a start
-      real(dp), intent(out) :: rho                 !! g.z
-      real(dp) :: sums(5), c(2), mean(2), inverse(2, 2), coupling(2, 2), form
+      type(convolution_type), intent(inout) :: operator
+      real(dp), intent(in) :: alpha
+      logical, intent(in) :: by_product            !! even if nothing is put back
+      logical, intent(in) :: again                 !! instead of the last step
+      logical :: returned, transformed
+
+      transformed = .false.
+      if (any(problem%mean_compliance > 0.0_dp)) then
+         call move_total(problem, operator, alpha, self%d, again, returned)
+      else
+         transformed = by_product
+         call move(problem, operator, alpha, self%d, again, transformed, returned)
+      end if
+      if (.not. (by_product .or. returned)) then
+         call problem%advance_slip(operator, alpha)
+      else if (transformed) then
+         call problem%update_slip(operator)
+      else
+         call problem%refresh_slip(operator)
+      end if
+   end subroutine move_to
+
+   !> z from the residual; g.z and, unless at a start, g.z_old.
+   subroutine precondition(self, problem, now)
+      type(friction_fast_type), intent(inout) :: self
+      type(friction_problem_type), intent(inout) :: problem
+      type(iteration_type), intent(inout) :: now
+      type(uniform_type) :: uniform
+      type(z_sums_type), allocatable :: rows(:)
+      type(z_sums_type) :: sums
+      real(dp), allocatable :: crosses(:)
+      real(dp) :: inverse(2, 2), coupling(2, 2), form
       integer :: j
 
+      allocate (rows(problem%ny), crosses(problem%ny))
       call mean_mode(problem, inverse, coupling)
-      c = matmul(inverse, problem%weighted_residual)
-      mean = matmul(coupling, c)
-      !$omp parallel do default(none) shared(problem, preconditioner, mean, c, zx, zy) &
-      !$omp private(j) num_threads(problem%threads)
+      uniform%traction = matmul(inverse, problem%sums%residual)
+      uniform%displacement = matmul(coupling, uniform%traction)
+      !$omp parallel do default(none) shared(self, problem, uniform, crosses) private(j) &
+      !$omp num_threads(problem%threads)
       do j = 1, problem%ny
-         call scale_row(problem, preconditioner, mean, c, j, zx(:, j), zy(:, j))
+         call scale_row(self, problem, uniform, j, crosses(j))
       end do
-      sums(1:1) = problem%totals(1)
-      cross = merge(0.0_dp, sums(1), restart)
-      call preconditioner%columns(columns_apply, form)
-      !$omp parallel do default(none) shared(problem, preconditioner, mean, c, zx, zy) &
-      !$omp private(j) num_threads(problem%threads)
+      now%cross = 0.0_dp
+      if (.not. now%restart) now%cross = global_sum(sum(crosses))
+      call self%preconditioner%columns(columns_apply, form)
+      !$omp parallel do default(none) shared(self, problem, uniform, rows) private(j) &
+      !$omp num_threads(problem%threads)
       do j = 1, problem%ny
-         call unscale_row(problem, preconditioner, mean, c, j, zx(:, j), zy(:, j))
+         call unscale_row(self, problem, uniform, j, rows(j))
       end do
-      sums = problem%totals(5)
-      shift = c - matmul(inverse, matmul(transpose(coupling), sums(2:3)) + sums(4:5))
-      rho = sums(1) + dot_product(problem%weighted_residual, shift)
+      sums = total_of(rows)
+      now%shift = uniform%traction &
+         - matmul(inverse, matmul(transpose(coupling), sums%total) + sums%bent)
+      now%gz = sums%gz + dot_product(problem%sums%residual, now%shift)
    end subroutine precondition
 
    !> K^-1 and (h/N) E; 0 where the mean mode is left alone.
@@ -178,73 +304,86 @@ contains
       type(friction_problem_type), intent(in) :: problem
       real(dp), intent(out) :: inverse(2, 2)
       real(dp), intent(out) :: coupling(2, 2)
-      real(dp) :: k(2, 2)
+      real(dp) :: tangent(2, 2), k(2, 2)
 
       inverse = 0.0_dp
       coupling = 0.0_dp
       if (.not. any(problem%mean_compliance > 0.0_dp)) return
-      coupling(1, :) = problem%mean_compliance(1)*problem%weighted_tangent(1, :)
-      coupling(2, :) = problem%mean_compliance(2)*problem%weighted_tangent(2, :)
-      k = matmul(problem%weighted_tangent, coupling) + problem%curved_tangent
-      inverse = pseudo_inverse(k(1, 1), 0.5_dp*(k(1, 2) + k(2, 1)), k(2, 2), 1.0e-12_dp)
+      tangent = matrix(problem%sums%tangent)
+      coupling(1, :) = problem%mean_compliance(1)*tangent(1, :)
+      coupling(2, :) = problem%mean_compliance(2)*tangent(2, :)
+      k = matmul(tangent, coupling) + matrix(problem%sums%curved)
+      inverse = pseudo_inverse([k(1, 1), 0.5_dp*(k(1, 2) + k(2, 1)), k(2, 2)], 1.0e-12_dp)
    end subroutine mean_mode
 
-   !> Transform a row of w Z (g - H e c).
-   subroutine scale_row(problem, preconditioner, mean, c, j, zx, zy)
-      type(friction_problem_type), intent(inout) :: problem
-      type(convolution_type), intent(inout) :: preconditioner
-      real(dp), intent(in) :: mean(2), c(2)
-      integer, intent(in) :: j
-      real(dp), intent(in) :: zx(:), zy(:)         !! z_old
-      real(dp) :: gx(problem%nx), gy(problem%nx)
+   !> The symmetric matrix of xx, xy, yy.
+   pure function matrix(elements)
+      real(dp), intent(in) :: elements(3)
+      real(dp) :: matrix(2, 2)
 
-      call scaled_row(problem%nx, problem%compliance, mean, c, problem%rx(:, j), problem%ry(:, j), &
-         problem%vx(:, j), problem%vy(:, j), problem%weight(:, j), zx, zy, gx, gy, &
-         problem%row_sums(1, j))
-      call preconditioner%forward_row(1, j, gx)
-      call preconditioner%forward_row(2, j, gy)
+      matrix = reshape([elements(1), elements(2), elements(2), elements(3)], [2, 2])
+   end function matrix
+
+   !> Transform a row of w Z (g - H e c).
+   subroutine scale_row(self, problem, uniform, j, cross)
+      type(friction_fast_type), intent(inout) :: self
+      type(friction_problem_type), intent(in) :: problem
+      type(uniform_type), intent(in) :: uniform
+      integer, intent(in) :: j
+      real(dp), intent(out) :: cross               !! g.z_old
+      real(dp) :: g(problem%nx, 2)
+
+      call scaled_row(problem%nx, problem%compliance, uniform, problem%slip(:, j, 1), &
+         problem%slip(:, j, 2), problem%work%tangent(:, :, j), self%z(:, :, j), g, cross)
+      call self%preconditioner%forward_row(1, j, g(:, 1))
+      call self%preconditioner%forward_row(2, j, g(:, 2))
    end subroutine scale_row
 
    !> A row of z.
-   subroutine unscale_row(problem, preconditioner, mean, c, j, zx, zy)
-      type(friction_problem_type), intent(inout) :: problem
-      type(convolution_type), intent(inout) :: preconditioner
-      real(dp), intent(in) :: mean(2), c(2)
+   subroutine unscale_row(self, problem, uniform, j, sums)
+      type(friction_fast_type), intent(inout) :: self
+      type(friction_problem_type), intent(in) :: problem
+      type(uniform_type), intent(in) :: uniform
       integer, intent(in) :: j
-      real(dp), intent(inout) :: zx(:), zy(:)
+      type(z_sums_type), intent(out) :: sums
 
-      call preconditioner%backward_row(1, j, zx)
-      call preconditioner%backward_row(2, j, zy)
-      call unscaled_row(problem%nx, problem%compliance, mean, c, problem%rx(:, j), problem%ry(:, j), &
-         problem%vx(:, j), problem%vy(:, j), problem%weight(:, j), zx, zy, problem%row_sums(1:5, j))
+      call self%preconditioner%backward_row(1, j, self%z(:, 1, j))
+      call self%preconditioner%backward_row(2, j, self%z(:, 2, j))
+      call unscaled_row(problem%nx, problem%compliance, uniform, problem%slip(:, j, 1), &
+         problem%slip(:, j, 2), problem%work%tangent(:, :, j), self%z(:, :, j), sums)
    end subroutine unscale_row
 
-   !> d = z + beta Z d with its transform, its slope g.d and the part of its curvature by the
-   !> bounds.
-   subroutine new_direction(problem, operator, beta, shift, zx, zy, dx, dy, slope, curvature)
-      type(friction_problem_type), intent(inout) :: problem
+   !> d = z + beta Z d with its transform, its slope g.d and the part of its curvature by the bounds.
+   subroutine turn(self, problem, operator, beta, now)
+      type(friction_fast_type), intent(inout) :: self
+      type(friction_problem_type), intent(in) :: problem
       type(convolution_type), intent(inout) :: operator
       real(dp), intent(in) :: beta
-      real(dp), intent(in) :: shift(2)             !! c
-      real(dp), intent(inout) :: zx(:, :), zy(:, :)
-      real(dp), intent(inout) :: dx(:, :), dy(:, :)
-      real(dp), intent(out) :: slope
-      real(dp), intent(out) :: curvature
-      real(dp) :: sums(2)
+      type(iteration_type), intent(inout) :: now
+      real(dp), allocatable :: slopes(:), curvatures(:)
       integer :: j
 
-      !$omp parallel do default(none) shared(problem, operator, beta, shift, zx, zy, dx, dy) &
+      allocate (slopes(problem%ny), curvatures(problem%ny))
+      !$omp parallel do default(none) shared(self, problem, operator, beta, now, slopes, curvatures) &
       !$omp private(j) num_threads(problem%threads)
       do j = 1, problem%ny
-         call turned_row(problem%nx, problem%compliance, beta, shift, problem%rx(:, j), &
-            problem%ry(:, j), problem%vx(:, j), problem%vy(:, j), problem%weight(:, j), zx(:, j), &
-            zy(:, j), dx(:, j), dy(:, j), problem%row_sums(1:2, j))
-         call operator%forward_row(1, j, dx(:, j))
-         call operator%forward_row(2, j, dy(:, j))
+         call turned_row(problem%nx, problem%compliance, beta, now%shift, problem%slip(:, j, 1), &
+            problem%slip(:, j, 2), problem%work%tangent(:, :, j), self%z(:, :, j), self%d(:, :, j), &
+            slopes(j), curvatures(j))
+         call operator%forward_row(1, j, self%d(:, 1, j))
+         call operator%forward_row(2, j, self%d(:, 2, j))
       end do
-      sums = problem%totals(2)
-      slope = sums(1)
-      curvature = sums(2)
-   end subroutine new_direction
+      now%slope = global_sum(sum(slopes))
+      now%curvature = global_sum(sum(curvatures))
+   end subroutine turn
+
+   !> Free the preconditioner and the work fields.
+   subroutine destroy(self)
+      class(friction_fast_type), intent(inout) :: self
+
+      call self%preconditioner%destroy()
+      call self%fallback%destroy()
+      if (allocated(self%z)) deallocate (self%z, self%d)
+   end subroutine destroy
 
 end module friction_cg_fast

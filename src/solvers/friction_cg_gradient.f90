@@ -8,104 +8,119 @@
 !> projection where the slope counts, but its fixed points are the solution: T + alpha r returns to
 !> T where r = 0, and where T is on the bound and r is along D.
 module friction_cg_gradient
+   use asperity_parallel, only : global_sum
+   use asperity_precision, only : dp
    use fft_conv, only : convolution_type
    use friction_law, only : contact_open, contact_stick
+   use friction_method, only : friction_goal_type, friction_method_type
+   use friction_moves, only : move
    use friction_problem, only : friction_problem_type
-   use asperity_precision, only : dp
    implicit none
    private
 
-   public :: iterate_gradient
+   public :: friction_gradient_type
+
+   !> The method with its work fields, which are made when it is first used.
+   type, extends(friction_method_type) :: friction_gradient_type
+      real(dp), allocatable, private :: slip(:, :, :)    !! [nx, 2, ny] r along the slope
+      real(dp), allocatable, private :: step(:, :, :)    !! [nx, 2, ny] s
+   contains
+      procedure :: iterate
+      procedure :: destroy
+   end type friction_gradient_type
 
 contains
 
-   !> Iterate until converged, at the limit, or until the residual has fallen by the factor `fall`.
-   subroutine iterate_gradient(problem, operator, tolerance, fall, limit, rx, ry, sx, sy, iterations)
+   !> Iterate, as `friction_method_type` says.
+   subroutine iterate(self, problem, operator, goal, iterations)
+      class(friction_gradient_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
-      real(dp), intent(in) :: tolerance            !! of the residual and of the change of T
-      real(dp), intent(in) :: fall                 !! 0: go on until converged
-      integer, intent(in) :: limit                 !! of `iterations`
-      real(dp), intent(inout) :: rx(:, :), ry(:, :), sx(:, :), sy(:, :)    !! work [nx, ny]
+      type(friction_goal_type), intent(in) :: goal
       integer, intent(inout) :: iterations
-      real(dp) :: alpha, first, sums(3), shortest, longest
-      integer :: returned
+      real(dp) :: alpha, first, first_alpha
+      logical :: returned
 
+      if (.not. allocated(self%step)) &
+         allocate (self%slip(problem%nx, 2, problem%ny), self%step(problem%nx, 2, problem%ny), source=0.0_dp)
       first = problem%residual
-      alpha = 1.0_dp/(problem%compliance*sqrt(real(max(problem%cells, 1), dp)))
-      do while (iterations < limit)
+      first_alpha = 1.0_dp/(problem%compliance*sqrt(real(max(problem%cells, 1), dp)))
+      alpha = first_alpha
+      do while (iterations < goal%most_iterations)
          iterations = iterations + 1
-         call form_step(problem, alpha, rx, ry, sx, sy)
-         call problem%move(operator, 1.0_dp, sx, sy, .true., returned, .false.)
+         call form_step(self, problem, alpha)
+         call move(problem, operator, 1.0_dp, self%step, .false., .true., returned)
          call problem%update_slip(operator)
-         if (problem%solved(tolerance)) return
-         if (problem%residual <= fall*first) return
-         call step_products(problem, rx, ry, sx, sy)
-         sums = problem%totals(3)
-         shortest = 0.0_dp
-         longest = 0.0_dp
-         if (sums(3) > 0.0_dp) shortest = sums(2)/sums(3)
-         if (sums(2) > 0.0_dp) longest = sums(1)/sums(2)
-         if (.not. shortest > 0.0_dp) then
-            alpha = 1.0_dp/(problem%compliance*sqrt(real(max(problem%cells, 1), dp)))
-         else if (shortest < 0.5_dp*longest) then
-            alpha = shortest
-         else
-            alpha = longest
-         end if
+         if (problem%solved(goal%tolerance)) return
+         if (problem%residual <= goal%fall*first) return
+         alpha = next_alpha(self, problem, first_alpha)
       end do
-   end subroutine iterate_gradient
+   end subroutine iterate
 
    !> s = return(T + alpha r) - T; r is kept.
-   subroutine form_step(problem, alpha, rx, ry, sx, sy)
+   subroutine form_step(self, problem, alpha)
+      type(friction_gradient_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
       real(dp), intent(in) :: alpha
-      real(dp), intent(inout) :: rx(:, :), ry(:, :), sx(:, :), sy(:, :)
       real(dp) :: slope(2), r(2), t(2)
       logical :: returned
       integer :: i, j
 
-      !$omp parallel do default(none) shared(problem, alpha, rx, ry, sx, sy) &
+      !$omp parallel do default(none) shared(self, problem, alpha) &
       !$omp private(i, j, slope, r, t, returned) num_threads(problem%threads)
       do j = 1, problem%ny
          do i = 1, problem%nx
             if (problem%contact(i, j) == contact_open) cycle
             slope = problem%slope_at(i, j)
-            r = problem%law%slip_along_slope(slope, [problem%rx(i, j), problem%ry(i, j)])
-            t = [problem%tx(i, j), problem%ty(i, j)] + alpha*r
-            call problem%law%return_to_bound(problem%p(i, j), slope, t, returned)
-            rx(i, j) = r(1)
-            ry(i, j) = r(2)
-            sx(i, j) = t(1) - problem%tx(i, j)
-            sy(i, j) = t(2) - problem%ty(i, j)
+            r = problem%law%slip_along_slope(slope, problem%slip(i, j, :))
+            t = problem%traction(i, j, :) + alpha*r
+            call problem%law%return_to_bound(problem%pressure(i, j), slope, t, returned)
+            self%slip(i, :, j) = r
+            self%step(i, :, j) = t - problem%traction(i, j, :)
             problem%contact(i, j) = contact_stick
          end do
       end do
    end subroutine form_step
 
-   !> s.s, s.y and y.y of the step just done.
-   subroutine step_products(problem, rx, ry, sx, sy)
-      type(friction_problem_type), intent(inout) :: problem
-      real(dp), intent(in) :: rx(:, :), ry(:, :), sx(:, :), sy(:, :)
-      real(dp) :: slope(2), y(2)
+   !> The next length, from the step just done.
+   function next_alpha(self, problem, first_alpha) result(alpha)
+      type(friction_gradient_type), intent(in) :: self
+      type(friction_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: first_alpha              !! where the step says nothing
+      real(dp) :: alpha
+      real(dp), allocatable :: ss(:), sy(:), yy(:)
+      real(dp) :: s(2), y(2), products(3), shortest, longest
       integer :: i, j
 
-      !$omp parallel do default(none) shared(problem, rx, ry, sx, sy) private(i, j, slope, y) &
+      allocate (ss(problem%ny), sy(problem%ny), yy(problem%ny), source=0.0_dp)
+      !$omp parallel do default(none) shared(self, problem, ss, sy, yy) private(i, j, s, y) &
       !$omp num_threads(problem%threads)
       do j = 1, problem%ny
-         associate (sums => problem%row_sums(:, j))
-            sums(:) = 0.0_dp
-            do i = 1, problem%nx
-               if (problem%contact(i, j) == contact_open) cycle
-               slope = problem%slope_at(i, j)
-               y = problem%law%slip_along_slope(slope, [problem%rx(i, j), problem%ry(i, j)])
-               y = [rx(i, j), ry(i, j)] - y
-               sums(1) = sums(1) + sx(i, j)**2 + sy(i, j)**2
-               sums(2) = sums(2) + sx(i, j)*y(1) + sy(i, j)*y(2)
-               sums(3) = sums(3) + y(1)**2 + y(2)**2
-            end do
-         end associate
+         do i = 1, problem%nx
+            if (problem%contact(i, j) == contact_open) cycle
+            y = self%slip(i, :, j) &
+               - problem%law%slip_along_slope(problem%slope_at(i, j), problem%slip(i, j, :))
+            s = self%step(i, :, j)
+            ss(j) = ss(j) + s(1)**2 + s(2)**2
+            sy(j) = sy(j) + s(1)*y(1) + s(2)*y(2)
+            yy(j) = yy(j) + y(1)**2 + y(2)**2
+         end do
       end do
-   end subroutine step_products
+      products = global_sum([sum(ss), sum(sy), sum(yy)])
+      shortest = 0.0_dp
+      longest = 0.0_dp
+      if (products(3) > 0.0_dp) shortest = products(2)/products(3)
+      if (products(2) > 0.0_dp) longest = products(1)/products(2)
+      alpha = longest
+      if (shortest < 0.5_dp*longest) alpha = shortest
+      if (.not. shortest > 0.0_dp) alpha = first_alpha
+   end function next_alpha
+
+   !> Free the work fields.
+   subroutine destroy(self)
+      class(friction_gradient_type), intent(inout) :: self
+
+      if (allocated(self%step)) deallocate (self%slip, self%step)
+   end subroutine destroy
 
 end module friction_cg_gradient

@@ -14,72 +14,79 @@
 !> both sides; K_1 and K_2 are in closed form (module `friction_law`). Restarts with d = g where t.g
 !> <= 0. Two products of the operator an iteration, the first without its inverse transform.
 module friction_cg_thesis
+   use asperity_parallel, only : global_sum
+   use asperity_precision, only : dp
    use fft_conv, only : columns_form, convolution_type
    use friction_law, only : contact_open, contact_slip
+   use friction_method, only : friction_goal_type, friction_method_type
+   use friction_moves, only : move
    use friction_problem, only : friction_problem_type
-   use asperity_precision, only : dp
    implicit none
    private
 
-   public :: iterate_thesis
+   public :: friction_thesis_type
 
    real(dp), parameter :: theta = 1.0_dp     !! the free parameter of eq. 3.14
 
+   !> The method with its work fields, which are made when it is first used.
+   type, extends(friction_method_type) :: friction_thesis_type
+      real(dp), allocatable, private :: gradient(:, :, :)    !! [nx, 2, ny] g
+      real(dp), allocatable, private :: direction(:, :, :)   !! [nx, 2, ny] d
+      real(dp), allocatable, private :: tangent(:, :, :)     !! [nx, 2, ny] t
+   contains
+      procedure :: iterate
+      procedure :: destroy
+   end type friction_thesis_type
+
 contains
 
-   !> Iterate until converged, broken down, or at the limit. On entry r belongs to T.
-   subroutine iterate_thesis(problem, operator, tolerance, limit, gx, gy, dx, dy, tx, ty, &
-      iterations)
+   !> Iterate, as `friction_method_type` says.
+   subroutine iterate(self, problem, operator, goal, iterations)
+      class(friction_thesis_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
-      real(dp), intent(in) :: tolerance            !! of the residual and of the change of T
-      integer, intent(in) :: limit                 !! of `iterations`
-      real(dp), intent(inout) :: gx(:, :), gy(:, :), dx(:, :), dy(:, :)    !! work [nx, ny]
-      real(dp), intent(inout) :: tx(:, :), ty(:, :)                        !! work [nx, ny]
+      type(friction_goal_type), intent(in) :: goal
       integer, intent(inout) :: iterations
-      real(dp) :: beta, ascent, bend, form, alpha, sums(4)
-      integer :: returned
+      real(dp) :: beta, ascent, bend, form, alpha
+      logical :: returned
 
+      if (.not. allocated(self%gradient)) then
+         allocate (self%gradient(problem%nx, 2, problem%ny), source=0.0_dp)
+         allocate (self%direction, self%tangent, source=self%gradient)
+      end if
       beta = 0.0_dp
-      do while (iterations < limit)
+      do while (iterations < goal%most_iterations)
          iterations = iterations + 1
-         call new_direction(problem, operator, beta, gx, gy, dx, dy, tx, ty, ascent, bend)
-         if (ascent <= 0.0_dp) then
-            call new_direction(problem, operator, 0.0_dp, gx, gy, dx, dy, tx, ty, ascent, bend)
-         end if
+         call new_direction(self, problem, operator, beta, ascent, bend)
+         if (ascent <= 0.0_dp) call new_direction(self, problem, operator, 0.0_dp, ascent, bend)
          call operator%columns(columns_form, form)
-         call problem%add_spring(tx, ty, form)
+         call problem%add_spring(self%tangent, form)
          if (.not. (form > 0.0_dp .and. abs(ascent) > 0.0_dp)) return
          ! The bound bends towards the solution or away: keep the step positive and finite.
          alpha = ascent/max(form - bend, 0.1_dp*form)
-         call problem%move(operator, alpha, dx, dy, .true., returned, .false.)
+         call move(problem, operator, alpha, self%direction, .false., .true., returned)
          call problem%update_slip(operator)
-         if (problem%solved(tolerance)) return
-         call direction_products(problem, gx, gy, tx, ty)
-         sums = problem%totals(4)
-         beta = 0.0_dp
-         if (abs(sums(1)) > 0.0_dp) beta = -sums(2)/sums(1) + theta*sums(3)*sums(4)/sums(1)**2
+         if (problem%solved(goal%tolerance)) return
+         beta = next_beta(self, problem)
       end do
-   end subroutine iterate_thesis
+   end subroutine iterate
 
    !> g, d = g + beta d and t = d + K_1 with its transform; t.g and K_2.r.
-   subroutine new_direction(problem, operator, beta, gx, gy, dx, dy, tx, ty, ascent, bend)
+   subroutine new_direction(self, problem, operator, beta, ascent, bend)
+      type(friction_thesis_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
       real(dp), intent(in) :: beta
-      real(dp), intent(inout) :: gx(:, :), gy(:, :)
-      real(dp), intent(inout) :: dx(:, :), dy(:, :)
-      real(dp), intent(inout) :: tx(:, :), ty(:, :)
       real(dp), intent(out) :: ascent              !! t.g
       real(dp), intent(out) :: bend                !! K_2.r
-      real(dp) :: d(2), r(2), g(2), v(2), t(2), first, second, sums(2)
+      real(dp), allocatable :: ascents(:), bends(:)
+      real(dp) :: d(2), r(2), g(2), v(2), t(2), first, second
       integer :: i, j
 
-      !$omp parallel do default(none) shared(problem, operator, beta, gx, gy, dx, dy, tx, ty) &
-      !$omp private(i, j, d, r, g, v, t, first, second) &
-      !$omp num_threads(problem%threads)
+      allocate (ascents(problem%ny), bends(problem%ny), source=0.0_dp)
+      !$omp parallel do default(none) shared(self, problem, operator, beta, ascents, bends) &
+      !$omp private(i, j, d, r, g, v, t, first, second) num_threads(problem%threads)
       do j = 1, problem%ny
-         problem%row_sums(1:2, j) = 0.0_dp
          do i = 1, problem%nx
             g = 0.0_dp
             v = 0.0_dp
@@ -87,58 +94,56 @@ contains
             if (problem%contact(i, j) /= contact_open) then
                call perpendicular(problem, i, j, d, r, g)
                v = g
-               if (abs(beta) > 0.0_dp) v = g + beta*[dx(i, j), dy(i, j)]
+               if (abs(beta) > 0.0_dp) v = g + beta*self%direction(i, :, j)
                t = v
                if (problem%contact(i, j) == contact_slip) then
-                  call problem%law%bound_variation(problem%p(i, j), problem%slope_at(i, j), d, v, &
+                  call problem%law%bound_variation(problem%pressure(i, j), problem%slope_at(i, j), d, v, &
                      first, second)
                   t = v + first*d
-                  problem%row_sums(2, j) = problem%row_sums(2, j) &
-                     + dot_product(second*d + 2.0_dp*first*v, r)
+                  bends(j) = bends(j) + dot_product(second*d + 2.0_dp*first*v, r)
                end if
-               problem%row_sums(1, j) = problem%row_sums(1, j) + dot_product(t, g)
+               ascents(j) = ascents(j) + dot_product(t, g)
             end if
-            gx(i, j) = g(1)
-            gy(i, j) = g(2)
-            dx(i, j) = v(1)
-            dy(i, j) = v(2)
-            tx(i, j) = t(1)
-            ty(i, j) = t(2)
+            self%gradient(i, :, j) = g
+            self%direction(i, :, j) = v
+            self%tangent(i, :, j) = t
          end do
-         call operator%forward_row(1, j, tx(:, j))
-         call operator%forward_row(2, j, ty(:, j))
+         call operator%forward_row(1, j, self%tangent(:, 1, j))
+         call operator%forward_row(2, j, self%tangent(:, 2, j))
       end do
-      sums = problem%totals(2)
-      ascent = sums(1)
-      bend = sums(2)
+      ascent = global_sum(sum(ascents))
+      bend = global_sum(sum(bends))
    end subroutine new_direction
 
-   !> t.y, y.g', t.g' and y.y with y = g' - g.
-   subroutine direction_products(problem, gx, gy, tx, ty)
-      type(friction_problem_type), intent(inout) :: problem
-      real(dp), intent(in) :: gx(:, :), gy(:, :)   !! the old g
-      real(dp), intent(in) :: tx(:, :), ty(:, :)
-      real(dp) :: d(2), r(2), g(2), y(2), t(2)
+   !> beta of eq. 3.14, with y = g' - g; the old g is in `gradient` still.
+   function next_beta(self, problem) result(beta)
+      type(friction_thesis_type), intent(in) :: self
+      type(friction_problem_type), intent(in) :: problem
+      real(dp) :: beta
+      real(dp), allocatable :: ty(:), yg(:), tg(:), yy(:)
+      real(dp) :: d(2), r(2), g(2), y(2), t(2), products(4)
       integer :: i, j
 
-      !$omp parallel do default(none) shared(problem, gx, gy, tx, ty) &
-      !$omp private(i, j, d, r, g, y, t) num_threads(problem%threads)
+      allocate (ty(problem%ny), yg(problem%ny), tg(problem%ny), yy(problem%ny), source=0.0_dp)
+      !$omp parallel do default(none) shared(self, problem, ty, yg, tg, yy) private(i, j, d, r, g, y, t) &
+      !$omp num_threads(problem%threads)
       do j = 1, problem%ny
-         associate (sums => problem%row_sums(:, j))
-            sums(:) = 0.0_dp
-            do i = 1, problem%nx
-               if (problem%contact(i, j) == contact_open) cycle
-               call perpendicular(problem, i, j, d, r, g)
-               y = g - [gx(i, j), gy(i, j)]
-               t = [tx(i, j), ty(i, j)]
-               sums(1) = sums(1) + dot_product(t, y)
-               sums(2) = sums(2) + dot_product(y, g)
-               sums(3) = sums(3) + dot_product(t, g)
-               sums(4) = sums(4) + dot_product(y, y)
-            end do
-         end associate
+         do i = 1, problem%nx
+            if (problem%contact(i, j) == contact_open) cycle
+            call perpendicular(problem, i, j, d, r, g)
+            y = g - self%gradient(i, :, j)
+            t = self%tangent(i, :, j)
+            ty(j) = ty(j) + dot_product(t, y)
+            yg(j) = yg(j) + dot_product(y, g)
+            tg(j) = tg(j) + dot_product(t, g)
+            yy(j) = yy(j) + dot_product(y, y)
+         end do
       end do
-   end subroutine direction_products
+      products = global_sum([sum(ty), sum(yg), sum(tg), sum(yy)])
+      beta = 0.0_dp
+      if (abs(products(1)) > 0.0_dp) &
+         beta = -products(2)/products(1) + theta*products(3)*products(4)/products(1)**2
+   end function next_beta
 
    !> D, the slip along the slope, and its part perpendicular to D where the point slips.
    pure subroutine perpendicular(problem, i, j, d, r, g)
@@ -149,13 +154,20 @@ contains
       real(dp) :: slope(2), dd
 
       slope = problem%slope_at(i, j)
-      d = problem%friction_part(i, j, slope)
-      r = problem%law%slip_along_slope(slope, [problem%rx(i, j), problem%ry(i, j)])
+      d = problem%traction(i, j, :) - problem%law%normal_traction(problem%pressure(i, j), slope)
+      r = problem%law%slip_along_slope(slope, problem%slip(i, j, :))
       g = r
       if (problem%contact(i, j) /= contact_slip) return
       dd = d(1)**2 + d(2)**2
       g = 0.0_dp
       if (dd > 0.0_dp) g = r - (r(1)*d(1) + r(2)*d(2))/dd*d
    end subroutine perpendicular
+
+   !> Free the work fields.
+   subroutine destroy(self)
+      class(friction_thesis_type), intent(inout) :: self
+
+      if (allocated(self%gradient)) deallocate (self%gradient, self%direction, self%tangent)
+   end subroutine destroy
 
 end module friction_cg_thesis

@@ -98,10 +98,9 @@ contains
       integer :: j
 
       total = 0.0_dp
-      if (.not. associated(problem%past_x)) return
+      if (.not. associated(problem%past)) return
       do j = 1, problem%ny
-         if (c == 1) total = total + sum(problem%past_x(:, j))
-         if (c == 2) total = total + sum(problem%past_y(:, j))
+         total = total + sum(problem%past(:, j, c))
       end do
       total = global_sum(total)
    end function past_total
