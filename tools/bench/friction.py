@@ -71,8 +71,9 @@ def road(folder: Path, steps: int, threads: int) -> None:
     history = case.run(output=folder / "road.h5", quiet=True).history
     slides = history["phase"] == 2
     part = np.divide(history["stick_area"], history["contact_area"])
-    print("\n| sticks, % of the contact | steps | iterations, normal | tangential | transforms |"
-          " seconds a step |\n| --- | --- | --- | --- | --- | --- |")
+    print("\n| sticking part of the contact, % | steps | normal iterations |"
+          " tangential iterations | transforms | seconds per step |\n"
+          "| --- | --- | --- | --- | --- | --- |")
     for low, high, name in ((0.75, 2, "more than 75"), (0.25, 0.75, "25 to 75"),
                             (1e-12, 0.25, "below 25"), (-1, 1e-12, "0"), (-1, 2, "all")):
         rows = slides & (part >= low) & (part < high)
@@ -81,8 +82,8 @@ def road(folder: Path, steps: int, threads: int) -> None:
                      ("iterations_normal", "iterations_tangential", "ffts", "seconds")]
             print(f"| {name} | {rows.sum()} | {means[0]:.1f} | {means[1]:.1f} | {means[2]:.0f} |"
                   f" {means[3]:.3f} |")
-    print(f"\nIn all {len(history['step'])} rows, {history['seconds'].sum():.0f} s,"
-          f" {threads} threads.")
+    print(f"\nThe whole run has {len(history['step'])} rows and took "
+          f"{history['seconds'].sum():.0f} s on {threads} threads.")
 
 
 def main() -> None:
