@@ -29,8 +29,8 @@ module command_line
    character(*), parameter :: python_verbs(6) = [character(8) :: 'plot', 'report', 'watch', &
       'import', 'fit', 'friction']             !! what the Python package does
    character(*), parameter :: verbs(10) = [own_verbs, python_verbs]
-   character(*), parameter :: verbs_there = 'run, check, template, info, plot, report, watch, '// &
-      'import, fit and friction are there'
+   character(*), parameter :: verbs_there = 'the commands are run, check, template, info, plot, '// &
+      'report, watch, import, fit and friction'
    character(*), parameter :: options(10) = [character(12) :: '--output', '--threads', '--restart', &
       '--overwrite', '--time-limit', '--quiet', '--help', '--version', '--reference', '-h']
 
@@ -106,7 +106,7 @@ contains
                   hint(nearest_name(argument, verbs))//'; '//verbs_there)
                return
             else if (any(python_verbs == argument)) then
-               call refuse(''''//argument//''' must be the first word: options stand behind it')
+               call refuse(''''//argument//''' must be the first word; its options follow it')
                return
             end if
          else if (.not. allocated(command%path)) then
@@ -129,7 +129,7 @@ contains
          end if
       else if (command%verb == '') then
          if (.not. allocated(error)) call refuse('no command is given: '//verbs_there// &
-            '; asperity --help says more')
+            '; asperity --help describes them')
       else
          call check_fit(command, error)
       end if
@@ -222,7 +222,7 @@ contains
       subroutine alien(option)
          character(*), intent(in) :: option
 
-         call add_fault(error, error_input, 'asperity: '//option//' does not belong to '//command%verb)
+         call add_fault(error, error_input, 'asperity: '//option//' is not an option of '//command%verb)
       end subroutine alien
 
    end subroutine check_fit
@@ -256,45 +256,45 @@ contains
       case ('run')
          text = 'asperity run CASE.nml [--output FILE.h5] [--threads N] [--restart] [--overwrite]'//nl// &
             '                     [--time-limit H:M:S] [--quiet]'//nl//nl// &
-            'Run a case. The result is an HDF5 file, beside the input by default. To draw it:'//nl// &
+            'Run a case. The result is an HDF5 file, by default next to the input. To draw it:'//nl// &
             'asperity plot RESULT.h5'//nl//nl// &
-            '  --output FILE.h5  write the result there'//nl// &
-            '  --threads N       use N threads; by default OMP_NUM_THREADS, SLURM_CPUS_PER_TASK,'//nl// &
+            '  --output FILE.h5  write the result to this file'//nl// &
+            '  --threads N       use N threads; the default is OMP_NUM_THREADS, SLURM_CPUS_PER_TASK,'//nl// &
             '                    or all processors'//nl// &
-            '  --restart         go on from the last checkpoint in the result'//nl// &
-            '  --overwrite       replace an unfinished run and its checkpoint'//nl// &
-            '  --time-limit T    stop in time, with a checkpoint: T is M, H:M:S or D-H:M:S; by'//nl// &
-            '                    default the end of the Slurm job, where there is one'//nl// &
+            '  --restart         continue from the last checkpoint of the result'//nl// &
+            '  --overwrite       replace an unfinished result and its checkpoint'//nl// &
+            '  --time-limit T    stop with a checkpoint before T has passed: M, H:M:S or D-H:M:S;'//nl// &
+            '                    the default is the end of the Slurm job, if there is one'//nl// &
             '  --quiet           show no progress'//nl//nl// &
-            'SIGINT, SIGTERM, SIGHUP and SIGXCPU stop a run after the step in hand, with a checkpoint;'//nl// &
-            'SIGUSR1 writes a checkpoint and the run goes on.'//nl//nl//statuses()
+            'SIGINT, SIGTERM, SIGHUP and SIGXCPU stop a run with a checkpoint after the current step;'//nl// &
+            'after SIGUSR1 it writes a checkpoint and continues.'//nl//nl//statuses()
       case ('check')
          text = 'asperity check CASE.nml'//nl//nl// &
-            'Check an input without running it, and print every setting as it is understood, with'//nl// &
-            'defaults, time steps and the memory needed. The print is an input itself.'//nl
+            'Check an input without running it. Print every setting as it is understood, including'//nl// &
+            'the defaults, the time steps and the memory needed. The output can be used as an input.'//nl
       case ('template')
          text = 'asperity template [NAME]'//nl//'asperity template --reference'//nl//nl// &
-            'Print an input to start from, as in: asperity template hertz > hertz.nml'//nl// &
-            'Without a name: list the templates.'//nl//nl// &
+            'Print an input to start from, for example: asperity template hertz > hertz.nml'//nl// &
+            'Without a name, list the templates.'//nl//nl// &
             '  --reference  print all groups and variables as Markdown'//nl
       case ('info')
          text = 'asperity info RESULT.h5'//nl//nl// &
-            'Say what a result holds: case, grid, phases, last step, finished or not.'//nl
+            'Describe a result: case, grid, phases, last row, and whether the run is finished.'//nl
       case default
          text = 'Asperity: contact of a viscoelastic solid with a rough surface'//nl//nl// &
             'asperity run CASE.nml [--output FILE.h5] [--threads N] [--restart] [--overwrite]'//nl// &
             '                      [--time-limit H:M:S] [--quiet]'//nl// &
-            'asperity check CASE.nml      validate only: settings, time steps, memory'//nl// &
+            'asperity check CASE.nml      check an input: settings, time steps, memory'//nl// &
             'asperity template [NAME]     print an input to start from; without a name, list them'//nl// &
-            'asperity info FILE.h5        what a result or a height map holds'//nl//nl// &
-            'By the Python package, where it is installed:'//nl// &
+            'asperity info FILE.h5        describe a result or a height map'//nl//nl// &
+            'These commands need the Python package:'//nl// &
             'asperity plot RESULT.h5      draw a result, or make a film of it'//nl// &
-            'asperity report RESULT.h5    a page about it for the browser'//nl// &
+            'asperity report RESULT.h5    write an HTML page about a result'//nl// &
             'asperity watch RESULT.h5     follow a run in the terminal'//nl// &
-            'asperity import TOPOGRAPHY   make a measured road ready for a run'//nl// &
+            'asperity import TOPOGRAPHY   prepare a measured road for a run'//nl// &
             'asperity fit DMA.csv         fit a material to measured moduli'//nl// &
-            'asperity friction ROAD ...   friction against speed, pressure and temperature'//nl//nl// &
-            'asperity --version | --help  each command also has --help'//nl//nl// &
+            'asperity friction ROAD ...   compute friction against speed, pressure and temperature'//nl//nl// &
+            'asperity --version | --help  every command has --help, too'//nl//nl// &
             'To begin: asperity template hertz > hertz.nml; asperity run hertz.nml'//nl//nl//statuses()
       end select
    end function help_text
@@ -303,8 +303,8 @@ contains
    pure function statuses() result(text)
       character(:), allocatable :: text
 
-      text = 'Exit status: 0 done; 2 input or command line wrong; 3 a file cannot be read or written;'//nl// &
-         'or not enough memory; 4 a solver did not converge; 124 stopped by the time limit;'//nl// &
+      text = 'Exit status: 0 complete; 2 error in the input or the command line; 3 a file cannot be read'//nl// &
+         'or written, or not enough memory; 4 a solver did not converge; 124 stopped by the time limit;'//nl// &
          '128 + N stopped by signal N (130 SIGINT, 143 SIGTERM).'//nl
    end function statuses
 

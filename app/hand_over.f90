@@ -25,7 +25,7 @@ module hand_over
       '  ASPERITY_COMMAND=asperity; export ASPERITY_COMMAND'//nl// &
       '  exec "$python" -m asperity "$@"'//nl// &
       'done'//nl// &
-      'echo "asperity: $1 is done by the Python package asperity, and no Python found here has it:'// &
+      'echo "asperity: $1 needs the Python package asperity, and no Python that was found here has it:'// &
       ' in the source tree, python3 -m pip install . installs it (docs/install.md);'// &
       ' ASPERITY_PYTHON=/path/to/python3 names a Python that has it" >&2'//nl// &
       'exit 3'//nl

@@ -120,7 +120,7 @@ contains
          case%output%file = command%output
          if (overwritten_file(case) /= '') then
             call fail(error, error_input, 'asperity: --output '//command%output// &
-               ': would be written over '//overwritten_file(case))
+               ': would overwrite '//overwritten_file(case))
             return
          end if
       end if
@@ -187,7 +187,7 @@ contains
             'and there is no checkpoint')
       else
          call fail(error, status, 'asperity: '//reason//' after step '//to_text(run%sim%row%step)// &
-            '; --restart goes on from there')
+            '; --restart continues from there')
       end if
    end subroutine stop_run
 

@@ -13,7 +13,7 @@ module out_of_memory
    public :: end_for_memory
 
    character(*), parameter :: message = 'asperity: not enough memory: an allocation failed; the '// &
-      'rows so far are kept. asperity check tells the memory that a case needs'//new_line('a')
+      'rows so far are kept. asperity check says how much memory a case needs'//new_line('a')
 
    interface
       function c_write(descriptor, text, length) bind(c, name='write') result(written)

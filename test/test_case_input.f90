@@ -163,7 +163,7 @@ contains
       call check_steps(2, 32, dx/1.0e-3_dp, 'one cell along x')
       call check_steps(3, 32, 3.0e-3_dp/32/3.0e-3_dp, 'one cell along y')
       call check_steps(4, 32, dx/1.0e-3_dp, 'one cell obliquely')
-      call check_that(case%phases(2)%dt_reason == 'for one cell a step', &
+      call check_that(case%phases(2)%dt_reason == 'for one cell per step', &
          'why: '//case%phases(2)%dt_reason)
       call check_that(index(case%warnings, '&phase 5: a step moves the road by 8 cells') > 0, &
          'a coarse step is warned of: '//case%warnings)
@@ -328,7 +328,7 @@ contains
       call refuse(no_grid//'&grid nx = 4 5, ny = 4, lx = 1.0 /', 'nx = 4 5: takes one value only')
       call refuse(no_grid//'&grid nx = , ny = 4, lx = 1.0 /', '&grid: nx')
       call refuse(no_grid//'&grid nx = 2*4, ny = 4, lx = 1.0 /', 'nx = 2*4: takes one value only')
-      call refuse(no_grid//'&grid nx(1) = 4, ny = 4, lx = 1.0 /', 'is a single value: it takes no subscript')
+      call refuse(no_grid//'&grid nx(1) = 4, ny = 4, lx = 1.0 /', 'is a single value and has no subscript')
       call refuse(no_grid//'&grid nx = 1, ny = 4, lx = 1.0 /', 'nx = 1: must be at least 2')
       call refuse(no_grid//'&grid nx = 4, ny = 4, lx = NaN /', 'lx = NaN: must be a positive number')
       call refuse(no_grid//'&grid nx = 4, ny = 4, lx = Infinity /', 'lx = Infinity: must be a positive number')
@@ -353,13 +353,13 @@ contains
       call refuse(body//'&solver tolerance = 1.0 /', 'tolerance = 1.0: must be a number above 0 and below 1')
       call refuse(body//'&output compression = 10 /', 'must be an integer of at least 0 and at most 9')
       call refuse(body//'&output file = '''' /', 'must name a file')
-      call refuse(body//'&output file = ''road.nml'' /', 'would be written over the input')
+      call refuse(body//'&output file = ''road.nml'' /', 'would overwrite the input')
       call refuse(body//'&surface shape = ''file'', file = ''a.h5'' /&output file = ''a.h5'' /', &
-         'would be written over the height map')
+         'would overwrite the height map')
       call refuse(body//'&case title = '''//repeat('x', 300)//''' /', 'must have at most 256 characters')
       call refuse(body//'&output file = '''//repeat('x', 3000)//''' /', 'of at most 1024 characters')
       call refuse(body//'&output snapshot_fields = ''slip_x'' /', 'need &friction')
-      call refuse(body//'&output snapshot_times = 1.0 /', 'must lie within the run, which ends at 0 s')
+      call refuse(body//'&output snapshot_times = 1.0 /', 'must be within the run, which ends at 0 s')
       call refuse(body//'&output snapshot_times = 1.0, snapshot_every = 2 /', 'are given together')
 
       ! names
@@ -367,7 +367,7 @@ contains
       call refuse(no_material//'&material shear_modulos = 1e6 /', &
          'shear_modulos: there is no such variable; did you mean shear_modulus?')
       call refuse(body//'&solver tol = 1e-6 /', 'did you mean tolerance?')
-      call refuse(body//grid, '&grid: the group stands twice, in line 1 and in line 5')
+      call refuse(body//grid, '&grid: the group is given twice, in line 1 and in line 5')
       call refuse(no_phase//'&phase pressure = 1.0, pressure = 2.0 /', 'pressure is given twice')
 
       ! form
@@ -377,16 +377,16 @@ contains
       call refuse('&solver tolerance = 1e-6'//nl//body, 'missing before the next group in line 2')
       call refuse('nx = 4'//nl//body, 'line 1: text outside of a group: nx = 4')
       call refuse(body//'&case title = ''open /'//nl, 'has a string that is not closed on its line')
-      call refuse(body//'&solver 1e-6 /', '1e-6 in line 5 is no assignment')
-      call refuse(body//achar(0), 'line 5: a character that is no text (code 0)')
+      call refuse(body//'&solver 1e-6 /', '1e-6 in line 5 is not an assignment')
+      call refuse(body//achar(0), 'line 5: a character that is not text (code 0)')
 
       ! lists
       call refuse(no_material//'&material shear_modulus=1, prony_g(2)=1.0, prony_tau=1.0,2.0/', &
          'prony_g = 1.0: has no element 1')
       call refuse(no_material//'&material shear_modulus=1, prony_g=1.0, prony_g(1)=2.0, prony_tau=1.0/', &
-         'has its element 1 given twice')
+         'sets its element 1 twice')
       call refuse(no_material//'&material shear_modulus=1, prony_g(0)=1.0, prony_tau=1.0/', &
-         'has a subscript that is not understood')
+         'has an invalid subscript')
       call refuse(no_material//'&material shear_modulus=1, prony_g(999999999)=1.0, prony_tau=1.0/', &
          'has a subscript above')
       call refuse(no_material//'&material shear_modulus=1, prony_g=999999999*1.0, prony_tau=1.0/', &
@@ -434,7 +434,7 @@ contains
       call refuse(no_phase//'&phase pressure=1.0, velocity_x=4 /', 'velocity_x = 4: needs a duration')
       call refuse(no_phase//'&phase pressure=1.0, duration=-1 /', 'duration = -1: must be 0 or a positive number')
       call refuse(no_phase//'&phase pressure=1.0, duration=1, dt=2 /', 'dt = 2: must be at most the duration')
-      call refuse(no_phase//'&phase pressure=1.0, duration=1, dt=1e-12 /', 'makes more than 1e9 steps')
+      call refuse(no_phase//'&phase pressure=1.0, duration=1, dt=1e-12 /', 'needs more than 1e9 steps')
       call refuse(no_phase//'&phase pressure=1.0, duration=1, dt=0.3, steps=4 /', 'dt = 0.3: does not agree')
 
       ! laws

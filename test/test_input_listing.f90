@@ -105,7 +105,7 @@ contains
       call check_error(error, 'a.nml: &grid: nxx: there is no such variable; did you mean nx?', 'a wrong name')
       call check_error(error, 'lx = -1: must be a positive number', 'a wrong value')
       call list_values('&case title = '''//field_separator//''' /', 'a.nml', listing, error)
-      call check_error(error, 'a character that is no text', 'the separator cannot be given')
+      call check_error(error, 'a character that is not text', 'the separator cannot be given')
    end subroutine test_faults
 
    !> Fields of a line, each followed by the separator.

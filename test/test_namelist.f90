@@ -69,13 +69,13 @@ contains
       call broken('&a x = 1'//nl//'&b /', 1, 'f: &a: the group that starts in line 1 is not closed')
       call broken('&a x = 1', 1, 'is missing before the end of the file')
       call broken('hello'//nl//'&a /'//nl//'world', 2, 'f: line 3: text outside of a group: world')
-      call broken('&a x 1 /', 1, 'x 1 in line 1 is no assignment')
-      call broken('&a = 1, y = 2 /', 1, '= 1 in line 1 is no assignment')
+      call broken('&a x 1 /', 1, 'x 1 in line 1 is not an assignment')
+      call broken('&a = 1, y = 2 /', 1, '= 1 in line 1 is not an assignment')
       call broken('&a x = (1,2', 1, 'is not closed')
       call broken('& a x = 1 /', 1, 'text outside of a group')
       call broken('&a /'//achar(27), 1, 'code 27')
       call broken(repeat('x', 100000), 1, '...: a group is &name')
-      call broken(repeat('&a x'//nl, 500), 100, 'too many faults')
+      call broken(repeat('&a x'//nl, 500), 100, 'there are more faults')
    end subroutine test_broken_form
 
    !> A text has so many faults, one of them with this fragment.

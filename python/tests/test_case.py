@@ -222,7 +222,7 @@ def test_misspelt_names_are_refused_at_once(build, told):
     ("grid.boundary", 3, "must be one of 'periodic'"),
     ("case.title", "two\nlines", "not closed on its line"),
     ("case.title", "x' / &grid nx = 3 /\n", "."),
-    ("case.title", "\x1f", "no text"),
+    ("case.title", "\x1f", "not text"),
     ("case.title", "x" * 2000, "at most"),
     ("material.prony_g", [], "has no value"),
     ("material.prony_g", [1.0, -1.0], "every value must be a positive number"),

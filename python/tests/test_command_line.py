@@ -88,8 +88,8 @@ def test_help(program, verb):
         (["run", "a.nml", "--threads", "two"], "--threads two"),
         (["run", "a.nml", "--threads=99999999999"], "--threads 99999999999"),
         (["run", "a.nml", "--quiet=yes"], "--quiet takes no value"),
-        (["info", "a.h5", "--restart"], "--restart does not belong to info"),
-        (["check", "a.nml", "--output", "x.h5"], "--output does not belong to check"),
+        (["info", "a.h5", "--restart"], "--restart is not an option of info"),
+        (["check", "a.nml", "--output", "x.h5"], "--output is not an option of check"),
         (["template", "herz"], "did you mean hertz?"),
         (["info"], "info needs a result"),
     ],
@@ -199,7 +199,7 @@ def test_a_result_never_replaces_what_it_comes_from(program, tmp_path):
     for other in ("case.nml", "./case.nml", f"../{tmp_path.name}/case.nml", "link.nml"):
         done = call(program, "run", "case.nml", "--output", other, cwd=tmp_path)
         assert done.returncode == 2
-        assert "would be written over the input" in done.err
+        assert "would overwrite the input" in done.err
     path.write_text(GOOD + "&output file = './link.nml' /\n")
     assert "over the input" in call(program, "run", path).err
     assert path.read_text().startswith(GOOD)

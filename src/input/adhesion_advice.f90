@@ -64,10 +64,10 @@ contains
       modulus = softest_modulus(case)
       pressure = largest_pressure(case)
       text = 'adhesion: '//zone_in_words(case)//' = '//to_text(largest_cell(case, modulus))// &
-         ' m, cells should not be larger'//with_modulus(case)
+         ' m: cells should not be larger'//with_modulus(case)
       if (case%adhesion%potential == 'maugis_dugdale') text = text//nl// &
          'adhesion: the attraction ends linearly over range +- '//to_text(rounded(adhesion_edge(case)))// &
-         ' m, which frees the contact from the cells'
+         ' m, so that the cells do not pin the contact'
       do i = 1, size(case%surfaces)
          associate (term => case%surfaces(i), adhesion => case%adhesion)
             select case (term%shape)
@@ -82,7 +82,7 @@ contains
                if (c1 > 0.0_dp) text = text//' C1 = '//to_text(rounded(c1))//' at '// &
                   to_text(pressure)//' Pa,'
                if (c2 > 0.0_dp) text = text//' C2 = '//to_text(rounded(c2))// &
-                  ': may be neglected if one is much less than 1'
+                  ': adhesion may be neglected if one of them is much less than 1'
             case default
                continue                        ! nothing to say of a plane, a ridge or a file
             end select

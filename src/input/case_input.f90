@@ -165,8 +165,8 @@ contains
       if (group%given('temperature') .and. .not. group%given('wlf_c1')) then
          if (abs(group%real_value('temperature') - group%real_value('reference_temperature')) > 0.0_dp) &
             call add_warning(case, '&material: temperature = '// &
-            to_text(group%real_value('temperature'))//' has no effect: relaxation times shift with '// &
-            'wlf_c1 and wlf_c2 only')
+            to_text(group%real_value('temperature'))//' has no effect: a shift of the relaxation times needs '// &
+            'wlf_c1 and wlf_c2')
       end if
    end subroutine note_unused
 
@@ -237,7 +237,7 @@ contains
       do k = 1, size(groups)
          do i = 1, size(names)
             if (groups(k)%given(trim(names(i)))) call groups(k)%fault(trim(names(i)), &
-               'needs &friction with a law: nothing else holds the road', faults)
+               'needs &friction with a law: without friction nothing holds the road', faults)
          end do
       end do
    end subroutine check_pulls
@@ -273,7 +273,8 @@ contains
       grid = new_grid(nx, ny, lx, ly, boundary)
       known = grid%dx > 0.0_dp .and. grid%dy > 0.0_dp .and. grid%dx*grid%dy > 0.0_dp .and. &
          lx*ly <= huge(1.0_dp)
-      if (.not. known) call group%fault('lx', 'makes cells whose area is no ordinary number', faults)
+      if (.not. known) call group%fault('lx', 'makes cells whose area is too large or too small for a '// &
+         'number in double precision', faults)
       if (.not. known) grid = grid_type()
    end subroutine resolve_grid
 
@@ -341,7 +342,7 @@ contains
       case%solver%precision = group%text_value('precision')
       case%solver%threads = group%integer_value('threads')
       if (case%solver%method == 'thesis' .and. case%solver%precision == 'mixed') &
-         call group%fault('precision', 'is ''mixed'', which method = ''fast'' has and ''thesis'' has not', &
+         call group%fault('precision', 'needs method = ''fast''; ''thesis'' works in double precision', &
          faults)
    end subroutine resolve_solver
 
@@ -359,7 +360,7 @@ contains
       if (.not. group%given('file')) output%file = default_result(case%path)
       case%output%file = output%file
       if (overwritten_file(case) /= '' .and. .not. group%bad('file')) call group%fault('file', &
-         'would be written over '//overwritten_file(case)//': the result must have a file of its own', faults)
+         'would overwrite '//overwritten_file(case)//': give the result another file', faults)
       output%snapshot_every = group%integer_value('snapshot_every')
       output%snapshot_times = group%reals_value('snapshot_times')
       output%checkpoint_every = group%integer_value('checkpoint_every')
@@ -371,7 +372,7 @@ contains
       if (size(output%snapshot_times) > 0 .and. .not. allocated(faults%error)) then
          finish = sum(case%phases%duration)
          if (any(output%snapshot_times > finish*(1.0_dp + 1.0e-9_dp))) call group%fault('snapshot_times', &
-            'must lie within the run, which ends at '//to_text(finish)//' s', faults)
+            'must be within the run, which ends at '//to_text(finish)//' s', faults)
          do i = 2, size(output%snapshot_times)
             if (output%snapshot_times(i) > output%snapshot_times(i - 1)) cycle
             call group%fault('snapshot_times', 'must increase', faults)

@@ -18,7 +18,7 @@ module case_phases
 
    real(dp), parameter :: most_steps = 1.0e9_dp
    real(dp), parameter :: most_rows = 2.0e9_dp                  !! of all phases: below 2^31
-   character(*), parameter :: one_cell = 'for one cell a step'   !! where a step comes from
+   character(*), parameter :: one_cell = 'for one cell per step'   !! where a step comes from
    character(*), parameter :: loads(3) = [character(12) :: 'pressure', 'force', 'displacement']
 
 contains
@@ -106,8 +106,8 @@ contains
             if (list /= '') list = list//' and '
             list = list//trim(loads(i))
          end do
-         call group%group_fault(list//' are given together: give one of them, or say by control '// &
-            'which of them is prescribed', faults)
+         call group%group_fault(list//' are given together: give one of them, or set control '// &
+            'to the one that is prescribed', faults)
       else if (count(named) == 1) then
          i = findloc(named, .true., dim=1)
          phase%control = loads(i)
@@ -144,10 +144,10 @@ contains
          phase%pulled(c) = .true.
          if (group%given(traction) .and. group%given(force)) call group%group_fault(traction//' and '// &
             force//' are given together: give one of them', faults)
-         if (group%given(velocity)) call group%fault(name, 'excludes '//velocity//': a force prescribes '// &
-            'how the road is pulled, and where it goes is found', faults)
-         if (phase%relaxed) call group%fault(name, 'excludes relaxed = .true.: let the pull rest for a '// &
-            'phase that is longer than the relaxation times', faults)
+         if (group%given(velocity)) call group%fault(name, 'excludes '//velocity//': where a force '// &
+            'pulls the road, its motion is computed', faults)
+         if (phase%relaxed) call group%fault(name, 'excludes relaxed = .true.: hold the pull for a '// &
+            'phase that is longer than the relaxation times instead', faults)
          if (phase%steady) call group%fault(name, 'excludes steady = .true., which needs a velocity', faults)
          if (group%bad(name)) cycle
          phase%pull(c) = group%real_value(name)
@@ -178,7 +178,7 @@ contains
       integer :: i
 
       if (phase%relaxed .and. phase%linear) call group%fault('relaxed', &
-         'excludes ramp = ''linear'': a load that grows has not rested', faults)
+         'excludes ramp = ''linear'': under a load that changes the rubber is not relaxed', faults)
       if (phase%relaxed .and. size(material%prony_g) > 0 .and. .not. material%shear_modulus > 0.0_dp) &
          call group%fault('relaxed', 'needs a long-term shear modulus above 0: this material flows', faults)
       if (.not. phase%static) return
@@ -204,8 +204,8 @@ contains
       type(faults_type), intent(inout) :: faults
 
       if (phase%relaxed) call group%fault('steady', &
-         'excludes relaxed = .true.: one says that the road has slid for ever, the other that it has '// &
-         'rested; with a velocity of zero steady means the same as relaxed', faults)
+         'excludes relaxed = .true.: the road has either slid or rested for an infinite time; with a '// &
+         'velocity of zero steady means the same as relaxed', faults)
       if (phase%linear) call group%fault('steady', &
          'excludes ramp = ''linear'': the load of a steady state is constant', faults)
       if (phase%control == 'displacement') call group%fault('steady', &
@@ -240,8 +240,8 @@ contains
          dt = phase%duration/phase%steps
          if (group%given('dt')) then
             if (abs(group%real_value('dt') - dt) > same*dt) call group%fault('dt', &
-               'does not agree with steps = '//to_text(phase%steps)//' in a duration of '// &
-               to_text(phase%duration)//' s, which make '//to_text(dt)//' s: give one of them', faults)
+               'does not agree with steps = '//to_text(phase%steps)//', which makes steps of '// &
+               to_text(dt)//' s in a duration of '//to_text(phase%duration)//' s: give one of them', faults)
          end if
       else if (group%given('dt')) then
          dt = group%real_value('dt')
@@ -255,7 +255,7 @@ contains
 
       if (phase%duration/dt > most_steps) then
          call group%group_fault('a time step of '//to_text(dt)//' s in a duration of '// &
-            to_text(phase%duration)//' s makes more than 1e9 steps: give steps or a longer dt', faults)
+            to_text(phase%duration)//' s needs more than 1e9 steps: give steps or a longer dt', faults)
          return
       end if
       if (.not. group%given('steps')) phase%steps = max(1, nint(phase%duration/dt))
@@ -263,7 +263,7 @@ contains
       if (grid%nx == 0) return
       cells = cells_a_step(phase, grid)
       if (phase%dt_reason == one_cell .and. abs(cells - 1.0_dp) < 1.0e-3_dp) return
-      if (cells > 0.0_dp) phase%dt_reason = trim(phase%dt_reason)//', '//to_text(cells)//' cells a step'
+      if (cells > 0.0_dp) phase%dt_reason = trim(phase%dt_reason)//', '//to_text(cells)//' cells per step'
    end subroutine resolve_steps
 
    !> How far a step moves the road, in cells.
@@ -327,7 +327,8 @@ contains
       if (phase%static .or. grid%nx == 0) return
       cells = cells_a_step(phase, grid)
       if (cells > 1.5_dp) call warn('a step moves the road by '//to_text(cells)// &
-         ' cells; the contact is well followed up to one cell a step, dt = '//to_text(phase%dt/cells)//' s')
+         ' cells; to resolve the contact, move it by at most one cell per step, dt = '// &
+         to_text(phase%dt/cells)//' s')
       tau = shortest_active(phase, material)
       if (tau > 0.0_dp .and. .not. cells > 0.0_dp) then
          if (phase%dt > tau) call warn('dt = '//to_text(phase%dt)// &

@@ -71,7 +71,7 @@ contains
       text = text//'! memory: about '//to_text(real(nint(memory*10.0_dp), dp)/10.0_dp)//unit//nl
       if (memory_needed(case) > limit) text = text//'! warning: '//whose//' '//memory_text(limit)// &
          ' of memory: the run needs more'//nl
-      text = text//'! time: '//duration_text(seconds_needed(case))//' here, within a factor of three or so'//nl
+      text = text//'! time: '//duration_text(seconds_needed(case))//' on this machine, to within a factor of about three'//nl
       text = text//marked('! ', adhesion_notes(case))//marked('! warning: ', case%warnings)
    end function case_summary
 
@@ -201,7 +201,7 @@ contains
       if (phase%given) then
          text = text//number(trim(phase%control), phase%target, control_units(phase%control))
       else
-         text = text//'  ! '//trim(phase%control)//' as before: '//to_text(phase%target)//' '// &
+         text = text//'  ! '//trim(phase%control)//' as in the phase before: '//to_text(phase%target)//' '// &
             control_units(phase%control)//nl
       end if
       text = text//string('ramp', merge('linear', 'step  ', phase%linear))//truth('relaxed', phase%relaxed)// &

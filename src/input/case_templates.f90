@@ -33,13 +33,13 @@ contains
          '&grid|nx = 128|ny = 128|lx = 4e-3|boundary = ''free''|/|'// &
          '&surface|shape = ''paraboloid''|radius = 10e-3|/|'//solid// &
          '&phase|force = 0.53333|/|&output|snapshot_every = 1|/|'), &
-         template_type('westergaard', 'a wave pressed into an elastic half-space, line contact', &
+         template_type('westergaard', 'a wave that is pressed into an elastic half-space, as a line contact', &
          '&case|title = ''Westergaard contact of a wave''|/|'// &
          '&grid|nx = 256|ny = 1|lx = 1e-3|boundary = ''periodic''|/|'// &
          '&surface|shape = ''sine''|amplitude = 10e-6|wavelength = 1e-3|/|'//solid// &
          '&phase|pressure = 25e3|/|&phase|pressure = 50e3|/|&phase|pressure = 100e3|/|'// &
          '&output|snapshot_every = 1|/|'), &
-         template_type('rough', 'a self-affine road, elastic, five growing loads', &
+         template_type('rough', 'a self-affine road and an elastic half-space, under five increasing loads', &
          '&case|title = ''Elastic contact with a rough road''|/|'// &
          '&grid|nx = 512|ny = 512|lx = 10e-3|boundary = ''periodic''|/|'// &
          '&surface|shape = ''self_affine''|hurst = 0.8|wavelength_long = 2.5e-3|'// &
@@ -47,14 +47,14 @@ contains
          '&phase|pressure = 5e3|/|&phase|pressure = 10e3|/|&phase|pressure = 20e3|/|'// &
          '&phase|pressure = 40e3|/|&phase|pressure = 80e3|/|'// &
          '&output|snapshot_every = 1|snapshot_fields = ''pressure'', ''gap''|/|'), &
-         template_type('viscoelastic', 'a sphere pressed on a Zener solid by a step load: Lee and Radok', &
+         template_type('viscoelastic', 'a sphere on a Zener solid under a sudden load: the problem of Lee and Radok', &
          '&case|title = ''Creep of a sphere into a viscoelastic solid''|/|'// &
          '&grid|nx = 64|ny = 64|lx = 0.1e-3|boundary = ''free''|/|'// &
          '&surface|shape = ''paraboloid''|radius = 1e-3|/|'// &
          '&material|shear_modulus = 0.0|zener_g0 = 1e6|zener_g1 = 0.1e6|zener_eta = 0.1e6|/|'// &
          '&phase|name = ''creep''|duration = 5.0|steps = 200|force = 0.02e-3|/|'// &
          '&output|snapshot_every = 50|/|'), &
-         template_type('sliding', 'a viscoelastic solid on a cylinder that slides without friction', &
+         template_type('sliding', 'a cylinder that slides without friction under a viscoelastic solid', &
          '&case|title = ''Viscoelastic friction of a cylinder''|/|'// &
          '&grid|nx = 512|ny = 1|lx = 8e-3|/|'// &
          '&surface|shape = ''cylinder''|radius = 10e-3|/|'// &
@@ -62,14 +62,14 @@ contains
          '&phase|name = ''load''|pressure = 6250.0|relaxed = .true.|/|'// &
          '&phase|name = ''slide''|duration = 0.1|velocity_x = 0.02|/|'// &
          '&output|snapshot_every = 32|/|'), &
-         template_type('adhesion', 'an adhesive sphere pressed and pulled off by its displacement', &
+         template_type('adhesion', 'an adhesive sphere that is pressed on and pulled off at prescribed displacements', &
          '&case|title = ''Adhesive sphere''|/|'// &
          '&grid|nx = 128|ny = 128|lx = 0.2e-3|boundary = ''free''|/|'// &
          '&surface|shape = ''paraboloid''|radius = 1e-3|/|'//solid// &
          '&adhesion|potential = ''exponential''|energy = 0.05|range = 0.27e-6|/|'// &
          '&phase|displacement = 1e-6|/|&phase|displacement = 0.0|/|&phase|displacement = -0.5e-6|/|'// &
          '&output|snapshot_every = 1|/|'), &
-         template_type('friction', 'a rubber block driven over a wavy road with Coulomb friction', &
+         template_type('friction', 'a rubber block that is driven over a wavy road with Coulomb friction', &
          '&case|title = ''Rubber block on a wavy road''|/|'// &
          '&grid|nx = 128|ny = 74|lx = 500e-6|ly = 288.675e-6|/|'// &
          '&surface|shape = ''hexagonal_wave''|amplitude = 5e-6|wavelength = 500e-6|/|'// &

@@ -29,7 +29,7 @@ contains
       self%count = self%count + 1
       if (self%count > most_faults) return
       if (self%count == most_faults) then
-         call add_fault(self%error, error_input, self%path//': too many faults; the rest is not shown')
+         call add_fault(self%error, error_input, self%path//': there are more faults, which are not shown')
       else
          call add_fault(self%error, error_input, self%path//': '//place//': '//message)
       end if

@@ -45,19 +45,19 @@ contains
       type(group_entry_type), allocatable :: entries(:)
 
       entries = [ &
-         group_entry_type('case', .false., .false., 'What the case is called.'), &
-         group_entry_type('grid', .true., .false., 'The regular grid of cells, the same for all fields.'), &
+         group_entry_type('case', .false., .false., 'Title of the case.'), &
+         group_entry_type('grid', .true., .false., 'The regular grid of cells that all fields share.'), &
          group_entry_type('surface', .true., .true., &
-            'The height of the rigid road; the heights of several groups add up.'), &
+            'The heights of the rigid road. The heights of several groups are added.'), &
          group_entry_type('material', .true., .false., &
             'The viscoelastic solid: a spring in parallel with Prony arms or Zener branches.'), &
          group_entry_type('adhesion', .false., .false., 'Attraction across the gap.'), &
          group_entry_type('friction', .false., .false., 'Friction in the interface.'), &
          group_entry_type('phase', .true., .true., &
-            'A stretch of time with its load and the velocity of the road; without a duration one '// &
+            'A period of time with a load and a velocity of the road. A phase without a duration is one '// &
             'static solve.'), &
-         group_entry_type('solver', .false., .false., 'How it is solved.'), &
-         group_entry_type('output', .false., .false., 'What is kept.')]
+         group_entry_type('solver', .false., .false., 'Numerical methods and tolerance.'), &
+         group_entry_type('output', .false., .false., 'What is written, and how often.')]
    end function group_entries
 
    !> All variables, group by group.
@@ -87,15 +87,15 @@ contains
       type(variable_entry_type), allocatable :: rows(:)
 
       rows = [ &
-         row('case', 'title', kind_text, '''''', '', 'any', 'A title, kept in the result.'), &
-         row('grid', 'nx', kind_integer, '(required)', '', 'positive', 'Cells along x, at least 2.'), &
+         row('case', 'title', kind_text, '''''', '', 'any', 'Title of the case, which is also written to the result.'), &
+         row('grid', 'nx', kind_integer, '(required)', '', 'positive', 'Number of cells along x, at least 2.'), &
          row('grid', 'ny', kind_integer, '(required)', '', 'positive', &
-            'Cells along y; 1 is a plane-strain line contact.'), &
+            'Number of cells along y; 1 makes a line contact in plane strain.'), &
          row('grid', 'lx', kind_real, '(required)', 'm', 'positive', 'Length along x.'), &
          row('grid', 'ly', kind_real, '(lx ny/nx)', 'm', 'positive', &
-            'Length along y; square cells by default.'), &
+            'Length along y; by default the cells are square.'), &
          row('grid', 'boundary', kind_word, '''periodic''', '', '''periodic'' | ''free''', &
-            'Repeated for ever, or one patch on an unbounded half-space.')]
+            '''periodic'': the grid is repeated without end; ''free'': one patch on an unbounded half-space.')]
    end function case_and_grid
 
    pure function surface() result(rows)
@@ -105,32 +105,34 @@ contains
          row('surface', 'shape', kind_word, '(required)', '', shape_words(' | '), &
             'Shape of the road: '//shape_meanings()//'.'), &
          row('surface', 'radius', kind_real, '(required)', 'm', 'positive', &
-            'Radius of sphere, paraboloid or cylinder.'), &
-         row('surface', 'amplitude', kind_real, '(required)', 'm', 'any', 'Amplitude of a wave.'), &
-         row('surface', 'wavelength', kind_real, '(required)', 'm', 'positive', 'Wavelength of a wave.'), &
-         row('surface', 'hurst', kind_real, '(required)', '', '(0, 1]', 'Hurst exponent of a rough surface.'), &
+            'Radius of the sphere, paraboloid or cylinder.'), &
+         row('surface', 'amplitude', kind_real, '(required)', 'm', 'any', 'Amplitude of the wave.'), &
+         row('surface', 'wavelength', kind_real, '(required)', 'm', 'positive', 'Wavelength of the wave.'), &
+         row('surface', 'hurst', kind_real, '(required)', '', '(0, 1]', 'Hurst exponent of the rough surface.'), &
          row('surface', 'wavelength_long', kind_real, '(shorter side)', 'm', 'positive', &
-            'Longest wavelength of a rough surface; lx where ny = 1.'), &
+            'Longest wavelength of the rough surface; the default is lx if ny = 1.'), &
          row('surface', 'wavelength_rolloff', kind_real, '(wavelength_long)', 'm', 'positive', &
-            'The spectrum is flat from here to wavelength_long.'), &
+            'The spectrum is constant between this wavelength and wavelength_long.'), &
          row('surface', 'wavelength_short', kind_real, '(8 cells)', 'm', 'positive', &
-            'Shortest wavelength of a rough surface.'), &
+            'Shortest wavelength of the rough surface.'), &
          row('surface', 'rms_height', kind_real, '(none)', 'm', 'positive', &
             'Root mean square height; give this or rms_slope.'), &
          row('surface', 'rms_slope', kind_real, '(none)', '', 'positive', &
             'Root mean square of the gradient; give this or rms_height.'), &
          row('surface', 'seed', kind_integer, '1', '', 'any', &
-            'Number of the random surface; the same seed gives the same surface.'), &
+            'Seed of the random surface; the same seed always gives the same surface.'), &
          row('surface', 'generator', kind_word, '''random_phase''', '', &
-            '''random_phase'' | ''filtered_noise''', 'How a rough surface is drawn.'), &
+            '''random_phase'' | ''filtered_noise''', 'How the rough surface is generated: with the '// &
+            'amplitudes of the spectrum and random phases, or as filtered Gaussian noise.'), &
          row('surface', 'file', kind_text, '(required)', '', 'any', &
-            'HDF5 file with a height map in metres, shape (ny, nx); a path from the input''s folder.'), &
+            'HDF5 file with a height map in metres, of shape (ny, nx). Its path is relative to the folder '// &
+            'of the input.'), &
          row('surface', 'dataset', kind_text, '''''', '', 'any', &
-            'Its dataset; ''surface/height'' and then ''surface'' are tried where none is given.'), &
-         row('surface', 'scale', kind_real, '1.0', '', 'any', 'Factor on the heights of the file.'), &
+            'Dataset in that file; by default ''surface/height'' or else ''surface''.'), &
+         row('surface', 'scale', kind_real, '1.0', '', 'any', 'Factor by which the heights of the file are multiplied.'), &
          row('surface', 'centre_x', kind_real, '((nx/2) lx/nx)', 'm', 'any', &
-            'Where the summit lies; the default falls on a cell.'), &
-         row('surface', 'centre_y', kind_real, '((ny/2) ly/ny)', 'm', 'any', 'The same along y.')]
+            'Position of the summit along x; the default is the centre of a cell.'), &
+         row('surface', 'centre_y', kind_real, '((ny/2) ly/ny)', 'm', 'any', 'Position of the summit along y.')]
    end function surface
 
    !> What each word of `shape` means.
@@ -151,29 +153,32 @@ contains
       type(variable_entry_type), allocatable :: rows(:)
 
       rows = [ &
-         row('material', 'poisson', kind_real, '0.5', '', '(-1, 0.5]', 'Poisson ratio, at all times.'), &
+         row('material', 'poisson', kind_real, '0.5', '', '(-1, 0.5]', 'Poisson ratio, constant in time.'), &
          row('material', 'shear_modulus', kind_real, '(required; 0 with arms)', 'Pa', 'not negative', &
-            'Spring in parallel with the arms; 0 only where there are arms or branches.'), &
+            'Long-term shear modulus: the spring in parallel with the arms. 0 is allowed only with arms or '// &
+            'branches.'), &
          row('material', 'prony_g', kind_reals, '(none)', 'Pa', 'positive', 'Moduli of the Prony arms.'), &
          row('material', 'prony_tau', kind_reals, '(none)', 's', 'positive', &
-            'Their relaxation times, at the reference temperature.'), &
+            'Relaxation times of the Prony arms at the reference temperature.'), &
          row('material', 'zener_g0', kind_reals, '(none)', 'Pa', 'positive', &
-            'Springs of the Zener branches, in series with (zener_g1 parallel to zener_eta).'), &
+            'Moduli of the springs of the Zener branches that are in series with (zener_g1 parallel to '// &
+            'zener_eta).'), &
          row('material', 'zener_g1', kind_reals, '(none)', 'Pa', 'not negative', &
-            'Springs parallel to the dampers.'), &
+            'Moduli of the springs that are parallel to the dampers.'), &
          row('material', 'zener_eta', kind_reals, '(none)', 'Pa s', 'positive', &
-            'Dampers; a branch relaxes with zener_eta/(zener_g0 + zener_g1).'), &
+            'Viscosities of the dampers; the relaxation time of a branch is '// &
+            'zener_eta/(zener_g0 + zener_g1).'), &
          row('material', 'thickness', kind_real, '0.0', 'm', 'not negative', &
-            'Height of the block, for its mean shear; 0 is a half-space.'), &
+            'Height of the block, which determines its mean shear; 0 means a half-space.'), &
          row('material', 'density', kind_real, '0.0', 'kg/m3', 'not negative', &
-            'For inertia of the mean shear, with thickness; 0 is none.'), &
+            'Density, for the inertia of the mean shear of a block with thickness; 0 means no inertia.'), &
          row('material', 'temperature', kind_real, '(reference_temperature)', 'C', '[-273.15, inf)', &
             'Temperature of the case.'), &
          row('material', 'reference_temperature', kind_real, '20.0', 'C', '[-273.15, inf)', &
-            'Temperature of the given relaxation times.'), &
+            'Temperature at which the relaxation times are given.'), &
          row('material', 'wlf_c1', kind_real, '0.0', '', 'not negative', &
-            'WLF shift: log10 a_T = -c1 (T - T_ref)/(c2 + T - T_ref).'), &
-         row('material', 'wlf_c2', kind_real, '0.0', 'K', 'not negative', 'The other constant of WLF.')]
+            'First constant of the WLF shift, log10 a_T = -c1 (T - T_ref)/(c2 + T - T_ref).'), &
+         row('material', 'wlf_c2', kind_real, '0.0', 'K', 'not negative', 'Second constant of the WLF shift.')]
    end function material
 
    pure function interface_laws() result(rows)
@@ -182,59 +187,66 @@ contains
       rows = [ &
          row('adhesion', 'potential', kind_word, '''none''', '', &
             '''none'' | ''exponential'' | ''gauss'' | ''maugis_dugdale''', &
-            'Energy against gap: -w exp(-g/r), -w exp(-g^2/r^2), or -w (1 - g/r) up to g = r.'), &
+            'Energy as a function of the gap g: -w exp(-g/r), -w exp(-g^2/r^2), or -w (1 - g/r) up to g = r.'), &
          row('adhesion', 'energy', kind_real, '(required)', 'J/m2', 'not negative', &
-         'Work of adhesion w.'), &
-         row('adhesion', 'range', kind_real, '(required)', 'm', 'positive', 'Range r.'), &
+         'Work of adhesion w per area.'), &
+         row('adhesion', 'range', kind_real, '(required)', 'm', 'positive', 'Range r of the attraction.'), &
          row('adhesion', 'start', kind_word, '''non_adhesive''', '', '''non_adhesive'' | ''full_contact''', &
-            'State from which the first one is sought; hysteresis is real.'), &
+            'State from which the first solve starts. Adhesion has hysteresis, so it affects the result.'), &
          row('friction', 'law', kind_word, '''none''', '', &
             '''none'' | ''coulomb'' | ''constant_shear'' | ''coulomb_orowan''', &
-            'Bound of the traction: coefficient times pressure, shear_strength, or the lower of both.'), &
+            'Bound of the tangential traction: coefficient times pressure, shear_strength, or the lower of '// &
+            'the two.'), &
          row('friction', 'coefficient', kind_real, '(required)', '', 'not negative', &
-            'Coulomb coefficient of the interface.'), &
+            'Coulomb friction coefficient of the interface.'), &
          row('friction', 'shear_strength', kind_real, '(required)', 'Pa', 'positive', &
             'Shear strength of the interface.'), &
          row('friction', 'slope_effect', kind_logical, '.true.', '', 'any', &
-            'Apply the law on the true local slope of the road.')]
+            'Apply the friction law on the true local slope of the road.')]
    end function interface_laws
 
    pure function phase() result(rows)
       type(variable_entry_type), allocatable :: rows(:)
 
       rows = [ &
-         row('phase', 'name', kind_text, '(phase N)', '', 'any', 'A name, kept in the result.'), &
+         row('phase', 'name', kind_text, '(phase N)', '', 'any', 'Name of the phase, which is also written to the result.'), &
          row('phase', 'duration', kind_real, '0.0', 's', 'not negative', &
-            'Time that the phase takes; 0 or none is one static solve.'), &
+            'Duration of the phase; without it, or with 0, the phase is one static solve.'), &
          row('phase', 'steps', kind_integer, '(derived)', '', 'positive', &
-            'Time steps; give this or dt. By default from dt.'), &
+            'Number of time steps; give this or dt. By default it follows from dt.'), &
          row('phase', 'dt', kind_real, '(derived)', 's', 'positive', &
-            'Time step, adjusted to a whole number of steps. By default one cell a step where the road '// &
-            'slides, else an eighth of the shortest active relaxation time and 20 steps at least.'), &
+            'Time step, adjusted to a whole number of steps. By default the road moves by one cell per '// &
+            'step; if it rests, the step is an eighth of the shortest active relaxation time, with at '// &
+            'least 20 steps.'), &
          row('phase', 'control', kind_word, '(from the load given)', '', &
-            '''pressure'' | ''force'' | ''displacement''', 'What is prescribed.'), &
+            '''pressure'' | ''force'' | ''displacement''', 'Which load is prescribed.'), &
          row('phase', 'pressure', kind_real, '(as before)', 'Pa', 'any', &
-            'Mean pressure at the end; 0 or less with adhesion only.'), &
+            'Mean pressure at the end of the phase; 0 or less is allowed with adhesion only.'), &
          row('phase', 'force', kind_real, '(as before)', 'N', 'any', &
-            'Force on the cell at the end, pressure lx ly; 0 or less with adhesion only.'), &
+            'Normal force at the end of the phase, equal to pressure lx ly; 0 or less is allowed with '// &
+            'adhesion only.'), &
          row('phase', 'displacement', kind_real, '(as before)', 'm', 'any', &
-            'Approach of the far rubber at the end, from first touch of the undeformed surfaces.'), &
+            'Approach of the far rubber at the end of the phase, counted from the first touch of the '// &
+            'undeformed surfaces.'), &
          row('phase', 'ramp', kind_word, '''step''', '', '''step'' | ''linear''', &
-            'The load jumps at the start, or grows through the phase.'), &
+            'The load jumps to its value at the start, or changes linearly during the phase.'), &
          row('phase', 'relaxed', kind_logical, '.false.', '', 'any', &
-            'Start as if the load had rested there for ever.'), &
+            'Start from the state after this load has acted for an infinite time.'), &
          row('phase', 'steady', kind_logical, '.false.', '', 'any', &
-            'Start as if the road had slid for ever under this load at this velocity.'), &
+            'Start from the state after the road has slid at this velocity under this load for an infinite '// &
+            'time.'), &
          row('phase', 'velocity_x', kind_real, '0.0', 'm/s', 'any', &
             'Velocity of the road relative to the top of the block, along x.'), &
-         row('phase', 'velocity_y', kind_real, '0.0', 'm/s', 'any', 'The same along y.'), &
+         row('phase', 'velocity_y', kind_real, '0.0', 'm/s', 'any', &
+            'Velocity of the road relative to the top of the block, along y.'), &
          row('phase', 'traction_x', kind_real, '(none)', 'Pa', 'any', &
-            'Instead of velocity_x: the force that pulls the road along x, at the end, over the area of '// &
-            'the cell. How far the road moves is found. By ramp, as the load. Needs &friction.'), &
-         row('phase', 'traction_y', kind_real, '(none)', 'Pa', 'any', 'The same along y.'), &
+            'Force per area that pulls the road along x at the end of the phase; give it instead of '// &
+            'velocity_x. The motion of the road is then computed. ramp applies to it as to the load. '// &
+            'Needs &friction.'), &
+         row('phase', 'traction_y', kind_real, '(none)', 'Pa', 'any', 'As traction_x, along y.'), &
          row('phase', 'force_x', kind_real, '(none)', 'N', 'any', &
-            'That force itself, traction_x lx ly: give one of them.'), &
-         row('phase', 'force_y', kind_real, '(none)', 'N', 'any', 'The same along y.')]
+            'The force itself, equal to traction_x lx ly: give one of them.'), &
+         row('phase', 'force_y', kind_real, '(none)', 'N', 'any', 'As force_x, along y.')]
    end function phase
 
    pure function solver_and_output() result(rows)
@@ -243,39 +255,42 @@ contains
          '''traction_x'' | ''traction_y'' | ''displacement_x'' | ''displacement_y'' | ''slip_x'' | ''slip_y'''
 
       rows = [ &
-         row('solver', 'tolerance', kind_real, '1e-6', '', '(0, 1)', 'Residual of every solve.'), &
-         row('solver', 'max_iterations', kind_integer, '1000', '', 'positive', 'Most iterations of a solve.'), &
+         row('solver', 'tolerance', kind_real, '1e-6', '', '(0, 1)', 'Largest allowed residual of every solve.'), &
+         row('solver', 'max_iterations', kind_integer, '1000', '', 'positive', 'Largest number of iterations of a solve.'), &
          row('solver', 'method', kind_word, '''fast''', '', '''fast'' | ''thesis''', &
             'The default algorithms, or those of the thesis.'), &
          row('solver', 'time_scheme', kind_word, '''exponential2''', '', &
-            '''exponential2'' | ''exponential'' | ''backward_euler''', 'Time integration of the arms.'), &
+            '''exponential2'' | ''exponential'' | ''backward_euler''', 'Time integration of the Prony arms.'), &
          row('solver', 'passes', kind_integer, '0', '', 'not negative', &
-            'Most passes of a step with friction; 0: until they settle.'), &
+            'Largest number of passes in a step with friction; 0 means as many as they need to settle.'), &
          row('solver', 'slip_law', kind_word, '''physical''', '', '''physical'' | ''thesis''', &
-            'Direction of slip on slopes.'), &
+            'Direction of slip on slopes: along the friction force in space, or in the plane as in the '// &
+            'thesis.'), &
          row('solver', 'interpolation', kind_word, '''cubic''', '', '''cubic'' | ''linear''', &
-            'How heights and slopes of a road that slides are read from its cells: by the cubic spline '// &
-            'and its own slopes, or bilinearly with central differences. The second suits maps with '// &
-            'jumps, which a spline overshoots between cells.'), &
+            'How the heights and slopes of a sliding road are interpolated: by a cubic spline and its '// &
+            'derivatives, or bilinearly with central differences. ''linear'' suits maps with jumps, where a '// &
+            'spline overshoots between cells.'), &
          row('solver', 'precision', kind_word, '''double''', '', '''double'' | ''mixed''', &
-            '''mixed'': contact without adhesion takes its steps with transforms in single precision '// &
-            'and checks them in double, to the same tolerance; adhesion and friction stay double. '// &
-            'Needs method = ''fast''.'), &
-         row('solver', 'threads', kind_integer, '0', '', '[0, 1024]', '0 takes all processors.'), &
+            '''mixed'': contact without adhesion is iterated with transforms in single precision and '// &
+            'checked in double precision, to the same tolerance; adhesion and friction use double '// &
+            'precision. Needs method = ''fast''.'), &
+         row('solver', 'threads', kind_integer, '0', '', '[0, 1024]', 'Number of threads; 0 means all processors.'), &
          row('output', 'file', kind_text, '(the input''s name with .h5)', '', 'any', &
-            'The result, an HDF5 file; a path from the input''s folder.'), &
+            'HDF5 file of the result. Its path is relative to the folder of the input.'), &
          row('output', 'snapshot_every', kind_integer, '0', 'steps', 'not negative', &
-            'Keep the fields every so many steps; 0 keeps the last only. Or give snapshot_times.'), &
+            'Number of steps from one snapshot to the next; 0 writes the last snapshot only. Give this or '// &
+            'snapshot_times.'), &
          row('output', 'snapshot_times', kind_reals, '(none)', 's', 'not negative', &
-            'Times at which the fields are kept, increasing.'), &
+            'Times of the snapshots, in increasing order.'), &
          row('output', 'snapshot_fields', kind_words, '(all that the case has)', '', fields, &
-            'Fields that are kept.'), &
+            'Fields that a snapshot contains.'), &
          row('output', 'checkpoint_every', kind_integer, '0', 'steps', 'not negative', &
-            'Steps between checkpoints; 0: only by time and when the run is stopped by a signal.'), &
+            'Number of steps between checkpoints; 0 means only after checkpoint_minutes and when a signal '// &
+            'stops the run.'), &
          row('output', 'checkpoint_minutes', kind_real, '10', 'min', 'not negative', &
-            'Minutes between checkpoints; 0: none by time.'), &
+            'Time between checkpoints; 0 means that none are written by time.'), &
          row('output', 'compression', kind_integer, '1', '', '[0, 9]', &
-            'Deflate level of the fields; 0 is none.')]
+            'Compression level (deflate) of the fields; 0 means no compression.')]
    end function solver_and_output
 
    !> Must the user give it wherever it applies?
@@ -400,10 +415,10 @@ contains
 
       allocate (groups, source=group_entries())
       allocate (variables, source=variable_entries())
-      text = '# Reference of the input'//nl//nl// &
-         'An input is a file of Fortran namelists, in any order; all numbers are SI.'//nl// &
-         'Defaults in parentheses are derived or absent. Intervals: a parenthesis excludes the end,'//nl// &
-         'a bracket includes it. `asperity template --reference` prints this page.'//nl//nl
+      text = '# Input reference'//nl//nl// &
+         'An input file consists of Fortran namelists in any order; all numbers are in SI units.'//nl// &
+         'Defaults in parentheses are derived, or there is none. In an interval a parenthesis excludes'//nl// &
+         'the end and a bracket includes it. `asperity template --reference` prints this page.'//nl//nl
       do i = 1, size(groups)
          text = text//'## `&'//trim(groups(i)%name)//'`'//nl//nl//trim(groups(i)%meaning)
          if (groups(i)%required) text = text//' Required.'

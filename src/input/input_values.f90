@@ -49,7 +49,7 @@ contains
          if (known(entry_of(i))%repeatable) cycle
          do j = 1, i - 1
             if (entry_of(j) == entry_of(i)) then
-               call faults%add('&'//trim(file%groups(i)%name), 'the group stands twice, in line '// &
+               call faults%add('&'//trim(file%groups(i)%name), 'the group is given twice, in line '// &
                   to_text(file%groups(j)%line)//' and in line '//to_text(file%groups(i)%line)// &
                   ': only &surface and &phase may be repeated')
                exit
@@ -167,10 +167,10 @@ contains
       first_element = assignment%subscript
       if (assignment%subscripted) then
          if (.not. is_array(value%entry)) then
-            call reject('is a single value: it takes no subscript')
+            call reject('is a single value and has no subscript')
             return
          else if (first_element == 0) then
-            call reject('has a subscript that is not understood: it must be (n) or (n:m), n from 1')
+            call reject('has an invalid subscript: it must be (n) or (n:m), with n at least 1')
             return
          else if (first_element > longest_list) then
             call reject('has a subscript above '//to_text(longest_list))
@@ -239,7 +239,7 @@ contains
             element = element + 1
             call put(value, element, item, good)
             if (.not. good) then
-               call reject('has its element '//to_text(element)//' given twice')
+               call reject('sets its element '//to_text(element)//' twice')
                return
             end if
          end do

@@ -82,7 +82,7 @@ contains
       if (bad > 0) then
          allocate (file%tokens(0))
          faults%hopeless = .true.
-         call faults%add('line '//to_text(line_of(text, bad)), 'a character that is no text (code '// &
+         call faults%add('line '//to_text(line_of(text, bad)), 'a character that is not text (code '// &
             to_text(iachar(text(bad:bad)))//'): this must be a text file of Fortran namelists')
          return
       end if
@@ -329,7 +329,7 @@ contains
             at = at + 1
          end do
          call faults%add('&'//trim(group%name), shown_tokens(file, first, at)//' in line '// &
-            to_text(file%tokens(first)%line)//' is no assignment: it must be ''variable = value''')
+            to_text(file%tokens(first)%line)//' is not an assignment: it must be ''variable = value''')
          at = at + 1
          return
       end if
