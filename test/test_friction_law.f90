@@ -82,6 +82,7 @@ contains
                star = law%normal_traction(p, slope)
                d = 4.0_dp*u(7:8) - 2.0_dp
                s = law%bound_ratio(p, slope, d)
+               call check_close(row_ratio(law, p, slope, d)/s, 1.0_dp, 1e-12_dp, 'the bound of a row')
                if (s >= unbounded) cycle
                hits = hits + 1
                t = star + s*d
@@ -104,6 +105,22 @@ contains
       end do
       call check_that(hits > 1000, 'most rays meet the bound')
    end subroutine test_cone
+
+   !> `bound_ratio` from what the loops over rows have: F and N_z of a cell, mu, and a strength beside.
+   function row_ratio(law, p, slope, d) result(s)
+      type(friction_law_type), intent(in) :: law
+      real(dp), intent(in) :: p, slope(2), d(2)
+      real(dp) :: s
+      real(dp) :: bound(1, 2), nd, m, reach
+
+      call law%bound_row(1, [p], [slope(1)], [slope(2)], bound)
+      nd = -bound(1, 2)*dot_product(slope, d)
+      m = sqrt(dot_product(d, d) - nd**2)
+      reach = m - law%reach_coefficient()*nd
+      s = unbounded
+      if (reach > 0.0_dp) s = bound(1, 1)/reach
+      if (law%strength_beside() >= 0.0_dp) s = min(s, law%strength_beside()/m)
+   end function row_ratio
 
    !> One slope in the direction of the traction: P (mu + tan)/(1 - mu tan) (thesis, eq. 3.2),
    !> uphill and downhill; no bound above mu tan = 1.

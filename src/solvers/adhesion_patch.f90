@@ -197,7 +197,8 @@ contains
       call self%evaluate_traction(contact)
       greatest = max(abs(contact%load), largest(contact%traction, self%threads))
       contact%units%traction = max(resolved_traction(contact%problem, greatest, self%nyquist, spread), &
-         traction_scale(contact%problem%potential, max(greatest, contact%problem%modulus*self%longest*deviation)))
+         traction_scale(contact%problem%potential, &
+         max(greatest, contact%problem%modulus*self%longest*deviation)))
    end subroutine begin
 
    !> The load or the sum of the gap that is prescribed, and the gap on what is allowed.
@@ -278,7 +279,8 @@ contains
          !$omp do
          do j = 1, self%my
             row(:) = contact%state(:, j)
-            if (j <= self%ny) row(1:nx) = row(1:nx) + (contact%height(:, j) - contact%problem%datum) + contact%level
+            if (j <= self%ny) row(1:nx) = row(1:nx) + (contact%height(:, j) - contact%problem%datum) &
+               + contact%level
             call self%stiffness%forward_row(1, j, row)
          end do
          !$omp end do
@@ -395,7 +397,8 @@ contains
       real(dp) :: sum_of_gap, sum_of_pressure, scale
       integer :: j
 
-      !$omp parallel do default(none) shared(self, contact, gap, pressure) private(j) num_threads(self%threads)
+      !$omp parallel do default(none) shared(self, contact, gap, pressure) private(j) &
+      !$omp num_threads(self%threads)
       do j = 1, self%ny
          gap(:, j) = contact%state(1:self%nx, j)
          pressure(:, j) = contact%traction(1:self%nx, j) + contact%load
@@ -414,7 +417,8 @@ contains
          if (contact%problem%control == control_pressure) load_error = abs(sum_of_pressure - contact%force) &
             /max(abs(contact%force), contact%units%traction)
       end if
-      call close_gaps(contact%problem, contact%units%length, contact%units%traction, self%threads, gap, pressure)
+      call close_gaps(contact%problem, contact%units%length, contact%units%traction, self%threads, &
+         gap, pressure)
    end subroutine hand_out
 
    !> Transforms done so far.

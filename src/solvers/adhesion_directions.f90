@@ -1,0 +1,289 @@
+!> Residuals and directions of the fast method for adhesive contact (module adhesion_cg_fast).
+!>
+!> The work fields of the method, where its iteration stands, and the first two parts of an iteration:
+!> `measure` finds r and the error from the traction at hand, `find_direction` the direction d = z + beta d
+!> with z = M r.
+module adhesion_directions
+   use adhesion_patch, only : adhesion_contact_type, adhesion_patch_type, evaluate_gradient, &
+      natural_residual
+   use adhesion_preconditioner, only : adhesion_preconditioner_type
+   use adhesion_state, only : control_approach, control_pressure, diagonal_scaling
+   use asperity_parallel, only : global_max, global_min, global_sum
+   use asperity_precision, only : dp
+   implicit none
+   private
+
+   public :: adhesion_iteration_type, adhesion_work_type, find_direction, measure
+
+   ! Passes over z. The first is left out where the sum of the gap is free.
+   integer, parameter :: sum_pass = 0           !! add up
+   integer, parameter :: last_pass = 2          !! z is what it will be
+
+   ! Where the traction comes from. Only a fresh one proves a solution.
+   integer, parameter, public :: updated = 1    !! it was updated with the steps: it has gathered round-off
+   integer, parameter, public :: fresh = 2      !! it is a product with B
+
+   !> The operators and work fields of the method.
+   type :: adhesion_work_type
+      type(adhesion_patch_type) :: patch
+      type(adhesion_preconditioner_type) :: preconditioner
+      real(dp), allocatable :: gradient(:, :)        !! G; then M's input; then z = M r
+      real(dp), allocatable :: residual(:, :)        !! r
+      real(dp), allocatable :: old(:, :)             !! r of the iteration before
+      real(dp), allocatable :: direction(:, :)       !! d
+      real(dp) :: scaling = 0.0_dp                   !! k of the Gauss potential, Pa/m; 0: none
+   end type adhesion_work_type
+
+   !> A contact that is being solved, and where its iteration stands.
+   type, extends(adhesion_contact_type) :: adhesion_iteration_type
+      integer :: source = fresh                  !! of the traction
+      integer :: updates = 0                     !! of the traction since it was fresh
+      integer :: failures = 0                    !! directions in a row that gave no step
+      real(dp) :: residual = 0.0_dp              !! natural residual by the traction at hand
+      real(dp) :: limit = 0.0_dp                 !! residual at which a solution is checked
+      real(dp) :: least = 0.0_dp                 !! least gap, m
+      real(dp) :: missing = 0.0_dp               !! prescribed force less sum of P, free mode, Pa
+      real(dp) :: old_missing = 0.0_dp           !! in the iteration before
+      real(dp) :: psi_r = 0.0_dp                 !! psi.r of the padding, Pa
+      real(dp) :: old_rz = 0.0_dp                !! r.z of the iteration before; 0: directions start anew
+      real(dp) :: kappa = 1.0_dp                 !! last form of a step over its estimate
+      real(dp) :: lift = 0.0_dp                  !! d of the level
+      real(dp) :: slope = 0.0_dp                 !! r.d
+      real(dp) :: squares = 0.0_dp               !! of the change of the displacement along d
+   end type adhesion_iteration_type
+
+   !> Sums of a row of z.
+   type :: z_sums_type
+      real(dp) :: rz = 0.0_dp                    !! r.z
+      real(dp) :: old_rz = 0.0_dp                !! z.(r of the iteration before)
+      real(dp) :: total = 0.0_dp                 !! sum of z over the cells that may move
+      real(dp) :: moving = 0.0_dp                !! their number
+   end type z_sums_type
+
+contains
+
+   !> The gradient G, the natural residual, and r, which is handed to the preconditioner.
+   subroutine measure(self, now)
+      type(adhesion_work_type), intent(inout) :: self
+      type(adhesion_iteration_type), intent(inout) :: now
+      real(dp), allocatable :: loads(:), paddings(:)
+      real(dp) :: worst, least
+      integer :: j
+
+      call evaluate_gradient(self%patch, now, self%gradient)
+      allocate (loads(self%patch%my), paddings(self%patch%my))
+      worst = 0.0_dp
+      least = huge(1.0_dp)
+      !$omp parallel do default(none) shared(self, now, loads, paddings) private(j) &
+      !$omp reduction(max: worst) reduction(min: least) num_threads(self%patch%threads)
+      do j = 1, self%patch%my
+         call measure_row(self, now, j, worst, least, paddings(j))
+         loads(j) = sum(now%traction(1:self%patch%inner(j), j))
+         call self%preconditioner%put_row(j, self%gradient(:, j))
+      end do
+      now%residual = global_max(worst)
+      now%least = global_min(least)
+      if (self%patch%periodic) return
+      now%psi_r = global_sum(sum(paddings))
+      if (now%problem%control /= control_pressure) return
+      now%old_missing = now%missing
+      now%missing = now%force - global_sum(sum(loads))
+      now%residual = max(now%residual, abs(now%missing)/max(abs(now%force), now%units%traction))
+   end subroutine measure
+
+   !> A row of r and of M's input, from the row of G less p.
+   subroutine measure_row(self, now, j, worst, least, padding)
+      type(adhesion_work_type), intent(inout) :: self
+      type(adhesion_iteration_type), intent(in) :: now
+      integer, intent(in) :: j
+      real(dp), intent(inout) :: worst                 !! natural residual
+      real(dp), intent(inout) :: least                 !! least gap, m
+      real(dp), intent(out) :: padding                 !! psi.r of the padding, Pa
+      real(dp) :: g, gap, r
+      integer :: i, n
+
+      n = self%patch%inner(j)
+      do i = 1, n
+         gap = now%state(i, j)
+         g = self%gradient(i, j) + now%load
+         worst = max(worst, natural_residual(now%units, gap, g))
+         least = min(least, gap)
+         r = 0.0_dp
+         if (gap > 0.0_dp .or. g < 0.0_dp) r = -g
+         self%old(i, j) = self%residual(i, j)
+         self%residual(i, j) = r
+         if (self%scaling > 0.0_dp) r = r*diagonal_scaling(now%problem, gap, self%scaling)
+         self%gradient(i, j) = r
+      end do
+      padding = 0.0_dp
+      do i = n + 1, self%patch%mx
+         r = -now%traction(i, j)
+         worst = max(worst, abs(r)/now%units%traction)
+         padding = padding + self%patch%psi(i, j)*r
+         self%old(i, j) = self%residual(i, j)
+         self%residual(i, j) = r
+         self%gradient(i, j) = r
+      end do
+   end subroutine measure_row
+
+   !> The direction d = z + beta d, or d = z where that one does not descend.
+   subroutine find_direction(self, now)
+      type(adhesion_work_type), intent(inout) :: self
+      type(adhesion_iteration_type), intent(inout) :: now
+      type(z_sums_type) :: sums
+      real(dp) :: level_z, beta
+
+      call self%preconditioner%transform()
+      level_z = 0.0_dp
+      if (.not. self%patch%periodic .and. now%problem%control == control_pressure) &
+         level_z = (now%missing + now%psi_r)/(now%problem%modulus*self%patch%psi_form)
+      call precondition(self, now, level_z, sums)
+      sums%rz = sums%rz + now%missing*level_z
+      sums%old_rz = sums%old_rz + now%old_missing*level_z
+      beta = 0.0_dp
+      if (now%old_rz > 0.0_dp) beta = max(0.0_dp, (sums%rz - sums%old_rz)/now%old_rz)
+      now%old_rz = sums%rz
+      call turn(self, beta, level_z, now)
+      if (now%slope <= 0.0_dp .and. beta > 0.0_dp) call turn(self, 0.0_dp, level_z, now)
+   end subroutine find_direction
+
+   !> z = M r on the free cells and in the padding, without cells in contact that it would close; of zero
+   !> mean where the sum of the gap is prescribed, and with the level's mode where that is unknown.
+   subroutine precondition(self, now, level_z, sums)
+      type(adhesion_work_type), intent(inout) :: self
+      type(adhesion_iteration_type), intent(in) :: now
+      real(dp), intent(in) :: level_z                  !! z of the level, m
+      type(z_sums_type), intent(out) :: sums
+      type(z_sums_type), allocatable :: rows(:)
+      real(dp), allocatable :: z(:)
+      real(dp) :: mean
+      integer :: first, j, pass
+
+      first = last_pass
+      if (self%patch%periodic .and. now%problem%control == control_approach) first = sum_pass
+      allocate (rows(self%patch%my))
+      !$omp parallel default(none) shared(self, now, level_z, rows, first) private(j, z) &
+      !$omp num_threads(self%patch%threads)
+      allocate (z(self%patch%mx))
+      !$omp do
+      do j = 1, self%patch%my
+         call self%preconditioner%get_row(j, self%gradient(:, j), z)
+         call take_z_row(self, now, level_z, j, z)
+         call center_row(self, now, first, 0.0_dp, j, rows(j))
+      end do
+      !$omp end do
+      !$omp end parallel
+      sums = sum_of(rows)
+      ! Cells in contact that the mean would close drop out, which changes the mean: once more.
+      do pass = first + 1, last_pass
+         mean = sums%total/max(sums%moving, 1.0_dp)
+         !$omp parallel do default(none) shared(self, now, pass, mean, rows) private(j) &
+         !$omp num_threads(self%patch%threads)
+         do j = 1, self%patch%my
+            call center_row(self, now, pass, mean, j, rows(j))
+         end do
+         sums = sum_of(rows)
+      end do
+   end subroutine precondition
+
+   !> A row of z from what M has made of r; 0 on the cells that are not free.
+   subroutine take_z_row(self, now, level_z, j, z)
+      type(adhesion_work_type), intent(inout) :: self
+      type(adhesion_iteration_type), intent(in) :: now
+      real(dp), intent(in) :: level_z                  !! m
+      integer, intent(in) :: j
+      real(dp), intent(inout) :: z(:)                  !! in: M r for Q = 1
+      integer :: i, n
+
+      n = self%patch%inner(j)
+      z(:) = z/now%problem%modulus
+      do i = 1, n
+         if (.not. (now%state(i, j) > 0.0_dp .or. self%residual(i, j) > 0.0_dp)) z(i) = 0.0_dp
+         if (self%scaling > 0.0_dp) z(i) = z(i)*diagonal_scaling(now%problem, now%state(i, j), self%scaling)
+      end do
+      if (n < self%patch%mx) z(n + 1:) = z(n + 1:) + level_z*self%patch%psi(n + 1:, j)
+      self%gradient(:, j) = z
+   end subroutine take_z_row
+
+   !> Take the mean off a row of z, and keep cells in contact from closing; the sums of the row.
+   subroutine center_row(self, now, pass, mean, j, sums)
+      type(adhesion_work_type), intent(inout) :: self
+      type(adhesion_iteration_type), intent(in) :: now
+      integer, intent(in) :: pass                      !! in sum_pass z is left as it is
+      real(dp), intent(in) :: mean                     !! m
+      integer, intent(in) :: j
+      type(z_sums_type), intent(out) :: sums
+      real(dp) :: z
+      logical :: open, opening
+      integer :: i
+
+      do i = 1, self%patch%mx
+         z = self%gradient(i, j)
+         if (i <= self%patch%inner(j)) then
+            open = now%state(i, j) > 0.0_dp
+            opening = self%residual(i, j) > 0.0_dp
+            if (pass == last_pass) opening = z > 0.0_dp
+            if (open .or. opening) z = z - mean
+            if (pass /= sum_pass .and. .not. open) then
+               z = merge(max(z, 0.0_dp), 0.0_dp, opening)
+               opening = z > 0.0_dp
+            end if
+            if (open .or. opening) sums%moving = sums%moving + 1.0_dp
+            self%gradient(i, j) = z
+            sums%total = sums%total + z
+         end if
+         sums%rz = sums%rz + z*self%residual(i, j)
+         sums%old_rz = sums%old_rz + z*self%old(i, j)
+      end do
+   end subroutine center_row
+
+   !> Sums of all rows, in order.
+   function sum_of(rows) result(sums)
+      type(z_sums_type), intent(in) :: rows(:)
+      type(z_sums_type) :: sums
+
+      sums%rz = global_sum(sum(rows%rz))
+      sums%old_rz = global_sum(sum(rows%old_rz))
+      sums%total = global_sum(sum(rows%total))
+      sums%moving = global_sum(sum(rows%moving))
+   end function sum_of
+
+   !> d = z + beta d on the free cells and in the padding, 0 elsewhere; the level's alike. The change of
+   !> the displacement along d is handed to the estimate.
+   subroutine turn(self, beta, level_z, now)
+      type(adhesion_work_type), intent(inout) :: self
+      real(dp), intent(in) :: beta
+      real(dp), intent(in) :: level_z                  !! z of the level, m
+      type(adhesion_iteration_type), intent(inout) :: now
+      real(dp), allocatable :: change(:), slopes(:), squares(:)
+      real(dp) :: d
+      integer :: i, j, n
+
+      now%lift = level_z + beta*now%lift
+      allocate (slopes(self%patch%my), squares(self%patch%my))
+      !$omp parallel default(none) shared(self, now, beta, slopes, squares) &
+      !$omp private(i, j, n, d, change) num_threads(self%patch%threads)
+      allocate (change(self%patch%mx))
+      !$omp do
+      do j = 1, self%patch%my
+         n = self%patch%inner(j)
+         slopes(j) = 0.0_dp
+         do i = 1, self%patch%mx
+            d = self%gradient(i, j) + beta*self%direction(i, j)
+            if (i <= n) then
+               if (.not. (now%state(i, j) > 0.0_dp .or. self%gradient(i, j) > 0.0_dp)) d = 0.0_dp
+            end if
+            slopes(j) = slopes(j) + self%residual(i, j)*d
+            self%direction(i, j) = d
+            change(i) = merge(d + now%lift, d, i <= n)
+         end do
+         squares(j) = sum(change**2)
+         call self%preconditioner%put_estimate_row(j, change)
+      end do
+      !$omp end do
+      !$omp end parallel
+      now%slope = global_sum(sum(slopes)) + now%missing*now%lift
+      now%squares = global_sum(sum(squares))
+   end subroutine turn
+
+end module adhesion_directions
