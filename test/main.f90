@@ -24,6 +24,7 @@ program main
    use test_prony, only : run_prony
    use test_result_file, only : run_result_file
    use test_roughness, only : run_roughness
+   use test_schur, only : run_schur
    use test_surface, only : run_surface
    use test_viscoelastic_energy, only : run_viscoelastic_energy
    use test_xdmf, only : run_xdmf
@@ -80,6 +81,7 @@ program main
       call run_normal_cg()
       call run_normal_limits()
       call run_normal_invariance()
+      call run_schur()
    end if
    if (wanted('adhesion_free')) call run_adhesion_free()
    if (wanted('facade')) call run_facade()

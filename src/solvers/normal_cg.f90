@@ -6,7 +6,8 @@
 !> of a viscoelastic material; nothing else changes with it). After Polonsky and Keer (1999), with
 !> * the exact projection on {P >= 0, sum P = load} instead of a rescaling;
 !> * the direction kept through changes of the contact set (Fletcher-Reeves);
-!> * a preconditioner ~ |q| of a local stencil and block means (module coarse_level);
+!> * a preconditioner ~ |q| of a local stencil and block means, of which the residual is extended off the
+!>   contact (module schur_preconditioner);
 !> * the step length predicted on the block means, so that the clipped step s is known before the
 !>   transform: two transforms per iteration, always;
 !> * passes over active blocks of 16 cells only, except the one that updates the gap.
@@ -31,16 +32,16 @@
 !> beside s. The pressure and the gap stay in double precision; module gap_watch says when the gap is
 !> computed afresh in double precision, and when single precision no longer helps.
 !>
-!> Fields of doubles: H, P, gap, and the work fields residual, direction, step; the operator's spectrum
-!> and a quarter for its symbol, a tenth for blocks and the coarse level: 7.4, measured 7.7 at n = 4096
-!> with all else the process holds. In free mode spectrum and symbol take three.
+!> Fields of doubles: H, P, gap and step; five fields in single precision (the direction and those of the
+!> preconditioner); the operator's spectrum and a quarter for its symbol; a quarter for blocks and the
+!> coarse level: 8. In free mode spectrum and symbol take three.
 module normal_cg
    use contact_solver, only : contact_solver_type
    use asperity_errors, only : error_type
    use finite_fields, only : reject_overflow
    use fft_conv, only : columns_apply, convolution_type, new_normal_operator
    use gap_watch, only : gap_watch_type, new_gap_watch
-   use normal_passes, only : clip_step, clip_type, find_clip, form_residual, longest_multiple, &
+   use normal_passes, only : clip_step, clip_type, find_clip, longest_multiple, &
       new_direction, new_normal_work, normal_work_type, survey, try_pressure, update_state
    use normal_state, only : combine_measures, control_pressure, evaluate_gap, first_pressure, &
       gap_measure_type, narrow_scale, normal_problem_type, prepare_problem, reason_converged, &
@@ -66,6 +67,11 @@ module normal_cg
    real(dp), parameter :: often_bent = 1e3_dp  !! kappa from which the direction is the plain residual
    real(dp), parameter :: hopeless = 1e9_dp    !! kappa from which no step is expected to descend
    real(dp), parameter :: useless = 0.1_dp     !! largest part of a clipped step that counts as little
+
+   ! Steps by which the preconditioner extends the residual. A third one saves iterations only where most
+   ! cells touch: the gaps between are then narrow, and the coarse level sees little of them.
+   integer, parameter :: few_steps = 2, more_steps = 3
+   real(dp), parameter :: much_contact = 0.3_dp   !! part of the cells in contact from which it pays
 
    !> The solver with its operators and work fields, kept from step to step. Not to be copied.
    type, extends(contact_solver_type) :: normal_solver_type
@@ -132,7 +138,7 @@ contains
          call measure_state()
          if (now%phase == phase_ended) exit
          outcome%iterations = outcome%iterations + 1
-         call choose_direction(self%work, task, measure%level, pressure, gap, now)
+         call choose_direction(self%work, task, measure, pressure, gap, now)
          call choose_step(self, product, task, measure%level, pressure, gap, now)
          if (now%alpha > 0.0_dp) then
             call update_state(self%work, product, task%target, now%alpha/task%modulus, now%alpha, &
@@ -148,7 +154,9 @@ contains
       subroutine start_solve()
          began = omp_get_wtime()
          before = transforms(self)
-         call self%work%active%clear(self%work%residual, self%work%direction, self%step)
+         call self%work%active%clear(self%work%preconditioner%residual, self%work%direction, &
+            self%work%preconditioner%search, self%step)
+         self%work%scale = 0.0_dp
          self%work%offset = 0.0_dp
          cells = real(self%grid%nx, dp)*self%grid%ny
          call prepare_problem(problem, self%grid, self%operator%threads, height, task, determined)
@@ -181,7 +189,11 @@ contains
          if (drifted .and. now%phase == phase_conjugate) now%phase = phase_restart
          if (.not. watch%single) product => self%operator
          if (outcome%iterations == problem%max_iterations) now%phase = phase_ended
-         call self%work%active%list_runs(measure%level, self%work%residual, self%work%direction, self%step)
+         associate (work => self%work)
+            if (work%scale <= 0.0_dp) work%scale = unit_of(measure%duality_gap, task%rms_height)
+            call work%active%list_runs(measure%level, work%preconditioner%residual, work%direction, self%step)
+            call work%active%list_wide_runs(work%preconditioner%search)
+         end associate
       end subroutine measure_state
 
       !> The gap by a product of the whole pressure, and its measure.
@@ -224,8 +236,22 @@ contains
       type(normal_solver_type), intent(in) :: self
       real(dp) :: count
 
-      count = real(self%operator%ffts + self%quick%ffts, dp) + self%work%coarse%transforms()
+      count = real(self%operator%ffts + self%quick%ffts, dp) + self%work%coarse%transforms() &
+         + self%work%preconditioner%transforms()
    end function transforms
+
+   !> One over the power of two above a length, or above another where that is 0.
+   pure function unit_of(length, other) result(unit)
+      real(dp), intent(in) :: length, other
+      real(dp) :: unit
+
+      unit = 1.0_dp
+      if (length > 0.0_dp .and. length <= huge(length)) then
+         unit = scale(1.0_dp, -exponent(length))
+      else if (other > 0.0_dp .and. other <= huge(other)) then
+         unit = scale(1.0_dp, -exponent(other))
+      end if
+   end function unit_of
 
    !> End the loop.
    pure subroutine end_loop(now, reason)
@@ -237,17 +263,20 @@ contains
    end subroutine end_loop
 
    !> The direction of an iteration, according to the phase; it sets the phase of the next one.
-   subroutine choose_direction(work, task, level, pressure, gap, now)
+   subroutine choose_direction(work, task, measure, pressure, gap, now)
       type(normal_work_type), intent(inout) :: work
       type(normal_problem_type), intent(in) :: task
-      real(dp), intent(in) :: level                    !! m
+      type(gap_measure_type), intent(in) :: measure
       real(dp), intent(in) :: pressure(:, :), gap(:, :)
       type(iteration_type), intent(inout) :: now
       real(dp) :: rz, beta
       logical :: fixed_load
 
       fixed_load = task%control == control_pressure
-      call form_residual(work, level, pressure, gap, rz)
+      call work%preconditioner%set_residual(work%coarse, work%active, work%scale, measure%level, &
+         pressure, gap)
+      call work%preconditioner%extend(work%coarse, work%active, &
+         merge(more_steps, few_steps, measure%contact > much_contact), rz)
       beta = 0.0_dp
       if (now%phase == phase_conjugate .and. now%rz > 0.0_dp) beta = rz/now%rz
       now%rz = rz
@@ -350,6 +379,7 @@ contains
       call self%operator%destroy()
       if (self%mixed) call self%quick%destroy()
       call self%work%coarse%destroy()
+      call self%work%preconditioner%destroy()
    end subroutine destroy
 
 end module normal_cg

@@ -4,21 +4,22 @@
 !> work fields are zero elsewhere. The innermost loops are in module normal_sweeps.
 module normal_passes
    use active_blocks, only : active_blocks_type, new_active_blocks
-   use coarse_level, only : coarse_level_type, new_coarse_level, stencil_c0
+   use coarse_level, only : coarse_level_type, new_coarse_level
    use asperity_errors, only : error_type
    use fft_conv, only : convolution_type
    use normal_state, only : row_measure
-   use normal_sums, only : direction_sums_type, residual_sums_type, state_sums_type, step_sums_type, &
+   use normal_sums, only : direction_sums_type, state_sums_type, step_sums_type, &
       total, trial_sums_type
-   use normal_sweeps, only : above_cells, clip_cells, coupling_cells, direction_cells, load_cells, &
-      longest_cells, residual_cells, trial_cells
+   use normal_sweeps, only : above_cells, clip_cells, direction_cells, load_cells, &
+      longest_cells, trial_cells
    use asperity_parallel, only : global_min
-   use asperity_precision, only : dp
+   use asperity_precision, only : dp, sp
    use regular_grid, only : boundary_periodic, grid_type
+   use schur_preconditioner, only : new_schur_preconditioner, schur_preconditioner_type
    implicit none
    private
 
-   public :: clip_step, clip_type, find_clip, form_residual, longest_multiple, new_direction, &
+   public :: clip_step, clip_type, find_clip, longest_multiple, new_direction, &
       new_normal_work, normal_work_type, survey, try_pressure, update_state
 
    !> The work fields of a solver, and what belongs to them.
@@ -27,11 +28,19 @@ module normal_passes
       integer :: threads = 1
       type(coarse_level_type) :: coarse
       type(active_blocks_type) :: active             !! where residual, direction and step are not 0
-      real(dp), allocatable :: residual(:, :)        !! with a rim: (0:nx+1, 0:ny+1), m
-      real(dp), allocatable :: direction(:, :)       !! [nx, ny]
+      type(schur_preconditioner_type) :: preconditioner   !! holds the residual
+      real(dp) :: scale = 0.0_dp                     !! of the residual and the direction; 0: not chosen yet
+      real(sp), allocatable :: direction(:, :)       !! [nx, ny]
       real(dp) :: offset = 0.0_dp                    !! to be subtracted from the direction where it acts
       type(state_sums_type), allocatable :: state(:)   !! of each row of the present state, [ny]
    end type normal_work_type
+
+   !> Values along x that the rows of a coarse block share.
+   type :: strip_type
+      real(sp), allocatable :: correction(:)         !! coarse part of z
+      real(sp), allocatable :: column(:)             !! sums of the direction over the rows
+      real(sp), allocatable :: shares(:)             !! numbers of cells in which it acts
+   end type strip_type
 
    !> How a trial pressure is put back on what is allowed: factor max(trial - shift, 0).
    type :: clip_type
@@ -54,9 +63,11 @@ contains
       self%threads = threads
       call new_coarse_level(self%coarse, grid, poisson, error)
       if (allocated(error)) return
-      allocate (self%residual(0:grid%nx + 1, 0:grid%ny + 1), source=0.0_dp)
-      allocate (self%direction(grid%nx, grid%ny), source=0.0_dp)
-      call new_active_blocks(self%active, grid%nx, grid%ny, threads)
+      call new_schur_preconditioner(self%preconditioner, grid, self%coarse, threads, error)
+      if (allocated(error)) return
+      allocate (self%direction(grid%nx, grid%ny), source=0.0_sp)
+      call new_active_blocks(self%active, grid%nx, grid%ny, grid%boundary == boundary_periodic, &
+         self%coarse%first_y, self%preconditioner%extends, threads)
       allocate (self%state(grid%ny))
    end subroutine new_normal_work
 
@@ -75,82 +86,6 @@ contains
       end do
    end subroutine survey
 
-   !> The residual r = level - gap on S = {P > 0 or gap < level}, its rim and block means; the coarse
-   !> correction; and the product r.z, where z = M r is the sum of the stencil and the correction.
-   subroutine form_residual(self, level, pressure, gap, rz)
-      type(normal_work_type), intent(inout) :: self
-      real(dp), intent(in) :: level
-      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny), gap(self%grid%nx, self%grid%ny)
-      real(dp), intent(out) :: rz
-      type(residual_sums_type), allocatable :: rows(:)
-      type(residual_sums_type) :: sums
-      real(dp), allocatable :: column(:)
-      real(dp) :: wx, wy
-      integer :: j, k, jb, n, nx, ny
-      logical :: periodic
-
-      allocate (rows(self%grid%ny))
-      wx = self%coarse%wx
-      wy = self%coarse%wy
-      nx = self%grid%nx
-      ny = self%grid%ny
-      periodic = self%grid%boundary == boundary_periodic
-      !$omp parallel default(none) shared(self, pressure, gap, level, wx, wy, nx, periodic, rows) &
-      !$omp private(j, k, jb, n, column, sums) num_threads(self%threads)
-      allocate (column(nx))
-      !$omp do schedule(dynamic)
-      do jb = 1, self%coarse%ny
-         column(:) = 0.0_dp
-         do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
-            sums = residual_sums_type()
-            do k = 1, self%active%runs(j)
-               associate (first => self%active%first(k, j))
-                  n = self%active%last(k, j) - first + 1
-                  call residual_cells(n, level, pressure(first, j), gap(first, j), &
-                     self%residual(first, j), column(first), sums)
-               end associate
-            end do
-            if (periodic) then
-               self%residual(0, j) = self%residual(nx, j)
-               self%residual(nx + 1, j) = self%residual(1, j)
-            end if
-            if (j > self%coarse%first_y(jb)) call couple_row(self, wx, wy, j, sums%coupling)
-            rows(j) = sums
-         end do
-         call self%coarse%set_means(jb, column)
-      end do
-      !$omp end parallel
-      if (periodic) then
-         self%residual(1:nx, 0) = self%residual(1:nx, ny)
-         self%residual(1:nx, ny + 1) = self%residual(1:nx, 1)
-      end if
-      ! The first row of a block needs a row that another thread may have formed.
-      do jb = 1, self%coarse%ny
-         j = self%coarse%first_y(jb)
-         call couple_row(self, wx, wy, j, rows(j)%coupling)
-      end do
-      call self%coarse%precondition()
-      sums = total(rows)
-      rz = (stencil_c0 + 2.0_dp*(wx + wy))*sums%square - 2.0_dp*sums%coupling &
-         + self%coarse%cells*sum(self%coarse%mean*self%coarse%correction)
-   end subroutine form_residual
-
-   !> Add the products of a row's residuals with those west and south of them.
-   subroutine couple_row(self, wx, wy, j, coupling)
-      type(normal_work_type), intent(in) :: self
-      real(dp), intent(in) :: wx, wy
-      integer, intent(in) :: j
-      real(dp), intent(inout) :: coupling
-      integer :: k
-
-      do k = 1, self%active%runs(j)
-         associate (first => self%active%first(k, j))
-            call coupling_cells(self%active%last(k, j) - first + 1, wx, wy, self%residual(first - 1, j), &
-               self%residual(first, j - 1), coupling)
-         end associate
-      end do
-   end subroutine couple_row
-
    !> direction = z + beta direction where it acts: on S, except in empty cells that z would empty
    !> further. The constant that makes sum(direction) zero is kept in `offset` and not subtracted; the
    !> products and block means are those with it subtracted.
@@ -164,48 +99,62 @@ contains
       real(dp), intent(out) :: square                !! d.d
       type(direction_sums_type), allocatable :: rows(:)
       type(direction_sums_type) :: sums
-      real(dp), allocatable :: correction(:), column(:), shares(:)
-      real(dp) :: wx, wy, centre
-      integer :: j, k, jb, n
+      type(strip_type) :: strip
+      integer :: j, jb
 
       allocate (rows(self%grid%ny))
-      wx = merge(self%coarse%wx, 0.0_dp, preconditioned)
-      wy = merge(self%coarse%wy, 0.0_dp, preconditioned)
-      centre = merge(stencil_c0, 1.0_dp, preconditioned) + 2.0_dp*(wx + wy)
-      !$omp parallel default(none) shared(self, preconditioned, wx, wy, centre, beta, pressure, rows) &
-      !$omp private(j, k, jb, n, sums, correction, column, shares) &
-      !$omp num_threads(self%threads)
-      allocate (correction(self%grid%nx), column(self%grid%nx), shares(self%grid%nx))
-      !$omp do
+      !$omp parallel default(none) shared(self, preconditioned, beta, pressure, rows) &
+      !$omp private(j, jb, strip) num_threads(self%threads)
+      allocate (strip%correction(self%grid%nx), strip%column(self%grid%nx), strip%shares(self%grid%nx))
+      !$omp do schedule(dynamic)
       do jb = 1, self%coarse%ny
-         correction(:) = 0.0_dp
-         if (preconditioned) correction(:) = self%coarse%correction(self%coarse%block_x, jb)
-         column(:) = 0.0_dp
-         shares(:) = 0.0_dp
+         strip%correction(:) = 0.0_sp
+         if (preconditioned) &
+            strip%correction(:) = real(self%preconditioner%pending(self%coarse%block_x, jb), sp)
+         strip%column(:) = 0.0_sp
+         strip%shares(:) = 0.0_sp
          do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
-            sums = direction_sums_type()
-            do k = 1, self%active%runs(j)
-               associate (first => self%active%first(k, j))
-                  n = self%active%last(k, j) - first + 1
-                  call direction_cells(n, wx, wy, centre, self%residual(first, j - 1), &
-                     self%residual(first - 1, j), self%residual(first, j + 1), correction(first), &
-                     beta, self%offset, pressure(first, j), self%direction(first, j), &
-                     column(first), shares(first), sums)
-               end associate
-            end do
-            rows(j) = sums
+            call direction_row(self, preconditioned, beta, j, pressure(:, j), strip, rows(j))
          end do
-         call self%coarse%set_means(jb, column)
-         call self%coarse%set_shares(jb, shares)
+         call self%coarse%sum_blocks(strip%column, self%coarse%mean(:, jb))
+         call self%coarse%sum_blocks(strip%shares, self%coarse%share(:, jb))
       end do
       !$omp end parallel
       sums = total(rows)
       self%offset = 0.0_dp
       if (fixed_load) self%offset = sums%value/max(sums%cells, 1.0_dp)
-      slope = sums%slope - self%offset*sums%residual
+      slope = (sums%slope - self%offset*sums%residual)/self%scale
       square = sums%square - self%offset*sums%value
-      if (fixed_load) self%coarse%mean(:, :) = self%coarse%mean - self%offset*self%coarse%share
+      self%coarse%mean(:, :) = (self%coarse%mean - self%offset*self%coarse%share)/self%coarse%cells
    end subroutine new_direction
+
+   !> The direction in a row.
+   subroutine direction_row(self, preconditioned, beta, j, pressure, strip, sums)
+      type(normal_work_type), intent(inout), target :: self
+      logical, intent(in) :: preconditioned
+      real(dp), intent(in) :: beta
+      integer, intent(in) :: j
+      real(dp), intent(in) :: pressure(self%grid%nx)
+      type(strip_type), intent(inout) :: strip
+      type(direction_sums_type), intent(out) :: sums
+      real(sp), pointer, contiguous :: image(:), response(:)
+      real(sp) :: length
+      integer :: k
+
+      ! z = image + length response + correction. The response is not set where the length is 0.
+      image => self%preconditioner%image(:, j)
+      if (.not. preconditioned) image => self%preconditioner%residual(1:self%grid%nx, j)
+      length = merge(self%preconditioner%length, 0.0_sp, preconditioned)
+      response => image
+      if (length > 0.0_sp) response => self%preconditioner%response(:, j)
+      do k = 1, self%active%runs(j)
+         associate (a => self%active%first(k, j), b => self%active%last(k, j))
+            call direction_cells(b - a + 1, length, image(a:b), response(a:b), strip%correction(a:b), &
+               self%preconditioner%residual(a:b, j), real(beta, sp), real(self%offset, sp), pressure(a:b), &
+               self%direction(a:b, j), strip%column(a:b), strip%shares(a:b), sums)
+         end associate
+      end do
+   end subroutine direction_row
 
    !> step = trial pressure P + alpha (direction - offset), and its sums above 0.
    subroutine try_pressure(self, alpha, pressure, step, sums)
@@ -314,7 +263,8 @@ contains
                call operator%forward_row(1, j, step(:, j))
             end if
          end do
-         call self%coarse%set_means(jb, column)
+         call self%coarse%sum_blocks(column, self%coarse%mean(:, jb))
+         self%coarse%mean(:, jb) = self%coarse%mean(:, jb)/self%coarse%cells
       end do
       !$omp end parallel
       sums = total(rows)

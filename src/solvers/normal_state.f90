@@ -41,6 +41,7 @@ module normal_state
       real(dp) :: level = 0.0_dp            !! mean of U - H + datum over P > 0, or the prescribed one, m
       real(dp) :: weighted_level = 0.0_dp   !! the same weighted by P, or the prescribed one, m
       real(dp) :: load = 0.0_dp             !! sum of P over the cells, Pa
+      real(dp) :: contact = 0.0_dp          !! part of the cells with P > 0
       real(dp) :: load_error = 0.0_dp       !! relative
       real(dp) :: duality_gap = 0.0_dp      !! mean of U - H weighted by P above its least, m
       real(dp) :: error = 0.0_dp            !! e1: duality gap over the rms height, or the load error
@@ -181,6 +182,7 @@ contains
       type(gap_measure_type) :: measure
 
       measure%load = sums%load
+      measure%contact = sums%cells/cells
       if (problem%control == control_approach) then
          measure%level = problem%target
          measure%weighted_level = problem%target

@@ -8,14 +8,8 @@ module normal_sums
    implicit none
    private
 
-   public :: direction_sums_type, residual_sums_type, state_sums_type, step_sums_type, total, &
+   public :: direction_sums_type, state_sums_type, step_sums_type, total, &
       trial_sums_type
-
-   !> Of the residual r = level - gap on the contact set.
-   type :: residual_sums_type
-      real(dp) :: square = 0.0_dp           !! r^2, m^2
-      real(dp) :: coupling = 0.0_dp         !! r times its weighted western and southern neighbours, m^2
-   end type residual_sums_type
 
    !> Of a direction d before its offset is taken off.
    type :: direction_sums_type
@@ -51,19 +45,10 @@ module normal_sums
 
    !> The sums of all rows, added in their order.
    interface total
-      module procedure :: total_residual, total_direction, total_trial, total_step, total_state
+      module procedure :: total_direction, total_trial, total_step, total_state
    end interface total
 
 contains
-
-   !> Sums of the residual over the grid.
-   pure function total_residual(rows) result(sums)
-      type(residual_sums_type), intent(in) :: rows(:)      !! [ny]
-      type(residual_sums_type) :: sums
-
-      sums%square = ordered(rows%square)
-      sums%coupling = ordered(rows%coupling)
-   end function total_residual
 
    !> Sums of a direction over the grid.
    pure function total_direction(rows) result(sums)

@@ -4,74 +4,54 @@
 !> is in the contact set S if the residual is not 0, and the direction acts where it is not 0.
 !> The loops take many arguments because passing them costs less than looking them up in records.
 module normal_sweeps
-   use normal_sums, only : direction_sums_type, residual_sums_type, state_sums_type, step_sums_type, &
+   use normal_sums, only : direction_sums_type, state_sums_type, step_sums_type, &
       trial_sums_type
-   use asperity_precision, only : dp
+   use asperity_precision, only : dp, sp
    implicit none
    private
 
-   public :: above_cells, clip_cells, coupling_cells, direction_cells, load_cells, longest_cells, &
+   public :: above_cells, clip_cells, direction_cells, load_cells, longest_cells, &
       residual_cells, trial_cells
 
 contains
 
-   !> The residual level - gap on S = {P > 0 or gap < level}, zero elsewhere; the sum of its square.
-   pure subroutine residual_cells(n, level, pressure, gap, residual, column, sums)
+   !> The residual scale (level - gap) on S = {P > 0 or gap < level}, zero elsewhere.
+   pure subroutine residual_cells(n, scale, level, pressure, gap, residual, column)
       integer, intent(in) :: n
-      real(dp), intent(in) :: level
+      real(dp), intent(in) :: scale, level
       real(dp), intent(in) :: pressure(n), gap(n)
-      real(dp), intent(inout) :: residual(n)
-      real(dp), intent(inout) :: column(n)          !! sums over the rows of a block
-      type(residual_sums_type), intent(inout) :: sums
-      real(dp) :: total, r
+      real(sp), intent(inout) :: residual(n)
+      real(sp), intent(inout) :: column(n)          !! sums over the rows of a block
+      real(dp) :: g
       integer :: i
 
-      total = 0.0_dp
-      !$omp simd reduction(+:total) private(r)
+      !$omp simd private(g)
       do i = 1, n
-         r = (level - gap(i))*positive(max(level - gap(i), pressure(i)))
-         residual(i) = r
-         column(i) = column(i) + r
-         total = total + r**2
+         g = level - gap(i)
+         residual(i) = real(scale*g*positive(max(g, pressure(i))), sp)
+         column(i) = column(i) + residual(i)
       end do
-      sums%square = sums%square + total
    end subroutine residual_cells
-
-   !> Sum of r (wx r_west + wy r_south).
-   pure subroutine coupling_cells(n, wx, wy, residual, south, sum)
-      integer, intent(in) :: n
-      real(dp), intent(in) :: wx, wy                !! weights of the stencil
-      real(dp), intent(in) :: residual(0:n), south(n)
-      real(dp), intent(inout) :: sum
-      real(dp) :: total
-      integer :: i
-
-      total = 0.0_dp
-      !$omp simd reduction(+:total)
-      do i = 1, n
-         total = total + residual(i)*(wx*residual(i - 1) + wy*south(i))
-      end do
-      sum = sum + total
-   end subroutine coupling_cells
 
    !> direction = z + beta (direction - offset), z = M r, where it acts: on S, except in empty cells that
    !> z would empty further.
-   pure subroutine direction_cells(n, wx, wy, centre, south, residual, north, correction, &
-      beta, offset, pressure, direction, column, shares, sums)
+   pure subroutine direction_cells(n, length, image, response, correction, residual, beta, offset, &
+      pressure, direction, column, shares, sums)
       integer, intent(in) :: n
-      real(dp), intent(in) :: wx, wy, centre        !! weights of the stencil
-      real(dp), intent(in) :: south(n), residual(0:n + 1), north(n)
-      real(dp), intent(in) :: correction(n)         !! of the coarse level
-      real(dp), intent(in) :: beta
-      real(dp), intent(in) :: offset                !! mean of the old direction
+      real(sp), intent(in) :: length
+      real(sp), intent(in) :: image(n), response(n), correction(n)   !! z = image + length response + ...
+      real(sp), intent(in) :: residual(n)
+      real(sp), intent(in) :: beta
+      real(sp), intent(in) :: offset                !! mean of the old direction
       real(dp), intent(in) :: pressure(n)
-      real(dp), intent(inout) :: direction(n)
-      real(dp), intent(inout) :: column(n)          !! sums over the rows of a block
-      real(dp), intent(inout) :: shares(n)          !! the same of 1 where it acts
+      real(sp), intent(inout) :: direction(n)
+      real(sp), intent(inout) :: column(n)          !! sums over the rows of a block
+      real(sp), intent(inout) :: shares(n)          !! the same of 1 where it acts
       type(direction_sums_type), intent(inout) :: sums
       ! Other passes assume that d acts where it is not 0, so it must not be 0 where it acts.
-      real(dp), parameter :: least = tiny(1.0_dp)
-      real(dp) :: total, cells, product, residuals, square, z, d, inside
+      real(sp), parameter :: least = tiny(1.0_sp)
+      real(dp) :: total, cells, product, residuals, square
+      real(sp) :: z, d, inside
       integer :: i
 
       total = 0.0_dp
@@ -81,11 +61,9 @@ contains
       square = 0.0_dp
       !$omp simd reduction(+:total, cells, product, residuals, square) private(z, d, inside)
       do i = 1, n
-         z = centre*residual(i) - wx*(residual(i - 1) + residual(i + 1)) &
-            - wy*(south(i) + north(i)) + correction(i)
-         inside = positive(max(pressure(i), min(abs(residual(i)), z)))
-         d = inside*(z + beta*(direction(i) &
-            - offset*positive(abs(direction(i)))) + least)
+         z = image(i) + length*response(i) + correction(i)
+         inside = real(positive(max(pressure(i), real(min(abs(residual(i)), z), dp))), sp)
+         d = inside*(z + beta*(direction(i) - offset*acts(direction(i))) + least)
          direction(i) = d
          column(i) = column(i) + d
          shares(i) = shares(i) + inside
@@ -106,7 +84,8 @@ contains
    pure subroutine trial_cells(n, alpha, offset, pressure, direction, trial, sums)
       integer, intent(in) :: n
       real(dp), intent(in) :: alpha, offset
-      real(dp), intent(in) :: pressure(n), direction(n)
+      real(dp), intent(in) :: pressure(n)
+      real(sp), intent(in) :: direction(n)
       real(dp), intent(inout) :: trial(n)
       type(trial_sums_type), intent(inout) :: sums
       real(dp) :: total, cells, lowest
@@ -118,7 +97,7 @@ contains
       !$omp simd reduction(+:total, cells) reduction(min:lowest)
       do i = 1, n
          trial(i) = pressure(i) + alpha*(direction(i) &
-            - offset*positive(abs(direction(i))))
+            - offset*acts(direction(i)))
          total = total + max(trial(i), 0.0_dp)
          cells = cells + positive(trial(i))
          lowest = min(lowest, trial(i))
@@ -191,6 +170,14 @@ contains
 
       positive = 0.5_dp - sign(0.5_dp, 0.0_dp - x)
    end function positive
+
+   !> 1 where the direction is not 0, else 0, without a branch.
+   elemental function acts(direction)
+      real(sp), intent(in) :: direction
+      real(sp) :: acts
+
+      acts = 0.5_sp + sign(0.5_sp, abs(direction) - tiny(1.0_sp))
+   end function acts
 
    !> P = P + alpha step, and the sums of the new state without its least gap.
    pure subroutine load_cells(n, alpha, target, gap, step, pressure, sums)

@@ -1,0 +1,409 @@
+!> The preconditioner of the normal solver: the residual is extended off the contact before a local
+!> model of the operator's inverse is applied to it.
+!>
+!> On a fixed contact set S the matrix of the problem is A_SS. Its inverse is
+!>     B_SS - B_SN B_NN^-1 B_NS,
+!> the Schur complement of B = A^-1 ~ |q|, where N are the cells off the contact. So M r is found in two
+!> steps: choose v = r on S, and on N so that v.B v is least; then M r = B v on S. With v = 0 on N
+!> instead, M r = B_SS r fits worse the more edges the contact has.
+!>
+!> B is modelled by a stencil and a coarse level, B v = K v + R^T missing R v, with block sums R (module
+!> schur_coarse). If the model fits |q| within a factor, the Schur complements fit within the same
+!> factor on any set S, so that the number of iterations hardly depends on the grid and the load.
+!>
+!> The minimum over N is approached by a few steps of conjugate gradients, preconditioned by a constant
+!> and a coarse part, W p = om p + coarse part. A step needs one pass over the cells. The pass adds the
+!> step before to the image b = B v, forms the search direction d, and its response e = K d. The other
+!> sums that conjugate gradients need follow from block sums, because coarse parts are constant in a
+!> block. What the last step adds to b is left to the caller:
+!>     M r = image + length response + pending.
+!>
+!> On small grids the extension saves no time, and on flat cells the stencil is too poor a model for it:
+!> there M r = B_SS r.
+!>
+!> Fields are in single precision: errors of 1e-7 do not matter in a preconditioner. N is restricted to a
+!> rim around the contact (the wide blocks of module active_blocks). Memory: four such fields.
+module schur_preconditioner
+   use active_blocks, only : active_blocks_type
+   use coarse_level, only : coarse_level_type
+   use asperity_errors, only : error_type
+   use normal_sweeps, only : residual_cells
+   use asperity_parallel, only : global_sum
+   use asperity_precision, only : dp, sp
+   use regular_grid, only : boundary_periodic, grid_type
+   use schur_coarse, only : new_schur_coarse, om, schur_coarse_type, stencil_c1
+   use schur_sweeps, only : image_cells, image_sums_type, last_response_cells, response_cells, &
+      response_sums_type, search_cells, start_search_cells
+   implicit none
+   private
+
+   public :: new_schur_preconditioner, schur_preconditioner_type
+
+   real(dp), parameter :: c0_extended = 0.7_dp !! of the stencil
+   real(dp), parameter :: c0_plain = 1.0_dp    !! the same without an extension
+   real(dp), parameter :: least_cells = 131072.0_dp   !! cells from which the extension saves time
+   real(dp), parameter :: largest_aspect = 2.0_dp     !! of a cell: beyond it the stencil fits |q| too badly
+   real(dp), parameter :: solved = 1e-8_dp     !! reduction of the residual on N that is enough
+
+   !> The preconditioner with its fields. Not to be copied.
+   type :: schur_preconditioner_type
+      type(grid_type), private :: grid
+      integer, private :: threads = 1
+      logical :: extends = .false.                       !! the residual is extended at all
+      type(schur_coarse_type), private :: model
+      real(sp), private :: weights(3) = 0.0_sp           !! of the stencil: centre, along x, along y
+      real(sp), allocatable :: residual(:, :)            !! (0:nx+1, 0:ny+1), v on S, 0 on N
+      real(sp), allocatable :: search(:, :)              !! (0:nx+1, 0:ny+1), d, 0 on S
+      real(sp), allocatable :: image(:, :)               !! [nx, ny], b
+      real(sp), allocatable :: response(:, :)            !! [nx, ny], e of the last step
+      real(sp) :: length = 0.0_sp                        !! multiple of e that is still to be added to b
+      real(dp), allocatable :: pending(:, :)             !! coarse part to be added to b, of each block
+      type(image_sums_type), private :: sums
+      ! Sums over the cells of N in each block:
+      real(dp), allocatable, private :: cells_off(:, :)      !! 1
+      real(dp), allocatable, private :: image_off(:, :)      !! b
+      real(dp), allocatable, private :: response_off(:, :)   !! e
+      real(dp), allocatable, private :: search_off(:, :)     !! d
+   contains
+      procedure :: set_residual
+      procedure :: extend
+      procedure :: transforms
+      procedure :: destroy
+   end type schur_preconditioner_type
+
+   !> What a pass needs to know of a step.
+   type :: step_type
+      logical :: first = .false., last = .false.
+      real(sp) :: beta = 0.0_sp                          !! multiple of the old direction
+      real(dp), allocatable :: correction(:, :)          !! coarse part of W, of each block
+   end type step_type
+
+contains
+
+   !> Make the preconditioner of a grid.
+   subroutine new_schur_preconditioner(self, grid, coarse, threads, error, extends)
+      type(schur_preconditioner_type), intent(out) :: self
+      type(grid_type), intent(in) :: grid
+      type(coarse_level_type), intent(in) :: coarse
+      integer, intent(in) :: threads
+      type(error_type), allocatable, intent(out) :: error
+      logical, intent(in), optional :: extends           !! chosen by the grid if absent
+      real(dp) :: wx, wy, c0
+
+      self%grid = grid
+      self%threads = threads
+      self%extends = min(grid%nx, grid%ny) > 1 .and. real(grid%nx, dp)*grid%ny >= least_cells &
+         .and. max(grid%dx/grid%dy, grid%dy/grid%dx) <= largest_aspect
+      if (present(extends)) self%extends = extends
+      c0 = merge(c0_extended, c0_plain, self%extends)
+      wx = merge(0.0_dp, stencil_c1*(coarse%h/grid%dx)**2, grid%nx == 1)
+      wy = merge(0.0_dp, stencil_c1*(coarse%h/grid%dy)**2, grid%ny == 1)
+      self%weights = real([c0 + 2.0_dp*(wx + wy), wx, wy], sp)
+      allocate (self%residual(0:grid%nx + 1, 0:grid%ny + 1), source=0.0_sp)
+      allocate (self%search(0:grid%nx + 1, 0:grid%ny + 1), source=0.0_sp)
+      allocate (self%image(grid%nx, grid%ny), self%response(grid%nx, grid%ny), source=0.0_sp)
+      allocate (self%pending(coarse%nx, coarse%ny), source=0.0_dp)
+      allocate (self%cells_off, self%image_off, self%response_off, self%search_off, source=self%pending)
+      call new_schur_coarse(self%model, grid, c0, coarse%h, [coarse%nx, coarse%ny], threads, error)
+   end subroutine new_schur_preconditioner
+
+   !> The residual scale (level - gap) on S = {P > 0 or gap < level}, its block means, and K of it.
+   subroutine set_residual(self, coarse, active, scale, level, pressure, gap)
+      class(schur_preconditioner_type), intent(inout) :: self
+      type(coarse_level_type), intent(inout) :: coarse
+      type(active_blocks_type), intent(in) :: active
+      real(dp), intent(in) :: scale                      !! a power of two
+      real(dp), intent(in) :: level                      !! m
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny), gap(self%grid%nx, self%grid%ny)
+      type(image_sums_type), allocatable :: rows(:)
+      real(sp), allocatable :: column(:)
+      integer :: j, k, jb
+
+      allocate (rows(self%grid%ny))
+      !$omp parallel default(none) shared(self, coarse, active, scale, level, pressure, gap, rows) &
+      !$omp private(j, k, jb, column) num_threads(self%threads)
+      allocate (column(self%grid%nx))
+      !$omp do schedule(dynamic)
+      do jb = 1, coarse%ny
+         column(:) = 0.0_sp
+         do j = coarse%first_y(jb), coarse%first_y(jb + 1) - 1
+            do k = 1, active%runs(j)
+               associate (first => active%first(k, j))
+                  call residual_cells(active%last(k, j) - first + 1, scale, level, pressure(first, j), &
+                     gap(first, j), self%residual(first, j), column(first))
+               end associate
+            end do
+            call close_row(self, self%residual(:, j))
+         end do
+         call coarse%sum_blocks(column, coarse%mean(:, jb))
+         coarse%mean(:, jb) = coarse%mean(:, jb)/coarse%cells
+         self%image_off(:, jb) = 0.0_dp
+         self%cells_off(:, jb) = 0.0_dp
+         call image_rows(self, coarse, active, jb, inner_rows(coarse, jb), rows)
+      end do
+      !$omp end do
+      !$omp single
+      call close_field(self, self%residual)
+      !$omp end single
+      ! The rows at the edges of blocks need rows that another thread may have formed.
+      !$omp do schedule(dynamic)
+      do jb = 1, coarse%ny
+         call image_rows(self, coarse, active, jb, edge_rows(coarse, jb), rows)
+      end do
+      !$omp end parallel
+      self%sums = image_sums_type()
+      do j = 1, self%grid%ny
+         self%sums%form = self%sums%form + rows(j)%form
+         self%sums%square = self%sums%square + rows(j)%square
+      end do
+      self%sums%form = global_sum(self%sums%form)
+      self%sums%square = global_sum(self%sums%square)
+   end subroutine set_residual
+
+   !> K of the residual in some rows of a block.
+   subroutine image_rows(self, coarse, active, jb, which, rows)
+      type(schur_preconditioner_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      type(active_blocks_type), intent(in) :: active
+      integer, intent(in) :: jb                          !! row of blocks
+      integer, intent(in) :: which(3)                    !! first and last row, and their distance
+      type(image_sums_type), intent(inout) :: rows(:)
+      real(sp), allocatable :: column(:), count(:)
+      integer :: j, k
+
+      allocate (column(self%grid%nx), count(self%grid%nx), source=0.0_sp)
+      do j = which(1), which(2), which(3)
+         rows(j) = image_sums_type()
+         do k = 1, active%wide_runs(jb)
+            associate (first => active%wide_first(k, jb))
+               call image_cells(active%wide_last(k, jb) - first + 1, self%weights, &
+                  self%residual(first, j - 1), self%residual(first - 1, j), self%residual(first, j + 1), &
+                  self%image(first, j), column(first), count(first), rows(j))
+            end associate
+         end do
+      end do
+      call add_blocks(coarse, column, self%image_off(:, jb))
+      call add_blocks(coarse, count, self%cells_off(:, jb))
+   end subroutine image_rows
+
+   !> Extend the residual to N by some steps of conjugate gradients.
+   subroutine extend(self, coarse, active, steps, form)
+      class(schur_preconditioner_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      type(active_blocks_type), intent(in) :: active
+      integer, intent(in) :: steps
+      real(dp), intent(out) :: form                      !! r.M r = v.B v
+      type(step_type) :: step
+      type(response_sums_type) :: sums
+      real(dp), allocatable :: addition(:, :)            !! coarse part of B d, of each block
+      real(dp) :: square                                 !! of the residual on N, which is -b
+      real(dp) :: product, before, first, length
+      integer :: k
+
+      call self%model%add_missing(coarse%cells*coarse%mean, self%pending)
+      self%length = 0.0_sp
+      form = self%sums%form + coarse%cells*sum(coarse%mean*self%pending)
+      if (steps == 0 .or. .not. self%extends) return
+      square = self%sums%square + sum(self%pending*(2.0_dp*self%image_off + self%pending*self%cells_off))
+      self%image_off(:, :) = self%image_off + self%pending*self%cells_off
+      self%search_off(:, :) = 0.0_dp
+      call self%model%set_weights(self%cells_off)
+      allocate (step%correction, addition, source=self%pending)
+      before = 0.0_dp
+      first = 0.0_dp
+      do k = 1, steps
+         call self%model%weigh(-self%image_off, step%correction)
+         product = om*square - sum(self%image_off*step%correction)
+         if (k == 1) first = product
+         if (product <= solved*first .or. product <= tiny(1.0_dp)) exit
+         step%first = k == 1
+         step%last = k == steps
+         if (k > 1) step%beta = real(product/before, sp)
+         before = product
+         self%search_off(:, :) = step%correction*self%cells_off - om*self%image_off &
+            + step%beta*self%search_off
+         call self%model%add_missing(self%search_off, addition)
+         call search_pass(self, coarse, active, step, sums)
+         self%length = 0.0_sp
+         self%pending(:, :) = 0.0_dp
+         length = sums%form + sum(self%search_off*addition)
+         if (length <= 0.0_dp) exit
+         length = product/length
+         form = form - length*product
+         square = square + 2.0_dp*length*(sums%cross + sum(addition*self%image_off)) + length**2 &
+            *(sums%square + sum(addition*(2.0_dp*self%response_off + addition*self%cells_off)))
+         self%image_off(:, :) = self%image_off + length*(self%response_off + addition*self%cells_off)
+         self%length = real(length, sp)
+         self%pending(:, :) = length*addition
+      end do
+   end subroutine extend
+
+   !> The pass of a step: add the step before to the image, form the direction and its response.
+   subroutine search_pass(self, coarse, active, step, sums)
+      type(schur_preconditioner_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      type(active_blocks_type), intent(in) :: active
+      type(step_type), intent(in) :: step
+      type(response_sums_type), intent(out) :: sums
+      type(response_sums_type), allocatable :: rows(:)
+      integer :: j, jb
+
+      allocate (rows(self%grid%ny))
+      !$omp parallel default(none) shared(self, coarse, active, step, rows) private(j, jb) &
+      !$omp num_threads(self%threads)
+      !$omp do schedule(dynamic)
+      do jb = 1, coarse%ny
+         self%response_off(:, jb) = 0.0_dp
+         if (active%wide_runs(jb) == 0) cycle
+         call search_rows(self, coarse, active, jb, step)
+         call response_rows(self, coarse, active, jb, inner_rows(coarse, jb), step%last, rows)
+      end do
+      !$omp end do
+      !$omp single
+      call close_field(self, self%search)
+      !$omp end single
+      !$omp do schedule(dynamic)
+      do jb = 1, coarse%ny
+         if (active%wide_runs(jb) == 0) cycle
+         call response_rows(self, coarse, active, jb, edge_rows(coarse, jb), step%last, rows)
+      end do
+      !$omp end parallel
+      sums = response_sums_type()
+      do j = 1, self%grid%ny
+         sums%form = sums%form + rows(j)%form
+         sums%cross = sums%cross + rows(j)%cross
+         sums%square = sums%square + rows(j)%square
+      end do
+      sums%form = global_sum(sums%form)
+      sums%cross = global_sum(sums%cross)
+      sums%square = global_sum(sums%square)
+   end subroutine search_pass
+
+   !> The image and the search direction in the rows of a block.
+   subroutine search_rows(self, coarse, active, jb, step)
+      type(schur_preconditioner_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      type(active_blocks_type), intent(in) :: active
+      integer, intent(in) :: jb
+      type(step_type), intent(in) :: step
+      real(sp), allocatable :: added(:), corrected(:)
+      integer :: j, k, n
+
+      allocate (added(self%grid%nx), corrected(self%grid%nx))
+      added(:) = real(self%pending(coarse%block_x, jb), sp)
+      corrected(:) = real(step%correction(coarse%block_x, jb), sp)
+      do j = coarse%first_y(jb), coarse%first_y(jb + 1) - 1
+         do k = 1, active%wide_runs(jb)
+            associate (first => active%wide_first(k, jb))
+               n = active%wide_last(k, jb) - first + 1
+               if (step%first) then
+                  call start_search_cells(n, real(om, sp), added(first), corrected(first), &
+                     self%residual(first, j), self%image(first, j), self%search(first, j))
+               else
+                  call search_cells(n, real(om, sp), self%length, step%beta, added(first), &
+                     corrected(first), self%residual(first, j), self%response(first, j), &
+                     self%image(first, j), self%search(first, j))
+               end if
+            end associate
+         end do
+         call close_row(self, self%search(:, j))
+      end do
+   end subroutine search_rows
+
+   !> K of the search direction in some rows of a block.
+   subroutine response_rows(self, coarse, active, jb, which, last, rows)
+      type(schur_preconditioner_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      type(active_blocks_type), intent(in) :: active
+      integer, intent(in) :: jb
+      integer, intent(in) :: which(3)                    !! first and last row, and their distance
+      logical, intent(in) :: last
+      type(response_sums_type), intent(inout) :: rows(:)
+      real(sp), allocatable :: column(:)
+      integer :: j, k, n
+
+      allocate (column(self%grid%nx), source=0.0_sp)
+      do j = which(1), which(2), which(3)
+         do k = 1, active%wide_runs(jb)
+            associate (first => active%wide_first(k, jb))
+               n = active%wide_last(k, jb) - first + 1
+               if (last) then
+                  call last_response_cells(n, self%weights, self%search(first, j - 1), &
+                     self%search(first - 1, j), self%search(first, j + 1), self%response(first, j), rows(j))
+               else
+                  call response_cells(n, self%weights, self%search(first, j - 1), &
+                     self%search(first - 1, j), self%search(first, j + 1), self%residual(first, j), &
+                     self%image(first, j), self%response(first, j), column(first), rows(j))
+               end if
+            end associate
+         end do
+      end do
+      if (.not. last) call add_blocks(coarse, column, self%response_off(:, jb))
+   end subroutine response_rows
+
+   !> The rows of a block whose neighbours belong to it, too: first, last, distance.
+   pure function inner_rows(coarse, jb) result(which)
+      type(coarse_level_type), intent(in) :: coarse
+      integer, intent(in) :: jb
+      integer :: which(3)
+
+      which = [coarse%first_y(jb) + 1, coarse%first_y(jb + 1) - 2, 1]
+   end function inner_rows
+
+   !> The first and the last row of a block, which may be the same: first, last, distance.
+   pure function edge_rows(coarse, jb) result(which)
+      type(coarse_level_type), intent(in) :: coarse
+      integer, intent(in) :: jb
+      integer :: which(3)
+
+      which = [coarse%first_y(jb), coarse%first_y(jb + 1) - 1, 1]
+      which(3) = max(which(2) - which(1), 1)
+   end function edge_rows
+
+   !> Add sums over the blocks along x.
+   pure subroutine add_blocks(coarse, column, blocks)
+      type(coarse_level_type), intent(in) :: coarse
+      real(sp), intent(in) :: column(:)
+      real(dp), intent(inout) :: blocks(:)
+      real(dp) :: more(size(blocks))
+
+      call coarse%sum_blocks(column, more)
+      blocks = blocks + more
+   end subroutine add_blocks
+
+   !> Repeat the ends of a row of a periodic field in its rim.
+   pure subroutine close_row(self, row)
+      type(schur_preconditioner_type), intent(in) :: self
+      real(sp), intent(inout) :: row(0:)
+
+      if (self%grid%boundary /= boundary_periodic) return
+      row(0) = row(self%grid%nx)
+      row(self%grid%nx + 1) = row(1)
+   end subroutine close_row
+
+   !> Repeat the first and the last row of a periodic field in its rim.
+   pure subroutine close_field(self, field)
+      type(schur_preconditioner_type), intent(in) :: self
+      real(sp), intent(inout) :: field(0:, 0:)
+
+      if (self%grid%boundary /= boundary_periodic) return
+      field(:, 0) = field(:, self%grid%ny)
+      field(:, self%grid%ny + 1) = field(:, 1)
+   end subroutine close_field
+
+   !> Transforms done so far, counted as those of the whole grid.
+   pure function transforms(self) result(count)
+      class(schur_preconditioner_type), intent(in) :: self
+      real(dp) :: count
+
+      count = self%model%transforms()
+   end function transforms
+
+   !> Free plans and memory.
+   subroutine destroy(self)
+      class(schur_preconditioner_type), intent(inout) :: self
+
+      call self%model%destroy()
+   end subroutine destroy
+
+end module schur_preconditioner

@@ -1,0 +1,161 @@
+!> Tests of the normal solver's preconditioner: against a dense matrix, and by what it saves.
+module test_schur
+   use active_blocks, only : active_blocks_type, new_active_blocks
+   use check, only : begin_suite, check_close, check_no_error, check_that
+   use coarse_level, only : coarse_level_type, new_coarse_level
+   use asperity_errors, only : error_type
+   use normal_fixture, only : rough_problem, run_problem, solution_type
+   use normal_state, only : normal_problem_type
+   use asperity_precision, only : dp, sp
+   use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
+   use schur_preconditioner, only : new_schur_preconditioner, schur_preconditioner_type
+   implicit none
+   private
+
+   public :: run_schur
+
+   !> A preconditioner and what it needs.
+   type :: setting_type
+      type(grid_type) :: grid
+      type(coarse_level_type) :: coarse
+      type(active_blocks_type) :: active
+      type(schur_preconditioner_type) :: preconditioner
+   end type setting_type
+
+contains
+
+   subroutine run_schur()
+      call begin_suite('normal_cg')
+      call test_dense(boundary_periodic, 24, 16, 1.0_dp)
+      call test_dense(boundary_periodic, 23, 17, 1.5_dp)
+      call test_dense(boundary_free, 19, 21, 1.0_dp)
+      call test_counts()
+   end subroutine run_schur
+
+   !> M r is the Schur complement of the model, which is a dense matrix on a small grid.
+   subroutine test_dense(boundary, nx, ny, aspect)
+      integer, intent(in) :: boundary, nx, ny
+      real(dp), intent(in) :: aspect                 !! dy/dx
+      type(setting_type) :: s
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: b(:, :), unit(:), r(:), z(:), exact(:), found(:)
+      logical, allocatable :: inside(:)
+      integer, allocatable :: on(:), off(:)
+      real(dp) :: form, before
+      integer :: i, n, steps
+
+      s%grid = new_grid(nx, ny, 1.0_dp, aspect*ny/nx, boundary)
+      call new_coarse_level(s%coarse, s%grid, 0.3_dp, error)
+      call check_no_error(error, 'a coarse level')
+      call new_active_blocks(s%active, nx, ny, boundary == boundary_periodic, s%coarse%first_y, .true., 1)
+      call new_schur_preconditioner(s%preconditioner, s%grid, s%coarse, 1, error, extends=.true.)
+      call check_no_error(error, 'a preconditioner')
+      n = nx*ny
+      allocate (b(n, n), unit(n), r(n), z(n))
+      do i = 1, n
+         unit(:) = 0.0_dp
+         unit(i) = 1.0_dp
+         call apply(s, unit, abs(unit) > 0.0_dp, 0, b(:, i), form)
+      end do
+      call check_that(maxval(abs(b - transpose(b))) <= 1e-6_dp*maxval(abs(b)), 'the model is symmetric')
+      inside = [(modulo(7*i*i + 3*i, 11) < 5, i=1, n)]
+      r = [(sin(1.7_dp*i) + 0.3_dp, i=1, n)]
+      where (.not. inside) r = 0.0_dp
+      on = pack([(i, i=1, n)], inside)
+      off = pack([(i, i=1, n)], .not. inside)
+      exact = matmul(b(on, off), solved(b(off, off), matmul(b(off, on), r(on))))
+      exact = matmul(b(on, on), r(on)) - exact
+      before = huge(1.0_dp)
+      do steps = 0, 3
+         call apply(s, r, inside, steps, z, form)
+         call check_that(form < before, 'every step lowers the energy')
+         call check_close(form, dot_product(r(on), z(on)), 1e-5_dp*form, 'the energy is r.M r')
+         before = form
+      end do
+      call apply(s, r, inside, 40, z, form)
+      found = z(on)
+      call check_that(norm2(found - exact) <= 1e-3_dp*norm2(exact), 'many steps give the Schur complement')
+      call check_close(form, dot_product(r(on), exact), 1e-4_dp*form, 'and its form')
+      call s%preconditioner%destroy()
+      call s%coarse%destroy()
+   end subroutine test_dense
+
+   !> z = M r for a residual on a contact set; z is B v elsewhere.
+   subroutine apply(s, r, inside, steps, z, form)
+      type(setting_type), intent(inout) :: s
+      real(dp), intent(in) :: r(:)
+      logical, intent(in) :: inside(:)
+      integer, intent(in) :: steps
+      real(dp), intent(out) :: z(:)
+      real(dp), intent(out) :: form
+      real(dp), allocatable :: pressure(:, :), gap(:, :), step(:, :), out(:, :)
+      real(sp), allocatable :: direction(:, :)
+      real(dp) :: least
+      integer :: i, j, jb
+
+      allocate (pressure(s%grid%nx, s%grid%ny), gap(s%grid%nx, s%grid%ny), step(s%grid%nx, s%grid%ny))
+      allocate (direction(s%grid%nx, s%grid%ny), out(s%grid%nx, s%grid%ny))
+      pressure(:, :) = reshape(merge(1.0_dp, 0.0_dp, inside), shape(gap))
+      gap(:, :) = reshape(merge(-r, 1.0_dp, inside), shape(gap))
+      call s%active%clear(s%preconditioner%residual, direction, s%preconditioner%search, step)
+      do j = 1, s%grid%ny
+         call s%active%survey_row(.true., j, pressure(:, j), gap(:, j), least)
+      end do
+      call s%active%list_runs(0.0_dp, s%preconditioner%residual, direction, step)
+      call s%active%list_wide_runs(s%preconditioner%search)
+      call s%preconditioner%set_residual(s%coarse, s%active, 1.0_dp, 0.0_dp, pressure, gap)
+      call s%preconditioner%extend(s%coarse, s%active, steps, form)
+      do jb = 1, s%coarse%ny
+         do j = s%coarse%first_y(jb), s%coarse%first_y(jb + 1) - 1
+            do i = 1, s%grid%nx
+               out(i, j) = s%preconditioner%image(i, j) + s%preconditioner%pending(s%coarse%block_x(i), jb)
+               if (s%preconditioner%length > 0.0_sp) &
+                  out(i, j) = out(i, j) + s%preconditioner%length*s%preconditioner%response(i, j)
+            end do
+         end do
+      end do
+      z = reshape(out, [size(z)])
+   end subroutine apply
+
+   !> The solution x of a x = b, by Cholesky's method.
+   pure function solved(a, b) result(x)
+      real(dp), intent(in) :: a(:, :), b(:)
+      real(dp) :: x(size(b))
+      real(dp), allocatable :: l(:, :)
+      integer :: i, j, n
+
+      n = size(b)
+      allocate (l(n, n), source=0.0_dp)
+      do j = 1, n
+         l(j, j) = sqrt(a(j, j) - sum(l(j, :j - 1)**2))
+         do i = j + 1, n
+            l(i, j) = (a(i, j) - dot_product(l(i, :j - 1), l(j, :j - 1)))/l(j, j)
+         end do
+      end do
+      do i = 1, n
+         x(i) = (b(i) - dot_product(l(i, :i - 1), x(:i - 1)))/l(i, i)
+      end do
+      do i = n, 1, -1
+         x(i) = (x(i) - dot_product(l(i + 1:, i), x(i + 1:)))/l(i, i)
+      end do
+   end function solved
+
+   !> Few iterations at every load, where the residual is extended.
+   subroutine test_counts()
+      type(grid_type) :: grid
+      type(normal_problem_type) :: problem
+      type(solution_type) :: solution
+      real(dp), allocatable :: h(:, :)
+      real(dp), parameter :: loads(3) = [0.0005_dp, 0.005_dp, 0.05_dp]
+      integer :: k
+
+      grid = new_grid(384, 350, 1.0_dp, 350.0_dp/384.0_dp, boundary_periodic)
+      do k = 1, size(loads)
+         call rough_problem(grid, 8.0_dp, loads(k), problem, h)
+         call run_problem(grid, problem, h, solution)
+         call check_that(solution%outcome%converged, solution%outcome%reason)
+         call check_that(solution%outcome%iterations <= 13, 'few iterations at every load')
+      end do
+   end subroutine test_counts
+
+end module test_schur
