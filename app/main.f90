@@ -97,11 +97,12 @@ contains
    !> asperity info RESULT.h5
    subroutine info(error)
       type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable :: saying
       character(:), allocatable :: text
 
       call summarise_result(command%path, text, error)
-      if (allocated(error)) return
-      call say(text, error)
+      if (text /= '') call say(text, saying)
+      if (.not. allocated(error) .and. allocated(saying)) call move_alloc(saying, error)
    end subroutine info
 
    !> asperity run CASE.nml

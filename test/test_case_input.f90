@@ -64,7 +64,7 @@ contains
       call check_that(case%solver%slip_law == 'physical' .and. case%solver%interpolation == 'cubic', &
          'slip_law, interpolation')
       call check_that(case%output%file == 'folder/road.h5', 'the result lies beside the input')
-      call check_that(size(case%output%snapshot_fields) == 4, 'snapshot_fields')
+      call check_that(size(case%output%snapshot_fields) == 5, 'snapshot_fields')
       call check_that(case%input == body, 'the text is kept')
 
       ! an odd number of cells, and an input without an ending

@@ -5,7 +5,8 @@ module test_checkpoint
    use check, only : begin_suite, check_close, check_error, check_no_error, check_that
    use asperity_checkpoint, only : checkpoint_path, checkpoint_reader_type, checkpoint_writer_type, &
       remove_checkpoint
-   use asperity_checksum, only : checksum_of_field, checksum_of_file, checksum_of_text, hexadecimal
+   use asperity_checksum, only : checksum_of_field, checksum_of_file, checksum_of_text, &
+      crc32_of_values, hexadecimal
    use asperity_errors, only : error_convergence, error_file, error_input, error_type
    use file_system, only : file_exists
    use asperity_precision, only : dp, int64, int8
@@ -56,6 +57,8 @@ contains
       integer(int64) :: sum, whole
       integer :: unit
 
+      ! As zlib finds it in Python: zlib.crc32(struct.pack('<3d', 1.0, -2.5e-3, 1e300)).
+      call check_that(crc32_of_values([1.0_dp, -2.5e-3_dp, 1.0e300_dp]) == 3242893255_int64, 'CRC-32')
       call check_that(hexadecimal(checksum_of_text('123456789')) == '995DC9BBDF1939FA', &
          'check value of CRC-64/XZ')
       text = 'abcdefghijklmnopqrstuvwxyz'//nl

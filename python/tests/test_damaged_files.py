@@ -173,3 +173,59 @@ def test_sweep_sees_a_changed_map(tmp_path: Path) -> None:
     second = areas()
     assert second != first
     assert all(b < a for a, b in zip(first, second, strict=True))
+
+
+def flip(path: Path, place: int) -> None:
+    """Change one bit of a file."""
+    data = bytearray(path.read_bytes())
+    data[place] ^= 4
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize("compression", [0, 4])
+def test_damaged_values_are_named(program: str, tmp_path: Path, compression: int) -> None:
+    """One wrong bit in any value of a field, an axis or the history is found and named."""
+    case = tmp_path / "y.nml"
+    case.write_text(vc.text(size=24, steps=2, output=f"snapshot_every = 2, compression ="
+                                                     f" {compression}"))
+    assert vc.run(program, case).returncode == 0
+    result = case.with_suffix(".h5")
+    whole = result.read_bytes()
+    done = call(program, "info", result)
+    assert done.returncode == 0 and "damaged" not in done.stdout
+    for name in ("snapshots/000002/pressure", "snapshots/000004/x", "surface/height",
+                 "material/prony_g", "grid/y"):
+        with h5py.File(result) as file:
+            chunk = file[name].id.get_chunk_info(0)
+        flip(result, chunk.byte_offset + chunk.size // 2)
+        done = call(program, "info", result)
+        assert done.returncode == 3
+        assert f"{result}: the file is damaged: /{name} cannot be read" in done.stderr
+        assert f"damaged     /{name}\n" in done.stdout and "finished    yes" in done.stdout
+        with h5py.File(result) as file, pytest.raises(OSError, match="letcher32"):
+            file[name][()]
+        result.write_bytes(whole)
+    with h5py.File(result) as file:
+        chunk = file["history/contact_area"].id.get_chunk_info(0)
+    flip(result, chunk.byte_offset + 3 * 8)
+    done = call(program, "info", result)
+    assert done.returncode == 3
+    assert "damaged: /history: row 3 does not agree with its checksum" in done.stderr
+    with pytest.warns(UserWarning, match="damaged in row 3"):
+        asperity.open(result)
+
+
+def test_damaged_field_in_python(program: str, tmp_path: Path) -> None:
+    """A damaged field is an error where it is read, the others are not lost."""
+    case = tmp_path / "y.nml"
+    case.write_text(vc.text(size=24, steps=2))
+    assert vc.run(program, case).returncode == 0
+    result = case.with_suffix(".h5")
+    with h5py.File(result) as file:
+        last = sorted(file["snapshots"])[-1]
+        chunk = file[f"snapshots/{last}/gap"].id.get_chunk_info(0)
+    flip(result, chunk.byte_offset + 11)
+    snapshot = asperity.open(result).snapshots[-1]
+    assert snapshot.pressure.max() > 0.0
+    with pytest.raises(OSError, match=r"y\.h5: cannot be read: .*letcher32"):
+        _ = snapshot.gap

@@ -382,6 +382,58 @@ def test_page_in_a_browser_fits_every_width(browser, tmp_path, kind, sliding):
         assert lines >= (4 if kind in ("sliding", "line") else 2)
 
 
+SAVED = """
+const done = arguments[0];
+window.saved = [];
+URL.createObjectURL = (blob) => { saved.push(blob); return "#main"; };
+const buttons = [...document.querySelectorAll("button.save")];
+for (const button of buttons) button.click();
+const read = (blob) => new Promise((kept) => {
+  const reader = new FileReader();
+  reader.onload = () => kept([blob.type, reader.result.split(",")[1]]);
+  reader.readAsDataURL(blob);
+});
+const wait = () => saved.length < buttons.length ? setTimeout(wait, 50)
+  : Promise.all(saved.map(read)).then(done);
+wait();"""
+
+
+@needs_browser
+def test_values_and_pictures_are_saved(browser, tmp_path, sliding):
+    run = asperity.open(sliding)
+    page = run.report(tmp_path / "page.html")
+    browser.window(1280, 900)
+    browser.open(page)
+    wait_for(browser, READY)
+    browser.call("POST", "/timeouts", {"script": 1000 * PATIENCE})
+    found = browser.call("POST", "/execute/async", {"script": SAVED, "args": []})
+    assert browser.console() == []
+    texts = [base64.b64decode(data).decode() for kind, data in found if kind == "text/csv"]
+    pictures = [base64.b64decode(data) for kind, data in found if kind == "image/png"]
+    assert len(pictures) == len(texts) - 1 >= 10  # the history has values only
+    assert all(data.startswith(b"\x89PNG") and len(data) > 3000 for data in pictures)
+    assert len(set(pictures)) == len(pictures)
+
+    def table(head):
+        (text,) = [text for text in texts if text.startswith(head)]
+        return np.genfromtxt(text.splitlines(), delimiter=",", names=True, deletechars="")
+
+    history = table("step,phase,time")
+    np.testing.assert_allclose(history["friction"], run.history["friction"], rtol=1e-9)
+    chart = table("Time (s),whole")
+    np.testing.assert_allclose(chart["whole"], run.history["friction"], rtol=1e-9)
+    snapshot = run.snapshots[-1]
+    for head, name, error in (("x (m),y (m),Pressure", "pressure", 1e-4),
+                              ("x (m),y (m),Height of the road", "road_height", 1e-4)):
+        values = table(head)
+        field = snapshot[name]
+        np.testing.assert_allclose(values["x_(m)"].reshape(field.shape)[3], run.grid.x, rtol=1e-9)
+        np.testing.assert_allclose(values["y_(m)"].reshape(field.shape)[:, 3], run.grid.y,
+                                   rtol=1e-9)
+        seen = values[values.dtype.names[2]].reshape(field.shape)
+        np.testing.assert_allclose(seen, field, atol=error * np.ptp(field))
+
+
 @needs_browser
 def test_zoom_slider_and_switch_work(browser, tmp_path, sliding):
     run = asperity.open(sliding)

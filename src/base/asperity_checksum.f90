@@ -3,6 +3,7 @@
 !> The polynomial is that of ECMA-182, bits in reflected order, as in the xz file format
 !> (CRC-64/XZ): the checksum of the nine bytes '123456789' is 995DC9BBDF1939FA. A CRC finds every
 !> error within 64 neighbouring bits for certain, and any other one but for a chance of 2^-64.
+!> `crc32_of_values` is the shorter CRC-32 of zlib, gzip and PNG, which other programs have at hand.
 !> Eight bytes are taken at once by eight tables (Intel's "slicing by 8"). Only shifts and
 !> exclusive ors are used, so that no integer overflows.
 module asperity_checksum
@@ -11,10 +12,12 @@ module asperity_checksum
    implicit none
    private
 
-   public :: checksum_of_field, checksum_of_file, checksum_of_text, hexadecimal
+   public :: checksum_of_field, checksum_of_file, checksum_of_text, crc32_of_values, hexadecimal
 
    integer(int64), parameter :: polynomial = &
       ior(shiftl(int(z'C96C5795', int64), 32), int(z'D7870F42', int64))
+   integer(int64), parameter :: short_polynomial = int(z'EDB88320', int64)
+   integer(int64), parameter :: short_mask = int(z'FFFFFFFF', int64)
    integer, parameter :: block_words = 131072     !! words of 8 bytes that are read at once, 1 MiB
 
    integer(int64) :: table(0:255, 8)
@@ -88,6 +91,28 @@ contains
       call add_bytes(sum, transfer(text, [0_int8], len(text)))
       sum = not(sum)
    end function checksum_of_text
+
+   !> CRC-32 of values, each as eight bytes, the lowest first; as a whole number below 2^32.
+   pure function crc32_of_values(values) result(sum)
+      real(dp), intent(in) :: values(:)
+      integer(int64) :: sum
+      integer(int64) :: word
+      integer :: i, k
+
+      sum = short_mask
+      do i = 1, size(values)
+         word = transfer(values(i), word)
+         ! A row is few bytes: bit by bit needs no table.
+         do k = 0, 63
+            if (btest(sum, 0) .neqv. btest(word, k)) then
+               sum = ieor(shiftr(sum, 1), short_polynomial)
+            else
+               sum = shiftr(sum, 1)
+            end if
+         end do
+      end do
+      sum = ieor(sum, short_mask)
+   end function crc32_of_values
 
    !> A checksum as sixteen digits.
    function hexadecimal(sum) result(text)

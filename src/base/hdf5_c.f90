@@ -516,6 +516,12 @@ module hdf5_c
          integer(c_int) :: status
       end function h5pset_shuffle
 
+      function h5pset_fletcher32(list) bind(c, name='H5Pset_fletcher32') result(status)
+         import :: c_int, hid_t
+         integer(hid_t), value :: list
+         integer(c_int) :: status
+      end function h5pset_fletcher32
+
       function h5pset_deflate(list, level) bind(c, name='H5Pset_deflate') result(status)
          import :: c_int, hid_t
          integer(hid_t), value :: list

@@ -12,6 +12,7 @@ module hdf5_file
    use asperity_errors, only : error_file, error_input, error_memory, error_type, fail
    use file_system, only : file_exists, folder_of
    use hdf5_library, only : h5aexists_f, h5oclose_f, h5oopen_f, hid_t, hsize_t
+   use hdf5_scales, only : attach_scales
    use hdf5_tree, only : hdf5_tree_type, most_expected, name_length
    use hdf5_values, only : get_number, get_reals, get_text, kind_int8, kind_integer, kind_real, &
       kind_text, new_column, new_dataset, put_attribute, put_rows, shape_of_dataset
@@ -32,6 +33,7 @@ module hdf5_file
       procedure :: dataset_shape
       procedure :: create_column
       procedure :: append
+      procedure :: name_axes
       procedure, private :: write_real_0, write_real_1, write_real_2, write_real_3, write_int8_2, &
          read_real_0, read_real_1, read_real_2, read_real_3, write_text, write_integer, write_real, read_text, &
          read_integer, read_real, store, load, store_attribute, load_number
@@ -234,7 +236,7 @@ contains
 
       call self%not_broken(path, error)
       if (allocated(error)) return
-      level = 0
+      level = -1
       if (present(compression)) level = max(0, min(compression, 9))
       call self%resolve(path, location, name)
       call new_dataset(location, name, extent, kind, buffer, level, status)
@@ -254,6 +256,24 @@ contains
       if (.not. allocated(error)) call self%write_attribute(path, 'long_name', long_name, error)
    end subroutine describe
 
+   !> Say of datasets of a group which vectors of the same group hold the coordinates along their axes.
+   subroutine name_axes(self, group, scales, datasets, error)
+      class(hdf5_file_type), intent(inout) :: self
+      character(*), intent(in) :: group
+      character(*), intent(in) :: scales(:)   !! names of the vectors in Fortran's order of the axes
+      character(*), intent(in) :: datasets(:) !! each has all these axes; none: the vectors are scales all the same
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: name
+      integer(hid_t) :: location
+      integer :: status
+
+      call self%not_broken(group, error)
+      if (allocated(error)) return
+      call self%resolve(group, location, name)
+      call attach_scales(location, name, scales(size(scales):1:-1), datasets, status)
+      call self%checked(status, 'the axes cannot be named', group, error)
+   end subroutine name_axes
+
    !> Write a single real.
    subroutine write_real_0(self, path, value, units, long_name, error)
       class(hdf5_file_type), intent(inout) :: self
@@ -269,15 +289,17 @@ contains
    end subroutine write_real_0
 
    !> Write a vector of reals.
-   subroutine write_real_1(self, path, values, units, long_name, error)
+   subroutine write_real_1(self, path, values, units, long_name, error, compression)
       class(hdf5_file_type), intent(inout) :: self
       character(*), intent(in) :: path
       real(dp), intent(in), contiguous, target :: values(:)
       character(*), intent(in) :: units
       character(*), intent(in) :: long_name
       type(error_type), allocatable, intent(out) :: error
+      integer, intent(in), optional :: compression  !! 0 none to 9 smallest, both with a checksum; default: neither
 
-      call self%store(path, shape(values), kind_real, address_1(values), units, long_name, error)
+      call self%store(path, shape(values), kind_real, address_1(values), units, long_name, error, &
+         compression)
    end subroutine write_real_1
 
    !> Write a field of reals; in the file its shape is (ny, nx).
@@ -288,7 +310,7 @@ contains
       character(*), intent(in) :: units
       character(*), intent(in) :: long_name
       type(error_type), allocatable, intent(out) :: error
-      integer, intent(in), optional :: compression  !! 0 none (default) to 9 smallest
+      integer, intent(in), optional :: compression  !! 0 none to 9 smallest, both with a checksum; default: neither
 
       call self%store(path, shape(values), kind_real, c_loc(values), units, long_name, &
          error, compression)
@@ -302,7 +324,7 @@ contains
       character(*), intent(in) :: units
       character(*), intent(in) :: long_name
       type(error_type), allocatable, intent(out) :: error
-      integer, intent(in), optional :: compression  !! 0 none (default) to 9 smallest
+      integer, intent(in), optional :: compression  !! 0 none to 9 smallest, both with a checksum; default: neither
 
       call self%store(path, shape(values), kind_real, c_loc(values), units, long_name, &
          error, compression)
@@ -316,7 +338,7 @@ contains
       character(*), intent(in) :: units
       character(*), intent(in) :: long_name
       type(error_type), allocatable, intent(out) :: error
-      integer, intent(in), optional :: compression  !! 0 none (default) to 9 smallest
+      integer, intent(in), optional :: compression  !! 0 none to 9 smallest, both with a checksum; default: neither
 
       call self%store(path, shape(values), kind_int8, c_loc(values), units, long_name, &
          error, compression)

@@ -16,7 +16,7 @@ module hdf5_library
       h5p_cls_file_create_id_g, h5p_cls_group_create_id_g, h5p_cls_link_create_id_g, h5pclose, &
       h5pcreate, h5pset_alignment, h5pset_attr_phase_change, h5pset_chunk, h5pset_chunk_cache, &
       h5pset_create_intermediate_group, h5pset_deflate, h5pset_est_link_info, &
-      h5pset_fclose_degree, h5pset_fill_time, h5pset_libver_bounds, h5pset_link_phase_change, &
+      h5pset_fclose_degree, h5pset_fill_time, h5pset_fletcher32, h5pset_libver_bounds, h5pset_link_phase_change, &
       h5pset_meta_block_size, h5pset_shuffle, h5pset_small_data_block_size, &
       h5pset_userblock, h5sclose, h5screate, &
       h5screate_simple, h5sget_simple_extent_dims, h5sget_simple_extent_ndims, &
@@ -36,7 +36,7 @@ module hdf5_library
       h5olink_f, h5oopen_f, h5open_f, h5pclose_f, h5pcreate_f, h5pset_alignment_f, &
       h5pset_attr_phase_change_f, h5pset_chunk_cache_f, h5pset_chunk_f, &
       h5pset_create_inter_group_f, h5pset_deflate_f, h5pset_est_link_info_f, &
-      h5pset_fclose_degree_f, h5pset_fill_time_f, h5pset_libver_bounds_f, &
+      h5pset_fclose_degree_f, h5pset_fill_time_f, h5pset_fletcher32_f, h5pset_libver_bounds_f, &
       h5pset_link_phase_change_f, h5pset_meta_block_size_f, h5pset_shuffle_f, &
       h5pset_small_data_block_size_f, h5pset_userblock_f, h5sclose_f, h5screate_f, h5screate_simple_f, &
       h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, &
@@ -690,6 +690,13 @@ contains
 
       status = h5pset_shuffle(list)
    end subroutine h5pset_shuffle_f
+
+   subroutine h5pset_fletcher32_f(list, status)
+      integer(hid_t), intent(in) :: list
+      integer, intent(out) :: status
+
+      status = h5pset_fletcher32(list)
+   end subroutine h5pset_fletcher32_f
 
    subroutine h5pset_deflate_f(list, level, status)
       integer(hid_t), intent(in) :: list

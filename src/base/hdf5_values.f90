@@ -9,7 +9,8 @@ module hdf5_values
       h5dcreate_f, h5dget_space_f, h5dopen_f, h5dread_f, h5dset_extent_f, h5dvlen_reclaim_f, &
       h5dwrite_f, H5P_DATASET_ACCESS_F, H5P_DATASET_CREATE_F, H5P_DEFAULT_F, &
       H5P_LINK_CREATE_F, h5pclose_f, h5pcreate_f, h5pset_chunk_cache_f, h5pset_chunk_f, &
-      h5pset_create_inter_group_f, h5pset_deflate_f, h5pset_fill_time_f, h5pset_shuffle_f, &
+      h5pset_create_inter_group_f, h5pset_deflate_f, h5pset_fill_time_f, h5pset_fletcher32_f, &
+      h5pset_shuffle_f, &
       H5S_SCALAR_F, H5S_SELECT_SET_F, H5S_UNLIMITED_F, h5sclose_f, h5screate_f, &
       h5screate_simple_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, &
       h5sselect_hyperslab_f, H5T_CSET_UTF8_F, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, &
@@ -29,7 +30,7 @@ module hdf5_values
    integer, parameter, public :: kind_integer = 2
    integer, parameter, public :: kind_int8 = 3
 
-   integer, parameter :: chunk_values = 131072        !! values in a compressed chunk, about 1 MiB
+   integer, parameter :: chunk_values = 131072        !! values in a chunk with a checksum, about 1 MiB
    integer, parameter :: column_chunk = 131072        !! rows of a column whose space is set aside
 
 contains
@@ -156,7 +157,8 @@ contains
       integer, intent(in) :: extent(:)      !! in Fortran's order; none: a single value
       integer, intent(in) :: kind
       type(c_ptr), intent(in) :: buffer
-      integer, intent(in) :: level          !! of compression: 0 none, to 9; for fields only
+      !> Of compression: 0 none, to 9. Negative: in one piece, without a checksum, and so for single values.
+      integer, intent(in) :: level
       integer, intent(out) :: status
       integer(hid_t) :: space, creation, links, dataset, file_type, memory_type
       integer(hsize_t) :: dims(size(extent)), chunk(size(extent))
@@ -168,13 +170,15 @@ contains
       if (status >= 0) call h5pset_create_inter_group_f(links, 1, status)
       if (status >= 0) call h5pcreate_f(H5P_DATASET_CREATE_F, creation, status)
       if (status >= 0) call h5pset_fill_time_f(creation, H5D_FILL_TIME_NEVER_F, status)
-      if (status >= 0 .and. level > 0 .and. size(extent) > 1 .and. all(extent > 0)) then
+      if (status >= 0 .and. level >= 0 .and. size(extent) > 0 .and. all(extent > 0)) then
          chunk = 1
          chunk(1) = dims(1)
-         chunk(2) = max(1_hsize_t, min(dims(2), chunk_values/dims(1)))
+         if (size(extent) > 1) chunk(2) = max(1_hsize_t, min(dims(2), chunk_values/dims(1)))
          call h5pset_chunk_f(creation, size(extent), chunk, status)
-         if (status >= 0) call h5pset_shuffle_f(creation, status)
-         if (status >= 0) call h5pset_deflate_f(creation, level, status)
+         if (status >= 0 .and. level > 0) call h5pset_shuffle_f(creation, status)
+         if (status >= 0 .and. level > 0) call h5pset_deflate_f(creation, level, status)
+         ! The last filter, so that damage is found before anything else reads the bytes.
+         if (status >= 0) call h5pset_fletcher32_f(creation, status)
       end if
       if (size(extent) == 0) then
          if (status >= 0) call h5screate_f(H5S_SCALAR_F, space, status)

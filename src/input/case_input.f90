@@ -389,7 +389,7 @@ contains
             '&friction', faults)
       else
          output%snapshot_fields = [character(word_length) :: 'pressure', 'gap', 'displacement_z', 'contact', &
-            'traction_x', 'traction_y', 'displacement_x', 'displacement_y', 'slip_x', 'slip_y']
+            'road_height', 'traction_x', 'traction_y', 'displacement_x', 'displacement_y', 'slip_x', 'slip_y']
          if (case%friction%law == 'none') output%snapshot_fields = pack(output%snapshot_fields, &
             .not. is_tangential(output%snapshot_fields))
       end if

@@ -252,7 +252,7 @@ contains
    pure function solver_and_output() result(rows)
       type(variable_entry_type), allocatable :: rows(:)
       character(*), parameter :: fields = '''pressure'' | ''gap'' | ''displacement_z'' | ''contact'' | '// &
-         '''traction_x'' | ''traction_y'' | ''displacement_x'' | ''displacement_y'' | ''slip_x'' | ''slip_y'''
+         '''road_height'' | ''traction_x'' | ''traction_y'' | ''displacement_x'' | ''displacement_y'' | ''slip_x'' | ''slip_y'''
 
       rows = [ &
          row('solver', 'tolerance', kind_real, '1e-6', '', '(0, 1)', 'Largest allowed residual of every solve.'), &

@@ -7,9 +7,10 @@ module result_file
    use asperity_errors, only : error_file, error_input, error_type, fail
    use file_system, only : name_of, remove_file, rename_file
    use hdf5_file, only : hdf5_file_type
-   use history_row, only : column_count, column_type, history_columns, history_row_type, row_values
+   use history_row, only : column_count, history_row_type, row_values
    use asperity_precision, only : dp, int8
    use random_id, only : new_id
+   use result_history, only : append_values, count_history_rows, create_history_columns, shorten_history
    use result_names, only : sibling_path
    use result_target, only : check_place
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
@@ -22,6 +23,7 @@ module result_file
    public :: result_file_type
 
    character(*), parameter :: stop_mark = 'at_stop'   !! attribute of a snapshot that a stop wrote
+   character(*), parameter :: axes(2) = ['x', 'y']    !! of every field, beside it in its group
 
    !> What a snapshot may hold.
    type :: field_type
@@ -34,6 +36,7 @@ module result_file
       field_type('pressure', 'Pa', 'normal traction on the rubber, pressure positive'), &
       field_type('gap', 'm', 'gap between rubber and road'), &
       field_type('displacement_z', 'm', 'displacement of the rubber along z'), &
+      field_type('road_height', 'm', 'height of the road as it stands under the rubber'), &
       field_type('traction_x', 'Pa', 'tangential traction on the rubber along x'), &
       field_type('traction_y', 'Pa', 'tangential traction on the rubber along y'), &
       field_type('displacement_x', 'm', 'displacement of the rubber along x'), &
@@ -62,6 +65,7 @@ module result_file
       procedure :: reopen => reopen_result
       procedure :: write_text
       procedure :: read_text
+      procedure :: pair_arms
       procedure :: append_row
       procedure :: begin_snapshot
       procedure, private :: write_real_field, write_state_field, write_material_value, &
@@ -149,11 +153,13 @@ contains
       call self%file%write('/surface/height', height, 'm', 'height of the road', error, &
          self%compression)
       if (allocated(error)) return
+      call write_axes(self, '/surface', ['height'], error)
+      if (allocated(error)) return
       call self%file%create_group('/material', error)
       if (allocated(error)) return
-      call self%file%create_group('/history', error, column_count)
+      call self%file%create_group('/history', error, column_count + 1)
       if (allocated(error)) return
-      call create_columns(self, error)
+      call create_history_columns(self%file, self%expected_rows, error)
       if (allocated(error)) return
       ! Made and removed: the root group keeps the room for this name.
       call self%link_checkpoint(error)
@@ -190,14 +196,10 @@ contains
    subroutine write_grid(self, error)
       class(result_file_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
-      integer :: i
+      character(1) :: none(0)
 
       associate (grid => self%grid)
-         call self%file%write('/grid/x', [(i*grid%dx, i=0, grid%nx - 1)], 'm', &
-            'centres of the cells along x', error)
-         if (allocated(error)) return
-         call self%file%write('/grid/y', [(i*grid%dy, i=0, grid%ny - 1)], 'm', &
-            'centres of the cells along y', error)
+         call write_axes(self, '/grid', none, error)
          if (allocated(error)) return
          call self%file%write_attribute('/grid', 'nx', grid%nx, error)
          if (allocated(error)) return
@@ -211,6 +213,26 @@ contains
             trim(merge('periodic', 'free    ', grid%boundary == boundary_periodic)), error)
       end associate
    end subroutine write_grid
+
+   !> Write the axes of a group and say of its fields that they have them. Each group has axes of its
+   !> own, since readers look for them beside the fields; the first field takes far more room.
+   subroutine write_axes(self, group, fields, error)
+      class(result_file_type), intent(inout) :: self
+      character(*), intent(in) :: group
+      character(*), intent(in) :: fields(:)          !! names of fields of this group
+      type(error_type), allocatable, intent(out) :: error
+      integer :: i
+
+      associate (grid => self%grid)
+         call self%file%write(group//'/x', [(i*grid%dx, i=0, grid%nx - 1)], 'm', &
+            'centres of the cells along x', error, self%compression)
+         if (allocated(error)) return
+         call self%file%write(group//'/y', [(i*grid%dy, i=0, grid%ny - 1)], 'm', &
+            'centres of the cells along y', error, self%compression)
+      end associate
+      if (allocated(error)) return
+      call self%file%name_axes(group, axes, fields, error)
+   end subroutine write_axes
 
    !> Read the grid of a result.
    subroutine read_grid(self, error)
@@ -233,22 +255,6 @@ contains
       self%grid = new_grid(nx, ny, lx, ly, &
          merge(boundary_periodic, boundary_free, boundary == 'periodic'))
    end subroutine read_grid
-
-   !> Make the columns of the history. `step` is the last in the file, so that it grows last.
-   subroutine create_columns(self, error)
-      class(result_file_type), intent(inout) :: self
-      type(error_type), allocatable, intent(out) :: error
-      type(column_type) :: columns(column_count)
-      integer :: i, j
-
-      columns = history_columns()
-      do i = 1, column_count
-         j = mod(i, column_count) + 1
-         call self%file%create_column('/history/'//trim(columns(j)%name), columns(j)%whole, &
-            self%expected_rows, trim(columns(j)%units), trim(columns(j)%long_name), error)
-         if (allocated(error)) return
-      end do
-   end subroutine create_columns
 
    !> Write a text as an attribute of the file, such as the name of a case.
    subroutine write_text(self, name, value, error)
@@ -292,20 +298,23 @@ contains
       character(*), intent(in) :: long_name
       type(error_type), allocatable, intent(out) :: error
 
-      call self%file%write('/material/'//name, values, units, long_name, error)
+      call self%file%write('/material/'//name, values, units, long_name, error, self%compression)
    end subroutine write_material_values
+
+   !> Say that the moduli of the arms go with their relaxation times; both are written.
+   subroutine pair_arms(self, error)
+      class(result_file_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%file%name_axes('/material', ['prony_tau'], ['prony_g'], error)
+   end subroutine pair_arms
 
    !> Add a row to the history; afterwards a kill cannot take it away.
    subroutine append_row(self, row, error)
       class(result_file_type), intent(inout) :: self
       type(history_row_type), intent(in) :: row
       type(error_type), allocatable, intent(out) :: error
-      type(column_type) :: columns(column_count)
-      real(dp) :: values(column_count)
-      integer :: i
 
-      columns = history_columns()
-      values = row_values(row)
       if (self%rows == 0) then
          ! The first row sets the columns' space aside, which takes several blocks of the file:
          ! it is written into a new group that takes the empty one's place.
@@ -313,14 +322,11 @@ contains
          if (allocated(error)) return
          call self%file%stage_group('/history', error)
          if (allocated(error)) return
-         call create_columns(self, error)
+         call create_history_columns(self%file, self%expected_rows, error)
          if (allocated(error)) return
       end if
-      do i = 1, column_count
-         call self%file%append('/history/'//trim(columns(i)%name), self%rows, values(i:i), &
-            error)
-         if (allocated(error)) return
-      end do
+      call append_values(self%file, self%rows, row_values(row), error)
+      if (allocated(error)) return
       if (self%rows == 0) then
          call self%file%publish_group(error)
       else
@@ -406,6 +412,8 @@ contains
       class(result_file_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
 
+      call write_axes(self, self%current_path, self%current%fields, error)
+      if (allocated(error)) return
       call self%file%publish_group(error)
       if (allocated(error)) return
       self%snapshots = [self%snapshots, self%current]
@@ -413,11 +421,12 @@ contains
    end subroutine end_snapshot
 
    !> Write where a state of steady sliding loses its energy, as a group /losses/NNNNNN.
-   subroutine write_losses(self, step, wavelength, octave, arm, error)
+   subroutine write_losses(self, step, wavelength, octave, prony_tau, arm, error)
       class(result_file_type), intent(inout) :: self
       integer, intent(in) :: step                          !! row of the history
       real(dp), intent(in), contiguous :: wavelength(:)    !! longest of each octave, m
       real(dp), intent(in), contiguous :: octave(:)        !! rate of loss of each octave, W
+      real(dp), intent(in), contiguous :: prony_tau(:)     !! relaxation time of each arm, s
       real(dp), intent(in), contiguous :: arm(:)           !! of each arm, W
       type(error_type), allocatable, intent(out) :: error
       character(:), allocatable :: path
@@ -427,15 +436,33 @@ contains
       if (allocated(error)) return
       call self%file%write_attribute(path, 'step', step, error)
       if (allocated(error)) return
-      call self%file%write(path//'/wavelength', wavelength, 'm', 'longest wavelength of each octave', error)
+      call self%file%write(path//'/wavelength', wavelength, 'm', 'longest wavelength of each octave', error, &
+         self%compression)
       if (allocated(error)) return
-      call self%file%write(path//'/octave', octave, 'W', 'rate of loss in the rubber by octaves', error)
+      call self%file%write(path//'/octave', octave, 'W', 'rate of loss in the rubber by octaves', error, &
+         self%compression)
       if (allocated(error)) return
-      if (size(arm) > 0) call self%file%write(path//'/arm', arm, 'W', &
-         'rate of loss in the rubber by arms of the material', error)
+      call self%file%name_axes(path, ['wavelength'], ['octave'], error)
+      if (allocated(error)) return
+      if (size(arm) > 0) call write_losses_of_arms(self, path, prony_tau, arm, error)
       if (allocated(error)) return
       call self%file%publish_group(error)
    end subroutine write_losses
+
+   !> Write the losses of the arms of the material, along their relaxation times.
+   subroutine write_losses_of_arms(self, path, prony_tau, arm, error)
+      class(result_file_type), intent(inout) :: self
+      character(*), intent(in) :: path
+      real(dp), intent(in), contiguous :: prony_tau(:), arm(:)
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%file%write(path//'/prony_tau', prony_tau, 's', 'relaxation times of the arms', error, self%compression)
+      if (allocated(error)) return
+      call self%file%write(path//'/arm', arm, 'W', 'rate of loss in the rubber by arms of the material', &
+         error, self%compression)
+      if (allocated(error)) return
+      call self%file%name_axes(path, ['prony_tau'], ['arm'], error)
+   end subroutine write_losses_of_arms
 
    !> Row of the last snapshot; -1: there is none.
    pure function last_snapshot(self) result(step)
@@ -515,18 +542,10 @@ contains
       class(result_file_type), intent(inout) :: self
       integer, intent(in) :: last_step
       type(error_type), allocatable, intent(out) :: error
-      type(column_type) :: columns(column_count)
-      integer, allocatable :: extent(:)
       character(120) :: text
-      integer :: i
 
-      columns = history_columns()
-      self%rows = huge(1)
-      do i = 1, column_count
-         call self%file%dataset_shape('/history/'//trim(columns(i)%name), extent, error)
-         if (allocated(error)) return
-         self%rows = min(self%rows, extent(1))
-      end do
+      call count_history_rows(self%file, self%rows, error)
+      if (allocated(error)) return
       if (last_step < 0 .or. last_step >= self%rows) then
          write (text, '(": the history has ", i0, " rows, the run would go on after row ", i0)') &
             self%rows, last_step
@@ -537,7 +556,8 @@ contains
       if (allocated(error)) return
       call self%file%read_attribute('/', 'expected_rows', self%expected_rows, error)
       if (allocated(error)) return
-      if (self%rows > last_step + 1) call shorten_history(self, last_step + 1, error)
+      if (self%rows > last_step + 1) call shorten_history(self%file, last_step + 1, self%expected_rows, &
+         error)
       if (allocated(error)) return
       call keep_snapshots(self, last_step, error)
       if (allocated(error)) return
@@ -552,34 +572,6 @@ contains
       if (allocated(error)) return
       call write_xdmf(self%xdmf_path, self%path, self%grid, self%snapshots, error)
    end subroutine go_back
-
-   !> Write the first rows of the history into a new group, to take the old one's place. It lies at
-   !> the end of the file, so that removing snapshots does not shorten the file.
-   subroutine shorten_history(self, rows, error)
-      class(result_file_type), intent(inout) :: self
-      integer, intent(in) :: rows
-      type(error_type), allocatable, intent(out) :: error
-      type(column_type) :: columns(column_count)
-      real(dp), allocatable :: values(:, :), column(:)
-      integer :: i
-
-      columns = history_columns()
-      allocate (values(rows, column_count))
-      do i = 1, column_count
-         call self%file%read('/history/'//trim(columns(i)%name), column, error)
-         if (allocated(error)) return
-         values(:, i) = column(:rows)
-      end do
-      call self%file%stage_group('/history', error)
-      if (allocated(error)) return
-      call create_columns(self, error)
-      do i = 1, column_count
-         if (allocated(error)) return
-         call self%file%append('/history/'//trim(columns(i)%name), 0, values(:, i), error)
-      end do
-      if (allocated(error)) return
-      call self%file%flush(error)
-   end subroutine shorten_history
 
    !> Remove the losses of rows behind a row.
    subroutine keep_losses(self, last_step, error)
@@ -627,6 +619,7 @@ contains
          if (allocated(error)) return
          call self%file%members(path, fields, error)
          if (allocated(error)) return
+         fields = pack(fields, fields /= axes(1) .and. fields /= axes(2))
          if (allocated(snapshot%fields)) deallocate (snapshot%fields)
          allocate (snapshot%fields(size(fields)))
          do j = 1, size(fields)

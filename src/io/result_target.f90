@@ -8,6 +8,7 @@ module result_target
    use file_kind, only : file_start, is_dangling_link, is_other_than_file
    use file_system, only : file_exists, folder_of, is_folder
    use hdf5_file, only : hdf5_file_type
+   use result_check, only : damage_type, find_damage
    use result_names, only : side_file, side_files, sibling_path
    use trial_process, only : trial_type
    implicit none
@@ -153,18 +154,35 @@ contains
    end function kind_of
 
    !> Read a result in a process of its own: an error where that crashes or comes to no end.
-   subroutine damage_of_result(path, error)
+   subroutine damage_of_result(path, error, fields)
       character(*), intent(in) :: path
       type(error_type), allocatable, intent(out) :: error
+      logical, intent(in), optional :: fields   !! read the fields, too, as `find_damage` does; default no
       type(trial_type) :: trial
 
       call trial%start(patience)
       if (trial%is_copy) then
          call read_result(path)
+         if (present(fields)) then
+            if (fields) call read_fields(path)
+         end if
          call trial%leave()
       end if
       call trial%verdict(path, error)
    end subroutine damage_of_result
+
+   !> Read what is looked at for damage.
+   subroutine read_fields(path)
+      character(*), intent(in) :: path
+      type(hdf5_file_type) :: file
+      type(error_type), allocatable :: error
+      type(damage_type) :: found
+
+      call file%open(path, 'read', error)
+      if (allocated(error)) return
+      call find_damage(file, found)
+      call file%close(error)
+   end subroutine read_fields
 
    !> Read all that a restart and a summary read.
    subroutine read_result(path)

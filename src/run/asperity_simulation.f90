@@ -558,6 +558,8 @@ contains
          values = max(self%gap, 0.0_dp)
       case ('displacement_z')
          values = self%displacement
+      case ('road_height')
+         values = self%height
       case default
          allocate (values(self%grid%nx, self%grid%ny), source=0.0_dp)
          if (.not. self%frictional) return

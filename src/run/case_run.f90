@@ -149,6 +149,8 @@ contains
          call result%write_material('prony_tau', m%prony_tau, 's', &
             'relaxation times of the arms at the temperature of the case', error)
          if (allocated(error)) return
+         call result%pair_arms(error)
+         if (allocated(error)) return
          call result%write_material('thickness', m%thickness, 'm', 'thickness of the block', error)
          if (allocated(error)) return
          call result%write_material('density', m%density, 'kg/m3', 'density', error)
@@ -292,7 +294,7 @@ contains
       associate (losses => self%sim%steady%losses)
          call self%result%write_losses(self%sim%row%step, &
             [(longest_wave(self%sim%grid)/2.0_dp**(k - 1), k = 1, size(losses%octave))], losses%octave, &
-            losses%arm, error)
+            self%sim%case%material%prony_tau, losses%arm, error)
       end associate
    end subroutine write_losses
 

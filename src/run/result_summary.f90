@@ -8,6 +8,7 @@ module result_summary
    use asperity_errors, only : error_file, error_type, fail
    use hdf5_file, only : hdf5_file_type
    use asperity_precision, only : dp
+   use result_check, only : damage_type, find_damage
    use result_target, only : damage_of_result
    use text_tools, only : ordinary, to_text
    implicit none
@@ -19,26 +20,57 @@ module result_summary
 
 contains
 
-   !> Read a result and say what it holds; it may belong to a run that is still going.
+   !> Read a result and say what it holds; it may belong to a run that is still going. Where parts of
+   !> it are damaged, there is a summary and an error.
    subroutine summarise_result(path, text, error)
       character(*), intent(in) :: path
-      character(:), allocatable, intent(out) :: text
+      character(:), allocatable, intent(out) :: text   !! '' where nothing can be said
       type(error_type), allocatable, intent(out) :: error
       type(hdf5_file_type) :: file
       type(error_type), allocatable :: ignored
 
       text = ''
-      call damage_of_result(path, error)
+      call damage_of_result(path, error, fields=.true.)
       if (allocated(error)) return
       call file%open(path, 'read', error)
       if (allocated(error)) return
       if (file%has_attribute('/', 'finished') .or. .not. file%has_dataset('/surface/height')) then
          call describe(file, path, text, error)
+         if (.not. allocated(error)) call add_damage(file, path, text, error)
       else
          call describe_map(file, path, text, error)
       end if
       call file%close(ignored)
    end subroutine summarise_result
+
+   !> Name the damaged parts of a result.
+   subroutine add_damage(file, path, text, error)
+      type(hdf5_file_type), intent(inout) :: file
+      character(*), intent(in) :: path
+      character(:), allocatable, intent(inout) :: text
+      type(error_type), allocatable, intent(out) :: error
+      type(damage_type) :: found
+      character(:), allocatable :: part
+      integer :: at, next
+
+      call find_damage(file, found)
+      if (found%left_out > 0) text = text//'not read    the fields of the first '// &
+         to_text(found%left_out)//' snapshots: the others take a gigabyte already'//nl
+      if (found%parts == 0) return
+      at = 1
+      do while (at <= len(found%names))
+         next = index(found%names(at:), nl)
+         if (next == 0) next = len(found%names) - at + 2
+         part = found%names(at:at + next - 2)
+         text = text//'damaged     '//part//nl
+         at = at + next
+      end do
+      part = found%names
+      if (index(part, nl) > 0) part = part(:index(part, nl) - 1)
+      if (index(part, ': ') == 0) part = part//' cannot be read'
+      if (found%parts > 1) part = part//', and '//to_text(found%parts - 1)//' more'
+      call fail(error, error_file, path//': the file is damaged: '//part)
+   end subroutine add_damage
 
    !> The summary of a height map, as `asperity import` and `asperity.surface.save` write it.
    subroutine describe_map(file, path, text, error)

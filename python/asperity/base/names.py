@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-__all__ = ["NamedValues", "UnknownNameError", "unknown_name"]
+__all__ = ["NamedValues", "OpenValues", "UnknownNameError", "unknown_name"]
 
 
 class UnknownNameError(KeyError):
@@ -38,6 +38,9 @@ def unknown_name(what: str, name: object, names: Iterable[str]) -> str:
 class NamedValues(Mapping[str, Any]):
     """Read-only mapping of names to values, which are attributes, too.
 
+    Type checkers know the names that a class of these declares, and take any other for a mistake;
+    `OpenValues` are for names that nobody can know.
+
     Parameters
     ----------
     values : Mapping
@@ -62,13 +65,14 @@ class NamedValues(Mapping[str, Any]):
         except (KeyError, TypeError):
             raise UnknownNameError(unknown_name(self._what, name, self._values)) from None
 
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        try:
-            return self._values[name]
-        except KeyError:
-            raise AttributeError(unknown_name(self._what, name, self._values)) from None
+    if not TYPE_CHECKING:
+        def __getattr__(self, name):
+            if name.startswith("_"):
+                raise AttributeError(name)
+            try:
+                return self._values[name]
+            except KeyError:
+                raise AttributeError(unknown_name(self._what, name, self._values)) from None
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._values)
@@ -84,3 +88,10 @@ class NamedValues(Mapping[str, Any]):
 
     def __repr__(self) -> str:
         return "\n".join(f"{name}: {value}" for name, value in self._values.items()) or "(empty)"
+
+
+class OpenValues(NamedValues):
+    """Named values of any names, such as the attributes of a file."""
+
+    if TYPE_CHECKING:
+        def __getattr__(self, name: str) -> Any: ...

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import warnings
+import zlib
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,7 +12,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.names import NamedValues
+from ..base.names import NamedValues, OpenValues
 from .history import Grid, History
 from .reading import NotAResultError, attributes_of, read_file, scalar_of, text_of
 
@@ -37,6 +39,18 @@ class Losses(NamedTuple):
     arm: FloatArray
 
 
+class Material(NamedValues):
+    """The properties of the material, in SI units (temperature in °C)."""
+
+    density: float
+    poisson: float
+    prony_g: FloatArray
+    prony_tau: FloatArray
+    shear_modulus: float
+    temperature: float
+    thickness: float
+
+
 class ResultFile:
     """The file of a run, without its snapshots; `asperity.Run` has those, too.
 
@@ -49,8 +63,8 @@ class ResultFile:
     path: Path
     grid: Grid
     history: History
-    material: NamedValues
-    attributes: NamedValues
+    material: Material
+    attributes: OpenValues
     losses: dict[int, Losses]
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -64,7 +78,7 @@ class ResultFile:
                 if group not in file:
                     raise NotAResultError(f"{self.path}: holds no /{group}: it is not a result"
                                            " of `asperity run`")
-            self.attributes = NamedValues(attributes_of(file), "attribute of the file")
+            self.attributes = OpenValues(attributes_of(file), "attribute of the file")
             self.grid = _grid(file["grid"])
             material = file.get("material")
             values = {}
@@ -72,15 +86,18 @@ class ResultFile:
                 values = attributes_of(material) | {
                     name: item[()] if name.startswith("prony") else scalar_of(item[()])
                     for name, item in material.items() if isinstance(item, h5py.Dataset)}
-            self.material = NamedValues(values, "property of the material")
+            self.material = Material(values, "property of the material")
             columns = {name: item for name, item in file["history"].items()
                        if isinstance(item, h5py.Dataset)}
+            sums = columns.pop("checksum", None)
             first = [name for name in ("step", "phase", "time") if name in columns]
             names = first + [name for name in columns if name not in first]
             self.history = History(
                 {name: np.atleast_1d(columns[name][()]) for name in names},
                 {name: text_of(columns[name].attrs.get("units", "1")) for name in names},
                 {name: text_of(columns[name].attrs.get("long_name", name)) for name in names})
+            if sums is not None:
+                self._compare(sums[()])
             self.losses = {int(key): Losses(*(
                 np.asarray(group[name][()]) if name in group else np.zeros(0)
                 for name in Losses._fields)) for key, group in file.get("losses", {}).items()}
@@ -88,6 +105,19 @@ class ResultFile:
             self._snapshot_keys = sorted(keys, key=int)
 
         read_file(self.path, read)
+
+    def _compare(self, sums: NDArray[np.float64]) -> None:
+        """Warn of rows of the history that do not agree with their checksums."""
+        names = sorted(name for name in self.history if name != "seconds")
+        rows = min(self.history.rows, len(sums))
+        table = np.ascontiguousarray(np.stack([self.history[name][:rows].astype("<f8")
+                                               for name in names], axis=1))
+        wrong = [row for row in range(rows) if zlib.crc32(table[row].data) != sums[row]]
+        if wrong:
+            told = ", ".join(map(str, wrong[:5])) + (", ..." if len(wrong) > 5 else "")
+            warnings.warn(f"{self.path}: the history does not agree with its checksums: the file"
+                          f" is damaged in row{'s' * (len(wrong) > 1)} {told}", UserWarning,
+                          stacklevel=2)
 
     @property
     def title(self) -> str:

@@ -41,9 +41,9 @@ class Run(ResultFile):
         Whether the run has come to its end.
     grid : Grid
         The grid of cells.
-    material : NamedValues
+    material : Material
         The properties of the material.
-    attributes : NamedValues
+    attributes : OpenValues
         All attributes of the file.
     history : History
         One value a row: ``run.history["friction"]``.

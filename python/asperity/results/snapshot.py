@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Snapshot", "Snapshots"]
 
-_NORMAL = ("pressure", "gap", "displacement_z", "contact")
+_NORMAL = ("pressure", "gap", "displacement_z", "contact", "road_height")
 _TANGENTIAL = ("traction_x", "traction_y", "displacement_x", "displacement_y", "slip_x", "slip_y")
 
 
@@ -48,7 +48,8 @@ class Snapshot:
             meanings = {
                 name: (text_of(dataset.attrs.get("units", "1")),
                        text_of(dataset.attrs.get("long_name", name.replace("_", " "))))
-                for name, dataset in group.items() if isinstance(dataset, h5py.Dataset)
+                for name, dataset in group.items()
+                if isinstance(dataset, h5py.Dataset) and not dataset.is_scale
             }
             step, when, phase = (scalar_of(group.attrs[name]) for name in ("step", "time", "phase"))
             return int(step), float(when), int(phase), meanings

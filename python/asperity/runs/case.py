@@ -16,6 +16,9 @@ from .groups import Group, Groups, UnknownVariableError, entry_of
 
 if TYPE_CHECKING:
     from ..results import Run
+    from .group_types import CaseGroups
+else:
+    CaseGroups = object
 
 __all__ = ["Case", "Group", "Groups", "UnknownVariableError"]
 
@@ -27,7 +30,7 @@ class _Text(str):
         return str(self)
 
 
-class Case:
+class Case(CaseGroups):
     """An input of the program, built, changed, checked, written and run from Python.
 
     The groups of the input are attributes and items: ``case.grid.nx = 128``,
@@ -78,16 +81,18 @@ class Case:
     path: Path | None
     _groups: dict[str, Group | Groups]
 
-    def __init__(self, title: str | None = None, **groups: Any) -> None:
-        object.__setattr__(self, "_groups", {})
-        object.__setattr__(self, "path", None)
-        for name in namelists.table():
-            self[name] = {} if not namelists.table()[name].is_repeatable else []
-        for name, values in groups.items():
-            self[name] = values
-        self._take_grid()
-        if title is not None:
-            self["case"]["title"] = title
+    # Type checkers know the groups by name, from CaseGroups.
+    if not TYPE_CHECKING:
+        def __init__(self, title: str | None = None, **groups: Any) -> None:
+            object.__setattr__(self, "_groups", {})
+            object.__setattr__(self, "path", None)
+            for name in namelists.table():
+                self[name] = {} if not namelists.table()[name].is_repeatable else []
+            for name, values in groups.items():
+                self[name] = values
+            self._take_grid()
+            if title is not None:
+                self["case"]["title"] = title
 
     @classmethod
     def read(cls, source: str | os.PathLike[str]) -> Case:
@@ -271,15 +276,6 @@ class Case:
         object.__setattr__(self, "path", state["path"])
 
     @property
-    def title(self) -> str:
-        """The title: the variable of the group ``case``."""
-        return self["case"].title
-
-    @title.setter
-    def title(self, title: str) -> None:
-        self["case"]["title"] = title
-
-    @property
     def result(self) -> Path:
         """The result that a run writes unless it is told another."""
         file = self["output"].file
@@ -299,18 +295,24 @@ class Case:
             values = [] if entry.is_repeatable else {}
         self._groups[name] = Groups(name, values) if entry.is_repeatable else Group(name, values)
 
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        return self[name]
+    if not TYPE_CHECKING:
+        @property
+        def title(self) -> str:
+            """The title: the variable of the group ``case``."""
+            return self["case"].title
 
-    def __setattr__(self, name: str, value: Any) -> None:
-        if name == "path":
-            object.__setattr__(self, "path", None if value is None else Path(value))
-        elif name == "title":
-            self["case"]["title"] = value
-        else:
-            self[name] = value
+        def __getattr__(self, name):
+            if name.startswith("_"):
+                raise AttributeError(name)
+            return self[name]
+
+        def __setattr__(self, name, value):
+            if name == "path":
+                object.__setattr__(self, "path", None if value is None else Path(value))
+            elif name == "title":
+                self["case"]["title"] = value
+            else:
+                self[name] = value
 
     def __dir__(self) -> list[str]:
         return sorted({*super().__dir__(), *self._groups})
@@ -324,7 +326,7 @@ class Case:
     __hash__ = None  # type: ignore[assignment]
 
     def __str__(self) -> str:
-        blocks = []
+        blocks: list[str] = []
         for name, group in self._groups.items():
             if isinstance(group, Groups):
                 blocks += map(str, group)

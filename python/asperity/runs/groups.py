@@ -6,7 +6,7 @@ Names, types, defaults and checks are those of the program: they come from the F
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, MutableMapping, MutableSequence
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 from ..base.check import shown
 from ..base.names import UnknownNameError, unknown_name
@@ -133,16 +133,19 @@ class Group(MutableMapping[str, Any]):
     def __len__(self) -> int:
         return len(self._values)
 
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        return self[name]
+    # Type checkers know the variables of each group by name (module group_types); they would take
+    # any other name for good if they saw these.
+    if not TYPE_CHECKING:
+        def __getattr__(self, name):
+            if name.startswith("_"):
+                raise AttributeError(name)
+            return self[name]
 
-    def __setattr__(self, name: str, value: Any) -> None:
-        self[name] = value
+        def __setattr__(self, name, value):
+            self[name] = value
 
-    def __delattr__(self, name: str) -> None:
-        del self[name]
+        def __delattr__(self, name):
+            del self[name]
 
     def __dir__(self) -> list[str]:
         return sorted({*super().__dir__(), *self._entry.variables})

@@ -33,9 +33,9 @@ _close = library.call("simulation_close")
 _row = library.call("run_row")
 _field = library.call("run_field")
 
-#: The fields of a simulation: those of a snapshot, and the road as it lies under the rubber.
+#: The fields of a simulation: those of a snapshot; `height` is short for `road_height`.
 FIELDS = ("pressure", "gap", "displacement_z", "traction_x", "traction_y", "displacement_x",
-          "displacement_y", "slip_x", "slip_y", "contact", "height")
+          "displacement_y", "slip_x", "slip_y", "contact", "road_height", "height")
 
 _LOADS = ("pressure", "force", "displacement")
 
@@ -92,8 +92,8 @@ class RunView:
     row : Row
         The last row, with the columns of the history as attributes and items.
     fields : Mapping
-        The fields as they are now, by the names of a snapshot and ``height`` (the road under the
-        rubber): arrays of shape (ny, nx).
+        The fields as they are now, by the names of a snapshot (``height`` is short for
+        ``road_height``): arrays of shape (ny, nx).
     rows : int
         Number of rows of the whole run.
     """
@@ -139,8 +139,8 @@ class Simulation:
         The last row, with the columns of the history as attributes and items; None before the
         first one.
     fields : Mapping
-        The fields as they are now, by the names of a snapshot and ``height`` (the road under the
-        rubber): arrays of shape (ny, nx).
+        The fields as they are now, by the names of a snapshot (``height`` is short for
+        ``road_height``): arrays of shape (ny, nx).
     rows : int
         Number of rows that the case has if nobody steers.
     shape : tuple of int

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["curve_page", "write_curve_page"]
 
-SCRIPTS = ("chart.js", "map.js", "curve.js")
+SCRIPTS = ("save.js", "chart.js", "map.js", "curve.js")
 _BUDGET = 12e6          # characters of all maps together
 _SIDES = (192, 128, 96, 64, 48, 32)
 

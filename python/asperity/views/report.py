@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PAGE", "SCRIPTS", "report_page", "write_report"]
 
-SCRIPTS = ("chart.js", "map.js", "page.js")
+SCRIPTS = ("save.js", "chart.js", "map.js", "page.js")
 
 
 def write_report(run: Run, path: str | os.PathLike[str] | None = None) -> Path:
@@ -279,7 +279,7 @@ def _history(run: Run, data: dict[str, Any]) -> str:
     phases = f" Phases: {escape(', '.join(names))}." if names else ""
     return ('<p class="soft">Hover, tap or use the arrow keys to read values; drag or pinch to'
             " zoom, double click to see all. The charts of this page zoom together."
-            f"{phases}{thinned}</p>\n"
+            f"{phases}{thinned} <span id=\"columns-csv\">All columns drawn: </span></p>\n"
             '<p class="control" hidden><label for="axis">Against </label>'
             '<select id="axis"></select></p>\n'
             '<div class="charts" id="charts-time"></div>')

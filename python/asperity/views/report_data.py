@@ -131,9 +131,13 @@ def _snapshots(run: Run) -> tuple[list[dict[str, Any]], tuple[int, int], int]:
     for side in sides:
         block = -(-max(grid.nx, grid.ny) // side)
         shape = (-(-grid.ny // block), -(-grid.nx // block))
-        if len(chosen) * shape[0] * shape[1] * 5 * 4 / 3 <= BUDGET:
+        if len(chosen) * shape[0] * shape[1] * 7 * 4 / 3 <= BUDGET:
             break
-    return [_snapshot(run.snapshots[int(at)], block) for at in chosen], shape, block
+    found = [_snapshot(run.snapshots[int(at)], block) for at in chosen]
+    for each in found[1:]:  # a road that rests is on the page once
+        if each["fields"].get("road_height") == found[0]["fields"].get("road_height", {}):
+            del each["fields"]["road_height"]
+    return found, shape, block
 
 
 def _snapshot(snapshot: Snapshot, block: int) -> dict[str, Any]:
@@ -154,7 +158,7 @@ def _snapshot(snapshot: Snapshot, block: int) -> dict[str, Any]:
             moved = np.hypot(np.diff(run.history["road_x"][:row + 1]),
                              np.diff(run.history["road_y"][:row + 1]))
             found["travel"] = float(moved.sum())
-    names = ["pressure", "gap"]
+    names = ["pressure", "gap", "road_height"]
     if run.grid.ny == 1:
         names += ["traction_x", "traction_y"]
     for name in names:

@@ -45,6 +45,7 @@ LABELS = {
     "friction": "Friction coefficient",
     "friction_viscous": "Viscous friction coefficient",
     "height": "Height",
+    "road_height": "Height of the road",
     "displacement_z": "Normal displacement",
     "displacement_x": "Displacement along x",
     "displacement_y": "Displacement along y",

@@ -102,6 +102,8 @@ class Chart {
       button.addEventListener("click", act);
       buttons.append(button);
     }
+    buttons.append(...saveButtons(options.title, [["csv", () => this.saveCsv()],
+      ["png", () => this.savePng()]]));
     head.append(buttons);
     this.legend = html("div", {class: "legend"});
     this.svg = svg("svg", {role: "img", tabindex: "0", "aria-label":
@@ -113,6 +115,41 @@ class Chart {
     this.listen();
     new ResizeObserver(() => this.draw()).observe(this.figure);
     this.draw();
+  }
+
+  /** Save the values of all lines in SI units; lines of one x share its column. */
+  saveCsv() {
+    const {series, xLabel, xUnit, unit, label, title} = this.options;
+    const columns = [];
+    let last = null;
+    for (const line of series) {
+      if (line.x !== last && String(line.x) !== String(last)) {
+        columns.push({name: withUnit(xLabel, xUnit), values: line.x});
+      }
+      last = line.x;
+      columns.push({name: withUnit(line.label || label, unit), values: line.y});
+      if (line.low) {
+        columns.push({name: withUnit(`${line.label} low`, unit), values: line.low},
+          {name: withUnit(`${line.label} high`, unit), values: line.high});
+      }
+    }
+    saveCsv(title, columns);
+  }
+
+  /** Save the chart as it is seen, with its title and legend. */
+  savePng() {
+    const width = Number(this.svg.getAttribute("width"));
+    const height = Number(this.svg.getAttribute("height"));
+    this.cursor = null;
+    this.drawCursor();
+    const style = getComputedStyle(document.documentElement);
+    const {series, title} = this.options;
+    const keys = series.length < 2 ? [] : series.filter((_, number) => !this.hidden.has(number))
+      .map((line) => ({text: line.label, colour: style.getPropertyValue(`--c${line.colour}`).trim(),
+        dash: line.dash}));
+    return savePng(title, width, height, keys, async (pen) => {
+      pen.drawImage(await imageOf(this.svg), 0, 0, width, height);
+    });
   }
 
   makeLegend() {

@@ -37,6 +37,10 @@ class FieldMap {
     this.figure = html("figure", {class: "map"});
     const head = html("figcaption");
     head.append(html("strong", {}, title));
+    const buttons = html("span", {class: "buttons"});
+    buttons.append(...saveButtons(title, [["csv", () => this.saveCsv()],
+      ["png", () => this.savePng()]]));
+    head.append(buttons);
     this.figure.append(head);
     this.frame = html("div", {class: "mapframe"});
     this.canvas = html("canvas", {width: grid.mx, height: grid.my, role: "img", tabindex: "0",
@@ -70,9 +74,10 @@ class FieldMap {
 
   /**
    * Draw values. `paint(i)` gives the colour of a cell, `word(i)` its value in words; `arrows` are
-   * x, y and tractions; `bar` the elements of the colour bar.
+   * x, y and tractions; `bar` the elements of the colour bar; `values` the numbers in `unit` that are
+   * saved.
    */
-  show(paint, word, bar, arrows = null) {
+  show(paint, word, bar, arrows, values, unit) {
     const {mx, my} = this.grid;
     const context = this.canvas.getContext("2d");
     const picture = context.createImageData(mx, my);
@@ -89,9 +94,62 @@ class FieldMap {
     context.putImageData(picture, 0, 0);
     this.word = word;
     this.arrows = arrows;
+    this.values = values;
+    this.unit = unit;
     this.bar.replaceChildren(...bar);
     this.place();
     this.tell();
+  }
+
+  /** Where the middle of a cell, or of a block of cells, lies. */
+  middle(k, n, length) {
+    const {block} = this.grid;
+    return (Math.min((k + 1) * block, n) + k * block - 1) / 2 * length / n;
+  }
+
+  /** Save x, y and value of each cell of the page, in SI units. */
+  saveCsv() {
+    const {mx, my, nx, ny, lx, ly} = this.grid;
+    const count = [...Array(mx * my).keys()];
+    const number = (value) => Number(value.toPrecision(10));
+    saveCsv(this.title, [
+      {name: "x (m)", values: count.map((k) => number(this.middle(k % mx, nx, lx)))},
+      {name: "y (m)", values: count.map((k) => number(this.middle(Math.floor(k / mx), ny, ly)))},
+      {name: withUnit(this.title, this.unit), values: count.map((k) => number(this.values[k]))}]);
+  }
+
+  /** Save the map as it is seen, with its title and colour bar. */
+  savePng() {
+    const width = Number(this.over.getAttribute("width"));
+    const height = Number(this.over.getAttribute("height"));
+    const scale = this.bar.querySelector(".scale");
+    const texts = [...this.bar.querySelectorAll(".numbers span")].map((each) => each.textContent);
+    const words = [...this.bar.querySelectorAll(".key")].flatMap((each) =>
+      [...each.childNodes].map((node) => node.textContent).filter(Boolean)).join(",  ");
+    const below = (scale ? 40 : 0) + (words && !scale ? 24 : 0);
+    return savePng(this.title, Math.max(width, 240), height + below, [], async (pen) => {
+      const {left, top, width: wide, height: tall} = this.canvas.style;
+      pen.imageSmoothingEnabled = false;
+      pen.drawImage(this.canvas, ...[left, top, wide, tall].map(parseFloat));
+      pen.drawImage(await imageOf(this.over), 0, 0, width, height);
+      const style = getComputedStyle(document.body);
+      pen.fillStyle = style.color;
+      pen.font = `12px ${style.fontFamily}`;
+      if (!scale) {
+        pen.fillText(words, 8, height + 14, width - 16);
+        return;
+      }
+      const fade = pen.createLinearGradient(46, 0, width - 8, 0);
+      const colours = scale.dataset.colours.split(",");
+      colours.forEach((colour, i) => fade.addColorStop(i / (colours.length - 1), colour));
+      pen.fillStyle = fade;
+      pen.fillRect(46, height + 4, width - 54, 12);
+      pen.fillStyle = style.color;
+      texts.forEach((text, i) => {
+        pen.textAlign = ["left", "center", "right"][i];
+        pen.fillText(text, [46, (width + 38) / 2, width - 8][i], height + 31);
+      });
+    });
   }
 
   /** Fit the map into the page; axes and arrows are drawn anew. */
@@ -163,13 +221,12 @@ class FieldMap {
   }
 
   tell() {
-    const {mx, my, lx, ly, nx, ny, block} = this.grid;
+    const {mx, my, lx, ly, nx, ny} = this.grid;
     if (!this.cell || !this.word) { this.readout.textContent = "\u00a0"; return; }
     const i = this.cell[0] = Math.min(Math.max(this.cell[0], 0), mx - 1);
     const j = this.cell[1] = Math.min(Math.max(this.cell[1], 0), my - 1);
-    const middle = (k, n) => (Math.min((k + 1) * block, n) + k * block - 1) / 2;
-    this.readout.textContent = `x ${shown(middle(i, nx) * lx / nx, "m")}, y `
-      + `${shown(middle(j, ny) * ly / ny, "m")}: ${this.word(j * mx + i)}`;
+    this.readout.textContent = `x ${shown(this.middle(i, nx, lx), "m")}, y `
+      + `${shown(this.middle(j, ny, ly), "m")}: ${this.word(j * mx + i)}`;
   }
 }
 
@@ -179,9 +236,12 @@ function colourBar(table, low, high, unit, open) {
   const [factor, name] = siScale(Math.max(Math.abs(low), Math.abs(high)), unit);
   const scale = html("div", {class: "scale"});
   scale.style.background = `linear-gradient(to right, ${table.join(",")})`;
+  scale.dataset.colours = table.join(",");
   const numbers = html("div", {class: "numbers"});
   for (const value of [low, (low + high) / 2, high]) {
-    numbers.append(html("span", {}, digits(value * factor, 3)));
+    // The middle of a scale of both signs is zero but for round-off.
+    const round = Math.abs(value) < 1e-9 * (high - low) ? 0 : value;
+    numbers.append(html("span", {}, digits(round * factor, 3)));
   }
   numbers.lastChild.textContent += name ? ` ${name}` : "";
   const parts = [scale, numbers];

@@ -46,6 +46,11 @@ function historyCharts() {
     });
     choice.parentElement.hidden = false;
   }
+  const place = document.getElementById("columns-csv");
+  if (place) {
+    place.append(...saveButtons("all columns", [["csv", () => saveCsv("history",
+      Object.entries(data.columns).map(([name, values]) => ({name, values})))]]));
+  }
   let snapshot = null;
   const marks = () => {
     if (!snapshot) return;
@@ -63,10 +68,18 @@ function overAll(name, number) {
     .map((each) => number(each.fields[name])));
 }
 
+/** A field of a snapshot; a road that rests is kept with the first one only. */
+function fieldOf(snapshot, name) {
+  return snapshot.fields[name]
+    || (name === "road_height" ? data.snapshots[0].fields[name] : undefined);
+}
+
 /** Maps of an area contact. Returns what draws a snapshot. */
 function areaMaps(parent, same) {
   const maps = {};
   const names = [...new Set(data.snapshots.flatMap((each) => Object.keys(each.fields)))];
+  // Heights have no natural zero: their scale goes from the lowest to the highest.
+  const heights = "road_height";
   for (const name of names) {
     const field = data.snapshots.find((each) => name in each.fields).fields[name];
     maps[name] = new FieldMap(parent, field.label, data.grid);
@@ -75,14 +88,18 @@ function areaMaps(parent, same) {
   if (data.snapshots.some((each) => each.contact)) maps.contact = new FieldMap(parent, title, data.grid);
   return (snapshot) => {
     for (const name of names) {
-      const field = snapshot.fields[name];
+      const field = fieldOf(snapshot, name);
       maps[name].figure.hidden = !field;
       if (!field) continue;
       const values = unpack(field);
       const attracted = same() ? Math.min(...data.snapshots.filter((each) => name in each.fields)
         .map((each) => each.fields[name].low)) < 0 : field.low < 0;
-      const top = same() ? overAll(name, (each) => each.top) : field.top;
-      const low = name === "pressure" && attracted ? -top : Math.min(0, field.low);
+      let top = same() ? overAll(name, (each) => each.top) : field.top;
+      let low = name === "pressure" && attracted ? -top : Math.min(0, field.low);
+      if (name === heights) {
+        top = same() ? overAll(name, (each) => each.high) : field.high;
+        low = same() ? -overAll(name, (each) => -each.low) : field.low;
+      }
       const table = data.colours[name === "pressure" ? (attracted ? "both" : "pressure") : "gap"];
       const colours = [...Array(256).keys()].map((i) => colourAt(table, i / 255));
       const masked = name === "pressure" && !attracted;
@@ -90,7 +107,7 @@ function areaMaps(parent, same) {
         (i) => masked && values[i] <= 0 ? OPEN
           : colours[Math.min(Math.max(Math.round((values[i] - low) / (top - low || 1) * 255), 0), 255)],
         (i) => shown(values[i], field.units), colourBar(table, low, top, field.units, masked),
-        null);
+        null, values, field.units);
     }
     if (!maps.contact) return;
     maps.contact.figure.hidden = !snapshot.contact;
@@ -111,7 +128,7 @@ function areaMaps(parent, same) {
         `Arrows: traction on the rubber, the longest ${shown(longest, "Pa")}.`));
     }
     maps.contact.show((i) => colours[states[i]], (i) => words[states[i]], bar,
-      snapshot.arrows || null);
+      snapshot.arrows || null, states, "0 open, 1 stick, 2 slip");
   };
 }
 
@@ -125,12 +142,13 @@ function lineProfiles(parent) {
   const has = (name) => data.snapshots.some((each) => name in each.fields);
   const pressure = has("pressure") ? make("Pressure and traction", "Traction", "Pa") : null;
   const gap = has("gap") ? make("Gap", "Gap", "m") : null;
+  const road = has("road_height") ? make("Road and rubber", "Height", "m") : null;
   const key = html("div", {class: "key"});
   parent.append(key);
   return (snapshot) => {
-    const line = (name, colour, dash) => name in snapshot.fields ? [{
-      label: snapshot.fields[name].label.toLowerCase(), colour, dash, x,
-      y: [...unpack(snapshot.fields[name])]}] : [];
+    const line = (name, colour, dash) => fieldOf(snapshot, name) ? [{
+      label: fieldOf(snapshot, name).label.toLowerCase(), colour, dash, x,
+      y: [...unpack(fieldOf(snapshot, name))]}] : [];
     const bands = [];
     if (snapshot.contact) {
       const states = unpackStates(snapshot.contact);
@@ -151,6 +169,16 @@ function lineProfiles(parent) {
     if (pressure) pressure.update([...line("pressure", 6, ""), ...line("traction_x", 1, "6 3"),
       ...line("traction_y", 3, "2 3")], {bands});
     if (gap) gap.update(line("gap", 0, ""), {bands});
+    if (road) {
+      const lines = line("road_height", 6, "");
+      // The rubber's surface lies above the road by the gap.
+      if (lines.length && "gap" in snapshot.fields) {
+        const open = unpack(snapshot.fields.gap);
+        lines[0].label = "road";
+        lines.push({label: "rubber", colour: 1, dash: "6 3", x, y: lines[0].y.map((y, i) => y + open[i])});
+      }
+      road.update(lines, {bands});
+    }
   };
 }
 

@@ -1,0 +1,108 @@
+"""What type checkers know: the groups of an input, the columns of a history, of a row."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+from conftest import ROOT
+
+import asperity
+from asperity.results.history import History
+from asperity.runs.row import Row, columns
+
+# A comment `E: text` is an error that mypy must report in that line, `N: text` a type it reveals;
+# there must be no others.
+SAMPLE = '''
+import numpy as np
+import asperity
+
+case = asperity.Case(
+    "Wave", surface=np.zeros((4, 4)), grid=dict(lx=1e-3),
+    material=dict(shear_modulus=1e6), phase=[dict(pressure=1e4)])
+reveal_type(case.grid.nx)  # N: "int"
+reveal_type(case.grid.ly)  # N: "float | None"
+reveal_type(case.grid.boundary)  # N: "Literal['periodic'] | Literal['free']"
+reveal_type(case.material.prony_g)  # N: "list[float] | None"
+reveal_type(case.phase[0].velocity_x)  # N: "float"
+reveal_type(case.phase[0].pressure)  # N: "float | None"
+reveal_type(case.title)  # N: "str"
+case.grid.nxx = 3  # E: has no attribute "nxx"
+print(case.grid.nxx)  # E: has no attribute "nxx"
+print(case.gird)  # E: has no attribute "gird"
+case.grid.nx = 12
+case.grid.nx = "12"  # E: Incompatible types in assignment
+case.grid.boundary = "open"  # E: Incompatible types in assignment
+case.grid.boundary = "free"
+case.grid.ly = None
+case.material.prony_g = np.array([1e6, 2e6])
+case.material.prony_tau = [1, 2]
+case.surface = np.ones((8, 8))
+case.solver = dict(tolerance=1e-8)
+case.output.file = "x.h5"
+case.phase.append(duration=1e-3, velocity_x=1.0)
+case.phase.append(velocity=1.0)  # E: Unexpected keyword argument "velocity"
+for phase in case.phase:
+    phase.steps = 10
+    phase.step = 10  # E: has no attribute "step"
+asperity.Case(girid=dict(nx=3))  # E: Unexpected keyword argument "girid"
+
+run = asperity.open("road.h5")
+reveal_type(run.history.friction)  # N: numpy.ndarray[
+print(run.history.fricton)  # E: has no attribute "fricton"
+print(run.history["friction"], run.material.shear_modulus, run.attributes.whatever)
+reveal_type(run.material.poisson)  # N: "float"
+print(run.material.poison)  # E: has no attribute "poison"
+sim = asperity.Simulation(case)
+row = sim.advance()
+reveal_type(row.friction)  # N: "float"
+reveal_type(row.step)  # N: "int"
+print(row.fricton)  # E: has no attribute "fricton"
+sim.pressure = 2e5
+'''
+
+
+def test_mypy_knows_names_and_types(tmp_path: Path) -> None:
+    """Misspelt groups, variables and columns are errors, and every type is what the program has."""
+    sample = tmp_path / "sample.py"
+    sample.write_text(SAMPLE)
+    settings = tmp_path / "mypy.ini"
+    # Other packages are not looked into: they take long and do not matter here.
+    left_out = ("h5py", "matplotlib", "pandas", "scipy", "xarray", "SurfaceTopography")
+    settings.write_text(
+        f"[mypy]\nfollow_imports = silent\nmypy_path = {ROOT / 'python'}\n"
+        + "".join(f"[mypy-{name}.*]\nfollow_imports = skip\n" for name in left_out))
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", "--config-file", settings, "--no-error-summary",
+         "--cache-dir", ROOT / "build" / "mypy", sample],
+        capture_output=True, text=True, check=False)
+    found = [re.fullmatch(r".*sample\.py:(\d+): (error|note): (.*)", line)
+             for line in done.stdout.splitlines()]
+    told: dict[int, list[str]] = {}
+    for line in found:
+        assert line is not None, done.stdout + done.stderr
+        told.setdefault(int(line[1]), []).append(line[3])
+    for number, line in enumerate(SAMPLE.splitlines(), 1):
+        wanted = re.search(r"# [EN]: (.*)", line)
+        messages = "\n".join(told.get(number, []))
+        if wanted:
+            assert wanted[1] in messages, f"{line}\n{messages}"
+        else:
+            assert not messages, f"{line}\n{messages}"
+
+
+def test_groups_are_those_of_the_program() -> None:
+    """The module for type checkers is what the program's table of the input gives."""
+    done = subprocess.run([sys.executable, ROOT / "tools" / "make_types.py", "--check"],
+                          check=False)
+    assert done.returncode == 0, "python tools/make_types.py writes it anew"
+
+
+def test_columns_are_those_of_the_program() -> None:
+    """History and row declare the columns that the library writes."""
+    names = [column.name for column in columns()]
+    assert list(Row.__annotations__) == names
+    assert [name for name in History.__annotations__ if not name.startswith("_")] == names
+    assert asperity.Run.__annotations__["snapshots"]

@@ -1,0 +1,158 @@
+"""Write python/asperity/runs/group_types.py: what type checkers and editors know of the input.
+
+    python tools/make_types.py            writes the module
+    python tools/make_types.py --check    ends with status 1 if it is not what it should be
+
+The names, types and words come from the table of the input in the Fortran library.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from pathlib import Path
+
+from asperity.runs import namelists
+
+TARGET = Path(__file__).resolve().parent.parent / "python/asperity/runs/group_types.py"
+
+HEAD = '''"""The groups of an input and their variables, for type checkers and editors.
+
+Written by `tools/make_types.py` from the program's table of the input; nothing here is used when a
+program runs. A variable is read as the first of its two types and set as the second; None takes it
+out of the input again.
+"""
+
+# ruff: noqa: D102, E501
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from os import PathLike
+from typing import TYPE_CHECKING, Any, Generic, Literal, TypedDict, TypeVar, overload
+
+from numpy.typing import NDArray
+
+from .groups import Group, Groups
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+Found = TypeVar("Found", covariant=True)
+Given = TypeVar("Given", contravariant=True)
+Path = str | PathLike[str]
+Reals = Sequence[float] | NDArray[Any] | float
+
+
+class Variable(Generic[Found, Given]):
+    """A variable: how it is read and set."""
+
+    def __get__(self, group: object, kind: type | None = None) -> Found:
+        """Return the value, or the default."""
+        raise NotImplementedError
+
+    def __set__(self, group: object, value: Given) -> None:
+        """Set the value."""
+'''
+
+KINDS = {"integer": "int", "real": "float", "logical": "bool", "text": "str",
+         "reals": "list[float]"}
+SETTABLE = {"reals": "Reals", "text": "str"}
+
+
+def words(variable: namelists.Variable) -> str:
+    """Return the words that a variable may have as a type."""
+    found = re.findall(r"'([^']*)'", variable.allowed)
+    return f"Literal[{', '.join(map(repr, found))}]" if found else "str"
+
+
+def types(variable: namelists.Variable) -> tuple[str, str]:
+    """Return how a variable is read and how it is set."""
+    if variable.kind == "word":
+        read = given = words(variable)
+    elif variable.kind == "words":
+        read, given = f"list[{words(variable)}]", f"Sequence[{words(variable)}] | {words(variable)}"
+    else:
+        read = KINDS[variable.kind]
+        given = SETTABLE.get(variable.kind, read)
+    if variable.name == "file":
+        given = "Path"
+    derived = variable.default.startswith("(") and not variable.is_required
+    return f"{read} | None" if derived else read, given
+
+
+def class_of(group: str) -> str:
+    """Return the name of a group's class."""
+    return "".join(part.title() for part in group.split("_"))
+
+
+def write_group(entry: namelists.GroupEntry) -> str:
+    """Return the classes of a group."""
+    name = class_of(entry.name)
+    values = [f"    {each.name}: {types(each)[1]} | None" for each in entry.variables.values()]
+    variables = [f"    {each.name}: Variable[{types(each)[0]}, {types(each)[1]} | None]"
+                 for each in entry.variables.values()]
+    text = [f"class {name}Values(TypedDict, total=False):",
+            f'    """Values of ``&{entry.name}``."""', "", *values, "", "",
+            f"class {name}Group(Group):", f'    """A group ``&{entry.name}``."""', "",
+            *variables]
+    if not entry.is_repeatable:
+        text = text[text.index(f"class {name}Group(Group):"):]
+    if entry.is_repeatable:
+        text += [
+            "", "", f"class {name}Groups(Groups):", f'    """The groups ``&{entry.name}``."""', "",
+            "    if TYPE_CHECKING:",
+            "        @overload  # type: ignore[override]",
+            f"        def __getitem__(self, index: int) -> {name}Group: ...",
+            "        @overload",
+            f"        def __getitem__(self, index: slice) -> list[{name}Group]: ...",
+            "        def __getitem__(self, index: int | slice) -> Any: ...",
+            f"        def __iter__(self) -> Iterator[{name}Group]: ...",
+            "        def append(  # type: ignore[override]",
+            "            self, values: Mapping[str, Any] | None = None,",
+            f"            **more: Unpack[{name}Values]) -> None: ..."]
+    return "\n".join(text)
+
+
+def write_case(entries: list[namelists.GroupEntry]) -> str:
+    """Return the part of `Case` that names its groups."""
+    text = ["class CaseGroups:", '    """The groups of a case."""', "",
+            "    title: Variable[str, str]"]
+    keywords = []
+    for entry in entries:
+        name = class_of(entry.name)
+        one = "Mapping[str, Any]"
+        if entry.is_repeatable:
+            given = f"Iterable[{one}] | {one} | None"
+            found = f"{name}Groups"
+        else:
+            given, found = f"{one} | None", f"{name}Group"
+        if entry.name == "surface":
+            given = f"{given.removesuffix(' | None')} | NDArray[Any] | HasHeights | None"
+        text.append(f"    {entry.name}: Variable[{found}, {given}]")
+        keywords.append(f"                 {entry.name}: {given} = None")
+    signature = ("        def __init__(self, title: str | None = None, *,\n"
+                 + ",\n".join(keywords) + ") -> None: ...")
+    return "\n".join([*text, "", "    if TYPE_CHECKING:", signature])
+
+
+def main() -> int:
+    """Write the module, or compare it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--check", action="store_true")
+    wanted = parser.parse_args()
+    entries = list(namelists.table().values())
+    topography = ('class HasHeights(Protocol):\n'
+                  '    """A topography of SurfaceTopography."""\n\n'
+                  "    def heights(self) -> Any: ...")
+    head = HEAD.replace("Literal, TypedDict", "Literal, Protocol, TypedDict")
+    body = "\n\n\n".join([topography, *map(write_group, entries), write_case(entries)])
+    text = f"{head}\n\n{body}\n"
+    if not wanted.check:
+        TARGET.write_text(text)
+    return int(TARGET.read_text() != text)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
