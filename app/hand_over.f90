@@ -1,5 +1,5 @@
-!> Commands that the Python package does, such as `asperity plot`: the program becomes
-!> `python3 -m asperity plot ...` where it finds a Python that has the package.
+!> Commands that the Python package carries out, such as `asperity plot`. The program becomes
+!> `python3 -m asperity plot ...` if it finds a Python that has the package.
 module hand_over
    use command_line, only : argument_text
    use asperity_errors, only : error_file, error_type, fail
@@ -13,8 +13,9 @@ module hand_over
    character(*), parameter :: nl = new_line('a')
 
    !> A shell tries one Python after another: the one that the user names, those that may belong to
-   !> this program (beside it, beside an editable build, around a wheel), and those on PATH. `exec`
-   !> leaves neither the shell nor this program behind, so signals and statuses are Python's.
+   !> this program (beside it, beside an editable build, around a wheel), and those on PATH. Because
+   !> of `exec` neither the shell nor this program remains, so that signals go to Python and the
+   !> exit status is Python's.
    character(*), parameter :: script = &
       'folder=$1; shift'//nl// &
       'for python in "$ASPERITY_PYTHON" "$folder/python3" "$folder/../bin/python3" \'//nl// &
@@ -30,7 +31,7 @@ module hand_over
       ' ASPERITY_PYTHON=/path/to/python3 names a Python that has it" >&2'//nl// &
       'exit 3'//nl
 
-   !> An argument as C wants it.
+   !> An argument in the form that C needs.
    type :: argument_type
       character(kind=c_char), allocatable :: text(:)
    end type argument_type
@@ -56,11 +57,11 @@ module hand_over
 
 contains
 
-   !> Become Python with the words of this program's own command line, or of another one. Returns
-   !> only where no shell can be started.
+   !> Become Python with the arguments of this program, or with a verb and an option instead. This
+   !> returns only if no shell can be started.
    subroutine become_python(error, verb, option)
       type(error_type), allocatable, intent(out) :: error
-      character(*), intent(in), optional :: verb      !! the only two words, instead of the own ones
+      character(*), intent(in), optional :: verb      !! with `option`, the only two arguments
       character(*), intent(in), optional :: option
       type(argument_type), allocatable, target :: arguments(:)
       type(c_ptr), allocatable :: pointers(:)
@@ -103,7 +104,8 @@ contains
       argument%text(len(text) + 1) = c_null_char
    end subroutine put
 
-   !> The folder of this program's file; a folder that is not there where the system does not tell.
+   !> The folder of this program's file; if the system does not report it, a folder that does not
+   !> exist.
    function own_folder() result(folder)
       character(:), allocatable :: folder
       character(kind=c_char) :: buffer(4096)

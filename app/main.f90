@@ -1,4 +1,5 @@
-!> The program `asperity`: from the command line to an exit status. The only place that stops.
+!> The program `asperity`: it reads the command line, carries out the command, and ends with an exit
+!> status. No other place ends the program.
 program main
    use case_input, only : overwritten_file, read_case
    use case_run, only : run_type
@@ -22,7 +23,7 @@ program main
    use wait_policy, only : wait_passively
    implicit none
 
-   integer, parameter :: stopped_by_limit = 124       !! exit status, as that of timeout(1)
+   integer, parameter :: stopped_by_limit = 124       !! exit status, the same as that of timeout(1)
 
    type(command_type) :: command
    type(error_type), allocatable :: error
@@ -131,7 +132,7 @@ contains
       call run_steps(case, error)
    end subroutine run
 
-   !> The steps of a run. A signal, or the time limit, stops it after the step in hand, with a
+   !> The steps of a run. A signal or the time limit stops it after the present step, with a
    !> checkpoint.
    subroutine run_steps(case, error)
       type(case_type), intent(in) :: case
@@ -174,7 +175,8 @@ contains
       if (.not. allocated(error) .and. allocated(closing)) call move_alloc(closing, error)
    end subroutine run_steps
 
-   !> Stop a run so that it can go on; the error says with which status the program ends.
+   !> Stop a run such that it can be continued. The error holds the status that the program ends
+   !> with.
    subroutine stop_run(run, status, reason, error)
       type(run_type), intent(inout) :: run
       integer, intent(in) :: status
@@ -192,7 +194,7 @@ contains
       end if
    end subroutine stop_run
 
-   !> New warnings of a run, on lines of their own.
+   !> Print new warnings of a run on lines of their own, after ending the line of the progress.
    subroutine tell_warnings(run, progress)
       type(run_type), intent(inout) :: run
       type(progress_type), intent(inout) :: progress

@@ -1,4 +1,5 @@
-!> Standard output and standard error, written by the system's own call, which tells when it fails.
+!> Standard output and standard error. They are written with the system's own call, which reports
+!> failures.
 module standard_streams
    use asperity_errors, only : error_file, error_type, fail
    use, intrinsic :: iso_c_binding, only : c_char, c_int, c_size_t
@@ -31,7 +32,7 @@ contains
       if (.not. written) call fail(error, error_file, 'asperity: standard output cannot be written')
    end subroutine say
 
-   !> Write lines to standard error; nobody can be told where that fails.
+   !> Write lines to standard error. A failure is ignored, because there is nowhere to report it.
    subroutine say_error(text)
       character(*), intent(in) :: text                         !! without its last line end
       logical :: written
@@ -39,7 +40,7 @@ contains
       call write_all(2_c_int, text//new_line('a'), written)
    end subroutine say_error
 
-   !> Write all of a text, in as many calls as it takes.
+   !> Write a text completely, in as many calls as that takes.
    subroutine write_all(descriptor, text, written)
       integer(c_int), intent(in) :: descriptor
       character(*), intent(in) :: text

@@ -1,6 +1,7 @@
-!> How idle threads wait. By default they spin for a while, which on a machine that others use too
-!> can slow a run tenfold; OMP_WAIT_POLICY = passive lets them sleep. OpenMP reads it only when a
-!> program starts, so where the user has not chosen, the program starts itself anew with it.
+!> The way in which idle threads wait. By default they spin for a while. On a machine with other
+!> users this can make a run ten times slower; OMP_WAIT_POLICY = passive lets them sleep instead.
+!> OpenMP reads this variable only when a program starts. Unless the user has set it, the program
+!> therefore sets it and starts itself again.
 module wait_policy
    use, intrinsic :: iso_c_binding, only : c_char, c_int, c_loc, c_null_char, c_null_ptr, c_ptr
    implicit none
@@ -8,7 +9,7 @@ module wait_policy
 
    public :: wait_passively
 
-   !> An argument as C wants it.
+   !> An argument in the form that C needs.
    type :: argument_type
       character(kind=c_char), allocatable :: text(:)
    end type argument_type
@@ -29,8 +30,8 @@ module wait_policy
 
 contains
 
-   !> Start anew with sleeping threads, unless the environment says how to wait. Where the program
-   !> cannot find itself, it goes on as it is.
+   !> Start the program again with sleeping threads, unless the environment says how to wait. If the
+   !> program cannot find its own file, it continues as it is.
    subroutine wait_passively()
       type(argument_type), allocatable, target :: arguments(:)
       type(c_ptr), allocatable :: pointers(:)

@@ -1,11 +1,11 @@
 !> Checksums (CRC-64) of bytes, of a file and of a field.
 !>
-!> The polynomial is that of ECMA-182, bits in reflected order, as in the xz file format
-!> (CRC-64/XZ): the checksum of the nine bytes '123456789' is 995DC9BBDF1939FA. A CRC finds every
-!> error within 64 neighbouring bits for certain, and any other one but for a chance of 2^-64.
-!> `crc32_of_values` is the shorter CRC-32 of zlib, gzip and PNG, which other programs have at hand.
-!> Eight bytes are taken at once by eight tables (Intel's "slicing by 8"). Only shifts and
-!> exclusive ors are used, so that no integer overflows.
+!> The polynomial is that of ECMA-182 with reflected bits, as in the xz file format (CRC-64/XZ): the
+!> checksum of the nine bytes '123456789' is 995DC9BBDF1939FA. Such a checksum detects every error
+!> that is confined to 64 neighbouring bits, and misses any other error with a probability of 2^-64.
+!> `crc32_of_values` is the shorter CRC-32 of zlib, gzip and PNG, which other programs can compute.
+!> Eight tables allow eight bytes to be processed at a time (Intel's "slicing by 8"). Only shifts and
+!> exclusive ors are used, because Fortran's integers must not overflow.
 module asperity_checksum
    use asperity_errors, only : error_file, error_type, fail
    use asperity_precision, only : dp, int64, int8
@@ -18,17 +18,17 @@ module asperity_checksum
       ior(shiftl(int(z'C96C5795', int64), 32), int(z'D7870F42', int64))
    integer(int64), parameter :: short_polynomial = int(z'EDB88320', int64)
    integer(int64), parameter :: short_mask = int(z'FFFFFFFF', int64)
-   integer, parameter :: block_words = 131072     !! words of 8 bytes that are read at once, 1 MiB
+   integer, parameter :: block_words = 131072     !! words of 8 bytes per read, which makes 1 MiB
 
    integer(int64) :: table(0:255, 8)
    logical :: filled = .false.
 
 contains
 
-   !> Checksum of what a file holds from a byte on.
+   !> Checksum of a file from a given byte to its end.
    subroutine checksum_of_file(path, first, sum, error)
       character(*), intent(in) :: path
-      integer(int64), intent(in) :: first           !! first byte that counts, from 1
+      integer(int64), intent(in) :: first           !! first byte that is included, from 1
       integer(int64), intent(out) :: sum
       type(error_type), allocatable, intent(out) :: error
       integer(int64), allocatable :: words(:)
@@ -61,7 +61,8 @@ contains
       if (status /= 0) call fail(error, error_file, path//': cannot be read')
    end subroutine checksum_of_file
 
-   !> Checksum of a field: that of the checksums of its rows, which threads find side by side.
+   !> Checksum of a field. It is the checksum of the checksums of the rows, so that threads can work
+   !> on different rows.
    function checksum_of_field(field) result(sum)
       real(dp), intent(in) :: field(:, :)           !! [nx, ny]
       integer(int64) :: sum
@@ -81,7 +82,7 @@ contains
       sum = not(sum)
    end function checksum_of_field
 
-   !> Checksum of the letters of a text.
+   !> Checksum of the characters of a text.
    function checksum_of_text(text) result(sum)
       character(*), intent(in) :: text
       integer(int64) :: sum
@@ -92,7 +93,7 @@ contains
       sum = not(sum)
    end function checksum_of_text
 
-   !> CRC-32 of values, each as eight bytes, the lowest first; as a whole number below 2^32.
+   !> CRC-32 of values as a whole number below 2^32. Each value is eight bytes, the lowest first.
    pure function crc32_of_values(values) result(sum)
       real(dp), intent(in) :: values(:)
       integer(int64) :: sum
@@ -102,7 +103,7 @@ contains
       sum = short_mask
       do i = 1, size(values)
          word = transfer(values(i), word)
-         ! A row is few bytes: bit by bit needs no table.
+         ! A row has few bytes, so that working bit by bit is fast enough and needs no table.
          do k = 0, 63
             if (btest(sum, 0) .neqv. btest(word, k)) then
                sum = ieor(shiftr(sum, 1), short_polynomial)
@@ -114,7 +115,7 @@ contains
       sum = ieor(sum, short_mask)
    end function crc32_of_values
 
-   !> A checksum as sixteen digits.
+   !> A checksum as sixteen hexadecimal digits.
    function hexadecimal(sum) result(text)
       integer(int64), intent(in) :: sum
       character(16) :: text
@@ -122,7 +123,7 @@ contains
       write (text, '(z16.16)') sum
    end function hexadecimal
 
-   !> Go on over words of eight bytes, the first byte the lowest.
+   !> Include further words of eight bytes, of which the first byte is the lowest, in a checksum.
    pure subroutine add_words(sum, words)
       integer(int64), intent(inout) :: sum
       integer(int64), intent(in) :: words(:)
@@ -142,7 +143,7 @@ contains
       end do
    end subroutine add_words
 
-   !> Go on over single bytes.
+   !> Include further single bytes in a checksum.
    pure subroutine add_bytes(sum, bytes)
       integer(int64), intent(inout) :: sum
       integer(int8), intent(in) :: bytes(:)
@@ -153,7 +154,7 @@ contains
       end do
    end subroutine add_bytes
 
-   !> Fill the tables, once; not to be called by several threads at a time.
+   !> Fill the tables at the first call. Several threads must not call this at the same time.
    subroutine fill_table()
       integer(int64) :: x
       integer :: i, k

@@ -6,7 +6,7 @@ module asperity_errors
 
    public :: error_type, fail, add_fault
 
-   !> What went wrong; but for the last, the values are the exit statuses of the program.
+   !> Kinds of errors. All values but the last are the exit statuses of the program.
    integer, parameter, public :: error_input = 2          !! the user's input is wrong
    integer, parameter, public :: error_file = 3           !! a file cannot be read or written
    integer, parameter, public :: error_convergence = 4    !! a solver did not converge
@@ -14,10 +14,11 @@ module asperity_errors
    !> MemoryError.
    integer, parameter, public :: error_memory = 5
 
-   !> An error: a message that says what, where, the value found and what is allowed.
+   !> An error. Its message says what is wrong and where, which value was found and which are
+   !> allowed.
    type :: error_type
       integer :: status = error_input          !! one of the parameters above
-      character(:), allocatable :: message     !! one line a fault, separated by new_line('a')
+      character(:), allocatable :: message     !! one line per fault, separated by new_line('a')
    end type error_type
 
 contains
@@ -33,7 +34,7 @@ contains
       error%message = message
    end subroutine fail
 
-   !> Add a fault to an error that may hold others already: all are reported at once.
+   !> Add a fault to an error that may already contain others, so that all are reported together.
    !> The status is that of the first fault.
    pure subroutine add_fault(error, status, message)
       type(error_type), allocatable, intent(inout) :: error

@@ -1,8 +1,8 @@
-!> Signals as flags that a run looks at between its steps.
+!> Signals set flags, which a run checks between its steps.
 !>
-!> SIGINT, SIGTERM, SIGHUP (the terminal is gone) and SIGXCPU (the batch system's limit is near) ask
-!> a run to stop after the step in hand; SIGUSR1 asks for a checkpoint. SIGXFSZ (a file larger than
-!> allowed) is ignored, so that the write that met it fails and says so.
+!> SIGINT, SIGTERM, SIGHUP (the terminal was closed) and SIGXCPU (the limit of the batch system is
+!> near) ask a run to stop after the present step. SIGUSR1 asks for a checkpoint. SIGXFSZ (a file
+!> would exceed the size limit) is ignored, so that the write that caused it fails with an error.
 module asperity_signals
    use, intrinsic :: iso_c_binding, only : c_funloc, c_funptr, c_int, c_intptr_t
    implicit none
@@ -31,8 +31,8 @@ module asperity_signals
 
 contains
 
-   !> Catch the signals from here on. A SIGHUP that is ignored at the start stays ignored, as nohup
-   !> wants it.
+   !> Catch the signals from now on. A SIGHUP that is ignored when the program starts stays ignored,
+   !> because nohup relies on it.
    subroutine catch_signals()
       type(c_funptr) :: before, ignore
 
@@ -46,14 +46,14 @@ contains
       before = c_signal(signal_file_size, ignore)
    end subroutine catch_signals
 
-   !> The signal that asks to stop, 0 if none came.
+   !> The signal that asked the run to stop, or 0.
    function stop_signal() result(number)
       integer :: number
 
       number = caught
    end function stop_signal
 
-   !> Its name.
+   !> The name of that signal.
    function stop_signal_name() result(name)
       character(:), allocatable :: name
 
@@ -76,12 +76,12 @@ contains
       yes = asked
    end function checkpoint_asked
 
-   !> The checkpoint that was asked for is written.
+   !> Clear the request for a checkpoint once the checkpoint is written.
    subroutine forget_checkpoint()
       asked = .false.
    end subroutine forget_checkpoint
 
-   !> Handler of the signals that ask to stop.
+   !> Handler of the signals that ask a run to stop.
    subroutine note_stop(number) bind(c)
       integer(c_int), value :: number
 

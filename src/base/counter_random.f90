@@ -1,8 +1,9 @@
-!> Random numbers that are a function of a counter: the number of a point or a mode depends on its
-!> indices and the seed only, so on no order of evaluation, number of threads, or grid size.
+!> Random numbers that are a function of a counter. The number of a point or a mode depends only on
+!> its indices and the seed, and not on the order of evaluation, the number of threads or the grid
+!> size.
 !>
 !> The mixing function is that of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014). Sums and products
-!> modulo 2^64 are put together from 32-bit halves: Fortran's integers must not overflow.
+!> modulo 2^64 are composed of 32-bit halves, because Fortran's integers must not overflow.
 module counter_random
    use asperity_precision, only : dp, int64, pi
    implicit none
@@ -20,7 +21,7 @@ module counter_random
 
 contains
 
-   !> Key of row `j`, to be passed on to the functions below.
+   !> Key of row `j`, which the functions below need.
    elemental function row_key(seed, j) result(key)
       integer, intent(in) :: seed
       integer, intent(in) :: j        !! any integer
@@ -29,7 +30,7 @@ contains
       key = mix(ieor(mix(int(seed, int64)), int(j, int64)))
    end function row_key
 
-   !> Uniform number in [0, 1) of column `i` of a row.
+   !> A uniformly distributed number in [0, 1), for column `i` of a row.
    elemental function uniform_number(key, i) result(u)
       integer(int64), intent(in) :: key   !! from row_key
       integer, intent(in) :: i            !! any integer
@@ -38,7 +39,7 @@ contains
       u = to_unit(mix(ieor(key, int(i, int64))))
    end function uniform_number
 
-   !> Standard normal number of column `i` of a row (Box and Muller).
+   !> A number with the standard normal distribution, for column `i` of a row (Box and Muller).
    elemental function normal_number(key, i) result(x)
       integer(int64), intent(in) :: key   !! from row_key
       integer, intent(in) :: i            !! any integer
@@ -49,7 +50,7 @@ contains
       x = sqrt(-2.0_dp*log(1.0_dp - to_unit(first)))*cos(2.0_dp*pi*to_unit(mix(first)))
    end function normal_number
 
-   !> One step of SplitMix64 from state `x`.
+   !> One step of SplitMix64 from the state `x`.
    elemental function mix(x) result(z)
       integer(int64), intent(in) :: x
       integer(int64) :: z
@@ -60,7 +61,7 @@ contains
       z = ieor(z, shiftr(z, 31))
    end function mix
 
-   !> The upper 53 bits as a number in [0, 1).
+   !> The upper 53 bits of `x` as a number in [0, 1).
    elemental function to_unit(x) result(u)
       integer(int64), intent(in) :: x
       real(dp) :: u
@@ -79,7 +80,7 @@ contains
       c = ior(shiftl(high, 32), iand(low, low_half))
    end function add
 
-   !> a b modulo 2^64.
+   !> The product a b modulo 2^64.
    elemental function multiply(a, b) result(c)
       integer(int64), intent(in) :: a, b
       integer(int64) :: c
@@ -94,7 +95,7 @@ contains
       c = add(c, shiftl(cross, 32))
    end function multiply
 
-   !> a b modulo 2^32 of two numbers below 2^32.
+   !> The product a b modulo 2^32 of two numbers below 2^32.
    elemental function low_product(a, b) result(c)
       integer(int64), intent(in) :: a, b
       integer(int64) :: c

@@ -1,4 +1,4 @@
-!> What stands under a name in the file system, and the identity of a file.
+!> The kind of thing that has a name in the file system, and the identity of a file.
 module file_kind
    use asperity_precision, only : int64
    implicit none
@@ -12,8 +12,8 @@ module file_kind
 
 contains
 
-   !> Is there something of this name that is no regular file: a folder, a device, a pipe? A link
-   !> counts as what it leads to.
+   !> Is there something of this name that is not a regular file, such as a folder, a device or a
+   !> pipe? A link counts as the thing that it leads to.
    function is_other_than_file(path) result(yes)
       character(*), intent(in) :: path
       logical :: yes
@@ -24,7 +24,7 @@ contains
       if (status == 0) yes = iand(values(3), kind_bits) /= regular
    end function is_other_than_file
 
-   !> Is this a link that leads to no file?
+   !> Is this a link that leads to nothing?
    function is_dangling_link(path) result(yes)
       character(*), intent(in) :: path
       logical :: yes
@@ -38,7 +38,7 @@ contains
       yes = status /= 0
    end function is_dangling_link
 
-   !> Is the file of a name the one that a unit is connected to?
+   !> Is the file of this name the one that a unit is connected to?
    function same_inode(path, unit) result(yes)
       character(*), intent(in) :: path
       integer, intent(in) :: unit
@@ -52,7 +52,8 @@ contains
       if (status == 0) yes = all(named(1:2) == opened(1:2))
    end function same_inode
 
-   !> The first bytes of a file, at most `length`; '' where it cannot be read or is empty.
+   !> The first bytes of a file, at most `length`. The text is '' if the file cannot be read or is
+   !> empty.
    function file_start(path, length) result(text)
       character(*), intent(in) :: path
       integer, intent(in) :: length

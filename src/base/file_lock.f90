@@ -1,9 +1,10 @@
-!> A lock on a name: one process at a time has it, and one that dies does not keep it.
+!> A lock that one process at a time can hold, and that a process which dies does not keep.
 !>
-!> The lock is flock(2) on a small file beside the files that it protects. The system gives it back
-!> when the process ends, however it ends. The file holds a line about the process that has the
-!> lock, for the message that others get; it is removed when the lock is given back, and a file that
-!> a dead process left behind does no harm. On a file system without locks there is no protection.
+!> The lock is flock(2) on a small file beside the files that it protects. The system releases it
+!> when the process ends, for whatever reason. The file contains a line about the process that holds
+!> the lock, which appears in the message that other processes print. It is removed when the lock is
+!> released; a file that a dead process left behind does no harm. On a file system without locks
+!> there is no protection.
 module file_lock
    use, intrinsic :: iso_c_binding, only : c_int
    use asperity_errors, only : error_file, error_type, fail
@@ -18,13 +19,13 @@ module file_lock
    integer(c_int), parameter :: exclusive_at_once = 6      !! LOCK_EX + LOCK_NB of every Unix
    integer(c_int), parameter :: unlock = 8                 !! LOCK_UN
    integer, parameter :: would_block(2) = [11, 35]         !! EWOULDBLOCK of Linux and of macOS
-   integer, parameter :: attempts = 20                     !! to find a file that nobody removes
-   character(*), parameter :: mark = 'asperity process '   !! how our own files begin
+   integer, parameter :: attempts = 20                     !! to lock a file that stays in place
+   character(*), parameter :: mark = 'asperity process '   !! the first words of a lock file
 
-   !> A lock. Not to be copied.
+   !> A lock. A variable of this type must not be copied.
    type :: file_lock_type
       private
-      integer :: unit = 0                                  !! 0: no file is open
+      integer :: unit = 0                                  !! 0 if no file is open
       character(:), allocatable :: path
    contains
       procedure :: acquire
@@ -46,11 +47,11 @@ module file_lock
 
 contains
 
-   !> Take the lock, or say at once who has it.
+   !> Take the lock. If another process holds it, report that process at once instead of waiting.
    subroutine acquire(self, path, protected, error)
       class(file_lock_type), intent(inout) :: self
       character(*), intent(in) :: path                !! of the lock's own file
-      character(*), intent(in) :: protected           !! what the lock protects, for the message
+      character(*), intent(in) :: protected           !! what the lock protects, for messages
       type(error_type), allocatable, intent(out) :: error
       character(200) :: reason, host
       character(:), allocatable :: holder
@@ -70,7 +71,7 @@ contains
             iomsg=reason)
          if (status /= 0) then
             self%unit = 0
-            ! The runtime opens no file twice: then this process has the lock.
+            ! gfortran's runtime refuses to open a file twice, so this process itself has the lock.
             if (index(reason, 'already opened') > 0) then
                call fail(error, error_file, protected//': is in use by another run of this process')
             else
@@ -88,7 +89,8 @@ contains
                return
             end if
          end if
-         ! Who had the lock before may have removed the file after it was opened here.
+         ! The process that held the lock may have removed the file after it was opened here. The
+         ! lock would then be on a file without a name, so try again with a new file.
          if (same_inode(path, self%unit)) exit
          close (self%unit)
          self%unit = 0
@@ -105,7 +107,7 @@ contains
       flush (self%unit, iostat=status)
    end subroutine acquire
 
-   !> Who has the lock, as the file says.
+   !> The process that holds the lock, according to the file.
    function first_line(unit) result(text)
       integer, intent(in) :: unit
       character(:), allocatable :: text
@@ -118,14 +120,14 @@ contains
       if (status == 0 .and. index(line, mark) == 1) text = trim(line(len('asperity ') + 1:))
    end function first_line
 
-   !> Give the lock back; without one nothing is done.
+   !> Release the lock. Nothing happens if it is not held.
    subroutine release(self)
       class(file_lock_type), intent(inout) :: self
       integer(c_int) :: status
 
       if (self%unit == 0) return
       call remove_file(self%path)
-      ! Not only by closing: a child of this process may have the file open, too.
+      ! Closing is not enough, because a child of this process may have the file open as well.
       status = c_flock(int(fnum(self%unit), c_int), unlock)
       close (self%unit)
       self%unit = 0

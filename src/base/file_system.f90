@@ -1,4 +1,4 @@
-!> What Fortran lacks to handle files: rename, remove, write through to the disk, look at folders.
+!> Operations on files that Fortran lacks: rename, remove, write through to the disk, and so on.
 module file_system
    use, intrinsic :: iso_c_binding, only : c_char, c_int, c_int64_t, c_intptr_t, c_null_char
    use asperity_errors, only : error_file, error_type, fail
@@ -69,7 +69,8 @@ module file_system
 
 contains
 
-   !> Give a file another name in the same file system; a file of that name is replaced at once.
+   !> Give a file another name in the same file system. A file that already has this name is
+   !> replaced in one step: at any time there is either the old or the new one.
    subroutine rename_file(old, new, error)
       character(*), intent(in) :: old
       character(*), intent(in) :: new
@@ -80,7 +81,7 @@ contains
       end if
    end subroutine rename_file
 
-   !> Remove a file; it is no error if there is none.
+   !> Remove a file. It is not an error if there is none.
    subroutine remove_file(path)
       character(*), intent(in) :: path
       integer(c_int) :: status
@@ -88,7 +89,7 @@ contains
       status = c_unlink(path//c_null_char)
    end subroutine remove_file
 
-   !> Wait until what was written to a file is on the disk.
+   !> Wait until everything that was written to a file is on the disk.
    subroutine sync_file(path, error)
       character(*), intent(in) :: path
       type(error_type), allocatable, intent(out) :: error
@@ -104,7 +105,7 @@ contains
       if (status /= 0) call fail(error, error_file, path//': cannot be written through to the disk')
    end subroutine sync_file
 
-   !> Make a file at least as long as this; what is added reads as zeros and takes no space yet.
+   !> Make a file at least this long. The bytes that are added read as zeros and take no space yet.
    subroutine lengthen_file(path, length, error)
       character(*), intent(in) :: path
       integer(int64), intent(in) :: length      !! bytes
@@ -118,7 +119,7 @@ contains
       end if
    end subroutine lengthen_file
 
-   !> Let a write beyond the limit on the size of files fail, where it would end the program.
+   !> Let a write beyond the limit on the size of files fail. By default it would end the program.
    subroutine let_size_limit_be_an_error()
       integer(c_intptr_t) :: old
 
@@ -139,7 +140,7 @@ contains
       inquire (file=path//'/.', exist=is_folder)
    end function is_folder
 
-   !> The folder part of a path, '.' if it has none.
+   !> The folder of a path, or '.' if the path contains none.
    pure function folder_of(path) result(folder)
       character(*), intent(in) :: path
       character(:), allocatable :: folder

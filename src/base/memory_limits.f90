@@ -1,8 +1,8 @@
-!> How much memory there is, and a clear error where it is not enough.
+!> The memory that a process may use, and a clear error if a task needs more.
 !>
-!> The machine's memory with its swap space, the limit of the control group (containers, batch
-!> jobs), and the limit on the address space (ulimit -v) are read from the files of Linux; where
-!> these are missing there is no limit.
+!> There are three limits: the memory of the machine with its swap space, the limit of the control
+!> group (containers and batch jobs), and the limit on the address space (ulimit -v). They are read
+!> from the files of Linux. On systems without these files there is no limit.
 module memory_limits
    use asperity_errors, only : error_memory, error_type, fail
    use asperity_precision, only : dp, int64
@@ -12,7 +12,8 @@ module memory_limits
 
    public :: memory_limit, memory_text, need_memory
 
-   !> Address space beside the fields, bytes: stacks and heaps of threads, libraries.
+   !> Address space that is needed in addition to the fields, for libraries and for the stacks and
+   !> heaps of threads, bytes.
    real(dp), parameter :: address_reserve = 256.0e6_dp
 
 contains
@@ -37,9 +38,9 @@ contains
          'leaves '//memory_text(max(0.0_dp, limit - address_reserve)))
    end subroutine need_memory
 
-   !> Memory that this process can have at most, bytes.
+   !> The most memory that this process can have, bytes.
    function memory_limit(what) result(limit)
-      character(:), allocatable, intent(out) :: what    !! whose limit it is, with a verb
+      character(:), allocatable, intent(out) :: what    !! such as 'this machine has'
       real(dp) :: limit
       real(dp) :: group
 
@@ -54,7 +55,7 @@ contains
       end if
    end function memory_limit
 
-   !> Limit of the control group, version 2 or 1, and of those above it.
+   !> The lowest limit of the control group, of version 2 or 1, and of the groups above it, bytes.
    function group_limit() result(limit)
       real(dp) :: limit
       character(512) :: line
@@ -106,7 +107,7 @@ contains
       close (unit)
    end function address_space
 
-   !> The number after a name in a file of lines; 0 where there is none.
+   !> The number that follows a name at the start of a line of a file; 0 if there is none.
    function field_of(path, name) result(value)
       character(*), intent(in) :: path, name
       real(dp) :: value
@@ -127,7 +128,7 @@ contains
       close (unit)
    end function field_of
 
-   !> The number that a file holds; huge where there is none ("max") or no file.
+   !> The number that a file contains; huge if there is no file or no number in it ("max").
    function number_in(path) result(value)
       character(*), intent(in) :: path
       real(dp) :: value
@@ -142,7 +143,7 @@ contains
       close (unit)
    end function number_in
 
-   !> A number of bytes for a message.
+   !> A number of bytes as text for a message.
    function memory_text(bytes) result(text)
       real(dp), intent(in) :: bytes
       character(:), allocatable :: text

@@ -9,7 +9,8 @@ module path_identity
    integer, parameter :: longest_path = 4096      !! PATH_MAX of Linux; macOS has less
 
    interface
-      !> realpath(3): the path without links and dots, in the buffer; null where there is no such file.
+      !> realpath(3) writes the path without links and dots to the buffer. The result is null if
+      !> there is no such file.
       function c_realpath(path, resolved) bind(c, name='realpath') result(address)
          import :: c_char, c_ptr
          implicit none
@@ -21,7 +22,7 @@ module path_identity
 
 contains
 
-   !> True if both paths lead to one file that exists, or are written alike.
+   !> True if both paths lead to the same existing file, or if they are the same text.
    logical function same_file(first, second)
       character(*), intent(in) :: first, second
       character(:), allocatable :: a, b
@@ -31,7 +32,7 @@ contains
       same_file = a == b
    end function same_file
 
-   !> The path without links and dots, or as it is where there is no such file.
+   !> The path without links and dots, or unchanged if there is no such file.
    function real_path(path) result(resolved)
       character(*), intent(in) :: path
       character(:), allocatable :: resolved
@@ -39,7 +40,7 @@ contains
       call resolve(trim(path), resolved)
    end function real_path
 
-   !> The path without links and dots, or as it is where there is no such file.
+   !> The path without links and dots, or unchanged if there is no such file.
    subroutine resolve(path, resolved)
       character(*), intent(in) :: path
       character(:), allocatable, intent(out) :: resolved

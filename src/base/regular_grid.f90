@@ -1,4 +1,4 @@
-!> The regular grid of cells on which everything lives.
+!> The regular grid of cells on which all fields are defined.
 module regular_grid
    use asperity_parallel, only : local_rows
    use asperity_precision, only : dp

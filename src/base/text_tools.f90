@@ -13,7 +13,7 @@ module text_tools
 
 contains
 
-   !> ASCII letters in lower case.
+   !> The word with its ASCII letters in lower case.
    pure function lower(word) result(lowered)
       character(*), intent(in) :: word
       character(len(word)) :: lowered
@@ -29,7 +29,8 @@ contains
       end do
    end function lower
 
-   !> The candidate that is nearest to a word; empty if none is near.
+   !> The candidate that is most like a word, for messages such as 'did you mean ...'; '' if none
+   !> is.
    pure function nearest_name(word, candidates) result(name)
       character(*), intent(in) :: word             !! as typed
       character(*), intent(in) :: candidates(:)    !! lower case, padded with blanks
@@ -48,7 +49,7 @@ contains
       end do
       if (name /= '') return
 
-      ! A word that is cut short or goes on, as 'tol' for 'tolerance'
+      ! The word may be an abbreviation, as 'tol' for 'tolerance'.
       if (len_trim(word) < 2) return
       do i = 1, size(candidates)
          if (index(trim(candidates(i)), lower(trim(word))) == 1) then
@@ -86,8 +87,8 @@ contains
       distance = row(len(b))
    end function edit_distance
 
-   !> A text fit for a message: control characters and runs of blanks become one blank, and what is
-   !> longer than `longest` is cut.
+   !> A text that is fit for a message: control characters and runs of blanks become one blank, and
+   !> a text that is longer than `longest` is cut.
    pure function ordinary(text, longest) result(shown)
       character(*), intent(in) :: text
       integer, intent(in) :: longest      !! characters, at least 4
@@ -138,7 +139,7 @@ contains
       text = trim(buffer)
    end function text_of_long
 
-   !> A real number with up to six significant digits, as 0.25, 120000 or 2.5e-7.
+   !> A real number with up to six significant digits, such as 0.25, 120000 or 2.5e-7.
    pure function text_of_real(number) result(text)
       real(dp), intent(in) :: number
       character(:), allocatable :: text
@@ -146,7 +147,7 @@ contains
       text = with_digits(number, 6)
    end function text_of_real
 
-   !> A real number with as few digits as give the same number when read again.
+   !> A real number with the fewest digits that give the same number when they are read.
    pure function exact_text(number) result(text)
       real(dp), intent(in) :: number
       character(:), allocatable :: text
@@ -161,7 +162,7 @@ contains
       end do
    end function exact_text
 
-   !> A real number rounded to so many significant digits, without zeros at its end.
+   !> A real number rounded to a number of significant digits, without zeros at its end.
    pure function with_digits(number, digits) result(text)
       real(dp), intent(in) :: number
       integer, intent(in) :: digits             !! 1 to 17

@@ -1,7 +1,7 @@
-!> A trial in a process of its own: what may crash or hang is tried there first.
+!> A trial in a separate process: anything that may crash or hang is tried there first.
 !>
-!> HDF5 may crash, or never return, when it reads a damaged file. So a copy of this process (fork)
-!> reads the file before this one does:
+!> HDF5 may crash, or never return, when it reads a damaged file. Therefore a copy of this process
+!> (fork) reads the file before this process does:
 !>
 !>     call trial%start(seconds)
 !>     if (trial%is_copy) then
@@ -10,8 +10,8 @@
 !>     end if
 !>     call trial%verdict(path, error)
 !>
-!> Ordinary errors in the copy are ignored: they will be found, and reported, here. The copy must
-!> neither print nor use OpenMP. Where no copy can be made, there is no trial.
+!> Ordinary errors in the copy are ignored, because this process will find and report them. The copy
+!> must neither print nor use OpenMP. If no copy can be made, there is no trial.
 module trial_process
    use, intrinsic :: iso_c_binding, only : c_int, c_intptr_t
    use asperity_errors, only : error_file, error_type, fail
@@ -29,7 +29,7 @@ module trial_process
 
    !> A trial.
    type :: trial_type
-      integer(c_int), private :: process = -1                  !! number of the copy
+      integer(c_int), private :: process = -1                  !! number of the copy, in this process
       logical :: is_copy = .false.                             !! this is the copy
    contains
       procedure :: start
@@ -72,7 +72,8 @@ module trial_process
 
 contains
 
-   !> Make the copy. It is ended after some time, so that nothing waits for ever.
+   !> Make the copy. The system ends it after this time, so that this process does not wait for
+   !> ever.
    subroutine start(self, seconds)
       class(trial_type), intent(inout) :: self
       integer, intent(in) :: seconds
@@ -96,7 +97,7 @@ contains
       if (self%is_copy) call c_exit_at_once(0_c_int)
    end subroutine leave
 
-   !> Wait for the copy; an error where it crashed or did not come to an end.
+   !> Wait for the copy. An error is set if it crashed or did not come to an end.
    subroutine verdict(self, path, error)
       class(trial_type), intent(inout) :: self
       character(*), intent(in) :: path                         !! of the file that was tried
@@ -114,7 +115,7 @@ contains
       number = iand(int(status), 127)
       if (found < 0 .or. number == 0) return
       if (number == alarm_signal) then
-         call fail(error, error_file, path//': the file is damaged: reading it comes to no end')
+         call fail(error, error_file, path//': the file is damaged: reading it does not come to an end')
       else
          call fail(error, error_file, path//': the file is damaged: HDF5 crashes when it reads it '// &
             '(signal '//to_text(number)//')')

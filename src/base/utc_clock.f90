@@ -1,4 +1,4 @@
-!> The time of day, the same everywhere.
+!> The date and time in UTC, which is the same everywhere.
 module utc_clock
    implicit none
    private
@@ -7,7 +7,7 @@ module utc_clock
 
 contains
 
-   !> Now, as ISO 8601 in UTC.
+   !> The present date and time in UTC, as ISO 8601.
    function utc_time() result(text)
       character(20) :: text
       integer :: values(8), days, minutes, year, month, day, length
@@ -45,7 +45,7 @@ contains
 
    contains
 
-      !> Number of days of the month.
+      !> Number of days in the month.
       integer function last_day()
          last_day = month_days(month)
          if (month /= 2) return
