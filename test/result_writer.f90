@@ -6,7 +6,7 @@ module result_writer
    use history_row, only : history_row_type
    use asperity_precision, only : dp, int8
    use regular_grid, only : boundary_periodic, grid_type, new_grid
-   use result_file, only : result_file_type
+   use result_file, only : result_file_type, result_plan_type
    use state_table, only : state_table_type
    implicit none
    private
@@ -71,6 +71,7 @@ contains
       type(checkpoint_reader_type) :: old
       type(error_type), allocatable :: closing
       type(grid_type) :: grid
+      type(result_plan_type) :: plan
       integer :: step, first
 
       grid = new_grid(nx, ny, 14.0_dp, 4.0_dp, boundary_periodic)
@@ -84,12 +85,18 @@ contains
          call output%reopen(path, old%result_id, first, compression, error)
          first = first + 1
       else
-         call output%create(path, 'a small run', '&case title = ''a small run'' /', 'nx = 7', &
-            grid, pressure_of(0), rows, rows/3 + 1, compression, error)
-         if (.not. allocated(error)) call output%write_material('prony_g', [1.0_dp, 2.0_dp], &
-            'Pa', 'moduli of the arms', error)
-         if (.not. allocated(error)) call output%write_material('poisson', 0.5_dp, '1', &
-            'Poisson''s ratio', error)
+         plan%title = 'a small run'
+         plan%input = '&case title = ''a small run'' /'
+         plan%settings = 'nx = 7'
+         plan%rows = rows
+         plan%snapshots = rows/3 + 1
+         plan%compression = compression
+         call output%create(path, grid, pressure_of(0), plan, error)
+         if (.not. allocated(error)) then
+            call output%write_material('prony_g', [1.0_dp, 2.0_dp], 'Pa', 'moduli of the arms')
+            call output%write_material('poisson', 0.5_dp, '1', 'Poisson''s ratio')
+            call output%report(error)
+         end if
       end if
       do step = first, rows - 1
          if (allocated(error)) exit
@@ -112,14 +119,10 @@ contains
 
          contact = int(mod(step, 3), int8)
          contact(2, 1) = 1_int8
-         call output%begin_snapshot(step, 0.25_dp*step, 1, error)
-         if (allocated(error)) return
-         call output%write_field('pressure', pressure_of(step), error)
-         if (allocated(error)) return
-         call output%write_field('gap', -pressure_of(step), error)
-         if (allocated(error)) return
-         call output%write_field('contact', contact, error)
-         if (allocated(error)) return
+         call output%begin_snapshot(step, 0.25_dp*step, 1)
+         call output%write_field('pressure', pressure_of(step))
+         call output%write_field('gap', -pressure_of(step))
+         call output%write_field('contact', contact)
          call output%end_snapshot(error)
       end subroutine write_snapshot
 
@@ -146,10 +149,8 @@ contains
          kept_pressure = pressure_of(step)
          call table%add('step', kept_step, 'the last step')
          call table%add('pressure', kept_pressure, 'Pa', 'the last pressure')
-         call state%start(path, output%id, 'grid: nx = 7', error)
-         if (allocated(error)) return
-         call state%put_state(table, error)
-         if (allocated(error)) return
+         call state%start(path, output%id, 'grid: nx = 7')
+         call state%put_state(table)
          call state%commit(error)
          if (allocated(error)) return
          call output%link_checkpoint(error)

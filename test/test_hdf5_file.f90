@@ -3,7 +3,8 @@ module test_hdf5_file
    use check, only : begin_suite, check_close, check_error, check_no_error, check_that
    use asperity_errors, only : error_file, error_input, error_type
    use file_system, only : remove_file
-   use hdf5_file, only : hdf5_file_type, read_field
+   use hdf5_field, only : read_field
+   use hdf5_file, only : hdf5_file_type
    use asperity_precision, only : dp, int8
    implicit none
    private
@@ -21,6 +22,7 @@ contains
       call columns_grow()
       call staged_groups_appear_whole()
       call failures_are_explained()
+      call first_fault_of_a_chain_is_reported()
       call remove_file(path)
    end subroutine run_hdf5_file
 
@@ -250,10 +252,57 @@ contains
       call file%write('/x', [2.0_dp], 'm', 'x', error)
       call check_error(error, '/x: the dataset cannot be written', 'dataset written twice')
       call file%write('/z', [2.0_dp], 'm', 'x', error)
-      call check_error(error, 'an earlier write to this file failed', 'nothing after a failure')
+      call check_error(error, '/x: the dataset cannot be written', 'nothing after a failure')
       call file%close(error)
       call check_no_error(error, 'close after a failure')
    end subroutine failures_are_explained
+
+   !> In a chain of calls without an error, the first fault ends the chain: later writes do nothing,
+   !> and this fault is the one that is reported, however many follow.
+   subroutine first_fault_of_a_chain_is_reported()
+      character(*), parameter :: other_path = 'build/first_fault.h5'
+      type(hdf5_file_type) :: file
+      type(error_type), allocatable :: error
+      integer :: n
+
+      call file%open(other_path, 'create')
+      call file%write('/x', [1.0_dp], 'm', 'x')
+      call file%flush()
+      call file%report(error)
+      call check_no_error(error, 'a chain without a fault')
+
+      call file%write('/x', [2.0_dp], 'm', 'x')
+      call file%write_attribute('/nowhere', 'n', 3)
+      call file%write('/y', [4.0_dp], 'm', 'y')
+      call file%create_group('/group')
+      call file%report(error)
+      call check_error(error, other_path//': /x: the dataset cannot be written', 'the first of two faults')
+      call file%write('/z', [4.0_dp], 'm', 'z', error)
+      call check_error(error, '/x: the dataset cannot be written', 'the same fault for later writes')
+      call file%flush(error)
+      call check_error(error, '/x: the dataset cannot be written', 'the same fault for a flush')
+      call check_that(.not. file%has('/y') .and. .not. file%has('/group'), 'nothing was written after it')
+      call file%close(error)
+      call check_no_error(error, 'closing does not report a fault again')
+
+      call file%open(other_path, 'read')
+      call check_that(file%has('/x') .and. .not. file%has('/y'), 'what was written before the fault')
+      n = 7
+      call file%read_attribute('/x', 'first', n)
+      call check_that(n == 0, 'a value that was not read is 0')
+      call file%read_attribute('/x', 'second', n)
+      call file%close(error)
+      call check_error(error, '/x has no attribute "first"', 'closing reports what nobody has asked for')
+
+      call file%open('no_such_file.h5', 'read')
+      call file%read_attribute('/', 'n', n)
+      call file%report(error)
+      call check_error(error, 'no_such_file.h5: there is no such file', 'a file that was not opened')
+      call file%open(other_path, 'read')
+      call file%report(error)
+      call check_no_error(error, 'opening forgets the fault of the file before')
+      call file%close(error)
+   end subroutine first_fault_of_a_chain_is_reported
 
    !> Not a bit differs.
    elemental logical function same(a, b)

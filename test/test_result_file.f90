@@ -7,8 +7,8 @@ module test_result_file
    use hdf5_file, only : hdf5_file_type
    use history_row, only : column_count, column_type, history_columns
    use asperity_precision, only : dp
-   use regular_grid, only : boundary_free, new_grid
-   use result_file, only : result_file_type
+   use regular_grid, only : boundary_free, grid_type, new_grid
+   use result_file, only : result_file_type, result_plan_type
    use result_names, only : sibling_path
    use result_writer, only : nx, ny, pressure_of, write_result
    implicit none
@@ -17,6 +17,7 @@ module test_result_file
    public :: run_result_file
 
    character(*), parameter :: path = 'test_result_file.h5'
+   character(*), parameter :: other_path = 'test_result_file_2.h5'
 
 contains
 
@@ -26,6 +27,7 @@ contains
       call run_goes_on()
       call wrong_use_is_refused()
       call remove_file(path)
+      call remove_file(other_path)
       call remove_file(checkpoint_path(path))
       call remove_file(sibling_path(path, '.xdmf'))
    end subroutine run_result_file
@@ -155,24 +157,38 @@ contains
       call file%close(error)
    end function id_of
 
-   !> What cannot be done is said; a file that cannot be made leaves nothing.
+   !> A result that cannot be created leaves no file. A field that does not exist and a second snapshot
+   !> before the first one is finished are refused.
    subroutine wrong_use_is_refused()
       type(result_file_type) :: output
+      type(result_plan_type) :: plan
+      type(grid_type) :: grid
       type(error_type), allocatable :: error
 
-      call output%create('no_such_folder/x.h5', 't', 'i', 's', &
-         new_grid(nx, ny, 1.0_dp, 1.0_dp, boundary_free), pressure_of(0), 1, 1, 0, error)
+      plan%title = 't'
+      plan%input = 'i'
+      plan%settings = 's'
+      plan%rows = 1
+      plan%snapshots = 1
+      grid = new_grid(nx, ny, 1.0_dp, 1.0_dp, boundary_free)
+      call output%create('no_such_folder/x.h5', grid, pressure_of(0), plan, error)
       call check_error(error, 'there is no folder "no_such_folder"', 'no folder')
-      call output%create('.', 't', 'i', 's', &
-         new_grid(nx, ny, 1.0_dp, 1.0_dp, boundary_free), pressure_of(0), 1, 1, 0, error)
+      call output%create('.', grid, pressure_of(0), plan, error)
       call check_error(error, 'is a folder', 'folder')
-      call output%create(path, 't', 'i', 's', &
-         new_grid(nx, ny, 1.0_dp, 1.0_dp, boundary_free), pressure_of(0), 1, 1, 0, error)
+      call output%create(path, grid, pressure_of(0), plan, error)
       call check_no_error(error, 'a free grid')
       call check_that(.not. file_exists(checkpoint_path(path)), 'old checkpoint removed')
+      call output%begin_snapshot(0, 0.0_dp, 1)
+      call output%write_field('pessure', pressure_of(0))
+      call output%write_field('gasp', pressure_of(0))
+      call output%end_snapshot(error)
+      call check_error(error, 'snapshots have no field "pessure"', 'the first of two unknown fields')
+      call check_that(output%last_snapshot() == -1, 'no snapshot with a fault')
+      call output%close(error)
+      call check_no_error(error, 'closed')
+
+      call output%create(other_path, grid, pressure_of(0), plan, error)
       call output%begin_snapshot(0, 0.0_dp, 1, error)
-      call output%write_field('pessure', pressure_of(0), error)
-      call check_error(error, 'snapshots have no field "pessure"', 'unknown field')
       call output%begin_snapshot(1, 0.0_dp, 1, error)
       call check_error(error, '/snapshots/000000 is not finished yet', 'two at once')
       call output%close(error)

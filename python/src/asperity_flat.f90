@@ -49,7 +49,7 @@ contains
    subroutine map_checksum(path, dataset, nx, ny, checksum_text, status, message)
       use asperity_checksum, only : checksum_of_field, hexadecimal
       use asperity_errors, only : error_input, error_type, fail
-      use hdf5_file, only : read_field
+      use hdf5_field, only : read_field
       use asperity_precision, only : dp
       character(len=*), intent(in) :: path
       character(len=*), intent(in) :: dataset              !! blank: the usual names

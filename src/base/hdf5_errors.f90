@@ -1,10 +1,12 @@
-!> What HDF5 says of its failures, in place of the messages that it would print.
+!> The reasons that HDF5 gives for its failures. By default it would print them.
 module hdf5_errors
    use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_f_pointer, c_funloc, c_funptr, &
-      c_int, c_int64_t, c_null_ptr, c_ptr, c_size_t
+      c_int, c_int64_t, c_null_funptr, c_null_ptr, c_ptr, c_size_t
    use asperity_errors, only : error_file, error_type, fail
    use file_system, only : let_size_limit_be_an_error
-   use hdf5_library, only : h5dont_atexit_f, h5eset_auto_f, h5open_f
+   use hdf5_c_objects, only : h5dont_atexit, h5eset_auto2
+   use hdf5_kinds, only : hid_t
+   use hdf5_library, only : open_library
    implicit none
    private
 
@@ -40,25 +42,25 @@ module hdf5_errors
    end interface
 
    logical :: started = .false.                       !! HDF5 is initialised
-   character(:), allocatable :: reason                !! what HDF5 said last
+   character(:), allocatable :: reason                !! description of the last failure
 
 contains
 
-   !> Start HDF5: no messages of its own, no writing when the program ends.
+   !> Start HDF5 such that it prints no messages and does not write when the program ends.
    subroutine start_hdf5(error)
       type(error_type), allocatable, intent(out) :: error
       integer :: status
 
       if (started) return
       call let_size_limit_be_an_error()
-      call h5dont_atexit_f(status)
-      call h5open_f(status)
-      if (status >= 0) call h5eset_auto_f(0, status)
+      status = h5dont_atexit()
+      call open_library(status)
+      if (status >= 0) status = h5eset_auto2(0_hid_t, c_null_funptr, c_null_ptr)
       started = status >= 0
       if (.not. started) call fail(error, error_file, 'HDF5 cannot be initialised')
    end subroutine start_hdf5
 
-   !> What HDF5 says about its last failure, the system's own words where it has them.
+   !> The reason of HDF5's last failure. If a call of the system failed, it is the system's message.
    function last_reason() result(text)
       character(:), allocatable :: text
       character(*), parameter :: mark = 'error message = '''
@@ -91,7 +93,7 @@ contains
       if (c_associated(entry%description)) reason = text_of(entry%description)
    end function keep_description
 
-   !> A C string as a Fortran one.
+   !> A text of C as a text of Fortran.
    function text_of(address) result(text)
       type(c_ptr), intent(in) :: address
       character(:), allocatable :: text

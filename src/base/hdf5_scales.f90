@@ -1,16 +1,19 @@
-!> Dimension scales: what the axes of a dataset are.
+!> Dimension scales: the coordinates along the axes of a dataset.
 !>
-!> A dataset says by its attribute DIMENSION_LIST which vectors of the same file, its scales, hold the
-!> coordinates along its axes; a scale says by CLASS and NAME that it is one, and by REFERENCE_LIST
-!> whose. These attributes are those of the "HDF5 Dimension Scale Specification", which netCDF, xarray
-!> and MATLAB read. They are written here and not by HDF5's library of high-level calls, which would be
-!> one more library to carry, and which writes the growing REFERENCE_LIST anew for each dataset.
+!> The attribute DIMENSION_LIST of a dataset refers to vectors of the same file, its scales, which
+!> hold the coordinates along its axes. The attributes CLASS and NAME mark a vector as a scale, and
+!> its REFERENCE_LIST refers to the datasets that use it. These attributes follow the "HDF5
+!> Dimension Scale Specification", which netCDF, xarray and MATLAB read. They are written here
+!> instead of by the high-level library of HDF5, because that is one more library to install, and
+!> because it rewrites the growing REFERENCE_LIST for each dataset.
 module hdf5_scales
    use, intrinsic :: iso_c_binding, only : c_char, c_funloc, c_int, c_int64_t, c_loc, c_null_char, c_ptr, &
       c_size_t
-   use hdf5_c, only : h5t_c_s1_g, h5tset_size, hid_t, hsize_t, value_of
-   use hdf5_library, only : h5aclose_f, h5acreate_f, h5awrite_f, h5dclose_f, h5dopen_f, H5S_SCALAR_F, &
-      h5sclose_f, h5screate_f, h5screate_simple_f, H5T_STD_I32LE, h5tclose_f, h5tcopy_f
+   use hdf5_c_lists, only : h5t_c_s1_g, value_of
+   use hdf5_c_values, only : h5aclose, h5acreate2, h5awrite, h5dclose, h5dopen2, h5sclose, &
+      h5screate, h5tclose, h5tcopy, h5tset_size
+   use hdf5_kinds, only : hid_t, hsize_t
+   use hdf5_library, only : c_text, h5p_default, h5s_scalar, h5t_std_i32le, simple_space, status_of
    implicit none
    private
 
@@ -72,8 +75,8 @@ module hdf5_scales
 
 contains
 
-   !> Make vectors of a group the scales of datasets in it, each of which has all of these axes. Scales
-   !> that belong to no dataset are marked as scales.
+   !> Make vectors of a group the scales of datasets in it, each of which has all of these axes.
+   !> Scales that belong to no dataset are marked as scales.
    subroutine attach_scales(location, folder, scales, datasets, status)
       integer(hid_t), intent(in) :: location      !! the file or a group
       character(*), intent(in) :: folder          !! the group of them all, seen from there
@@ -92,20 +95,31 @@ contains
       do i = 1, size(datasets)
          if (status < 0) return
          status = reference_to(location, folder, datasets(i), pairs(i)%dataset)
-         if (status >= 0) call h5dopen_f(location, path_of(folder, datasets(i)), dataset, status)
+         if (status >= 0) call open_dataset(location, path_of(folder, datasets(i)), dataset, status)
          if (status >= 0) call list_axes(dataset, references, status)
-         if (status >= 0) call h5dclose_f(dataset, status)
+         if (status >= 0) status = h5dclose(dataset)
       end do
       do k = 1, size(scales)
          if (status < 0) return
          pairs%axis = k - 1
-         call h5dopen_f(location, path_of(folder, scales(k)), dataset, status)
+         call open_dataset(location, path_of(folder, scales(k)), dataset, status)
          if (status >= 0) call put_fixed_text(dataset, 'CLASS', 'DIMENSION_SCALE', status)
          if (status >= 0) call put_fixed_text(dataset, 'NAME', trim(scales(k)), status)
          if (status >= 0 .and. size(pairs) > 0) call list_users(dataset, pairs, status)
-         if (status >= 0) call h5dclose_f(dataset, status)
+         if (status >= 0) status = h5dclose(dataset)
       end do
    end subroutine attach_scales
+
+   !> Open a dataset.
+   subroutine open_dataset(location, path, dataset, status)
+      integer(hid_t), intent(in) :: location
+      character(*), intent(in) :: path
+      integer(hid_t), intent(out) :: dataset
+      integer, intent(out) :: status
+
+      dataset = h5dopen2(location, c_text(path), h5p_default)
+      status = status_of(dataset)
+   end subroutine open_dataset
 
    !> Name of an object of a group.
    pure function path_of(folder, name) result(path)
@@ -115,7 +129,7 @@ contains
       path = trim(folder)//'/'//trim(name)
    end function path_of
 
-   !> Where an object lies; the status is negative where that is not found.
+   !> A reference to an object; the status is negative if there is no such object.
    function reference_to(location, folder, name, reference) result(status)
       integer(hid_t), intent(in) :: location
       character(*), intent(in) :: folder, name
@@ -138,12 +152,12 @@ contains
          axes(k)%first = c_loc(references(k))
       end do
       file_type = h5tvlen_create(value_of(c_funloc(h5t_std_ref_obj_g)))
-      status = merge(-1, 0, file_type < 0)
+      status = status_of(file_type)
       if (status >= 0) call put_vector(dataset, 'DIMENSION_LIST', file_type, size(axes), c_loc(axes), status)
-      if (status >= 0) call h5tclose_f(file_type, ignored)
+      if (status >= 0) ignored = h5tclose(file_type)
    end subroutine list_axes
 
-   !> REFERENCE_LIST of a scale: the datasets that have it, and along which axis.
+   !> REFERENCE_LIST of a scale: the datasets that use it, and along which axis.
    subroutine list_users(scale, pairs, status)
       integer(hid_t), intent(in) :: scale
       type(pair_type), intent(in), target :: pairs(:)
@@ -152,12 +166,12 @@ contains
       integer :: ignored
 
       file_type = h5tcreate(class_compound, pair_size)
-      status = merge(-1, 0, file_type < 0)
+      status = status_of(file_type)
       if (status >= 0) status = h5tinsert(file_type, 'dataset'//c_null_char, 0_c_size_t, &
          value_of(c_funloc(h5t_std_ref_obj_g)))
-      if (status >= 0) status = h5tinsert(file_type, 'dimension'//c_null_char, 8_c_size_t, H5T_STD_I32LE)
+      if (status >= 0) status = h5tinsert(file_type, 'dimension'//c_null_char, 8_c_size_t, h5t_std_i32le)
       if (status >= 0) call put_vector(scale, 'REFERENCE_LIST', file_type, size(pairs), c_loc(pairs), status)
-      if (status >= 0) call h5tclose_f(file_type, ignored)
+      if (status >= 0) ignored = h5tclose(file_type)
    end subroutine list_users
 
    !> Write an attribute that is a vector; its type is the same in memory.
@@ -171,15 +185,16 @@ contains
       integer(hid_t) :: attribute, space
       integer :: ignored
 
-      call h5screate_simple_f(1, [int(length, hsize_t)], space, status)
-      if (status >= 0) call h5acreate_f(object, name, type, space, attribute, status)
-      if (status >= 0) call h5awrite_f(attribute, type, buffer, status)
+      space = simple_space([int(length, hsize_t)])
+      attribute = h5acreate2(object, c_text(name), type, space, h5p_default, h5p_default)
+      status = status_of(attribute)
+      if (status >= 0) status = h5awrite(attribute, type, buffer)
       if (status < 0) return
-      call h5aclose_f(attribute, ignored)
-      call h5sclose_f(space, ignored)
+      ignored = h5aclose(attribute)
+      ignored = h5sclose(space)
    end subroutine put_vector
 
-   !> Write a text of fixed length, with the null at its end, as the specification wants it.
+   !> Write a text of fixed length with a null at its end, as the specification requires.
    subroutine put_fixed_text(object, name, text, status)
       integer(hid_t), intent(in) :: object
       character(*), intent(in) :: name, text
@@ -192,15 +207,17 @@ contains
          letters(i) = text(i:i)
       end do
       letters(len(text) + 1) = c_null_char
-      call h5tcopy_f(value_of(c_funloc(h5t_c_s1_g)), text_type, status)
-      if (status >= 0) status = h5tset_size(text_type, int(size(letters), c_size_t))
-      if (status >= 0) call h5screate_f(H5S_SCALAR_F, space, status)
-      if (status >= 0) call h5acreate_f(object, name, text_type, space, attribute, status)
-      if (status >= 0) call h5awrite_f(attribute, text_type, c_loc(letters), status)
+      text_type = h5tcopy(value_of(c_funloc(h5t_c_s1_g)))
+      status = h5tset_size(text_type, int(size(letters), c_size_t))
       if (status < 0) return
-      call h5aclose_f(attribute, ignored)
-      call h5sclose_f(space, ignored)
-      call h5tclose_f(text_type, ignored)
+      space = h5screate(h5s_scalar)
+      attribute = h5acreate2(object, c_text(name), text_type, space, h5p_default, h5p_default)
+      status = status_of(attribute)
+      if (status >= 0) status = h5awrite(attribute, text_type, c_loc(letters))
+      if (status < 0) return
+      ignored = h5aclose(attribute)
+      ignored = h5sclose(space)
+      ignored = h5tclose(text_type)
    end subroutine put_fixed_text
 
 end module hdf5_scales

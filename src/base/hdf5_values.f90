@@ -1,22 +1,21 @@
-!> The values in an HDF5 file: attributes, datasets and columns that grow, of objects that are open.
+!> The values in an HDF5 file: attributes, datasets and columns that grow, in objects that are open.
 !>
-!> Nothing here has messages: `status` is negative after a failure, and HDF5 holds the reason.
+!> This module has no messages: `status` is negative after a failure, and HDF5 knows the reason.
 module hdf5_values
-   use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_loc, c_null_char, c_null_ptr, &
-      c_ptr
-   use hdf5_library, only : h5aclose_f, h5acreate_f, h5aexists_f, h5aget_space_f, &
-      h5aget_type_f, h5aopen_f, h5aread_f, h5awrite_f, H5D_FILL_TIME_NEVER_F, h5dclose_f, &
-      h5dcreate_f, h5dget_space_f, h5dopen_f, h5dread_f, h5dset_extent_f, h5dvlen_reclaim_f, &
-      h5dwrite_f, H5P_DATASET_ACCESS_F, H5P_DATASET_CREATE_F, H5P_DEFAULT_F, &
-      H5P_LINK_CREATE_F, h5pclose_f, h5pcreate_f, h5pset_chunk_cache_f, h5pset_chunk_f, &
-      h5pset_create_inter_group_f, h5pset_deflate_f, h5pset_fill_time_f, h5pset_fletcher32_f, &
-      h5pset_shuffle_f, &
-      H5S_SCALAR_F, H5S_SELECT_SET_F, H5S_UNLIMITED_F, h5sclose_f, h5screate_f, &
-      h5screate_simple_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, &
-      h5sselect_hyperslab_f, H5T_CSET_UTF8_F, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, &
-      H5T_NATIVE_INT8, H5T_NATIVE_INTEGER, H5T_STD_I32LE, H5T_STD_I8LE, H5T_STR_NULLTERM_F, H5T_STRING, h5tclose_f, &
-      h5tcopy_f, h5tget_size_f, h5tis_variable_str_f, h5tset_cset_f, h5tset_strpad_f, hid_t, &
-      hsize_t, size_t
+   use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_double, c_loc, c_null_char, &
+      c_null_ptr, c_ptr
+   use hdf5_c_lists, only : h5pclose, h5pcreate, h5pset_chunk_cache, &
+      h5pset_create_intermediate_group, h5pset_deflate, h5pset_fill_time, h5pset_fletcher32, h5pset_shuffle
+   use hdf5_c_values, only : h5aclose, h5acreate2, h5aexists, h5aget_space, h5aget_type, h5aopen, &
+      h5aread, h5awrite, h5dclose, h5dcreate2, h5dget_space, h5dopen2, h5dread, h5dset_extent, &
+      h5dvlen_reclaim, h5dwrite, h5sclose, h5screate, h5sselect_hyperslab, h5tclose, h5tcopy, &
+      h5tget_size, h5tis_variable_str, h5tset_cset, h5tset_strpad
+   use hdf5_kinds, only : hid_t, hsize_t, size_t
+   use hdf5_library, only : c_text, extent_of_space, h5d_fill_time_never, h5p_dataset_access, &
+      h5p_dataset_create, h5p_default, h5p_link_create, h5s_all, h5s_scalar, h5s_select_set, &
+      h5s_unlimited, h5t_cset_utf8, h5t_ieee_f64le, h5t_native_double, h5t_native_int, &
+      h5t_native_int8, h5t_std_i32le, h5t_std_i8le, h5t_str_nullterm, h5t_string, set_chunk, &
+      simple_space, status_of
    use hdf5_errors, only : text_of
    use asperity_precision, only : dp
    implicit none
@@ -35,7 +34,8 @@ module hdf5_values
 
 contains
 
-   !> Write an attribute from memory; one of the same name gets the new value in place.
+   !> Write an attribute from memory. If there is one of the same name, its value is replaced in
+   !> place.
    subroutine put_attribute(object, name, kind, buffer, status)
       integer(hid_t), intent(in) :: object
       character(*), intent(in) :: name
@@ -43,22 +43,25 @@ contains
       type(c_ptr), intent(in) :: buffer     !! one value; for text the address of a C string
       integer, intent(out) :: status        !! negative: failed
       integer(hid_t) :: space, attribute, file_type, memory_type
-      integer :: ignored
-      logical :: exists
+      integer :: exists, ignored
 
       call get_types(kind, file_type, memory_type)
-      call h5aexists_f(object, name, exists, status)
-      if (status >= 0 .and. exists) then
-         call h5aopen_f(object, name, attribute, status)
-      else if (status >= 0) then
-         call h5screate_f(H5S_SCALAR_F, space, status)
-         call h5acreate_f(object, name, file_type, space, attribute, status)
-         call h5sclose_f(space, ignored)
+      attribute = -1
+      exists = h5aexists(object, c_text(name))
+      status = min(exists, 0)
+      if (exists > 0) then
+         attribute = h5aopen(object, c_text(name), h5p_default)
+         status = status_of(attribute)
+      else if (exists == 0) then
+         space = h5screate(h5s_scalar)
+         attribute = h5acreate2(object, c_text(name), file_type, space, h5p_default, h5p_default)
+         status = status_of(attribute)
+         if (status >= 0) ignored = h5sclose(space)
       end if
-      if (status >= 0) call h5awrite_f(attribute, memory_type, buffer, status)
+      if (status >= 0) status = h5awrite(attribute, memory_type, buffer)
       if (status < 0) return
-      call h5aclose_f(attribute, ignored)
-      if (kind == kind_text) call h5tclose_f(file_type, ignored)
+      ignored = h5aclose(attribute)
+      if (kind == kind_text) ignored = h5tclose(file_type)
    end subroutine put_attribute
 
    !> Read the number of an attribute into memory.
@@ -70,13 +73,12 @@ contains
       integer, intent(out) :: status
       integer(hid_t) :: attribute, file_type, memory_type
       integer :: ignored
-      type(c_ptr) :: target_address
 
       call get_types(kind, file_type, memory_type)
-      call h5aopen_f(object, name, attribute, status)
-      target_address = buffer
-      if (status >= 0) call h5aread_f(attribute, memory_type, target_address, status)
-      if (status >= 0) call h5aclose_f(attribute, ignored)
+      attribute = h5aopen(object, c_text(name), h5p_default)
+      status = status_of(attribute)
+      if (status >= 0) status = h5aread(attribute, memory_type, buffer)
+      if (status >= 0) ignored = h5aclose(attribute)
    end subroutine get_number
 
    !> Read the text of an attribute, of fixed or variable length.
@@ -86,25 +88,29 @@ contains
       character(:), allocatable, intent(out) :: value
       integer, intent(out) :: status
       integer(hid_t) :: attribute, text_type
-      integer :: ignored
-      logical :: variable
+      integer :: ignored, variable
 
       value = ''
-      call h5aopen_f(object, name, attribute, status)
-      if (status >= 0) call h5aget_type_f(attribute, text_type, status)
-      if (status >= 0) call h5tis_variable_str_f(text_type, variable, status)
+      attribute = h5aopen(object, c_text(name), h5p_default)
+      status = status_of(attribute)
       if (status < 0) return
-      if (variable) then
+      text_type = h5aget_type(attribute)
+      status = status_of(text_type)
+      if (status < 0) return
+      variable = h5tis_variable_str(text_type)
+      if (variable > 0) then
          call get_variable_text(attribute, text_type, value, status)
-      else
+      else if (variable == 0) then
          call get_fixed_text(attribute, text_type, value, status)
+      else
+         status = variable
       end if
       if (status < 0) return
-      call h5tclose_f(text_type, ignored)
-      call h5aclose_f(attribute, ignored)
+      ignored = h5tclose(text_type)
+      ignored = h5aclose(attribute)
    end subroutine get_text
 
-   !> A text that HDF5 keeps with its own length.
+   !> A text of variable length, for which HDF5 allocates the memory.
    subroutine get_variable_text(attribute, text_type, value, status)
       integer(hid_t), intent(in) :: attribute
       integer(hid_t), intent(in) :: text_type
@@ -113,19 +119,17 @@ contains
       integer(hid_t) :: space
       integer :: ignored
       type(c_ptr), target :: address(1)
-      type(c_ptr) :: buffer
 
       address(1) = c_null_ptr
-      buffer = c_loc(address)
-      call h5aread_f(attribute, text_type, buffer, status)
+      status = h5aread(attribute, text_type, c_loc(address))
       if (status < 0) return
       if (c_associated(address(1))) value = text_of(address(1))
-      call h5aget_space_f(attribute, space, status)
-      call h5dvlen_reclaim_f(text_type, space, H5P_DEFAULT_F, buffer, status)
-      call h5sclose_f(space, ignored)
+      space = h5aget_space(attribute)
+      status = h5dvlen_reclaim(text_type, space, h5p_default, c_loc(address))
+      ignored = h5sclose(space)
    end subroutine get_variable_text
 
-   !> A text in a field of fixed length, up to the first null.
+   !> A text of fixed length; it ends at the first null.
    subroutine get_fixed_text(attribute, text_type, value, status)
       integer(hid_t), intent(in) :: attribute
       integer(hid_t), intent(in) :: text_type
@@ -133,13 +137,12 @@ contains
       integer, intent(out) :: status
       integer(size_t) :: length
       integer :: i
-      type(c_ptr) :: buffer
       character(kind=c_char), allocatable, target :: letters(:)
 
-      call h5tget_size_f(text_type, length, status)
+      length = h5tget_size(text_type)       ! 0 after a failure
       allocate (letters(length))
-      buffer = c_loc(letters)
-      if (status >= 0) call h5aread_f(attribute, text_type, buffer, status)
+      status = -1
+      if (length > 0) status = h5aread(attribute, text_type, c_loc(letters))
       if (status < 0) return
       do i = 1, int(length)
          if (letters(i) == c_null_char) exit
@@ -150,51 +153,66 @@ contains
       end do
    end subroutine get_fixed_text
 
-   !> Make a dataset and write it from memory; groups above it are made where they are missing.
+   !> Create a dataset and write it from memory. Groups above it that are missing are created as
+   !> well.
    subroutine new_dataset(location, name, extent, kind, buffer, level, status)
       integer(hid_t), intent(in) :: location
       character(*), intent(in) :: name
-      integer, intent(in) :: extent(:)      !! in Fortran's order; none: a single value
+      integer, intent(in) :: extent(:)      !! in Fortran's order; of size 0 for a single value
       integer, intent(in) :: kind
       type(c_ptr), intent(in) :: buffer
-      !> Of compression: 0 none, to 9. Negative: in one piece, without a checksum, and so for single values.
+      !> Of compression: 0 none, to 9. Negative: in one piece and without a checksum, as single
+      !> values are
       integer, intent(in) :: level
       integer, intent(out) :: status
       integer(hid_t) :: space, creation, links, dataset, file_type, memory_type
-      integer(hsize_t) :: dims(size(extent)), chunk(size(extent))
       integer :: ignored
 
-      dims = extent
       call get_types(kind, file_type, memory_type)
-      call h5pcreate_f(H5P_LINK_CREATE_F, links, status)
-      if (status >= 0) call h5pset_create_inter_group_f(links, 1, status)
-      if (status >= 0) call h5pcreate_f(H5P_DATASET_CREATE_F, creation, status)
-      if (status >= 0) call h5pset_fill_time_f(creation, H5D_FILL_TIME_NEVER_F, status)
-      if (status >= 0 .and. level >= 0 .and. size(extent) > 0 .and. all(extent > 0)) then
-         chunk = 1
-         chunk(1) = dims(1)
-         if (size(extent) > 1) chunk(2) = max(1_hsize_t, min(dims(2), chunk_values/dims(1)))
-         call h5pset_chunk_f(creation, size(extent), chunk, status)
-         if (status >= 0 .and. level > 0) call h5pset_shuffle_f(creation, status)
-         if (status >= 0 .and. level > 0) call h5pset_deflate_f(creation, level, status)
-         ! The last filter, so that damage is found before anything else reads the bytes.
-         if (status >= 0) call h5pset_fletcher32_f(creation, status)
-      end if
+      links = h5pcreate(h5p_link_create)
+      creation = h5pcreate(h5p_dataset_create)
       if (size(extent) == 0) then
-         if (status >= 0) call h5screate_f(H5S_SCALAR_F, space, status)
+         space = h5screate(h5s_scalar)
       else
-         if (status >= 0) call h5screate_simple_f(size(extent), dims, space, status)
+         space = simple_space(int(extent, hsize_t))
       end if
-      if (status >= 0) call h5dcreate_f(location, name, file_type, space, dataset, status, &
-         dcpl_id=creation, lcpl_id=links)
-      if (status >= 0 .and. all(extent > 0)) call h5dwrite_f(dataset, memory_type, buffer, status)
+      status = h5pset_create_intermediate_group(links, 1)
+      if (status >= 0) status = h5pset_fill_time(creation, h5d_fill_time_never)
+      if (status >= 0 .and. level >= 0 .and. size(extent) > 0 .and. all(extent > 0)) &
+         call set_chunks(creation, extent, level, status)
+      if (status >= 0) then
+         dataset = h5dcreate2(location, c_text(name), file_type, space, links, creation, &
+            h5p_default)
+         status = status_of(dataset)
+      end if
+      if (status >= 0 .and. all(extent > 0)) &
+         status = h5dwrite(dataset, memory_type, h5s_all, h5s_all, h5p_default, buffer)
       ! Compressed data leave the cache here, so that a full disk is noticed here.
-      if (status >= 0) call h5dclose_f(dataset, status)
+      if (status >= 0) status = h5dclose(dataset)
       if (status < 0) return
-      call h5sclose_f(space, ignored)
-      call h5pclose_f(creation, ignored)
-      call h5pclose_f(links, ignored)
+      ignored = h5sclose(space)
+      ignored = h5pclose(creation)
+      ignored = h5pclose(links)
    end subroutine new_dataset
+
+   !> Let values be stored in chunks of whole rows, each with a checksum and perhaps compressed.
+   subroutine set_chunks(creation, extent, level, status)
+      integer(hid_t), intent(in) :: creation
+      integer, intent(in) :: extent(:)
+      integer, intent(in) :: level
+      integer, intent(out) :: status
+      integer(hsize_t) :: chunk(size(extent))
+
+      chunk = 1
+      chunk(1) = extent(1)
+      if (size(extent) > 1) chunk(2) = max(1, min(extent(2), chunk_values/extent(1)))
+      status = set_chunk(creation, chunk)
+      if (status >= 0 .and. level > 0) status = h5pset_shuffle(creation)
+      if (status >= 0 .and. level > 0) status = h5pset_deflate(creation, level)
+      ! The checksum is the last filter, so that damage is found before anything else reads the
+      ! bytes.
+      if (status >= 0) status = h5pset_fletcher32(creation)
+   end subroutine set_chunks
 
    !> Shape of a dataset in Fortran's order; of size 0 for a single value.
    subroutine shape_of_dataset(dataset, extent, status)
@@ -202,17 +220,11 @@ contains
       integer(hsize_t), allocatable, intent(out) :: extent(:)
       integer, intent(out) :: status
       integer(hid_t) :: space
-      integer(hsize_t) :: dims(32), most(32)
-      integer :: rank, ignored
+      integer :: ignored
 
-      allocate (extent(0))
-      call h5dget_space_f(dataset, space, status)
-      if (status >= 0) call h5sget_simple_extent_ndims_f(space, rank, status)
-      if (status >= 0 .and. rank > 0) then
-         call h5sget_simple_extent_dims_f(space, dims(:rank), most(:rank), status)
-         if (status >= 0) extent = dims(:rank)
-      end if
-      if (status >= 0) call h5sclose_f(space, ignored)
+      space = h5dget_space(dataset)
+      call extent_of_space(space, extent, status)
+      if (status >= 0) ignored = h5sclose(space)
    end subroutine shape_of_dataset
 
    !> Read a whole dataset of numbers of any kind as reals.
@@ -220,13 +232,11 @@ contains
       integer(hid_t), intent(in) :: dataset
       type(c_ptr), intent(in) :: buffer
       integer, intent(out) :: status
-      type(c_ptr) :: target_address
 
-      target_address = buffer
-      call h5dread_f(dataset, H5T_NATIVE_DOUBLE, target_address, status)
+      status = h5dread(dataset, h5t_native_double, h5s_all, h5s_all, h5p_default, buffer)
    end subroutine get_reals
 
-   !> Make an empty column that grows row by row.
+   !> Create an empty column that grows row by row.
    subroutine new_column(location, name, kind, expected_rows, status)
       integer(hid_t), intent(in) :: location
       character(*), intent(in) :: name
@@ -237,20 +247,23 @@ contains
       integer :: ignored
 
       call get_types(kind, file_type, memory_type)
-      call h5pcreate_f(H5P_DATASET_CREATE_F, creation, status)
-      if (status >= 0) call h5pset_fill_time_f(creation, H5D_FILL_TIME_NEVER_F, status)
-      if (status >= 0) call h5pset_chunk_f(creation, 1, &
-         [int(max(64, min(expected_rows, column_chunk)), hsize_t)], status)
-      if (status >= 0) call h5screate_simple_f(1, [0_hsize_t], space, status, [H5S_UNLIMITED_F])
-      if (status >= 0) call h5dcreate_f(location, name, file_type, space, dataset, status, &
-         dcpl_id=creation)
-      if (status >= 0) call h5dclose_f(dataset, status)
+      creation = h5pcreate(h5p_dataset_create)
+      space = simple_space([0_hsize_t], [h5s_unlimited])
+      status = h5pset_fill_time(creation, h5d_fill_time_never)
+      if (status >= 0) status = set_chunk(creation, &
+         [int(max(64, min(expected_rows, column_chunk)), hsize_t)])
+      if (status >= 0) then
+         dataset = h5dcreate2(location, c_text(name), file_type, space, h5p_default, creation, &
+            h5p_default)
+         status = status_of(dataset)
+      end if
+      if (status >= 0) status = h5dclose(dataset)
       if (status < 0) return
-      call h5sclose_f(space, ignored)
-      call h5pclose_f(creation, ignored)
+      ignored = h5sclose(space)
+      ignored = h5pclose(creation)
    end subroutine new_column
 
-   !> Write values into the rows of a column from a row on; it grows to hold them.
+   !> Write values into a column from a given row on. The column grows to hold them.
    subroutine put_rows(location, name, row, values, status)
       integer(hid_t), intent(in) :: location
       character(*), intent(in) :: name
@@ -258,26 +271,32 @@ contains
       real(dp), intent(in), contiguous, target :: values(:)  !! at least one
       integer, intent(out) :: status
       integer(hid_t) :: access_list, dataset, memory, file_space
-      integer(hsize_t) :: count
+      integer(hsize_t) :: count(1), first(1)
       integer :: ignored
 
       count = size(values)
-      ! Without a cache of its own: values go straight to the file.
-      call h5pcreate_f(H5P_DATASET_ACCESS_F, access_list, status)
-      if (status >= 0) call h5pset_chunk_cache_f(access_list, 0_size_t, 0_size_t, 0.75, status)
-      if (status >= 0) call h5dopen_f(location, name, dataset, status, access_list)
-      call h5pclose_f(access_list, ignored)
-      if (status >= 0) call h5dset_extent_f(dataset, [row + count], status)
-      if (status >= 0) call h5dget_space_f(dataset, file_space, status)
-      if (status >= 0) call h5sselect_hyperslab_f(file_space, H5S_SELECT_SET_F, &
-         [int(row, hsize_t)], [count], status)
-      if (status >= 0) call h5screate_simple_f(1, [count], memory, status)
-      if (status >= 0) call h5dwrite_f(dataset, H5T_NATIVE_DOUBLE, c_loc(values), status, &
-         mem_space_id=memory, file_space_id=file_space)
-      if (status >= 0) call h5dclose_f(dataset, status)
+      first = row
+      ! The dataset has no cache of its own, so that the values go straight to the file.
+      access_list = h5pcreate(h5p_dataset_access)
+      status = h5pset_chunk_cache(access_list, 0_size_t, 0_size_t, 0.75_c_double)
+      if (status >= 0) then
+         dataset = h5dopen2(location, c_text(name), access_list)
+         status = status_of(dataset)
+      end if
+      if (status >= 0) status = h5dset_extent(dataset, first + count)
+      if (status >= 0) then
+         file_space = h5dget_space(dataset)
+         memory = simple_space(count)
+         status = h5sselect_hyperslab(file_space, h5s_select_set, first, c_null_ptr, count, &
+            c_null_ptr)
+      end if
+      if (status >= 0) status = h5dwrite(dataset, h5t_native_double, memory, file_space, &
+         h5p_default, c_loc(values))
+      if (status >= 0) status = h5dclose(dataset)
       if (status < 0) return
-      call h5sclose_f(memory, ignored)
-      call h5sclose_f(file_space, ignored)
+      ignored = h5pclose(access_list)
+      ignored = h5sclose(memory)
+      ignored = h5sclose(file_space)
    end subroutine put_rows
 
    !> The types of a kind of value in the file and in memory.
@@ -289,18 +308,18 @@ contains
 
       select case (kind)
       case (kind_real)
-         file_type = H5T_IEEE_F64LE
-         memory_type = H5T_NATIVE_DOUBLE
+         file_type = h5t_ieee_f64le
+         memory_type = h5t_native_double
       case (kind_integer)
-         file_type = H5T_STD_I32LE
-         memory_type = H5T_NATIVE_INTEGER
+         file_type = h5t_std_i32le
+         memory_type = h5t_native_int
       case (kind_int8)
-         file_type = H5T_STD_I8LE
-         memory_type = H5T_NATIVE_INT8
+         file_type = h5t_std_i8le
+         memory_type = h5t_native_int8
       case default                          ! text
-         call h5tcopy_f(H5T_STRING, file_type, ignored)
-         call h5tset_strpad_f(file_type, H5T_STR_NULLTERM_F, ignored)
-         call h5tset_cset_f(file_type, H5T_CSET_UTF8_F, ignored)
+         file_type = h5tcopy(h5t_string)
+         ignored = h5tset_strpad(file_type, h5t_str_nullterm)
+         ignored = h5tset_cset(file_type, h5t_cset_utf8)
          memory_type = file_type
       end select
    end subroutine get_types

@@ -1,21 +1,26 @@
-!> Virtual datasets: are all the files there that their values come from?
+!> The files that the values of a virtual dataset come from.
 !>
-!> A virtual dataset is a view of datasets in other files. Where one of these is missing, or where
-!> the view leaves a gap, HDF5 returns the fill value, usually zero, without an error.
+!> A virtual dataset is a view of datasets in other files. If one of these is missing, or if the
+!> view has a gap, HDF5 returns the fill value, usually zero, without an error.
 module hdf5_virtual
    use, intrinsic :: iso_c_binding, only : c_char, c_int, c_long, c_null_char, c_size_t
-   use hdf5_c, only : h5pclose, h5sclose, hid_t, hsize_t
+   use asperity_errors, only : error_type
+   use file_system, only : file_exists, folder_of
+   use hdf5_c_lists, only : h5pclose
+   use hdf5_c_values, only : h5dget_space, h5sclose
+   use hdf5_kinds, only : hid_t, hsize_t
+   use hdf5_tree, only : hdf5_tree_type
    implicit none
    private
 
-   public :: list_sources, source_type
+   public :: check_sources
 
    integer(c_int), parameter :: layout_virtual = 3      !! H5D_VIRTUAL
    integer, parameter :: longest_name = 4096
 
    !> A dataset in another file.
    type :: source_type
-      character(:), allocatable :: file                 !! as it is stored; '.' is the file itself
+      character(:), allocatable :: file                 !! as stored; '.' is the file itself
       character(:), allocatable :: dataset
    end type source_type
 
@@ -25,12 +30,6 @@ module hdf5_virtual
          integer(hid_t), value :: dataset
          integer(hid_t) :: list
       end function h5dget_create_plist
-
-      function h5dget_space(dataset) bind(c, name='H5Dget_space') result(space)
-         import :: hid_t
-         integer(hid_t), value :: dataset
-         integer(hid_t) :: space
-      end function h5dget_space
 
       function h5pget_layout(list) bind(c, name='H5Pget_layout') result(layout)
          import :: c_int, hid_t
@@ -88,7 +87,43 @@ module hdf5_virtual
 
 contains
 
-   !> The sources of a dataset, none if it is not virtual, and whether they cover all of it.
+   !> Check that nothing is missing of the sources of a virtual dataset.
+   subroutine check_sources(path, dataset, fault)
+      character(*), intent(in) :: path                       !! of the file with the dataset
+      integer(hid_t), intent(in) :: dataset
+      character(:), allocatable, intent(out) :: fault        !! '' if all is well
+      type(source_type), allocatable :: sources(:)
+      type(hdf5_tree_type) :: file
+      type(error_type), allocatable :: error
+      character(:), allocatable :: name
+      logical :: complete
+      integer :: i
+
+      call list_sources(dataset, sources, complete)
+      fault = ''
+      if (.not. complete) fault = 'parts of it have no source'
+      do i = 1, size(sources)
+         if (fault /= '') exit
+         name = sources(i)%file
+         if (name == '.') cycle
+         if (index(name//sources(i)%dataset, '%') > 0) then
+            fault = 'its sources are named by a pattern, "'//name//'"'
+            exit
+         end if
+         if (name(1:1) /= '/' .and. file_exists(folder_of(path)//'/'//name)) &
+            name = folder_of(path)//'/'//name
+         call file%open(name, 'read', error)
+         if (allocated(error)) then
+            fault = 'its source "'//sources(i)%file//'" cannot be opened'
+         else if (.not. file%has_dataset(sources(i)%dataset)) then
+            fault = 'its source "'//sources(i)%file//'" has no dataset "'//sources(i)%dataset//'"'
+         end if
+         call file%close()
+      end do
+   end subroutine check_sources
+
+   !> The sources of a dataset, and whether they cover all of it. A dataset that is not virtual has
+   !> none.
    subroutine list_sources(dataset, sources, complete)
       integer(hid_t), intent(in) :: dataset
       type(source_type), allocatable, intent(out) :: sources(:)

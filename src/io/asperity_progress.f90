@@ -1,4 +1,5 @@
-!> How far a run is: a line written over on a terminal, plain lines now and then elsewhere.
+!> The progress of a run. On a terminal it is one line that is overwritten, elsewhere a line is
+!> printed from time to time.
 module asperity_progress
    use, intrinsic :: iso_fortran_env, only : error_unit
    use file_system, only : is_terminal
@@ -21,7 +22,7 @@ module asperity_progress
       logical :: pending = .false.                    !! the last row has not been shown
       integer :: rows = 0                             !! of the whole history
       integer :: first_step = 0                       !! the first row of this run
-      integer :: shown_length = 0                     !! letters of the line on the terminal
+      integer :: shown_length = 0                     !! characters of the line on the terminal
       real(dp) :: started = 0.0_dp                    !! s
       real(dp) :: shown = 0.0_dp                      !! s
       type(history_row_type) :: row                   !! the last one
@@ -34,7 +35,7 @@ module asperity_progress
 
 contains
 
-   !> Start; nothing is shown yet.
+   !> Start. Nothing is shown yet.
    subroutine start(self, rows, first_step, quiet)
       class(progress_type), intent(inout) :: self
       integer, intent(in) :: rows           !! rows of the history when it is complete
@@ -51,7 +52,7 @@ contains
       self%shown = self%started
    end subroutine start
 
-   !> A step is done: show it if the last line is old enough.
+   !> Note a step that is done, and show it if the last line is old enough.
    subroutine update(self, row)
       class(progress_type), intent(inout) :: self
       type(history_row_type), intent(in) :: row
@@ -65,7 +66,7 @@ contains
          call self%show(now)
    end subroutine update
 
-   !> The run is over, or a message follows: show the last step and end the line.
+   !> Show the last step and end the line, because the run is over or a message follows.
    subroutine finish(self)
       class(progress_type), intent(inout) :: self
 
@@ -96,7 +97,7 @@ contains
       self%pending = .false.
    end subroutine show
 
-   !> A row in words.
+   !> The line about a row.
    pure function progress_line(row, rows, first_step, elapsed) result(line)
       type(history_row_type), intent(in) :: row
       integer, intent(in) :: rows           !! rows of the history when it is complete
@@ -143,7 +144,7 @@ contains
       text = trim(buffer)
    end function duration_text
 
-   !> Time of a clock that only runs forward, s.
+   !> Time of a clock that never runs backwards, s.
    function clock() result(seconds)
       real(dp) :: seconds
       integer(int64) :: count, rate

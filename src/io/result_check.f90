@@ -1,7 +1,7 @@
-!> Damage in a result: what does not agree with its checksums, or cannot be read.
+!> Damage in a result: the parts that do not agree with their checksums or cannot be read.
 !>
-!> Fields and vectors carry HDF5's checksums (Fletcher's, of each block), the rows of the history
-!> those of module `result_history`.
+!> Fields and vectors have HDF5's checksums (Fletcher's, of each block). The rows of the history
+!> have those of the module `result_history`.
 module result_check
    use asperity_errors, only : error_type
    use hdf5_file, only : hdf5_file_type
@@ -12,18 +12,19 @@ module result_check
 
    public :: damage_type, find_damage
 
-   real(dp), parameter :: most_bytes = 2.0_dp**30   !! of fields that are read, as numbers of 8 bytes
+   real(dp), parameter :: most_bytes = 2.0_dp**30   !! of fields that are read, 8 bytes a value
 
-   !> What was found.
+   !> The damage that was found.
    type :: damage_type
-      character(:), allocatable :: names            !! of damaged parts, a line each
+      character(:), allocatable :: names            !! of damaged parts, one line per part
       integer :: parts = 0                          !! number of damaged parts
-      integer :: left_out = 0                       !! snapshots that were not read, the oldest
+      integer :: left_out = 0                       !! number of snapshots that were not read
    end type damage_type
 
 contains
 
-   !> Read all of a result, but of its snapshots only the last that together are not too large.
+   !> Read a whole result, except that of the snapshots only the latest are read, up to
+   !> `most_bytes`.
    subroutine find_damage(file, found)
       type(hdf5_file_type), intent(inout) :: file
       type(damage_type), intent(out) :: found
@@ -36,7 +37,7 @@ contains
       found%names = ''
       bytes = 0.0_dp
       if (has_checksums(file)) then
-         call damaged_rows(file, text, error)
+         call damaged_rows(file%path, text, error)
          if (allocated(error)) text = 'cannot be read'
          if (text /= '') call add(found, '/history: '//text)
       end if
@@ -58,7 +59,7 @@ contains
 
    contains
 
-      !> The names in a group; none where it is missing.
+      !> The names in a group; none if there is no such group.
       subroutine list(path)
          character(*), intent(in) :: path
          type(error_type), allocatable :: fault
@@ -87,7 +88,7 @@ contains
          end do
       end subroutine read_group
 
-      !> Read a dataset and forget it.
+      !> Read a dataset and discard its values.
       subroutine read_dataset(path)
          character(*), intent(in) :: path
          type(error_type), allocatable :: fault

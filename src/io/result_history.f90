@@ -1,15 +1,18 @@
 !> The history in a result: one column per quantity, one value per row, and a checksum per row.
 !>
 !> A row counts when all columns have it: readers take the shortest column. `step` is written last.
-!> The columns have the space for all rows from the first row on, see `hdf5_file`. HDF5's own
-!> checksums would be those of whole blocks of a column, which would then be written anew for each
-!> row; so each row has the checksum of its own values, in the column `checksum`.
+!> The columns have the space for all rows from the first row on (see `hdf5_file`). HDF5's own
+!> checksums would be those of whole blocks of a column, which would have to be rewritten for each
+!> row. Therefore each row has the checksum of its own values, in the column `checksum`.
+!>
+!> The file remembers the first fault of these calls, and the caller asks for it once at the end
+!> (see `hdf5_handle`). After a fault nothing is written any more.
 module result_history
    use asperity_checksum, only : crc32_of_values
    use asperity_errors, only : error_type
+   use asperity_precision, only : dp
    use hdf5_file, only : hdf5_file_type
    use history_row, only : column_count, column_type, history_columns
-   use asperity_precision, only : dp
    use text_tools, only : to_text
    implicit none
    private
@@ -19,122 +22,111 @@ module result_history
 
    character(*), parameter :: group = '/history'
    character(*), parameter :: checksum_name = 'checksum'
-   !> Not in the checksum, since it differs between two runs that are equal.
+   !> Not part of the checksum, because it differs between two runs that are equal
    character(*), parameter :: left_out = 'seconds'
 
 contains
 
-   !> Make the columns, empty. `step` is the last in the file, so that it grows last.
-   subroutine create_history_columns(file, expected_rows, error)
-      class(hdf5_file_type), intent(inout) :: file
+   !> Create the columns, empty. `step` is the last in the file, so that it grows last.
+   subroutine create_history_columns(file, expected_rows)
+      type(hdf5_file_type), intent(inout) :: file
       integer, intent(in) :: expected_rows
-      type(error_type), allocatable, intent(out) :: error
       type(column_type) :: columns(column_count)
       integer :: i, j
 
       columns = history_columns()
       call file%create_column(group//'/'//checksum_name, .false., expected_rows, '1', &
-         'CRC-32 of the values of the row', error)
+         'CRC-32 of the values of the row')
       do i = 1, column_count
-         if (allocated(error)) return
          j = mod(i, column_count) + 1
          call file%create_column(group//'/'//trim(columns(j)%name), columns(j)%whole, expected_rows, &
-            trim(columns(j)%units), trim(columns(j)%long_name), error)
+            trim(columns(j)%units), trim(columns(j)%long_name))
       end do
-      if (allocated(error)) return
       call file%name_axes(group, ['step'], [pack(columns%name, columns%name /= 'step'), &
-         [character(24) :: checksum_name]], error)
-      if (allocated(error)) return
-      ! What the conventions of netCDF for climate and forecast (CF) call auxiliary coordinates.
-      call file%write_attribute(group, 'coordinates', 'time phase', error)
+         [character(24) :: checksum_name]])
+      ! The netCDF conventions for climate and forecast (CF) call these auxiliary coordinates.
+      call file%write_attribute(group, 'coordinates', 'time phase')
    end subroutine create_history_columns
 
-   !> Write the values of a row; they are not flushed.
-   subroutine append_values(file, row, values, error)
-      class(hdf5_file_type), intent(inout) :: file
+   !> Write the values of a row. They are not flushed.
+   subroutine append_values(file, row, values)
+      type(hdf5_file_type), intent(inout) :: file
       integer, intent(in) :: row                      !! from 0
       real(dp), intent(in) :: values(column_count)    !! in the order of `history_columns`
-      type(error_type), allocatable, intent(out) :: error
       type(column_type) :: columns(column_count)
       integer :: i
 
       columns = history_columns()
       call file%append(group//'/'//checksum_name, row, &
-         [real(crc32_of_values(values(covered_columns())), dp)], error)
+         [real(crc32_of_values(values(covered_columns())), dp)])
       do i = 1, column_count
-         if (allocated(error)) return
-         call file%append(group//'/'//trim(columns(i)%name), row, values(i:i), error)
+         call file%append(group//'/'//trim(columns(i)%name), row, values(i:i))
       end do
    end subroutine append_values
 
-   !> Number of rows that all columns have.
-   subroutine count_history_rows(file, rows, error)
-      class(hdf5_file_type), intent(inout) :: file
-      integer, intent(out) :: rows
-      type(error_type), allocatable, intent(out) :: error
+   !> Number of rows that all columns have; 0 after a fault.
+   function count_history_rows(file) result(rows)
+      type(hdf5_file_type), intent(inout) :: file
+      integer :: rows
       type(column_type) :: columns(column_count)
       integer, allocatable :: extent(:)
       integer :: i
 
       columns = history_columns()
-      rows = huge(1)
+      call file%dataset_shape(group//'/'//checksum_name, extent)
+      rows = sum(extent)                              ! a column has one extent
       do i = 1, column_count
-         call file%dataset_shape(group//'/'//trim(columns(i)%name), extent, error)
-         if (allocated(error)) return
-         rows = min(rows, extent(1))
+         call file%dataset_shape(group//'/'//trim(columns(i)%name), extent)
+         rows = min(rows, sum(extent))
       end do
-      call file%dataset_shape(group//'/'//checksum_name, extent, error)
-      if (.not. allocated(error)) rows = min(rows, extent(1))
-   end subroutine count_history_rows
+   end function count_history_rows
 
-   !> Write the first rows into a new group, to take the old one's place. It lies at the end of the
-   !> file, so that removing snapshots does not shorten the file.
-   subroutine shorten_history(file, rows, expected_rows, error)
-      class(hdf5_file_type), intent(inout) :: file
-      integer, intent(in) :: rows
-      integer, intent(in) :: expected_rows
-      type(error_type), allocatable, intent(out) :: error
+   !> Write the first rows into a new group, which the caller publishes in place of the old one. It
+   !> lies at the end of the file, so that removing snapshots does not shorten the file.
+   subroutine shorten_history(file, rows, expected_rows)
+      type(hdf5_file_type), intent(inout) :: file
+      integer, intent(in) :: rows                     !! to be kept; at most those that there are
+      integer, intent(in) :: expected_rows            !! when the history is complete
       type(column_type) :: columns(column_count)
       real(dp), allocatable :: values(:, :), sums(:)
       integer :: i
 
       columns = history_columns()
-      call read_rows(file, values, sums, error)
-      if (allocated(error)) return
-      call file%stage_group(group, error)
-      if (allocated(error)) return
-      call create_history_columns(file, expected_rows, error)
-      if (allocated(error)) return
-      call file%append(group//'/'//checksum_name, 0, sums(:rows), error)
+      call read_rows(file, values, sums)
+      if (file%has_failed()) return
+      call file%stage_group(group)
+      call create_history_columns(file, expected_rows)
+      call file%append(group//'/'//checksum_name, 0, sums(:rows))
       do i = 1, column_count
-         if (allocated(error)) return
-         call file%append(group//'/'//trim(columns(i)%name), 0, values(:rows, i), error)
+         call file%append(group//'/'//trim(columns(i)%name), 0, values(:rows, i))
       end do
-      if (allocated(error)) return
-      call file%flush(error)
+      call file%flush()
    end subroutine shorten_history
 
-   !> Have the rows of a result checksums? Those of earlier versions have none.
+   !> Do the rows of a result have checksums? Those of earlier versions have none.
    function has_checksums(file) result(yes)
-      class(hdf5_file_type), intent(in) :: file
+      type(hdf5_file_type), intent(in) :: file
       logical :: yes
 
       yes = file%has_dataset(group//'/'//checksum_name)
    end function has_checksums
 
-   !> Which rows do not agree with their checksums, in words; '' where all do.
-   subroutine damaged_rows(file, text, error)
-      class(hdf5_file_type), intent(inout) :: file
+   !> The rows that do not agree with their checksums, as a text; '' if all agree. The file is
+   !> opened separately, so that a fault in the history does not end the reading of other parts.
+   subroutine damaged_rows(path, text, error)
+      character(*), intent(in) :: path                !! of the result
       character(:), allocatable, intent(out) :: text
       type(error_type), allocatable, intent(out) :: error
+      type(hdf5_file_type) :: file
       real(dp), allocatable :: values(:, :), sums(:)
       integer, allocatable :: order(:)
       integer :: count, i, first
 
       text = ''
       order = covered_columns()
-      call read_rows(file, values, sums, error)
-      if (allocated(error)) return
+      call file%open(path, 'read')
+      call read_rows(file, values, sums)
+      call file%close(error)
       count = 0
       first = -1
       do i = 1, size(sums)
@@ -147,31 +139,29 @@ contains
          to_text(first)
    end subroutine damaged_rows
 
-   !> The rows that all columns have, and their checksums.
-   subroutine read_rows(file, values, sums, error)
-      class(hdf5_file_type), intent(inout) :: file
+   !> Read the rows that all columns have, and their checksums; none after a fault.
+   subroutine read_rows(file, values, sums)
+      type(hdf5_file_type), intent(inout) :: file
       real(dp), allocatable, intent(out) :: values(:, :)   !! [rows, columns]
       real(dp), allocatable, intent(out) :: sums(:)
-      type(error_type), allocatable, intent(out) :: error
       type(column_type) :: columns(column_count)
       real(dp), allocatable :: column(:)
       integer :: i, rows
 
       columns = history_columns()
-      call count_history_rows(file, rows, error)
-      if (allocated(error)) return
-      allocate (values(rows, column_count))
+      rows = count_history_rows(file)
+      allocate (values(rows, column_count), sums(0))
       do i = 1, column_count
-         call file%read(group//'/'//trim(columns(i)%name), column, error)
-         if (allocated(error)) return
+         call file%read(group//'/'//trim(columns(i)%name), column)
+         if (file%has_failed()) return
          values(:, i) = column(:rows)
       end do
-      call file%read(group//'/'//checksum_name, column, error)
-      if (.not. allocated(error)) sums = column(:rows)
+      call file%read(group//'/'//checksum_name, column)
+      if (.not. file%has_failed()) sums = column(:rows)
    end subroutine read_rows
 
-   !> The columns whose values the checksum of a row covers, in the alphabetical order of their names:
-   !> readers need not know the order in which they are written.
+   !> The columns whose values the checksum of a row covers. They are in the alphabetical order of
+   !> their names, so that readers need not know the order in which they are written.
    function covered_columns() result(order)
       integer, allocatable :: order(:)
       type(column_type) :: columns(column_count)

@@ -23,7 +23,7 @@ contains
       sibling = path(:length)//ending
    end function sibling_path
 
-   !> Name of the file number `n` that a run writes beside a result, for a while or to keep.
+   !> Name of the file number `n` that a run writes beside a result, temporarily or permanently.
    pure function side_file(path, n) result(name)
       character(*), intent(in) :: path      !! name of the result
       integer, intent(in) :: n              !! 1 to side_files

@@ -1,8 +1,9 @@
-!> What stands where a result is to be written: may it be replaced?
+!> Checks of the place where a result is to be written: may the file that is there be replaced?
 !>
-!> A run replaces what an earlier run has finished, and nothing that is of use: an unfinished run
-!> with rows, a checkpoint, and whatever is not of Asperity stay, unless `overwrite` allows it.
-!> The files beside a result (see `result_names`) are replaced only if Asperity wrote them.
+!> A run may replace the result of an earlier run that has finished. It does not replace anything
+!> that is of use: an unfinished run with rows, a checkpoint, or a file that Asperity did not write,
+!> unless `overwrite` allows it. The files beside a result (see `result_names`) are replaced only if
+!> Asperity wrote them.
 module result_target
    use asperity_errors, only : error_file, error_type, fail
    use file_kind, only : file_start, is_dangling_link, is_other_than_file
@@ -16,14 +17,14 @@ module result_target
 
    public :: check_place, check_replaced, damage_of_result
 
-   integer, parameter :: patience = 60       !! s that the trial of a result may take
+   integer, parameter :: patience = 60       !! longest time for the trial of a result, s
 
-   !> What an existing file turned out to be.
+   !> The kinds of files that may be there.
    integer, parameter :: is_result = 1, is_unfinished = 2, is_alien = 3
 
 contains
 
-   !> Refuse a place where no result can be, and files beside it that are not ours.
+   !> Refuse a place where there can be no result, and files beside it that Asperity did not write.
    subroutine check_place(path, error)
       character(*), intent(in) :: path          !! of the result
       type(error_type), allocatable, intent(out) :: error
@@ -62,13 +63,13 @@ contains
       ours = start == ''
       select case (n)
       case (1)
-         ! A run that was killed may have left any beginning of a result.
+         ! A killed run may have left any part of the beginning of a result.
          if (.not. ours) ours = index(start, char(0)) == 1 .or. kind_of(name) /= is_alien
          if (.not. ours) ours = index(start, char(137)//'HDF') == 1 .and. is_beginning(name)
       case (2)
          ours = ours .or. index(start, 'asperity checkpoint') == 1
       case (3)
-         ! The block with the mark is written last: until then it is empty.
+         ! The block with the mark is written last, and is empty until then.
          ours = ours .or. index(start, 'asperity checkpoint') == 1 .or. index(start, char(0)) == 1
       case (4, 5)
          ours = ours .or. index(start, '<Xdmf') > 0
@@ -79,7 +80,7 @@ contains
          ', and what is there was not written by Asperity: it is not replaced')
    end subroutine check_side_file
 
-   !> Refuse to replace an unfinished run, a checkpoint, or what is not a result.
+   !> Refuse to replace an unfinished run, a checkpoint, or a file that is not a result.
    subroutine check_replaced(path, error)
       character(*), intent(in) :: path
       type(error_type), allocatable, intent(out) :: error
@@ -108,8 +109,8 @@ contains
          'removes it, or choose another --output')
    end subroutine check_replaced
 
-   !> Does this HDF5 file hold nothing but what a result holds before it has its first attribute, or
-   !> does it not even open?
+   !> Does this HDF5 file contain only what a result contains before its first attribute is written,
+   !> or can it not even be opened?
    function is_beginning(path) result(yes)
       character(*), intent(in) :: path
       logical :: yes
@@ -125,7 +126,7 @@ contains
       call file%close(error)
    end function is_beginning
 
-   !> What a file is.
+   !> The kind of a file.
    function kind_of(path) result(kind)
       character(*), intent(in) :: path
       integer :: kind
@@ -153,11 +154,12 @@ contains
       call file%close(error)
    end function kind_of
 
-   !> Read a result in a process of its own: an error where that crashes or comes to no end.
+   !> Read a result in a separate process. It is an error if that crashes or does not come to an
+   !> end.
    subroutine damage_of_result(path, error, fields)
       character(*), intent(in) :: path
       type(error_type), allocatable, intent(out) :: error
-      logical, intent(in), optional :: fields   !! read the fields, too, as `find_damage` does; default no
+      logical, intent(in), optional :: fields   !! read the fields as well; default no
       type(trial_type) :: trial
 
       call trial%start(patience)
@@ -171,7 +173,7 @@ contains
       call trial%verdict(path, error)
    end subroutine damage_of_result
 
-   !> Read what is looked at for damage.
+   !> Read everything that is checked for damage.
    subroutine read_fields(path)
       character(*), intent(in) :: path
       type(hdf5_file_type) :: file
@@ -181,10 +183,11 @@ contains
       call file%open(path, 'read', error)
       if (allocated(error)) return
       call find_damage(file, found)
-      call file%close(error)
+      call file%close()
    end subroutine read_fields
 
-   !> Read all that a restart and a summary read.
+   !> Read everything that a restart and a summary read. Errors are ignored, because only a crash
+   !> matters here.
    subroutine read_result(path)
       character(*), intent(in) :: path
       type(hdf5_file_type) :: file

@@ -1,8 +1,9 @@
 !> A table of the pieces of a state: their names, units, meanings, and where they are in memory.
 !>
-!> Who owns a state makes a table of it, one line per piece (`add`). Whoever keeps the state, such
-!> as a checkpoint, walks the table and needs to know nothing of the pieces. A name may have parts
-!> that are separated by '/', such as 'schedule/row'. The order of the pieces has no meaning.
+!> The owner of a state makes a table of it, with one line per piece (`add`). Whoever stores the
+!> state, such as a checkpoint, goes through the table and needs to know nothing about the pieces. A
+!> name may have parts that are separated by '/', such as 'schedule/row'. The pieces stay in the
+!> order in which they were added.
 !>
 !> The table points into the state, which therefore must be a target and stay where it is while the
 !> table is in use. Pieces that are not allocated or empty in a case are left out of the table.
@@ -46,7 +47,7 @@ module state_table
 
 contains
 
-   !> Make room for one more piece and name it.
+   !> Make space for one more piece, and name it.
    subroutine start_piece(self, name, units, meaning)
       class(state_table_type), intent(inout) :: self
       character(*), intent(in) :: name, units, meaning
@@ -162,7 +163,7 @@ contains
       self%pieces(self%count)%text => value
    end subroutine add_text
 
-   !> Are all numbers of a piece finite?
+   !> Are all real numbers of a piece finite?
    function is_finite(self) result(yes)
       class(state_piece_type), intent(in) :: self
       logical :: yes

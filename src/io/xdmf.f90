@@ -1,8 +1,8 @@
-!> The XDMF file beside a result, by which ParaView and VisIt read it.
+!> The XDMF file beside a result, which lets ParaView and VisIt read the result.
 !>
-!> XDMF is a description in XML of arrays that lie in an HDF5 file (version 2 of the format). Every
-!> snapshot is a regular grid whose nodes are the centres of the cells: the values belong to points.
-!> XDMF gives numbers in the order of the arrays in the file: z, y, x.
+!> XDMF (version 2) describes, in XML, the arrays of an HDF5 file. Every snapshot is a regular grid
+!> whose nodes are the centres of the cells, so that the values belong to points. XDMF gives numbers
+!> in the order of the arrays in the file: z, y, x.
 module xdmf
    use asperity_errors, only : error_file, error_type, fail
    use file_system, only : name_of, remove_file, rename_file
@@ -13,7 +13,7 @@ module xdmf
 
    public :: snapshot_type, snapshot_name, write_xdmf
 
-   !> What the XDMF file says of a snapshot.
+   !> What the XDMF file contains about a snapshot.
    type :: snapshot_type
       integer :: step = 0                            !! its row in the history
       real(dp) :: time = 0.0_dp                      !! time, s
@@ -22,7 +22,7 @@ module xdmf
 
 contains
 
-   !> Name of a snapshot's group: its step with at least six digits.
+   !> Name of the group of a snapshot: its step with at least six digits.
    pure function snapshot_name(step) result(name)
       integer, intent(in) :: step           !! 0 or more
       character(:), allocatable :: name
@@ -32,7 +32,7 @@ contains
       name = trim(text)
    end function snapshot_name
 
-   !> Write the file anew and put it in the old one's place at once.
+   !> Write the file under another name, and let it replace the old one in one step.
    subroutine write_xdmf(path, result_path, grid, snapshots, error)
       character(*), intent(in) :: path                   !! name of the XDMF file
       character(*), intent(in) :: result_path            !! the result, in the same folder
@@ -73,7 +73,7 @@ contains
       call rename_file(temporary, path, error)
    end subroutine write_xdmf
 
-   !> Write one snapshot: the grid, the height map, the fields.
+   !> Write one snapshot: the grid, the height map and the fields.
    subroutine write_snapshot(unit, result_name, grid, snapshot, status, reason)
       integer, intent(in) :: unit
       character(*), intent(in) :: result_name
@@ -104,7 +104,7 @@ contains
       if (status == 0) write (unit, '("</Grid>")', iostat=status, iomsg=reason)
    end subroutine write_snapshot
 
-   !> Write where a field is.
+   !> Write where the values of a field are.
    subroutine write_field(unit, name, place, grid, byte, status, reason)
       integer, intent(in) :: unit
       character(*), intent(in) :: name
@@ -123,7 +123,7 @@ contains
          name, grid%ny, grid%nx, kind, place
    end subroutine write_field
 
-   !> A text as XML wants it.
+   !> A text with the characters escaped that have a meaning in XML.
    pure function escaped(text) result(xml)
       character(*), intent(in) :: text
       character(:), allocatable :: xml

@@ -17,7 +17,7 @@ module case_run
    use asperity_parallel, only : set_threads
    use path_identity, only : real_path
    use asperity_precision, only : dp, int64, int8
-   use result_file, only : result_file_type
+   use result_file, only : result_file_type, result_plan_type
    use result_names, only : sibling_path
    use result_target, only : check_place, check_replaced, damage_of_result
    use asperity_schedule, only : count_rows
@@ -109,53 +109,46 @@ contains
       end if
    end subroutine take_place
 
-   !> A new result with all that is known before the first row.
+   !> Create a result with everything that is known before the first row.
    subroutine create_result(self, error)
       type(run_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
-      integer :: snapshots
+      type(result_plan_type) :: plan
 
       associate (case => self%sim%case)
-         snapshots = size(case%output%snapshot_times) + 1
+         plan%title = trim(case%title)
+         plan%input = case%input
+         plan%settings = self%settings
+         plan%rows = self%rows
+         plan%snapshots = size(case%output%snapshot_times) + 1
          if (case%output%snapshot_every > 0) &
-            snapshots = snapshots + self%rows/case%output%snapshot_every
-         if (self%sim%has_steady) self%result%expected_losses = count(case%phases%steady)
-         call self%result%create(self%path, trim(case%title), case%input, self%settings, &
-            self%sim%grid, self%sim%height, self%rows, snapshots, case%output%compression, error)
+            plan%snapshots = plan%snapshots + self%rows/case%output%snapshot_every
+         if (self%sim%has_steady) plan%losses = count(case%phases%steady)
+         plan%compression = case%output%compression
+         call self%result%create(self%path, self%sim%grid, self%sim%height, plan, error)
          if (allocated(error)) return
-         call write_material(self, error)
-         if (allocated(error)) return
-         call self%result%write_text('height_maps', checksums_of_maps(self%sim), error)
-         if (allocated(error)) return
-         call self%result%write_text('warnings', case%warnings, error)
-         if (allocated(error)) return
-         call self%result%write_text('outcome', 'running', error)
+         call write_material(self)
+         call self%result%write_text('height_maps', checksums_of_maps(self%sim))
+         call self%result%write_text('warnings', case%warnings)
+         call self%result%write_text('outcome', 'running')
       end associate
+      call self%result%report(error)
    end subroutine create_result
 
-   !> The material, as it is at the case's temperature.
-   subroutine write_material(self, error)
+   !> Write the material as it is at the temperature of the case.
+   subroutine write_material(self)
       type(run_type), intent(inout) :: self
-      type(error_type), allocatable, intent(out) :: error
 
       associate (m => self%sim%case%material, result => self%result)
-         call result%write_material('shear_modulus', m%shear_modulus, 'Pa', 'long-term shear modulus', &
-            error)
-         if (allocated(error)) return
-         call result%write_material('poisson', m%poisson, '1', 'Poisson ratio', error)
-         if (allocated(error)) return
-         call result%write_material('prony_g', m%prony_g, 'Pa', 'moduli of the arms', error)
-         if (allocated(error)) return
+         call result%write_material('shear_modulus', m%shear_modulus, 'Pa', 'long-term shear modulus')
+         call result%write_material('poisson', m%poisson, '1', 'Poisson ratio')
+         call result%write_material('prony_g', m%prony_g, 'Pa', 'moduli of the arms')
          call result%write_material('prony_tau', m%prony_tau, 's', &
-            'relaxation times of the arms at the temperature of the case', error)
-         if (allocated(error)) return
-         call result%pair_arms(error)
-         if (allocated(error)) return
-         call result%write_material('thickness', m%thickness, 'm', 'thickness of the block', error)
-         if (allocated(error)) return
-         call result%write_material('density', m%density, 'kg/m3', 'density', error)
-         if (allocated(error)) return
-         call result%write_material('temperature', m%temperature, 'C', 'temperature', error)
+            'relaxation times of the arms at the temperature of the case')
+         call result%pair_arms()
+         call result%write_material('thickness', m%thickness, 'm', 'thickness of the block')
+         call result%write_material('density', m%density, 'kg/m3', 'density')
+         call result%write_material('temperature', m%temperature, 'C', 'temperature')
       end associate
    end subroutine write_material
 
@@ -328,18 +321,16 @@ contains
       integer :: k
 
       associate (sim => self%sim, names => self%sim%case%output%snapshot_fields)
-         call self%result%begin_snapshot(sim%row%step, sim%row%time, sim%row%phase, error, at_stop)
+         call self%result%begin_snapshot(sim%row%step, sim%row%time, sim%row%phase, at_stop=at_stop)
          do k = 1, size(names)
-            if (allocated(error)) return
             if (names(k) == 'contact') then
                call sim%contact_states(states)
-               call self%result%write_field('contact', states, error)
+               call self%result%write_field('contact', states)
             else
                call sim%field(trim(names(k)), field)
-               call self%result%write_field(trim(names(k)), field, error)
+               call self%result%write_field(trim(names(k)), field)
             end if
          end do
-         if (allocated(error)) return
          call self%result%end_snapshot(error)
          self%last_snapshot = sim%row%step
       end associate
@@ -368,15 +359,11 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(checkpoint_writer_type) :: writer
 
-      call writer%start(self%path, self%result%id, self%identity, error)
-      if (allocated(error)) return
-      call writer%put_number('rms_height', self%sim%rms_height, error)
-      if (allocated(error)) return
-      call writer%put_number('summit', self%sim%summit, error)
-      if (allocated(error)) return
-      call save_state(self%sim, writer, error)
-      if (allocated(error)) return
-      call writer%commit(error)
+      call writer%start(self%path, self%result%id, self%identity)
+      call writer%put_number('rms_height', self%sim%rms_height)
+      call writer%put_number('summit', self%sim%summit)
+      call save_state(self%sim, writer)
+      call writer%commit(error)                 ! reports the first fault of all these calls
       if (allocated(error)) return
       call self%result%link_checkpoint(error)
       call system_clock(self%saved_at)

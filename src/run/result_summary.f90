@@ -127,16 +127,17 @@ contains
       integer :: finished, nx, ny
       real(dp) :: lx, ly
 
-      call file%read_attribute('/', 'title', title, error)
-      if (.not. allocated(error)) call file%read_attribute('/', 'version', maker, error)
-      if (.not. allocated(error)) call file%read_attribute('/', 'created', written, error)
-      if (.not. allocated(error)) call file%read_attribute('/', 'input', input, error)
-      if (.not. allocated(error)) call file%read_attribute('/', 'finished', finished, error)
-      if (.not. allocated(error)) call file%read_attribute('/grid', 'nx', nx, error)
-      if (.not. allocated(error)) call file%read_attribute('/grid', 'ny', ny, error)
-      if (.not. allocated(error)) call file%read_attribute('/grid', 'lx', lx, error)
-      if (.not. allocated(error)) call file%read_attribute('/grid', 'ly', ly, error)
-      if (.not. allocated(error)) call file%read_attribute('/grid', 'boundary', boundary, error)
+      call file%read_attribute('/', 'title', title)
+      call file%read_attribute('/', 'version', maker)
+      call file%read_attribute('/', 'created', written)
+      call file%read_attribute('/', 'input', input)
+      call file%read_attribute('/', 'finished', finished)
+      call file%read_attribute('/grid', 'nx', nx)
+      call file%read_attribute('/grid', 'ny', ny)
+      call file%read_attribute('/grid', 'lx', lx)
+      call file%read_attribute('/grid', 'ly', ly)
+      call file%read_attribute('/grid', 'boundary', boundary)
+      call file%report(error)
       if (allocated(error)) return
 
       text = 'file        '//path//nl

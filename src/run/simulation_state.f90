@@ -25,7 +25,7 @@ contains
    subroutine save_state(sim, writer, error)
       type(simulation_type), intent(in), target :: sim
       type(checkpoint_writer_type), intent(inout) :: writer
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(out), optional :: error
       type(state_table_type) :: table
       real(dp), target :: row(column_count)
 

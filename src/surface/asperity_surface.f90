@@ -8,7 +8,7 @@ module asperity_surface
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use asperity_checksum, only : checksum_of_field
    use asperity_errors, only : add_fault, error_input, error_type, fail
-   use hdf5_file, only : read_field
+   use hdf5_field, only : read_field
    use asperity_precision, only : dp, int64
    use regular_grid, only : grid_type
    use surface_self_affine, only : add_self_affine
