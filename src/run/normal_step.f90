@@ -197,7 +197,7 @@ contains
    subroutine destroy(self)
       class(normal_step_type), intent(inout) :: self
 
-      call self%normal%destroy()
+      if (allocated(self%normal)) call self%normal%destroy()
       if (self%adhesive) call self%sticky%destroy()
    end subroutine destroy
 
