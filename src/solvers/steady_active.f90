@@ -4,31 +4,42 @@
 !> system, whose matrix takes its entries from the displacement of one loaded cell. Cells with P < 0
 !> leave C, those that overlap join it, until C stays. Few cells make the system cheap where the
 !> splitting of `steady_normal` is slow: small patches far apart, or a summit on a tall map. Near the
-!> solution a few rounds are enough. There is no proof that C settles: the caller goes on otherwise
-!> where it does not.
+!> solution a few rounds are enough. There is no proof that C settles, and from a distant guess it
+!> swings: the attempt is given up as soon as it does not come closer, and the caller goes on.
+!>
+!> The matrix is factored for the first guess. Cells that leave or join later change the solution by a
+!> small system of their own (module `changed_set`), which makes the rounds after the first cheap.
 module steady_active
-   use dense_factors, only : factor, solve_factors
+   use changed_set, only : changed_set_type, new_changed_set
    use normal_state, only : gap_measure_type, measure_gap, narrow_scale, normal_problem_type
    use asperity_precision, only : dp
    use steady_operator, only : steady_operator_type
    implicit none
    private
 
-   public :: affordable, finish_on_contact
+   public :: finish_on_contact, worthwhile
 
-   integer, parameter :: most_rounds = 12        !! of joining
-   integer, parameter :: most_departures = 8     !! of leaving, within a round
+   integer, parameter :: most_rounds = 30        !! of joining
+   integer, parameter :: most_departures = 12    !! of leaving, within a round
+   integer, parameter :: most_factors = 4        !! of the matrix, in an attempt
+   integer, parameter :: patience = 6            !! rounds that need not come closer
 
 contains
 
-   !> Is a dense system of so many cells cheap beside some tens of transforms?
-   pure function affordable(cells_in_contact, cells) result(cheap)
+   !> Is a dense system cheap beside the transforms spent so far, and small beside the solver's fields?
+   pure function worthwhile(cells_in_contact, cells, transforms) result(cheap)
       integer, intent(in) :: cells_in_contact, cells
+      integer, intent(in) :: transforms                !! real transforms since the solve began
       logical :: cheap
-      real(dp), parameter :: transforms = 300.0_dp   !! measured (operations per cell and level)
+      real(dp), parameter :: factoring = 3.0_dp        !! measured: m^3 of a factoring over n log2(n) of a transform
+      real(dp), parameter :: part = 0.25_dp            !! of the time so far
+      real(dp), parameter :: fields = 16.0_dp          !! memory of the matrix
+      real(dp) :: m, n
 
-      cheap = real(cells_in_contact, dp)**3 <= transforms*cells*log(real(max(cells, 2), dp))/log(2.0_dp)
-   end function affordable
+      m = cells_in_contact
+      n = max(cells, 2)
+      cheap = m**2 <= fields*n .and. m**3 <= part*transforms*factoring*n*log(n)/log(2.0_dp)
+   end function worthwhile
 
    !> Solve from the contact of a pressure. In: P of the right load; out where it succeeds: the solution,
    !> its gap U - H and its error. The pressure is otherwise left alone.
@@ -40,20 +51,21 @@ contains
       real(dp), intent(inout) :: gap(:, :)
       type(gap_measure_type), intent(out) :: found
       logical, intent(out) :: success
+      type(changed_set_type) :: set
       type(normal_problem_type) :: narrowed
-      real(dp), allocatable :: kernel(:, :), trial(:, :)
+      real(dp), allocatable :: trial(:, :)
       real(dp) :: level
       logical :: solved
-      integer :: round
+      integer :: fewest, joining, most, round, since
 
       success = .false.
-      allocate (kernel(size(height, 1), size(height, 2)), source=0.0_dp)
-      allocate (trial, source=pressure)
-      gap = 0.0_dp
-      gap(1, 1) = 1.0_dp
-      call operator%displace(gap, kernel)
+      call new_changed_set(set, operator, height, task%target*size(height), pressure > 0.0_dp, gap)
+      allocate (trial, mold=pressure)
+      most = 2*count(pressure > 0.0_dp) + 50
+      fewest = huge(fewest)
+      since = 0
       do round = 1, most_rounds
-         call press_cells(kernel, task%target*size(height), height, operator%threads, trial, level, solved)
+         call settle_departures(set, trial, level, solved)
          if (.not. solved) return
          call operator%displace(trial, gap)
          gap = gap - height
@@ -65,85 +77,33 @@ contains
             pressure(:, :) = trial
             return
          end if
-         ! Cells that overlap join with a pressure that only marks them.
-         where (trial <= 0.0_dp .and. gap < level) trial = tiny(1.0_dp)
-         if (.not. affordable(count(trial > 0.0_dp), size(trial))) return
+         call set%join(trial <= 0.0_dp .and. gap < level, joining)
+         since = since + 1
+         if (joining < fewest) since = 0
+         fewest = min(fewest, joining)
+         if (joining == 0 .or. since > patience .or. count(trial > 0.0_dp) + joining > most) return
       end do
    end subroutine finish_on_contact
 
-   !> The pressure on the cells where it is positive, without those that would pull.
-   subroutine press_cells(kernel, load, height, threads, pressure, level, solved)
-      real(dp), intent(in) :: kernel(:, :)             !! displacement of the first cell's unit pressure
-      real(dp), intent(in) :: load                     !! sum of P over the cells, Pa
-      real(dp), intent(in) :: height(:, :)
-      integer, intent(in) :: threads
-      real(dp), intent(inout) :: pressure(:, :)        !! in: positive where cells take part
+   !> The pressure of the set, without the cells that would pull.
+   subroutine settle_departures(set, pressure, level, solved)
+      type(changed_set_type), intent(inout) :: set
+      real(dp), intent(inout) :: pressure(:, :)
       real(dp), intent(out) :: level
       logical, intent(out) :: solved
-      integer, allocatable :: cells(:, :)
-      real(dp), allocatable :: matrix(:, :), p(:), ones(:)
-      integer :: departure, k, n
+      integer :: departure, leaving
 
-      solved = .false.
-      level = 0.0_dp
       do departure = 1, most_departures
-         call list_cells(pressure, cells)
-         n = size(cells, 2)
-         if (n == 0) return
-         allocate (matrix(n, n), p(n), ones(n))
-         call fill_matrix(kernel, cells, threads, matrix)
-         call factor(matrix, threads)
-         do k = 1, n
-            p(k) = height(cells(1, k), cells(2, k))
-         end do
-         ones = 1.0_dp
-         call solve_factors(matrix, p)
-         call solve_factors(matrix, ones)
-         level = (load - sum(p))/sum(ones)
-         p = p + level*ones
-         if (.not. all(abs(p) < huge(1.0_dp))) return
-         do k = 1, n
-            pressure(cells(1, k), cells(2, k)) = max(p(k), 0.0_dp)
-         end do
-         solved = all(p >= 0.0_dp)
-         deallocate (matrix, p, ones)
-         if (solved) return
+         if (set%crowded()) then
+            if (set%factors >= most_factors) exit
+            call set%refresh()
+         end if
+         call set%solve(pressure, level, solved)
+         if (.not. solved) return
+         call set%leave(pressure < 0.0_dp, leaving)
+         if (leaving == 0) return
       end do
-   end subroutine press_cells
-
-   !> The cells with a positive pressure.
-   subroutine list_cells(pressure, cells)
-      real(dp), intent(in) :: pressure(:, :)
-      integer, allocatable, intent(out) :: cells(:, :)     !! [2, n]
-      integer :: i, j, n
-
-      allocate (cells(2, count(pressure > 0.0_dp)))
-      n = 0
-      do j = 1, size(pressure, 2)
-         do i = 1, size(pressure, 1)
-            if (pressure(i, j) <= 0.0_dp) cycle
-            n = n + 1
-            cells(:, n) = [i, j]
-         end do
-      end do
-   end subroutine list_cells
-
-   !> The displacement of each cell by each.
-   subroutine fill_matrix(kernel, cells, threads, matrix)
-      real(dp), intent(in) :: kernel(:, :)
-      integer, intent(in) :: cells(:, :)
-      integer, intent(in) :: threads
-      real(dp), intent(inout) :: matrix(:, :)
-      integer :: a, b, d(2)
-
-      !$omp parallel do default(none) shared(kernel, cells, matrix) private(a, b, d) num_threads(threads)
-      do b = 1, size(cells, 2)
-         do a = 1, size(cells, 2)
-            d = cells(:, a) - cells(:, b)
-            where (d < 0) d = d + shape(kernel)
-            matrix(a, b) = kernel(d(1) + 1, d(2) + 1)
-         end do
-      end do
-   end subroutine fill_matrix
+      solved = .false.
+   end subroutine settle_departures
 
 end module steady_active

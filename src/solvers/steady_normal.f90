@@ -26,7 +26,7 @@ module steady_normal
    use projection, only : project_simplex
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
-   use steady_active, only : affordable, finish_on_contact
+   use steady_active, only : finish_on_contact, worthwhile
    use steady_operator, only : steady_operator_type
    implicit none
    private
@@ -35,7 +35,7 @@ module steady_normal
 
    integer, parameter :: pairs = 6               !! of the acceleration
    integer, parameter :: sums_count = 7
-   integer, parameter :: trials(*) = [16, 32, 64, 128, 256, 512]   !! of finishing on few cells
+   integer, parameter :: first_trial = 16        !! iteration at which finishing on few cells is first tried
    real(dp), parameter :: cautious = 2.0_dp      !! growth of the residual that stops accelerating
 
    !> What one evaluation of the fixed-point map tells.
@@ -91,7 +91,7 @@ contains
       type(steady_measure_type) :: measure
       real(dp) :: least, reference, mean
       integer(int64) :: before
-      integer :: checks
+      integer :: checks, trial
       logical :: determined, finished
 
       before = operator%ffts
@@ -101,6 +101,7 @@ contains
       least = huge(1.0_dp)
       reference = huge(1.0_dp)
       checks = 0
+      trial = first_trial
       outcome%reason = reason_iterations
       do
          call self%evaluate(operator, task, height, mean, self%z, measure)
@@ -116,8 +117,10 @@ contains
             least = measure%error
             self%best(:, :) = self%pressure
          end if
-         if (outcome%reason /= reason_converged .and. any(outcome%iterations == trials)) then
-            if (affordable(count(self%pressure > 0.0_dp), size(self%pressure))) then
+         if (outcome%reason /= reason_converged .and. outcome%iterations >= trial) then
+            if (worthwhile(count(self%pressure > 0.0_dp), size(self%pressure), &
+               int(operator%ffts - before))) then
+               trial = outcome%iterations + outcome%iterations/2
                call finish_on_contact(operator, task, height, self%pressure, gap, found, finished)
                if (finished) outcome%reason = reason_converged
             end if

@@ -16,7 +16,7 @@ from ..roads.measured import MeasuredSurface, load
 from ..roads.patches import DrawnRoad, MeasuredRoad
 from ..roads.spectra import Spectrum, join_spectra, spectrum_of_map
 from ..rubber.compound import Compound
-from ..rubber.dma_fit import fit_dma
+from ..rubber.dma_fit import fit_dma, wlf_constants
 from ..rubber.dma_table import read_dma
 from ..rubber.material import Prony
 from ..rubber.wlf import WLF
@@ -186,8 +186,9 @@ def compound_of(
     if isinstance(source, Compound):
         return source
     if isinstance(source, Prony):
-        return Compound(source, None if reference is None else float(reference),
-                        None if wlf is None else WLF(*wlf))
+        constants = wlf_constants(wlf, reference)
+        usual = reference if constants is None else constants.t_ref
+        return Compound(source, None if usual is None else float(usual), constants)
     path = Path(source)
     lines = text_lines(path)
     words = next((line.strip() for _, line in lines if not line.strip().startswith("!")), "")

@@ -226,7 +226,7 @@ def fit_dma(
     sweeps: list[Rows] = []
     if table.temperature is not None:
         sweeps = _sweeps(table.temperature, temperature_tolerance)
-    found = _shifted(table, sweeps, _constants(wlf, reference), reference, temperature_tolerance,
+    found = _shifted(table, sweeps, wlf_constants(wlf, reference), reference, temperature_tolerance,
                      vertical)
     notes += found.notes
     reduced = table.omega * 10.0**found.log_shift
@@ -328,7 +328,7 @@ def _range_notes(table: DmaTable, omega: FloatArray) -> list[str]:
     return []
 
 
-def _constants(wlf: Sequence[float] | None, reference: float | None) -> WLF | None:
+def wlf_constants(wlf: Sequence[float] | None, reference: float | None) -> WLF | None:
     """Return the constants, at the reference temperature that was asked for."""
     if reference is not None:
         number("reference", reference)
