@@ -1,6 +1,7 @@
 !> A case in words: every resolved setting as an input of its own, time steps and memory.
 module case_report
    use adhesion_advice, only : adhesion_notes
+   use footprint_advice, only : footprint_note
    use case_settings, only : case_type, phase_settings_type, road_moves
    use case_time, only : duration_text, seconds_needed
    use memory_limits, only : memory_limit, memory_text
@@ -72,7 +73,8 @@ contains
       if (memory_needed(case) > limit) text = text//'! warning: '//whose//' '//memory_text(limit)// &
          ' of memory: the run needs more'//nl
       text = text//'! time: '//duration_text(seconds_needed(case))//' on this machine, to within a factor of about three'//nl
-      text = text//marked('! ', adhesion_notes(case))//marked('! warning: ', case%warnings)
+      text = text//marked('! ', adhesion_notes(case))// &
+         marked('! note: ', footprint_note(case))//marked('! warning: ', case%warnings)
    end function case_summary
 
    !> Lines with a mark before each.
@@ -96,7 +98,7 @@ contains
    !> each arm one field, and three for the steps before and their traction; sliding four, the
    !> original map and its slopes; adhesion 6 fields and a second buffer; friction 42 fields, two
    !> buffers, and with arms four fields and two an arm; mixed precision 0.6 of a buffer;
-   !> steady phases 28 fields, 130 with friction. The rest:
+   !> steady phases 28 fields, 133 with friction. The rest:
    !> 26 MB. Measured at 1024 x 1024 cells on one thread, MB: 118 for 119 (elastic), 202 for 202 (three
    !> arms, sliding), 431 for 437 (friction), 742 for 747 (friction, ten arms).
    pure function memory_needed(case) result(bytes)
@@ -121,7 +123,7 @@ contains
          if (arms > 0) fields = fields + 4.0_dp
          buffers = buffers + 2.0_dp
       end if
-      if (any(case%phases%steady)) fields = fields + merge(130.0_dp, 28.0_dp, case%friction%law /= 'none')
+      if (any(case%phases%steady)) fields = fields + merge(133.0_dp, 28.0_dp, case%friction%law /= 'none')
       if (case%solver%precision == 'mixed') buffers = buffers + 0.6_dp
       bytes = 8.0_dp*(real(case%grid%nx, dp)*real(case%grid%ny, dp)*fields + &
          padding*buffers*real(case%grid%nx + 2, dp)*real(case%grid%ny, dp)) + program_itself

@@ -17,7 +17,9 @@
 !> Converged means: the duality gap of P under the road at x + u, u = A_T T of the traction handed out,
 !> and |bound(T + c_t r) - T|/|T|, all recomputed, are below the tolerance.
 !>
-!> Memory beside the caller's: 16 fields, 50 for the acceleration in single precision, and 10 of doubles.
+!> Where the rounds do not settle, the contact of the least error is handed out.
+!>
+!> Memory beside the caller's: 19 fields, 50 for the acceleration in single precision, and 10 of doubles.
 module steady_friction
    use anderson, only : anderson_type, new_anderson
    use friction_law, only : friction_law_type, law_constant_shear
@@ -39,6 +41,8 @@ module steady_friction
 
    integer, parameter :: pairs = 10              !! of the acceleration
    integer, parameter :: components = 5          !! of a state: z, u, r
+   integer, parameter :: doubtful = 100          !! rounds after which the best contact is kept
+   integer, parameter :: looks = 25              !! rounds between two looks at it
 
    !> A steady contact with friction.
    type :: steady_contact_type
@@ -64,6 +68,7 @@ module steady_friction
       integer :: since = 0                       !! rounds since then
       real(dp) :: weights(components) = 0.0_dp
       real(dp) :: accepted = 0.0_dp              !! change below which a solution is checked
+      real(dp) :: best = huge(1.0_dp)            !! largest error of the kept contact
    end type pace_type
 
    !> Work fields. Not to be copied.
@@ -76,6 +81,7 @@ module steady_friction
       real(dp) :: c = 0.0_dp                           !! c_t, Pa
       real(dp), allocatable, private :: state(:, :, :)     !! z, u, r [nx, 5, ny]
       real(dp), allocatable, private :: residual(:, :, :)
+      real(dp), allocatable, private :: best(:, :, :)      !! P and T of the least error, Pa [nx, 3, ny]
       real(dp), allocatable, private :: ratio(:, :, :)     !! T/P [nx, 2, ny]
       real(dp), allocatable, private :: place(:, :, :)     !! u+, m [nx, 2, ny]
       type(anderson_type), private :: memory
@@ -95,7 +101,8 @@ contains
       self%law = law
       call new_steady_normal(self%normal, grid)
       allocate (self%state(grid%nx, components, grid%ny), self%residual(grid%nx, components, grid%ny), &
-         self%ratio(grid%nx, 2, grid%ny), self%place(grid%nx, 2, grid%ny), source=0.0_dp)
+         self%best(grid%nx, 3, grid%ny), self%ratio(grid%nx, 2, grid%ny), &
+         self%place(grid%nx, 2, grid%ny), source=0.0_dp)
       call new_anderson(self%memory, grid%nx, components, grid%ny, pairs)
    end subroutine new_steady_friction
 
@@ -133,9 +140,12 @@ contains
          end if
          if (rubbing%iterations >= task%max_iterations) then
             call finish(self, operator, task, road, contact, normal, rubbing)
+            call return_to_best(self, operator, task, road, pace, contact, normal, rubbing)
             call explain(self, contact, normal, rubbing)
             exit
          end if
+         if (rubbing%iterations >= doubtful .and. mod(rubbing%iterations, looks) == 0) &
+            call keep_best(self, operator, task, road, pace, contact)
          call advance(self, operator, task, pace, rubbing%iterations, &
             max(change, measure%change/measure%size), measure)
       end do
@@ -225,6 +235,43 @@ contains
       self%residual(:, 1, :) = self%normal%z - self%state(:, 1, :)
    end subroutine round
 
+   !> Judge the contact of the round, and keep it if it is the best so far. The rounds go on as if
+   !> nothing had happened.
+   subroutine keep_best(self, operator, task, road, pace, contact)
+      class(steady_friction_type), intent(inout) :: self
+      type(steady_operator_type), intent(inout) :: operator
+      type(normal_problem_type), intent(in) :: task
+      type(interpolation_type), intent(in) :: road
+      type(pace_type), intent(inout) :: pace
+      type(steady_contact_type), intent(inout) :: contact
+      type(solver_result_type) :: normal, rubbing
+      real(dp), allocatable :: ratio(:, :, :)
+
+      allocate (ratio, source=self%ratio)
+      call finish(self, operator, task, road, contact, normal, rubbing)
+      self%ratio(:, :, :) = ratio
+      if (.not. max(normal%residual, rubbing%residual) < pace%best) return
+      pace%best = max(normal%residual, rubbing%residual)
+      self%best(:, 1, :) = contact%pressure
+      self%best(:, 2:3, :) = contact%traction
+   end subroutine keep_best
+
+   !> Hand out the kept contact where it is better than that in hand: rounds that do not settle may swing.
+   subroutine return_to_best(self, operator, task, road, pace, contact, normal, rubbing)
+      class(steady_friction_type), intent(inout) :: self
+      type(steady_operator_type), intent(inout) :: operator
+      type(normal_problem_type), intent(in) :: task
+      type(interpolation_type), intent(in) :: road
+      type(pace_type), intent(in) :: pace
+      type(steady_contact_type), intent(inout) :: contact
+      type(solver_result_type), intent(inout) :: normal, rubbing
+
+      if (.not. pace%best < max(normal%residual, rubbing%residual)) return
+      contact%pressure(:, :) = self%best(:, 1, :)
+      contact%traction(:, :, :) = self%best(:, 2:3, :)
+      call judge(self, operator, task, road, contact, normal, rubbing)
+   end subroutine return_to_best
+
    !> |u' - u|/|u'|, from the relaxed change.
    function relative_change(self, beta) result(change)
       class(steady_friction_type), intent(in) :: self
@@ -288,8 +335,8 @@ contains
    end subroutine advance
 
    !> Why there may be no solution. A constant shear stress jumps at the rim of the contact: the cell
-   !> that it takes out of contact is drawn into it again without it. On a slope steeper than 1/mu the
-   !> law bounds no traction uphill (module friction_law).
+   !> that it takes out of contact is drawn into it again without it. Uphill the law on the slope gives
+   !> T = P tan(atan(mu) + alpha), which has no bound where mu tan(alpha) reaches 1: the road wedges.
    subroutine explain(self, contact, normal, rubbing)
       type(steady_friction_type), intent(in) :: self
       type(steady_contact_type), intent(in) :: contact
@@ -300,7 +347,8 @@ contains
          normal%reason = 'cells at the rim of the contact come and go'
       else if (self%law%slope) then
          if (any(contact%pressure > 0.0_dp .and. self%law%coefficient*hypot(contact%slope_x, &
-            contact%slope_y) >= 1.0_dp)) normal%reason = 'slopes above 1/coefficient bound no traction'
+            contact%slope_y) >= 1.0_dp)) &
+            normal%reason = 'the road wedges: slopes in contact exceed 1/coefficient'
       end if
       rubbing%reason = normal%reason
    end subroutine explain
@@ -318,9 +366,25 @@ contains
       length = sqrt(global_sum(length))
    end function length_of
 
-   !> Hand out: T within the bound of P and of the slopes, the displacement of that T, the road there,
-   !> and the errors of it all.
+   !> Hand out: P, T within its bound and that of the slopes, and what follows from them.
    subroutine finish(self, operator, task, road, contact, normal, rubbing)
+      class(steady_friction_type), intent(inout) :: self
+      type(steady_operator_type), intent(inout) :: operator
+      type(normal_problem_type), intent(in) :: task
+      type(interpolation_type), intent(in) :: road
+      type(steady_contact_type), intent(inout) :: contact
+      type(solver_result_type), intent(inout) :: normal, rubbing
+
+      contact%pressure(:, :) = self%normal%pressure
+      call read_road(self, road, contact)
+      call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio)
+      call bound_tractions(self%law, self%c, contact%pressure, contact%slope_x, contact%slope_y, &
+         self%ratio, contact%slip, contact%traction)
+      call judge(self, operator, task, road, contact, normal, rubbing)
+   end subroutine finish
+
+   !> Complete a contact from its P and T: displacement, road, gap, and the errors of it all.
+   subroutine judge(self, operator, task, road, contact, normal, rubbing)
       class(steady_friction_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
       type(normal_problem_type), intent(in) :: task
@@ -330,14 +394,8 @@ contains
       type(gap_measure_type) :: found
       real(dp), allocatable :: again(:, :, :)
 
-      contact%pressure(:, :) = self%normal%pressure
-      call read_road(self, road, contact)
-      call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio)
-      call bound_tractions(self%law, self%c, contact%pressure, contact%slope_x, contact%slope_y, &
-         self%ratio, contact%slip, contact%traction)
       call operator%shear(contact%traction, contact%displacement, contact%slip)
       call read_road(self, road, contact)
-
       call operator%displace(contact%pressure, contact%gap)
       contact%gap = contact%gap - contact%height
       found = measure_gap(task, contact%pressure, contact%gap, operator%threads)
@@ -355,7 +413,7 @@ contains
       rubbing%residual = sqrt(sum((again - contact%traction)**2)/max(sum(contact%traction**2), tiny(1.0_dp)))
       rubbing%converged = rubbing%residual <= task%tolerance
       if (rubbing%converged) rubbing%reason = reason_converged
-   end subroutine finish
+   end subroutine judge
 
    !> The road at x + u, u = A_T T less its mean over the contact; and r. In: slip holds d(A_T T)/ds.
    subroutine read_road(self, road, contact)
