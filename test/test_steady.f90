@@ -43,6 +43,9 @@ contains
       call test_curve()
       call test_threads()
       call test_long_run()
+      call test_order()
+      call test_starts()
+      call test_best_kept()
    end subroutine run_steady
 
    !> Full contact with a wave: P = p + K^-1 H, so that friction is k^2 h^2 G''(k V)/(2 (1-nu) p).
@@ -296,6 +299,107 @@ contains
       end subroutine compare
 
    end subroutine test_long_run
+
+   !> The state at the end of a run in time differs from that of the continuum by the error of the steps
+   !> and of the mesh, one cell a step: it falls nearly with the square of the cell.
+   subroutine test_order()
+      type(case_type) :: case
+      type(simulation_type) :: sim
+      type(steady_step_type) :: steady
+      type(error_type), allocatable :: error
+      real(dp) :: difference(2), order
+      integer :: k, n
+
+      do k = 1, 2
+         n = 16*2**k
+         call write_map(map_file, 0.3_dp*wavy(n, 3*n/4))
+         call parse_case('&grid nx = '//to_text(n)//', ny = '//to_text(3*n/4)//', lx = 16e-3 /'//nl// &
+            '&surface shape = ''file'', file = '''//map_file//''' /'//nl// &
+            '&material shear_modulus = 1e6, prony_g = 3e6, prony_tau = 3e-3 /'//nl// &
+            '&solver tolerance = 1e-9 /'//nl//'&phase steady = T, pressure = 1e5, velocity_x = 0.5, '// &
+            'duration = 64e-3, steps = '//to_text(2*n)//' /', 'test.nml', case, error)
+         call check_no_error(error, 'order: input')
+         call new_simulation(sim, case, error)
+         call check_no_error(error, 'order: simulation')
+         do while (.not. sim%finished)
+            call sim%advance(error)
+         end do
+         call find_steady(case, sim, 0.0_dp, steady)
+         difference(k) = norm2(sim%pressure - steady%contact%pressure)/norm2(steady%contact%pressure)
+         call steady%destroy()
+         call sim%destroy()
+      end do
+      order = log(difference(1)/difference(2))/log(2.0_dp)
+      call check_close(order, 1.9_dp, 0.4_dp, 'order of the difference to a run in time')
+   end subroutine test_order
+
+   !> A cold start, one from another speed and one from another load end in one state.
+   subroutine test_starts()
+      type(record_type) :: cold, speed, load
+      character(*), parameter :: case = '&grid nx = 32, ny = 24, lx = 64e-3, ly = 48e-3 /'//nl// &
+         '&surface shape = ''self_affine'', hurst = 0.8, wavelength_long = 48e-3, wavelength_short = 16e-3,'// &
+         ' rms_slope = 0.15, seed = 3 /'//nl//rubber//'&friction law = ''coulomb'', coefficient = 0.4 /'// &
+         nl//'&solver tolerance = 1e-8 /'//nl
+      character(*), parameter :: final = 'velocity_x = 0.4, velocity_y = 0.1 /'
+
+      call run_case(case//'&phase steady = T, pressure = 1e5, '//final, 'cold start', cold)
+      call run_case(case//'&phase steady = T, pressure = 1e5, velocity_x = 4e-3 /'//nl// &
+         '&phase steady = T, '//final, 'from another speed', speed)
+      call run_case(case//'&phase steady = T, pressure = 1e4, '//final//nl// &
+         '&phase steady = T, pressure = 1e5, '//final, 'from another load', load)
+      call check_close(maxval(abs(speed%pressure - cold%pressure))/maxval(cold%pressure), 0.0_dp, 1e-5_dp, &
+         'one state from another speed')
+      call check_close(maxval(abs(load%pressure - cold%pressure))/maxval(cold%pressure), 0.0_dp, 1e-5_dp, &
+         'one state from another load')
+      call check_close(speed%rows(1)%friction/cold%rows(0)%friction, 1.0_dp, 1e-6_dp, 'from another speed')
+      call check_close(load%rows(1)%friction/cold%rows(0)%friction, 1.0_dp, 1e-6_dp, 'from another load')
+   end subroutine test_starts
+
+   !> Where friction on the slope has no solution, more rounds never hand out a worse state; and the
+   !> reason names the slopes.
+   subroutine test_best_kept()
+      type(solver_result_type) :: normal, rubbing
+      real(dp) :: missed(2)
+      integer :: k
+
+      do k = 1, 2
+         call wedge(merge(100, 300, k == 1), normal, rubbing)
+         missed(k) = max(normal%residual, rubbing%residual)
+         call check_that(.not. (normal%converged .and. rubbing%converged), 'wedged road: no solution')
+         call check_that(index(normal%reason, 'wedges') > 0, 'wedged road: reason: '//trim(normal%reason))
+      end do
+      call check_that(missed(2) <= missed(1), 'wedged road: a better state is lost: '// &
+         to_text(missed(2))//' after '//to_text(missed(1)))
+   end subroutine test_best_kept
+
+   !> Some rounds on a road steeper than 1/mu in places.
+   subroutine wedge(rounds, normal, rubbing)
+      integer, intent(in) :: rounds
+      type(solver_result_type), intent(out) :: normal, rubbing
+      type(case_type) :: case
+      type(steady_step_type) :: steady
+      type(error_type), allocatable :: error
+      type(interpolation_type) :: road
+      type(planned_row_type) :: plan
+      real(dp), allocatable :: height(:, :)
+
+      call parse_case('&grid nx = 32, ny = 32, lx = 32e-3 /'//nl//'&surface shape = ''self_affine'', '// &
+         'hurst = 0.8, wavelength_long = 16e-3, wavelength_short = 4e-3, rms_slope = 0.3, seed = 1 /'//nl// &
+         '&material shear_modulus = 1e6, prony_g = 9e6, prony_tau = 1e-2 /'//nl// &
+         '&friction law = ''coulomb'', coefficient = 1.5 /'//nl//'&solver max_iterations = '// &
+         to_text(rounds)//' /'//nl//'&phase steady = T, pressure = 2e5, velocity_x = 0.1 /', 'test.nml', &
+         case, error)
+      call check_no_error(error, 'wedged road: input')
+      call new_height(case%grid, case%surfaces, height, error)
+      call new_interpolation(road, case%grid, height, 'cubic', error)
+      call new_steady_step(steady, case, 1e-3_dp, error)
+      call check_no_error(error, 'wedged road: steady')
+      plan%load = case%phases(1)%target
+      plan%velocity_x = case%phases(1)%velocity_x
+      call steady%begin_curve([0.0_dp, 0.0_dp])
+      call steady%solve(plan, road, normal, rubbing)
+      call steady%destroy()
+   end subroutine wedge
 
    !> The steady state of a case with the road where a run in time has left it.
    subroutine find_steady(case, sim, dt, steady)

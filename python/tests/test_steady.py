@@ -239,3 +239,18 @@ def test_check_lists_it(program: str, tmp_path: Path) -> None:
     case.write_text(curve(1))
     done = subprocess.run([program, "check", str(case)], capture_output=True, text=True, check=True)
     assert "steady = .true." in done.stdout
+
+
+@pytest.mark.parametrize(("velocity", "told"), [("velocity_x = 0.5", True),
+                                                ("velocity_x = 0.5, velocity_y = 0.2", False),
+                                                ("velocity_x = 1e-4", False)])
+def test_check_notes_footprints(program: str, tmp_path: Path, velocity: str, told: bool) -> None:
+    """Along an axis the rubber meets its own footprint, unless it has recovered by then."""
+    case = tmp_path / "case.nml"
+    case.write_text(
+        "&grid nx = 32, ny = 32, lx = 0.01 / &surface shape = 'sine', amplitude = 1e-4,"
+        " wavelength = 5e-3 / &material shear_modulus = 1e6, prony_g = 9e6, prony_tau = 0.01 /\n"
+        f"&phase steady = T, pressure = 1e5, {velocity} /\n"
+    )
+    done = subprocess.run([program, "check", str(case)], capture_output=True, text=True, check=True)
+    assert ("meets its own footprint" in done.stdout) == told, done.stdout
