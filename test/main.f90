@@ -9,6 +9,7 @@ program main
    use test_case_input, only : run_case_input
    use test_checkpoint, only : run_checkpoint
    use test_coupled_passes, only : run_coupled_passes
+   use test_coupled_runs, only : run_coupled_runs
    use test_fft_conv, only : run_fft_conv
    use test_friction_cg, only : run_friction_cg
    use test_friction_law, only : run_friction_law
@@ -64,6 +65,7 @@ program main
    if (wanted('simulation_sliding')) call run_simulation_sliding()
    if (wanted('steady')) call run_steady()
    if (wanted('coupled_passes')) call run_coupled_passes()
+   if (wanted('coupled_runs')) call run_coupled_runs()
    if (wanted('simulation_pull')) call run_simulation_pull()
    if (wanted('simulation_friction')) call run_simulation_friction()
    if (wanted('simulation_adhesion')) call run_simulation_adhesion()
