@@ -61,6 +61,7 @@ contains
       call check_that(case%solver%method == 'fast', 'method')
       call check_that(case%solver%time_scheme == 'exponential2', 'time_scheme')
       call check_that(case%solver%passes == 0 .and. case%solver%threads == 0, 'passes, threads')
+      call check_close(case%solver%coupling_tolerance, 0.0_dp, 0.0_dp, 'coupling tolerance')
       call check_that(case%solver%slip_law == 'physical' .and. case%solver%interpolation == 'cubic', &
          'slip_law, interpolation')
       call check_that(case%output%file == 'folder/road.h5', 'the result lies beside the input')

@@ -19,8 +19,11 @@ contains
       call begin_suite('simulation_pull')
       call test_mindlin_cycle()
       call test_creep()
-      call test_as_driven('.true.')
-      call test_as_driven('.false.')
+      call test_as_driven('.true.', 'fast')
+      call test_as_driven('.false.', 'fast')
+      call test_as_driven('.true.', 'thesis')
+      call test_as_driven('.false.', 'thesis')
+      call test_far_way()
       call test_beyond()
       call test_mass()
       call test_faults()
@@ -100,8 +103,9 @@ contains
 
    !> A rough road in partial slip, pulled obliquely by steps and ramps: driven by the velocities that
    !> were found it takes the forces that were asked for.
-   subroutine test_as_driven(slope_effect)
+   subroutine test_as_driven(slope_effect, method)
       character(*), intent(in) :: slope_effect
+      character(*), intent(in) :: method            !! of the solvers
       type(record_type) :: driven, pulled
       character(*), parameter :: body = '&grid nx = 36, ny = 30, lx = 1e-3, ly = 0.9e-3 /'//nl// &
          '&surface shape = ''self_affine'', hurst = 0.8, rms_slope = 0.1, wavelength_long = 0.5e-3, '// &
@@ -114,16 +118,18 @@ contains
          'traction_x = 1e4, traction_y = -1e4, ramp = ''linear'', ']
       real(dp), parameter :: pull(2, 4) = reshape([2e4_dp, -1e4_dp, 3.5e4_dp, 0.0_dp, 1e4_dp, -2e4_dp, &
          1e4_dp, -1e4_dp], [2, 4]), dt = 2e-3_dp, area = 0.9e-6_dp
-      character(:), allocatable :: start, text
+      character(:), allocatable :: start, text, solver
       integer :: k
 
+      solver = '&solver tolerance = 1e-8, time_scheme = ''exponential'', max_iterations = 5000, method = '''// &
+         method//''' /'
       start = body//nl//'&friction law = ''coulomb'', coefficient = 0.6, slope_effect = '//slope_effect// &
          ' /'//nl//'&phase pressure = 1e5, duration = 1e-3, steps = 1 /'//nl
       text = start
       do k = 1, 4
          text = text//'&phase '//trim(phases(k))//' duration = 2e-3, steps = 1 /'//nl
       end do
-      call run_case(text//'&solver tolerance = 1e-8, passes = 60, time_scheme = ''exponential'' /', 'pulled', pulled)
+      call run_case(text//solver, 'pulled, '//method, pulled)
       call check_that(last(pulled) == 5, 'pulled: ramps have no row of their own')
       text = start
       do k = 2, 5
@@ -131,7 +137,7 @@ contains
             //', velocity_y = '//exact_text((pulled%rows(k)%road_y - pulled%rows(k - 1)%road_y)/dt)// &
             ', duration = 2e-3, steps = 1 /'//nl
       end do
-      call run_case(text//'&solver tolerance = 1e-8, passes = 60, time_scheme = ''exponential'' /', 'driven', driven)
+      call run_case(text//solver, 'driven, '//method, driven)
       do k = 2, 5
          call check_close(pulled%drag(1, k)/area, pull(1, k - 1), 1e-2_dp, 'pulled: the force along x')
          if (k /= 3) call check_close(pulled%drag(2, k)/area, pull(2, k - 1), 1e-2_dp, 'pulled: the force along y')
@@ -143,6 +149,25 @@ contains
          'pulled along x only: the road goes on along y')
       call check_that(pulled%rows(4)%stick_area < pulled%rows(4)%contact_area, 'pulled: something slips')
    end subroutine test_as_driven
+
+   !> A pull that moves the road by more than a cell in a step is warned of once, with the step that would do.
+   subroutine test_far_way()
+      type(record_type) :: far, near
+      character(*), parameter :: start = '&grid nx = 16, ny = 12, lx = 1e-3 /'//nl// &
+         '&surface shape = ''flat'' /'//nl//'&material shear_modulus = 1e6, thickness = 4e-3 /'//nl// &
+         '&friction law = ''coulomb'', coefficient = 1 /'//nl//'&phase pressure = 1e5 /'//nl
+      integer :: first
+
+      ! Under this pull the block is sheared by 0.32 mm, five cells, in two steps and in ten.
+      call run_case(start//'&phase traction_x = 8e4, ramp = ''linear'', duration = 1, steps = 2 /', 'far', far)
+      first = index(far%warnings, 'the pull moves the road by 2.56 cells in a step')
+      call check_that(first > 0 .and. index(far%warnings, 'dt = 0.195312') > first, 'a far way: '//far%warnings)
+      call check_that(index(far%warnings, 'the pull moves', back=.true.) == first, 'a far way is told once')
+      call run_case(start//'&phase traction_x = 8e4, ramp = ''linear'', duration = 1, steps = 10 /', 'near', near)
+      call check_that(index(near%warnings, 'the pull moves') == 0, 'half a cell per step is followed')
+      call run_case(start//'&phase traction_x = 8e4, duration = 1, steps = 10 /', 'jump', far)
+      call check_that(index(far%warnings, 'let the pull grow along a ramp') > 0, 'a jump of the pull')
+   end subroutine test_far_way
 
    !> More than the friction holds: a row that has not converged, and a reason with the limit.
    subroutine test_beyond()

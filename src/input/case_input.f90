@@ -337,6 +337,7 @@ contains
       case%solver%method = group%text_value('method')
       case%solver%time_scheme = group%text_value('time_scheme')
       case%solver%passes = group%integer_value('passes')
+      case%solver%coupling_tolerance = group%real_value('coupling_tolerance')
       case%solver%slip_law = group%text_value('slip_law')
       case%solver%interpolation = group%text_value('interpolation')
       case%solver%precision = group%text_value('precision')

@@ -235,7 +235,8 @@ contains
       associate (s => case%solver, o => case%output)
          text = '&solver'//nl//number('tolerance', s%tolerance, '')// &
             whole('max_iterations', s%max_iterations)//string('method', s%method)// &
-            string('time_scheme', s%time_scheme)//whole('passes', s%passes)//string('slip_law', s%slip_law)// &
+            string('time_scheme', s%time_scheme)//whole('passes', s%passes)// &
+            number('coupling_tolerance', s%coupling_tolerance, '')//string('slip_law', s%slip_law)// &
             string('interpolation', s%interpolation)//string('precision', s%precision)// &
             whole('threads', s%threads)//'/'//nl
          text = text//'&output'//nl//string('file', o%file)

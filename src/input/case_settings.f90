@@ -67,7 +67,8 @@ module case_settings
       integer :: max_iterations
       character(word_length) :: method              !! 'fast' | 'thesis'
       character(word_length) :: time_scheme         !! 'exponential2' | 'exponential' | 'backward_euler'
-      integer :: passes
+      integer :: passes                             !! most of a step with friction; 0: until they settle
+      real(dp) :: coupling_tolerance                !! of `residual_coupling`; 0: as `passes` makes it
       character(word_length) :: slip_law            !! 'physical' | 'thesis'
       character(word_length) :: interpolation       !! 'cubic' | 'linear'
       character(word_length) :: precision           !! 'double' | 'mixed'

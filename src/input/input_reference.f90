@@ -263,6 +263,9 @@ contains
             '''exponential2'' | ''exponential'' | ''backward_euler''', 'Time integration of the Prony arms.'), &
          row('solver', 'passes', kind_integer, '0', '', 'not negative', &
             'Largest number of passes in a step with friction; 0 means as many as they need to settle.'), &
+         row('solver', 'coupling_tolerance', kind_real, '0', '', 'not negative', &
+            'Largest residual_coupling with which a step with friction counts as solved; 0 means tolerance, '// &
+            'or 1e-2 if passes is not 0. A step that leaves more ends the run with status 4.'), &
          row('solver', 'slip_law', kind_word, '''physical''', '', '''physical'' | ''thesis''', &
             'Direction of slip on slopes: along the friction force in space, or in the plane as in the '// &
             'thesis.'), &

@@ -23,7 +23,7 @@ module asperity_simulation
    use outside_balance, only : book_outside
    use asperity_parallel, only : global_sum
    use asperity_precision, only : dp, int64, int8
-   use pulled_road, only : guess_road, pull_outcome, take_road
+   use pulled_road, only : guess_road, pull_outcome, take_road, watch_way
    use road_motion, only : move_road, place_road
    use asperity_schedule, only : next_row, planned_row_type, schedule_type
    use solver_result, only : solver_result_type
@@ -42,7 +42,8 @@ module asperity_simulation
 
    public :: new_simulation, simulation_type
 
-   !> What remains of the coupling where the case limits the passes: above this a warning tells of it.
+   !> What may remain of the coupling where the case limits the passes and gives no `coupling_tolerance`:
+   !> the mean friction of a run is then right within 1 %. Above this a warning tells of what remains.
    real(dp), parameter :: large_mismatch = 1.0e-2_dp
 
    !> A run in hand. Not to be copied.
@@ -55,6 +56,7 @@ module asperity_simulation
       real(dp) :: residual = 0.0_dp                 !! of the solver that did not, or of the normal one
       real(dp) :: allowed = 0.0_dp                  !! of that residual
       logical :: told_passes = .false.              !! a warning has told of passes that did not settle
+      logical :: told_way = .false.                 !! a warning has told of a pull that moves the road far
       character(:), allocatable :: warnings         !! new ones, a line each; the caller clears them
       real(dp) :: drive_force(2) = 0.0_dp           !! horizontal force on the rubber, N
       type(stick_slip_watch_type) :: watch          !! what has been seen of the mean slip
@@ -173,6 +175,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(solver_result_type) :: outcome, rubbing
       real(dp) :: level
+      character(:), allocatable :: message
       integer(int64) :: start, now, rate
 
       call guess_road(plan, [self%row%road_x, self%row%road_y], self%velocity)
@@ -207,8 +210,11 @@ contains
             self%reason = trim(self%reason)//' before the tractions settled'
          if (self%tangential%slides_off) self%reason = pull_outcome(plan, self%tangential)
       end if
-      if (self%frictional) call take_road(plan, self%schedule, self%tangential, &
-         [self%row%road_x, self%row%road_y], self%velocity)
+      if (self%frictional) then
+         call take_road(plan, self%schedule, self%tangential, [self%row%road_x, self%row%road_y], self%velocity)
+         call watch_way(plan, self%grid, [self%row%road_x, self%row%road_y], self%told_way, message)
+         call add_warning(self, plan, message)
+      end if
 
       if (self%rubs() .and. .not. plan%steady) call look_at_passes(self, plan)
       if (.not. plan%steady) call commit_step(self, level)
@@ -288,8 +294,8 @@ contains
       row%sliding_speed = norm2(self%velocity)
    end subroutine fill_steady
 
-   !> A row whose passes have not settled has not converged. Where the case limits the passes, a
-   !> warning tells of what remains.
+   !> A row whose passes leave more than the case allows has not converged. Where the case allows
+   !> much, a warning tells of what remains.
    subroutine look_at_passes(self, plan)
       type(simulation_type), intent(inout) :: self
       type(planned_row_type), intent(in) :: plan
@@ -297,7 +303,8 @@ contains
 
       associate (solver => self%case%solver, left => self%passes%residual)
          if (.not. self%converged .or. left <= solver%tolerance) return
-         if (solver%passes > 0) self%allowed = huge(1.0_dp)
+         if (solver%passes > 0) self%allowed = max(self%allowed, large_mismatch)
+         if (solver%coupling_tolerance > 0.0_dp) self%allowed = max(solver%tolerance, solver%coupling_tolerance)
          advice = advice_on_passes(self)
          if (.not. left <= self%allowed) then
             self%converged = .false.

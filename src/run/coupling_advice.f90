@@ -31,10 +31,11 @@ contains
             '1/coefficient, where friction holds any force uphill and there may be no solution: take a '// &
             'smoother road or a lower coefficient'
       else if (self%case%solver%passes > 0) then
-         advice = 'Allow more passes (passes = 0 goes on until they settle)'
+         advice = 'Allow more passes (passes = 0 goes on until they settle), or more of what remains '// &
+            '(coupling_tolerance)'
       else
-         advice = 'A mass (density) may help, shorter steps seldom do; a limit, such as passes = 30, goes on '// &
-            'with what remains and tells it in residual_coupling'
+         advice = 'A mass (density) may help, shorter steps seldom do; coupling_tolerance lets a '// &
+            'run go on with what remains, which residual_coupling tells'
       end if
    end function advice_on_passes
 

@@ -7,13 +7,14 @@
 !> solver returns without the guess.
 module pulled_road
    use asperity_precision, only : dp
+   use regular_grid, only : grid_type
    use asperity_schedule, only : planned_row_type, schedule_type
    use tangential_state, only : tangential_state_type
    use text_tools, only : to_text
    implicit none
    private
 
-   public :: drive_direction, guess_road, pull_outcome, take_road
+   public :: drive_direction, guess_road, pull_outcome, take_road, watch_way
 
 contains
 
@@ -70,6 +71,32 @@ contains
          plan%velocity_y = velocity(2)
       end if
    end subroutine take_road
+
+   !> Warn once where a pull moves the road so far in a step that the contact is not followed. The steps of
+   !> a road that is driven are known beforehand (module `case_phases`); those of a pulled one are not.
+   subroutine watch_way(plan, grid, road, told, message)
+      type(planned_row_type), intent(in) :: plan
+      type(grid_type), intent(in) :: grid
+      real(dp), intent(in) :: road(2)               !! displacement of the road at the last row, m
+      logical, intent(inout) :: told                !! the warning has been given
+      character(:), allocatable, intent(out) :: message
+      real(dp), parameter :: followed = 1.0_dp      !! cells per step
+      real(dp) :: cells
+
+      message = ''
+      if (told .or. .not. any(plan%pulled)) return
+      cells = abs(plan%road_x - road(1))/grid%dx
+      if (grid%ny > 1) cells = max(cells, abs(plan%road_y - road(2))/grid%dy)
+      if (cells <= followed) return
+      told = .true.
+      message = 'the pull moves the road by '//to_text(cells)//' cells in a step; the contact is well '// &
+         'followed up to one cell per step: '
+      if (plan%dt > 0.0_dp) then
+         message = message//'dt = '//to_text(plan%dt/cells)//' s'
+      else
+         message = message//'let the pull grow along a ramp instead of at once'
+      end if
+   end subroutine watch_way
 
    !> Why a row whose pull the friction does not hold has no solution.
    function pull_outcome(plan, tangential) result(reason)

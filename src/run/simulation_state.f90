@@ -74,6 +74,7 @@ contains
       call table%add('stick_slip/turns', sim%watch%turns, 'alternations of that change')
       call table%add('passes/reported', sim%told_passes, &
          'passes that did not settle have been warned of')
+      call table%add('pull/reported', sim%told_way, 'a pull that moves the road far has been warned of')
       call table%add('passes/first_mismatch', sim%first_mismatch, '1', &
          'mismatch that the first pass of the last step left')
 
