@@ -40,7 +40,7 @@ module coupled_passes
 
    public :: carry, coupled_passes_type, new_coupled_passes
 
-   integer, parameter, public :: most_passes = 200      !! where the case leaves the number open
+   integer, parameter, public :: most_passes = 400      !! where the case leaves the number open
 
    integer, parameter :: pairs = 6                      !! of the acceleration
    real(dp), parameter :: largest_factor = 1.0e3_dp     !! of the acceleration; a larger one is round-off
@@ -170,12 +170,12 @@ contains
    subroutine choose_place(self, state, control)
       class(coupled_passes_type), intent(inout) :: self
       class(contact_state_type), intent(in) :: state
-      type(pass_control_type), intent(in) :: control
+      type(pass_control_type), intent(inout) :: control
       real(dp) :: motion(2)
       integer :: c, j
 
       if (control%best_yet) self%best_place(:, :, :) = self%place
-      if (control%forget .or. control%plain) call self%mixing%forget()
+      if (control%forget) call self%mixing%forget()
       if (control%go_back) then
          self%place(:, :, :) = self%best_place
          return
@@ -193,8 +193,13 @@ contains
       do j = 1, state%grid%ny
          self%residuals(:, :, j) = self%residuals(:, :, j) - self%place(:, :, j)
       end do
-      call self%mixing%step([1.0_dp, 1.0_dp], self%residuals, self%place, plain=.false., &
-         damping=control%damping)
+      if (control%plain) then
+         call control%follow(self%mixing%turn(self%residuals))
+         call self%mixing%glide(self%residuals, self%place, control%damping, control%momentum)
+      else
+         call self%mixing%step([1.0_dp, 1.0_dp], self%residuals, self%place, plain=.false., &
+            damping=control%damping)
+      end if
    end subroutine choose_place
 
    !> What remains of the coupling: by how much the road at U_T differs from the road solved on. The

@@ -10,10 +10,15 @@
 !>   share falls tenfold, and the accuracy may become better than the tolerance.
 !> * An extrapolation goes astray. Where the mismatch is ten times the least so far, the
 !>   acceleration forgets what it has seen.
-!> * The passes go round in circles. Where the mismatch has not been halved in `stalled` passes, they
-!>   go back to the best place, and on in short steps without acceleration; after the next stall with
-!>   acceleration again and shorter steps. Cells that let go make differences of residuals that the
-!>   acceleration is led astray by, while short plain steps settle.
+!> * The passes do not come closer: the mismatch has not been halved in `stalled` passes. Either cells
+!>   that stick, slip and open in turn make differences that lead the acceleration astray; short plain
+!>   steps settle then. Or the state that the rows have followed ends (a fold: the contact will snap to
+!>   another one). The residual then keeps its direction and hardly changes from pass to pass, while each
+!>   step leads a little further to the other state. The passes go back to the best place and on without
+!>   acceleration (`plain`), with a momentum that grows as long as the residual keeps its direction and
+!>   vanishes where it turns. When the mismatch has fallen to a tenth, or after `stalled_plain` passes,
+!>   the acceleration begins anew from the place reached; what was the best place before is forgotten,
+!>   since it belongs to the state that ended.
 module pass_control
    use asperity_precision, only : dp
    implicit none
@@ -29,7 +34,11 @@ module pass_control
    real(dp), parameter :: slow = 0.5_dp             !! a mismatch above this part of the last falls slowly
    real(dp), parameter :: slow_damping = 0.5_dp
    real(dp), parameter :: astray = 10.0_dp
-   real(dp), parameter :: shorter = 0.3_dp, shortest = 0.05_dp    !! steps after a stall
+   real(dp), parameter :: first_plain = 0.3_dp, shortest = 0.05_dp, longest = 0.5_dp  !! plain steps
+   real(dp), parameter :: grows = 1.2_dp, shrinks = 0.5_dp, gathers = 0.7_dp          !! how they change
+   real(dp), parameter :: most_momentum = 0.95_dp
+   real(dp), parameter :: straight = 0.8_dp, bent = 0.2_dp  !! cosine of the angle between two residuals
+   real(dp), parameter :: gained = 0.1_dp           !! part of the first mismatch at which plain steps end
    integer, parameter :: patience = 2
    integer, parameter :: stalled = 15, stalled_plain = 60
 
@@ -37,13 +46,15 @@ module pass_control
    type :: pass_control_type
       real(dp) :: accuracy = coarsest               !! of the solves of the next pass
       real(dp) :: damping = 1.0_dp                  !! of the step to the next place
+      real(dp) :: momentum = 0.0_dp                 !! of the plain steps
       logical :: forget = .false.                   !! the acceleration starts anew
       logical :: go_back = .false.                  !! to the best place so far
       logical :: plain = .false.                    !! the steps are not accelerated
       logical :: best_yet = .false.                 !! the last pass was the best
       real(dp), private :: tolerance = 0.0_dp
       real(dp), private :: share = usual_share
-      real(dp), private :: length = 1.0_dp          !! of all steps, less than 1 after a stall
+      real(dp), private :: length = 1.0_dp          !! of plain steps
+      real(dp), private :: plain_start = 0.0_dp     !! mismatch where the plain steps began
       real(dp), private :: least = huge(1.0_dp)     !! mismatch so far
       real(dp), private :: last = huge(1.0_dp)      !! mismatch
       real(dp), private :: milestone = huge(1.0_dp) !! mismatch that must be halved
@@ -53,6 +64,7 @@ module pass_control
    contains
       procedure :: start
       procedure :: judge
+      procedure :: follow
    end type pass_control_type
 
 contains
@@ -73,8 +85,8 @@ contains
       real(dp), intent(in) :: mismatch
 
       self%seen = self%seen + 1
-      self%damping = self%length
-      if (self%seen > 2 .and. mismatch > slow*self%last .and. .not. self%plain) self%damping = slow_damping*self%length
+      self%damping = 1.0_dp
+      if (self%seen > 2 .and. mismatch > slow*self%last) self%damping = slow_damping
       self%last = mismatch
 
       self%idle = self%idle + 1
@@ -87,7 +99,8 @@ contains
       if (self%share >= usual_share) self%accuracy = max(self%accuracy, self%tolerance)
       self%accuracy = min(self%accuracy, max(coarsest, self%tolerance))
 
-      self%forget = mismatch > astray*self%least
+      self%forget = mismatch > astray*self%least .and. .not. self%plain
+      self%go_back = .false.
       self%best_yet = mismatch < self%least
       self%least = min(self%least, mismatch)
       self%since = self%since + 1
@@ -95,14 +108,55 @@ contains
          self%milestone = mismatch
          self%since = 0
       end if
-      self%go_back = self%since >= merge(stalled_plain, stalled, self%plain)
-      if (self%go_back) then
-         self%forget = .true.
-         self%since = 0
-         self%plain = .not. self%plain
-         if (self%plain) self%length = max(shorter*self%length, shortest)
-         self%damping = self%length
+      if (self%plain) then
+         if (self%since >= stalled_plain .or. mismatch < gained*self%plain_start) call accelerate(self, mismatch)
+      else if (self%since >= stalled) then
+         call go_plain(self)
       end if
    end subroutine judge
+
+   !> Go back to the best place, and on in plain steps.
+   pure subroutine go_plain(self)
+      class(pass_control_type), intent(inout) :: self
+
+      self%plain = .true.
+      self%go_back = .true.
+      self%forget = .true.
+      self%since = 0
+      self%length = first_plain
+      self%damping = self%length
+      self%momentum = 0.0_dp
+      self%plain_start = self%least
+   end subroutine go_plain
+
+   !> End the plain steps: the acceleration begins anew from here.
+   pure subroutine accelerate(self, mismatch)
+      class(pass_control_type), intent(inout) :: self
+      real(dp), intent(in) :: mismatch
+
+      self%plain = .false.
+      self%forget = .true.
+      self%best_yet = .true.
+      self%least = mismatch
+      self%milestone = mismatch
+      self%since = 0
+      self%seen = 0
+   end subroutine accelerate
+
+   !> Before a plain step: steps and momentum grow while the residual keeps its direction, and fall where it
+   !> turns.
+   pure subroutine follow(self, cosine)
+      class(pass_control_type), intent(inout) :: self
+      real(dp), intent(in) :: cosine                !! of the angle between the last two residuals
+
+      if (cosine > straight) then
+         self%momentum = min(1.0_dp - gathers*(1.0_dp - self%momentum), most_momentum)
+         self%length = min(grows*self%length, longest)
+      else if (cosine < bent) then
+         self%momentum = 0.0_dp
+         self%length = max(shrinks*self%length, shortest)
+      end if
+      self%damping = self%length
+   end subroutine follow
 
 end module pass_control

@@ -41,7 +41,9 @@ module anderson
       real(dp), allocatable, private :: last_f(:, :, :), last_g(:, :, :)
    contains
       procedure :: forget
+      procedure :: glide
       procedure :: step
+      procedure :: turn
    end type anderson_type
 
 contains
@@ -94,6 +96,65 @@ contains
          call combine_row(self, gamma, left, j, f(:, :, j), x(:, :, j))
       end do
    end subroutine step
+
+   !> The next iterate without acceleration but with momentum: x + b f + m (x - the last x). What all
+   !> residuals have in common is followed in steps b/(1 - m) long, while a part that changes its sign from
+   !> one iterate to the next is damped as by b alone. What has been learnt is forgotten.
+   subroutine glide(self, f, x, damping, momentum)
+      class(anderson_type), intent(inout) :: self
+      real(dp), intent(in) :: f(self%nx, self%components, self%ny)  !! g(x) - x
+      real(dp), intent(inout) :: x(self%nx, self%components, self%ny)   !! in: x; out: the next
+      real(dp), intent(in) :: damping                !! b, from 0 to 1
+      real(dp), intent(in) :: momentum               !! m, from 0 to 1
+      real(dp) :: m
+      integer :: j
+
+      m = merge(momentum, 0.0_dp, self%begun)
+      call self%forget()
+      self%begun = .true.
+      !$omp parallel do default(none) shared(self, f, x, damping, m) private(j) num_threads(self%threads)
+      do j = 1, self%ny
+         call glide_row(self, damping, m, j, f(:, :, j), x(:, :, j))
+      end do
+   end subroutine glide
+
+   !> A row of it: the last x is the last g less the last f.
+   subroutine glide_row(self, damping, m, j, f, x)
+      class(anderson_type), intent(inout) :: self
+      real(dp), intent(in) :: damping, m
+      integer, intent(in) :: j
+      real(dp), intent(in) :: f(self%nx, self%components)
+      real(dp), intent(inout) :: x(self%nx, self%components)
+      real(dp) :: next(self%nx, self%components)
+
+      next = x + damping*f
+      if (m > 0.0_dp) next = next + m*(x - (self%last_g(:, :, j) - self%last_f(:, :, j)))
+      self%last_f(:, :, j) = f
+      self%last_g(:, :, j) = x + f
+      x = next
+   end subroutine glide_row
+
+   !> The cosine of the angle between a residual and the last one; 0 where there is none.
+   function turn(self, f) result(cosine)
+      class(anderson_type), intent(in) :: self
+      real(dp), intent(in) :: f(self%nx, self%components, self%ny)  !! g(x) - x
+      real(dp) :: cosine
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: sums(3)
+      integer :: j
+
+      cosine = 0.0_dp
+      if (.not. self%begun) return
+      allocate (rows(3, self%ny))
+      !$omp parallel do default(none) shared(self, f, rows) private(j) num_threads(self%threads)
+      do j = 1, self%ny
+         rows(1, j) = sum(f(:, :, j)*self%last_f(:, :, j))
+         rows(2, j) = sum(f(:, :, j)**2)
+         rows(3, j) = sum(self%last_f(:, :, j)**2)
+      end do
+      sums = global_sum([sum(rows(1, :)), sum(rows(2, :)), sum(rows(3, :))])
+      if (min(sums(2), sums(3)) > 0.0_dp) cosine = sums(1)/(sqrt(sums(2))*sqrt(sums(3)))
+   end function turn
 
    !> A row of the next iterate, with g = x + f: g - left f - sum gamma (dg - left df).
    subroutine combine_row(self, gamma, left, j, f, x)
