@@ -80,7 +80,7 @@ def run(case: asperity.Case, path: Path) -> asperity.Run:
         found = asperity.open(path)
         if found.finished and found.input == str(case):
             return found
-    return asperity.run(case, output=path, threads=jobs)
+    return asperity.run(case, output=path, threads=jobs, overwrite=True)
 
 
 def shortened(case: asperity.Case, cells: int = 64, steps: int = 20) -> asperity.Case:
