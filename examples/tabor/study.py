@@ -57,7 +57,8 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 def check(data: dict[str, Any], quick: bool) -> None:
     """Hold both potentials against the theory."""
     exact = data["theory"]
-    # The area counts whole cells: at 96 a side, about 20 over the radius, that is 2 %; at 288 under 1 %.
+    # The area counts whole cells: at 96 per side, about 20 over the radius, that is 2 %; at 288
+    # it is less than 1 %.
     error = np.abs(data["maugis_dugdale"] / exact - 1).max()
     assert error < (0.02 if quick else 0.01), f"Maugis-Dugdale is {error:.2%} off its theory"
     # Another shape of the attraction at the same energy and range: between DMT and JKR, 1.5 %.
