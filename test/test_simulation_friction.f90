@@ -277,7 +277,7 @@ contains
             '&material poisson = 0.5, shear_modulus = 1e6, thickness = 2e-2, density = '//density// &
             ' /'//nl//'&friction law = ''coulomb'', coefficient = 0.5 /'//nl// &
             '&phase pressure = 0.15e6 /'//nl//'&phase velocity_x = 1, duration = 3e-3, steps = 60 /' &
-            //nl//'&solver interpolation = ''linear'', passes = '//to_text(passes)//', coupling_tolerance = 1 /', &
+            //nl//'&solver interpolation = ''linear'', passes = '//to_text(passes)//', coupling_tolerance = 100 /', &
             'stick-slip, density '//density, record)
       end subroutine slide
 

@@ -261,7 +261,7 @@ def block(thickness, density, passes, steps, *, cells=48, duration=3e-3):
         &friction law = 'coulomb', coefficient = 0.5 /
         &phase pressure = 0.15e6 /
         &phase velocity_x = 1, duration = {duration}, steps = {steps} /
-        &solver passes = {passes}, coupling_tolerance = 1 /
+        &solver passes = {passes}, coupling_tolerance = 100 /
         """, f"block_{thickness}_{density}_{passes}_{steps}_{cells}")
 
 

@@ -49,7 +49,7 @@ def _slide(folder: Path, name: str, quick: bool) -> dict[str, Any]:
     if name.startswith(ELASTIC):
         del case.material.prony_g, case.material.prony_tau
     case.solver.passes = passes
-    case.solver.coupling_tolerance = 1.0    # what too few passes leave is the subject
+    case.solver.coupling_tolerance = 100.0    # what too few passes leave is the subject
     case.material.density = density
     case.phase[1].steps *= finer
     with warnings.catch_warnings(record=True) as said:
@@ -75,7 +75,7 @@ def _creep(folder: Path, name: str) -> dict[str, Any]:
     passes, finer, friction = LOCAL[name]
     case = asperity.Case.read(HERE / "local.nml")
     case.solver.passes = passes
-    case.solver.coupling_tolerance = 1.0    # what too few passes leave is the subject
+    case.solver.coupling_tolerance = 100.0    # what too few passes leave is the subject
     case.friction.coefficient = friction
     case.phase[1].steps *= finer
     with warnings.catch_warnings():

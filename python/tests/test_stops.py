@@ -72,7 +72,7 @@ SWINGING = """
 &friction law = 'coulomb', coefficient = 0.5 /
 &phase pressure = 0.15e6 /
 &phase velocity_x = 1, duration = 3e-3, steps = 60 /
-&solver passes = 1, coupling_tolerance = 1, interpolation = 'linear' /
+&solver passes = 1, coupling_tolerance = 100, interpolation = 'linear' /
 """
 
 OVER_THE_EDGE = """

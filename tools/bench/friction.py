@@ -32,7 +32,7 @@ SPHERE = """
 &friction law = 'coulomb', coefficient = 0.3, slope_effect = .false. /
 &phase force = 9.196 /
 &phase velocity_x = 1, duration = {shift}, steps = 1 /
-&solver tolerance = {tolerance}, passes = 1, coupling_tolerance = 1, threads = {threads},
+&solver tolerance = {tolerance}, passes = 1, coupling_tolerance = 100, threads = {threads},
    method = '{method}', max_iterations = 20000 /
 """
 
