@@ -145,7 +145,7 @@ contains
       call limit%start(command%time_limit)
       call run%open(case, command%restart, command%overwrite, error)
       if (.not. allocated(error)) then
-         call progress%start(run%rows, max(run%sim%schedule%row + 1, 0), command%quiet)
+         call progress%start(run%rows, max(run%sim%state%schedule%row + 1, 0), command%quiet)
          do while (.not. run%finished)
             call tell_warnings(run, progress)
             if (stop_signal() /= 0) then
@@ -165,7 +165,7 @@ contains
             call limit%step_begins()
             call run%step(error)
             call limit%step_ends(.false.)
-            if (run%sim%schedule%row >= 0) call progress%update(run%sim%row)
+            if (run%sim%state%schedule%row >= 0) call progress%update(run%sim%state%row)
             if (allocated(error)) exit
          end do
          call tell_warnings(run, progress)
@@ -185,11 +185,11 @@ contains
 
       call run%interrupt(error)
       if (allocated(error)) return
-      if (run%sim%schedule%row < 0) then
+      if (run%sim%state%schedule%row < 0) then
          call fail(error, status, 'asperity: '//reason//' before the first row: nothing was computed, '// &
             'and there is no checkpoint')
       else
-         call fail(error, status, 'asperity: '//reason//' after step '//to_text(run%sim%row%step)// &
+         call fail(error, status, 'asperity: '//reason//' after step '//to_text(run%sim%state%row%step)// &
             '; --restart continues from there')
       end if
    end subroutine stop_run

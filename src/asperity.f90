@@ -5,7 +5,8 @@
 !> Below these stand the parts, which can be used alone:
 !>
 !> * grids (`new_grid`) and surfaces (`new_height`, `height_statistics`, `height_psd`);
-!> * operators (`new_normal_operator`, `new_tangential_operator`): displacements from tractions;
+!> * solids (`normal_half_space`, `tangential_half_space`) and operators (`new_convolution`): displacements
+!>   from tractions;
 !> * solvers: normal contact (`new_normal_solver`, or `new_contact_solver` by the name of a method),
 !>   adhesion (`new_adhesion_solver`), friction (`new_friction_solver`); each returns a record
 !>   (`solver_result_type`);
@@ -22,11 +23,12 @@ module asperity
    use case_settings, only : case_type
    use contact_solver, only : contact_solver_type
    use asperity_errors, only : error_convergence, error_file, error_input, error_type
-   use fft_conv, only : convolution_type, new_normal_operator, new_tangential_operator
+   use fft_conv, only : convolution_type, new_convolution
    use friction_cg, only : friction_fields_type, friction_solver_type, new_friction_solver
    use friction_law, only : friction_law_type, new_friction_law
    use history_row, only : history_row_type
    use asperity_interpolation, only : displaced, interpolation_type, new_interpolation, shifted
+   use kernels, only : kernel_type, normal_half_space, tangential_half_space
    use normal_cg, only : new_normal_solver, normal_solver_type
    use normal_solvers, only : new_contact_solver
    use normal_state, only : control_approach, control_pressure, normal_problem_type

@@ -29,6 +29,9 @@ program main
    use test_surface, only : run_surface
    use test_viscoelastic_energy, only : run_viscoelastic_energy
    use test_xdmf, only : run_xdmf
+   use test_field_sums, only : run_field_sums
+   use test_kernels, only : run_kernels
+   use test_proposal, only : run_proposal
    use test_zener, only : run_zener
    use test_normal_cg, only : run_normal_cg
    use test_simulation, only : run_simulation
@@ -48,7 +51,9 @@ program main
       stop
    end if
    if (wanted('base')) call run_base()
+   if (wanted('field_sums')) call run_field_sums()
    if (wanted('fft_conv')) call run_fft_conv()
+   if (wanted('kernels')) call run_kernels()
    if (wanted('hdf5_file')) call run_hdf5_file()
    if (wanted('prony')) call run_prony()
    if (wanted('surface')) call run_surface()
@@ -62,6 +67,7 @@ program main
    if (wanted('result_file')) call run_result_file()
    if (wanted('checkpoint')) call run_checkpoint()
    if (wanted('simulation')) call run_simulation()
+   if (wanted('proposal')) call run_proposal()
    if (wanted('simulation_sliding')) call run_simulation_sliding()
    if (wanted('steady')) call run_steady()
    if (wanted('coupled_passes')) call run_coupled_passes()

@@ -2,11 +2,12 @@
 module normal_fixture
    use check, only : check_no_error, check_that
    use asperity_errors, only : error_type
-   use fft_conv, only : convolution_type, new_normal_operator
+   use fft_conv, only : convolution_type, new_convolution
    use contact_solver, only : contact_solver_type
    use normal_solvers, only : new_contact_solver
    use normal_state, only : control_pressure, normal_problem_type
    use asperity_parallel, only : set_threads, thread_count
+   use kernels, only : normal_half_space
    use asperity_precision, only : dp, pi
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
@@ -57,7 +58,7 @@ contains
          solution%pressure = start
          task%warm = .true.
       end if
-      call new_contact_solver(solver, method, grid, poisson, error, mixed)
+      call new_contact_solver(solver, method, grid, normal_half_space(poisson), error, mixed)
       call check_no_error(error, 'a solver')
       call solver%solve(task, height, solution%pressure, solution%gap, solution%level, &
          solution%outcome, history)
@@ -142,7 +143,7 @@ contains
       real(dp), allocatable :: g(:, :)
 
       allocate (g(grid%nx, grid%ny))
-      call new_normal_operator(operator, grid, poisson, error)
+      call new_convolution(operator, grid, normal_half_space(poisson), error)
       call check_no_error(error, 'an operator')
       call operator%apply(pressure, g)
       call operator%destroy()
@@ -163,7 +164,7 @@ contains
       real(dp), allocatable :: difference(:, :)
 
       difference = p - q
-      call new_normal_operator(operator, grid, poisson, error)
+      call new_convolution(operator, grid, normal_half_space(poisson), error)
       call check_no_error(error, 'an operator')
       call operator%quadratic_form(difference, d)
       call operator%destroy()

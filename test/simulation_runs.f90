@@ -60,16 +60,16 @@ contains
          call sim%advance(error)
          if (allocated(error)) exit
          converged = converged .and. sim%converged
-         record%rows(k) = sim%row
-         record%drag(:, k) = sim%drive_force
+         record%rows(k) = sim%state%row
+         record%drag(:, k) = sim%state%drive_force
       end do
       call check_no_error(error, what//': steps')
       call check_that(converged, what//': converged')
-      call check_that(sim%finished .and. sim%row%step == expected - 1, &
+      call check_that(sim%finished .and. sim%state%row%step == expected - 1, &
          what//': as many rows as were counted')
-      record%pressure = sim%pressure
-      record%gap = sim%gap
-      record%displacement = sim%displacement
+      record%pressure = sim%state%pressure
+      record%gap = sim%state%gap
+      record%displacement = sim%state%displacement
       record%warnings = sim%warnings
       call sim%destroy()
    end subroutine run_case

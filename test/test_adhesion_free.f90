@@ -12,6 +12,7 @@ module test_adhesion_free
    use asperity_errors, only : error_type
    use influence, only : love_normal
    use asperity_parallel, only : set_threads
+   use kernels, only : normal_half_space
    use asperity_precision, only : dp, pi
    use regular_grid, only : boundary_free, grid_type, new_grid
    use solver_result, only : solver_result_type
@@ -99,7 +100,7 @@ contains
       integer :: i, j
 
       grid = new_grid(27, 22, 5.0_dp, 6.0_dp, boundary_free)
-      call new_adhesion_solver(solver, grid, poisson, error, preconditioner=preconditioner)
+      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error, preconditioner=preconditioner)
       call check_no_error(error, 'solver')
       height = paraboloid(grid)
       do j = 1, grid%ny
@@ -162,7 +163,7 @@ contains
       real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :)
 
       grid = new_grid(n, n, side, side, boundary_free)
-      call new_adhesion_solver(solver, grid, poisson, error)
+      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
       height = paraboloid(grid)
       call new_adhesion_potential(problem%potential, name, 1.0_dp/pi, range, error)
       problem%modulus = modulus
@@ -297,7 +298,7 @@ contains
       range = 2.0_dp/(pi*lambda)
       side = max(4.0_dp, 2.6_dp*sqrt(2*range))
       grid = new_grid(n, n, side, side, boundary_free)
-      call new_adhesion_solver(solver, grid, poisson, error)
+      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
       height = paraboloid(grid)
       call new_adhesion_potential(problem%potential, name, 1.0_dp/pi, range, error)
       problem%modulus = modulus
@@ -328,7 +329,7 @@ contains
       integer :: k, step
 
       grid = new_grid(24, 31, 5.0_dp, 6.0_dp, boundary_free)
-      call new_adhesion_solver(solver, grid, poisson, error)
+      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
       height = paraboloid(grid)
       call new_adhesion_potential(problem%potential, 'exponential', 1.0_dp/pi, 0.5_dp, error)
       problem%modulus = modulus
@@ -388,7 +389,7 @@ contains
       real(dp) :: level
 
       grid = new_grid(40, 40, 5.0_dp, 5.0_dp, boundary_free)
-      call new_adhesion_solver(solver, grid, poisson, error)
+      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
       height = paraboloid(grid)
       call new_adhesion_potential(problem%potential, 'exponential', 1.0_dp/pi, 0.4_dp, error)
       problem%modulus = modulus
@@ -407,7 +408,7 @@ contains
          'lets go: '//trim(outcome%reason))
       call solver%destroy()
       grid = new_grid(40, 1, 5.0_dp, 5.0_dp, boundary_free)
-      call new_adhesion_solver(solver, grid, poisson, error)
+      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
       call check_error(error, 'ny > 1', 'free line contact')
    end subroutine test_outcomes
 

@@ -124,21 +124,21 @@ contains
       call check_no_error(error, 'flat block')
       if (allocated(error)) return
       do while (.not. sim%finished)
-         before = sim%row%time
+         before = sim%state%row%time
          call sim%advance(error)
          if (allocated(error) .or. .not. sim%converged) exit
-         if (sim%row%time - before < 0.1_dp*period/steps) cycle          ! a jump
-         call move(exact, before, sim%row%time - before)
-         sums = sums + [(sim%tangential%displacement(1, 1, 1) - exact%y(1))**2, &
-            (sim%tangential%block%speed(1) - exact%y(2))**2, exact%y(1)**2, exact%y(2)**2]
+         if (sim%state%row%time - before < 0.1_dp*period/steps) cycle          ! a jump
+         call move(exact, before, sim%state%row%time - before)
+         sums = sums + [(sim%state%tangential%displacement(1, 1, 1) - exact%y(1))**2, &
+            (sim%state%tangential%block%speed(1) - exact%y(2))**2, exact%y(1)**2, exact%y(2)**2]
          n = n + 1
       end do
       call check_no_error(error, 'flat block')
       call check_that(sim%converged .and. n == 12*steps, 'flat block: all rows')
       error_u = sqrt(sums(1)/sums(3))
       error_v = sqrt(sums(2)/sums(4))
-      lost = sim%row%dissipated_numerical
-      viscous = sim%row%dissipated_viscous
+      lost = sim%state%row%dissipated_numerical
+      viscous = sim%state%row%dissipated_viscous
       call sim%destroy()
    end subroutine compare
 

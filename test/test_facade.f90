@@ -1,7 +1,7 @@
 !> The library as another program sees it: everything through the one module.
 module test_facade
    use asperity, only : version_number, boundary_free, dp, default_surface, error_type, grid_type, &
-      new_grid, new_height, new_normal_solver, normal_problem_type, normal_solver_type, &
+      new_grid, new_height, new_normal_solver, normal_half_space, normal_problem_type, normal_solver_type, &
       solver_result_type, surface_settings_type
    use check, only : begin_suite, check_close, check_no_error, check_that
    implicit none
@@ -29,7 +29,7 @@ contains
       term%radius = 50e-3_dp
       call new_height(grid, [term], height, error)
       call check_no_error(error, 'height')
-      call new_normal_solver(solver, grid, 0.42_dp, error)
+      call new_normal_solver(solver, grid, normal_half_space(0.42_dp), error)
       call check_no_error(error, 'solver')
       allocate (pressure(96, 96), gap(96, 96), source=0.0_dp)
       problem%modulus = 100e6_dp

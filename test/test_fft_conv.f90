@@ -2,9 +2,9 @@
 module test_fft_conv
    use check, only : begin_suite, check_close, check_no_error, check_that
    use asperity_errors, only : error_type
-   use fft_conv, only : convolution_type, new_normal_operator, new_symbol_operator, &
-      new_tangential_operator
+   use fft_conv, only : convolution_type, new_convolution, new_symbol_operator
    use influence, only : love_normal, love_tangential, transform_length
+   use kernels, only : normal_half_space, tangential_half_space
    use asperity_precision, only : dp, pi
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    implicit none
@@ -91,9 +91,9 @@ contains
 
       loose = merge(1e-6_dp, 0.0_dp, single)
       grid = new_grid(nx, ny, lx, ly, boundary_periodic)
-      call new_normal_operator(normal, grid, nu, error, single)
+      call new_convolution(normal, grid, normal_half_space(nu), error, single)
       call check_no_error(error, 'normal operator')
-      call new_tangential_operator(tangential, grid, nu, h, error, single)
+      call new_convolution(tangential, grid, tangential_half_space(nu, h), error, single)
       call check_no_error(error, 'tangential operator')
       allocate (p(nx, ny), py(nx, ny), u(nx, ny), uy(nx, ny), w(nx, ny))
       do ky = -min(2, (ny - 1)/2), min(2, (ny - 1)/2)
@@ -151,8 +151,8 @@ contains
 
       loose = merge(1e-6_dp, 0.0_dp, single)
       grid = new_grid(nx, ny, 1.0_dp, 1.7_dp, boundary_free)
-      call new_normal_operator(normal, grid, nu, error, single)
-      call new_tangential_operator(tangential, grid, nu, 0.0_dp, error, single)
+      call new_convolution(normal, grid, normal_half_space(nu), error, single)
+      call new_convolution(tangential, grid, tangential_half_space(nu), error, single)
       allocate (p(nx, ny), py(nx, ny), u(nx, ny), ux(nx, ny), uy(nx, ny))
       do j = 1, ny
          do i = 1, nx
@@ -199,7 +199,7 @@ contains
 
       loose = merge(1e-6_dp, 0.0_dp, single)
       grid = new_grid(12, 7, 2.0_dp, 1.0_dp, boundary_periodic)
-      call new_normal_operator(normal, grid, 0.5_dp, error, single)
+      call new_convolution(normal, grid, normal_half_space(0.5_dp), error, single)
       do j = 1, 7
          do i = 1, 12
             p(i, j) = sin(0.7_dp*i*j)
@@ -228,8 +228,8 @@ contains
       integer :: i, j, k
 
       grid = new_grid(11, 6, 2e-9_dp, 1e-9_dp, boundary_free)
-      call new_normal_operator(exact, grid, 0.3_dp, error)
-      call new_normal_operator(single, grid, 0.3_dp, error, single=.true.)
+      call new_convolution(exact, grid, normal_half_space(0.3_dp), error)
+      call new_convolution(single, grid, normal_half_space(0.3_dp), error, single=.true.)
       do k = -60, 60, 30
          size = 10.0_dp**k
          do j = 1, 6
@@ -262,8 +262,8 @@ contains
 
       large = new_grid(n, n, real(n, dp), real(n, dp), boundary_periodic)
       small = new_grid(m, m, real(m, dp), real(m, dp), boundary_free)
-      call new_normal_operator(periodic, large, 0.2_dp, error)
-      call new_normal_operator(free, small, 0.2_dp, error)
+      call new_convolution(periodic, large, normal_half_space(0.2_dp), error)
+      call new_convolution(free, small, normal_half_space(0.2_dp), error)
       allocate (p(n, n), u(n, n), source=0.0_dp)
       ! Smooth, so that the discretisation matters little, and small beside the period.
       do j = 1, m

@@ -2,12 +2,14 @@
 module test_friction_cg
    use check, only : begin_suite, check_close, check_no_error, check_that
    use asperity_errors, only : error_type
-   use fft_conv, only : convolution_type, new_tangential_operator
+   use fft_conv, only : convolution_type, new_convolution
    use friction_cg, only : friction_fast, friction_fields_type, friction_gradient, &
-      friction_solver_type, friction_thesis, new_friction_solver, set_mean_compliance
+      friction_solver_type, friction_thesis, new_friction_solver
    use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type, &
-      largest_excess, new_friction_law, return_tractions
+      new_friction_law, return_tractions
    use asperity_parallel, only : set_threads, thread_count
+   use friction_bounds, only : largest_excess
+   use kernels, only : tangential_half_space
    use asperity_precision, only : dp, int8, pi
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use solver_result, only : solver_result_type
@@ -62,9 +64,9 @@ contains
       type(error_type), allocatable :: error
 
       self%grid = new_grid(nx, ny, lx, ly, boundary)
-      call new_tangential_operator(self%operator, self%grid, poisson, thickness, error)
+      call new_convolution(self%operator, self%grid, tangential_half_space(poisson, thickness), error)
       call check_no_error(error, 'operator')
-      call new_friction_solver(self%solver, self%grid, poisson, self%operator, error)
+      call new_friction_solver(self%solver, self%grid, self%operator, error)
       call check_no_error(error, 'solver')
       allocate (self%p(nx, ny), self%contact(nx, ny))
       allocate (self%hx, self%hy, self%drive_x, self%drive_y, self%tx, self%ty, self%rx, self%ry, &
@@ -566,7 +568,7 @@ contains
             self%drive_y = 0.5_dp*drive
             do k = 1, 3
                call self%solver%destroy()
-               call new_friction_solver(self%solver, self%grid, 0.4_dp, self%operator, error, methods(k))
+               call new_friction_solver(self%solver, self%grid, self%operator, error, methods(k))
                call check_no_error(error, 'method')
                self%solver%max_iterations = 5000
                self%solver%tolerance = 1e-8_dp
@@ -742,7 +744,7 @@ contains
       self%drive_x = 0.1_dp
       call run_case(self, 'block', 1e-8_dp)
       call check_close(self%tx(3, 7), 0.1_dp/0.7_dp, 1e-8_dp, 'block: T = G DX/h')
-      call set_mean_compliance(self%operator, 0.02_dp)
+      call self%operator%set_mean_compliance(0.02_dp)
       call run_case(self, 'block with inertia', 1e-8_dp)
       measured = sum(self%tx)/size(self%tx)
       call check_close(measured, 0.1_dp/0.02_dp, 1e-7_dp, 'mean compliance set by the caller')

@@ -2,7 +2,8 @@
 module test_friction_law
    use check, only : begin_suite, check_close, check_that
    use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type, &
-      largest_excess, new_friction_law, return_tractions, unbounded
+      new_friction_law, return_tractions, unbounded
+   use friction_bounds, only : largest_excess
    use asperity_precision, only : dp, int8
    implicit none
    private

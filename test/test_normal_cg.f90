@@ -2,10 +2,11 @@
 module test_normal_cg
    use check, only : begin_suite, check_close, check_no_error, check_that
    use asperity_errors, only : error_type
-   use fft_conv, only : convolution_type, new_normal_operator
+   use fft_conv, only : convolution_type, new_convolution
    use normal_fixture, only : duality_gap, poisson, rms, rough_height, rough_problem, &
       run_problem, solution_type, unit_modulus
    use normal_state, only : control_approach, control_pressure, normal_problem_type
+   use kernels, only : normal_half_space
    use asperity_precision, only : dp, pi
    use projection, only : project_simplex
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
@@ -258,7 +259,7 @@ contains
       ! No wave at the Nyquist number, which a real transform cannot tell apart.
       call rough_height(grid, 4.0_dp, h)
       allocate (p(63, 40))
-      call new_normal_operator(operator, grid, poisson, error)
+      call new_convolution(operator, grid, normal_half_space(poisson), error)
       call operator%apply_inverse(h, p)
       call operator%destroy()
       p = unit_modulus*p

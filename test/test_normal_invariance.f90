@@ -2,10 +2,11 @@
 module test_normal_invariance
    use check, only : begin_suite, check_close, check_no_error, check_that
    use asperity_errors, only : error_type
-   use fft_conv, only : convolution_type, new_normal_operator
+   use fft_conv, only : convolution_type, new_convolution
    use normal_fixture, only : check_threads, distance, poisson, rms, rough_problem, run_problem, &
       solution_type, unit_modulus
    use normal_state, only : control_approach, normal_problem_type
+   use kernels, only : normal_half_space
    use asperity_precision, only : dp
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    implicit none
@@ -196,7 +197,7 @@ contains
             history(i, j) = 0.01_dp*sin(0.31_dp*i + 0.17_dp*j) - 0.003_dp
          end do
       end do
-      call new_normal_operator(operator, grid, poisson, error)
+      call new_convolution(operator, grid, normal_half_space(poisson), error)
       call check_no_error(error, 'an operator')
       call operator%apply(history, u)
       call operator%destroy()

@@ -2,11 +2,12 @@
 module test_normal_limits
    use check, only : begin_suite, check_close, check_no_error, check_that
    use asperity_errors, only : error_type
-   use fft_conv, only : convolution_type, new_normal_operator
+   use fft_conv, only : convolution_type, new_convolution
    use normal_cg, only : new_normal_solver, normal_solver_type
    use normal_fixture, only : duality_gap, poisson, rms, rough_height, rough_problem, run_problem, &
       solution_type, unit_modulus
    use normal_state, only : control_approach, control_pressure, normal_problem_type
+   use kernels, only : normal_half_space
    use asperity_precision, only : dp, pi
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use solver_result, only : solver_result_type
@@ -379,7 +380,7 @@ contains
       call check_that(s%pressure(33, 20) > 0.0_dp, 'the corner carries')
       call check_that(s%pressure(1, 1) <= 0.0_dp, 'the other does not')
       ! Complementarity by an operator of its own.
-      call new_normal_operator(operator, grid, poisson, error)
+      call new_convolution(operator, grid, normal_half_space(poisson), error)
       call operator%apply(s%pressure, u)
       call operator%destroy()
       u = u/unit_modulus - h - s%level
@@ -462,7 +463,7 @@ contains
       grid = new_grid(70, 48, 1.0_dp, 1.0_dp, boundary_periodic)
       call rough_height(grid, 6.0_dp, h)
       allocate (p(70, 48), gap(70, 48))
-      call new_normal_solver(solver, grid, poisson, error)
+      call new_normal_solver(solver, grid, normal_half_space(poisson), error)
       call check_no_error(error, 'a solver')
       problem%modulus = unit_modulus
       problem%rms_height = rms(h)

@@ -6,6 +6,7 @@ module test_schur
    use asperity_errors, only : error_type
    use normal_fixture, only : rough_problem, run_problem, solution_type
    use normal_state, only : normal_problem_type
+   use kernels, only : normal_half_space
    use asperity_precision, only : dp, sp
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use schur_preconditioner, only : new_schur_preconditioner, schur_preconditioner_type
@@ -45,7 +46,7 @@ contains
       integer :: i, n, steps
 
       s%grid = new_grid(nx, ny, 1.0_dp, aspect*ny/nx, boundary)
-      call new_coarse_level(s%coarse, s%grid, 0.3_dp, error)
+      call new_coarse_level(s%coarse, s%grid, normal_half_space(0.3_dp), error)
       call check_no_error(error, 'a coarse level')
       call new_active_blocks(s%active, nx, ny, boundary == boundary_periodic, s%coarse%first_y, .true., 1)
       call new_schur_preconditioner(s%preconditioner, s%grid, s%coarse, 1, error, extends=.true.)

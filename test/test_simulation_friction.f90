@@ -4,8 +4,8 @@ module test_simulation_friction
    use case_settings, only : case_type
    use check, only : begin_suite, check_close, check_no_error, check_that
    use asperity_errors, only : error_type
-   use friction_law, only : largest_excess
    use asperity_parallel, only : set_threads
+   use friction_bounds, only : largest_excess
    use asperity_precision, only : dp, int8, pi
    use asperity_simulation, only : new_simulation, simulation_type
    use simulation_runs, only : check_books, check_same_rows, last, nl, record_type, run_case
@@ -322,10 +322,10 @@ contains
             call sim%advance(error)
             call check_no_error(error, 'before motion: row')
             call sim%contact_states(contact)
-            call check_that(count(sim%pressure > 0.0_dp) > 100, 'before motion: contact')
-            call check_that(all(contact == merge(state, 0, sim%pressure > 0.0_dp)), &
+            call check_that(count(sim%state%pressure > 0.0_dp) > 100, 'before motion: contact')
+            call check_that(all(contact == merge(state, 0, sim%state%pressure > 0.0_dp)), &
                'before motion: states')
-            call check_close(sim%row%stick_area, merge(sim%row%contact_area, 0.0_dp, k < 3), 0.0_dp, &
+            call check_close(sim%state%row%stick_area, merge(sim%state%row%contact_area, 0.0_dp, k < 3), 0.0_dp, &
                'before motion: stick area')
             call sim%destroy()
          end do

@@ -288,10 +288,10 @@ contains
          real(dp), intent(in) :: tolerance
 
          associate (found => steady%contact)
-            call check_close(norm2(sim%pressure - found%pressure)/norm2(found%pressure), 0.0_dp, tolerance, &
+            call check_close(norm2(sim%state%pressure - found%pressure)/norm2(found%pressure), 0.0_dp, tolerance, &
                'long run: pressure, '//what//' '//trim(laws(law)))
             do c = 1, merge(2, 0, law > 1)
-               call check_close(norm2(sim%tangential%traction(:, :, c) - found%traction(:, c, :)) &
+               call check_close(norm2(sim%state%tangential%traction(:, :, c) - found%traction(:, c, :)) &
                   /norm2(found%traction), 0.0_dp, tolerance, 'long run: traction, '//what//' '// &
                   trim(laws(law)))
             end do
@@ -422,7 +422,7 @@ contains
       steady%scheme_dt = dt
       plan%load = case%phases(1)%target
       plan%velocity_x = case%phases(1)%velocity_x
-      place = [sim%row%road_x - 2.0_dp*case%grid%lx, sim%row%road_y]
+      place = [sim%state%row%road_x - 2.0_dp*case%grid%lx, sim%state%row%road_y]
       base = 0.0_dp
       ! The contact's mean displacement hardly depends on the place: a few rounds bring the road there.
       do k = 1, merge(4, 1, case%friction%law /= 'none')

@@ -61,7 +61,7 @@ contains
       integer :: i, j
 
       call new_zener(self%material, g_e, g, tau, trim(scheme), error)
-      call new_history(self%history, self%material, cells, 1, error)
+      call new_history(self%history, self%material, cells, 1, 1, error)
       call new_books(self%books, self%material, 0.25_dp)
       do j = 1, cells
          do i = 1, cells
@@ -190,7 +190,7 @@ contains
 
       do i = 2, 3
          call new_zener(material, g_e, g, tau, trim(schemes(i)), error)
-         call new_history(history, material, 1, 1, error)
+         call new_history(history, material, 1, 1, 1, error)
          call new_books(books, material, 2.0_dp)
          u = 0.0_dp
          m = 0.0_dp
@@ -274,7 +274,7 @@ contains
 
       call zener_to_prony(g_inf, g0, g1, eta, g_e, g, tau)
       call new_zener(material, g_e, g, tau, 'backward_euler', error)
-      call new_history(history, material, 1, 1, error)
+      call new_history(history, material, 1, 1, 1, error)
       call new_books(books, material, area)
       u = 0.0_dp
       pk = 0.0_dp                                ! A P_k of the branches
@@ -384,7 +384,7 @@ contains
          integer :: step
 
          call new_zener(material, 1.0_dp, g, tau, trim(scheme), error)
-         call new_history(history, material, 1, 1, error)
+         call new_history(history, material, 1, 1, 1, error)
          call new_books(books, material, 1.0_dp)
          u = 0.0_dp
          loss = 0.0_dp

@@ -51,7 +51,7 @@ contains
 
       call new_zener(self%material, g_e, g, tau, trim(scheme), error)
       call check_no_error(error, 'a material')
-      call new_history(self%history, self%material, 1, 1, error)
+      call new_history(self%history, self%material, 1, 1, 1, error)
       call check_no_error(error, 'a history')
    end subroutine new_point
 
@@ -175,7 +175,7 @@ contains
 
       call zener_to_prony(g_inf, g0, g1, eta, g_e, g, tau)
       call new_zener(material, g_e, g, tau, 'backward_euler', error)
-      call new_history(history, material, 3, 1, error)
+      call new_history(history, material, 3, 1, 1, error)
       products = new_products(material)
       u = 0.0_dp
       thesis_u = 0.0_dp
@@ -482,10 +482,10 @@ contains
       do s = 1, 3
          call new_zener(material, 0.4_dp, [1.0_dp, 0.3_dp], [0.1_dp, 2.0_dp], &
             trim(schemes(s)), error)
-         call new_history(one, material, nx*ny, 1, error)
-         call new_history(two, material, nx*ny, 1, error)
-         call new_history(both, material, nx*ny, 2, error)
-         call new_history(single, material, 1, 1, error)
+         call new_history(one, material, nx, ny, 1, error)
+         call new_history(two, material, nx, ny, 1, error)
+         call new_history(both, material, nx, ny, 2, error)
+         call new_history(single, material, 1, 1, 1, error)
          u = 0.0_dp
          w = 0.0_dp
          do n = 1, 4

@@ -219,6 +219,7 @@ contains
       use asperity_errors, only : error_type
       use contact_solver, only : contact_solver_type
       use normal_solvers, only : new_contact_solver
+      use kernels, only : normal_half_space
       use normal_state, only : control_approach, control_pressure, normal_problem_type, &
          rms_about_mean
       use asperity_parallel, only : thread_count
@@ -256,7 +257,7 @@ contains
       call see_memory(grid, 12, 'the contact', error)
       ! E* = 2 G/(1 - nu) is all that the normal problem knows of the material: take nu = 0.
       if (.not. allocated(error)) call new_contact_solver(solver, trim(merge('thesis', 'fast  ', thesis == 1)), &
-         grid, 0.0_dp, error)
+         grid, normal_half_space(0.0_dp), error)
       if (.not. allocated(error)) then
          problem%modulus = 0.5_dp*modulus
          problem%control = merge(control_approach, control_pressure, approach == 1)
@@ -277,13 +278,15 @@ contains
       potential, energy, range_, approach, load, start, thesis, tolerance, max_iterations, old_level, &
       level, energy_adhesive, contact_area, iterations, ffts, residual, seconds, converged, reason, &
       status, message)
-      use adhesion_potential, only : adhesive_slope
-      use case_settings, only : case_type
+      use adhesion_potential, only : adhesive_slope, edge_of_cells
+      use case_settings, only : adhesion_settings_type, solver_settings_type
       use contact_rule, only : touches
       use asperity_errors, only : error_type
-      use normal_step, only : new_normal_step, normal_step_type
+      use field_sums, only : field_count
+      use kernels, only : normal_half_space
+      use normal_step, only : new_normal_step, normal_step_type, normal_task_type
+      use regular_grid, only : grid_type
       use asperity_precision, only : dp
-      use asperity_schedule, only : planned_row_type
       use solver_result, only : solver_result_type
       integer(c_int), intent(in) :: nx, ny
       real(c_double), intent(in) :: height(nx, ny)           !! m
@@ -312,9 +315,11 @@ contains
       integer(c_int), intent(out) :: status
       character(len=2000), intent(out) :: message
       type(error_type), allocatable :: error
-      type(case_type) :: case
+      type(grid_type) :: grid
+      type(solver_settings_type) :: solver
+      type(adhesion_settings_type) :: adhesion
       type(normal_step_type) :: side
-      type(planned_row_type) :: plan
+      type(normal_task_type) :: task
       type(solver_result_type) :: outcome
       integer :: j
 !f2py threadsafe
@@ -322,29 +327,31 @@ contains
       level = old_level
       energy_adhesive = 0.0_dp
       contact_area = 0.0_dp
-      case%grid = grid_of(nx, ny, lx, ly, is_free)
-      case%material%poisson = 0.0_dp                         ! E* = 2 G is all that matters
-      case%material%shear_modulus = 0.5_dp*modulus
-      allocate (case%material%prony_g(0), case%material%prony_tau(0), case%phases(0))
-      case%solver%method = 'fast'
-      if (thesis == 1) case%solver%method = 'thesis'
-      case%solver%precision = 'double'
-      case%solver%tolerance = tolerance
-      case%solver%max_iterations = max_iterations
-      case%adhesion%potential = potential
-      case%adhesion%energy = energy
-      case%adhesion%range = range_
-      case%adhesion%start = 'non_adhesive'
-      if (start == 1) case%adhesion%start = 'full_contact'
-      plan%control = 'pressure'
-      if (approach == 1) plan%control = 'displacement'
-      plan%load = load
-      call see_memory(case%grid, 20, 'the contact', error)
-      if (.not. allocated(error)) call new_normal_step(side, case, height, error)
+      grid = grid_of(nx, ny, lx, ly, is_free)
+      solver%method = 'fast'
+      if (thesis == 1) solver%method = 'thesis'
+      solver%precision = 'double'
+      solver%tolerance = tolerance
+      solver%max_iterations = max_iterations
+      adhesion%potential = potential
+      adhesion%energy = energy
+      adhesion%range = range_
+      adhesion%start = 'non_adhesive'
+      if (start == 1) adhesion%start = 'full_contact'
+      ! E* = 2 G/(1 - nu) is all that the normal problem knows of the material: take nu = 0.
+      task%modulus = 0.5_dp*modulus
+      task%control = 'pressure'
+      if (approach == 1) task%control = 'displacement'
+      task%load = load
+      task%first = start /= 2
+      call see_memory(grid, 20, 'the contact', error)
+      if (.not. allocated(error)) call new_normal_step(side, grid, normal_half_space(0.0_dp), solver, &
+         adhesion, edge_of_cells(energy, range_, modulus, merge(grid%dx, max(grid%dx, grid%dy), ny == 1)), &
+         height, error)
       if (.not. allocated(error)) then
-         call side%solve(plan, 0.5_dp*modulus, start /= 2, height, pressure, gap, level, outcome)
+         call side%solve(task, height, pressure, gap, level, outcome)
          energy_adhesive = side%energy(gap)
-         contact_area = count(touches(side%adhesive, pressure, gap))/real(size(gap), dp)
+         contact_area = field_count(touches(side%adhesive, pressure, gap))/grid%cells()
          do j = 1, ny
             attraction(:, j) = -adhesive_slope(side%potential, gap(:, j))
          end do
@@ -414,7 +421,7 @@ contains
             else
                handle = number
                rows = run%rows
-               if (restart == 1) first = run%sim%row%step + 1
+               if (restart == 1) first = run%sim%state%row%step + 1
                call take_warnings(run%warnings, warnings)
                run%warnings = ''
             end if
@@ -450,10 +457,10 @@ contains
       if (associated(run)) then
          if (.not. run%finished) call run%step(error)
          finished = merge(1, 0, run%finished)
-         step = run%sim%row%step
-         time = run%sim%row%time
-         contact_area = run%sim%row%contact_area
-         friction = run%sim%row%friction
+         step = run%sim%state%row%step
+         time = run%sim%state%row%time
+         contact_area = run%sim%state%row%contact_area
+         friction = run%sim%state%row%friction
          call take_warnings(run%warnings, warnings)
          run%warnings = ''
       else
@@ -538,7 +545,7 @@ contains
       else if (n /= column_count) then
          call fail(error, error_input, 'a row has another number of columns')
       else
-         values = row_values(sim%row)
+         values = row_values(sim%state%row)
       end if
       call report(error, status, message)
    end subroutine run_row
@@ -694,8 +701,8 @@ contains
             call take_warnings(sim%warnings, warnings)
             sim%warnings = ''
             if (.not. allocated(error) .and. .not. sim%converged) call fail(error, error_convergence, &
-               'step '//to_text(sim%row%step)//' of phase '//to_text(sim%row%phase)//', t = '// &
-               to_text(sim%row%time)//' s: the solver did not converge: '//trim(sim%reason)// &
+               'step '//to_text(sim%state%row%step)//' of phase '//to_text(sim%state%row%phase)//', t = '// &
+               to_text(sim%state%row%time)//' s: the solver did not converge: '//trim(sim%reason)// &
                '; residual '//to_text(sim%residual)//', allowed '// &
                to_text(sim%case%solver%tolerance))
          end associate
@@ -808,7 +815,8 @@ contains
    subroutine operator_open(tangential, nx, ny, lx, ly, is_free, modulus, poisson, thickness, handle, &
       mx, my, status, message)
       use asperity_errors, only : error_input, error_type, fail
-      use fft_conv, only : new_normal_operator, new_tangential_operator
+      use fft_conv, only : new_convolution
+      use kernels, only : normal_half_space, tangential_half_space
       use operator_handles, only : free_operator, new_operator, operator_of, operator_type
       integer(c_int), intent(in) :: tangential                 !! 1: tangential, 0: normal
       integer(c_int), intent(in) :: nx, ny
@@ -835,10 +843,11 @@ contains
          operator => operator_of(number)
          operator%modulus = modulus
          if (tangential == 1) then
-            call new_tangential_operator(operator%map, grid_of(nx, ny, lx, ly, is_free), poisson, &
-               thickness, error)
+            call new_convolution(operator%map, grid_of(nx, ny, lx, ly, is_free), &
+               tangential_half_space(poisson, thickness), error)
          else
-            call new_normal_operator(operator%map, grid_of(nx, ny, lx, ly, is_free), poisson, error)
+            call new_convolution(operator%map, grid_of(nx, ny, lx, ly, is_free), &
+               normal_half_space(poisson), error)
          end if
          if (allocated(error)) then
             call free_operator(number)
@@ -901,8 +910,7 @@ contains
       else if (columns /= operator%map%mx/2 + 1 .or. rows /= operator%map%my/2 + 1) then
          call fail(error, error_input, 'the symbol has another shape')
       else
-         values(:, :) = operator%map%symbol(0:columns - 1, 0:rows - 1, part)* &
-            (real(operator%map%mx, dp)*real(operator%map%my, dp)/operator%modulus)
+         values(:, :) = operator%map%symbol_of(int(part))/operator%modulus
       end if
       call report(error, status, message)
    end subroutine operator_symbol

@@ -116,15 +116,8 @@ contains
       finished = self%phase > size(phases)
       if (finished) return
       associate (phase => phases(self%phase))
-         if (self%step == 0 .and. .not. self%entered) then
-            row%new_speed = abs(phase%velocity_x - self%velocity_x) > 0.0_dp .or. &
-               abs(phase%velocity_y - self%velocity_y) > 0.0_dp .or. &
-               any(phase%pulled .neqv. self%held_pulled)
-            self%start_pull = merge(self%held_pull, present_pull, self%held_pulled)
-            self%start_load = load_at_start(self, phase, present_load)
-            self%velocity_x = phase%velocity_x
-            self%velocity_y = phase%velocity_y
-         end if
+         if (self%step == 0 .and. .not. self%entered) &
+            call enter_phase(self, phase, present_load, present_pull, row)
          row%new_speed = row%new_speed .or. self%speed_changed
          self%speed_changed = .false.
          row%phase = self%phase
@@ -133,61 +126,110 @@ contains
          row%velocity_y = phase%velocity_y
          row%pulled = phase%pulled
          row%pull = phase%pull
-
          if (.not. self%entered .and. begins_with_row(phase, self)) then
-            part = 0.0_dp
-            row%instantaneous = .true.
-            row%load = self%start_load
-            if (.not. phase%linear) row%load = phase%target
-            if (phase%linear) row%pull = merge(self%start_pull, 0.0_dp, phase%pulled)
+            call plan_jump(self, phase, row)
          else
-            self%step = self%step + 1
-            part = real(self%step, dp)/phase%steps
-            row%instantaneous = phase%static
-            row%dt = phase%dt
-            row%load = phase%target
-            if (phase%linear) row%load = self%start_load + part*(phase%target - self%start_load)
-            row%pull_before = row%pull
-            if (phase%linear) then
-               row%pull = merge(self%start_pull + part*(phase%pull - self%start_pull), 0.0_dp, phase%pulled)
-               row%pull_before = merge(self%start_pull + real(self%step - 1, dp)/phase%steps &
-                  *(phase%pull - self%start_pull), 0.0_dp, phase%pulled)
-            end if
-            if (self%step == phase%steps) then
-               row%load = phase%target
-               row%pull = phase%pull
-            end if
-            row%load_before = phase%target
-            if (phase%linear) row%load_before = self%start_load &
-               + real(self%step - 1, dp)/phase%steps*(phase%target - self%start_load)
-            if (self%step == 1 .and. .not. phase%static) call note_rate(self, phase, row)
-            if (.not. phase%static) call note_change(self, present_load, row)
-            if (self%step == 1 .and. phase%linear .and. any(phase%pulled)) row%new_rate = .not. phase%static
+            call plan_step(self, phase, present_load, row)
          end if
+         row%relaxed = phase%relaxed .and. row%instantaneous
+         if (phase%steady .and. row%instantaneous) call plan_steady(phase, row)
          row%ramped = phase%linear .and. self%step > 0 .and. self%row >= 0
          self%entered = .true.
-         row%relaxed = phase%relaxed .and. row%instantaneous
-         if (phase%steady .and. row%instantaneous) then
-            row%steady = abs(phase%velocity_x) > 0.0_dp .or. abs(phase%velocity_y) > 0.0_dp
-            row%relaxed = .not. row%steady
-            row%next_dt = phase%dt
-         end if
+         part = real(self%step, dp)/phase%steps
          row%time = self%start_time + part*phase%duration
          row%road_x = self%start_x + part*phase%duration*phase%velocity_x
          row%road_y = self%start_y + part*phase%duration*phase%velocity_y
          self%row = self%row + 1
-
-         if (self%step == phase%steps) then
-            self%start_time = row%time
-            self%start_x = row%road_x
-            self%start_y = row%road_y
-            call hold(self, phase)
-            self%phase = self%phase + 1
-            self%step = 0
-            self%entered = .false.
-         end if
+         if (self%step == phase%steps) call leave_phase(self, phase, row)
       end associate
    end subroutine next_row
+
+   !> A phase begins: what its load and its pull start from, and whether its speed is new.
+   subroutine enter_phase(self, phase, present_load, present_pull, row)
+      type(schedule_type), intent(inout) :: self
+      type(phase_settings_type), intent(in) :: phase
+      real(dp), intent(in) :: present_load(3)      !! pressure, force and displacement now
+      real(dp), intent(in) :: present_pull(2)      !! horizontal force of the road on the rubber now, Pa
+      type(planned_row_type), intent(inout) :: row
+
+      row%new_speed = abs(phase%velocity_x - self%velocity_x) > 0.0_dp .or. &
+         abs(phase%velocity_y - self%velocity_y) > 0.0_dp .or. &
+         any(phase%pulled .neqv. self%held_pulled)
+      self%start_pull = merge(self%held_pull, present_pull, self%held_pulled)
+      self%start_load = load_at_start(self, phase, present_load)
+      self%velocity_x = phase%velocity_x
+      self%velocity_y = phase%velocity_y
+   end subroutine enter_phase
+
+   !> The row with which a phase begins at once: a jump, or a state in which it has rested for ever.
+   subroutine plan_jump(self, phase, row)
+      type(schedule_type), intent(in) :: self
+      type(phase_settings_type), intent(in) :: phase
+      type(planned_row_type), intent(inout) :: row
+
+      row%instantaneous = .true.
+      row%load = self%start_load
+      if (.not. phase%linear) row%load = phase%target
+      if (phase%linear) row%pull = merge(self%start_pull, 0.0_dp, phase%pulled)
+   end subroutine plan_jump
+
+   !> The next step of a phase.
+   subroutine plan_step(self, phase, present_load, row)
+      type(schedule_type), intent(inout) :: self
+      type(phase_settings_type), intent(in) :: phase
+      real(dp), intent(in) :: present_load(3)      !! pressure, force and displacement now
+      type(planned_row_type), intent(inout) :: row
+      real(dp) :: part, part_before
+
+      part_before = real(self%step, dp)/phase%steps
+      self%step = self%step + 1
+      part = real(self%step, dp)/phase%steps
+      row%instantaneous = phase%static
+      row%dt = phase%dt
+      row%load = phase%target
+      row%load_before = phase%target
+      row%pull_before = row%pull
+      if (phase%linear) then
+         row%load = self%start_load + part*(phase%target - self%start_load)
+         row%load_before = self%start_load + part_before*(phase%target - self%start_load)
+         row%pull = merge(self%start_pull + part*(phase%pull - self%start_pull), 0.0_dp, phase%pulled)
+         row%pull_before = merge(self%start_pull + part_before*(phase%pull - self%start_pull), 0.0_dp, &
+            phase%pulled)
+      end if
+      if (self%step == phase%steps) then
+         row%load = phase%target
+         row%pull = phase%pull
+      end if
+      if (phase%static) return
+      if (self%step == 1) call note_rate(self, phase, row)
+      call note_change(self, present_load, row)
+      if (self%step == 1 .and. phase%linear .and. any(phase%pulled)) row%new_rate = .true.
+   end subroutine plan_step
+
+   !> A row of steady sliding; with a velocity of zero it is one of rest.
+   subroutine plan_steady(phase, row)
+      type(phase_settings_type), intent(in) :: phase
+      type(planned_row_type), intent(inout) :: row
+
+      row%steady = abs(phase%velocity_x) > 0.0_dp .or. abs(phase%velocity_y) > 0.0_dp
+      row%relaxed = .not. row%steady
+      row%next_dt = phase%dt
+   end subroutine plan_steady
+
+   !> The last step of a phase is planned: the next row belongs to the phase that follows.
+   subroutine leave_phase(self, phase, row)
+      type(schedule_type), intent(inout) :: self
+      type(phase_settings_type), intent(in) :: phase
+      type(planned_row_type), intent(in) :: row
+
+      self%start_time = row%time
+      self%start_x = row%road_x
+      self%start_y = row%road_y
+      call hold(self, phase)
+      self%phase = self%phase + 1
+      self%step = 0
+      self%entered = .false.
+   end subroutine leave_phase
 
    !> A load that was changed within a phase is a ramp over one step: a kink at its start and its end.
    subroutine note_change(self, present_load, row)

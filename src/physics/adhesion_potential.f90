@@ -23,7 +23,7 @@ module adhesion_potential
    private
 
    public :: adhesion_potential_type, adhesive_curvature, adhesive_energy, adhesive_slope, &
-      adhesive_terms, has_smooth_potential, edge_of_cells, new_adhesion_potential, release_pressure
+      adhesive_terms, has_smooth_potential, edge_of_cells, new_adhesion_potential
 
    integer, parameter, public :: potential_none = 0
    integer, parameter, public :: potential_exponential = 1
@@ -208,17 +208,5 @@ contains
 
       edge = min(edge_width*energy/range*cell/modulus, range)
    end function edge_of_cells
-
-   !> The least pressure that a point in contact can bear, -e'(0+), Pa.
-   elemental function release_pressure(self) result(value)
-      type(adhesion_potential_type), intent(in) :: self
-      real(dp) :: value
-
-      value = 0.0_dp
-      select case (self%kind)
-      case (potential_exponential, potential_maugis_dugdale)
-         value = -self%energy/self%range
-      end select
-   end function release_pressure
 
 end module adhesion_potential

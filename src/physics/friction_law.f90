@@ -26,7 +26,7 @@ module friction_law
    implicit none
    private
 
-   public :: friction_law_type, new_friction_law, return_tractions, largest_excess
+   public :: friction_law_type, new_friction_law, return_tractions
 
    integer, parameter, public :: law_coulomb = 1            !! |T| <= mu P
    integer, parameter, public :: law_constant_shear = 2     !! |T| <= sigma_max
@@ -328,34 +328,5 @@ contains
          end do
       end do
    end subroutine return_tractions
-
-   !> By how much the tractions lie outside their bounds: the largest |T - returned T|, Pa.
-   function largest_excess(law, p, slope_x, slope_y, contact, tx, ty) result(excess)
-      type(friction_law_type), intent(in) :: law
-      real(dp), intent(in) :: p(:, :)                       !! [nx, ny], Pa
-      real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)  !! [nx, ny]; any size without slope
-      integer(int8), intent(in) :: contact(:, :)            !! [nx, ny] 0 open
-      real(dp), intent(in) :: tx(:, :), ty(:, :)            !! [nx, ny], Pa
-      real(dp) :: excess
-      real(dp) :: slope(2), t(2)
-      logical :: returned
-      integer :: i, j
-
-      excess = 0.0_dp
-      slope = 0.0_dp
-      !$omp parallel do default(none) shared(law, p, slope_x, slope_y, contact, tx, ty) &
-      !$omp private(i, j, t, returned) firstprivate(slope) reduction(max: excess)
-      do j = 1, size(p, 2)
-         do i = 1, size(p, 1)
-            t = 0.0_dp
-            if (contact(i, j) /= contact_open) then
-               if (law%slope) slope = [slope_x(i, j), slope_y(i, j)]
-               t = [tx(i, j), ty(i, j)]
-               call law%return_to_bound(p(i, j), slope, t, returned)
-            end if
-            excess = max(excess, hypot(tx(i, j) - t(1), ty(i, j) - t(2)))
-         end do
-      end do
-   end function largest_excess
 
 end module friction_law

@@ -21,11 +21,11 @@
 !> parts. A jump is a step of no duration: alpha = 1, b1 = g.
 !>
 !> Memory: S and one field an arm; one more (S - S_old) for exponential2; none for an elastic body.
-!> Results do not depend on the number of threads: sums are formed block by block.
+!> Results do not depend on the number of threads or processes: sums are formed row by row.
 module zener
    use asperity_errors, only : add_fault, error_input, error_type, fail
-   use asperity_parallel, only : global_sum
    use asperity_precision, only : dp
+   use field_sums, only : row_totals
    use relaxation_functions, only : mean_decay, slope_response
    implicit none
    private
@@ -33,8 +33,8 @@ module zener
    public :: history_type, products_type, zener_type
    public :: new_zener, start_step, start_jump, start_relaxed, finish_step, restart_order
    public :: extrapolates, is_elastic, needs_start
-   public :: new_history, history_field, commit_history, destroy_history
-   public :: new_products
+   public :: new_history, history_field, commit_history, commit_row, destroy_history
+   public :: add_rows, new_products, new_row_sums
 
    integer, parameter, public :: scheme_backward_euler = 1
    integer, parameter, public :: scheme_exponential = 2
@@ -44,7 +44,7 @@ module zener
    integer, parameter, public :: step_jump = 2      !! instantaneous
    integer, parameter, public :: step_relaxed = 3   !! the load has rested for ever
 
-   integer, parameter :: block = 1024               !! cells of a block of the passes
+   integer, parameter :: piece = 1024               !! most cells of a row that are swept at once
    integer, parameter :: fixed_sums = 4             !! sums of a pass beside those of the arms
 
    !> The material, its time scheme and the coefficients of the step in hand. No fields.
@@ -68,6 +68,7 @@ module zener
    !> The history of a field of tractions with one or more components.
    type :: history_type
       integer :: cells = 0                   !! values of a component on this process
+      integer :: row = 0                     !! values of a row of the grid
       integer :: components = 0
       real(dp), allocatable :: s(:, :)       !! S = P over a modulus [cells, components]
       real(dp), allocatable :: ds(:, :)      !! S - S_old, exponential2 only
@@ -228,19 +229,21 @@ contains
    end subroutine restart_order
 
    !> A history at rest.
-   subroutine new_history(self, material, cells, components, error)
+   subroutine new_history(self, material, nx, rows, components, error)
       type(history_type), intent(out) :: self
       type(zener_type), intent(in) :: material
-      integer, intent(in) :: cells           !! values of a component on this process, nx ny
+      integer, intent(in) :: nx              !! cells of a row
+      integer, intent(in) :: rows            !! rows of this process
       integer, intent(in) :: components      !! 1: normal, 2: tangential
       type(error_type), allocatable, intent(out) :: error
       integer :: arms, i, status
 
-      self%cells = cells
+      self%row = nx
+      self%cells = nx*rows
       self%components = components
       arms = size(material%g)
       i = 0
-      if (arms > 0) i = cells
+      if (arms > 0) i = self%cells
       allocate (self%s(i, components), stat=status)
       if (status == 0) allocate (self%arm(i, arms, components), stat=status)
       if (material%scheme /= scheme_exponential2) i = 0
@@ -259,6 +262,7 @@ contains
       type(history_type), intent(inout) :: self
 
       self%cells = 0
+      self%row = 0
       self%components = 0
       if (allocated(self%s)) deallocate (self%s, self%ds, self%arm)
    end subroutine destroy_history
@@ -271,58 +275,69 @@ contains
       allocate (products%arm_du(size(material%g)), source=0.0_dp)
    end function new_products
 
+   !> Room for the sums of the books of one row, which `commit_row` fills.
+   pure function new_row_sums(material, rows) result(sums)
+      type(zener_type), intent(in) :: material
+      integer, intent(in) :: rows            !! rows of this process
+      real(dp), allocatable :: sums(:, :)
+
+      allocate (sums(fixed_sums + size(material%g), rows), source=0.0_dp)
+   end function new_row_sums
+
+   !> Add the sums of all rows to those of a step, so that several fields share one set of books.
+   subroutine add_rows(self, sums)
+      type(products_type), intent(inout) :: self
+      real(dp), intent(in) :: sums(:, :)     !! of `new_row_sums`
+      real(dp) :: total(size(sums, 1))
+
+      total = row_totals(sums)
+      self%u_s = self%u_s + total(1)
+      self%p_du = self%p_du + total(2)
+      self%du_ds = self%du_ds + total(3)
+      self%du_ds_old = self%du_ds_old + total(4)
+      self%arm_du = self%arm_du + total(fixed_sums + 1:)
+   end subroutine add_rows
+
    !> What the past adds to the traction of the step in hand: S' = (P' + hist)/Q.
    subroutine history_field(self, material, hist)
       type(history_type), intent(in) :: self
       type(zener_type), intent(in) :: material        !! after start_step, _jump or _relaxed
       real(dp), intent(out) :: hist(self%cells, self%components)   !! Pa; of any rank, x first
-      integer :: c, first, n
-      real(dp) :: b1, b2
+      integer :: c, first, last
 
-      n = self%cells
-      b1 = sum(material%b1)
-      b2 = sum(material%b2)
       do c = 1, self%components
-         !$omp parallel do schedule(static) default(none) shared(self, material, hist, c, n, b1, b2)
-         do first = 1, n, block
+         !$omp parallel do schedule(static) default(none) shared(self, material, hist, c) private(last)
+         do first = 1, self%cells, piece
+            last = min(first + piece - 1, self%cells)
             if (is_elastic(material)) then
-               hist(first:min(first + block - 1, n), c) = 0.0_dp
+               hist(first:last, c) = 0.0_dp
             else
-               call history_block(first, min(first + block - 1, n), b1, b2, material%alpha, &
-                  self%s(:, c), self%ds(:, c), self%arm(:, :, c), hist(first:, c))
+               call history_cells(self, material, c, first, hist(first:last, c))
             end if
          end do
          !$omp end parallel do
       end do
    end subroutine history_field
 
-   !> The history of the cells first to last.
-   pure subroutine history_block(first, last, b1, b2, alpha, s, ds, arm, hist)
+   !> The history of some cells from the cell `first` on.
+   pure subroutine history_cells(self, material, c, first, hist)
+      type(history_type), intent(in) :: self
+      type(zener_type), intent(in) :: material
+      integer, intent(in) :: c               !! component
       integer, intent(in) :: first
-      integer, intent(in) :: last
-      real(dp), intent(in) :: b1             !! sum of the arms' b1, Pa
-      real(dp), intent(in) :: b2             !! sum of the arms' b2, Pa
-      real(dp), intent(in) :: alpha(:)
-      real(dp), intent(in), contiguous :: s(:)
-      real(dp), intent(in), contiguous :: ds(:)
-      real(dp), intent(in), contiguous :: arm(:, :)
-      real(dp), intent(inout), contiguous :: hist(:)     !! element 1 is that of cell `first`
-      integer :: i, k
+      real(dp), intent(out) :: hist(:)       !! Pa
+      real(dp) :: b1, b2
+      integer :: k, last
 
-      do i = first, last
-         hist(i - first + 1) = b1*s(i)
+      last = first + size(hist) - 1
+      b1 = sum(material%b1)
+      b2 = sum(material%b2)
+      hist = b1*self%s(first:last, c)
+      if (abs(b2) > 0.0_dp) hist = hist - b2*self%ds(first:last, c)
+      do k = 1, size(material%alpha)
+         hist = hist - material%alpha(k)*self%arm(first:last, k, c)
       end do
-      if (abs(b2) > 0.0_dp) then
-         do i = first, last
-            hist(i - first + 1) = hist(i - first + 1) - b2*ds(i)
-         end do
-      end if
-      do k = 1, size(alpha)
-         do i = first, last
-            hist(i - first + 1) = hist(i - first + 1) - alpha(k)*arm(i, k)
-         end do
-      end do
-   end subroutine history_block
+   end subroutine history_cells
 
    !> End the step in hand for one field: new S and p_k, and the sums of the books, in one pass.
    !>
@@ -336,138 +351,140 @@ contains
       type(products_type), intent(inout) :: products               !! of `new_products`
       real(dp), intent(in), optional :: carried(self%components)   !! uniform part of P' that moves
                                                 !! a mass and does not strain the rubber, Pa
-      real(dp), allocatable :: sums(:, :), total(:)
-      real(dp) :: b1, b2, off
-      integer :: arms, c, first, n
+      real(dp), allocatable :: sums(:, :)
+      real(dp) :: off
+      integer :: c, first, j, last
 
-      n = self%cells
-      arms = size(material%g)
-      b1 = sum(material%b1)
-      b2 = sum(material%b2)
-      allocate (sums(fixed_sums + arms, (n + block - 1)/block), total(fixed_sums + arms))
-      total = 0.0_dp
       do c = 1, self%components
          off = 0.0_dp
          if (present(carried)) off = carried(c)
+         sums = new_row_sums(material, self%cells/self%row)
          !$omp parallel do schedule(static) default(none) &
-         !$omp shared(self, material, p, u_old, u_new, sums, c, n, b1, b2, off)
-         do first = 1, n, block
-            if (is_elastic(material)) then
-               call elastic_block(first, min(first + block - 1, n), material%g_e, off, p(:, c), &
-                  u_old(:, c), u_new(:, c), sums(:, (first - 1)/block + 1))
-            else
-               call commit_block(first, min(first + block - 1, n), b1, b2, material, off, p(:, c), &
-                  u_old(:, c), u_new(:, c), self%s(:, c), self%ds(:, c), self%arm(:, :, c), &
-                  sums(:, (first - 1)/block + 1))
-            end if
+         !$omp shared(self, material, p, u_old, u_new, sums, c, off) private(first, last)
+         do j = 1, self%cells/self%row
+            first = (j - 1)*self%row + 1
+            last = j*self%row
+            call commit_row(self, material, c, j, p(first:last, c) - off, u_old(first:last, c), &
+               u_new(first:last, c), sums(:, j))
          end do
          !$omp end parallel do
-         total = total + sum(sums, dim=2)
+         call add_rows(products, sums)
       end do
-      total = global_sum(total)
-      products%u_s = products%u_s + total(1)
-      products%p_du = products%p_du + total(2)
-      products%du_ds = products%du_ds + total(3)
-      products%du_ds_old = products%du_ds_old + total(4)
-      products%arm_du = products%arm_du + total(fixed_sums + 1:)
    end subroutine commit_history
 
-   !> The cells first to last of a body with arms.
-   pure subroutine commit_block(first, last, b1, b2, material, off, p, u_old, u_new, s, ds, arm, &
-      sums)
-      integer, intent(in) :: first
-      integer, intent(in) :: last
-      real(dp), intent(in) :: b1             !! sum of the arms' b1, Pa
-      real(dp), intent(in) :: b2             !! sum of the arms' b2, Pa
-      type(zener_type), intent(in) :: material
-      real(dp), intent(in) :: off            !! part of p that does not strain the rubber, Pa
-      real(dp), intent(in), contiguous :: p(:)
-      real(dp), intent(in), contiguous :: u_old(:)
-      real(dp), intent(in), contiguous :: u_new(:)
-      real(dp), intent(inout), contiguous :: s(:)
-      real(dp), intent(inout), contiguous :: ds(:)
-      real(dp), intent(inout), contiguous :: arm(:, :)
-      real(dp), intent(out) :: sums(:)       !! u_s, p_du, du_ds, du_ds_old, arm_du(:)
-      real(dp) :: du(block), step(block), old(block)
-      real(dp) :: a, first_b, second_b, u_s, p_du, du_ds, du_ds_old, arm_du, s_new
-      integer :: i, k, m, n
-      logical :: parabola
+   !> End the step in hand for row j of a component. May be called for several rows at once.
+   pure subroutine commit_row(self, material, c, j, p, u_old, u_new, sums)
+      type(history_type), intent(inout) :: self
+      type(zener_type), intent(in) :: material        !! after start_step, _jump or _relaxed
+      integer, intent(in) :: c                        !! component
+      integer, intent(in) :: j                        !! row
+      real(dp), intent(in) :: p(self%row)             !! P' that strains the rubber, at the end, Pa
+      real(dp), intent(in) :: u_old(self%row)         !! at the start, m
+      real(dp), intent(in) :: u_new(self%row)         !! at the end, m
+      real(dp), intent(inout) :: sums(:)              !! u_s, p_du, du_ds, du_ds_old, arm_du(:)
+      integer :: first, last
 
-      n = last - first + 1
-      parabola = size(ds) > 0
-      call history_block(first, last, b1, b2, material%alpha, s, ds, arm, step)
-      u_s = 0.0_dp
-      p_du = 0.0_dp
-      du_ds = 0.0_dp
-      !$omp simd private(m, s_new) reduction(+:u_s, p_du, du_ds)
-      do i = 1, n
-         m = first + i - 1
-         du(i) = u_new(m) - u_old(m)
-         s_new = (p(m) - off + step(i))/material%q
-         step(i) = s_new - s(m)
-         s(m) = s_new
-         u_s = u_s + u_new(m)*s_new
-         p_du = p_du + (p(m) - off)*du(i)
-         du_ds = du_ds + du(i)*step(i)
+      if (is_elastic(material)) then
+         sums(1) = sums(1) + dot_of_cells(self%row, u_new, p)/material%g_e
+         sums(2) = sums(2) + dot_of_cells(self%row, p, u_new - u_old)
+         return
+      end if
+      do first = 1, self%row, piece
+         last = min(first + piece - 1, self%row)
+         call commit_cells(self, material, c, (j - 1)*self%row + first, p(first:last), &
+            u_old(first:last), u_new(first:last), sums)
       end do
-      du_ds_old = 0.0_dp
-      if (parabola) then
-         !$omp simd private(m) reduction(+:du_ds_old)
-         do i = 1, n
-            m = first + i - 1
-            old(i) = ds(m)
-            ds(m) = step(i)
-            du_ds_old = du_ds_old + du(i)*old(i)
-         end do
+   end subroutine commit_row
+
+   !> End the step for a few cells from the cell `first` on.
+   pure subroutine commit_cells(self, material, c, first, p, u_old, u_new, sums)
+      type(history_type), intent(inout) :: self
+      type(zener_type), intent(in) :: material
+      integer, intent(in) :: c
+      integer, intent(in) :: first
+      real(dp), intent(in) :: p(:), u_old(:), u_new(:)
+      real(dp), intent(inout) :: sums(:)
+      real(dp) :: du(piece), step(piece), old(piece)
+      integer :: k, last, n
+
+      n = size(p)
+      last = first + n - 1
+      call history_cells(self, material, c, first, step(:n))
+      du(:n) = u_new - u_old
+      call new_strain(n, material%q, p, du, u_new, self%s(first:last, c), step, sums)
+      old(:n) = 0.0_dp
+      if (size(self%ds, 1) > 0) then
+         old(:n) = self%ds(first:last, c)
+         self%ds(first:last, c) = step(:n)
+         sums(4) = sums(4) + dot_of_cells(n, du, old)
       end if
       do k = 1, size(material%alpha)
-         a = material%alpha(k)
-         first_b = material%b1(k)
-         second_b = material%b2(k)
-         arm_du = 0.0_dp
-         if (abs(second_b) > 0.0_dp) then
-            !$omp simd private(m) reduction(+:arm_du)
-            do i = 1, n
-               m = first + i - 1
-               arm_du = arm_du + arm(m, k)*du(i)
-               arm(m, k) = a*arm(m, k) + first_b*step(i) + second_b*old(i)
-            end do
-         else
-            !$omp simd private(m) reduction(+:arm_du)
-            do i = 1, n
-               m = first + i - 1
-               arm_du = arm_du + arm(m, k)*du(i)
-               arm(m, k) = a*arm(m, k) + first_b*step(i)
-            end do
-         end if
-         sums(fixed_sums + k) = arm_du
+         sums(fixed_sums + k) = sums(fixed_sums + k) &
+            + dot_of_cells(n, du, self%arm(first:last, k, c))
+         call advance_arm(n, material%alpha(k), material%b1(k), material%b2(k), step, old, &
+            self%arm(first:last, k, c))
       end do
-      sums(1:fixed_sums) = [u_s, p_du, du_ds, du_ds_old]
-   end subroutine commit_block
+   end subroutine commit_cells
 
-   !> The cells first to last of an elastic body: only the products.
-   pure subroutine elastic_block(first, last, modulus, off, p, u_old, u_new, sums)
-      integer, intent(in) :: first
-      integer, intent(in) :: last
-      real(dp), intent(in) :: modulus        !! Pa
-      real(dp), intent(in) :: off            !! part of p that does not strain the rubber, Pa
-      real(dp), intent(in), contiguous :: p(:)
-      real(dp), intent(in), contiguous :: u_old(:)
-      real(dp), intent(in), contiguous :: u_new(:)
-      real(dp), intent(out) :: sums(:)       !! u_s, p_du, 0, 0
-      real(dp) :: u_s, p_du
+   !> The new S of a few cells, its change, and the products U'.S', P'.dU and dU.dS.
+   pure subroutine new_strain(n, q, p, du, u_new, s, step, sums)
+      integer, intent(in) :: n
+      real(dp), intent(in) :: q              !! modulus of the step, Pa
+      real(dp), intent(in) :: p(n), du(n), u_new(n)
+      real(dp), intent(inout) :: s(n)
+      real(dp), intent(inout) :: step(n)     !! in: the history, Pa; out: S' - S
+      real(dp), intent(inout) :: sums(3)
+      real(dp) :: u_s, p_du, du_ds, s_new
       integer :: i
 
       u_s = 0.0_dp
       p_du = 0.0_dp
-      !$omp simd reduction(+:u_s, p_du)
-      do i = first, last
-         u_s = u_s + u_new(i)*(p(i) - off)
-         p_du = p_du + (p(i) - off)*(u_new(i) - u_old(i))
+      du_ds = 0.0_dp
+      !$omp simd private(s_new) reduction(+:u_s, p_du, du_ds)
+      do i = 1, n
+         s_new = (p(i) + step(i))/q
+         step(i) = s_new - s(i)
+         s(i) = s_new
+         u_s = u_s + u_new(i)*s_new
+         p_du = p_du + p(i)*du(i)
+         du_ds = du_ds + du(i)*step(i)
       end do
-      sums = 0.0_dp
-      sums(1) = u_s/modulus
-      sums(2) = p_du
-   end subroutine elastic_block
+      sums = sums + [u_s, p_du, du_ds]
+   end subroutine new_strain
+
+   !> p_k' = alpha p_k + b1 (S' - S) + b2 (S - S_old).
+   pure subroutine advance_arm(n, alpha, b1, b2, step, old, arm)
+      integer, intent(in) :: n
+      real(dp), intent(in) :: alpha, b1, b2
+      real(dp), intent(in) :: step(n), old(n)
+      real(dp), intent(inout) :: arm(n)
+      integer :: i
+
+      if (abs(b2) > 0.0_dp) then
+         !$omp simd
+         do i = 1, n
+            arm(i) = alpha*arm(i) + b1*step(i) + b2*old(i)
+         end do
+      else
+         !$omp simd
+         do i = 1, n
+            arm(i) = alpha*arm(i) + b1*step(i)
+         end do
+      end if
+   end subroutine advance_arm
+
+   !> Sum of the products of two rows.
+   pure function dot_of_cells(n, one, other) result(total)
+      integer, intent(in) :: n
+      real(dp), intent(in) :: one(n), other(n)
+      real(dp) :: total
+      integer :: i
+
+      total = 0.0_dp
+      !$omp simd reduction(+:total)
+      do i = 1, n
+         total = total + one(i)*other(i)
+      end do
+   end function dot_of_cells
 
 end module zener

@@ -165,7 +165,7 @@ contains
       if (.not. allocated(error)) call load_state(self%sim, reader, error)
       call reader%close()
       if (allocated(error)) return
-      call self%result%reopen(self%path, reader%result_id, self%sim%row%step, &
+      call self%result%reopen(self%path, reader%result_id, self%sim%state%row%step, &
          self%sim%case%output%compression, error)
       if (allocated(error)) return
       call self%result%write_text('outcome', 'running', error)
@@ -176,7 +176,7 @@ contains
       self%last_snapshot = self%result%last_snapshot()
       associate (times => self%sim%case%output%snapshot_times)
          do while (self%next_time <= size(times))
-            if (times(self%next_time) > self%sim%row%time) exit
+            if (times(self%next_time) > self%sim%state%row%time) exit
             self%next_time = self%next_time + 1
          end do
       end associate
@@ -219,7 +219,7 @@ contains
          line = left(at:at + next - 2)
          at = at + next
          read (line(min(6, len(line)):max(5, index(line, ',') - 1)), *, iostat=status) step
-         if (status == 0 .and. step > self%sim%row%step) cycle
+         if (status == 0 .and. step > self%sim%state%row%step) cycle
          if (len(self%told) > 0) self%told = self%told//new_line('a')
          self%told = self%told//line
       end do
@@ -243,21 +243,21 @@ contains
 
       call self%sim%advance(error)
       if (allocated(error)) return
-      if (.not. all(ieee_is_finite(row_values(self%sim%row)))) then
+      if (.not. all(ieee_is_finite(row_values(self%sim%state%row)))) then
          self%sim%converged = .false.
          self%sim%reason = 'a value is not a finite number'
       end if
       self%finished = self%sim%finished
       call collect_warnings(self)
-      call self%result%append_row(self%sim%row, error)
+      call self%result%append_row(self%sim%state%row, error)
       if (allocated(error)) return
-      if (self%sim%was_steady) call write_losses(self, error)
+      if (self%sim%state%steady%now) call write_losses(self, error)
       if (allocated(error)) return
       if (snapshot_due(self)) call write_snapshot(self, error)
       if (allocated(error)) return
       if (.not. self%sim%converged) then
-         outcome = 'step '//to_text(self%sim%row%step)//' of phase '//to_text(self%sim%row%phase)// &
-            ', t = '//to_text(self%sim%row%time)//' s: the solver did not converge: '// &
+         outcome = 'step '//to_text(self%sim%state%row%step)//' of phase '//to_text(self%sim%state%row%phase)// &
+            ', t = '//to_text(self%sim%state%row%time)//' s: the solver did not converge: '// &
             trim(self%sim%reason)//'; residual '//to_text(self%sim%residual)//', allowed '// &
             to_text(self%sim%allowed)
          call leave_word(self, outcome, error)
@@ -285,7 +285,7 @@ contains
       integer :: k
 
       associate (losses => self%sim%steady%losses)
-         call self%result%write_losses(self%sim%row%step, &
+         call self%result%write_losses(self%sim%state%row%step, &
             [(longest_wave(self%sim%grid)/2.0_dp**(k - 1), k = 1, size(losses%octave))], losses%octave, &
             self%sim%case%material%prony_tau, losses%arm, error)
       end associate
@@ -300,9 +300,9 @@ contains
       associate (output => self%sim%case%output)
          due = self%finished .or. .not. self%sim%converged
          if (output%snapshot_every > 0) &
-            due = due .or. mod(self%sim%row%step, output%snapshot_every) == 0
+            due = due .or. mod(self%sim%state%row%step, output%snapshot_every) == 0
          ! A time counts as reached within round-off.
-         now = self%sim%row%time*(1.0_dp + 1e-12_dp)
+         now = self%sim%state%row%time*(1.0_dp + 1e-12_dp)
          do while (self%next_time <= size(output%snapshot_times))
             if (output%snapshot_times(self%next_time) > now) exit
             due = .true.
@@ -321,7 +321,8 @@ contains
       integer :: k
 
       associate (sim => self%sim, names => self%sim%case%output%snapshot_fields)
-         call self%result%begin_snapshot(sim%row%step, sim%row%time, sim%row%phase, at_stop=at_stop)
+         call self%result%begin_snapshot(sim%state%row%step, sim%state%row%time, sim%state%row%phase, &
+            at_stop=at_stop)
          do k = 1, size(names)
             if (names(k) == 'contact') then
                call sim%contact_states(states)
@@ -332,7 +333,7 @@ contains
             end if
          end do
          call self%result%end_snapshot(error)
-         self%last_snapshot = sim%row%step
+         self%last_snapshot = sim%state%row%step
       end associate
    end subroutine write_snapshot
 
@@ -345,7 +346,7 @@ contains
       associate (output => self%sim%case%output)
          due = .false.
          if (output%checkpoint_every > 0) &
-            due = mod(self%sim%row%step, output%checkpoint_every) == 0 .and. self%sim%row%step > 0
+            due = mod(self%sim%state%row%step, output%checkpoint_every) == 0 .and. self%sim%state%row%step > 0
          if (output%checkpoint_minutes > 0.0_dp) then
             call system_clock(now, rate)
             due = due .or. real(now - self%saved_at, dp) > 60.0_dp*output%checkpoint_minutes*rate
@@ -375,14 +376,14 @@ contains
       class(run_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
 
-      if (self%sim%row%step > self%last_snapshot .and. self%sim%schedule%row >= 0) &
+      if (self%sim%state%row%step > self%last_snapshot .and. self%sim%state%schedule%row >= 0) &
          call write_snapshot(self, error, at_stop=.true.)
       if (allocated(error)) return
-      if (self%sim%schedule%row < 0) then
+      if (self%sim%state%schedule%row < 0) then
          call leave_word(self, 'stopped before the first row', error)
          return
       end if
-      call leave_word(self, 'stopped after step '//to_text(self%sim%row%step), error)
+      call leave_word(self, 'stopped after step '//to_text(self%sim%state%row%step), error)
       if (.not. allocated(error)) call self%save(error)
    end subroutine interrupt_run
 

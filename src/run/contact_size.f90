@@ -9,8 +9,8 @@
 !> counts.
 module contact_size
    use contact_rule, only : touches
-   use asperity_parallel, only : global_sum
-   use asperity_precision, only : dp, int64, pi
+   use asperity_precision, only : dp, pi
+   use field_sums, only : row_totals
    use regular_grid, only : boundary_periodic, grid_type
    use text_tools, only : to_text
    implicit none
@@ -34,7 +34,7 @@ contains
       message = ''
       widest = max(widest, across)
       if (.not. ends .or. widest >= fewest .or. .not. widest > 0.0_dp) return
-      if (grid%nx*int(grid%ny, int64) == 1) return
+      if (nint(min(grid%cells(), 2.0_dp)) == 1) return
       message = 'patches of contact are only '//to_text(nint(10.0_dp*widest)/10.0_dp)// &
          ' cells across on average: below 3 the contact area, the approach and the pressures depend '// &
          'on the cells; a finer grid is needed'
@@ -48,29 +48,26 @@ contains
       real(dp), intent(in) :: pressure(:, :), gap(:, :)
       real(dp) :: across
       logical, allocatable :: row(:), below(:)
-      integer :: cells, ends_x, ends_y, j
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: sums(3)
+      integer :: j
 
-      cells = 0
-      ends_x = 0
-      ends_y = 0
-      allocate (row(grid%nx))
+      allocate (row(grid%nx), rows(3, grid%ny))
       below = touches(adhesive, pressure(:, grid%ny), gap(:, grid%ny))
       if (grid%boundary /= boundary_periodic) below = .false.
       do j = 1, grid%ny
          row(:) = touches(adhesive, pressure(:, j), gap(:, j))
-         cells = cells + count(row)
-         ends_x = ends_x + count(row(2:) .and. .not. row(:grid%nx - 1))
+         rows(:, j) = [count(row), count(row(2:) .and. .not. row(:grid%nx - 1)), &
+            count(row .and. .not. below)]
          if (row(1) .and. .not. (row(grid%nx) .and. grid%boundary == boundary_periodic)) &
-            ends_x = ends_x + 1
-         ends_y = ends_y + count(row .and. .not. below)
+            rows(2, j) = rows(2, j) + 1.0_dp
          below(:) = row
       end do
-      cells = global_sum(cells)
-      ends_x = global_sum(ends_x)
-      ends_y = global_sum(ends_y)
-      across = merge(huge(1.0_dp), 0.0_dp, cells > 0)
-      if (ends_x > 0) across = real(cells, dp)/ends_x
-      if (ends_y > 0 .and. grid%ny > 1) across = min(across, real(cells, dp)/ends_y)
+      sums = row_totals(rows)
+      ! sums: cells in contact, and patches that start along x and along y.
+      across = merge(huge(1.0_dp), 0.0_dp, sums(1) > 0.0_dp)
+      if (sums(2) > 0.0_dp) across = sums(1)/sums(2)
+      if (sums(3) > 0.0_dp .and. grid%ny > 1) across = min(across, sums(1)/sums(3))
       if (grid%ny > 1 .and. across < huge(1.0_dp)) across = 4.0_dp/pi*across
    end function cells_across
 

@@ -27,9 +27,9 @@
 !> slopes of the check; and those of the acceleration.
 module coupled_passes
    use anderson, only : anderson_type, new_anderson
-   use contact_state, only : contact_mean, contact_state_type, solve_normal
+   use contact_model, only : contact_mean, contact_type, solve_normal
    use asperity_interpolation, only : displaced
-   use asperity_parallel, only : global_sum
+   use field_sums, only : row_totals
    use pass_control, only : pass_control_type
    use asperity_precision, only : dp
    use regular_grid, only : boundary_free
@@ -77,9 +77,9 @@ contains
    end subroutine new_coupled_passes
 
    !> Solve a row. The road has moved, and the tangential step has begun.
-   subroutine solve(self, state, plan, motion, normal, rubbing)
+   subroutine solve(self, contact, plan, motion, normal, rubbing)
       class(coupled_passes_type), intent(inout) :: self
-      class(contact_state_type), intent(inout) :: state
+      class(contact_type), intent(inout) :: contact
       type(planned_row_type), intent(in) :: plan
       real(dp), intent(in) :: motion(2)                  !! of the road in this row, m
       type(solver_result_type), intent(out) :: normal    !! all normal solves
@@ -89,87 +89,92 @@ contains
       integer :: most
       logical :: unlike                                  !! the row before
 
-      tolerance = state%case%solver%tolerance
-      most = state%case%solver%passes
+      tolerance = contact%case%solver%tolerance
+      most = contact%case%solver%passes
       if (most == 0) most = most_passes
       call self%mixing%forget()
-      call predict(self, state, motion)
+      call predict(self, contact, motion)
       unlike = plan%instantaneous .or. plan%new_speed
-      call control%start(tolerance, merge(1.0_dp, state%first_mismatch, unlike))
-      if (.not. plan%instantaneous) call state%tangential%extrapolate(.not. plan%new_speed)
+      call control%start(tolerance, merge(1.0_dp, contact%state%first_mismatch, unlike))
+      if (.not. plan%instantaneous) &
+         call contact%tangential%extrapolate(contact%state%tangential, .not. plan%new_speed)
 
       self%passes = 0
       do
          self%passes = self%passes + 1
          if (self%passes == most) control%accuracy = min(control%accuracy, tolerance)
-         call do_pass(self, state, plan, control%accuracy, normal, rubbing)
-         if (self%passes == 1 .and. .not. plan%instantaneous) state%first_mismatch = self%residual
+         call do_pass(self, contact, plan, control%accuracy, normal, rubbing)
+         if (self%passes == 1 .and. .not. plan%instantaneous) contact%state%first_mismatch = self%residual
          if (self%passes == most .or. .not. normal%converged) exit
          if (control%accuracy <= tolerance .and. self%residual <= tolerance) then
-            call settle(self, state, plan, rubbing)
+            call settle(self, contact, plan, rubbing)
             if (self%residual <= tolerance) return
          end if
          call control%judge(self%residual)
-         call choose_place(self, state, control)
+         call choose_place(self, contact, control)
          ! The last of many passes is for the best place that was found.
          if (self%passes == most - 1 .and. most > 10) self%place(:, :, :) = self%best_place
       end do
-      call settle(self, state, plan, rubbing)
+      call settle(self, contact, plan, rubbing)
    end subroutine solve
 
    !> One pass at the place, and the mismatch that it leaves.
-   subroutine do_pass(self, state, plan, accuracy, normal, rubbing)
+   subroutine do_pass(self, contact, plan, accuracy, normal, rubbing)
       class(coupled_passes_type), intent(inout) :: self
-      class(contact_state_type), intent(inout) :: state
+      class(contact_type), intent(inout) :: contact
       type(planned_row_type), intent(in) :: plan
       real(dp), intent(in) :: accuracy                   !! of both solves
       type(solver_result_type), intent(inout) :: normal, rubbing
       type(solver_result_type) :: part
 
-      call displaced(state%road, plan%road_x, plan%road_y, self%place(:, 1, :), self%place(:, 2, :), &
-         state%height, state%slope_x, state%slope_y)
-      call solve_normal(state, plan, accuracy, part)
+      call displaced(contact%road, plan%road_x, plan%road_y, self%place(:, 1, :), self%place(:, 2, :), &
+         contact%height, contact%slope_x, contact%slope_y)
+      call solve_normal(contact, plan, accuracy, part)
       call add_result(normal, part)
-      call state%tangential%solve(state%pressure, state%gap, state%slope_x, state%slope_y, accuracy, &
-         .false., part)
+      contact%tangential%tolerance = accuracy
+      contact%tangential%settle = .false.
+      call contact%tangential%solve(contact%state%tangential, contact%state%pressure, contact%state%gap, &
+         contact%slope_x, contact%slope_y, part)
       call add_result(rubbing, part)
-      self%residual = mismatch(self, state, plan)
+      self%residual = mismatch(self, contact, plan)
    end subroutine do_pass
 
    !> Let the traction itself settle, which the passes do not need.
-   subroutine settle(self, state, plan, rubbing)
+   subroutine settle(self, contact, plan, rubbing)
       class(coupled_passes_type), intent(inout) :: self
-      class(contact_state_type), intent(inout) :: state
+      class(contact_type), intent(inout) :: contact
       type(planned_row_type), intent(in) :: plan
       type(solver_result_type), intent(inout) :: rubbing
       type(solver_result_type) :: part
 
-      call state%tangential%solve(state%pressure, state%gap, state%slope_x, state%slope_y, &
-         state%case%solver%tolerance, .true., part)
+      contact%tangential%tolerance = contact%case%solver%tolerance
+      contact%tangential%settle = .true.
+      call contact%tangential%solve(contact%state%tangential, contact%state%pressure, contact%state%gap, &
+         contact%slope_x, contact%slope_y, part)
       call add_result(rubbing, part)
-      self%residual = mismatch(self, state, plan)
+      self%residual = mismatch(self, contact, plan)
    end subroutine settle
 
    !> The first place of a row: the displacement of the row before, moved along with the contact, which
    !> the road takes over the rubber, and with the rubber's mean motion.
-   subroutine predict(self, state, motion)
+   subroutine predict(self, contact, motion)
       class(coupled_passes_type), intent(inout) :: self
-      class(contact_state_type), intent(in) :: state
+      class(contact_type), intent(in) :: contact
       real(dp), intent(in) :: motion(2)                  !! of the road, m
       integer :: c
 
       do c = 1, 2
-         call carry(state%tangential%displacement(:, :, c), state%drift - motion, &
-            [state%grid%dx, state%grid%dy], state%grid%boundary /= boundary_free, &
+         call carry(contact%state%tangential%displacement(:, :, c), contact%drift - motion, &
+            [contact%grid%dx, contact%grid%dy], contact%grid%boundary /= boundary_free, &
             self%place(:, c, :))
-         self%place(:, c, :) = self%place(:, c, :) + state%drift(c)
+         self%place(:, c, :) = self%place(:, c, :) + contact%drift(c)
       end do
    end subroutine predict
 
    !> The next place, from what the last pass found.
-   subroutine choose_place(self, state, control)
+   subroutine choose_place(self, contact, control)
       class(coupled_passes_type), intent(inout) :: self
-      class(contact_state_type), intent(in) :: state
+      class(contact_type), intent(in) :: contact
       type(pass_control_type), intent(inout) :: control
       real(dp) :: motion(2)
       integer :: c, j
@@ -180,17 +185,17 @@ contains
          self%place(:, :, :) = self%best_place
          return
       end if
-      !$omp parallel do default(none) shared(self, state) private(j)
-      do j = 1, state%grid%ny
-         self%residuals(:, :, j) = state%tangential%trial(:, j, :) - self%place(:, :, j)
+      !$omp parallel do default(none) shared(self, contact) private(j)
+      do j = 1, contact%grid%ny
+         self%residuals(:, :, j) = contact%tangential%trial(:, j, :) - self%place(:, :, j)
       end do
-      motion = contact_mean(state, self%residuals)
+      motion = contact_mean(contact, self%residuals)
       do c = 1, 2
-         call carry(state%tangential%trial(:, :, c), motion, [state%grid%dx, state%grid%dy], &
-            state%grid%boundary /= boundary_free, self%residuals(:, c, :))
+         call carry(contact%tangential%trial(:, :, c), motion, [contact%grid%dx, contact%grid%dy], &
+            contact%grid%boundary /= boundary_free, self%residuals(:, c, :))
       end do
-      !$omp parallel do default(none) shared(self, state) private(j)
-      do j = 1, state%grid%ny
+      !$omp parallel do default(none) shared(self, contact) private(j)
+      do j = 1, contact%grid%ny
          self%residuals(:, :, j) = self%residuals(:, :, j) - self%place(:, :, j)
       end do
       if (control%plain) then
@@ -205,31 +210,31 @@ contains
    !> What remains of the coupling: by how much the road at U_T differs from the road solved on. The
    !> larger of two means that are weighted by the pressure: the difference of the heights over the
    !> rms height of the map, and that of the slopes over the slopes in the contact.
-   function mismatch(self, state, plan) result(residual)
+   function mismatch(self, contact, plan) result(residual)
       class(coupled_passes_type), intent(inout) :: self
-      class(contact_state_type), intent(in) :: state
+      class(contact_type), intent(in) :: contact
       type(planned_row_type), intent(in) :: plan
       real(dp) :: residual
       real(dp), allocatable :: rows(:, :)
       real(dp) :: sums(4)
-      integer :: j, k
+      integer :: j
 
-      call displaced(state%road, plan%road_x, plan%road_y, state%tangential%trial(:, :, 1), &
-         state%tangential%trial(:, :, 2), self%height, self%slope_x, self%slope_y)
-      allocate (rows(4, state%grid%ny))
-      !$omp parallel do default(none) shared(self, state, rows) private(j)
-      do j = 1, state%grid%ny
-         rows(1, j) = sum(abs(state%pressure(:, j)))
-         rows(2, j) = sum(abs(state%pressure(:, j)*(self%height(:, j) - state%height(:, j))))
-         rows(3, j) = sum(abs(state%pressure(:, j))*hypot(self%slope_x(:, j) - state%slope_x(:, j), &
-            self%slope_y(:, j) - state%slope_y(:, j)))
-         rows(4, j) = sum(abs(state%pressure(:, j))*hypot(state%slope_x(:, j), state%slope_y(:, j)))
+      call displaced(contact%road, plan%road_x, plan%road_y, contact%tangential%trial(:, :, 1), &
+         contact%tangential%trial(:, :, 2), self%height, self%slope_x, self%slope_y)
+      allocate (rows(4, contact%grid%ny))
+      !$omp parallel do default(none) shared(self, contact, rows) private(j)
+      do j = 1, contact%grid%ny
+         rows(1, j) = sum(abs(contact%state%pressure(:, j)))
+         rows(2, j) = sum(abs(contact%state%pressure(:, j)*(self%height(:, j) - contact%height(:, j))))
+         rows(3, j) = sum(abs(contact%state%pressure(:, j))*hypot(self%slope_x(:, j) - contact%slope_x(:, j), &
+            self%slope_y(:, j) - contact%slope_y(:, j)))
+         rows(4, j) = sum(abs(contact%state%pressure(:, j))*hypot(contact%slope_x(:, j), contact%slope_y(:, j)))
       end do
-      sums = global_sum([(sum(rows(k, :)), k = 1, 4)])
+      sums = row_totals(rows)
       residual = 0.0_dp
       if (.not. sums(1) > 0.0_dp) return
-      residual = max(sums(2)/max(state%rms_height*sums(1), tiny(1.0_dp)), &
-         sums(3)/max(sums(4), least_slope*state%rms_slope*sums(1), tiny(1.0_dp)))
+      residual = max(sums(2)/max(contact%rms_height*sums(1), tiny(1.0_dp)), &
+         sums(3)/max(sums(4), least_slope*contact%rms_slope*sums(1), tiny(1.0_dp)))
    end function mismatch
 
    !> Add the record of a solve to that of the row: the last outcome, all the work.

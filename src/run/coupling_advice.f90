@@ -1,8 +1,8 @@
 !> What to do where the passes of a row did not settle.
 module coupling_advice
-   use contact_state, only : contact_state_type
+   use contact_model, only : contact_type
    use friction_law, only : law_constant_shear
-   use asperity_parallel, only : global_sum
+   use field_sums, only : row_totals
    use asperity_precision, only : dp
    use text_tools, only : to_text
    implicit none
@@ -17,7 +17,7 @@ contains
 
    !> A sentence or two: the likely reason, and what helps.
    function advice_on_passes(self) result(advice)
-      class(contact_state_type), intent(in) :: self
+      class(contact_type), intent(in) :: self
       character(:), allocatable :: advice
       real(dp) :: jammed
 
@@ -41,10 +41,10 @@ contains
 
    !> Part of the normal force that acts on slopes steeper than 1/mu.
    function jammed_part(self) result(part)
-      class(contact_state_type), intent(in) :: self
+      class(contact_type), intent(in) :: self
       real(dp) :: part
       real(dp), allocatable :: rows(:, :)
-      real(dp) :: mu
+      real(dp) :: mu, sums(2)
       integer :: j
 
       part = 0.0_dp
@@ -52,11 +52,12 @@ contains
       if (.not. self%tangential%law%slope) return
       allocate (rows(2, self%grid%ny))
       do j = 1, self%grid%ny
-         rows(1, j) = sum(abs(self%pressure(:, j)))
-         rows(2, j) = sum(abs(self%pressure(:, j)), &
+         rows(1, j) = sum(abs(self%state%pressure(:, j)))
+         rows(2, j) = sum(abs(self%state%pressure(:, j)), &
             mu*hypot(self%slope_x(:, j), self%slope_y(:, j)) > 1.0_dp)
       end do
-      part = global_sum(sum(rows(2, :)))/max(global_sum(sum(rows(1, :))), tiny(1.0_dp))
+      sums = row_totals(rows)
+      part = sums(2)/max(sums(1), tiny(1.0_dp))
    end function jammed_part
 
 end module coupling_advice

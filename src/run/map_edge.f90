@@ -6,9 +6,10 @@
 !> rms height is enough, too; but that of a long map on which a summit travels says nothing.)
 module map_edge
    use contact_rule, only : touches
-   use asperity_parallel, only : global_min, global_sum
    use asperity_precision, only : dp
+   use field_sums, only : least_of_rows, row_total, row_totals
    use regular_grid, only : boundary_free, grid_type
+   use row_state, only : edge_near, edge_touches, state_type
    use text_tools, only : to_text
    implicit none
    private
@@ -18,59 +19,37 @@ module map_edge
    real(dp), parameter :: well_below = 0.1_dp     !! least gap of a moving edge over depth or rms height
    real(dp), parameter :: out_of_reach = 5.0_dp   !! least gap of a moving edge over the range of adhesion
 
-   integer, parameter, public :: edge_clear = 0   !! `state` of `look_at_edge`
-   integer, parameter, public :: edge_near = 1
-   integer, parameter, public :: edge_touches = 2
 
 contains
 
    !> Look at the cells at the edge: those that enter or leave within a step, one at least.
-   subroutine look_at_edge(grid, range, pressure, displacement, gap, move_x, move_y, rms_height, &
-      state, message)
+   subroutine look_at_edge(grid, range, rms_height, move, state, message)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: range                  !! of adhesion, m; 0: there is none
-      real(dp), intent(in) :: pressure(:, :)         !! Pa, [nx, ny]
-      real(dp), intent(in) :: displacement(:, :)     !! U_z, m, [nx, ny]
-      real(dp), intent(in) :: gap(:, :)              !! m, [nx, ny]
-      real(dp), intent(in) :: move_x, move_y         !! of the road in the step, m
       real(dp), intent(in) :: rms_height             !! of the road, m
-      integer, intent(inout) :: state                !! what was found so far; only worse is told
+      real(dp), intent(in) :: move(2)                !! of the road in the step, m
+      type(state_type), intent(inout) :: state       !! `edge` says what was found so far; only worse is told
       character(:), allocatable, intent(inout) :: message   !! a line is added; without the time
       real(dp) :: depth, least, near, reach
       logical :: adhesive
-      integer :: i, j, touching, wx, wy
+      integer :: touching, wx, wy
 
       if (grid%boundary /= boundary_free) return
       adhesive = range > 0.0_dp
-      wx = min(1 + ceiling(min(abs(move_x)/grid%dx, real(grid%nx, dp))), grid%nx)
-      wy = min(1 + ceiling(min(abs(move_y)/grid%dy, real(grid%ny, dp))), grid%ny)
-      touching = 0
-      least = huge(1.0_dp)
-      do j = 1, grid%ny
-         if (j <= wy .or. j > grid%ny - wy) then
-            touching = touching + count(touches(adhesive, pressure(:, j), gap(:, j)))
-            least = min(least, minval(gap(:, j)))
-         else
-            do i = 1, grid%nx
-               if (i > wx .and. i <= grid%nx - wx) cycle
-               if (touches(adhesive, pressure(i, j), gap(i, j))) touching = touching + 1
-               least = min(least, gap(i, j))
-            end do
-         end if
-      end do
-      touching = global_sum(touching)
-      least = global_min(least)
-      if (touching > 0 .and. state < edge_touches) then
-         state = edge_touches
+      wx = min(1 + ceiling(min(abs(move(1))/grid%dx, real(grid%nx, dp))), grid%nx)
+      wy = min(1 + ceiling(min(abs(move(2))/grid%dy, real(grid%ny, dp))), grid%ny)
+      call scan_edge(grid, adhesive, [wx, wy], state, touching, least)
+      if (touching > 0 .and. state%edge < edge_touches) then
+         state%edge = edge_touches
          call tell(to_text(touching)//' cells at the edge of the free map touch; what touches beyond '// &
             'the map is left out: a larger map is needed')
-      else if (abs(move_x) + abs(move_y) > 0.0_dp .and. state < edge_near) then
+      else if (any(abs(move) > 0.0_dp) .and. state%edge < edge_near) then
          reach = out_of_reach*range
          if (least >= max(well_below*rms_height, reach)) return
-         depth = depth_of_contact(pressure, displacement)
+         depth = depth_of_contact(state%pressure, state%displacement)
          near = max(well_below*min(depth, rms_height), reach)
          if (least >= near) return
-         state = edge_near
+         state%edge = edge_near
          call tell('points enter or leave the free map only '//to_text(least)// &
             ' m below the rubber, which is displaced by '//to_text(depth)//' m under the load: less than '// &
             to_text(near)//' m is near, a larger map is needed')
@@ -88,24 +67,47 @@ contains
 
    end subroutine look_at_edge
 
+   !> Cells that touch, and the least gap, in a frame along the edge of the map.
+   subroutine scan_edge(grid, adhesive, width, state, touching, least)
+      type(grid_type), intent(in) :: grid
+      logical, intent(in) :: adhesive
+      integer, intent(in) :: width(2)                !! of the frame along x and y, cells
+      type(state_type), intent(in) :: state
+      integer, intent(out) :: touching               !! cells of the frame that touch
+      real(dp), intent(out) :: least                 !! m
+      real(dp), allocatable :: rows(:, :)
+      logical :: inside(grid%nx)
+      integer :: i, j, row
+
+      allocate (rows(2, grid%rows()))
+      do j = 1, grid%rows()
+         row = grid%first_row + j - 1
+         inside = row <= width(2) .or. row > grid%ny - width(2)
+         do i = 1, grid%nx
+            if (i <= width(1) .or. i > grid%nx - width(1)) inside(i) = .true.
+         end do
+         rows(1, j) = count(inside .and. touches(adhesive, state%pressure(:, j), state%gap(:, j)))
+         rows(2, j) = minval(state%gap(:, j), inside)
+      end do
+      touching = nint(row_total(rows, 1))
+      least = least_of_rows(rows(2, :))
+   end subroutine scan_edge
+
    !> Mean displacement under the load, m: weighted by the pressure where that is positive.
    function depth_of_contact(pressure, displacement) result(depth)
       real(dp), intent(in) :: pressure(:, :), displacement(:, :)
       real(dp) :: depth
-      real(dp) :: load, work
-      integer :: i, j
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: sums(2)
+      integer :: j
 
-      load = 0.0_dp
-      work = 0.0_dp
+      allocate (rows(2, size(pressure, 2)))
       do j = 1, size(pressure, 2)
-         do i = 1, size(pressure, 1)
-            load = load + max(pressure(i, j), 0.0_dp)
-            work = work + max(pressure(i, j), 0.0_dp)*displacement(i, j)
-         end do
+         rows(:, j) = [sum(max(pressure(:, j), 0.0_dp)), &
+            sum(max(pressure(:, j), 0.0_dp)*displacement(:, j))]
       end do
-      load = global_sum(load)
-      work = global_sum(work)
-      depth = max(work/max(load, tiny(1.0_dp)), 0.0_dp)
+      sums = row_totals(rows)
+      depth = max(sums(2)/max(sums(1), tiny(1.0_dp)), 0.0_dp)
    end function depth_of_contact
 
 end module map_edge

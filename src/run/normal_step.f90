@@ -4,24 +4,31 @@
 !> solution without adhesion, or from full contact; later ones from the state before.
 module normal_step
    use adhesion_cg, only : adhesion_solver_type, new_adhesion_solver
-   use adhesion_advice, only : adhesion_edge
    use adhesion_potential, only : adhesion_potential_type, adhesive_energy, &
       new_adhesion_potential
    use adhesion_state, only : adhesion_problem_type
-   use case_settings, only : case_type
+   use case_settings, only : adhesion_settings_type, solver_settings_type
    use asperity_errors, only : error_input, error_type, fail
    use contact_solver, only : contact_solver_type
+   use field_sums, only : field_maximum, field_mean, field_rms, row_total
+   use kernels, only : kernel_type
    use normal_solvers, only : new_contact_solver
-   use normal_state, only : control_approach, control_pressure, normal_problem_type, rms_about_mean
-   use asperity_parallel, only : global_max, global_sum
+   use normal_state, only : control_approach, control_pressure, normal_problem_type
    use asperity_precision, only : dp
    use regular_grid, only : boundary_free, grid_type
-   use asperity_schedule, only : planned_row_type
    use solver_result, only : solver_result_type
    implicit none
    private
 
-   public :: new_normal_step, normal_step_type
+   public :: new_normal_step, normal_step_type, normal_task_type
+
+   !> What a row asks of the normal side.
+   type :: normal_task_type
+      character(12) :: control = 'pressure'        !! 'pressure' | 'force' | 'displacement'
+      real(dp) :: load = 0.0_dp                    !! Pa, N or m
+      real(dp) :: modulus = 0.0_dp                 !! Q, Pa
+      logical :: first = .false.                   !! there is no state yet
+   end type normal_task_type
 
    !> Solvers and settings of the normal side. Not to be copied.
    type :: normal_step_type
@@ -43,42 +50,43 @@ module normal_step
 
 contains
 
-   !> Prepare the solvers that a case needs.
-   subroutine new_normal_step(self, case, height, error)
+   !> Prepare the solvers.
+   subroutine new_normal_step(self, grid, kernel, solver, adhesion, edge, height, error)
       type(normal_step_type), intent(out) :: self
-      type(case_type), intent(in) :: case
-      real(dp), intent(in) :: height(:, :)         !! the original map, m
+      type(grid_type), intent(in) :: grid
+      type(kernel_type), intent(in) :: kernel           !! what the solid is, normal
+      type(solver_settings_type), intent(in) :: solver
+      type(adhesion_settings_type), intent(in) :: adhesion
+      real(dp), intent(in) :: edge                      !! width of a rounded jump of the attraction, m
+      real(dp), intent(in) :: height(:, :)              !! the original map, m
       type(error_type), allocatable, intent(out) :: error
 
-      self%grid = case%grid
-      self%tolerance = case%solver%tolerance
-      self%max_iterations = case%solver%max_iterations
-      self%adhesive = case%adhesion%potential /= 'none'
-      self%summit = global_max(maxval(height))
-      call new_contact_solver(self%normal, trim(case%solver%method), self%grid, case%material%poisson, &
-         error, mixed=case%solver%precision == 'mixed')
+      self%grid = grid
+      self%tolerance = solver%tolerance
+      self%max_iterations = solver%max_iterations
+      self%adhesive = adhesion%potential /= 'none'
+      self%summit = field_maximum(height)
+      call new_contact_solver(self%normal, trim(solver%method), self%grid, kernel, error, &
+         mixed=solver%precision == 'mixed')
       if (allocated(error)) return
-      self%rms_height = rms_about_mean(height, self%normal%operator%threads)
+      self%rms_height = field_rms(height, field_mean(height))
       if (.not. self%adhesive) return
-      self%full_contact = case%adhesion%start == 'full_contact'
-      if (case%solver%method == 'thesis' .and. self%grid%boundary == boundary_free) then
+      self%full_contact = adhesion%start == 'full_contact'
+      if (solver%method == 'thesis' .and. self%grid%boundary == boundary_free) then
          call fail(error, error_input, '&solver: method = ''thesis'' with &adhesion: needs boundary = '// &
             '''periodic''; ''fast'' serves both')
          return
       end if
-      call new_adhesion_potential(self%potential, trim(case%adhesion%potential), case%adhesion%energy, &
-         case%adhesion%range, error, edge=adhesion_edge(case))
+      call new_adhesion_potential(self%potential, trim(adhesion%potential), adhesion%energy, &
+         adhesion%range, error, edge=edge)
       if (allocated(error)) return
-      call new_adhesion_solver(self%sticky, self%grid, case%material%poisson, error, &
-         trim(case%solver%method))
+      call new_adhesion_solver(self%sticky, self%grid, kernel, error, trim(solver%method))
    end subroutine new_normal_step
 
-   !> Solve under the row's load, from the pressure and gap handed in; `first`: there is no state yet.
-   subroutine solve(self, plan, modulus, first, height, pressure, gap, level, outcome, past)
+   !> Solve under the row's load, from the pressure and gap handed in.
+   subroutine solve(self, task, height, pressure, gap, level, outcome, past)
       class(normal_step_type), intent(inout) :: self
-      type(planned_row_type), intent(in) :: plan
-      real(dp), intent(in) :: modulus                  !! Q, Pa
-      logical, intent(in) :: first
+      type(normal_task_type), intent(in) :: task
       real(dp), intent(in) :: height(:, :)             !! H under the rubber, m
       real(dp), intent(inout) :: pressure(:, :)        !! Pa
       real(dp), intent(inout) :: gap(:, :)             !! m
@@ -90,75 +98,72 @@ contains
       integer :: j
 
       if (.not. self%adhesive) then
-         call solve_bare(self, plan, modulus, .not. first, height, pressure, gap, level, outcome, past)
+         call solve_bare(self, task, height, pressure, gap, level, outcome, past)
          return
       end if
-      if (first .and. self%full_contact) then
+      if (task%first .and. self%full_contact) then
          !$omp parallel do default(none) shared(self, gap) private(j)
-         do j = 1, self%grid%ny
+         do j = 1, self%grid%rows()
             gap(:, j) = 0.0_dp
          end do
-      else if (first) then
-         call start(self, plan, modulus, height, pressure, gap, level, before, past)
+      else if (task%first) then
+         call start(self, task, height, pressure, gap, level, before, past)
       end if
       problem%potential = self%potential
-      problem%modulus = modulus
+      problem%modulus = task%modulus
       problem%tolerance = self%tolerance
       problem%max_iterations = self%max_iterations
-      problem%full_contact = first .and. self%full_contact
-      call load_of(self, plan, problem%control, problem%target)
+      problem%full_contact = task%first .and. self%full_contact
+      call load_of(self, task, problem%control, problem%target)
       call self%sticky%solve(problem, height, gap, pressure, level, outcome, past)
       outcome%iterations = outcome%iterations + before%iterations
       outcome%ffts = outcome%ffts + before%ffts
    end subroutine solve
 
    !> The load of a row as the solvers want it: mean pressure, or level.
-   subroutine load_of(self, plan, control, target)
+   subroutine load_of(self, task, control, target)
       type(normal_step_type), intent(in) :: self
-      type(planned_row_type), intent(in) :: plan
+      type(normal_task_type), intent(in) :: task
       integer, intent(out) :: control
       real(dp), intent(out) :: target
 
       control = control_pressure
-      target = plan%load
-      if (plan%control == 'force') target = plan%load/(self%grid%lx*self%grid%ly)
-      if (plan%control == 'displacement') then
+      target = task%load
+      if (task%control == 'force') target = task%load/self%grid%area()
+      if (task%control == 'displacement') then
          control = control_approach
-         target = plan%load - self%summit
+         target = task%load - self%summit
       end if
    end subroutine load_of
 
    !> The first state with adhesion: the solution without, or mere touch where the load does not press.
-   subroutine start(self, plan, modulus, height, pressure, gap, level, outcome, past)
+   subroutine start(self, task, height, pressure, gap, level, outcome, past)
       type(normal_step_type), intent(inout) :: self
-      type(planned_row_type), intent(in) :: plan
-      real(dp), intent(in) :: modulus
+      type(normal_task_type), intent(in) :: task
       real(dp), intent(in) :: height(:, :)
       real(dp), intent(inout) :: pressure(:, :), gap(:, :)
       real(dp), intent(inout) :: level
       type(solver_result_type), intent(out) :: outcome
       real(dp), intent(in), optional :: past(:, :)
-      type(planned_row_type) :: touch
+      type(normal_task_type) :: touch
       integer :: j
 
-      touch = plan
-      if (plan%control /= 'displacement' .and. plan%load <= 0.0_dp) then
+      touch = task
+      if (task%control /= 'displacement' .and. task%load <= 0.0_dp) then
          touch%control = 'displacement'
          touch%load = 0.0_dp
       end if
-      call solve_bare(self, touch, modulus, .false., height, pressure, gap, level, outcome, past)
+      call solve_bare(self, touch, height, pressure, gap, level, outcome, past)
       !$omp parallel do default(none) shared(self, gap) private(j)
-      do j = 1, self%grid%ny
+      do j = 1, self%grid%rows()
          gap(:, j) = max(gap(:, j), 0.0_dp)
       end do
    end subroutine start
 
    !> The contact without adhesion.
-   subroutine solve_bare(self, plan, modulus, warm, height, pressure, gap, level, outcome, past)
+   subroutine solve_bare(self, task, height, pressure, gap, level, outcome, past)
       type(normal_step_type), intent(inout) :: self
-      type(planned_row_type), intent(in) :: plan
-      real(dp), intent(in) :: modulus
-      logical, intent(in) :: warm
+      type(normal_task_type), intent(in) :: task
       real(dp), intent(in) :: height(:, :)
       real(dp), intent(inout) :: pressure(:, :), gap(:, :)
       real(dp), intent(out) :: level
@@ -166,12 +171,12 @@ contains
       real(dp), intent(in), optional :: past(:, :)
       type(normal_problem_type) :: problem
 
-      problem%modulus = modulus
+      problem%modulus = task%modulus
       problem%tolerance = self%tolerance
       problem%max_iterations = self%max_iterations
       problem%rms_height = self%rms_height
-      problem%warm = warm
-      call load_of(self, plan, problem%control, problem%target)
+      problem%warm = .not. task%first
+      call load_of(self, task, problem%control, problem%target)
       call self%normal%solve(problem, height, pressure, gap, level, outcome, past)
    end subroutine solve_bare
 
@@ -190,7 +195,7 @@ contains
       do j = 1, self%grid%ny
          rows(j) = sum(adhesive_energy(self%potential, gap(:, j)))
       end do
-      total = global_sum(sum(rows))*self%grid%dx*self%grid%dy
+      total = row_total(rows)*self%grid%cell_area()
    end function energy
 
    !> Free plans and memory.

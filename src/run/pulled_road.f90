@@ -2,14 +2,14 @@
 !> it has been found.
 !>
 !> The tangential solver finds how far the road has moved in a row (modules `friction_pull`,
-!> `tangential_state`). Until then the row is reckoned with a guess, the motion of the last step. The
+!> `tangential_step`). Until then the row is reckoned with a guess, the motion of the last step. The
 !> guess changes no result beyond the tolerance: heights are read at U_T - D, which the tangential
 !> solver returns without the guess.
 module pulled_road
    use asperity_precision, only : dp
    use regular_grid, only : grid_type
    use asperity_schedule, only : planned_row_type, schedule_type
-   use tangential_state, only : tangential_state_type
+   use tangential_step, only : tangential_step_type
    use text_tools, only : to_text
    implicit none
    private
@@ -47,17 +47,18 @@ contains
    end subroutine guess_road
 
    !> Take over where the road has been found.
-   subroutine take_road(plan, schedule, tangential, road, velocity)
+   subroutine take_road(plan, schedule, tangential, moved, road, velocity)
       type(planned_row_type), intent(inout) :: plan
       type(schedule_type), intent(inout) :: schedule
-      type(tangential_state_type), intent(inout) :: tangential
+      type(tangential_step_type), intent(inout) :: tangential
+      logical, intent(in) :: moved                  !! the road has moved: friction acts
       real(dp), intent(in) :: road(2)               !! displacement of the road at the last row, m
       real(dp), intent(inout) :: velocity(2)        !! of the road in the step, m/s
       real(dp) :: motion(2)
 
       if (.not. any(plan%pulled)) return
       motion = 0.0_dp
-      if (tangential%moved) call tangential%take_motion(motion)
+      if (moved) call tangential%take_motion(motion)
       if (plan%pulled(1)) then
          plan%road_x = road(1) + motion(1)
          schedule%start_x = plan%road_x
@@ -101,7 +102,7 @@ contains
    !> Why a row whose pull the friction does not hold has no solution.
    function pull_outcome(plan, tangential) result(reason)
       type(planned_row_type), intent(in) :: plan
-      type(tangential_state_type), intent(in) :: tangential
+      type(tangential_step_type), intent(in) :: tangential
       character(:), allocatable :: reason
 
       reason = 'the road is pulled by '//to_text(norm2(merge(plan%pull, 0.0_dp, plan%pulled)))// &

@@ -4,8 +4,7 @@
 !> of contact) are shifted with it by whole cells: they are the best start for the solvers. The
 !> rubber's surface is expected to move on as in the step before.
 module road_motion
-   use contact_state, only : contact_state_type
-   use asperity_interpolation, only : displaced, shifted
+   use contact_model, only : contact_type, place_road
    use asperity_precision, only : dp, int8
    use pulled_road, only : drive_direction
    use regular_grid, only : boundary_free
@@ -13,63 +12,55 @@ module road_motion
    implicit none
    private
 
-   public :: move_road, place_road
+   public :: move_road
 
 contains
 
    !> Move the road, and the pressure with it.
    subroutine move_road(self, plan)
-      class(contact_state_type), intent(inout) :: self
+      class(contact_type), intent(inout) :: self
       type(planned_row_type), intent(in) :: plan
       integer :: cells(2)
       real(dp) :: drift(2), seen(2)
 
-      call drive_direction(plan, self%direction)
+      call drive_direction(plan, self%state%direction)
       if (.not. self%slides) return
       drift = 0.0_dp
       if (self%rubs()) then
          ! The surface is expected to move on as in the step before; where the road starts, with it.
-         drift = self%tangential%rate*plan%dt
-         if (plan%new_speed .and. .not. any(abs(self%velocity) > 0.0_dp)) &
+         drift = self%state%tangential%rate*plan%dt
+         if (plan%new_speed .and. .not. any(abs(self%state%velocity) > 0.0_dp)) &
             drift = [plan%velocity_x, plan%velocity_y]*plan%dt
       end if
-      self%velocity = [plan%velocity_x, plan%velocity_y]
+      self%state%velocity = [plan%velocity_x, plan%velocity_y]
       self%drift = drift
-      self%drifted = self%drifted + drift
-      seen = [plan%road_x, plan%road_y] - self%drifted
+      self%state%drifted = self%state%drifted + drift
+      seen = [plan%road_x, plan%road_y] - self%state%drifted
       cells = nint(seen/[self%grid%dx, self%grid%dy])
-      if (any(cells /= self%moved_cells)) then
-         call shift_fields(self, cells - self%moved_cells)
-         self%moved_cells = cells
+      if (any(cells /= self%state%moved_cells)) then
+         call shift_fields(self, cells - self%state%moved_cells)
+         self%state%moved_cells = cells
       end if
       ! With friction the passes read the road where the surface is.
       if (.not. self%rubs()) call place_road(self, plan%road_x, plan%road_y)
    end subroutine move_road
 
-   !> Heights and slopes of the road at a displacement, under a surface that has not moved.
-   subroutine place_road(self, road_x, road_y)
-      class(contact_state_type), intent(inout) :: self
-      real(dp), intent(in) :: road_x, road_y        !! m
-
-      if (self%slides) call shifted(self%road, road_x, road_y, self%height, self%slope_x, self%slope_y)
-   end subroutine place_road
-
    !> Shift by whole cells what moves with the road.
    subroutine shift_fields(self, cells)
-      class(contact_state_type), intent(inout) :: self
+      class(contact_type), intent(inout) :: self
       integer, intent(in) :: cells(2)
       logical :: free
       integer :: c
 
       free = self%grid%boundary == boundary_free
-      call shift_field(cells, free, self%pressure)
-      if (self%side%adhesive .and. .not. free) call shift_field(cells, free, self%gap)
+      call shift_field(cells, free, self%state%pressure)
+      if (self%side%adhesive .and. .not. free) call shift_field(cells, free, self%state%gap)
       if (.not. self%rubs()) return
       do c = 1, 2
-         call shift_field(cells, free, self%tangential%traction(:, :, c))
-         call shift_field(cells, free, self%tangential%before(:, :, c))
+         call shift_field(cells, free, self%state%tangential%traction(:, :, c))
+         call shift_field(cells, free, self%state%tangential%before(:, :, c))
       end do
-      call shift_states(cells, free, self%tangential%contact)
+      call shift_states(cells, free, self%state%tangential%contact)
    end subroutine shift_fields
 
    !> Shift a field by whole cells; what enters a free map is zero.

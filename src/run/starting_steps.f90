@@ -38,9 +38,7 @@ module starting_steps
       real(dp), allocatable :: slip(:, :, :)       !! m
    contains
       procedure :: add
-      procedure :: add_slip
       procedure :: hand_out
-      procedure :: hand_out_slip
    end type part_sums_type
 
 contains
@@ -75,11 +73,12 @@ contains
       end do
    end subroutine split_start
 
-   !> Add the row of a part.
-   pure subroutine add(self, dt, row)
+   !> Add the row of a part, and its slip.
+   subroutine add(self, dt, row, slip)
       class(part_sums_type), intent(inout) :: self
       real(dp), intent(in) :: dt                   !! of the part, s
       type(history_row_type), intent(in) :: row
+      real(dp), allocatable, intent(in) :: slip(:, :, :)   !! m; not allocated without friction
 
       self%iterations_normal = self%iterations_normal + row%iterations_normal
       self%iterations_tangential = self%iterations_tangential + row%iterations_tangential
@@ -93,11 +92,12 @@ contains
       self%lost_friction = self%lost_friction + dt*row%power_friction
       self%residual_normal = max(self%residual_normal, row%residual_normal)
       self%residual_tangential = max(self%residual_tangential, row%residual_tangential)
+      if (allocated(slip)) call add_slip(self, slip)
    end subroutine add
 
    !> Add the slip of a part.
    subroutine add_slip(self, slip)
-      class(part_sums_type), intent(inout) :: self
+      type(part_sums_type), intent(inout) :: self
       real(dp), intent(in) :: slip(:, :, :)        !! m
       integer :: j
 
@@ -111,10 +111,11 @@ contains
       end do
    end subroutine add_slip
 
-   !> Put the sums into the row of the step.
-   pure subroutine hand_out(self, row)
+   !> Put the sums into the row of the step, and the slip of all parts into that of the step.
+   subroutine hand_out(self, row, slip)
       class(part_sums_type), intent(in) :: self
       type(history_row_type), intent(inout) :: row
+      real(dp), allocatable, intent(inout) :: slip(:, :, :)   !! m
 
       row%iterations_normal = self%iterations_normal
       row%iterations_tangential = self%iterations_tangential
@@ -127,19 +128,7 @@ contains
       row%power_friction = self%lost_friction/self%time
       row%residual_normal = self%residual_normal
       row%residual_tangential = self%residual_tangential
+      if (allocated(self%slip)) slip(:, :, :) = self%slip
    end subroutine hand_out
-
-   !> Put the slip of all parts into that of the step.
-   subroutine hand_out_slip(self, slip)
-      class(part_sums_type), intent(in) :: self
-      real(dp), intent(inout) :: slip(:, :, :)     !! m
-      integer :: j
-
-      if (.not. allocated(self%slip)) return
-      !$omp parallel do default(none) shared(self, slip) private(j)
-      do j = 1, size(slip, 2)
-         slip(:, j, :) = self%slip(:, j, :)
-      end do
-   end subroutine hand_out_slip
 
 end module starting_steps

@@ -34,7 +34,7 @@ contains
             ': must be positive without adhesion')
       end if
       if (allocated(error)) return
-      call change_load(sim%schedule, sim%case%phases, control, load)
+      call change_load(sim%state%schedule, sim%case%phases, control, load)
    end subroutine steer_load
 
    !> Let the road move with a velocity.
@@ -51,8 +51,8 @@ contains
             'cannot move')
       end if
       if (allocated(error)) return
-      call change_velocity(sim%schedule, sim%case%phases, velocity, &
-         [sim%row%road_x, sim%row%road_y])
+      call change_velocity(sim%state%schedule, sim%case%phases, velocity, &
+         [sim%state%row%road_x, sim%state%row%road_y])
    end subroutine steer_velocity
 
    !> Bring the rubber to a temperature: its relaxation times shift by the WLF law.

@@ -9,6 +9,7 @@ module adhesion_cg
    use finite_fields, only : reject_overflow
    use asperity_errors, only : error_input, error_type, fail
    use asperity_parallel, only : global_max, thread_count
+   use kernels, only : kernel_type
    use asperity_precision, only : dp
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
@@ -28,10 +29,10 @@ module adhesion_cg
 contains
 
    !> Make a solver for a grid; in free mode ny > 1.
-   subroutine new_adhesion_solver(self, grid, poisson, error, method, preconditioner)
+   subroutine new_adhesion_solver(self, grid, kernel, error, method, preconditioner)
       type(adhesion_solver_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
-      real(dp), intent(in) :: poisson
+      type(kernel_type), intent(in) :: kernel          !! what the solid is, normal
       type(error_type), allocatable, intent(out) :: error
       character(*), intent(in), optional :: method          !! 'fast' (default) or 'thesis' (periodic)
       character(*), intent(in), optional :: preconditioner  !! 'coarse' (default) or 'full', of 'fast'
@@ -52,9 +53,9 @@ contains
       end select
       select type (chosen => self%method)
       type is (adhesion_fast_type)
-         call new_adhesion_fast(chosen, grid, poisson, trim(form), error)
+         call new_adhesion_fast(chosen, grid, kernel, trim(form), error)
       type is (adhesion_thesis_type)
-         call new_adhesion_thesis(chosen, grid, poisson, error)
+         call new_adhesion_thesis(chosen, grid, kernel, error)
       end select
    end subroutine new_adhesion_solver
 

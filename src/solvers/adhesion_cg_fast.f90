@@ -41,6 +41,7 @@ module adhesion_cg_fast
    use adhesion_steps, only : choose_step, clipped_step, form_step_row, known_of_step, step_sums_type, &
       stepped_gap, sum_shift
    use asperity_errors, only : error_type
+   use kernels, only : kernel_type
    use asperity_precision, only : dp, int64
    use fft_conv, only : columns_apply
    use omp_lib, only : omp_get_wtime
@@ -75,16 +76,16 @@ module adhesion_cg_fast
 contains
 
    !> Make a solver for a grid; in free mode ny > 1.
-   subroutine new_adhesion_fast(self, grid, poisson, preconditioner, error)
+   subroutine new_adhesion_fast(self, grid, kernel, preconditioner, error)
       type(adhesion_fast_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
-      real(dp), intent(in) :: poisson
+      type(kernel_type), intent(in) :: kernel          !! what the solid is, normal
       character(*), intent(in) :: preconditioner           !! 'coarse' or 'full'
       type(error_type), allocatable, intent(out) :: error
       real(dp), allocatable :: stiffness(:, :), compliance(:, :)
 
       associate (work => self%work)
-         call new_adhesion_patch(work%patch, grid, poisson, stiffness, compliance, error)
+         call new_adhesion_patch(work%patch, grid, kernel, stiffness, compliance, error)
          if (allocated(error)) return
          associate (mx => work%patch%mx, my => work%patch%my)
             call new_adhesion_preconditioner(work%preconditioner, preconditioner, mx, my, compliance, &

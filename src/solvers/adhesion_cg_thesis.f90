@@ -19,6 +19,7 @@ module adhesion_cg_thesis
    use adhesion_steps, only : stepped_gap, sum_shift
    use asperity_errors, only : error_input, error_type, fail
    use asperity_parallel, only : global_max, global_min, global_sum
+   use kernels, only : kernel_type
    use asperity_precision, only : dp, int64
    use omp_lib, only : omp_get_wtime
    use regular_grid, only : boundary_periodic, grid_type
@@ -47,10 +48,10 @@ module adhesion_cg_thesis
 contains
 
    !> Make a solver for a periodic grid.
-   subroutine new_adhesion_thesis(self, grid, poisson, error)
+   subroutine new_adhesion_thesis(self, grid, kernel, error)
       type(adhesion_thesis_type), intent(out) :: self
       type(grid_type), intent(in) :: grid                  !! periodic
-      real(dp), intent(in) :: poisson
+      type(kernel_type), intent(in) :: kernel          !! what the solid is, normal
       type(error_type), allocatable, intent(out) :: error
       real(dp), allocatable :: stiffness(:, :), compliance(:, :)
 
@@ -59,7 +60,7 @@ contains
             "method = 'thesis': adhesion on a free grid: must be 'fast' there")
          return
       end if
-      call new_adhesion_patch(self%patch, grid, poisson, stiffness, compliance, error)
+      call new_adhesion_patch(self%patch, grid, kernel, stiffness, compliance, error)
       if (allocated(error)) return
       allocate (self%residual(grid%nx, grid%ny), self%direction(grid%nx, grid%ny), &
          self%product(grid%nx, grid%ny), self%trial_gap(grid%nx, grid%ny), &

@@ -23,9 +23,9 @@ module adhesion_patch
    use adhesion_steps, only : stepped_gap, sum_shift
    use asperity_errors, only : error_input, error_type, fail
    use asperity_parallel, only : global_max, global_min, global_sum
-   use asperity_precision, only : dp, int64, pi
-   use fft_conv, only : columns_apply, convolution_type, new_normal_operator, new_symbol_operator
-   use influence, only : normal_symbol
+   use kernels, only : kernel_type
+   use asperity_precision, only : dp, int64
+   use fft_conv, only : columns_apply, convolution_type, new_convolution, new_symbol_operator
    use regular_grid, only : boundary_periodic, grid_type
    implicit none
    private
@@ -82,36 +82,41 @@ module adhesion_patch
 contains
 
    !> Make the patch of a grid, and its symbols for a preconditioner.
-   subroutine new_adhesion_patch(self, grid, poisson, stiffness, compliance, error)
+   subroutine new_adhesion_patch(self, grid, kernel, stiffness, compliance, error)
       type(adhesion_patch_type), intent(out) :: self
       type(grid_type), intent(in) :: grid                      !! free grids: ny > 1
-      real(dp), intent(in) :: poisson
+      type(kernel_type), intent(in) :: kernel          !! what the solid is, normal
       real(dp), allocatable, intent(out) :: stiffness(:, :)    !! B for G = 1, (0:mx/2, 0:my/2)
       real(dp), allocatable, intent(out) :: compliance(:, :)   !! about its inverse, > 0
       type(error_type), allocatable, intent(out) :: error
+      real(dp), allocatable :: symbol(:, :, :)
 
       self%periodic = grid%boundary == boundary_periodic
       self%nx = grid%nx
       self%ny = grid%ny
-      self%cells = real(grid%nx, dp)*grid%ny
-      self%nyquist = pi/sqrt(grid%dx*merge(grid%dx, grid%dy, grid%ny == 1))/(1.0_dp - poisson)
-      self%longest = 2.0_dp*pi/max(grid%lx, merge(0.0_dp, grid%ly, grid%ny == 1))/(1.0_dp - poisson)
+      self%cells = grid%cells()
+      self%nyquist = kernel%largest_stiffness(grid)
+      self%longest = kernel%least_stiffness(grid)
       self%mx = merge(1, 2, self%periodic)*grid%nx
       self%my = merge(1, 2, self%periodic)*grid%ny
-      allocate (stiffness(0:self%mx/2, 0:self%my/2), compliance(0:self%mx/2, 0:self%my/2))
+      allocate (stiffness(0:self%mx/2, 0:self%my/2), compliance(0:self%mx/2, 0:self%my/2), &
+         symbol(0:self%mx/2, 0:self%my/2, 1))
       if (self%periodic) then
-         call periodic_symbols(self, grid, poisson, stiffness, compliance)
+         call kernel%inverse_symbols(grid, symbol)
+         stiffness(:, :) = symbol(:, :, 1)
+         compliance(:, :) = 1.0_dp/(stiffness + self%longest)      ! finite at wave number zero
       else if (grid%ny < 2) then
          call fail(error, error_input, 'adhesion_patch: a free grid must have ny > 1')
          return
       else
-         call normal_symbol(grid, poisson, self%mx, self%my, compliance)
+         call kernel%symbols(grid, self%mx, self%my, symbol)
+         compliance(:, :) = symbol(:, :, 1)
          if (minval(compliance) <= 0.0_dp) then
             call fail(error, error_input, 'adhesion_patch: the symbol of this grid is not positive')
             return
          end if
          stiffness = 1.0_dp/compliance
-         call new_normal_operator(self%operator, grid, poisson, error)
+         call new_convolution(self%operator, grid, kernel, error)
          if (allocated(error)) return
       end if
       call new_symbol_operator(self%stiffness, self%mx, self%my, stiffness, error)
@@ -119,22 +124,6 @@ contains
       self%threads = self%stiffness%threads
       if (.not. self%periodic) call make_psi(self)
    end subroutine new_adhesion_patch
-
-   !> B = |q|/(1 - nu), and the inverse of B kept finite at wave number zero.
-   subroutine periodic_symbols(self, grid, poisson, stiffness, compliance)
-      type(adhesion_patch_type), intent(in) :: self
-      type(grid_type), intent(in) :: grid
-      real(dp), intent(in) :: poisson
-      real(dp), intent(out) :: stiffness(0:, 0:), compliance(0:, 0:)
-      integer :: i, j
-
-      do j = 0, grid%ny/2
-         do i = 0, grid%nx/2
-            stiffness(i, j) = 2.0_dp*pi*hypot(i/grid%lx, j/grid%ly)/(1.0_dp - poisson)
-            compliance(i, j) = 1.0_dp/(stiffness(i, j) + self%longest)
-         end do
-      end do
-   end subroutine periodic_symbols
 
    !> psi: the displacement of a uniform pressure on the patch over its least value there, at most 1.
    subroutine make_psi(self)

@@ -8,7 +8,8 @@
 !> up to a factor, so that the preconditioner stays symmetric for any numbers of cells.
 module coarse_level
    use asperity_errors, only : error_type
-   use fft_conv, only : convolution_type, new_normal_operator
+   use fft_conv, only : convolution_type, new_convolution
+   use kernels, only : kernel_type
    use asperity_precision, only : dp, pi, sp
    use regular_grid, only : grid_type, new_grid
    implicit none
@@ -41,10 +42,10 @@ module coarse_level
 contains
 
    !> Make the coarse level of a grid.
-   subroutine new_coarse_level(self, grid, poisson, error)
+   subroutine new_coarse_level(self, grid, kernel, error)
       type(coarse_level_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
-      real(dp), intent(in) :: poisson
+      type(kernel_type), intent(in) :: kernel      !! what the solid is, normal
       type(error_type), allocatable, intent(out) :: error
       type(grid_type) :: blocks
       real(dp) :: h
@@ -58,7 +59,7 @@ contains
       self%ny = min(max(1, nint(grid%ly/(ratio*h))), grid%ny)
       self%cells = real(grid%nx, dp)*grid%ny/(real(self%nx, dp)*self%ny)
       self%h = h
-      self%fine_symbol = (1.0_dp - poisson)*ratio*h/(2.0_dp*pi)
+      self%fine_symbol = kernel%compliance(2.0_dp*pi/(ratio*h))
 
       allocate (self%block_x(grid%nx), self%last_x(self%nx), self%first_y(self%ny + 1))
       do i = 1, grid%nx
@@ -71,7 +72,7 @@ contains
       allocate (self%mean(self%nx, self%ny), self%share(self%nx, self%ny))
 
       blocks = new_grid(self%nx, self%ny, grid%lx, grid%ly, grid%boundary)
-      call new_normal_operator(self%normal, blocks, poisson, error)
+      call new_convolution(self%normal, blocks, kernel, error)
    end subroutine new_coarse_level
 
    !> Sums over the blocks along x of values in single precision.

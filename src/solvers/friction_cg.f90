@@ -14,7 +14,7 @@
 !> The operator A is that of G = 1. For a scheme of time with the factor Q pass DX' = Q DX and the
 !> traction T_h of the memory: r = Q DX - A (T + T_h) is then Q times the slip, and the displacement
 !> is U = DX - r/Q, without another product. With inertia the mean mode of the operator differs from
-!> A(0): set it by `set_mean_compliance`.
+!> A(0): set it by the operator's `set_mean_compliance`.
 !>
 !> Methods: 'fast' (module `friction_cg_fast`, which falls back on `friction_cg_gradient`), 'gradient'
 !> (the fallback alone) and 'thesis' (`friction_cg_thesis`). Converged means both the criterion of
@@ -42,13 +42,14 @@ module friction_cg
    use friction_problem, only : friction_fields_type, friction_problem_type, friction_work_type
    use friction_pull, only : friction_pull_type
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
+   use kernels, only : kernel_type
    use omp_lib, only : omp_get_wtime
    use regular_grid, only : boundary_periodic, grid_type
    use solver_result, only : solver_result_type
    implicit none
    private
 
-   public :: friction_fields_type, friction_solver_type, new_friction_solver, set_mean_compliance
+   public :: friction_fields_type, friction_solver_type, new_friction_solver
 
    integer, parameter, public :: friction_fast = 1
    integer, parameter, public :: friction_thesis = 2
@@ -84,34 +85,33 @@ module friction_cg
 
 contains
 
-   !> Make the solver for an operator of `new_tangential_operator`.
-   subroutine new_friction_solver(self, grid, poisson, operator, error, method)
+   !> Make the solver for an operator of a tangential kernel.
+   subroutine new_friction_solver(self, grid, operator, error, method)
       type(friction_solver_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
-      real(dp), intent(in) :: poisson
       type(convolution_type), intent(in) :: operator
       type(error_type), allocatable, intent(out) :: error
       integer, intent(in), optional :: method        !! friction_fast (default), _thesis or _gradient
 
       self%periodic = grid%boundary == boundary_periodic
       self%length = max(grid%lx, grid%ly)
-      self%compliance = self_compliance(operator, self%periodic)
+      self%compliance = operator%self_compliance()
       if (self%compliance <= 0.0_dp) self%compliance = self%length     ! one cell has no modes
       allocate (self%work%bound(grid%nx, 2, grid%ny), self%work%tangent(grid%nx, 3, grid%ny), &
          self%work%old(grid%nx, 2, grid%ny), self%work%level(grid%nx), source=0.0_dp)
       if (present(method)) then
-         call choose_method(self, method, grid, poisson, error)
+         call choose_method(self, method, grid, operator%kernel, error)
       else
-         call choose_method(self, friction_fast, grid, poisson, error)
+         call choose_method(self, friction_fast, grid, operator%kernel, error)
       end if
    end subroutine new_friction_solver
 
    !> Make the method that is asked for.
-   subroutine choose_method(self, method, grid, poisson, error)
+   subroutine choose_method(self, method, grid, kernel, error)
       type(friction_solver_type), intent(inout) :: self
       integer, intent(in) :: method
       type(grid_type), intent(in) :: grid
-      real(dp), intent(in) :: poisson
+      type(kernel_type), intent(in) :: kernel        !! what the solid is, tangential
       type(error_type), allocatable, intent(out) :: error
 
       select case (method)
@@ -124,37 +124,9 @@ contains
       end select
       select type (chosen => self%method)
       type is (friction_fast_type)
-         call new_friction_fast(chosen, grid, poisson, error)
+         call new_friction_fast(chosen, grid, kernel, error)
       end select
    end subroutine choose_method
-
-   !> a_0, the mean of the symbols over the whole spectrum; without the mean mode where periodic.
-   pure function self_compliance(operator, periodic) result(compliance)
-      type(convolution_type), intent(in) :: operator
-      logical, intent(in) :: periodic
-      real(dp) :: compliance
-      real(dp) :: weight
-      integer :: i, j
-
-      compliance = 0.0_dp
-      do j = 0, operator%my/2
-         do i = 0, operator%mx/2
-            if (periodic .and. i == 0 .and. j == 0) cycle
-            weight = merge(1.0_dp, 2.0_dp, i == 0 .or. 2*i == operator%mx) &
-               *merge(1.0_dp, 2.0_dp, j == 0 .or. 2*j == operator%my)
-            compliance = compliance &
-               + 0.5_dp*weight*(operator%symbol(i, j, 1) + operator%symbol(i, j, 2))
-         end do
-      end do
-   end function self_compliance
-
-   !> Set the mean mode of a periodic tangential operator: u = compliance t for a uniform traction.
-   subroutine set_mean_compliance(operator, compliance)
-      type(convolution_type), intent(inout) :: operator
-      real(dp), intent(in) :: compliance           !! m for G = 1 Pa; h for a block at rest
-
-      operator%symbol(0, 0, 1:2) = compliance/(real(operator%mx, dp)*operator%my)
-   end subroutine set_mean_compliance
 
    !> Solve for T, starting from the T given.
    subroutine solve(self, operator, law, fields, result)
@@ -198,7 +170,6 @@ contains
       type(friction_law_type), intent(in) :: law
       type(friction_fields_type), intent(in) :: fields
       type(friction_problem_type), intent(out) :: problem
-      real(dp) :: cells
 
       problem%friction_fields_type = fields
       problem%work => self%work
@@ -210,9 +181,8 @@ contains
       problem%settle = self%settle
       problem%near = self%near
       problem%least_scale = self%least_scale
-      cells = real(operator%nx, dp)*operator%ny
-      if (self%periodic .and. operator%symbol(0, 0, 1)*cells > thick*self%length) &
-         problem%mean_compliance = operator%symbol(0, 0, 1)
+      if (self%periodic .and. operator%mean_mode(1)*operator%grid%cells() > thick*self%length) &
+         problem%mean_compliance = operator%mean_mode(1)
       call self%pull%hang(problem, operator, thick*self%length)
    end subroutine set_problem
 

@@ -42,15 +42,15 @@
 module friction_cg_fast
    use asperity_errors, only : error_type
    use asperity_parallel, only : global_sum
+   use kernels, only : kernel_type
    use asperity_precision, only : dp, pi
-   use fft_conv, only : columns_apply, columns_form, convolution_type, new_tensor_symbol_operator
+   use fft_conv, only : columns_apply, columns_form, convolution_type, new_inverse_convolution
    use friction_cg_gradient, only : friction_gradient_type
    use friction_method, only : friction_goal_type, friction_method_type
    use friction_moves, only : move, move_total, pseudo_inverse
    use friction_problem, only : friction_problem_type
    use friction_rows, only : scaled_row, total_of, turned_row, uniform_type, unscaled_row, z_sums_type
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
-   use influence, only : tangential_symbol
    use regular_grid, only : boundary_periodic, grid_type
    implicit none
    private
@@ -96,33 +96,21 @@ module friction_cg_fast
 contains
 
    !> Make the method for a half-space.
-   subroutine new_friction_fast(self, grid, poisson, error)
+   subroutine new_friction_fast(self, grid, kernel, error)
       type(friction_fast_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
-      real(dp), intent(in) :: poisson
+      type(kernel_type), intent(in) :: kernel        !! what the solid is, tangential
       type(error_type), allocatable, intent(out) :: error
-      real(dp), allocatable :: xx(:, :), yy(:, :), xy(:, :)
       type(grid_type) :: periodic
-      real(dp) :: determinant, swap
-      integer :: i, j
+      type(kernel_type) :: block
 
       self%periodic = grid%boundary == boundary_periodic
       self%half_wave = max(grid%lx, grid%ly)/pi
       periodic = grid
       periodic%boundary = boundary_periodic
-      allocate (xx(0:grid%nx/2, 0:grid%ny/2))
-      allocate (yy, xy, mold=xx)
-      call tangential_symbol(periodic, poisson, self%half_wave, grid%nx, grid%ny, xx, yy, xy)
-      do j = 0, grid%ny/2
-         do i = 0, grid%nx/2
-            determinant = xx(i, j)*yy(i, j) - xy(i, j)**2
-            swap = xx(i, j)
-            xx(i, j) = yy(i, j)/determinant
-            yy(i, j) = swap/determinant
-            xy(i, j) = -xy(i, j)/determinant
-         end do
-      end do
-      call new_tensor_symbol_operator(self%preconditioner, grid%nx, grid%ny, xx, yy, xy, error)
+      block = kernel
+      block%mean_mode = self%half_wave
+      call new_inverse_convolution(self%preconditioner, periodic, block, error)
       if (allocated(error)) return
       allocate (self%z(grid%nx, 2, grid%ny), self%d(grid%nx, 2, grid%ny), source=0.0_dp)
    end subroutine new_friction_fast
@@ -154,13 +142,12 @@ contains
    subroutine set_mean_stiffness(self, operator)
       type(friction_fast_type), intent(inout) :: self
       type(convolution_type), intent(in) :: operator
-      real(dp) :: cells, mean
+      real(dp) :: mean
 
       if (.not. self%periodic) return
-      cells = real(operator%nx, dp)*operator%ny
-      mean = operator%symbol(0, 0, 1)*cells
+      mean = operator%mean_mode(1)*operator%grid%cells()
       if (mean <= 0.0_dp) mean = self%half_wave
-      self%preconditioner%symbol(0, 0, 1:2) = 1.0_dp/(mean*cells)
+      call self%preconditioner%set_mean_compliance(1.0_dp/mean)
    end subroutine set_mean_stiffness
 
    !> The conjugate gradients, until solved, stalled, or at the limit.

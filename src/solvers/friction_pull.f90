@@ -59,8 +59,8 @@ contains
       problem%pulled = self%along
       do c = 1, 2
          if (.not. self%along(c)) cycle
-         self%mean_mode(c) = operator%symbol(0, 0, c)
-         operator%symbol(0, 0, c) = 0.0_dp
+         self%mean_mode(c) = operator%mean_mode(c)
+         call operator%set_mean_mode(c, 0.0_dp)
          problem%pull(c) = self%traction(c)*cells
          ! A patch of n cells is about as stiff as sqrt(n) cells side by side.
          problem%spring(c) = softer*problem%compliance/sqrt(touching)
@@ -84,7 +84,7 @@ contains
       self%offset = 0.0_dp
       do c = 1, 2
          if (.not. self%along(c)) cycle
-         operator%symbol(0, 0, c) = self%mean_mode(c)
+         call operator%set_mean_mode(c, self%mean_mode(c))
          self%offset(c) = problem%offset(c) &
             + self%mean_mode(c)*(problem%total(c) + past_total(problem, c))
       end do

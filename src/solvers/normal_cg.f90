@@ -39,7 +39,7 @@ module normal_cg
    use contact_solver, only : contact_solver_type
    use asperity_errors, only : error_type
    use finite_fields, only : reject_overflow
-   use fft_conv, only : columns_apply, convolution_type, new_normal_operator
+   use fft_conv, only : columns_apply, convolution_type, new_convolution
    use gap_watch, only : gap_watch_type, new_gap_watch
    use normal_passes, only : clip_step, clip_type, find_clip, longest_multiple, &
       new_direction, new_normal_work, normal_work_type, survey, try_pressure, update_state
@@ -48,6 +48,7 @@ module normal_cg
       reason_iterations, reason_undetermined
    use normal_sums, only : state_sums_type, step_sums_type, total, trial_sums_type
    use omp_lib, only : omp_get_wtime
+   use kernels, only : kernel_type
    use asperity_precision, only : dp, int64
    use projection, only : project_simplex
    use regular_grid, only : grid_type
@@ -97,20 +98,20 @@ module normal_cg
 contains
 
    !> Make a solver for a grid.
-   subroutine new_normal_solver(self, grid, poisson, error, mixed)
+   subroutine new_normal_solver(self, grid, kernel, error, mixed)
       type(normal_solver_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
-      real(dp), intent(in) :: poisson                  !! -1 < nu <= 0.5
+      type(kernel_type), intent(in) :: kernel          !! what the solid is, normal
       type(error_type), allocatable, intent(out) :: error
       logical, intent(in), optional :: mixed           !! in mixed precision
 
       self%grid = grid
-      call new_normal_operator(self%operator, grid, poisson, error)
+      call new_convolution(self%operator, grid, kernel, error)
       if (allocated(error)) return
       if (present(mixed)) self%mixed = mixed
-      if (self%mixed) call new_normal_operator(self%quick, grid, poisson, error, single=.true.)
+      if (self%mixed) call new_convolution(self%quick, grid, kernel, error, single=.true.)
       if (allocated(error)) return
-      call new_normal_work(self%work, grid, poisson, self%operator%threads, error)
+      call new_normal_work(self%work, grid, kernel, self%operator%threads, error)
       if (allocated(error)) return
       allocate (self%step(grid%nx, grid%ny), source=0.0_dp)
    end subroutine new_normal_solver

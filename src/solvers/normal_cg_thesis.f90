@@ -7,13 +7,14 @@
 module normal_cg_thesis
    use contact_solver, only : contact_solver_type
    use asperity_errors, only : error_type
-   use fft_conv, only : new_normal_operator
+   use fft_conv, only : new_convolution
    use finite_fields, only : reject_overflow
    use normal_state, only : control_pressure, evaluate_gap, first_pressure, gap_measure_type, &
       measure_gap, narrow_scale, normal_problem_type, prepare_problem, reason_converged, &
       reason_iterations, reason_undetermined
    use omp_lib, only : omp_get_wtime
    use asperity_parallel, only : global_sum
+   use kernels, only : kernel_type
    use asperity_precision, only : dp, int64
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
@@ -31,14 +32,14 @@ module normal_cg_thesis
 contains
 
    !> Make a solver for a grid.
-   subroutine new_thesis_solver(self, grid, poisson, error)
+   subroutine new_thesis_solver(self, grid, kernel, error)
       type(thesis_solver_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
-      real(dp), intent(in) :: poisson                  !! -1 < nu <= 0.5
+      type(kernel_type), intent(in) :: kernel          !! what the solid is, normal
       type(error_type), allocatable, intent(out) :: error
 
       self%grid = grid
-      call new_normal_operator(self%operator, grid, poisson, error)
+      call new_convolution(self%operator, grid, kernel, error)
       if (allocated(error)) return
       allocate (self%step(grid%nx, grid%ny), source=0.0_dp)
    end subroutine new_thesis_solver

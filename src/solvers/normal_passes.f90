@@ -13,6 +13,7 @@ module normal_passes
    use normal_sweeps, only : above_cells, clip_cells, direction_cells, load_cells, &
       longest_cells, trial_cells
    use asperity_parallel, only : global_min
+   use kernels, only : kernel_type
    use asperity_precision, only : dp, sp
    use regular_grid, only : boundary_periodic, grid_type
    use schur_preconditioner, only : new_schur_preconditioner, schur_preconditioner_type
@@ -52,16 +53,16 @@ module normal_passes
 contains
 
    !> Allocate the work fields.
-   subroutine new_normal_work(self, grid, poisson, threads, error)
+   subroutine new_normal_work(self, grid, kernel, threads, error)
       type(normal_work_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
-      real(dp), intent(in) :: poisson
+      type(kernel_type), intent(in) :: kernel          !! what the solid is, normal
       integer, intent(in) :: threads
       type(error_type), allocatable, intent(out) :: error
 
       self%grid = grid
       self%threads = threads
-      call new_coarse_level(self%coarse, grid, poisson, error)
+      call new_coarse_level(self%coarse, grid, kernel, error)
       if (allocated(error)) return
       call new_schur_preconditioner(self%preconditioner, grid, self%coarse, threads, error)
       if (allocated(error)) return

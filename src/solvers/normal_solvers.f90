@@ -4,6 +4,7 @@ module normal_solvers
    use asperity_errors, only : error_input, error_type, fail
    use normal_cg, only : new_normal_solver, normal_solver_type
    use normal_cg_thesis, only : new_thesis_solver, thesis_solver_type
+   use kernels, only : kernel_type
    use asperity_precision, only : dp
    use regular_grid, only : grid_type
    implicit none
@@ -14,11 +15,11 @@ module normal_solvers
 contains
 
    !> Make a solver.
-   subroutine new_contact_solver(self, method, grid, poisson, error, mixed)
+   subroutine new_contact_solver(self, method, grid, kernel, error, mixed)
       class(contact_solver_type), allocatable, intent(out) :: self
       character(*), intent(in) :: method               !! 'fast' or 'thesis'
       type(grid_type), intent(in) :: grid
-      real(dp), intent(in) :: poisson                  !! -1 < nu <= 0.5
+      type(kernel_type), intent(in) :: kernel          !! what the solid is, normal
       type(error_type), allocatable, intent(out) :: error
       logical, intent(in), optional :: mixed           !! steps in single precision; 'fast' only
       type(normal_solver_type), allocatable :: fast
@@ -27,11 +28,11 @@ contains
       select case (method)
       case ('fast')
          allocate (fast)
-         call new_normal_solver(fast, grid, poisson, error, mixed)
+         call new_normal_solver(fast, grid, kernel, error, mixed)
          call move_alloc(fast, self)
       case ('thesis')
          allocate (thesis)
-         call new_thesis_solver(thesis, grid, poisson, error)
+         call new_thesis_solver(thesis, grid, kernel, error)
          call move_alloc(thesis, self)
       case default
          call fail(error, error_input, 'there is no normal solver '''//method//'''')

@@ -1,7 +1,7 @@
 !> The convolution operator: displacements of the half-space from tractions, by FFT.
 !>
-!> u = A p with the influence coefficients of module `influence` (thesis, eq. 2.4), G = 1. Scalar
-!> (normal) or 2 x 2 (tangential); periodic, or free on a zero-padded grid.
+!> u = A p with the response A of a solid (module `kernels`; thesis, eq. 2.4), G = 1. Scalar (normal) or
+!> 2 x 2 (tangential); periodic, or free on a zero-padded grid.
 !>
 !> The two-dimensional transform is done by rows and columns of our own (`row_column.inc`), so that a
 !> solver hands in its rows as it forms them and takes the results as the inverse makes them
@@ -13,7 +13,8 @@
 !> works in single precision, and is used in the same way.
 module fft_conv
    use asperity_errors, only : error_input, error_type, fail
-   use influence, only : normal_symbol, tangential_symbol, transform_length
+   use influence, only : transform_length
+   use kernels, only : kernel_type
    use asperity_parallel, only : global_sum, thread_count
    use asperity_precision, only : dp, int64, sp
    use regular_grid, only : boundary_periodic, grid_type
@@ -24,8 +25,7 @@ module fft_conv
    implicit none
    private
 
-   public :: convolution_type, new_normal_operator, new_symbol_operator, new_tangential_operator, &
-      new_tensor_symbol_operator
+   public :: convolution_type, new_convolution, new_inverse_convolution, new_symbol_operator
 
    integer, parameter, public :: columns_apply = 1     !! multiply by the symbol, transform back
    integer, parameter, public :: columns_inverse = 2   !! the same with 1/symbol (0 where it is 0)
@@ -43,8 +43,10 @@ module fft_conv
       integer :: threads = 1                !! for parallel loops around forward_row, backward_row
       integer(int64) :: ffts = 0            !! real transforms done so far
       logical :: single = .false.           !! the transforms are in single precision
+      type(grid_type) :: grid               !! of an operator of a solid
+      type(kernel_type) :: kernel           !! what the solid is
       !> Symbols over (mx my): (0:, 0:my/2, 1) or xx, yy, xy; zero beyond mx/2. Not there if single.
-      real(dp), allocatable :: symbol(:, :, :)
+      real(dp), allocatable, private :: symbol(:, :, :)
       type(row_column_double_type), private :: high        !! does the work if not single
       type(row_column_single_type), private :: low         !! does the work if single
       real(sp), allocatable, private :: low_symbol(:, :, :)   !! the symbols for it ...
@@ -54,48 +56,56 @@ module fft_conv
       procedure :: apply_inverse
       procedure :: apply_vector
       procedure :: quadratic_form
-      procedure :: quadratic_form_vector
       procedure :: forward_row
       procedure :: forward_zero_row
       procedure :: columns
       procedure :: backward_row
       procedure :: add_backward_row
       procedure :: set_unit
+      procedure :: symbol_of
+      procedure :: self_compliance
+      procedure :: mean_mode
+      procedure :: set_mean_mode
+      procedure :: set_mean_compliance
       procedure :: destroy
    end type convolution_type
 
 contains
 
-   !> The normal operator A_zz for G = 1, m/Pa.
-   subroutine new_normal_operator(self, grid, poisson, error, single)
+   !> The operator of a solid of unit shear modulus, m/Pa.
+   subroutine new_convolution(self, grid, kernel, error, single)
       type(convolution_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
-      real(dp), intent(in) :: poisson
+      type(kernel_type), intent(in) :: kernel      !! what the solid is
       type(error_type), allocatable, intent(out) :: error
       logical, intent(in), optional :: single      !! work in single precision
 
-      call plan(self, grid%nx, grid%ny, grid%boundary, 1, error, single)
+      if (grid%boundary /= boundary_periodic .and. .not. associated(kernel%cell)) then
+         call fail(error, error_input, 'this solid is for periodic boundaries only')
+         return
+      end if
+      call plan(self, grid%nx, grid%ny, grid%boundary, kernel%components, error, single)
       if (allocated(error)) return
-      call normal_symbol(grid, poisson, self%mx, self%my, self%symbol(0:self%mx/2, :, 1))
+      self%grid = grid
+      self%kernel = kernel
+      call kernel%symbols(grid, self%mx, self%my, self%symbol(0:self%mx/2, :, :))
       call finish_symbol(self)
-   end subroutine new_normal_operator
+   end subroutine new_convolution
 
-   !> The tangential operator A_T for G = 1, m/Pa.
-   subroutine new_tangential_operator(self, grid, poisson, thickness, error, single)
+   !> The inverse of the operator of a solid on a periodic grid: tractions from displacements, Pa/m.
+   subroutine new_inverse_convolution(self, grid, kernel, error)
       type(convolution_type), intent(out) :: self
-      type(grid_type), intent(in) :: grid
-      real(dp), intent(in) :: poisson
-      real(dp), intent(in) :: thickness        !! of the block, m: its mean mode in periodic mode
+      type(grid_type), intent(in) :: grid          !! periodic
+      type(kernel_type), intent(in) :: kernel      !! what the solid is
       type(error_type), allocatable, intent(out) :: error
-      logical, intent(in), optional :: single      !! work in single precision
 
-      call plan(self, grid%nx, grid%ny, grid%boundary, 2, error, single)
+      call plan(self, grid%nx, grid%ny, boundary_periodic, kernel%components, error)
       if (allocated(error)) return
-      call tangential_symbol(grid, poisson, thickness, self%mx, self%my, &
-         self%symbol(0:self%mx/2, :, 1), self%symbol(0:self%mx/2, :, 2), &
-         self%symbol(0:self%mx/2, :, 3))
+      self%grid = grid
+      self%kernel = kernel
+      call kernel%inverse_symbols(grid, self%symbol(0:self%mx/2, :, :))
       call finish_symbol(self)
-   end subroutine new_tangential_operator
+   end subroutine new_inverse_convolution
 
    !> A periodic scalar operator from its symbol, even in both wave numbers.
    subroutine new_symbol_operator(self, nx, ny, symbol, error, single)
@@ -110,24 +120,6 @@ contains
       self%symbol(0:nx/2, :, 1) = symbol
       call finish_symbol(self)
    end subroutine new_symbol_operator
-
-   !> A periodic symmetric 2 x 2 operator from its symbols: xx and yy even, xy odd in both wave numbers.
-   subroutine new_tensor_symbol_operator(self, nx, ny, xx, yy, xy, error, single)
-      type(convolution_type), intent(out) :: self
-      integer, intent(in) :: nx, ny
-      real(dp), intent(in) :: xx(0:, 0:)          !! (0:nx/2, 0:ny/2)
-      real(dp), intent(in) :: yy(0:, 0:)
-      real(dp), intent(in) :: xy(0:, 0:)
-      type(error_type), allocatable, intent(out) :: error
-      logical, intent(in), optional :: single      !! work in single precision
-
-      call plan(self, nx, ny, boundary_periodic, 2, error, single)
-      if (allocated(error)) return
-      self%symbol(0:nx/2, :, 1) = xx
-      self%symbol(0:nx/2, :, 2) = yy
-      self%symbol(0:nx/2, :, 3) = xy
-      call finish_symbol(self)
-   end subroutine new_tensor_symbol_operator
 
    !> Put the factor of the inverse transform into the symbol; in single precision where that works.
    subroutine finish_symbol(self)
@@ -260,21 +252,6 @@ contains
       call self%columns(columns_form, form)
    end subroutine quadratic_form
 
-   !> p.A p over the cells for a vector operator: two transforms.
-   subroutine quadratic_form_vector(self, px, py, form)
-      class(convolution_type), intent(inout) :: self
-      real(dp), intent(in) :: px(:, :), py(:, :)
-      real(dp), intent(out) :: form
-      integer :: j
-
-      !$omp parallel do default(none) shared(self, px, py) private(j) num_threads(self%threads)
-      do j = 1, self%ny
-         call self%forward_row(1, j, px(:, j))
-         call self%forward_row(2, j, py(:, j))
-      end do
-      call self%columns(columns_form, form)
-   end subroutine quadratic_form_vector
-
    !> Transform row j of a component; to be called for every row, by up to `threads` threads.
    subroutine forward_row(self, component, j, row)
       class(convolution_type), intent(inout) :: self
@@ -339,6 +316,66 @@ contains
 
       if (self%single) call self%low%set_unit(power_of_two(size))
    end subroutine set_unit
+
+   !> One part of the symbol for a field and its transform without factors, in the first quarter of the
+   !> plane of wave numbers. Not for a single operator.
+   pure function symbol_of(self, part) result(table)
+      class(convolution_type), intent(in) :: self
+      integer, intent(in) :: part                  !! 1; of a vector operator 1: xx, 2: yy, 3: xy
+      real(dp) :: table(0:self%mx/2, 0:self%my/2)  !! m/Pa
+
+      table = self%symbol(0:self%mx/2, :, part)*(real(self%mx, dp)*self%my)
+   end function symbol_of
+
+   !> Displacement of a cell under a unit traction on that cell alone, the mean of both components: the
+   !> mean of the symbols over the whole spectrum; without the mean mode where periodic.
+   pure function self_compliance(self) result(compliance)
+      class(convolution_type), intent(in) :: self
+      real(dp) :: compliance
+      real(dp) :: weight
+      integer :: i, j
+
+      compliance = 0.0_dp
+      do j = 0, self%my/2
+         do i = 0, self%mx/2
+            if (self%grid%boundary == boundary_periodic .and. i == 0 .and. j == 0) cycle
+            weight = merge(1.0_dp, 2.0_dp, i == 0 .or. 2*i == self%mx) &
+               *merge(1.0_dp, 2.0_dp, j == 0 .or. 2*j == self%my)
+            compliance = compliance &
+               + 0.5_dp*weight*(self%symbol(i, j, 1) + self%symbol(i, j, self%components))
+         end do
+      end do
+   end function self_compliance
+
+   !> The mean mode: the uniform displacement that goes with tractions whose sum over the cells is 1 Pa.
+   pure function mean_mode(self, component) result(mode)
+      class(convolution_type), intent(in) :: self
+      integer, intent(in) :: component             !! 1, or 2 of a vector operator
+      real(dp) :: mode                             !! m/Pa
+
+      mode = self%symbol(0, 0, component)
+   end function mean_mode
+
+   !> Set the mean mode of one component.
+   subroutine set_mean_mode(self, component, mode)
+      class(convolution_type), intent(inout) :: self
+      integer, intent(in) :: component
+      real(dp), intent(in) :: mode                 !! as `mean_mode` gives it, m/Pa
+
+      self%symbol(0, 0, component) = mode
+   end subroutine set_mean_mode
+
+   !> Set the mean mode of all components of a periodic operator by the compliance for a uniform traction:
+   !> u = compliance t. For a block at rest that is its thickness.
+   subroutine set_mean_compliance(self, compliance)
+      class(convolution_type), intent(inout) :: self
+      real(dp), intent(in) :: compliance           !! m/Pa
+      integer :: c
+
+      do c = 1, self%components
+         call self%set_mean_mode(c, compliance/(real(self%mx, dp)*self%my))
+      end do
+   end subroutine set_mean_compliance
 
    !> Between the rows' two passes: transform the columns, multiply by the symbol, transform back.
    subroutine columns(self, action, form)

@@ -1,21 +1,19 @@
-!> Influence coefficients: the displacement of a half-space of unit shear modulus under a traction.
+!> Influence coefficients of the half-space of unit shear modulus for any Poisson ratio: the displacement
+!> of cell centres under a uniform traction on one cell (Love 1929; Kalker 1990).
 !>
-!> Periodic: the symbol of the operator for a wave vector q. Free: the displacement of cell centres
-!> under a uniform traction on one cell (Love 1929; Kalker 1990), and the discrete transform of these
-!> coefficients on a doubled, wrapped grid. Both for any Poisson ratio.
-!>
-!> All symbols are even in q_x and q_y, but that of the coupling xy, which is odd in both: a quarter of
-!> the plane is stored, tables (0:mx/2, 0:my/2).
+!> In free mode these coefficients are transformed on a doubled, wrapped grid. A table (0:mx/2, 0:my/2)
+!> holds a quarter of the plane: all coefficients are even in x and y, but that of the coupling xy, which
+!> is odd in both.
 module influence
    use, intrinsic :: iso_c_binding, only : c_f_pointer, c_int, c_loc, c_ptr, c_size_t
    use asperity_fftw, only : fftw_alloc_real, fftw_destroy_plan, fftw_estimate, fftw_execute_r2r, &
       fftw_free, fftw_plan_r2r_2d, fftw_redft00, fftw_rodft00
    use asperity_precision, only : dp, pi
-   use regular_grid, only : boundary_periodic, grid_type
+   use regular_grid, only : boundary_periodic
    implicit none
    private
 
-   public :: love_normal, love_tangential, normal_symbol, tangential_symbol, transform_length
+   public :: love_normal, love_tangential, transform_even, transform_length, transform_odd
 
 contains
 
@@ -95,83 +93,6 @@ contains
          m = m + 2
       end do
    end function transform_length
-
-   !> Symbol of A_zz for G = 1: (1-nu)/q, or the transform of Love's coefficients in free mode.
-   subroutine normal_symbol(grid, poisson, mx, my, symbol)
-      type(grid_type), intent(in) :: grid
-      real(dp), intent(in) :: poisson
-      integer, intent(in) :: mx, my                     !! lengths of the transforms
-      real(dp), intent(out) :: symbol(0:mx/2, 0:my/2)   !! m/Pa for G = 1 Pa
-      integer :: i, j
-      real(dp) :: q
-
-      if (grid%boundary == boundary_periodic) then
-         !$omp parallel do default(none) shared(grid, poisson, mx, my, symbol) private(i, j, q)
-         do j = 0, my/2
-            do i = 0, mx/2
-               q = 2.0_dp*pi*hypot(i/grid%lx, j/grid%ly)
-               if (q > 0.0_dp) then
-                  symbol(i, j) = (1.0_dp - poisson)/q
-               else
-                  symbol(i, j) = 0.0_dp
-               end if
-            end do
-         end do
-      else
-         !$omp parallel do default(none) shared(grid, poisson, mx, my, symbol) private(i, j)
-         do j = 0, my/2
-            do i = 0, mx/2
-               symbol(i, j) = love_normal(i*grid%dx, j*grid%dy, grid%dx, grid%dy, poisson)
-            end do
-         end do
-         call transform_even(mx, my, symbol)
-      end if
-   end subroutine normal_symbol
-
-   !> Symbols of A_xx, A_yy and A_xy for G = 1. The zero mode of a periodic block is its thickness:
-   !> a block sheared over the height h gives by h/G (0 for a half-space).
-   subroutine tangential_symbol(grid, poisson, thickness, mx, my, a_xx, a_yy, a_xy)
-      type(grid_type), intent(in) :: grid
-      real(dp), intent(in) :: poisson
-      real(dp), intent(in) :: thickness                 !! m; used in periodic mode only
-      integer, intent(in) :: mx, my
-      real(dp), intent(out) :: a_xx(0:mx/2, 0:my/2)
-      real(dp), intent(out) :: a_yy(0:mx/2, 0:my/2)
-      real(dp), intent(out) :: a_xy(0:mx/2, 0:my/2)     !! for q_x, q_y >= 0; odd in both
-      integer :: i, j
-      real(dp) :: qx, qy, q
-
-      if (grid%boundary == boundary_periodic) then
-         do j = 0, my/2
-            do i = 0, mx/2
-               qx = 2.0_dp*pi*i/grid%lx
-               qy = 2.0_dp*pi*j/grid%ly
-               q = hypot(qx, qy)
-               if (q > 0.0_dp) then
-                  a_xx(i, j) = (1.0_dp - poisson*(qx/q)**2)/q
-                  a_yy(i, j) = (1.0_dp - poisson*(qy/q)**2)/q
-                  a_xy(i, j) = -poisson*(qx/q)*(qy/q)/q
-               else
-                  a_xx(i, j) = thickness
-                  a_yy(i, j) = thickness
-                  a_xy(i, j) = 0.0_dp
-               end if
-               ! An odd symbol has no value on the Nyquist lines.
-               if (2*i == mx .or. 2*j == my) a_xy(i, j) = 0.0_dp
-            end do
-         end do
-      else
-         do j = 0, my/2
-            do i = 0, mx/2
-               call love_tangential(i*grid%dx, j*grid%dy, grid%dx, grid%dy, poisson, &
-                  a_xx(i, j), a_xy(i, j), a_yy(i, j))
-            end do
-         end do
-         call transform_even(mx, my, a_xx)
-         call transform_even(mx, my, a_yy)
-         call transform_odd(mx, my, a_xy)
-      end if
-   end subroutine tangential_symbol
 
    !> Transform of coefficients that are even in both directions, in place; mx and my even.
    subroutine transform_even(mx, my, table)

@@ -11,6 +11,7 @@
 program bench_normal
    use asperity_errors, only : error_type
    use fft_conv, only : convolution_type
+   use kernels, only : normal_half_space
    use normal_cg, only : new_normal_solver, normal_solver_type
    use normal_state, only : normal_problem_type, rms_about_mean
    use omp_lib, only : omp_get_wtime
@@ -53,7 +54,7 @@ program bench_normal
    allocate (pressure(n, n), gap(n, n))
    call get_command_argument(4, precision)
    if (all(precision /= ['double', 'mixed '])) error stop usage
-   call new_normal_solver(solver, grid, 0.5_dp, error, precision == 'mixed')
+   call new_normal_solver(solver, grid, normal_half_space(0.5_dp), error, precision == 'mixed')
    if (allocated(error)) error stop 'no solver'
    problem%modulus = 0.25_dp
    problem%target = 0.1_dp*load

@@ -1,4 +1,7 @@
-!> The regular grid of cells on which all fields are defined.
+!> The regular grid of cells on which all fields live.
+!>
+!> `nx` by `ny` is the whole grid. A process holds the rows `first_row` to `last_row` of every field, so that
+!> its fields have the shape [nx, rows] and the first of their rows is row `first_row` of the grid.
 module regular_grid
    use asperity_parallel, only : local_rows
    use asperity_precision, only : dp
@@ -19,8 +22,13 @@ module regular_grid
       real(dp) :: dx = 0.0_dp                   !! lx/nx
       real(dp) :: dy = 0.0_dp                   !! ly/ny
       integer :: boundary = boundary_periodic
-      integer :: first_row = 1                  !! this process's rows
-      integer :: last_row = 0
+      integer :: first_row = 1                  !! first row of this process, counted from 1
+      integer :: last_row = 0                   !! its last row
+   contains
+      procedure :: rows
+      procedure :: cells
+      procedure :: area
+      procedure :: cell_area
    end type grid_type
 
 contains
@@ -41,5 +49,37 @@ contains
       self%boundary = boundary
       call local_rows(ny, self%first_row, self%last_row)
    end function new_grid
+
+   !> Number of rows that this process holds.
+   pure function rows(self)
+      class(grid_type), intent(in) :: self
+      integer :: rows
+
+      rows = self%last_row - self%first_row + 1
+   end function rows
+
+   !> Number of cells of the whole grid. Real, since it may exceed the integers.
+   pure function cells(self)
+      class(grid_type), intent(in) :: self
+      real(dp) :: cells
+
+      cells = real(self%nx, dp)*self%ny
+   end function cells
+
+   !> Area of the whole grid, m2.
+   pure function area(self)
+      class(grid_type), intent(in) :: self
+      real(dp) :: area
+
+      area = self%lx*self%ly
+   end function area
+
+   !> Area of one cell, m2.
+   pure function cell_area(self)
+      class(grid_type), intent(in) :: self
+      real(dp) :: cell_area
+
+      cell_area = self%dx*self%dy
+   end function cell_area
 
 end module regular_grid

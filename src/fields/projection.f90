@@ -1,7 +1,7 @@
 !> Projections of fields on what a solution must satisfy.
 module projection
-   use asperity_parallel, only : global_sum, thread_count
    use asperity_precision, only : dp
+   use field_sums, only : cell_count, row_total, threads_for
    implicit none
    private
 
@@ -18,10 +18,11 @@ contains
       real(dp), intent(inout) :: x(:, :)       !! [nx, ny]
       real(dp), intent(in) :: total            !! x becomes 0 where this is 0 or less
       real(dp), allocatable :: rows(:, :)
-      real(dp) :: level, next, above, negative, kept
+      real(dp) :: cells, level, next, above, negative, kept
       integer :: count, next_count, threads, stride
 
-      threads = merge(1, thread_count(), size(x) < 16384)
+      cells = cell_count(x)
+      threads = threads_for(x)
       allocate (rows(3, size(x, 2)))
       stride = 1
       if (total <= 0.0_dp) then
@@ -32,12 +33,12 @@ contains
       if (abs(above - total) <= 1e-15_dp*count*total .and. abs(negative) <= 0.0_dp) return
       ! The first level is below the solution; Newton's steps rise to it. From any other level the
       ! first step leads below it, too: a few rows tell one that is close.
-      level = (above + negative - total)/size(x)
+      level = (above + negative - total)/cells
       if (size(x, 2) >= 4*sample) call guess()
       call sum_above(level, above, count, negative)
       if (count == 0) then
          ! All cells are equal.
-         call fill(total/size(x))
+         call fill(total/cells)
          return
       end if
       do
@@ -59,7 +60,7 @@ contains
          integer :: cells
 
          stride = sample
-         part = total*((size(x, 2) - 1)/stride + 1)/size(x, 2)
+         part = total*cell_count(x(:1, ::stride))/cell_count(x(:1, :))      ! rows of the sample, of all
          trial = level
          do
             call sum_above(trial, above, cells, negative)
@@ -96,9 +97,9 @@ contains
             end do
             rows(:, j) = [a, b, n]
          end do
-         sum = row_sum(1)
-         others = row_sum(2)
-         number = nint(row_sum(3))
+         sum = row_total(rows(:, ::stride), 1)
+         others = row_total(rows(:, ::stride), 2)
+         number = nint(row_total(rows(:, ::stride), 3))
       end subroutine sum_above
 
       !> x = max(x - limit, 0) and its sum.
@@ -118,7 +119,7 @@ contains
             end do
             rows(1, j) = a
          end do
-         sum = row_sum(1)
+         sum = row_total(rows(:, ::stride), 1)
       end subroutine clip
 
       !> x = factor x.
@@ -142,19 +143,6 @@ contains
             x(:, j) = value
          end do
       end subroutine fill
-
-      !> Sum of the rows' partial sums, in order, so that the threads do not matter.
-      function row_sum(which) result(sum)
-         integer, intent(in) :: which
-         real(dp) :: sum
-         integer :: j
-
-         sum = 0.0_dp
-         do j = 1, size(x, 2), stride
-            sum = sum + rows(which, j)
-         end do
-         sum = global_sum(sum)
-      end function row_sum
 
    end subroutine project_simplex
 

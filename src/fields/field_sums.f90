@@ -1,0 +1,201 @@
+!> Field algebra: sums, means, extremes and counts over the cells of the whole grid.
+!>
+!> A field is summed in two stages. Each row is summed first, in parallel. The sums of the rows are then
+!> added one after the other in the order of the rows of the whole grid, so that a result does not
+!> depend, to the last bit, on how threads or processes share the rows. A loop that needs several sums
+!> at once forms the sums of its rows itself, in an array with one column per row, and hands that array
+!> to `row_total`, `row_totals`, `largest_of_rows` or `least_of_rows`.
+!>
+!> A process holds only its own rows of a field, so that `size(field)` is not the number of cells:
+!> `cell_count` and the means of this module are over the whole grid.
+module field_sums
+   use asperity_parallel, only : global_max, global_min, global_sum, thread_count
+   use asperity_precision, only : dp
+   implicit none
+   private
+
+   public :: cell_count, field_count, field_maximum, field_mean, field_minimum, field_product, &
+      field_rms, field_sum, largest_of_rows, least_of_rows, row_total, row_totals, threads_for
+
+   integer, parameter :: small = 16384          !! cells below which one thread is faster
+
+   !> Total of one sum per row: of `rows(j)`, or of `rows(k, j)` for a given k.
+   interface row_total
+      module procedure :: total_of_rows, total_of_row_sums
+   end interface row_total
+
+contains
+
+   !> Total over all rows of the grid, added in the order of the rows.
+   pure function total_of_rows(rows) result(total)
+      real(dp), intent(in) :: rows(:)          !! one sum for each row of this process
+      real(dp) :: total
+      integer :: j
+
+      total = 0.0_dp
+      do j = 1, size(rows)
+         total = total + rows(j)
+      end do
+      total = global_sum(total)
+   end function total_of_rows
+
+   !> The same for the k-th of several sums per row.
+   pure function total_of_row_sums(rows, k) result(total)
+      real(dp), intent(in) :: rows(:, :)       !! [sums, rows of this process]
+      integer, intent(in) :: k
+      real(dp) :: total
+      integer :: j
+
+      total = 0.0_dp
+      do j = 1, size(rows, 2)
+         total = total + rows(k, j)
+      end do
+      total = global_sum(total)
+   end function total_of_row_sums
+
+   !> Totals of several sums per row, each added in the order of the rows.
+   pure function row_totals(rows) result(totals)
+      real(dp), intent(in) :: rows(:, :)       !! [sums, rows of this process]
+      real(dp) :: totals(size(rows, 1))
+      integer :: j
+
+      totals = 0.0_dp
+      do j = 1, size(rows, 2)
+         totals = totals + rows(:, j)
+      end do
+      totals = global_sum(totals)
+   end function row_totals
+
+   !> Largest of one number per row.
+   pure function largest_of_rows(rows) result(largest)
+      real(dp), intent(in) :: rows(:)
+      real(dp) :: largest
+
+      largest = global_max(maxval(rows))
+   end function largest_of_rows
+
+   !> Least of one number per row.
+   pure function least_of_rows(rows) result(least)
+      real(dp), intent(in) :: rows(:)
+      real(dp) :: least
+
+      least = global_min(minval(rows))
+   end function least_of_rows
+
+   !> Number of cells of the whole grid that a field lives on. Real, since it may exceed the integers.
+   pure function cell_count(field) result(cells)
+      real(dp), intent(in) :: field(:, :)      !! [nx, rows of this process]
+      real(dp) :: cells
+
+      cells = global_sum(real(size(field, 1), dp)*size(field, 2))
+   end function cell_count
+
+   !> Number of threads for a loop over a field: one if the field is small.
+   function threads_for(field) result(threads)
+      real(dp), intent(in) :: field(:, :)      !! [nx, rows of this process]
+      integer :: threads
+
+      threads = thread_count()
+      if (real(size(field, 1), dp)*size(field, 2) < small) threads = 1
+   end function threads_for
+
+   !> Sum of a field.
+   function field_sum(field) result(total)
+      real(dp), intent(in) :: field(:, :)
+      real(dp) :: total
+      real(dp), allocatable :: rows(:)
+      integer :: j
+
+      allocate (rows(size(field, 2)))
+      !$omp parallel do default(none) shared(field, rows) private(j) num_threads(threads_for(field))
+      do j = 1, size(field, 2)
+         rows(j) = sum(field(:, j))
+      end do
+      total = row_total(rows)
+   end function field_sum
+
+   !> Mean of a field over the cells of the grid.
+   function field_mean(field) result(mean)
+      real(dp), intent(in) :: field(:, :)
+      real(dp) :: mean
+
+      mean = field_sum(field)/cell_count(field)
+   end function field_mean
+
+   !> Sum of the products of two fields.
+   function field_product(one, other) result(total)
+      real(dp), intent(in) :: one(:, :), other(:, :)
+      real(dp) :: total
+      real(dp), allocatable :: rows(:)
+      integer :: j
+
+      allocate (rows(size(one, 2)))
+      !$omp parallel do default(none) shared(one, other, rows) private(j) num_threads(threads_for(one))
+      do j = 1, size(one, 2)
+         rows(j) = sum(one(:, j)*other(:, j))
+      end do
+      total = row_total(rows)
+   end function field_product
+
+   !> Root of the mean square of a field about a level, for example about its mean.
+   function field_rms(field, about) result(rms)
+      real(dp), intent(in) :: field(:, :)
+      real(dp), intent(in) :: about
+      real(dp) :: rms
+      real(dp), allocatable :: rows(:)
+      integer :: j
+
+      allocate (rows(size(field, 2)))
+      !$omp parallel do default(none) shared(field, about, rows) private(j) &
+      !$omp num_threads(threads_for(field))
+      do j = 1, size(field, 2)
+         rows(j) = sum((field(:, j) - about)**2)
+      end do
+      rms = sqrt(row_total(rows)/cell_count(field))
+   end function field_rms
+
+   !> Largest value of a field.
+   function field_maximum(field) result(largest)
+      real(dp), intent(in) :: field(:, :)
+      real(dp) :: largest
+      real(dp), allocatable :: rows(:)
+      integer :: j
+
+      allocate (rows(size(field, 2)))
+      !$omp parallel do default(none) shared(field, rows) private(j) num_threads(threads_for(field))
+      do j = 1, size(field, 2)
+         rows(j) = maxval(field(:, j))
+      end do
+      largest = largest_of_rows(rows)
+   end function field_maximum
+
+   !> Least value of a field.
+   function field_minimum(field) result(least)
+      real(dp), intent(in) :: field(:, :)
+      real(dp) :: least
+      real(dp), allocatable :: rows(:)
+      integer :: j
+
+      allocate (rows(size(field, 2)))
+      !$omp parallel do default(none) shared(field, rows) private(j) num_threads(threads_for(field))
+      do j = 1, size(field, 2)
+         rows(j) = minval(field(:, j))
+      end do
+      least = least_of_rows(rows)
+   end function field_minimum
+
+   !> Number of cells of the whole grid for which a condition holds, as a real number.
+   function field_count(condition) result(cells)
+      logical, intent(in) :: condition(:, :)   !! [nx, rows of this process]
+      real(dp) :: cells
+      real(dp), allocatable :: rows(:)
+      integer :: j
+
+      allocate (rows(size(condition, 2)))
+      do j = 1, size(condition, 2)
+         rows(j) = count(condition(:, j))
+      end do
+      cells = row_total(rows)
+   end function field_count
+
+end module field_sums

@@ -1,0 +1,199 @@
+!> A rubber block on its road: its settings, its solvers, the step in hand, and its state.
+!>
+!> `contact_type` joins the machinery with the one component that a row leaves to the next, `state`
+!> (module `row_state`). The stages of a step (`road_motion`, `coupled_passes`, `row_account`) work on it;
+!> `asperity_simulation` runs them.
+!>
+!> Fields of doubles besides the state and the normal solver: H; with sliding also the original map and the
+!> two slopes; with Prony arms the traction of the history; with friction those of the modules
+!> `tangential_step` and `coupled_passes`.
+module contact_model
+   use adhesion_advice, only : adhesion_edge
+   use asperity_errors, only : error_type
+   use asperity_interpolation, only : interpolation_type, new_interpolation, shifted
+   use asperity_precision, only : dp
+   use asperity_schedule, only : planned_row_type
+   use case_settings, only : case_type, road_moves
+   use contact_rule, only : touches
+   use field_sums, only : field_product, row_totals
+   use kernels, only : normal_half_space
+   use normal_step, only : new_normal_step, normal_step_type, normal_task_type
+   use regular_grid, only : grid_type
+   use row_state, only : state_type
+   use solver_result, only : solver_result_type
+   use tangential_state, only : new_tangential_state
+   use tangential_step, only : new_tangential_step, tangential_step_type
+   use viscoelastic_energy, only : book_step, new_books
+   use zener, only : add_rows, commit_row, finish_step, is_elastic, new_history, new_products, &
+      new_row_sums, new_zener, products_type, zener_type
+   implicit none
+   private
+
+   public :: contact_mean, contact_type, commit_step, new_contact, place_road, solve_normal
+
+   !> A block on its road. Not to be copied; its state may be.
+   type :: contact_type
+      type(state_type), allocatable :: state        !! what the last row left
+      type(case_type) :: case
+      type(grid_type) :: grid
+      type(normal_step_type) :: side                !! the solvers of the normal contact
+      type(tangential_step_type) :: tangential      !! the solver of friction, and its step in hand
+      type(zener_type) :: material                  !! with the coefficients of the step in hand
+      type(interpolation_type) :: road              !! the original map
+      real(dp), allocatable :: height(:, :)         !! H under the rubber in the step in hand, m
+      real(dp), allocatable :: slope_x(:, :)        !! of the road under the rubber, -
+      real(dp), allocatable :: slope_y(:, :)
+      real(dp), allocatable :: past(:, :)           !! traction of the history, Pa
+      real(dp) :: drift(2) = 0.0_dp                 !! expected motion of the surface in the step, m
+      real(dp) :: summit = 0.0_dp                   !! highest point of the original map, m
+      real(dp) :: rms_height = 0.0_dp               !! of the original map about its mean, m
+      real(dp) :: rms_slope = 0.0_dp                !! of the original map, -
+      logical :: slides = .false.                   !! the road moves in some phase, or may be made to
+      logical :: frictional = .false.               !! there is a friction law, and the road moves
+   contains
+      procedure :: rubs
+      procedure :: holds
+   end type contact_type
+
+contains
+
+   !> Prepare the solvers, and a state at rest. `self%case`, `grid`, `height` and `slides` are set.
+   subroutine new_contact(self, error)
+      class(contact_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+      real(dp) :: edge
+      integer :: nx, ny
+
+      nx = self%grid%nx
+      ny = self%grid%ny
+      associate (case => self%case)
+         edge = 0.0_dp
+         if (case%adhesion%potential /= 'none') edge = adhesion_edge(case)
+         call new_normal_step(self%side, self%grid, normal_half_space(case%material%poisson), &
+            case%solver, case%adhesion, edge, self%height, error)
+         if (allocated(error)) return
+         call new_zener(self%material, case%material%shear_modulus, case%material%prony_g, &
+            case%material%prony_tau, trim(case%solver%time_scheme), error)
+         if (allocated(error)) return
+      end associate
+      self%summit = self%side%summit
+      self%rms_height = self%side%rms_height
+      call new_history(self%state%history, self%material, nx, ny, 1, error)
+      if (allocated(error)) return
+      call new_books(self%state%books, self%material, self%grid%cell_area())
+      allocate (self%state%pressure(nx, ny), self%state%gap(nx, ny), self%state%displacement(nx, ny), &
+         source=0.0_dp)
+      if (.not. is_elastic(self%material)) allocate (self%past(nx, ny), source=0.0_dp)
+      if (self%slides) call new_road(self, error)
+      if (allocated(error)) return
+      self%frictional = self%slides .and. self%case%friction%law /= 'none'
+      if (.not. self%frictional) return
+      call new_tangential_state(self%state%tangential, self%case, self%material, error)
+      if (allocated(error)) return
+      call new_tangential_step(self%tangential, self%case, error)
+   end subroutine new_contact
+
+   !> Prepare a road that moves.
+   subroutine new_road(self, error)
+      class(contact_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+
+      call new_interpolation(self%road, self%grid, self%height, trim(self%case%solver%interpolation), &
+         error)
+      if (allocated(error)) return
+      allocate (self%slope_x(self%grid%nx, self%grid%ny), self%slope_y(self%grid%nx, self%grid%ny))
+      call place_road(self, 0.0_dp, 0.0_dp)
+      self%rms_slope = sqrt((field_product(self%slope_x, self%slope_x) &
+         + field_product(self%slope_y, self%slope_y))/self%grid%cells())
+   end subroutine new_road
+
+   !> Heights and slopes of the road at a displacement, under a surface that has not moved.
+   subroutine place_road(self, road_x, road_y)
+      class(contact_type), intent(inout) :: self
+      real(dp), intent(in) :: road_x, road_y        !! m
+
+      if (self%slides) call shifted(self%road, road_x, road_y, self%height, &
+         self%slope_x, self%slope_y)
+   end subroutine place_road
+
+   !> Does friction act yet?
+   pure function rubs(self) result(yes)
+      class(contact_type), intent(in) :: self
+      logical :: yes
+
+      yes = .false.
+      if (self%frictional) yes = self%state%tangential%moved
+   end function rubs
+
+   !> Is there friction that nothing has called for yet? What touches then sticks.
+   pure function holds(self) result(yes)
+      class(contact_type), intent(in) :: self
+      logical :: yes
+
+      yes = self%case%friction%law /= 'none' .and. .not. self%rubs()
+   end function holds
+
+   !> Solve the normal contact under the row's load.
+   subroutine solve_normal(self, plan, tolerance, outcome)
+      class(contact_type), intent(inout) :: self
+      type(planned_row_type), intent(in) :: plan
+      real(dp), intent(in) :: tolerance
+      type(solver_result_type), intent(out) :: outcome
+      type(normal_task_type) :: task
+
+      task = normal_task_type(plan%control, plan%load, self%material%q, self%state%first)
+      self%side%tolerance = tolerance
+      ! Without arms `past` is not allocated, and so not present.
+      call self%side%solve(task, self%height, self%state%pressure, self%state%gap, self%state%level, &
+         outcome, self%past)
+      self%state%first = .false.
+   end subroutine solve_normal
+
+   !> End the step: displacements, histories and energies of both directions.
+   subroutine commit_step(self)
+      class(contact_type), intent(inout) :: self
+      type(products_type) :: products
+      real(dp), allocatable :: displacement(:), sums(:, :)
+      integer :: j
+
+      sums = new_row_sums(self%material, self%grid%rows())
+      allocate (displacement(self%grid%nx))
+      !$omp parallel do default(none) shared(self, sums) private(j) firstprivate(displacement)
+      do j = 1, self%grid%rows()
+         displacement(:) = self%state%gap(:, j) + self%height(:, j) + self%state%level
+         call commit_row(self%state%history, self%material, 1, j, self%state%pressure(:, j), &
+            self%state%displacement(:, j), displacement, sums(:, j))
+         self%state%displacement(:, j) = displacement
+      end do
+      products = new_products(self%material)
+      call add_rows(products, sums)
+      call book_step(self%state%books, self%material, products)
+      if (self%frictional) call self%tangential%commit(self%state%tangential, self%material, &
+         self%state%pressure, self%slope_x, self%slope_y)
+      call finish_step(self%material)
+      self%state%dt_old = self%material%dt_old
+   end subroutine commit_step
+
+   !> Mean of a vector field over the contact.
+   function contact_mean(self, field) result(mean)
+      class(contact_type), intent(in) :: self
+      real(dp), intent(in) :: field(:, :, :)        !! [nx, 2, ny]
+      real(dp) :: mean(2)
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: sums(3)
+      logical, allocatable :: touching(:)
+      integer :: j
+
+      allocate (rows(3, self%grid%rows()))
+      !$omp parallel do default(none) shared(self, field, rows) private(j, touching)
+      do j = 1, self%grid%rows()
+         touching = touches(self%side%adhesive, self%state%pressure(:, j), self%state%gap(:, j))
+         rows(1, j) = sum(field(:, 1, j), touching)
+         rows(2, j) = sum(field(:, 2, j), touching)
+         rows(3, j) = count(touching)
+      end do
+      sums = row_totals(rows)
+      mean = sums(1:2)/max(sums(3), 1.0_dp)
+   end function contact_mean
+
+end module contact_model

@@ -1,0 +1,76 @@
+!> Warnings of a run: what an engineer should know although the row has been solved.
+module step_watches
+   use asperity_precision, only : dp
+   use asperity_schedule, only : planned_row_type
+   use contact_model, only : contact_type
+   use contact_size, only : cells_across, watch_contact_size
+   use map_edge, only : look_at_edge
+   use stick_slip_watch, only : watch_slip
+   use text_tools, only : to_text
+   implicit none
+   private
+
+   public :: add_warning, watch_cells, watch_edge, watch_stick_slip
+
+contains
+
+   !> Warn where a free map is too small. The state is that of the end of the step, its row the one before.
+   subroutine watch_edge(contact, plan, warnings)
+      class(contact_type), intent(inout) :: contact
+      type(planned_row_type), intent(in) :: plan
+      character(:), allocatable, intent(inout) :: warnings
+      character(:), allocatable :: message
+
+      message = ''
+      call look_at_edge(contact%grid, merge(contact%case%adhesion%range, 0.0_dp, contact%side%adhesive), &
+         contact%rms_height, [plan%road_x - contact%state%row%road_x, &
+         plan%road_y - contact%state%row%road_y], contact%state, message)
+      call add_warning(warnings, contact%state%schedule%row, plan%time, message)
+   end subroutine watch_edge
+
+   !> Look at the size of the patches of contact where a phase ends.
+   subroutine watch_cells(contact, plan, warnings)
+      class(contact_type), intent(inout) :: contact
+      type(planned_row_type), intent(in) :: plan
+      character(:), allocatable, intent(inout) :: warnings
+      character(:), allocatable :: message
+
+      associate (state => contact%state)
+         if (state%schedule%phase == plan%phase) return
+         call watch_contact_size(contact%grid, cells_across(contact%grid, contact%side%adhesive, &
+            state%pressure, state%gap), state%schedule%phase > size(contact%case%phases), &
+            state%widest, message)
+         call add_warning(warnings, state%schedule%row, plan%time, message)
+      end associate
+   end subroutine watch_cells
+
+   !> Warn where the scheme makes the block stick and slip in turn. The row is done.
+   subroutine watch_stick_slip(contact, plan, warnings)
+      class(contact_type), intent(inout) :: contact
+      type(planned_row_type), intent(in) :: plan
+      character(:), allocatable, intent(inout) :: warnings
+      character(:), allocatable :: message
+      real(dp) :: speed
+
+      if (.not. contact%frictional) return
+      speed = hypot(plan%velocity_x, plan%velocity_y)
+      ! A block that comes to rest behind its road is no stick-slip.
+      if (.not. plan%dt*speed > 0.0_dp) return
+      call watch_slip(contact%state%watch, contact%state%row%sliding_speed, speed, &
+         contact%case%solver%passes, contact%case%material%density, message)
+      call add_warning(warnings, contact%state%schedule%row, plan%time, message)
+   end subroutine watch_stick_slip
+
+   !> Add a line to the warnings, unless it is empty.
+   subroutine add_warning(warnings, step, time, message)
+      character(:), allocatable, intent(inout) :: warnings
+      integer, intent(in) :: step                   !! number of the row
+      real(dp), intent(in) :: time                  !! s
+      character(*), intent(in) :: message
+
+      if (len(message) == 0) return
+      if (len(warnings) > 0) warnings = warnings//new_line('a')
+      warnings = warnings//'step '//to_text(step)//', t = '//to_text(time)//' s: '//message
+   end subroutine add_warning
+
+end module step_watches

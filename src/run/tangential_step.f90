@@ -1,0 +1,482 @@
+!> The tangential side of a step: tractions, displacements and slip of a rubber block that is driven over
+!> a road, with the block's viscoelasticity and the inertia of its mean motion.
+!>
+!> Slip of a step: r = DX - U', DX = U + (D' - D), U' = A(T + T_h)/Q with the traction T_h of the
+!> history. The solver works with Q r = DX' - A(T + T_h), DX' = Q DX. The mean of a block
+!> with mass moves by the rule of module block_motion; the part of the mean traction that accelerates the
+!> mass does not strain the rubber.
+!>
+!> The loss by friction is that of the mean traction over the step, second order in its length.
+!>
+!> Fields of doubles besides the state, two components each: the trial U', slip, DX', T_h; those of the
+!> solver.
+module tangential_step
+   use case_settings, only : case_type
+   use contact_rule, only : touches
+   use asperity_errors, only : error_type
+   use field_sums, only : field_count, field_mean, row_totals
+   use fft_conv, only : convolution_type, new_convolution
+   use friction_cg, only : friction_fast, friction_fields_type, friction_solver_type, friction_thesis, &
+      new_friction_solver
+   use friction_law, only : friction_law_type, new_friction_law
+   use asperity_precision, only : dp, int8
+   use kernels, only : tangential_half_space
+   use regular_grid, only : boundary_periodic, grid_type
+   use solver_result, only : solver_result_type
+   use steady_friction, only : steady_contact_type
+   use tangential_state, only : tangential_state_type
+   use viscoelastic_energy, only : book_step
+   use zener, only : commit_history, history_field, new_products, products_type, zener_type
+   implicit none
+   private
+
+   public :: new_tangential_step, tangential_step_type
+
+   !> The solver of the tangential side and the step in hand. Not to be copied.
+   type :: tangential_step_type
+      type(grid_type) :: grid
+      type(friction_law_type) :: law
+      logical :: adhesive = .false.                   !! the contact has an adhesive potential
+      real(dp) :: tolerance = 1e-6_dp                 !! of the next solve
+      logical :: settle = .true.                      !! T has to settle too, not only the displacements
+      real(dp), allocatable :: trial(:, :, :)         !! U_T at the end of the step, m [nx, ny, 2]
+      real(dp), allocatable :: slip(:, :, :)          !! of the step, m
+      logical :: pulled(2) = .false.                  !! the road hangs on a force along x, y
+      real(dp) :: pull(2) = 0.0_dp                    !! that force, over the cell, Pa
+      logical :: slides_off = .false.                 !! it is more than the friction holds,
+      real(dp) :: held(2) = 0.0_dp                    !! which is this, Pa
+      type(convolution_type), private :: operator
+      type(friction_solver_type), private :: solver
+      real(dp), allocatable, private :: drive(:, :, :)    !! DX'
+      real(dp), allocatable, private :: past(:, :, :)     !! T_h
+      real(dp), private :: motion(2) = 0.0_dp             !! D' - D of the step in hand, m; a guess where pulled
+      real(dp), private :: found(2) = 0.0_dp              !! D' - D as found by the last solve, m
+      real(dp), private :: mass_place(2) = 0.0_dp         !! of a pulled mass, in the units of DX'
+      real(dp), private :: mass_yields = 0.0_dp           !! a pulled mass yields to T - F by this
+      real(dp), private :: dt = 0.0_dp
+      real(dp), private :: q = 0.0_dp
+      real(dp), private :: past_mean(2) = 0.0_dp
+   contains
+      procedure :: begin
+      procedure :: extrapolate
+      procedure :: solve
+      procedure :: take_steady
+      procedure :: take_motion
+      procedure :: commit
+      procedure :: sums
+      procedure :: destroy
+   end type tangential_step_type
+
+contains
+
+   !> Prepare the operator and the solver.
+   subroutine new_tangential_step(self, case, error)
+      type(tangential_step_type), intent(out) :: self
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      real(dp) :: adhesive
+
+      self%grid = case%grid
+      adhesive = 0.0_dp
+      self%adhesive = case%adhesion%potential /= 'none'
+      if (self%adhesive) adhesive = case%adhesion%energy/case%adhesion%range
+      self%law = new_friction_law(trim(case%friction%law), case%friction%coefficient, &
+         case%friction%shear_strength, adhesive, case%friction%slope_effect, &
+         case%solver%slip_law == 'physical')
+      call new_convolution(self%operator, self%grid, &
+         tangential_half_space(case%material%poisson, case%material%thickness), error)
+      if (allocated(error)) return
+      call new_friction_solver(self%solver, self%grid, self%operator, error, &
+         merge(friction_thesis, friction_fast, case%solver%method == 'thesis'))
+      if (allocated(error)) return
+      self%solver%max_iterations = case%solver%max_iterations
+      allocate (self%trial(self%grid%nx, self%grid%ny, 2), source=0.0_dp)
+      allocate (self%slip, self%drive, self%past, source=self%trial)
+   end subroutine new_tangential_step
+
+   !> Begin a step: what the road's motion and the past ask for. The material's step has begun.
+   subroutine begin(self, state, material, motion, dt, pulled, pull)
+      class(tangential_step_type), intent(inout) :: self
+      type(tangential_state_type), intent(inout) :: state
+      type(zener_type), intent(in) :: material
+      real(dp), intent(in) :: motion(2)               !! D' - D, m; a guess where pulled
+      real(dp), intent(in) :: dt                      !! s; 0: instantaneous
+      logical, intent(in) :: pulled(2)                !! the road hangs on a force along x, y
+      real(dp), intent(in) :: pull(2)                 !! that force, over the cell, Pa
+      real(dp) :: height, shift(2)
+      integer :: c, j
+
+      self%motion = motion
+      self%dt = dt
+      self%q = material%q
+      self%pulled = pulled
+      self%pull = pull
+      self%found = motion
+      self%solver%near = .false.
+      self%slides_off = .false.
+      state%moved = state%moved .or. any(abs(motion) > 0.0_dp) .or. any(pulled .and. abs(pull) > 0.0_dp)
+      if (.not. state%moved) return
+      ! A road that goes back where it began leaves displacements of round-off.
+      self%solver%least_scale = self%q*norm2(merge(0.0_dp, motion, pulled))
+      if (.not. dt > 0.0_dp) state%pace = 0.0_dp
+      call history_field(state%history, material, self%past)
+      self%past_mean = means(self%past)
+      height = state%block%height
+      shift = self%q*motion
+      if (state%block%inert(dt)) then
+         ! A mass makes the mean stiffer: like a lower block, moved by what is known of the mass.
+         height = self%q*height/(self%q + state%block%resistance(dt))
+         shift = shift - height*state%block%known(means(state%displacement), motion, dt)
+      else if (state%block%mass > 0.0_dp) then
+         ! A mass does not move in no time: the mean of the surface stays.
+         height = 0.0_dp
+         shift = shift - self%q*means(state%displacement)
+      end if
+      where (pulled) shift = 0.0_dp
+      do c = 1, 2
+         !$omp parallel do default(none) shared(self, state, c, shift) private(j)
+         do j = 1, self%grid%ny
+            self%drive(:, j, c) = self%q*state%displacement(:, j, c) + shift(c)
+         end do
+      end do
+      call set_thickness(self, height)
+      if (any(pulled) .and. state%block%mass > 0.0_dp) call place_mass(self, state)
+   end subroutine begin
+
+   !> A pulled mass: the rubber carries the pull F from its top to the mass, which T brakes. Means:
+   !>
+   !>    U' = h (F + T_h)/Q,   T - F = f' = R (U' - (D' - D))/h - k
+   !>
+   !> with the force f' on the mass, its resistance R and what is known of it, k, by module
+   !> `block_motion`. So Q (D' - D) - Q U' = -Q h/R (k + T - F): a spring for the solver, whose operator
+   !> needs no mean mode. In no time the mass does not move.
+   subroutine place_mass(self, state)
+      type(tangential_step_type), intent(inout) :: self
+      type(tangential_state_type), intent(in) :: state
+      integer :: c
+
+      if (state%block%inert(self%dt)) then
+         self%mass_yields = self%q*state%block%height/state%block%resistance(self%dt)
+         self%mass_place = -self%mass_yields &
+            *state%block%known(means(state%displacement), [0.0_dp, 0.0_dp], self%dt)
+      else
+         self%mass_yields = tiny(1.0_dp)
+         self%mass_place = -self%q*means(state%displacement)
+      end if
+      do c = 1, 2
+         if (self%pulled(c)) call self%operator%set_mean_mode(c, 0.0_dp)
+      end do
+   end subroutine place_mass
+
+   !> Tell the solver what pulls the road. The rest of the horizontal force is not in T: without
+   !> `slope_effect` that of all slopes, else that of the slopes which attraction pulls at outside the
+   !> contact.
+   subroutine hang_road(self, state, pressure, slope_x, slope_y)
+      type(tangential_step_type), intent(inout) :: self
+      type(tangential_state_type), intent(in) :: state
+      real(dp), intent(in) :: pressure(:, :), slope_x(:, :), slope_y(:, :)
+
+      associate (pull => self%solver%pull)
+         pull%along = self%pulled
+         if (.not. any(self%pulled)) return
+         pull%traction = self%pull - outside_force(self, state, pressure, slope_x, slope_y)
+         if (state%block%mass > 0.0_dp) then
+            pull%offset = self%mass_place
+            pull%yielding = self%mass_yields
+         else
+            pull%offset = self%q*self%found
+            pull%yielding = 0.0_dp
+         end if
+      end associate
+   end subroutine hang_road
+
+   !> How far the pulled road has moved, from what the solver has found.
+   subroutine find_motion(self, state)
+      type(tangential_step_type), intent(inout) :: self
+      type(tangential_state_type), intent(in) :: state
+
+      if (.not. any(self%pulled)) return
+      associate (pull => self%solver%pull)
+         if (state%block%mass > 0.0_dp) pull%offset = pull%offset + &
+            state%block%height*(pull%traction + self%past_mean)
+         self%found = merge(pull%offset/self%q, self%motion, self%pulled)
+         self%slides_off = pull%slides_off
+         if (self%slides_off) self%held = merge(means(state%traction) + self%pull - pull%traction, 0.0_dp, &
+            self%pulled)
+      end associate
+   end subroutine find_motion
+
+   !> Mean horizontal force of the road on the rubber that T does not hold, Pa.
+   function outside_force(self, state, pressure, slope_x, slope_y) result(force)
+      type(tangential_step_type), intent(in) :: self
+      type(tangential_state_type), intent(in) :: state
+      real(dp), intent(in) :: pressure(:, :), slope_x(:, :), slope_y(:, :)
+      real(dp) :: force(2)
+      real(dp), allocatable :: rows(:, :)
+      logical, allocatable :: counts(:)
+      integer :: j
+
+      force = 0.0_dp
+      if (self%law%slope .and. .not. self%adhesive) return
+      allocate (rows(2, self%grid%ny))
+      !$omp parallel do default(none) shared(self, state, pressure, slope_x, slope_y, rows) private(j, counts)
+      do j = 1, self%grid%ny
+         counts = state%contact(:, j) == 0_int8 .or. .not. self%law%slope
+         rows(1, j) = sum(pressure(:, j)*slope_x(:, j), counts)
+         rows(2, j) = sum(pressure(:, j)*slope_y(:, j), counts)
+      end do
+      force = -row_totals(rows)/self%grid%cells()
+   end function outside_force
+
+   !> The step is solved: take over how far the pulled road has moved, which the displacements were
+   !> reckoned without.
+   subroutine take_motion(self, motion)
+      class(tangential_step_type), intent(inout) :: self
+      real(dp), intent(out) :: motion(2)              !! of the road in the step, m
+      integer :: c, j
+
+      motion = self%found
+      do c = 1, 2
+         if (.not. self%pulled(c)) cycle
+         !$omp parallel do default(none) shared(self, c) private(j)
+         do j = 1, self%grid%ny
+            self%trial(:, j, c) = self%trial(:, j, c) + (self%found(c) - self%motion(c))
+         end do
+      end do
+      self%motion = self%found
+   end subroutine take_motion
+
+   !> Start the step's traction from the change of the last step going on. To be called when the road
+   !> has moved, once a step.
+   subroutine extrapolate(self, state, steady)
+      class(tangential_step_type), intent(inout) :: self
+      type(tangential_state_type), intent(inout) :: state
+      logical, intent(in) :: steady                   !! the road moves as in the step before
+      real(dp) :: factor, t(2)
+      integer :: i, j
+
+      factor = 0.0_dp
+      if (steady .and. state%pace > 0.0_dp) factor = self%dt/state%pace
+      !$omp parallel do default(none) shared(self, state, factor) private(i, j, t)
+      do j = 1, self%grid%ny
+         do i = 1, self%grid%nx
+            t = state%traction(i, j, :)
+            if (state%contact(i, j) == 1_int8) &
+               state%traction(i, j, :) = t + factor*(t - state%before(i, j, :))
+            state%before(i, j, :) = t
+         end do
+      end do
+      state%pace = self%dt
+      self%solver%near = factor > 0.0_dp
+   end subroutine extrapolate
+
+   !> The compliance of the mean mode, periodic mode only.
+   subroutine set_thickness(self, thickness)
+      type(tangential_step_type), intent(inout) :: self
+      real(dp), intent(in) :: thickness
+
+      if (self%grid%boundary == boundary_periodic) call self%operator%set_mean_compliance(thickness)
+   end subroutine set_thickness
+
+   !> Means of a vector field over the grid.
+   function means(field) result(mean)
+      real(dp), intent(in) :: field(:, :, :)
+      real(dp) :: mean(2)
+
+      mean = [field_mean(field(:, :, 1)), field_mean(field(:, :, 2))]
+   end function means
+
+   !> Solve for the traction under a pressure: T, the trial displacement, the slip. Where the road is
+   !> pulled, the trial displacement is reckoned as if the road had moved by the guess: U - (D' - D) is
+   !> right, and the road is read by that. `take_motion` ends this.
+   subroutine solve(self, state, pressure, gap, slope_x, slope_y, outcome)
+      class(tangential_step_type), intent(inout), target :: self
+      type(tangential_state_type), intent(inout), target :: state
+      real(dp), intent(in), contiguous, target :: pressure(:, :)
+      real(dp), intent(in) :: gap(:, :)
+      real(dp), intent(in), contiguous, target :: slope_x(:, :), slope_y(:, :)
+      type(solver_result_type), intent(out) :: outcome
+      type(friction_fields_type) :: fields
+      integer :: j, c
+
+      self%solver%tolerance = self%tolerance
+      self%solver%settle = self%settle
+      call mark_contact(self, state, pressure, gap)
+      call hang_road(self, state, pressure, slope_x, slope_y)
+      fields%pressure => pressure
+      fields%slope_x => slope_x
+      fields%slope_y => slope_y
+      fields%drive => self%drive
+      fields%past => self%past
+      fields%traction => state%traction
+      fields%slip => self%slip
+      fields%contact => state%contact
+      call self%solver%solve(self%operator, self%law, fields, outcome)
+      call find_motion(self, state)
+      do c = 1, 2
+         !$omp parallel do default(none) shared(self, state, c) private(j)
+         do j = 1, self%grid%ny
+            self%slip(:, j, c) = self%slip(:, j, c)/self%q
+            self%trial(:, j, c) = state%displacement(:, j, c) + self%motion(c) - self%slip(:, j, c)
+         end do
+      end do
+   end subroutine solve
+
+   !> Mark the cells that may carry friction, those that touch. A cell that slipped is still marked so.
+   subroutine mark_contact(self, state, pressure, gap)
+      type(tangential_step_type), intent(inout) :: self
+      type(tangential_state_type), intent(inout) :: state
+      real(dp), intent(in) :: pressure(:, :), gap(:, :)
+      integer :: i, j
+
+      !$omp parallel do default(none) shared(self, state, pressure, gap) private(i, j)
+      do j = 1, self%grid%ny
+         do i = 1, self%grid%nx
+            if (.not. touches(self%adhesive, pressure(i, j), gap(i, j))) then
+               state%contact(i, j) = 0_int8
+            else if (state%contact(i, j) == 0_int8) then
+               state%contact(i, j) = 1_int8
+            end if
+         end do
+      end do
+   end subroutine mark_contact
+
+   !> Take a state of steady sliding. Its history and energies are set by the caller.
+   subroutine take_steady(self, state, found, velocity)
+      class(tangential_step_type), intent(inout) :: self
+      type(tangential_state_type), intent(inout) :: state
+      type(steady_contact_type), intent(in) :: found
+      real(dp), intent(in) :: velocity(2)             !! of the road, m/s
+      real(dp), parameter :: within = 1.0_dp + 1e-6_dp  !! s of the bound from which a point sticks
+      real(dp) :: slope(2), star(2), before
+      integer :: i, j
+
+      before = state%block%kinetic()
+      state%moved = .true.
+      state%pace = 0.0_dp
+      state%rate = 0.0_dp
+      state%block%speed = -velocity
+      state%block%fresh = .true.
+      state%block%work = state%block%work + state%block%kinetic() - before
+      !$omp parallel do default(none) shared(self, state, found) private(i, j, slope, star)
+      do j = 1, self%grid%ny
+         do i = 1, self%grid%nx
+            state%traction(i, j, :) = found%traction(i, :, j)
+            state%displacement(i, j, :) = found%displacement(i, :, j)
+            slope = [found%slope_x(i, j), found%slope_y(i, j)]
+            star = self%law%normal_traction(found%pressure(i, j), slope)
+            state%contact(i, j) = 0_int8
+            state%rubbing(i, j, :) = 0.0_dp
+            if (found%pressure(i, j) <= 0.0_dp) cycle
+            state%rubbing(i, j, :) = state%traction(i, j, :) - star
+            state%contact(i, j) = 2_int8
+            if (self%law%bound_ratio(found%pressure(i, j), slope, state%traction(i, j, :) - star) > within) &
+               state%contact(i, j) = 1_int8
+         end do
+      end do
+      state%rubbed(:, :) = state%contact
+      state%before(:, :, :) = state%traction
+      self%trial(:, :, :) = state%displacement
+      self%slip(:, :, :) = 0.0_dp
+   end subroutine take_steady
+
+   !> End the step: history, energies, the motion of the mass.
+   subroutine commit(self, state, material, pressure, slope_x, slope_y)
+      class(tangential_step_type), intent(inout) :: self
+      type(tangential_state_type), intent(inout) :: state
+      type(zener_type), intent(in) :: material
+      real(dp), intent(in) :: pressure(:, :)
+      real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)
+      type(products_type) :: products
+      real(dp) :: carried(2), before(2), after(2)
+
+      if (.not. state%moved) return
+      products = new_products(material)
+      carried = 0.0_dp
+      if (state%block%mass > 0.0_dp) then
+         before = means(state%displacement)
+         after = means(self%trial)
+         carried = means(state%traction) + self%past_mean - self%q*after/state%block%height
+         call state%block%finish(after - before - self%motion, carried, self%dt)
+      end if
+      call commit_history(state%history, material, state%traction, state%displacement, self%trial, &
+         products, carried)
+      call book_step(state%books, material, products)
+      call book_friction(self, state, pressure, slope_x, slope_y)
+      state%displacement(:, :, :) = self%trial
+   end subroutine commit
+
+   !> Energy lost by friction, and the mean speed of the surface in the contact.
+   subroutine book_friction(self, state, pressure, slope_x, slope_y)
+      class(tangential_step_type), intent(inout) :: self
+      type(tangential_state_type), intent(inout) :: state
+      real(dp), intent(in) :: pressure(:, :)
+      real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: rubbing(2), slope(2), total(4)
+      integer :: i, j
+
+      allocate (rows(4, self%grid%ny), source=0.0_dp)
+      slope = 0.0_dp
+      !$omp parallel do default(none) shared(self, state, pressure, slope_x, slope_y, rows) &
+      !$omp private(i, j, rubbing) firstprivate(slope)
+      do j = 1, self%grid%ny
+         do i = 1, self%grid%nx
+            rubbing = 0.0_dp
+            if (state%contact(i, j) /= 0_int8) then
+               if (self%law%slope) slope = [slope_x(i, j), slope_y(i, j)]
+               rubbing = state%traction(i, j, :) - self%law%normal_traction(pressure(i, j), slope)
+               rows(2:3, j) = rows(2:3, j) + self%trial(i, j, :) - state%displacement(i, j, :)
+               rows(4, j) = rows(4, j) + 1.0_dp
+            end if
+            ! The slip of a point that sticks is what the solver's tolerance left: it loses nothing.
+            if (state%contact(i, j) /= 1_int8) rows(1, j) = rows(1, j) &
+               + rubbed_off(state%rubbed(i, j) == 1_int8, state%rubbing(i, j, :), rubbing, self%slip(i, j, :))
+            state%rubbing(i, j, :) = rubbing
+            state%rubbed(i, j) = state%contact(i, j)
+         end do
+      end do
+      total = row_totals(rows)
+      state%lost_friction = state%lost_friction + total(1)*self%grid%cell_area()
+      if (self%dt > 0.0_dp .and. total(4) > 0.0_dp) state%rate = total(2:3)/(total(4)*self%dt)
+   end subroutine book_friction
+
+   !> What a cell loses by friction in a step, J/m2: the mean of the frictional tractions at both ends times
+   !> the slip. A cell that enters or leaves the contact has none at one end. A cell that stuck at the start
+   !> slips only once its traction has reached its bound, so that the traction of the end counts alone; so it
+   !> does where the slip has turned against the traction of the start, since the cell has stuck in between.
+   pure function rubbed_off(stuck, before, after, slip) result(loss)
+      logical, intent(in) :: stuck                    !! at the start of the step
+      real(dp), intent(in) :: before(2)               !! T - T* at the start of the step, Pa
+      real(dp), intent(in) :: after(2)                !! and at its end, Pa
+      real(dp), intent(in) :: slip(2)                 !! m
+      real(dp) :: loss
+      real(dp) :: first
+
+      loss = max(dot_product(after, slip), 0.0_dp)
+      first = dot_product(before, slip)
+      if (first >= 0.0_dp .and. .not. stuck) loss = 0.5_dp*(first + loss)
+   end function rubbed_off
+
+   !> Means of the traction, part of the grid that sticks, mean slip of the step.
+   subroutine sums(self, state, traction, stick, slip)
+      class(tangential_step_type), intent(in) :: self
+      type(tangential_state_type), intent(in) :: state
+      real(dp), intent(out) :: traction(2)            !! Pa
+      real(dp), intent(out) :: stick
+      real(dp), intent(out) :: slip(2)                !! m
+
+      traction = means(state%traction)
+      slip = means(self%slip)
+      stick = field_count(state%contact == 1_int8)/self%grid%cells()
+   end subroutine sums
+
+   !> Free plans and fields.
+   subroutine destroy(self)
+      class(tangential_step_type), intent(inout) :: self
+
+      call self%operator%destroy()
+      call self%solver%destroy()
+   end subroutine destroy
+
+end module tangential_step

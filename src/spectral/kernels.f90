@@ -1,0 +1,228 @@
+!> What the solid is: the response of its surface to tractions, for a shear modulus of 1.
+!>
+!> On a periodic grid a kernel answers a wave exp(i q.x) of traction with A(q) times that wave of
+!> displacement: a number for the normal direction, a symmetric 2 x 2 matrix (xx, yy, xy) for the
+!> tangential ones. On a free grid it answers a uniform traction on one cell with the displacement at a
+!> distance from that cell. A kernel also knows the mean mode of a periodic grid, the inverse (the
+!> stiffness), and the least and largest stiffness on a grid. In steady sliding, module `steady_symbols`
+!> divides A(q) by the complex modulus at the frequency of the wave.
+!>
+!> A new solid is one new function, `wave`, and its exact test; a second function, `cell`, if the solid
+!> is to be used with a free boundary. Half-space (Johnson, Contact Mechanics, 1985; nu: Poisson ratio):
+!>
+!>     normal        A = (1 - nu)/q
+!>     tangential    A = [1 - nu q q/q^2]/q;  the mean mode of a sheared block is its thickness
+!>     one cell      Love 1929; Kalker 1990 (module `influence`)
+module kernels
+   use asperity_precision, only : dp, pi
+   use influence, only : love_normal, love_tangential, transform_even, transform_odd
+   use regular_grid, only : boundary_periodic, grid_type
+   implicit none
+   private
+
+   public :: cell_response, kernel_type, normal_half_space, tangential_half_space, wave_response
+
+   !> A solid of unit shear modulus.
+   type :: kernel_type
+      integer :: components = 1             !! 1: normal, 2: both tangential directions
+      real(dp) :: poisson = 0.5_dp          !! -1 < nu <= 0.5
+      real(dp) :: mean_mode = 0.0_dp        !! A at zero wave number on a periodic grid, m/Pa
+      procedure(wave_response), pointer :: wave => null()   !! A at a wave vector that is not zero
+      procedure(cell_response), pointer :: cell => null()   !! null: for periodic grids only
+   contains
+      procedure :: tensor
+      procedure :: compliance
+      procedure :: least_stiffness
+      procedure :: largest_stiffness
+      procedure :: symbols
+      procedure :: inverse_symbols
+   end type kernel_type
+
+   abstract interface
+      !> A at a wave vector (qx, qy) /= 0: [a, -, -] for a normal kernel, [xx, yy, xy] for a tangential one.
+      pure function wave_response(self, qx, qy) result(a)
+         import :: dp, kernel_type
+         implicit none
+         class(kernel_type), intent(in) :: self
+         real(dp), intent(in) :: qx, qy     !! rad/m
+         real(dp) :: a(3)                   !! m/Pa
+      end function wave_response
+
+      !> The displacement at (x, y) from the centre of a cell dx by dy under a uniform unit traction.
+      pure function cell_response(self, x, y, dx, dy) result(a)
+         import :: dp, kernel_type
+         implicit none
+         class(kernel_type), intent(in) :: self
+         real(dp), intent(in) :: x, y       !! m
+         real(dp), intent(in) :: dx, dy     !! m
+         real(dp) :: a(3)                   !! m/Pa
+      end function cell_response
+   end interface
+
+contains
+
+   !> The half-space in the normal direction. On a periodic grid the mean normal displacement belongs to
+   !> the approach of the bodies: the mean mode is 0.
+   function normal_half_space(poisson) result(self)
+      real(dp), intent(in) :: poisson
+      type(kernel_type) :: self
+
+      self%poisson = poisson
+      self%wave => half_space_normal_wave
+      self%cell => half_space_normal_cell
+   end function normal_half_space
+
+   !> The half-space in both tangential directions, or a block of some thickness whose mean shear counts.
+   function tangential_half_space(poisson, thickness) result(self)
+      real(dp), intent(in) :: poisson
+      real(dp), intent(in), optional :: thickness   !! of the block, m; 0 or absent: half-space
+      type(kernel_type) :: self
+
+      self%components = 2
+      self%poisson = poisson
+      if (present(thickness)) self%mean_mode = thickness
+      self%wave => half_space_tangential_wave
+      self%cell => half_space_tangential_cell
+   end function tangential_half_space
+
+   !> (1 - nu)/q.
+   pure function half_space_normal_wave(self, qx, qy) result(a)
+      class(kernel_type), intent(in) :: self
+      real(dp), intent(in) :: qx, qy
+      real(dp) :: a(3)
+
+      a = [(1.0_dp - self%poisson)/hypot(qx, qy), 0.0_dp, 0.0_dp]
+   end function half_space_normal_wave
+
+   !> [1 - nu q q/q^2]/q.
+   pure function half_space_tangential_wave(self, qx, qy) result(a)
+      class(kernel_type), intent(in) :: self
+      real(dp), intent(in) :: qx, qy
+      real(dp) :: a(3)
+      real(dp) :: q
+
+      q = hypot(qx, qy)
+      a = [(1.0_dp - self%poisson*(qx/q)**2)/q, (1.0_dp - self%poisson*(qy/q)**2)/q, &
+         -self%poisson*(qx/q)*(qy/q)/q]
+   end function half_space_tangential_wave
+
+   !> Love's coefficient of a normal pressure.
+   pure function half_space_normal_cell(self, x, y, dx, dy) result(a)
+      class(kernel_type), intent(in) :: self
+      real(dp), intent(in) :: x, y, dx, dy
+      real(dp) :: a(3)
+
+      a = [love_normal(x, y, dx, dy, self%poisson), 0.0_dp, 0.0_dp]
+   end function half_space_normal_cell
+
+   !> The coefficients of tangential tractions.
+   pure function half_space_tangential_cell(self, x, y, dx, dy) result(a)
+      class(kernel_type), intent(in) :: self
+      real(dp), intent(in) :: x, y, dx, dy
+      real(dp) :: a(3)
+
+      call love_tangential(x, y, dx, dy, self%poisson, a(1), a(3), a(2))
+   end function half_space_tangential_cell
+
+   !> A at any wave vector of a periodic grid, the zero one included.
+   pure function tensor(self, qx, qy) result(a)
+      class(kernel_type), intent(in) :: self
+      real(dp), intent(in) :: qx, qy        !! rad/m
+      real(dp) :: a(3)                      !! m/Pa
+
+      if (max(abs(qx), abs(qy)) > 0.0_dp) then
+         a = self%wave(qx, qy)
+      else
+         a = [self%mean_mode, self%mean_mode, 0.0_dp]
+      end if
+   end function tensor
+
+   !> The first element of A for a wave number along x: of a normal kernel, its compliance.
+   pure function compliance(self, q) result(a)
+      class(kernel_type), intent(in) :: self
+      real(dp), intent(in) :: q             !! rad/m, > 0
+      real(dp) :: a                         !! m/Pa
+      real(dp) :: elements(3)
+
+      elements = self%wave(q, 0.0_dp)
+      a = elements(1)
+   end function compliance
+
+   !> Stiffness of a normal kernel for the longest wave of a grid.
+   pure function least_stiffness(self, grid) result(stiffness)
+      class(kernel_type), intent(in) :: self
+      type(grid_type), intent(in) :: grid
+      real(dp) :: stiffness                 !! Pa/m
+
+      stiffness = 1.0_dp/self%compliance(2.0_dp*pi/max(grid%lx, merge(0.0_dp, grid%ly, grid%ny == 1)))
+   end function least_stiffness
+
+   !> Stiffness of a normal kernel for the shortest wave of a grid: two cells long, or the geometric mean
+   !> of that for both directions.
+   pure function largest_stiffness(self, grid) result(stiffness)
+      class(kernel_type), intent(in) :: self
+      type(grid_type), intent(in) :: grid
+      real(dp) :: stiffness                 !! Pa/m
+
+      stiffness = 1.0_dp/self%compliance(pi/merge(grid%dx, sqrt(grid%dx*grid%dy), grid%ny == 1))
+   end function largest_stiffness
+
+   !> A for all wave numbers of the transforms of a grid: the first quarter of the plane, since xx and yy
+   !> are even in both wave numbers and xy is odd in both.
+   subroutine symbols(self, grid, mx, my, table)
+      class(kernel_type), intent(in) :: self
+      type(grid_type), intent(in) :: grid
+      integer, intent(in) :: mx, my                    !! lengths of the transforms
+      real(dp), intent(out) :: table(0:, 0:, :)        !! [0:mx/2, 0:my/2, 1 or 3], m/Pa
+      real(dp) :: a(3)
+      integer :: i, j
+
+      if (grid%boundary == boundary_periodic) then
+         !$omp parallel do default(none) shared(self, grid, mx, my, table) private(i, j, a)
+         do j = 0, my/2
+            do i = 0, mx/2
+               a = self%tensor(2.0_dp*pi*(i/grid%lx), 2.0_dp*pi*(j/grid%ly))
+               ! An odd symbol has no value on the Nyquist lines.
+               if (2*i == mx .or. 2*j == my) a(3) = 0.0_dp
+               table(i, j, :) = a(:size(table, 3))
+            end do
+         end do
+      else
+         !$omp parallel do default(none) shared(self, grid, mx, my, table) private(i, j, a)
+         do j = 0, my/2
+            do i = 0, mx/2
+               a = self%cell(i*grid%dx, j*grid%dy, grid%dx, grid%dy)
+               table(i, j, :) = a(:size(table, 3))
+            end do
+         end do
+         call transform_even(mx, my, table(0:mx/2, 0:my/2, 1))
+         if (size(table, 3) == 1) return
+         call transform_even(mx, my, table(0:mx/2, 0:my/2, 2))
+         call transform_odd(mx, my, table(0:mx/2, 0:my/2, 3))
+      end if
+   end subroutine symbols
+
+   !> The inverse of A on a periodic grid; 0 where A is 0.
+   subroutine inverse_symbols(self, grid, table)
+      class(kernel_type), intent(in) :: self
+      type(grid_type), intent(in) :: grid
+      real(dp), intent(out) :: table(0:, 0:, :)        !! [0:nx/2, 0:ny/2, 1 or 3], Pa/m
+      real(dp) :: determinant, a(3)
+      integer :: i, j
+
+      call self%symbols(grid, grid%nx, grid%ny, table)
+      do j = 0, grid%ny/2
+         do i = 0, grid%nx/2
+            if (self%components == 1) then
+               if (table(i, j, 1) > 0.0_dp) table(i, j, 1) = 1.0_dp/table(i, j, 1)
+            else
+               a = table(i, j, :)
+               determinant = a(1)*a(2) - a(3)**2
+               table(i, j, :) = 0.0_dp
+               if (determinant > 0.0_dp) table(i, j, :) = [a(2), a(1), -a(3)]/determinant
+            end if
+         end do
+      end do
+   end subroutine inverse_symbols
+
+end module kernels

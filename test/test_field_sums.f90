@@ -1,0 +1,113 @@
+!> Tests of the field algebra and of the projection.
+module test_field_sums
+   use asperity_parallel, only : set_threads
+   use asperity_precision, only : dp
+   use check, only : begin_suite, check_close, check_that
+   use field_sums, only : cell_count, field_count, field_maximum, field_mean, field_minimum, &
+      field_product, field_rms, field_sum, largest_of_rows, least_of_rows, row_total, row_totals
+   use projection, only : project_simplex
+   use regular_grid, only : boundary_free, grid_type, new_grid
+   implicit none
+   private
+
+   public :: run_field_sums
+
+contains
+
+   subroutine run_field_sums()
+      call begin_suite('field_sums')
+      call the_grid_counts()
+      call totals_of_rows()
+      call known_fields()
+      call threads_do_not_matter()
+   end subroutine run_field_sums
+
+   !> An oblong grid whose numbers of cells exceed the integers.
+   subroutine the_grid_counts()
+      type(grid_type) :: grid
+
+      grid = new_grid(6, 4, 3.0_dp, 1.0_dp, boundary_free)
+      call check_that(grid%first_row == 1 .and. grid%rows() == 4, 'one process holds all rows')
+      call check_close(grid%cells(), 24.0_dp, 0.0_dp, 'cells of the grid')
+      call check_close(grid%area(), 3.0_dp, 0.0_dp, 'area of the grid')
+      call check_close(grid%cell_area(), 0.125_dp, 0.0_dp, 'area of a cell')
+      grid = new_grid(100000, 50000, 1.0_dp, 1.0_dp, boundary_free)
+      call check_close(grid%cells(), 5e9_dp, 0.0_dp, 'more cells than integers')
+   end subroutine the_grid_counts
+
+   !> Row sums are added one after the other: with 1, 2^60 and -2^60 in this order nothing is left.
+   subroutine totals_of_rows()
+      real(dp), parameter :: large = 2.0_dp**60
+      real(dp) :: rows(2, 3), totals(2)
+
+      rows(1, :) = [1.0_dp, large, -large]
+      rows(2, :) = [large, -large, 1.0_dp]
+      totals = row_totals(rows)
+      call check_close(totals(1), 0.0_dp, 0.0_dp, 'the small number is lost in the order of the rows')
+      call check_close(totals(2), 1.0_dp, 0.0_dp, 'the small number is kept in the order of the rows')
+      call check_close(row_total(rows, 1), 0.0_dp, 0.0_dp, 'the first of two sums per row')
+      call check_close(row_total(rows(2, :)), 1.0_dp, 0.0_dp, 'one sum per row')
+      call check_close(largest_of_rows(rows(1, :)), large, 0.0_dp, 'largest of the rows')
+      call check_close(least_of_rows(rows(1, :)), -large, 0.0_dp, 'least of the rows')
+   end subroutine totals_of_rows
+
+   !> The field i + 10 j on an oblong grid, whose sums are integers.
+   subroutine known_fields()
+      integer, parameter :: nx = 5, ny = 3
+      real(dp) :: field(nx, ny), ones(nx, ny)
+      integer :: i, j
+
+      field = reshape([((real(i + 10*j, dp), i = 1, nx), j = 1, ny)], [nx, ny])
+      ones = 1.0_dp
+      call check_close(cell_count(field), 15.0_dp, 0.0_dp, 'number of cells')
+      call check_close(field_sum(field), 345.0_dp, 0.0_dp, 'sum')
+      call check_close(field_mean(field), 23.0_dp, 0.0_dp, 'mean')
+      call check_close(field_product(field, ones), 345.0_dp, 0.0_dp, 'product with ones')
+      call check_close(field_product(field, field), 8965.0_dp, 0.0_dp, 'sum of squares')
+      call check_close(field_rms(field, 23.0_dp), sqrt(1030.0_dp/15.0_dp), 1e-14_dp, 'rms about the mean')
+      call check_close(field_maximum(field), 35.0_dp, 0.0_dp, 'maximum')
+      call check_close(field_minimum(field), 11.0_dp, 0.0_dp, 'minimum')
+      call check_close(field_count(field > 30.0_dp), 5.0_dp, 0.0_dp, 'count')
+      ! Clipping at 30.5 leaves 0.5, 1.5, ... in the last row alone.
+      call project_simplex(field, 12.5_dp)
+      call check_close(field(1, ny), 0.5_dp, 1e-14_dp, 'the projection clips at the level of the sum')
+      call check_close(field_sum(field), 12.5_dp, 1e-13_dp, 'the projection keeps the sum')
+      call check_close(field_count(field > 0.0_dp), 5.0_dp, 0.0_dp, 'the projection leaves one row')
+   end subroutine known_fields
+
+   !> All results are the same to the last bit with one thread and with three.
+   subroutine threads_do_not_matter()
+      integer, parameter :: nx = 257, ny = 131
+      real(dp), allocatable :: field(:, :), other(:, :)
+      real(dp) :: results(4, 2)
+      integer :: k
+
+      allocate (field(nx, ny), other(nx, ny))
+      do k = 1, 2
+         call set_threads(merge(1, 3, k == 1))
+         call random_field(field, 1)
+         call random_field(other, 2)
+         results(1, k) = field_sum(field)
+         results(2, k) = field_product(field, other)
+         results(3, k) = field_rms(field, 0.5_dp)
+         call project_simplex(field, 100.0_dp)
+         results(4, k) = field_product(field, other)
+      end do
+      call set_threads(0)
+      call check_that(all(abs(results(:, 1) - results(:, 2)) <= 0.0_dp), 'same bits with three threads')
+   end subroutine threads_do_not_matter
+
+   !> Numbers between 0 and 1 without a pattern.
+   subroutine random_field(field, seed)
+      real(dp), intent(out) :: field(:, :)
+      integer, intent(in) :: seed
+      integer :: i, j
+
+      do j = 1, size(field, 2)
+         do i = 1, size(field, 1)
+            field(i, j) = modulo(sin(12.9898_dp*i + 78.233_dp*j + seed)*43758.5453_dp, 1.0_dp)
+         end do
+      end do
+   end subroutine random_field
+
+end module test_field_sums

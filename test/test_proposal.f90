@@ -1,0 +1,120 @@
+!> Tests of rows that are proposed and then accepted or rejected.
+module test_proposal
+   use asperity_errors, only : error_type
+   use asperity_schedule, only : count_rows
+   use asperity_simulation, only : new_simulation, simulation_type
+   use case_input, only : parse_case
+   use case_settings, only : case_type
+   use check, only : begin_suite, check_no_error, check_that
+   use row_state, only : list_state, state_type
+   use simulation_runs, only : nl
+   use state_table, only : state_piece_type, state_table_type
+   implicit none
+   private
+
+   public :: run_proposal
+
+   character(*), parameter :: grid = '&grid nx = 24, ny = 18, lx = 24e-3, ly = 18e-3 /'//nl// &
+      '&surface shape = ''self_affine'', hurst = 0.8, wavelength_long = 12e-3, wavelength_short = 4e-3, '// &
+      'rms_slope = 0.2, seed = 3 /'//nl
+   character(*), parameter :: rubber = &
+      '&material shear_modulus = 1e6, prony_g = 2e6, 1e6, prony_tau = 1e-3, 1e-2, thickness = 2e-2'
+   character(*), parameter :: rubs = '&friction law = ''coulomb'', coefficient = 0.4 /'//nl
+
+contains
+
+   subroutine run_proposal()
+      call begin_suite('proposal')
+      call propose_reject_advance()
+   end subroutine run_proposal
+
+   !> A row that was rejected leaves no trace, whatever acts.
+   subroutine propose_reject_advance()
+      ! The first row in time of each case is taken in three parts.
+      call try_case(grid//rubber//' /'//nl//'&phase pressure = 1e5 /'//nl// &
+         '&phase pressure = 2e5, ramp = ''linear'', duration = 4e-3, steps = 2 /', 'load')
+      call try_case(grid//rubber//', density = 1e3 /'//nl//rubs//'&phase pressure = 1e5 /'//nl// &
+         '&phase velocity_x = 0.3, velocity_y = 0.1, duration = 6e-3, steps = 3 /'//nl// &
+         '&phase pressure = 1.5e5, velocity_x = 0.3, velocity_y = 0.1, duration = 4e-3, steps = 2 /', &
+         'friction, with a jump of the load')
+      call try_case(grid//rubber//' /'//nl//'&phase pressure = 1e5, velocity_x = 0.5, steady = .true., '// &
+         'duration = 2e-3, steps = 2 /', 'steady sliding and the way on in time')
+      call try_case(grid//'&material shear_modulus = 1e6 /'//nl//'&adhesion potential = ''exponential'', '// &
+         'energy = 0.05, range = 5e-5 /'//nl//'&phase pressure = 1e5 /'//nl// &
+         '&phase pressure = 2e4, velocity_x = 0.3, duration = 4e-3, steps = 2 /', 'adhesion')
+   end subroutine propose_reject_advance
+
+   !> Three ways through a case: advance; propose, reject, advance; propose, accept.
+   subroutine try_case(text, what)
+      character(*), intent(in) :: text, what
+      type(simulation_type) :: plain, hesitant, formal
+      type(state_type) :: before
+      type(case_type) :: case
+      type(error_type), allocatable :: error
+      integer :: k
+
+      call parse_case(text, 'proposal.nml', case, error)
+      call check_no_error(error, what//': input')
+      if (allocated(error)) return
+      call new_simulation(plain, case, error)
+      call new_simulation(hesitant, case, error)
+      call new_simulation(formal, case, error)
+      do k = 1, count_rows(case%phases)
+         call plain%advance(error)
+         call check_no_error(error, what//': advance')
+         before = hesitant%state
+         call hesitant%propose(error)
+         call check_no_error(error, what//': propose')
+         call check_that(same(hesitant%state, before), what//': a proposal changes no state')
+         call check_that(same(hesitant%proposed, plain%state), what//': it is the next state')
+         call hesitant%reject()
+         call check_that(.not. allocated(hesitant%proposed), what//': nothing is left of it')
+         call hesitant%advance(error)
+         call check_that(same(hesitant%state, plain%state), what//': advance after reject')
+         call formal%propose(error)
+         call formal%accept()
+         call check_that(same(formal%state, plain%state), what//': propose and accept')
+      end do
+      call check_that(plain%finished .and. hesitant%finished .and. formal%finished, what//': finished')
+      call check_that(plain%converged, what//': converged: '//trim(plain%reason))
+      call check_that(hesitant%warnings == plain%warnings, what//': warnings')
+      call plain%destroy()
+      call hesitant%destroy()
+      call formal%destroy()
+   end subroutine try_case
+
+   !> Are two states the same to the last bit, but for the seconds that the row took?
+   function same(one, other) result(yes)
+      type(state_type), intent(in), target :: one, other
+      logical :: yes
+      type(state_table_type) :: first, second
+      integer :: k
+
+      call list_state(one, first)
+      call list_state(other, second)
+      yes = first%count == second%count
+      if (.not. yes) return
+      do k = 1, first%count
+         if (first%pieces(k)%name == 'row/seconds') cycle
+         yes = yes .and. same_piece(first%pieces(k), second%pieces(k))
+      end do
+   end function same
+
+   !> Are two pieces the same?
+   function same_piece(a, b) result(yes)
+      type(state_piece_type), intent(in) :: a, b
+      logical :: yes
+
+      yes = a%name == b%name
+      if (associated(a%truth)) yes = yes .and. (a%truth .eqv. b%truth)
+      if (associated(a%whole)) yes = yes .and. a%whole == b%whole
+      if (associated(a%whole_1)) yes = yes .and. all(a%whole_1 == b%whole_1)
+      if (associated(a%byte_2)) yes = yes .and. all(a%byte_2 == b%byte_2)
+      if (associated(a%real_0)) yes = yes .and. abs(a%real_0 - b%real_0) <= 0.0
+      if (associated(a%real_1)) yes = yes .and. all(abs(a%real_1 - b%real_1) <= 0.0)
+      if (associated(a%real_2)) yes = yes .and. all(abs(a%real_2 - b%real_2) <= 0.0)
+      if (associated(a%real_3)) yes = yes .and. all(abs(a%real_3 - b%real_3) <= 0.0)
+      if (associated(a%text)) yes = yes .and. a%text == b%text
+   end function same_piece
+
+end module test_proposal
