@@ -2,10 +2,12 @@
 
     python tools/add_licences.py NAME.whl
 
-The texts are those of the Debian packages that the libraries come from. A library without a text is
-an error.
+The texts are those that tools/build_libraries.sh left for the libraries it built (in the folder
+that the variable ASPERITY_LIBRARIES names), or else of the packages of Debian or of a system with
+RPM that the libraries come from. A library without a text is an error.
 """
 
+import os
 import re
 import subprocess
 import sys
@@ -19,21 +21,48 @@ Licences of the binary wheel
 The sources of Asperity are under the MIT licence. This wheel carries the shared libraries named
 below, each under its own licence; the texts are beside this file. FFTW 3 is under the GNU General
 Public License, version 2 or later: whoever passes the wheel on must keep to that licence for the
-whole. The sources of all libraries are those of the Debian packages named.
+whole. The sources of all libraries are those of the packages named, or what their projects
+publish under the version named.
 
 """
 
 
+BUILT = {"libhdf5": ("hdf5", "hdf5"), "libfftw3": ("fftw3", "fftw3")}  # licence, pkg-config
+
+
+def output_of(*words):
+    """Return what a command prints; None where it fails or is not there."""
+    try:
+        done = subprocess.run(words, capture_output=True, text=True)
+    except FileNotFoundError:
+        return None
+    return done.stdout if done.returncode == 0 else None
+
+
 def package_of(library):
-    """Return the Debian package and version of a library, named as auditwheel renames it."""
+    """Return name, version and licence texts of what holds a library, named as auditwheel does."""
     original = re.sub(r"-[0-9a-f]{8}(?=\.)", "", library)
-    owners = subprocess.run(["dpkg", "-S", f"*/{original}"], capture_output=True, text=True)
-    if owners.returncode:
-        sys.exit(f"{library}: no Debian package holds {original}")
-    name = owners.stdout.split(":")[0]
-    version = subprocess.run(["dpkg-query", "-W", "-f", "${Version}\n", name], check=True,
-                             capture_output=True, text=True).stdout.split()[0]
-    return name, version
+    prefix = Path(os.environ.get("ASPERITY_LIBRARIES") or "/nowhere")
+    if (prefix / "lib" / original).exists():
+        name, module = next(value for start, value in BUILT.items() if original.startswith(start))
+        text = (prefix / "lib" / "pkgconfig" / f"{module}.pc").read_text()
+        version = re.search(r"(?m)^Version: *(\S+)", text)[1]
+        return name, version, sorted((prefix / "share" / "licenses" / name).iterdir())
+    owners = output_of("dpkg", "-S", f"*/{original}")
+    if owners:
+        name = owners.split(":")[0]
+        version = output_of("dpkg-query", "-W", "-f", "${Version}\n", name).split()[0]
+        return name, version, [Path("/usr/share/doc") / name / "copyright"]
+    for folder in ("/usr/lib64", "/lib64"):
+        owner = output_of("rpm", "-qf", "--qf", "%{NAME} %{VERSION}-%{RELEASE}\n",
+                          f"{folder}/{original}")
+        if owner:
+            name, version = owner.split()[:2]
+            # The libraries of GCC are under the licence that its package libgcc has.
+            texts = [text for place in (name, "libgcc") for text in sorted(
+                (Path("/usr/share/licenses") / place).glob("COPYING*"))]
+            return name, version, texts
+    return sys.exit(f"{library}: no package holds {original}")
 
 
 def main():
@@ -45,14 +74,16 @@ def main():
         (wheel,) = Path(folder).iterdir()
         (info,) = wheel.glob("*.dist-info")
         libraries = sorted(library.name for library in wheel.glob("*.libs/*"))
-        found = dict(package_of(library) for library in libraries)
+        found = {}
         licences = info / "licenses"
         licences.mkdir(exist_ok=True)
-        for name in found:
-            text = Path("/usr/share/doc") / name / "copyright"
-            if not text.is_file():
-                sys.exit(f"{path.name}: no licence of {name} in {text.parent}")
-            (licences / f"{name}.txt").write_bytes(text.read_bytes())
+        for library in libraries:
+            name, found_version, texts = package_of(library)
+            texts = [text for text in texts if text.is_file()]
+            if not texts:
+                sys.exit(f"{path.name}: no licence of {name}, which holds {library}")
+            found[name] = found_version
+            (licences / f"{name}.txt").write_bytes(b"\n".join(map(Path.read_bytes, texts)))
         (licences / "BUNDLED.txt").write_text(
             NOTE + "Libraries: " + ", ".join(libraries) + "\n\nPackages:\n"
             + "".join(f"  {name} {version}\n" for name, version in sorted(found.items())))

@@ -114,18 +114,24 @@ def test_spectrum_of_a_tiny_map() -> None:
         asperity.surface.psd(np.ones((8, 8)), 1e-308, 1.0)
 
 
-def test_overflow_is_no_success(program: str, tmp_path: Path) -> None:
-    """Numbers that overflow in a run end it with status 4."""
+@pytest.mark.parametrize(("length", "modulus", "pressure"), [(1e60, 1e200, 1e199),
+                                                          (1e150, 1e200, 1e200)])
+def test_overflow_is_status_4(program: str, tmp_path: Path, length: float, modulus: float,
+                              pressure: float) -> None:
+    """Energies or fields that overflow end a run with status 4; the result says why."""
     case = tmp_path / "y.nml"
     case.write_text(
-        "&grid nx = 16, ny = 16, lx = 1e150 /\n"
-        "&surface shape = 'sine', amplitude = 1e149, wavelength = 1e150 /\n"
-        "&material shear_modulus = 1e200, prony_g = 1e200, prony_tau = 1 /\n"
-        "&phase pressure = 1e200, duration = 1, steps = 3 /\n")
+        f"&grid nx = 16, ny = 16, lx = {length} /\n"
+        f"&surface shape = 'sine', amplitude = {0.1 * length}, wavelength = {length} /\n"
+        f"&material shear_modulus = {modulus}, prony_g = {modulus}, prony_tau = 1 /\n"
+        f"&phase pressure = {pressure}, duration = 1, steps = 3 /\n")
     done = call(program, "run", case)
-    assert done.returncode in (2, 4), (done.returncode, done.stderr)
-    if done.returncode == 4:
-        assert not asperity.open(tmp_path / "y.h5").finished
+    assert done.returncode == 4, (done.returncode, done.stderr)
+    assert "a value is not a finite number" in done.stderr
+    run = asperity.open(tmp_path / "y.h5")
+    assert not run.finished and "not a finite number" in run.outcome
+    with pytest.raises(asperity.NotConverged, match="not a finite number"):
+        asperity.run(case, quiet=True, overwrite=True)
 
 
 def test_damaged_results(program: str, tmp_path: Path) -> None:
@@ -202,7 +208,7 @@ def test_damaged_values_are_named(program: str, tmp_path: Path, compression: int
         assert done.returncode == 3
         assert f"{result}: the file is damaged: /{name} cannot be read" in done.stderr
         assert f"damaged     /{name}\n" in done.stdout and "finished    yes" in done.stdout
-        with h5py.File(result) as file, pytest.raises(OSError, match="letcher32"):
+        with h5py.File(result) as file, pytest.raises(OSError, match=r"[Ff](ilter|letcher)"):
             file[name][()]
         result.write_bytes(whole)
     with h5py.File(result) as file:
@@ -227,5 +233,5 @@ def test_damaged_field_in_python(program: str, tmp_path: Path) -> None:
     flip(result, chunk.byte_offset + 11)
     snapshot = asperity.open(result).snapshots[-1]
     assert snapshot.pressure.max() > 0.0
-    with pytest.raises(OSError, match=r"y\.h5: cannot be read: .*letcher32"):
+    with pytest.raises(OSError, match=r"y\.h5: cannot be read: "):
         _ = snapshot.gap

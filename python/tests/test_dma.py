@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from asperity import NotConverged
 from asperity.__main__ import main
 from asperity.dma import DmaTable, fit_dma, read_dma
 from asperity.material import WLF, Prony
@@ -571,3 +572,18 @@ def test_the_table_is_not_written_over(tmp_path, capsys):
     assert main(["fit", str(path), "-o", str(group), "--plot", "fit.xyz"]) == 2
     assert "fit.xyz: the ending must be .png" in capsys.readouterr().err
     assert path.read_text() == before and not group.exists()
+
+
+def test_a_fit_that_fails_is_status_4(tmp_path, monkeypatch, capsys):
+    path = write(tmp_path / "dma.csv", "f (Hz),G' (Pa),G'' (Pa)",
+                 [(10.0**k, 1e6 * 1.1**k, 1e5) for k in range(-3, 4)])
+
+    def fail(*_, **__):
+        raise RuntimeError("Maximum number of iterations reached.")
+
+    monkeypatch.setattr("asperity.rubber.prony_fit.nnls", fail)
+    assert main(["fit", str(path), "-o", str(tmp_path / "x.nml")]) == 4
+    assert "the fit of" in (told := capsys.readouterr().err) and "found no solution" in told
+    assert not (tmp_path / "x.nml").exists()
+    with pytest.raises(NotConverged, match="Maximum number of iterations"):
+        fit_dma(read_dma(path))

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
 from ..base.check import array_of, number, positive
+from ..base.errors import NotConverged
 
 __all__ = ["MOST_ARMS", "FittedModuli", "fit_moduli"]
 
@@ -123,7 +124,11 @@ def _smoothest(columns: FloatArray, floor: float, slack: float) -> FloatArray:
     def solve(weight: float) -> tuple[FloatArray, float]:
         system = np.vstack([columns, weight * penalty])
         right = np.concatenate([target, np.zeros(len(penalty))])
-        unknowns, _ = nnls(system, right, maxiter=50 * (count + 1))
+        try:
+            unknowns, _ = nnls(system, right, maxiter=50 * (count + 1))
+        except RuntimeError as error:
+            raise NotConverged(f"the fit of {count} moduli has found no solution: {error}"
+                               " try fewer relaxation times") from None
         misfit = float(np.sqrt(np.mean((columns @ unknowns - target) ** 2)))
         return unknowns, misfit
 
