@@ -7,6 +7,7 @@ program main
    use case_settings, only : case_type, path_length
    use case_templates, only : all_template_names, find_template, template_is_available, template_list, &
       template_text
+   use copies_guard, only : refuse_copies
    use command_line, only : command_type, help_text, read_command_line
    use asperity_errors, only : error_file, error_input, error_memory, error_type, fail
    use hand_over, only : become_python
@@ -18,6 +19,7 @@ program main
    use standard_streams, only : say, say_error
    use asperity_surface, only : check_files
    use time_limit, only : time_limit_type
+   use linked_libraries, only : linked_versions
    use text_tools, only : nearest_name, ordinary, to_text
    use asperity_version, only : version_number
    use wait_policy, only : wait_passively
@@ -36,7 +38,7 @@ program main
       case ('help')
          call say(help_text(command%help_of), error)
       case ('version')
-         call say('asperity '//version_number//new_line('a'), error)
+         call say('asperity '//version_number//new_line('a')//linked_versions(), error)
       case ('template')
          call template(error)
       case ('check')
@@ -111,6 +113,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(case_type) :: case
 
+      call refuse_copies(error)
+      if (allocated(error)) return
       call read_case(command%path, case, error)
       if (allocated(error)) return
       if (allocated(command%output)) then

@@ -63,7 +63,26 @@ def test_values_without_effect_are_told(program, folder, old, new, told):
 def test_version(program, root):
     done = call(program, "--version")
     assert done.returncode == 0
-    assert done.out == f"asperity {(root / 'VERSION').read_text().strip()}\n"
+    lines = done.out.splitlines()
+    assert lines[0] == f"asperity {(root / 'VERSION').read_text().strip()}"
+    assert [line.split(": ")[0] for line in lines[1:]] == ["compiler", "FFTW", "HDF5", "MPI"]
+    assert re.fullmatch(r"compiler: GCC .*\d+\.\d+\.\d+.*", lines[1])
+    assert re.fullmatch(r"FFTW: 3\.\d+\.\d+", lines[2])
+    assert re.fullmatch(r"HDF5: [12]\.\d+\.\d+", lines[3])
+    assert lines[4] == "MPI: none"
+
+
+@pytest.mark.parametrize("variable", ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MV2_COMM_WORLD_SIZE"])
+def test_copies_side_by_side_are_refused(program, tmp_path, variable, monkeypatch):
+    (tmp_path / "case.nml").write_text(GOOD)
+    monkeypatch.setenv(variable, "4")
+    done = call(program, "run", "case.nml", cwd=tmp_path)
+    assert done.returncode == 2
+    assert f"{variable} = 4: this program was started several times" in done.err
+    assert not list(tmp_path.glob("*.h5"))
+
+    monkeypatch.setenv(variable, "1")
+    assert call(program, "run", "case.nml", "--quiet", cwd=tmp_path).returncode == 0
 
 
 @pytest.mark.parametrize("verb", ["", *VERBS])

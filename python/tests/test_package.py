@@ -14,7 +14,7 @@ def test_versions_agree(program, root):
     assert asperity.__version__ == written
     assert version("asperity") == written
     printed = subprocess.run([program, "--version"], capture_output=True, text=True, check=True)
-    assert printed.stdout.split() == ["asperity", written]
+    assert printed.stdout.splitlines()[0] == f"asperity {written}"
     module = subprocess.run([sys.executable, "-m", "asperity", "--version"], capture_output=True,
                             text=True, check=True)
     assert module.stdout.split() == ["asperity", written]

@@ -16,6 +16,7 @@ module case_input
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use surface_warnings, only : find_warnings, warning_length
    use text_tools, only : to_text
+   use transform_lengths, only : length_warning
    implicit none
    private
 
@@ -145,6 +146,10 @@ contains
       do i = 1, size(found)
          call add_warning(case, trim(found(i)))
       end do
+      if (case%grid%boundary == boundary_periodic) then
+         call add_warning(case, length_warning('nx', case%grid%nx, case%grid%ny))
+         call add_warning(case, length_warning('ny', case%grid%ny, case%grid%nx))
+      end if
       call add_warning(case, adhesion_warning(case))
    end subroutine add_warnings
 

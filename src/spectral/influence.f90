@@ -10,6 +10,7 @@ module influence
       fftw_free, fftw_plan_r2r_2d, fftw_redft00, fftw_rodft00
    use asperity_precision, only : dp, pi
    use regular_grid, only : boundary_periodic
+   use transform_lengths, only : good_length
    implicit none
    private
 
@@ -71,27 +72,12 @@ contains
       integer, intent(in) :: n
       integer, intent(in) :: boundary
       integer :: m
-      integer :: rest
 
       if (boundary == boundary_periodic) then
          m = n
-         return
+      else
+         m = good_length(2*n, 2)
       end if
-      m = 2*n
-      do
-         rest = m
-         do while (mod(rest, 2) == 0)
-            rest = rest/2
-         end do
-         do while (mod(rest, 3) == 0)
-            rest = rest/3
-         end do
-         do while (mod(rest, 5) == 0)
-            rest = rest/5
-         end do
-         if (rest == 1) return
-         m = m + 2
-      end do
    end function transform_length
 
    !> Transform of coefficients that are even in both directions, in place; mx and my even.

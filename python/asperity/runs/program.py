@@ -41,9 +41,9 @@ def program() -> str:
         if candidate is None or not Path(candidate).is_file():
             continue
         told = subprocess.run([candidate, "--version"], capture_output=True, text=True, check=False)
-        if told.stdout.split()[-1:] == [own]:
+        if told.stdout.split()[1:2] == [own]:
             return str(Path(candidate).absolute())
-        tried.append(f"{candidate} is {told.stdout.strip() or 'no such program'}")
+        tried.append(f"{candidate} is {''.join(told.stdout.splitlines()[:1]) or 'no such program'}")
     raise FileNotFoundError(
         f"the program asperity {own} is not found{': ' if tried else ''}{', '.join(tried)}:"
         " install the package with its program, `python -m pip install .`, or name it in the"

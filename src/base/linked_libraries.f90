@@ -1,0 +1,70 @@
+!> What this program was built with: the compiler and the versions of the libraries that are linked.
+!> Reports of faults and results from clusters need it.
+module linked_libraries
+   use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_f_pointer, c_int, c_ptr
+   use, intrinsic :: iso_fortran_env, only : compiler_version
+   implicit none
+   private
+
+   public :: linked_versions
+
+   interface
+      !> Version of the HDF5 library; negative if it cannot be asked.
+      function h5get_libversion(major, minor, release) bind(c, name='H5get_libversion') result(status)
+         import :: c_int
+         integer(c_int), intent(out) :: major, minor, release
+         integer(c_int) :: status
+      end function h5get_libversion
+
+      !> FFTW's wisdom as a text that starts with the version, "(fftw-3.3.10 fftw_wisdom ...". The version
+      !> itself is a constant of the C library, which Fortran can only define and not import.
+      function fftw_export_wisdom_to_string() bind(c, name='fftw_export_wisdom_to_string') result(text)
+         import :: c_ptr
+         type(c_ptr) :: text
+      end function fftw_export_wisdom_to_string
+
+      subroutine c_free(memory) bind(c, name='free')
+         import :: c_ptr
+         type(c_ptr), value :: memory
+      end subroutine c_free
+   end interface
+
+contains
+
+   !> Compiler, FFTW, HDF5 and MPI, one per line.
+   function linked_versions() result(text)
+      character(:), allocatable :: text
+      character(40) :: hdf5
+      integer(c_int) :: major, minor, release
+
+      hdf5 = 'unknown'
+      if (h5get_libversion(major, minor, release) >= 0) then
+         write (hdf5, '(i0, 2(".", i0))') major, minor, release
+      end if
+
+      text = 'compiler: '//compiler_version()//new_line('a')// &
+         'FFTW: '//fftw_version()//new_line('a')// &
+         'HDF5: '//trim(hdf5)//new_line('a')// &
+         'MPI: none'//new_line('a')
+   end function linked_versions
+
+   !> The version of FFTW, from the first word of its wisdom.
+   function fftw_version() result(text)
+      character(:), allocatable :: text
+      integer, parameter :: longest = 40
+      character(kind=c_char), pointer :: wisdom(:)
+      type(c_ptr) :: memory
+      integer :: i
+
+      text = ''
+      memory = fftw_export_wisdom_to_string()
+      if (.not. c_associated(memory)) return
+      call c_f_pointer(memory, wisdom, [longest])
+      do i = len('(fftw-') + 1, longest
+         if (verify(wisdom(i), '0123456789.') > 0) exit
+         text = text//wisdom(i)
+      end do
+      call c_free(memory)
+   end function fftw_version
+
+end module linked_libraries
