@@ -7,13 +7,85 @@ module check
    implicit none
    private
 
-   public :: begin_suite, check_that, check_close, check_no_error, check_error, finish
+   public :: begin_suite, check_close, check_error, check_no_error, check_order, check_that, &
+      run_suites, selected, suite_type
+
+   !> A suite of the driver's table: the name on the command line and the procedure that runs its tests.
+   type :: suite_type
+      character(32) :: name
+      procedure(run_suite), pointer, nopass :: run
+   end type suite_type
+
+   abstract interface
+      !> Run the tests of a suite.
+      subroutine run_suite()
+      end subroutine run_suite
+   end interface
+
+   !> Pass if two numbers stand in the stated order; print both if they do not.
+   interface check_order
+      module procedure check_order_real
+      module procedure check_order_integer
+   end interface check_order
 
    integer :: passed = 0
    integer :: failed = 0
    character(:), allocatable :: suite
 
+   !> The tests that the command line names, and how many tests of each name have run. All tests run if no
+   !> name is given.
+   character(64), allocatable :: chosen(:)
+   integer, allocatable :: runs_of_chosen(:)
+
 contains
+
+   !> Run the suites of the table that the command line names, or all. An argument that is not the name of a
+   !> suite is the name of a test (see `selected`).
+   subroutine run_suites(suites)
+      type(suite_type), intent(in) :: suites(:)
+      character(64) :: argument
+      logical :: wanted(size(suites))
+      integer :: i, k
+
+      wanted = .false.
+      allocate (chosen(0))
+      do i = 1, command_argument_count()
+         call get_command_argument(i, argument)
+         if (any(suites%name == argument)) then
+            wanted = wanted .or. suites%name == argument
+         else
+            chosen = [character(64) :: chosen, argument]
+         end if
+      end do
+      allocate (runs_of_chosen(size(chosen)), source=0)
+
+      do i = 1, size(suites)
+         if (wanted(i) .or. .not. any(wanted)) call suites(i)%run()
+      end do
+
+      do i = 1, size(chosen)
+         if (runs_of_chosen(i) > 0) cycle
+         failed = failed + 1
+         write (error_unit, '(a)') 'FAILED: no suite or test is called '//trim(chosen(i))//'; the suites are:'
+         write (error_unit, '(*(3x, a, /))') (trim(suites(k)%name), k=1, size(suites))
+         exit
+      end do
+      call finish()
+   end subroutine run_suites
+
+   !> Shall the test of this name run? The prefix `test_` may be left out on the command line.
+   logical function selected(name)
+      character(*), intent(in) :: name
+      integer :: i
+
+      selected = size(chosen) == 0
+      do i = 1, size(chosen)
+         if (chosen(i) /= name .and. 'test_'//chosen(i) /= name) cycle
+         runs_of_chosen(i) = runs_of_chosen(i) + 1
+         selected = .true.
+      end do
+      if (selected .and. size(chosen) > 0) write (output_unit, '(a)') 'test '//name
+   end function selected
 
    !> Name the suite that the next checks belong to.
    subroutine begin_suite(name)
@@ -53,6 +125,41 @@ contains
          write (error_unit, '(a)') 'FAILED '//suite//': '//what//trim(numbers)
       end if
    end subroutine check_close
+
+   !> Pass if `a < b`, or whichever of <, <=, > and >= is given, holds; never passes for NaN.
+   subroutine check_order_real(a, relation, b, what)
+      real(dp), intent(in) :: a
+      character(*), intent(in) :: relation
+      real(dp), intent(in) :: b
+      character(*), intent(in) :: what
+      character(60) :: numbers
+      logical :: holds
+
+      select case (relation)
+      case ('<')
+         holds = a < b
+      case ('<=')
+         holds = a <= b
+      case ('>')
+         holds = a > b
+      case ('>=')
+         holds = a >= b
+      case default
+         holds = .false.
+      end select
+      write (numbers, '(es22.15, 1x, a, es22.15)') a, relation, b
+      call check_that(holds, what//': '//trim(adjustl(numbers)))
+   end subroutine check_order_real
+
+   !> Pass if two integers stand in the stated order.
+   subroutine check_order_integer(a, relation, b, what)
+      integer, intent(in) :: a
+      character(*), intent(in) :: relation
+      integer, intent(in) :: b
+      character(*), intent(in) :: what
+
+      call check_order_real(real(a, dp), relation, real(b, dp), what)
+   end subroutine check_order_integer
 
    !> Pass if there is no error.
    subroutine check_no_error(error, what)

@@ -8,7 +8,8 @@ module test_adhesion_free
       new_adhesion_potential
    use adhesion_state, only : adhesion_problem_type, control_approach, control_pressure, &
       reason_detached
-   use check, only : begin_suite, check_close, check_error, check_no_error, check_that
+   use check, only : begin_suite, check_close, check_error, check_no_error, check_order, &
+      check_that, selected
    use asperity_errors, only : error_type
    use influence, only : love_normal
    use asperity_parallel, only : set_threads
@@ -28,23 +29,23 @@ contains
 
    subroutine run_adhesion_free()
       call begin_suite('adhesion_free')
-      call test_solution('exponential', 'coarse')
-      call test_solution('gauss', 'full')
-      call test_solution('maugis_dugdale', 'coarse')
-      call test_sphere_limits()
-      call test_sphere_mesh()
+      if (selected('test_solution')) call test_solution('exponential', 'coarse')
+      if (selected('test_solution')) call test_solution('gauss', 'full')
+      if (selected('test_solution')) call test_solution('maugis_dugdale', 'coarse')
+      if (selected('test_sphere_limits')) call test_sphere_limits()
+      if (selected('test_sphere_mesh')) call test_sphere_mesh()
       ! Long range: a sharp minimum at first touch, where half a step of 0.02 costs 0.003; and a disc of
       ! 25 cells' radius is full of cells to 0.6 %: 1 % in all.
-      call test_pull_off('maugis_dugdale', 0.1_dp, 32, -0.38_dp, 0.02_dp, 0.02_dp)
+      if (selected('test_pull_off')) call test_pull_off('maugis_dugdale', 0.1_dp, 32, -0.38_dp, 0.02_dp, 0.02_dp)
       ! First order in the cell (pinned edge of the cohesive zone, see test_sphere_mesh); the minimum
       ! is smooth: steps of 0.1 miss it by less than 1e-3.
-      call test_pull_off('maugis_dugdale', 1.0_dp, 40, 0.0_dp, 0.1_dp, 0.05_dp)
+      if (selected('test_pull_off')) call test_pull_off('maugis_dugdale', 1.0_dp, 40, 0.0_dp, 0.1_dp, 0.05_dp)
       ! Another potential; beyond Tabor 1 its form matters little: 3 % of 1.5.
-      call test_pull_off('exponential', 3.5_dp, 40, 0.0_dp, 0.1_dp, 0.04_dp)
-      call test_force_from_energy()
-      call test_strong()
-      call test_threads()
-      call test_outcomes()
+      if (selected('test_pull_off')) call test_pull_off('exponential', 3.5_dp, 40, 0.0_dp, 0.1_dp, 0.04_dp)
+      if (selected('test_force_from_energy')) call test_force_from_energy()
+      if (selected('test_strong')) call test_strong()
+      if (selected('test_threads')) call test_threads()
+      if (selected('test_outcomes')) call test_outcomes()
    end subroutine run_adhesion_free
 
    !> A paraboloid of radius 1 with its summit, height 0, on a cell.
@@ -127,7 +128,7 @@ contains
       call check_close(maxval(abs(min(true_gap/0.6_dp, &
          (pressure + adhesive_slope(problem%potential, max(true_gap, 0.0_dp)))/scale))), &
          outcome%residual, 1e-10_dp + outcome%load_error, name//': true residual, as told')
-      call check_that(outcome%residual <= 1e-7_dp, name//': true residual')
+      call check_order(outcome%residual, '<=', 1e-7_dp, name//': true residual')
 
       problem%control = control_approach
       problem%target = level
@@ -212,7 +213,7 @@ contains
          call solve_sphere(24*2**(k - 1), 8.0_dp, 'maugis_dugdale', 2.0_dp/(pi*lambda), load, &
             radius, levels(k))
       end do
-      call check_that(abs(levels(3) - approach) < 0.5_dp*abs(levels(1) - approach), &
+      call check_order(abs(levels(3) - approach), '<', 0.5_dp*abs(levels(1) - approach), &
          'Maugis: converges with the mesh')
       call check_close(levels(3), approach, 0.03_dp, 'Maugis: approach')
       call check_close(radius, a, 0.05_dp, 'Maugis: radius')
@@ -275,7 +276,7 @@ contains
          call draw_off(name, lambda, k*n, first, step, loads(k))
       end do
       call check_close(loads(2), exact, tolerance, 'pull-off '//name)
-      call check_that(abs(loads(2) - exact) < 0.65_dp*abs(loads(1) - exact) + 3e-3_dp, &
+      call check_order(abs(loads(2) - exact), '<', 0.65_dp*abs(loads(1) - exact) + 3e-3_dp, &
          'pull-off '//name//': converges with the mesh')
    end subroutine test_pull_off
 

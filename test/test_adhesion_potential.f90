@@ -2,7 +2,7 @@
 module test_adhesion_potential
    use adhesion_potential, only : adhesion_potential_type, adhesive_curvature, adhesive_energy, &
       adhesive_slope, adhesive_terms, new_adhesion_potential
-   use check, only : begin_suite, check_close, check_error, check_no_error, check_that
+   use check, only : begin_suite, check_close, check_error, check_no_error, check_that, selected
    use asperity_errors, only : error_type
    use asperity_precision, only : dp
    implicit none
@@ -15,15 +15,20 @@ module test_adhesion_potential
 contains
 
    subroutine run_adhesion_potential()
+      call begin_suite('adhesion_potential')
+      if (selected('test_derivatives')) call test_derivatives('exponential', -energy/range)
+      if (selected('test_derivatives')) call test_derivatives('gauss', 0.0_dp)
+      if (selected('test_derivatives')) call test_derivatives('maugis_dugdale', -energy/range)
+      if (selected('test_derivatives')) call test_derivatives('maugis_dugdale', -energy/range, edge=0.4_dp*range)
+      if (selected('test_derivatives')) call test_derivatives('maugis_dugdale', -energy/range, edge=range)
+      if (selected('bounds_of_the_range')) call bounds_of_the_range()
+   end subroutine run_adhesion_potential
+
+   !> The attraction of Maugis-Dugdale ends at the range; wrong names and numbers are refused together.
+   subroutine bounds_of_the_range()
       type(adhesion_potential_type) :: potential
       type(error_type), allocatable :: error
 
-      call begin_suite('adhesion_potential')
-      call test_derivatives('exponential', -energy/range)
-      call test_derivatives('gauss', 0.0_dp)
-      call test_derivatives('maugis_dugdale', -energy/range)
-      call test_derivatives('maugis_dugdale', -energy/range, edge=0.4_dp*range)
-      call test_derivatives('maugis_dugdale', -energy/range, edge=range)
       call new_adhesion_potential(potential, 'maugis_dugdale', energy, range, error)
       call check_close(adhesive_slope(potential, 0.999_dp*range), energy/range, 0.0_dp, 'inside')
       call check_close(adhesive_slope(potential, 1.001_dp*range), 0.0_dp, 0.0_dp, 'outside')
@@ -36,7 +41,7 @@ contains
       call new_adhesion_potential(potential, 'gauss', -1.0_dp, 0.0_dp, error)
       call check_error(error, 'energy', 'negative energy')
       call check_error(error, 'range', 'range of zero, in the same message')
-   end subroutine run_adhesion_potential
+   end subroutine bounds_of_the_range
 
    !> e' and e'' against central differences, the values at contact, and the area under e'.
    subroutine test_derivatives(name, release, edge)

@@ -4,7 +4,7 @@ module test_block_motion
    use block_motion, only : block_motion_type
    use case_input, only : parse_case
    use case_settings, only : case_type
-   use check, only : begin_suite, check_close, check_no_error, check_that
+   use check, only : begin_suite, check_close, check_no_error, check_order, check_that, selected
    use asperity_errors, only : error_type
    use asperity_precision, only : dp, pi
    use asperity_simulation, only : new_simulation, simulation_type
@@ -35,10 +35,10 @@ contains
 
    subroutine run_block_motion()
       call begin_suite('block_motion')
-      call test_rule()
-      call test_stuck()
-      call test_exact_motion()
-      call test_flat_books()
+      if (selected('test_rule')) call test_rule()
+      if (selected('test_stuck')) call test_stuck()
+      if (selected('test_exact_motion')) call test_exact_motion()
+      if (selected('test_flat_books')) call test_flat_books()
    end subroutine run_block_motion
 
    !> The rule against a given force m a(t), a = cos(w t): second order through steps of two lengths; work =
@@ -80,10 +80,10 @@ contains
          known = block%known([0.0_dp, 0.0_dp], [0.0_dp, 0.0_dp], 0.1_dp)
          force = -known(1)
          call block%finish([0.0_dp, 0.0_dp], [force, 0.0_dp], 0.1_dp)
-         call check_that(abs(block%speed(1)) <= 4.0_dp*i*0.5_dp**i, 'stuck: step '//to_text(i))
+         call check_order(abs(block%speed(1)), '<=', 4.0_dp*i*0.5_dp**i, 'stuck: step '//to_text(i))
       end do
       call check_close(force, 0.0_dp, 1e-5_dp, 'stuck: no force is left')
-      call check_that(block%lost >= 0.0_dp, 'stuck: the loss is positive')
+      call check_order(block%lost, '>=', 0.0_dp, 'stuck: the loss is positive')
    end subroutine test_stuck
 
    !> Stick, slip, a drop and a rise of the load: displacement and speed of second order, rms over all rows.
@@ -252,7 +252,7 @@ contains
          call check_books(record, 'flat block', 1e-9_dp)
          missing(k) = maxval(abs(record%rows%work_missing))/maxval(record%rows%work_drive)
       end do
-      call check_that(maxval(record%rows%energy_kinetic) > 0.05_dp*maxval(record%rows%energy_elastic), &
+      call check_order(maxval(record%rows%energy_kinetic), '>', 0.05_dp*maxval(record%rows%energy_elastic), &
          'the block swings')
       call check_close(missing(2), 0.0_dp, 0.01_dp, 'flat block: missing work')
    end subroutine test_flat_books

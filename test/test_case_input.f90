@@ -4,7 +4,8 @@ module test_case_input
    use case_report, only : case_summary, memory_needed, resolved_input
    use case_settings, only : case_type
    use case_templates, only : all_template_names, template_is_available, template_list, template_text
-   use check, only : begin_suite, check_close, check_error, check_no_error, check_that
+   use check, only : begin_suite, check_close, check_error, check_no_error, check_order, &
+      check_that, selected
    use asperity_errors, only : error_file, error_input, error_type
    use asperity_precision, only : dp
    use regular_grid, only : boundary_free
@@ -24,17 +25,17 @@ contains
 
    subroutine run_case_input()
       call begin_suite('case_input')
-      call test_defaults()
-      call test_given_values()
-      call test_phases()
-      call test_steps()
-      call test_materials()
-      call test_bad_inputs()
-      call test_many_faults()
-      call test_files()
-      call test_features()
-      call test_report()
-      call test_templates()
+      if (selected('test_defaults')) call test_defaults()
+      if (selected('test_given_values')) call test_given_values()
+      if (selected('test_phases')) call test_phases()
+      if (selected('test_steps')) call test_steps()
+      if (selected('test_materials')) call test_materials()
+      if (selected('test_bad_inputs')) call test_bad_inputs()
+      if (selected('test_many_faults')) call test_many_faults()
+      if (selected('test_files')) call test_files()
+      if (selected('test_features')) call test_features()
+      if (selected('test_report')) call test_report()
+      if (selected('test_templates')) call test_templates()
    end subroutine run_case_input
 
    !> What is not given.
@@ -166,7 +167,7 @@ contains
       call check_steps(4, 32, dx/1.0e-3_dp, 'one cell obliquely')
       call check_that(case%phases(2)%dt_reason == 'for one cell per step', &
          'why: '//case%phases(2)%dt_reason)
-      call check_that(index(case%warnings, '&phase 5: a step moves the road by 8 cells') > 0, &
+      call check_order(index(case%warnings, '&phase 5: a step moves the road by 8 cells'), '>', 0, &
          'a coarse step is warned of: '//case%warnings)
 
    contains
@@ -228,7 +229,7 @@ contains
       call check_close(again%surfaces(2)%wavelength_long, 1.0e-3_dp, 0.0_dp, 'a derived default')
       call check_that(again%phases(3)%control == 'displacement' .and. .not. again%phases(3)%given, &
          'an inherited load stays inherited')
-      call check_that(index(text, 'tolerance = 1e-6') > 0, 'defaults are shown')
+      call check_order(index(text, 'tolerance = 1e-6'), '>', 0, 'defaults are shown')
 
       ! 64 x 32 cells: 9 fields and a buffer of 66 x 32
       call check_close(memory_needed(case), 8.0_dp*(10*64*32 + 66*32) + 26.0e6_dp, 1.0e-6_dp, 'memory')
@@ -245,9 +246,10 @@ contains
       allocate (case%material%prony_g(0))
       case%grid%boundary = boundary_free
       call check_close(memory_needed(case), 8.0_dp*(10*64*32 + 4*66*32) + 26.0e6_dp, 1.0e-6_dp, 'memory, free')
-      call check_that(index(case_summary(case), '3 phases, 3 static solves, 0 time steps in 0 s') > 0, &
+      call check_order(index(case_summary(case), '3 phases, 3 static solves, 0 time steps in 0 s'), '>', 0, &
          'summary: '//case_summary(case))
-      call check_that(index(case_summary(case), 'memory: about 26.2 MB') > 0, 'summary: '//case_summary(case))
+      call check_order(index(case_summary(case), 'memory: about 26.2 MB'), '>', 0, &
+         'summary: '//case_summary(case))
    end subroutine test_report
 
    !> Every template is a good input, or waits for a feature; those of the elastic spine are there.
@@ -258,7 +260,7 @@ contains
       integer :: i
 
       allocate (names, source=all_template_names())
-      call check_that(size(names) >= 7, 'seven templates')
+      call check_order(size(names), '>=', 7, 'seven templates')
       do i = 1, size(names)
          call parse_case(template_text(trim(names(i))), trim(names(i)), case, error)
          if (allocated(error)) then
@@ -268,8 +270,8 @@ contains
          else
             call check_that(case%title /= '' .and. case%warnings == '', 'template '//trim(names(i))// &
                ' is in order '//case%warnings)
-            call check_that(index(nl//template_list(), nl//trim(names(i))//' ') > 0, trim(names(i))// &
-               ' is listed, its name first')
+            call check_order(index(nl//template_list(), nl//trim(names(i))//' '), '>', 0, &
+               trim(names(i))// ' is listed, its name first')
          end if
       end do
       do i = 1, 3

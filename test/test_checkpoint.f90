@@ -2,7 +2,7 @@
 !> checkpoint that is not as it was written is refused.
 module test_checkpoint
    use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
-   use check, only : begin_suite, check_close, check_error, check_no_error, check_that
+   use check, only : begin_suite, check_close, check_error, check_no_error, check_that, selected
    use asperity_checkpoint, only : checkpoint_path, checkpoint_reader_type, checkpoint_writer_type, &
       remove_checkpoint
    use asperity_checksum, only : checksum_of_field, checksum_of_file, checksum_of_text, &
@@ -39,12 +39,12 @@ contains
    subroutine run_checkpoint()
       call begin_suite('checkpoint')
       call remove_checkpoint(path)
-      call checksums()
-      call state_comes_back()
-      call other_cases_are_refused()
-      call old_one_stays_until_commit()
-      call damage_is_found()
-      call values_that_are_no_numbers_are_refused()
+      if (selected('checksums')) call checksums()
+      if (selected('state_comes_back')) call state_comes_back()
+      if (selected('other_cases_are_refused')) call other_cases_are_refused()
+      if (selected('old_one_stays_until_commit')) call old_one_stays_until_commit()
+      if (selected('damage_is_found')) call damage_is_found()
+      if (selected('values_that_are_no_numbers_are_refused')) call values_that_are_no_numbers_are_refused()
       call remove_checkpoint(path)
       call check_that(.not. file_exists(checkpoint_path(path)), 'removed')
    end subroutine run_checkpoint

@@ -1,12 +1,13 @@
 !> Tests of the influence coefficients and of the convolution operator.
 module test_fft_conv
-   use check, only : begin_suite, check_close, check_no_error, check_that
+   use check, only : begin_suite, check_close, check_no_error, check_order, check_that, selected
    use asperity_errors, only : error_type
    use fft_conv, only : convolution_type, new_convolution, new_symbol_operator
    use influence, only : love_normal, love_tangential, transform_length
    use kernels, only : normal_half_space, tangential_half_space
-   use asperity_precision, only : dp, pi
+   use asperity_precision, only : dp, int64, pi
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
+   use transform_lengths, only : good_length, length_warning
    implicit none
    private
 
@@ -16,28 +17,57 @@ contains
 
    subroutine run_fft_conv()
       call begin_suite('fft_conv')
-      call test_quadrature()
-      call test_waves(8, 6, 3.0_dp, 2.0_dp, .false.)
-      call test_waves(8, 6, 3.0_dp, 2.0_dp, .true.)
-      call test_waves(9, 5, 1.0_dp, 2.0_dp, .false.)
-      call test_waves(9, 5, 1.0_dp, 2.0_dp, .true.)
-      call test_waves(16, 1, 1.0_dp, 2.0_dp, .false.)
-      call test_waves(16, 1, 1.0_dp, 2.0_dp, .true.)
-      call test_waves(160, 131, 1.0_dp, 0.7_dp, .false.)
-      call test_waves(160, 131, 1.0_dp, 0.7_dp, .true.)
-      call test_free_sums(7, 5, .false.)
-      call test_free_sums(7, 5, .true.)
-      call test_free_sums(6, 8, .false.)
-      call test_free_sums(6, 8, .true.)
-      call test_free_sums(1, 3, .false.)
-      call test_free_sums(1, 3, .true.)
-      call test_inverse(.false.)
-      call test_inverse(.true.)
-      call test_range()
-      call test_periodic_against_free()
+      if (selected('good_lengths')) call good_lengths()
+      if (selected('test_quadrature')) call test_quadrature()
+      if (selected('test_waves')) call test_waves(8, 6, 3.0_dp, 2.0_dp, .false.)
+      if (selected('test_waves')) call test_waves(8, 6, 3.0_dp, 2.0_dp, .true.)
+      if (selected('test_waves')) call test_waves(9, 5, 1.0_dp, 2.0_dp, .false.)
+      if (selected('test_waves')) call test_waves(9, 5, 1.0_dp, 2.0_dp, .true.)
+      if (selected('test_waves')) call test_waves(16, 1, 1.0_dp, 2.0_dp, .false.)
+      if (selected('test_waves')) call test_waves(16, 1, 1.0_dp, 2.0_dp, .true.)
+      if (selected('test_waves')) call test_waves(160, 131, 1.0_dp, 0.7_dp, .false.)
+      if (selected('test_waves')) call test_waves(160, 131, 1.0_dp, 0.7_dp, .true.)
+      if (selected('test_free_sums')) call test_free_sums(7, 5, .false.)
+      if (selected('test_free_sums')) call test_free_sums(7, 5, .true.)
+      if (selected('test_free_sums')) call test_free_sums(6, 8, .false.)
+      if (selected('test_free_sums')) call test_free_sums(6, 8, .true.)
+      if (selected('test_free_sums')) call test_free_sums(1, 3, .false.)
+      if (selected('test_free_sums')) call test_free_sums(1, 3, .true.)
+      if (selected('test_inverse')) call test_inverse(.false.)
+      if (selected('test_inverse')) call test_inverse(.true.)
+      if (selected('test_range')) call test_range()
+      if (selected('test_periodic_against_free')) call test_periodic_against_free()
+      if (selected('transform_lengths_of_grids')) call transform_lengths_of_grids()
+   end subroutine run_fft_conv
+
+   !> A periodic grid is not padded; a free one is padded to small factors.
+   subroutine transform_lengths_of_grids()
       call check_that(transform_length(7, boundary_periodic) == 7, 'no padding where periodic')
       call check_that(transform_length(509, boundary_free) == 1024, 'padding to small factors')
-   end subroutine run_fft_conv
+   end subroutine transform_lengths_of_grids
+
+   !> Good lengths divide a power of 60, and none is passed over; a warning names the two next to a bad one.
+   subroutine good_lengths()
+      integer :: n, up, down, k
+
+      do n = 1, 400
+         up = good_length(n, 1)
+         down = good_length(n, -1)
+         call check_that(divides_a_power_of_60(up) .and. divides_a_power_of_60(down), 'good lengths are smooth')
+         call check_that(.not. any([(divides_a_power_of_60(k), k=down + 1, n - 1)]) .and. &
+            .not. any([(divides_a_power_of_60(k), k=n + 1, up - 1)]), 'good lengths are the next ones')
+      end do
+      call check_that(index(length_warning('ny', 296, 512), 'ny = 296 has the prime factor 37') > 0 .and. &
+         index(length_warning('ny', 296, 512), 'ny = 288 or 300') > 0, 'a warning: '//length_warning('ny', 296, 512))
+      call check_that(length_warning('ny', 300, 296) == '' .and. length_warning('nx', 37, 37) == '', &
+         'no warning for good lengths and small grids')
+   end subroutine good_lengths
+
+   pure logical function divides_a_power_of_60(n)
+      integer, intent(in) :: n
+
+      divides_a_power_of_60 = mod(mod(60_int64**5, int(n, int64))*mod(60_int64**5, int(n, int64)), int(n, int64)) == 0
+   end function divides_a_power_of_60
 
    !> Love's coefficients against midpoint quadrature of the point solutions.
    subroutine test_quadrature()
@@ -214,7 +244,8 @@ contains
       call check_close(maxval(abs(back - p)), 0.0_dp, 1e-15_dp + loose, 'identity')
       call check_that(identity%ffts == 2, 'an application is two transforms')
       call check_that(identity%single .eqv. single, 'the precision asked for')
-      if (single) call check_that(maxval(abs(back - p)) > 1e-12_dp, 'single precision is at work')
+      if (single) call check_order(maxval(abs(back - p)), '>', 1e-12_dp, &
+         'single precision is at work')
       call normal%destroy()
       call identity%destroy()
    end subroutine test_inverse

@@ -1,7 +1,7 @@
 !> Tests of the input as lines for other programs.
 module test_input_listing
    use, intrinsic :: iso_fortran_env, only : int64
-   use check, only : begin_suite, check_error, check_no_error, check_that
+   use check, only : begin_suite, check_error, check_no_error, check_that, selected
    use asperity_errors, only : error_type
    use input_listing, only : field_separator, input_table, list_values
    use input_reference, only : group_entries, variable_entries
@@ -17,11 +17,11 @@ contains
 
    subroutine run_input_listing()
       call begin_suite('input_listing')
-      call test_table()
-      call test_values()
-      call test_digits()
-      call test_long_list()
-      call test_faults()
+      if (selected('test_table')) call test_table()
+      if (selected('test_values')) call test_values()
+      if (selected('test_digits')) call test_digits()
+      if (selected('test_long_list')) call test_long_list()
+      if (selected('test_faults')) call test_faults()
    end subroutine run_input_listing
 
    !> A line for each group and each variable.

@@ -1,6 +1,7 @@
 !> Tests of the interpolation and of the slopes.
 module test_interpolation
-   use check, only : begin_suite, check_close, check_error, check_no_error, check_that
+   use check, only : begin_suite, check_close, check_error, check_no_error, check_order, &
+      check_that, selected
    use counter_random, only : normal_number, row_key
    use asperity_errors, only : error_type
    use asperity_interpolation, only : displaced, interpolation_type, new_interpolation, shifted
@@ -19,19 +20,19 @@ contains
 
    subroutine run_interpolation()
       call begin_suite('interpolation')
-      call test_whole_cells()
-      call test_free_whole_cells()
-      call test_polynomials()
-      call test_order()
-      call test_fields()
-      call test_smoothness()
-      call test_rim()
-      call test_small_grids()
-      call test_slopes()
-      call test_wave_factors()
-      call test_jump()
-      call test_threads()
-      call test_faults()
+      if (selected('test_whole_cells')) call test_whole_cells()
+      if (selected('test_free_whole_cells')) call test_free_whole_cells()
+      if (selected('test_polynomials')) call test_polynomials()
+      if (selected('test_order')) call test_order()
+      if (selected('test_fields')) call test_fields()
+      if (selected('test_smoothness')) call test_smoothness()
+      if (selected('test_rim')) call test_rim()
+      if (selected('test_small_grids')) call test_small_grids()
+      if (selected('test_slopes')) call test_slopes()
+      if (selected('test_wave_factors')) call test_wave_factors()
+      if (selected('test_jump')) call test_jump()
+      if (selected('test_threads')) call test_threads()
+      if (selected('test_faults')) call test_faults()
    end subroutine run_interpolation
 
    !> A rough map.
@@ -172,7 +173,7 @@ contains
       call wave_error('cubic', 32, 27, coarse)
       call wave_error('cubic', 64, 54, fine)
       call check_close(log(coarse(1)/fine(1))/log(2.0_dp), 4.0_dp, 0.2_dp, 'cubic: order')
-      call check_that(log(coarse(2)/fine(2))/log(2.0_dp) > 2.9_dp, 'cubic: order of the slope')
+      call check_order(log(coarse(2)/fine(2))/log(2.0_dp), '>', 2.9_dp, 'cubic: order of the slope')
       ! the spline's leading error, h^4 f'''' u^2 (1 - u)^2/24 a direction
       call check_close(fine(1), ((2.0_dp*pi*3/64)**4*(0.4_dp*0.6_dp)**2 &
          + (2.0_dp*pi*2/54)**4*(0.3_dp*0.7_dp)**2)/24.0_dp, 1.0e-6_dp, 'cubic: its error')

@@ -2,7 +2,8 @@
 module test_kernels
    use asperity_errors, only : error_type
    use asperity_precision, only : dp, pi
-   use check, only : begin_suite, check_close, check_error, check_no_error, check_that
+   use check, only : begin_suite, check_close, check_error, check_no_error, check_order, &
+      check_that, selected
    use fft_conv, only : convolution_type, new_convolution, new_inverse_convolution
    use kernels, only : kernel_type, normal_half_space, tangential_half_space
    use normal_cg, only : new_normal_solver, normal_solver_type
@@ -21,11 +22,11 @@ contains
 
    subroutine run_kernels()
       call begin_suite('kernels')
-      call a_winkler_foundation()
-      call contact_on_a_winkler_foundation()
-      call inverses_of_the_half_space()
-      call extreme_stiffness_of_a_grid()
-      call mean_mode_of_an_operator()
+      if (selected('a_winkler_foundation')) call a_winkler_foundation()
+      if (selected('contact_on_a_winkler_foundation')) call contact_on_a_winkler_foundation()
+      if (selected('inverses_of_the_half_space')) call inverses_of_the_half_space()
+      if (selected('extreme_stiffness_of_a_grid')) call extreme_stiffness_of_a_grid()
+      if (selected('mean_mode_of_an_operator')) call mean_mode_of_an_operator()
    end subroutine run_kernels
 
    !> A solid of springs side by side: every cell moves by its own traction. This function is all that
@@ -94,7 +95,7 @@ contains
       call solver%solve(problem, height, pressure, gap, level, outcome)
       call check_that(outcome%converged, 'springs: '//outcome%reason)
       call check_close(maxval(abs(pressure - exact)), 0.0_dp, 1e-7_dp, 'pressure on springs')
-      call check_that(count(exact > 0.0_dp) < nx*ny, 'the contact on springs is partial')
+      call check_order(count(exact > 0.0_dp), '<', nx*ny, 'the contact on springs is partial')
       call solver%destroy()
    end subroutine contact_on_a_winkler_foundation
 

@@ -1,6 +1,6 @@
 !> Tests of the scanner of namelists, the reference table and the words and numbers of messages.
 module test_namelist
-   use check, only : begin_suite, check_close, check_error, check_that
+   use check, only : begin_suite, check_close, check_error, check_order, check_that, selected
    use input_faults, only : faults_type
    use input_group, only : group_values_type
    use input_reference, only : allowed_phrase, group_entries, reference_markdown, value_range, &
@@ -20,11 +20,11 @@ contains
 
    subroutine run_namelist()
       call begin_suite('namelist')
-      call test_form()
-      call test_broken_form()
-      call test_table()
-      call test_words()
-      call test_numbers()
+      if (selected('test_form')) call test_form()
+      if (selected('test_broken_form')) call test_broken_form()
+      if (selected('test_table')) call test_table()
+      if (selected('test_words')) call test_words()
+      if (selected('test_numbers')) call test_numbers()
    end subroutine run_namelist
 
    !> Groups and assignments, whatever the layout.
@@ -104,13 +104,16 @@ contains
       do i = 1, size(entries)
          associate (name => trim(entries(i)%group)//' '//trim(entries(i)%name))
             call check_that(any(group_entries_names() == entries(i)%group), name//': its group')
-            call check_that(index(markdown, '| `'//trim(entries(i)%name)//'` | ') > 0, name//': documented')
+            call check_order(index(markdown, '| `'//trim(entries(i)%name)//'` | '), '>', 0, &
+               name//': documented')
             call check_that(len_trim(entries(i)%meaning) > 0 .and. len_trim(entries(i)%meaning) < &
                len(entries(i)%meaning), name//': its meaning')
             call check_that(len_trim(entries(i)%default) > 0 .and. len_trim(entries(i)%default) < &
                len(entries(i)%default), name//': its default')
-            call check_that(len_trim(entries(i)%allowed) < len(entries(i)%allowed), name//': allowed values')
-            call check_that(index(allowed_phrase(entries(i)), 'must be') > 0, name//': its phrase')
+            call check_order(len_trim(entries(i)%allowed), '<', len(entries(i)%allowed), &
+               name//': allowed values')
+            call check_order(index(allowed_phrase(entries(i)), 'must be'), '>', 0, &
+               name//': its phrase')
             call check_that(count(entries%group == entries(i)%group .and. entries%name == entries(i)%name) &
                == 1, name//': stands once')
             call default_group(entries(i)%group, group)

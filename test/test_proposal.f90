@@ -5,7 +5,7 @@ module test_proposal
    use asperity_simulation, only : new_simulation, simulation_type
    use case_input, only : parse_case
    use case_settings, only : case_type
-   use check, only : begin_suite, check_no_error, check_that
+   use check, only : begin_suite, check_no_error, check_that, selected
    use row_state, only : list_state, state_type
    use simulation_runs, only : nl
    use state_table, only : state_piece_type, state_table_type
@@ -25,7 +25,7 @@ contains
 
    subroutine run_proposal()
       call begin_suite('proposal')
-      call propose_reject_advance()
+      if (selected('propose_reject_advance')) call propose_reject_advance()
    end subroutine run_proposal
 
    !> A row that was rejected leaves no trace, whatever acts.

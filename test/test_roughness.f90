@@ -1,6 +1,6 @@
 !> Tests of the roughness measures.
 module test_roughness
-   use check, only : begin_suite, check_close, check_error, check_no_error, check_that
+   use check, only : begin_suite, check_close, check_error, check_no_error, check_that, selected
    use counter_random, only : normal_number, row_key
    use asperity_errors, only : error_type
    use asperity_precision, only : dp, pi
@@ -15,11 +15,11 @@ contains
 
    subroutine run_roughness()
       call begin_suite('roughness')
-      call test_one_wave()
-      call test_profile()
-      call test_normalisation()
-      call test_isotropic_nayak()
-      call test_free()
+      if (selected('test_one_wave')) call test_one_wave()
+      if (selected('test_profile')) call test_profile()
+      if (selected('test_normalisation')) call test_normalisation()
+      if (selected('test_isotropic_nayak')) call test_isotropic_nayak()
+      if (selected('test_free')) call test_free()
    end subroutine run_roughness
 
    !> One oblique wave: every measure in closed form.

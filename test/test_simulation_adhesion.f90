@@ -3,7 +3,7 @@ module test_simulation_adhesion
    use adhesion_advice, only : adhesion_criteria, adhesion_notes
    use case_input, only : parse_case
    use case_settings, only : case_type
-   use check, only : begin_suite, check_close, check_no_error, check_that
+   use check, only : begin_suite, check_close, check_no_error, check_order, check_that, selected
    use asperity_errors, only : error_type
    use history_row, only : history_row_type
    use asperity_precision, only : dp, pi
@@ -38,20 +38,20 @@ contains
 
    subroutine run_simulation_adhesion()
       call begin_suite('simulation_adhesion')
-      call test_controls('periodic', wavy, '0.01', '0.4e-6', '0.55e-6')
-      call test_controls('free', free_map//sphere, '0.05', '0.1e-6', '0.5e-6')
-      call test_work_of_the_load()
-      call test_pull_off()
-      call test_detachment()
-      call test_hysteresis()
-      call test_viscoelastic_loop()
-      call test_sliding_elastic()
-      call test_sliding_viscoelastic()
-      call test_sliding_friction()
-      call test_no_energy()
-      call test_repeated_rows()
-      call test_pulled_from_the_start()
-      call test_advice()
+      if (selected('test_controls')) call test_controls('periodic', wavy, '0.01', '0.4e-6', '0.55e-6')
+      if (selected('test_controls')) call test_controls('free', free_map//sphere, '0.05', '0.1e-6', '0.5e-6')
+      if (selected('test_work_of_the_load')) call test_work_of_the_load()
+      if (selected('test_pull_off')) call test_pull_off()
+      if (selected('test_detachment')) call test_detachment()
+      if (selected('test_hysteresis')) call test_hysteresis()
+      if (selected('test_viscoelastic_loop')) call test_viscoelastic_loop()
+      if (selected('test_sliding_elastic')) call test_sliding_elastic()
+      if (selected('test_sliding_viscoelastic')) call test_sliding_viscoelastic()
+      if (selected('test_sliding_friction')) call test_sliding_friction()
+      if (selected('test_no_energy')) call test_no_energy()
+      if (selected('test_repeated_rows')) call test_repeated_rows()
+      if (selected('test_pulled_from_the_start')) call test_pulled_from_the_start()
+      if (selected('test_advice')) call test_advice()
    end subroutine run_simulation_adhesion
 
    !> `&adhesion`
@@ -139,7 +139,7 @@ contains
          end associate
       end do
       ! the contact edge jumps from cell to cell: not a smooth second order
-      call check_that(errors(2) < errors(1)/2.5_dp, 'work of the load converges')
+      call check_order(errors(2), '<', errors(1)/2.5_dp, 'work of the load converges')
       call check_close(errors(2), 0.0_dp, 4e-3_dp, 'work of the load with 16 steps')
    end subroutine test_work_of_the_load
 
@@ -265,11 +265,12 @@ contains
          call check_that(loss(1) > 0.0_dp .and. loss(2) > 2.0_dp*loss(1), 'adhesion loses more: '// &
             to_text(loss(2)/loss(1)))
          call check_close(b(n)%force, 0.0_dp, 1e-6_dp*maxval(b%force), 'without adhesion it lifts off')
-         call check_that(minval(a%force) < -1.3_dp*unit_force, 'with adhesion it pulls')
+         call check_order(minval(a%force), '<', -1.3_dp*unit_force, 'with adhesion it pulls')
          call check_close(a(n)%contact_area, 0.0_dp, 0.0_dp, 'in the end there is no contact')
          ! the force at the same displacement is lower on the way back
          do k = 13, 20
-            call check_that(a(k)%force < at(a(0:12), a(k)%displacement), 'the way back lies below')
+            call check_order(a(k)%force, '<', at(a(0:12), a(k)%displacement), &
+               'the way back lies below')
          end do
          ! the outside view of the closed path: what the load did, less what is still in there
          call check_close((a(n)%work_load - a(n)%energy_elastic - a(n)%energy_adhesive)/loss(2), 1.0_dp, &
@@ -315,7 +316,8 @@ contains
             ! the slopes are not quite those of the discrete energy
             call check_close(rows(k)%friction, 0.0_dp, 1e-3_dp, 'sliding, elastic: no friction')
             call check_close(rows(k)%friction, rows(1)%friction, 1e-8_dp, 'sliding, elastic: same friction')
-            call check_that(rows(k)%iterations_normal <= 2, 'sliding, elastic: the start is the solution')
+            call check_order(rows(k)%iterations_normal, '<=', 2, &
+               'sliding, elastic: the start is the solution')
          end do
       end associate
    end subroutine test_sliding_elastic
@@ -375,7 +377,7 @@ contains
          '&phase duration = 0.05, steps = 8, velocity_x = 1e-4, velocity_y = 4e-5 /', &
          'sliding, friction with slope', record)
       call check_books(record, 'sliding, friction with slope')
-      call check_that(record%rows(last(record))%dissipated_friction > 0.0_dp, &
+      call check_order(record%rows(last(record))%dissipated_friction, '>', 0.0_dp, &
          'sliding, friction with slope: heat')
    end subroutine test_sliding_friction
 
@@ -433,7 +435,7 @@ contains
          call run_case(text//'&phase force = -4e-6 /', 'pulled', record)
          call run_case(text//'&phase force = 2e-5 /'//nl//'&phase force = -4e-6 /', 'unloaded', pressed)
          call check_close(record%rows(0)%force, -4e-6_dp, 1e-10_dp, 'pulled: force')
-         call check_that(record%rows(0)%contact_area > 0.0_dp, 'pulled: there is contact')
+         call check_order(record%rows(0)%contact_area, '>', 0.0_dp, 'pulled: there is contact')
          call check_close(record%rows(0)%displacement, pressed%rows(1)%displacement, 1e-12_dp, &
             'pulled: as after a load')
          call check_close(record%rows(0)%contact_area, pressed%rows(1)%contact_area, 0.0_dp, &
@@ -463,7 +465,7 @@ contains
       stored = 0.25_dp*e_star*spectral_sum(height, case%grid%lx, case%grid%ly)
       ! the spectrum of the formula is continuous, that of the map has few waves
       call check_close(c2*stored/energy, 1.0_dp, 0.1_dp, 'advice: energy of full contact')
-      call check_that(c1 > 0.0_dp, 'advice: C1')
+      call check_order(c1, '>', 0.0_dp, 'advice: C1')
 
       call parse_case(free_map//sphere//elastic//sticky('gauss', '0.5e-6')//'&phase force = 1e-5 /', &
          'test.nml', case, error)
@@ -480,7 +482,7 @@ contains
       call check_close(c1, 2.0_dp*energy/(pi*0.8e-6_dp*5e4_dp), 1e-12_dp, 'advice: C1 of a hexagonal wave')
       call check_close(c2, energy/(0.8e-6_dp**2*3.0_dp*pi*1e6_dp/(8.0_dp*40e-6_dp)), 1e-12_dp, &
          'advice: C2 as in eq. 4.9')
-      call check_that(index(adhesion_notes(case), 'C1 = 0.796 at 50000 Pa, C2 = 2.65') > 0, &
+      call check_order(index(adhesion_notes(case), 'C1 = 0.796 at 50000 Pa, C2 = 2.65'), '>', 0, &
          'advice: '//adhesion_notes(case))
 
    contains

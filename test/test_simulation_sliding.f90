@@ -1,6 +1,6 @@
 !> Tests of the step loop with a moving road: known solutions, invariances, free boundaries.
 module test_simulation_sliding
-   use check, only : begin_suite, check_close, check_that
+   use check, only : begin_suite, check_close, check_order, check_that, selected
    use asperity_errors, only : error_type
    use asperity_parallel, only : set_threads
    use asperity_precision, only : dp, pi
@@ -21,19 +21,19 @@ contains
 
    subroutine run_simulation_sliding()
       call begin_suite('simulation_sliding')
-      call test_hunter()
-      call test_speed_limits()
-      call test_waves()
-      call test_coarse_wave()
-      call test_elastic_road()
-      call test_order_in_time()
-      call test_works()
-      call test_rest_is_creep()
-      call test_invariances()
-      call test_threads()
-      call test_free_map()
-      call test_edge()
-      call test_few_cells()
+      if (selected('test_hunter')) call test_hunter()
+      if (selected('test_speed_limits')) call test_speed_limits()
+      if (selected('test_waves')) call test_waves()
+      if (selected('test_coarse_wave')) call test_coarse_wave()
+      if (selected('test_elastic_road')) call test_elastic_road()
+      if (selected('test_order_in_time')) call test_order_in_time()
+      if (selected('test_works')) call test_works()
+      if (selected('test_rest_is_creep')) call test_rest_is_creep()
+      if (selected('test_invariances')) call test_invariances()
+      if (selected('test_threads')) call test_threads()
+      if (selected('test_free_map')) call test_free_map()
+      if (selected('test_edge')) call test_edge()
+      if (selected('test_few_cells')) call test_few_cells()
    end subroutine run_simulation_sliding
 
    !> Friction of Hunter's cylinder, one cell a step, 100 cells over the contact.
@@ -61,9 +61,9 @@ contains
          'Hunter', record)
       friction = record%rows(last(record))%friction
       ! The first step is solved in three parts, whose iterations are added.
-      call check_that(record%rows(lbound(record%rows, 1) + 1)%iterations_normal < 3*60, &
+      call check_order(record%rows(lbound(record%rows, 1) + 1)%iterations_normal, '<', 3*60, &
          'Hunter: iterations of the first step')
-      call check_that(maxval(record%rows(lbound(record%rows, 1) + 2:)%iterations_normal) < 60, &
+      call check_order(maxval(record%rows(lbound(record%rows, 1) + 2:)%iterations_normal), '<', 60, &
          'Hunter: iterations of a step')
       call check_books(record, 'Hunter, '//scheme)
    end function cylinder_friction
@@ -299,8 +299,8 @@ contains
             deallocate (velocity, stress)
          end do
          orders = log(errors(1:2)/errors(2:3))/log(2.0_dp)
-         call check_that(minval(orders) > least(s), 'waves, '//trim(schemes(s))//': orders '// &
-            to_text(orders(1))//', '//to_text(orders(2)))
+         call check_order(minval(orders), '>', least(s), &
+            'waves, '//trim(schemes(s))//': orders '// to_text(orders(1))//', '//to_text(orders(2)))
       end do
    end subroutine test_order_in_time
 
@@ -351,7 +351,8 @@ contains
          call check_close(moving%rows(k)%contact_area, resting%rows(k)%contact_area, 0.0_dp, 'no speed: area')
          call check_close(moving%rows(k)%friction, 0.0_dp, 0.0_dp, 'no speed: friction')
       end do
-      call check_that(moving%rows(last(moving))%friction > 0.01_dp, 'friction once the road moves')
+      call check_order(moving%rows(last(moving))%friction, '>', 0.01_dp, &
+         'friction once the road moves')
    end subroutine test_rest_is_creep
 
    !> The same numbers for a road that is moved, mirrored, turned, scaled.
@@ -371,7 +372,7 @@ contains
       do k = 1, 2
          call slide(map, '1.0e-3', '0.81e-3', '1', '11e-3', '-4e-3', base)
          call check_books(base, 'oblique')
-         call check_that(base%rows(last(base))%friction > 0.01_dp, 'oblique: friction')
+         call check_order(base%rows(last(base))%friction, '>', 0.01_dp, 'oblique: friction')
          call slide(cshift(cshift(map, 7, 1), -4, 2), '1.0e-3', '0.81e-3', '1', '11e-3', '-4e-3', other)
          call check_same_rows(base, other, 1e-8_dp, 'moved by whole cells')
          call slide(map(nx:1:-1, :), '1.0e-3', '0.81e-3', '1', '-11e-3', '-4e-3', other)
@@ -501,7 +502,7 @@ contains
          difference(k) = maxval(abs(free%rows%friction - periodic%rows%friction))/maxval(free%rows%friction)
       end do
       call check_close(difference(2), 0.0_dp, 3e-3_dp, 'free map and large cell: friction')
-      call check_that(difference(2) < difference(1)/4.0_dp, 'images of a cell weigh as 1/L^3')
+      call check_order(difference(2), '<', difference(1)/4.0_dp, 'images of a cell weigh as 1/L^3')
    end subroutine test_free_map
 
    !> Contact at the edge of a free map, and points that enter or leave close to the contact: once each.
@@ -535,7 +536,7 @@ contains
       ! The edge lies some ten micrometres below: within five ranges of one attraction, not of another.
       call run_case(body//'&phase displacement = 2e-6, duration = 1, steps = 2, velocity_x = 5e-6 /'//nl// &
          '&adhesion potential = ''exponential'', energy = 0.01, range = 3e-6 /', 'within reach', record)
-      call check_that(index(record%warnings, 'points enter or leave the free map') > 0, &
+      call check_order(index(record%warnings, 'points enter or leave the free map'), '>', 0, &
          'an edge within the reach of adhesion: '//record%warnings)
       call run_case(body//'&phase displacement = 2e-6, duration = 1, steps = 2, velocity_x = 5e-6 /'//nl// &
          '&adhesion potential = ''exponential'', energy = 0.01, range = 0.5e-6 /', 'out of reach', record)

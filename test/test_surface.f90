@@ -1,7 +1,8 @@
 !> Tests of the surfaces.
 module test_surface
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite, ieee_quiet_nan, ieee_value
-   use check, only : begin_suite, check_close, check_error, check_no_error, check_that
+   use check, only : begin_suite, check_close, check_error, check_no_error, check_order, &
+      check_that, selected
    use counter_random, only : mix, normal_number, row_key, uniform_number
    use asperity_errors, only : error_file, error_input, error_type
    use hdf5_file, only : hdf5_file_type
@@ -23,20 +24,20 @@ contains
 
    subroutine run_surface()
       call begin_suite('surface')
-      call test_counter_random()
-      call test_caps()
-      call test_waves()
-      call test_sum_and_rim()
-      call test_spectrum()
-      call test_rms()
-      call test_same_modes()
-      call test_threads()
-      call test_noise_is_gaussian()
-      call test_faults()
-      call every_shape_can_be_checked_and_listed()
-      call test_file()
-      call test_warnings()
-      call test_map_warnings()
+      if (selected('test_counter_random')) call test_counter_random()
+      if (selected('test_caps')) call test_caps()
+      if (selected('test_waves')) call test_waves()
+      if (selected('test_sum_and_rim')) call test_sum_and_rim()
+      if (selected('test_spectrum')) call test_spectrum()
+      if (selected('test_rms')) call test_rms()
+      if (selected('test_same_modes')) call test_same_modes()
+      if (selected('test_threads')) call test_threads()
+      if (selected('test_noise_is_gaussian')) call test_noise_is_gaussian()
+      if (selected('test_faults')) call test_faults()
+      if (selected('every_shape_can_be_checked_and_listed')) call every_shape_can_be_checked_and_listed()
+      if (selected('test_file')) call test_file()
+      if (selected('test_warnings')) call test_warnings()
+      if (selected('test_map_warnings')) call test_map_warnings()
    end subroutine run_surface
 
    !> The generator is SplitMix64: the first outputs from state 0 and 1234567 are known.
@@ -203,17 +204,17 @@ contains
       allocate (psd(60, 45))
       call height_psd(grid, h, psd, error)
       plateau = psd(4, 1)                       ! mode (3, 0): wavelength 1
-      call check_that(plateau > 0.0_dp, 'the end of the band belongs to it')
+      call check_order(plateau, '>', 0.0_dp, 'the end of the band belongs to it')
       call check_close(psd(1, 4)/plateau, 1.0_dp, 1.0e-12_dp, 'constant up to the roll-off')
       k = 2.0_dp*pi*hypot(10.0_dp/3.0_dp, 4.0_dp/2.0_dp)
       call check_close(psd(11, 42)/plateau, (k*0.25_dp/pi)**(-3.4_dp), 1.0e-12_dp, &
          'power law above the roll-off, mode (10, -4)')
       call check_close(psd(51, 5)/plateau, (k*0.25_dp/pi)**(-3.4_dp), 1.0e-12_dp, &
          'power law above the roll-off, mode (-10, 4)')
-      call check_that(psd(3, 1) < 1.0e-25_dp*plateau, 'nothing below k_l')
-      call check_that(psd(22, 1) < 1.0e-25_dp*plateau, 'nothing above k_s')
-      call check_that(psd(21, 1) > 1.0e-3_dp*plateau, 'k_s itself belongs to the band')
-      call check_that(psd(1, 1) < 1.0e-25_dp*plateau, 'no mean')
+      call check_order(psd(3, 1), '<', 1.0e-25_dp*plateau, 'nothing below k_l')
+      call check_order(psd(22, 1), '<', 1.0e-25_dp*plateau, 'nothing above k_s')
+      call check_order(psd(21, 1), '>', 1.0e-3_dp*plateau, 'k_s itself belongs to the band')
+      call check_order(psd(1, 1), '<', 1.0e-25_dp*plateau, 'no mean')
 
       grid = new_grid(135, 1, 3.0_dp, 2.0_dp, boundary_periodic)
       call new_height(grid, [term], h, error)
@@ -280,7 +281,7 @@ contains
          'a finer grid holds the same surface')
       term%seed = 2
       call new_height(grid, [term], refined, error)
-      call check_that(maxval(abs(refined - h)) > 0.5_dp, 'another seed, another surface')
+      call check_order(maxval(abs(refined - h)), '>', 0.5_dp, 'another seed, another surface')
    end subroutine test_same_modes
 
    !> The same surface bit for bit on any number of threads.
@@ -508,13 +509,14 @@ contains
       term%wavelength_long = 2.0_dp
       call find_warnings(grid, [term], warnings)
       call check_that(size(warnings) == 2, 'two warnings')
-      call check_that(index(warnings(1), 'wavelength_long = 2.000E+00') > 0, 'waves as long as the side')
-      call check_that(index(warnings(2), '6.4 cells') > 0, 'few cells a wave')
+      call check_order(index(warnings(1), 'wavelength_long = 2.000E+00'), '>', 0, &
+         'waves as long as the side')
+      call check_order(index(warnings(2), '6.4 cells'), '>', 0, 'few cells a wave')
       term%wavelength_long = 0.5_dp
       term%wavelength_short = 0.05_dp
       call find_warnings(grid, [term], warnings)
       call check_that(size(warnings) == 1, 'one warning')
-      call check_that(index(warnings(1), 'Nyquist') > 0, 'below the Nyquist wavelength')
+      call check_order(index(warnings(1), 'Nyquist'), '>', 0, 'below the Nyquist wavelength')
 
       term = default_surface(grid)
       term%shape = 'sine'
@@ -568,8 +570,8 @@ contains
       call check_that(size(warnings) == 3, 'size, unit and edges are doubted')
       call check_that(index(warnings(1), '&surface: file = ''told_map.h5'': according to the file '// &
          'the map is 2.5000E-01 m by 6.0000E-01 m, but the grid is 5.0000E-01 m by') == 1, 'another length')
-      call check_that(index(warnings(2), 'the unit of the map is um') > 0, 'another unit')
-      call check_that(index(warnings(3), 'not periodic') > 0, 'edges that do not fit')
+      call check_order(index(warnings(2), 'the unit of the map is um'), '>', 0, 'another unit')
+      call check_order(index(warnings(3), 'not periodic'), '>', 0, 'edges that do not fit')
       term%scale = 1.0e-6_dp
       grid = new_grid(5, 3, 0.25_dp, 0.6_dp, boundary_free)
       call find_warnings(grid, [term], warnings)
