@@ -41,92 +41,39 @@ contains
       type(command_type), intent(out) :: command
       type(error_type), allocatable, intent(out) :: error
       character(:), allocatable :: argument, name
-      logical :: help, options_end
+      logical :: help, options_end, done
       integer :: i
 
+      command%help_of = ''
       if (command_argument_count() > 0) then
-         argument = argument_text(1)
-         if (any(python_verbs == argument)) then
+         command%handed_over = argument_text(1)
+         if (any(python_verbs == command%handed_over)) then
             ! What follows is for Python to read.
             command%verb = 'python'
-            command%handed_over = argument
-            command%help_of = ''
             return
          end if
+         deallocate (command%handed_over)
       end if
       command%verb = ''
       help = .false.
       options_end = .false.
+      done = .false.
       i = 0
-      do while (i < command_argument_count())
+      do while (i < command_argument_count() .and. .not. done)
          i = i + 1
          argument = argument_text(i)
          if (argument == '--' .and. .not. options_end) then
             options_end = .true.
          else if (len(argument) > 1 .and. index(argument, '-') == 1 .and. .not. options_end) then
-            name = argument
-            if (index(argument, '--') == 1 .and. index(argument, '=') > 0) &
-               name = argument(:index(argument, '=') - 1)
-            if (name /= argument .and. all(name /= [character(12) :: '--output', '--threads', &
-               '--time-limit'])) then
-               if (any(options == name)) then
-                  call refuse(name//' takes no value')
-                  cycle
-               end if
-            end if
-            select case (name)
-            case ('--help', '-h')
-               help = .true.
-            case ('--version')
-               command%verb = 'version'
-            case ('--restart')
-               command%restart = .true.
-            case ('--overwrite')
-               command%overwrite = .true.
-            case ('--time-limit')
-               call take_time_limit()
-            case ('--quiet')
-               command%quiet = .true.
-            case ('--reference')
-               command%reference = .true.
-            case ('--output')
-               if (allocated(command%output)) call refuse('--output is given twice')
-               call take_value(command%output)
-            case ('--threads')
-               call take_threads()
-            case default
-               call refuse(ordinary(name, 60)//': there is no such option'//hint(nearest_name(name, options)))
-            end select
-         else if (command%verb == '') then
-            command%verb = argument
-            if (argument == 'help') then
-               help = .true.
-            else if (.not. any(verbs == argument)) then
-               call refuse(''''//ordinary(argument, 60)//''': there is no such command'// &
-                  hint(nearest_name(argument, verbs))//'; '//verbs_there)
-               return
-            else if (any(python_verbs == argument)) then
-               call refuse(''''//argument//''' must be the first word; its options follow it')
-               return
-            end if
-         else if (.not. allocated(command%path)) then
-            command%path = argument
+            call take_option()
          else
-            call refuse(''''//ordinary(argument, 60)//''' is one argument too many')
+            call take_word()
          end if
       end do
+      if (done) return
 
       if (help) then
-         command%help_of = ''
-         if (any(verbs == command%verb)) command%help_of = command%verb
-         if (command%verb == 'help' .and. allocated(command%path)) then
-            if (any(verbs == command%path)) command%help_of = command%path
-         end if
-         command%verb = 'help'
-         if (any(python_verbs == command%help_of)) then
-            command%verb = 'python'
-            command%handed_over = command%help_of
-         end if
+         call show_help()
       else if (command%verb == '') then
          if (.not. allocated(error)) call refuse('no command is given: '//verbs_there// &
             '; asperity --help describes them')
@@ -136,6 +83,75 @@ contains
 
    contains
 
+      !> An option; its value may follow a '='.
+      subroutine take_option()
+         name = argument
+         if (index(argument, '--') == 1 .and. index(argument, '=') > 0) &
+            name = argument(:index(argument, '=') - 1)
+         if (name /= argument .and. any(options == name) .and. all(name /= [character(12) :: &
+            '--output', '--threads', '--time-limit'])) then
+            call refuse(name//' takes no value')
+            return
+         end if
+         select case (name)
+         case ('--help', '-h')
+            help = .true.
+         case ('--version')
+            command%verb = 'version'
+         case ('--restart')
+            command%restart = .true.
+         case ('--overwrite')
+            command%overwrite = .true.
+         case ('--time-limit')
+            call take_time_limit()
+         case ('--quiet')
+            command%quiet = .true.
+         case ('--reference')
+            command%reference = .true.
+         case ('--output')
+            if (allocated(command%output)) call refuse('--output is given twice')
+            call take_value(command%output)
+         case ('--threads')
+            call take_threads()
+         case default
+            call refuse(ordinary(name, 60)//': there is no such option'//hint(nearest_name(name, options)))
+         end select
+      end subroutine take_option
+
+      !> A word: the command, or the file that it works on. `done` if the rest cannot be understood.
+      subroutine take_word()
+         if (command%verb == '') then
+            command%verb = argument
+            if (argument == 'help') then
+               help = .true.
+            else if (.not. any(verbs == argument)) then
+               call refuse(''''//ordinary(argument, 60)//''': there is no such command'// &
+                  hint(nearest_name(argument, verbs))//'; '//verbs_there)
+               done = .true.
+            else if (any(python_verbs == argument)) then
+               call refuse(''''//argument//''' must be the first word; its options follow it')
+               done = .true.
+            end if
+         else if (.not. allocated(command%path)) then
+            command%path = argument
+         else
+            call refuse(''''//ordinary(argument, 60)//''' is one argument too many')
+         end if
+      end subroutine take_word
+
+      !> Help was asked for: of the program, or of the command that is named.
+      subroutine show_help()
+         if (any(verbs == command%verb)) command%help_of = command%verb
+         if (command%verb == 'help' .and. allocated(command%path)) then
+            if (any(verbs == command%path)) command%help_of = command%path
+         end if
+         command%verb = 'help'
+         if (any(python_verbs == command%help_of)) then
+            command%verb = 'python'
+            command%handed_over = command%help_of
+         end if
+      end subroutine show_help
+
       !> Add a fault.
       subroutine refuse(message)
          character(*), intent(in) :: message
@@ -143,7 +159,7 @@ contains
          call add_fault(error, error_input, 'asperity: '//message)
       end subroutine refuse
 
-      !> The value of the option in hand: behind its '=', or the next argument.
+      !> The value of the present option: after its '=', or the next argument.
       subroutine take_value(value)
          character(:), allocatable, intent(inout) :: value
 

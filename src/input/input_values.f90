@@ -160,113 +160,118 @@ contains
       type(value_type), intent(inout) :: value
       type(faults_type), intent(inout) :: faults
       type(token_type) :: token
-      type(item_type) :: item
-      integer :: at, element, first_element, repeats, star, token_number
-      logical :: comma_before, good
+      character(:), allocatable :: fault
+      integer :: element, repeats, next
+      logical :: comma_before
 
-      first_element = assignment%subscript
-      if (assignment%subscripted) then
-         if (.not. is_array(value%entry)) then
-            call reject('is a single value and has no subscript')
-            return
-         else if (first_element == 0) then
-            call reject('has an invalid subscript: it must be (n) or (n:m), with n at least 1')
-            return
-         else if (first_element > longest_list) then
-            call reject('has a subscript above '//to_text(longest_list))
-            return
-         end if
-      end if
-
-      element = first_element - 1
+      element = assignment%subscript - 1
       comma_before = .true.
-      token_number = assignment%first
-      do while (token_number <= assignment%last)
-         token = file%tokens(token_number)
-         token_number = token_number + 1
+      next = assignment%first
+      fault = fault_of_subscript(assignment, value%entry)
+      do while (fault == '' .and. next <= assignment%last)
+         token = file%tokens(next)
+         next = next + 1
          if (token%kind == token_comma) then
-            if (comma_before) then
-               call reject('has an empty value before a comma')
-               return
-            end if
+            if (comma_before) fault = 'has an empty value before a comma'
             comma_before = .true.
             cycle
          end if
          comma_before = .false.
          if (token%kind == token_broken) then
-            call reject('has a string that is not closed on its line')
-            return
+            fault = 'has a string that is not closed on its line'
+            exit
          end if
-
-         repeats = 1
-         if (token%kind == token_word) then
-            star = index(file%text(token%first:token%last), '*')
-            if (star > 1) then
-               call repeat_count(file%text(token%first:token%first + star - 2), repeats)
-               token%first = token%first + star
-               if (token%first > token%last .and. token_number <= assignment%last) then
-                  ! n*'string': the string is a token of its own
-                  if (file%tokens(token_number)%kind == token_string .and. &
-                     file%tokens(token_number)%first == token%first) then
-                     token = file%tokens(token_number)
-                     token_number = token_number + 1
-                  end if
-               end if
-               if (repeats < 1 .or. token%first > token%last) then
-                  call reject(allowed_phrase(value%entry)//'; a repetition is written n*value')
-                  return
-               end if
-            end if
+         call take_repetition(file, assignment%last, token, next, repeats)
+         if (repeats < 1) then
+            fault = allowed_phrase(value%entry)//'; a repetition is written n*value'
+            exit
          end if
-         call convert(file%text, token, value%entry, item, good)
-         if (.not. good) then
-            call reject(allowed_phrase(value%entry)//too_long(token))
-            return
-         end if
-         if (element + repeats > merge(longest_list, 1, is_array(value%entry))) then
-            if (is_array(value%entry)) then
-               call reject('has more than '//to_text(longest_list)//' values')
-            else
-               call reject('takes one value only: it '//allowed_phrase(value%entry))
-            end if
-            return
-         end if
-         if (assignment%upper > 0 .and. element + repeats > assignment%upper) then
-            call reject('has more values than its subscript has elements')
-            return
-         end if
-         do at = 1, repeats
-            element = element + 1
-            call put(value, element, item, good)
-            if (.not. good) then
-               call reject('sets its element '//to_text(element)//' twice')
-               return
-            end if
-         end do
+         call take_items(file%text, token, repeats, assignment%upper, value, element, fault)
       end do
-      if (element == first_element - 1) call reject('has no value: it '//allowed_phrase(value%entry))
-
-   contains
-
-      !> Report the variable, as found, and drop its value.
-      subroutine reject(message)
-         character(*), intent(in) :: message
-
-         if (value%good) call faults%add(place(group, value), message//line_note(group, value))
-         value%good = .false.
-      end subroutine reject
-
-      !> A note where a string is too long.
-      function too_long(token) result(note)
-         type(token_type), intent(in) :: token
-         character(:), allocatable :: note
-
-         note = ''
-         if (token%kind == token_string .and. token%last - token%first - 1 > path_length) &
-            note = ' of at most '//to_text(path_length)//' characters'
-      end function too_long
-
+      if (fault == '' .and. element == assignment%subscript - 1) &
+         fault = 'has no value: it '//allowed_phrase(value%entry)
+      if (fault == '') return
+      if (value%good) call faults%add(place(group, value), fault//line_note(group, value))
+      value%good = .false.
    end subroutine take_values
+
+   !> What is wrong with the subscript of a variable; empty if nothing is.
+   function fault_of_subscript(assignment, entry) result(fault)
+      type(assignment_type), intent(in) :: assignment
+      type(variable_entry_type), intent(in) :: entry
+      character(:), allocatable :: fault
+
+      fault = ''
+      if (.not. assignment%subscripted) return
+      if (.not. is_array(entry)) then
+         fault = 'is a single value and has no subscript'
+      else if (assignment%subscript == 0) then
+         fault = 'has an invalid subscript: it must be (n) or (n:m), with n at least 1'
+      else if (assignment%subscript > longest_list) then
+         fault = 'has a subscript above '//to_text(longest_list)
+      end if
+   end function fault_of_subscript
+
+   !> Split n*value: the token becomes that of the value. Other tokens stand for themselves, once.
+   subroutine take_repetition(file, last, token, next, repeats)
+      type(namelists_type), intent(in) :: file
+      integer, intent(in) :: last              !! token of the assignment
+      type(token_type), intent(inout) :: token
+      integer, intent(inout) :: next           !! number of the token that follows it
+      integer, intent(out) :: repeats          !! 0: not understood
+      integer :: star
+
+      repeats = 1
+      if (token%kind /= token_word) return
+      star = index(file%text(token%first:token%last), '*')
+      if (star <= 1) return
+      call repeat_count(file%text(token%first:token%first + star - 2), repeats)
+      token%first = token%first + star
+      if (token%first > token%last .and. next <= last) then
+         ! n*'string': the string is a token of its own
+         if (file%tokens(next)%kind == token_string .and. file%tokens(next)%first == token%first) then
+            token = file%tokens(next)
+            next = next + 1
+         end if
+      end if
+      if (token%first > token%last) repeats = 0
+   end subroutine take_repetition
+
+   !> Append a value `repeats` times to the elements that are there.
+   subroutine take_items(text, token, repeats, upper, value, element, fault)
+      character(*), intent(in) :: text
+      type(token_type), intent(in) :: token
+      integer, intent(in) :: repeats
+      integer, intent(in) :: upper             !! last element of the subscript; 0: none
+      type(value_type), intent(inout) :: value
+      integer, intent(inout) :: element        !! last element that is there
+      character(:), allocatable, intent(inout) :: fault
+      type(item_type) :: item
+      integer :: k
+      logical :: good
+
+      call convert(text, token, value%entry, item, good)
+      if (.not. good) then
+         fault = allowed_phrase(value%entry)
+         if (token%kind == token_string .and. token%last - token%first - 1 > path_length) &
+            fault = fault//' of at most '//to_text(path_length)//' characters'
+      else if (.not. is_array(value%entry) .and. element + repeats > 1) then
+         fault = 'takes one value only: it '//allowed_phrase(value%entry)
+      else if (element + repeats > longest_list) then
+         fault = 'has more than '//to_text(longest_list)//' values'
+      else if (upper > 0 .and. element + repeats > upper) then
+         fault = 'has more values than its subscript has elements'
+      end if
+      if (fault /= '') return
+      do k = 1, repeats
+         element = element + 1
+         call put(value, element, item, good)
+         if (.not. good) then
+            fault = 'sets its element '//to_text(element)//' twice'
+            return
+         end if
+      end do
+   end subroutine take_items
 
    !> Set an element of a list that grows as needed.
    pure subroutine put(value, element, item, good)
