@@ -220,7 +220,7 @@ def test_a_result_never_replaces_what_it_comes_from(program, tmp_path):
         assert done.returncode == 2
         assert "would overwrite the input" in done.err
     path.write_text(GOOD + "&output file = './link.nml' /\n")
-    assert "over the input" in call(program, "run", path).err
+    assert "overwrite the input" in call(program, "run", path).err
     assert path.read_text().startswith(GOOD)
 
 

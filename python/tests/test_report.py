@@ -479,7 +479,7 @@ def test_zoom_slider_and_switch_work(browser, tmp_path, sliding):
             " let s = 0; for (let i = 0; i < d.length; i++) s = (31 * s + d[i]) % 1000003;"
             " return s; })")
     last = browser.run(maps)
-    assert len(last) == 3
+    assert len(last) == 4          # the road, and the three maps of the slider
     told = "return document.getElementById('step-told').textContent"
     assert browser.run(told).startswith(f"step {run.snapshots.steps[-1]},")
     browser.run("document.getElementById('step').focus()")

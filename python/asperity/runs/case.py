@@ -142,7 +142,7 @@ class Case(CaseGroups):
         >>> import asperity
         >>> asperity.Case.help("solver.tolerance")
         solver.tolerance: real, default 1e-6; (0, 1)
-            Residual of every solve.
+            Largest allowed residual of every solve.
         """
         if name is None:
             return _Text("\n".join(f"&{entry.name}: {entry.meaning}"

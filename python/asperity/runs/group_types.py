@@ -221,6 +221,7 @@ class SolverGroup(Group):
     method: Variable[Literal['fast', 'thesis'], Literal['fast', 'thesis'] | None]
     time_scheme: Variable[Literal['exponential2', 'exponential', 'backward_euler'], Literal['exponential2', 'exponential', 'backward_euler'] | None]
     passes: Variable[int, int | None]
+    coupling_tolerance: Variable[float, float | None]
     slip_law: Variable[Literal['physical', 'thesis'], Literal['physical', 'thesis'] | None]
     interpolation: Variable[Literal['cubic', 'linear'], Literal['cubic', 'linear'] | None]
     precision: Variable[Literal['double', 'mixed'], Literal['double', 'mixed'] | None]
