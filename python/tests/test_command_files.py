@@ -131,7 +131,8 @@ def estimated(program, folder, text):
     (folder / "case.nml").write_text(text)
     told = subprocess.run([program, "check", "case.nml"], cwd=folder, check=True,
                           capture_output=True, text=True).stdout
-    number, unit = re.search(r"^! time: about (\d+) (\w+?)s? on this machine", told, flags=re.M).groups()
+    number, unit = re.search(r"^! time: about (\d+) (\w+?)s? on this machine", told,
+                             flags=re.M).groups()
     return int(number) * {"second": 1, "minute": 60, "hour": 3600, "day": 86400}[unit]
 
 
