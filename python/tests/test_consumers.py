@@ -27,7 +27,7 @@ program consumer
    if (.not. allocated(error)) call new_simulation(simulation, case, error)
    if (.not. allocated(error)) call simulation%advance(error)
    if (allocated(error)) error stop error%message
-   print '(2es16.8)', simulation%row%displacement, &
+   print '(2es16.8)', simulation%state%row%displacement, &
       (0.75_dp*0.1_dp*0.02_dp/modulus)**(2.0_dp/3.0_dp)/0.02_dp
 end program consumer
 """
