@@ -27,6 +27,10 @@ THICKNESS, TRAVEL = 1e-3, 1e-3                               # m, of the default
 TEMPERATURES = (-10.0, 0.0, 10.0, 25.0, 40.0, 60.0, 80.0)    # C
 SCALES = (1 / 16, 1 / 4, 1.0, 4.0, 16.0)
 THICKNESSES = (0.25e-3, 0.5e-3, 1e-3, 2e-3, 4e-3)
+#: Two equal problems differ by rounding, and one of them may need a pass more to come within the
+#: tolerance of a step: they differ by as much as the tolerance then, which is therefore ten times
+#: finer than the difference that the study allows.
+TOLERANCE, ALLOWED = 1e-7, 1e-6
 #: What keeps a thick block from numerical stick-slip.
 HEAVY: dict[str, Any] = dict(density=100.0, passes=0)
 
@@ -58,7 +62,7 @@ def _runs(folder: Path, cells: int, cases: list[dict[str, float]]) -> list[dict[
         friction=dict(law="coulomb", coefficient=1.0),
         phase=[dict(pressure=PRESSURE, duration=1.0, steps=20),
                dict(velocity_x=1.0, duration=1.0)],
-        solver=dict(tolerance=1e-5, threads=1), output=dict(snapshot_every=0))
+        solver=dict(tolerance=TOLERANCE, threads=1), output=dict(snapshot_every=0))
     table = sweep(case, {NAMES: [_values(cells, **one) for one in cases]}, folder)
     found = []
     for run, one in zip(table.runs, cases, strict=True):
@@ -94,7 +98,11 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
     data: dict[str, Any] = {
         "temperatures": np.array(temperatures), "scales": np.array(scales),
         "thicknesses": np.array(thicknesses), "shift": np.array(shift)}
-    return data | {name: _runs(folder / name, cells, some) for name, some in cases.items()}
+    data |= {name: _runs(folder / name, cells, some) for name, some in cases.items()}
+    for kind, other in (("temperature", "shifted"), ("scale", "faster")):
+        data[f"{kind}_differs"] = [_change(*pair)
+                                   for pair in zip(data[kind], data[other], strict=True)]
+    return data
 
 
 def _change(one: dict[str, Any], other: dict[str, Any]) -> float:
@@ -104,15 +112,12 @@ def _change(one: dict[str, Any], other: dict[str, Any]) -> float:
 
 def check(data: dict[str, Any], quick: bool) -> None:
     """Hold each temperature and scale against the change of times that it is."""
-    # The same numbers but for rounding, which the iterations magnify to less than the tolerance
-    # of the solver, 1e-5. Cells of contact are whole: none may differ.
-    for kind, other in (("temperature", "shifted"), ("scale", "faster")):
-        for number, pair in enumerate(zip(data[kind], data[other], strict=True)):
-            assert _change(*pair) < 1e-6, f"{kind} {number}: differs by {_change(*pair):.2e}"
-    for scale, pair in zip(data["scales"], zip(data["scale"], data["faster"], strict=True),
-                           strict=True):
-        # powers of two change exponents only: no rounding at all
-        assert _change(*pair) == 0.0, f"scale {scale}: differs by {_change(*pair):.2e}"
+    # The same numbers but for rounding, and for what it makes of the iterations: see TOLERANCE.
+    # Cells of contact are whole: none may differ.
+    differs = max(*data["temperature_differs"], *data["scale_differs"])
+    assert differs < ALLOWED, f"equal problems differ by {differs:.2e}"
+    # powers of two change exponents only: no rounding at all
+    assert max(data["scale_differs"]) == 0.0, f"scales differ: {data['scale_differs']}"
     # warmer and larger are slower: less friction, on the slow side of the bell
     for kind, least in (("temperature", 0.0), ("scale", 0.25)):
         steady = np.array([item["dyn"] for item in data[kind]])[data[f"{kind}s"] >= least]
