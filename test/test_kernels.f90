@@ -115,6 +115,9 @@ contains
       call inverse%apply(u(:, :, 1), back(:, :, 1))
       call check_close(maxval(abs(back(:, :, 1) - p(:, :, 1) + sum(p(:, :, 1))/135.0_dp)), 0.0_dp, &
          1e-14_dp, 'normal: pressures but for their mean')
+      call operator%destroy()
+      call inverse%destroy()
+
       call new_convolution(operator, grid, tangential_half_space(0.3_dp, 0.7_dp), error)
       call new_inverse_convolution(inverse, grid, tangential_half_space(0.3_dp, 0.7_dp), error)
       call operator%apply_vector(p(:, :, 1), p(:, :, 2), u(:, :, 1), u(:, :, 2))
@@ -123,6 +126,8 @@ contains
       do c = 1, 2
          call check_close(sum(u(:, :, c)), 0.7_dp*sum(p(:, :, c)), 1e-13_dp, 'mean shear of a block')
       end do
+      call operator%destroy()
+      call inverse%destroy()
    end subroutine inverses_of_the_half_space
 
    !> q/(1 - nu) of the longest and of the shortest wave.
