@@ -16,7 +16,8 @@
 !> Everything is SI. Errors are values (`error_type`), an unconverged solve is an outcome.
 module asperity
    use adhesion_cg, only : adhesion_solver_type, new_adhesion_solver
-   use adhesion_potential, only : adhesion_potential_type, new_adhesion_potential
+   use adhesion_potential, only : adhesion_potential_type, new_adhesion_potential, &
+      new_tabulated_potential
    use adhesion_state, only : adhesion_problem_type
    use case_input, only : parse_case, read_case
    use case_run, only : run_type

@@ -1,7 +1,8 @@
 !> Tests of the adhesive potentials.
 module test_adhesion_potential
    use adhesion_potential, only : adhesion_potential_type, adhesive_curvature, adhesive_energy, &
-      adhesive_slope, adhesive_terms, new_adhesion_potential
+      adhesive_slope, adhesive_terms, has_smooth_potential, new_adhesion_potential, &
+      new_tabulated_potential, stiffens
    use check, only : begin_suite, check_close, check_error, check_no_error, check_that, selected
    use asperity_errors, only : error_type
    use asperity_precision, only : dp
@@ -22,6 +23,8 @@ contains
       if (selected('test_derivatives')) call test_derivatives('maugis_dugdale', -energy/range, edge=0.4_dp*range)
       if (selected('test_derivatives')) call test_derivatives('maugis_dugdale', -energy/range, edge=range)
       if (selected('bounds_of_the_range')) call bounds_of_the_range()
+      if (selected('table')) call table()
+      if (selected('table_of_a_line')) call table_of_a_line()
    end subroutine run_adhesion_potential
 
    !> The attraction of Maugis-Dugdale ends at the range; wrong names and numbers are refused together.
@@ -42,6 +45,68 @@ contains
       call check_error(error, 'energy', 'negative energy')
       call check_error(error, 'range', 'range of zero, in the same message')
    end subroutine bounds_of_the_range
+
+   !> A table of another potential is that potential, to the order of cubic interpolation; its energy, slope
+   !> and curvature belong together exactly.
+   subroutine table()
+      type(adhesion_potential_type) :: exact, made
+      type(error_type), allocatable :: error
+      integer, parameter :: intervals(2) = [100, 200]
+      character(11), parameter :: names(2) = ['exponential', 'gauss      ']
+      real(dp), parameter :: reach = 10.0_dp*range
+      real(dp) :: miss(2), gap, h, e, slope, curvature
+      integer :: k, n, pass, which
+
+      do which = 1, 2
+         call new_adhesion_potential(exact, trim(names(which)), energy, range, error)
+         do pass = 1, 2
+            n = intervals(pass)
+            call new_tabulated_potential(made, reach/n, [(adhesive_slope(exact, k*reach/n), k=0, n)], &
+               [(adhesive_curvature(exact, k*reach/n), k=0, n)], error)
+            call check_no_error(error, 'table')
+            miss(pass) = 0.0_dp
+            do k = 1, 999
+               gap = k*reach/1000.0_dp
+               miss(pass) = max(miss(pass), abs(adhesive_slope(made, gap) - adhesive_slope(exact, gap)))
+            end do
+         end do
+         call check_that(miss(2) < 1e-6_dp*energy/range .and. miss(2) < miss(1)/12.0_dp, &
+            trim(names(which))//': fourth order')
+         ! What the table leaves out beyond its end is exp(-10) of the exponential.
+         call check_close(made%energy, energy, 1e-4_dp*energy, trim(names(which))//': work of separation')
+         h = 1e-3_dp*reach/n
+         do k = 1, 20
+            gap = (k*0.37_dp + 0.01_dp)*range
+            call adhesive_terms(made, gap, e, slope, curvature)
+            call check_close(slope, (adhesive_energy(made, gap + h) - adhesive_energy(made, gap - h)) &
+               /(2*h), 1e-7_dp*energy/range, trim(names(which))//': slope of the energy')
+            call check_close(curvature, (adhesive_slope(made, gap + h) - adhesive_slope(made, gap - h)) &
+               /(2*h), 1e-6_dp*energy/range**2, trim(names(which))//': slope of the attraction')
+         end do
+         call check_close(adhesive_energy(made, reach), 0.0_dp, 0.0_dp, 'nothing beyond the end')
+         call check_that(stiffens(made) .eqv. stiffens(exact), trim(names(which))//': stiffens')
+         call check_that(has_smooth_potential(made), 'a table is smooth')
+      end do
+      call check_close(made%range, sqrt(0.5_dp*exp(1.0_dp))*range, 2e-3_dp*range, 'unit of length of gauss')
+   end subroutine table
+
+   !> One interval with an attraction that falls linearly, by hand; wrong tables are refused.
+   subroutine table_of_a_line()
+      type(adhesion_potential_type) :: made
+      type(error_type), allocatable :: error
+
+      call new_tabulated_potential(made, 2.0_dp, [6.0_dp, 0.0_dp], [-3.0_dp, -3.0_dp], error)
+      call check_no_error(error, 'a line')
+      call check_close(adhesive_energy(made, 0.0_dp), -6.0_dp, 1e-14_dp, 'energy of touch')
+      call check_close(adhesive_energy(made, 1.0_dp), -1.5_dp, 1e-14_dp, 'energy half way')
+      call check_close(adhesive_slope(made, 1.0_dp), 3.0_dp, 1e-14_dp, 'attraction half way')
+      call check_close(adhesive_curvature(made, 0.5_dp), -3.0_dp, 1e-14_dp, 'curvature')
+      call check_close(made%range, 1.0_dp, 1e-14_dp, 'unit of length')
+      call new_tabulated_potential(made, 2.0_dp, [6.0_dp, -1.0_dp], [-3.0_dp, -3.0_dp], error)
+      call check_error(error, '0 or more', 'a repulsion')
+      call new_tabulated_potential(made, 0.0_dp, [6.0_dp, 0.0_dp], [-3.0_dp, -3.0_dp], error)
+      call check_error(error, 'spacing', 'no spacing')
+   end subroutine table_of_a_line
 
    !> e' and e'' against central differences, the values at contact, and the area under e'.
    subroutine test_derivatives(name, release, edge)

@@ -275,10 +275,10 @@ contains
 
    !> Elastic normal contact with adhesion: one row of the step loop.
    subroutine contact_adhesive(height, pressure, gap, attraction, nx, ny, lx, ly, is_free, modulus, &
-      potential, energy, range_, approach, load, start, thesis, tolerance, max_iterations, old_level, &
-      level, energy_adhesive, contact_area, iterations, ffts, residual, seconds, converged, reason, &
-      status, message)
-      use adhesion_potential, only : adhesive_slope, edge_of_cells
+      potential, energy, range_, values, table, approach, load, start, thesis, tolerance, &
+      max_iterations, old_level, level, energy_adhesive, contact_area, iterations, ffts, residual, &
+      seconds, converged, reason, status, message)
+      use adhesion_potential, only : adhesive_slope, edge_of_cells, new_tabulated_potential
       use case_settings, only : adhesion_settings_type, solver_settings_type
       use contact_rule, only : touches
       use asperity_errors, only : error_type
@@ -298,6 +298,10 @@ contains
       real(c_double), intent(in) :: modulus                  !! E*, Pa
       character(len=*), intent(in) :: potential
       real(c_double), intent(in) :: energy, range_           !! J/m2 and m
+      !> Attraction, Pa, and its slope, Pa/m, at equidistant gaps from 0 to the range: the potential where
+      !> there is more than one value.
+      integer(c_int), intent(in) :: values
+      real(c_double), intent(in) :: table(values, 2)
       integer(c_int), intent(in) :: approach                 !! 1: the load is a displacement
       real(c_double), intent(in) :: load                     !! m, or mean pressure, Pa
       integer(c_int), intent(in) :: start                    !! 0: non-adhesive, 1: full contact, 2: given
@@ -348,6 +352,8 @@ contains
       if (.not. allocated(error)) call new_normal_step(side, grid, normal_half_space(0.0_dp), solver, &
          adhesion, edge_of_cells(energy, range_, modulus, merge(grid%dx, max(grid%dx, grid%dy), ny == 1)), &
          height, error)
+      if (.not. allocated(error) .and. values > 1) call new_tabulated_potential(side%potential, &
+         range_/(values - 1), table(:, 1), table(:, 2), error)
       if (.not. allocated(error)) then
          call side%solve(task, height, pressure, gap, level, outcome)
          energy_adhesive = side%energy(gap)

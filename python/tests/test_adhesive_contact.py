@@ -96,6 +96,69 @@ def test_conditions_recomputed(potential, boundary):
         assert contact.energy_elastic == pytest.approx(energy, rel=1e-6)
 
 
+LAWS = {"exponential": lambda x: np.exp(-x), "gauss": lambda x: 2 * x * np.exp(-x**2)}
+
+
+@pytest.mark.parametrize("potential", LAWS)
+@pytest.mark.parametrize(("boundary", "method"), [
+    ("periodic", "fast"), ("periodic", "thesis"), ("free", "fast")])
+def test_attraction_that_is_a_function(potential, boundary, method):
+    energy, z0 = 0.01, 0.4e-6
+    given = {"pressure": 2e4, "boundary": boundary, "tolerance": 1e-8, "method": method}
+    known = asperity.solve_adhesive(wavy(), 40e-6, 33e-6, MODULUS, potential=potential,
+                                    energy=energy, range=z0, **given)
+    calls = []
+
+    def attraction(gap):
+        calls.append(gap)
+        return energy / z0 * LAWS[potential](gap / z0)
+
+    found = asperity.solve_adhesive(wavy(), 40e-6, 33e-6, MODULUS, potential=attraction,
+                                    range=30 * z0, **given)
+    assert len(calls) == 1 and calls[0][0] == 0.0 and calls[0][-1] == 30 * z0
+    largest = known.pressure.max()
+    np.testing.assert_allclose(found.pressure, known.pressure, atol=1e-5 * largest)
+    np.testing.assert_allclose(found.adhesive_pressure, known.adhesive_pressure,
+                               atol=1e-5 * energy / z0)
+    assert found.contact_area == known.contact_area
+    assert found.energy_adhesive == pytest.approx(known.energy_adhesive, rel=1e-5)
+    assert found.converged and found.residual <= 1e-8
+
+
+def test_jump_of_a_function_is_the_jump_of_maugis():
+    given = {"range": LENGTH / 0.3, "force": 2e-5, "boundary": "free"}
+    exact = maugis(RADIUS, MODULUS, ENERGY, force=2e-5, range=LENGTH / 0.3)
+    # The attraction drops to zero at the range by itself.
+    with pytest.warns(UserWarning, match="steepest fall of the attraction"):
+        found = asperity.solve_adhesive(sphere(96, 44e-6), 44e-6, None, MODULUS, **given,
+                                        potential=lambda gap: 0 * gap + ENERGY / given["range"])
+    assert radius_of(found, 44e-6) == pytest.approx(exact.contact_radius, rel=0.02)
+    assert found.displacement == pytest.approx(exact.approach, abs=0.04 * LENGTH)
+
+
+@pytest.mark.parametrize(("potential", "more", "said"), [
+    (lambda gap: -gap, {}, "attraction at the gap .* must be finite and 0 or more"),
+    (lambda gap: np.full_like(gap, np.nan), {}, "must be finite"),
+    (lambda gap: 1.0, {}, r"returns shape \(\) for gaps of shape"),
+    (lambda gap: "no", {}, "could not convert"),
+    (lambda: 1.0, {}, "must take an array of gaps"),
+    (lambda gap: 0 * gap, {"energy": 1.0}, "must be left out"),
+    ("exponential", {}, "energy: is missing")])
+def test_functions_that_are_refused(potential, more, said):
+    with pytest.raises(ValueError, match=said):
+        asperity.solve_adhesive(wavy(), 40e-6, 33e-6, MODULUS, potential=potential, range=1e-6,
+                                pressure=1e4, **more)
+
+
+def test_function_without_attraction_is_no_adhesion():
+    given = {"pressure": 3e4, "tolerance": 1e-9}
+    bare = asperity.solve_normal(wavy(), 40e-6, 33e-6, MODULUS, **given)
+    zero = asperity.solve_adhesive(wavy(), 40e-6, 33e-6, MODULUS, range=1e-7,
+                                   potential=np.zeros_like, **given)
+    np.testing.assert_allclose(zero.pressure, bare.pressure, atol=1e-4 * bare.pressure.max())
+    assert zero.energy_adhesive == 0.0
+
+
 def test_controls_agree_and_force_is_the_derivative_of_the_energy():
     pressed = press(48, range=LENGTH, potential="exponential", force=1e-5, tolerance=1e-9)
     driven = press(48, range=LENGTH, potential="exponential", tolerance=1e-9,

@@ -16,6 +16,12 @@
 !>     e = -gamma_0/z_0 (z_0 + edge - g)^2/(4 edge)        for |g - z_0| < edge.
 !> The work of separation, and all else, stays what it is. `edge_of_cells` is the least width that frees
 !> the contact.
+!>
+!> Any other potential is given by a table of its attraction, `new_tabulated_potential`: cubic Hermite
+!> interpolation between equidistant gaps, and nothing beyond the last. The energy is the exact integral of
+!> the interpolated attraction and the curvature its derivative, so the solvers meet one consistent
+!> potential. The kernels call these functions in parallel loops, where a procedure of the user, or of
+!> Python, could not be called.
 module adhesion_potential
    use asperity_errors, only : add_fault, error_input, error_type
    use asperity_precision, only : dp
@@ -23,12 +29,14 @@ module adhesion_potential
    private
 
    public :: adhesion_potential_type, adhesive_curvature, adhesive_energy, adhesive_slope, &
-      adhesive_terms, has_smooth_potential, edge_of_cells, new_adhesion_potential
+      adhesive_terms, has_smooth_potential, edge_of_cells, new_adhesion_potential, &
+      new_tabulated_potential, stiffens
 
    integer, parameter, public :: potential_none = 0
    integer, parameter, public :: potential_exponential = 1
    integer, parameter, public :: potential_gauss = 2
    integer, parameter, public :: potential_maugis_dugdale = 3
+   integer, parameter, public :: potential_table = 4
 
    real(dp), parameter :: edge_width = 1.0_dp  !! half width of the edge in gamma_0/z_0 dx/E*
    real(dp), parameter :: far = 40.0_dp        !! exp(-far) is nothing beside 1
@@ -38,6 +46,10 @@ module adhesion_potential
       real(dp) :: energy = 0.0_dp              !! gamma_0, J/m2, >= 0
       real(dp) :: range = 0.0_dp               !! z_0, m, > 0 (0 for 'none')
       real(dp) :: edge = 0.0_dp                !! half width of the edge, m, 0 to z_0; maugis_dugdale
+      real(dp) :: spacing = 0.0_dp             !! h, of the gaps of a table, m
+      !> [0:4, n] Per interval of a table, with t = (g - g_k)/h from 0 to 1: the energy at its end, J/m2,
+      !> and the attraction sum_j table(j, k) t^(j-1), Pa, for j = 1 to 4.
+      real(dp), allocatable :: table(:, :)
    end type adhesion_potential_type
 
 contains
@@ -79,6 +91,55 @@ contains
       self%edge = min(edge, range)
    end subroutine new_adhesion_potential
 
+   !> Make a potential from its attraction e' at the gaps 0, h, 2h, ... The last value should be 0: beyond
+   !> it there is no attraction. The unit of length `range` becomes energy/(largest attraction), which is
+   !> z_0 of the exponential and Maugis-Dugdale potentials, or the gap of the largest attraction if that
+   !> is longer.
+   subroutine new_tabulated_potential(self, spacing, attraction, slope, error)
+      type(adhesion_potential_type), intent(out) :: self
+      real(dp), intent(in) :: spacing          !! h, m, > 0
+      real(dp), intent(in) :: attraction(:)    !! e', Pa, >= 0, two values or more
+      real(dp), intent(in) :: slope(:)         !! e'' at the same gaps, Pa/m
+      type(error_type), allocatable, intent(out) :: error
+      real(dp) :: start, rise, first, last
+      integer :: k, n
+
+      n = size(attraction) - 1
+      if (n < 1 .or. size(slope) /= n + 1 .or. .not. (spacing > 0.0_dp .and. spacing <= huge(1.0_dp))) then
+         call add_fault(error, error_input, 'adhesion: a table needs a positive spacing, and two values '// &
+            'or more of the attraction and of its slope')
+      else if (.not. (all(attraction >= 0.0_dp .and. attraction <= huge(1.0_dp)) .and. &
+         all(abs(slope) <= huge(1.0_dp)))) then
+         call add_fault(error, error_input, 'adhesion: the attraction of a table must be 0 or more, and '// &
+            'its slope finite')
+      end if
+      if (allocated(error)) return
+      self%kind = potential_table
+      self%spacing = spacing
+      allocate (self%table(0:4, n))
+      do k = n, 1, -1
+         start = attraction(k)
+         rise = attraction(k + 1) - start
+         first = spacing*slope(k)
+         last = spacing*slope(k + 1)
+         self%table(0, k) = -self%energy
+         self%table(1:4, k) = [start, first, 3.0_dp*rise - 2.0_dp*first - last, first + last - 2.0_dp*rise]
+         self%energy = self%energy + spacing*(start + 0.5_dp*rise + (first - last)/12.0_dp)
+      end do
+      self%range = spacing*(maxloc(attraction, dim=1) - 1)
+      if (maxval(attraction) > 0.0_dp) self%range = max(self%range, self%energy/maxval(attraction))
+      if (.not. self%range > 0.0_dp) self%range = n*spacing
+   end subroutine new_tabulated_potential
+
+   !> Does the attraction grow with the gap somewhere, so that e'' adds to the stiffness there?
+   pure function stiffens(self)
+      type(adhesion_potential_type), intent(in) :: self
+      logical :: stiffens
+
+      stiffens = self%kind == potential_gauss
+      if (self%kind == potential_table) stiffens = any(self%table(2, :) > 0.0_dp)
+   end function stiffens
+
    !> Is e' continuous?
    pure function has_smooth_potential(self) result(smooth)
       type(adhesion_potential_type), intent(in) :: self
@@ -95,7 +156,7 @@ contains
       real(dp) :: x, slope, curvature
 
       value = 0.0_dp
-      if (gap >= far*self%range) return
+      if (is_far(self, gap)) return
       x = gap/self%range
       select case (self%kind)
       case (potential_exponential)
@@ -104,6 +165,8 @@ contains
          value = -self%energy*exp(-x**2)
       case (potential_maugis_dugdale)
          call constant_terms(self, gap, value, slope, curvature)
+      case (potential_table)
+         call table_terms(self, gap, value, slope, curvature)
       end select
    end function adhesive_energy
 
@@ -115,7 +178,7 @@ contains
       real(dp) :: x, energy, curvature
 
       value = 0.0_dp
-      if (gap >= far*self%range) return
+      if (is_far(self, gap)) return
       x = gap/self%range
       select case (self%kind)
       case (potential_exponential)
@@ -124,6 +187,8 @@ contains
          value = 2.0_dp*self%energy/self%range*x*exp(-x**2)
       case (potential_maugis_dugdale)
          call constant_terms(self, gap, energy, value, curvature)
+      case (potential_table)
+         call table_terms(self, gap, energy, value, curvature)
       end select
    end function adhesive_slope
 
@@ -135,7 +200,7 @@ contains
       real(dp) :: x, energy, slope
 
       value = 0.0_dp
-      if (gap >= far*self%range) return
+      if (is_far(self, gap)) return
       x = gap/self%range
       select case (self%kind)
       case (potential_exponential)
@@ -144,6 +209,8 @@ contains
          value = 2.0_dp*self%energy/self%range**2*(1.0_dp - 2.0_dp*x**2)*exp(-x**2)
       case (potential_maugis_dugdale)
          call constant_terms(self, gap, energy, slope, value)
+      case (potential_table)
+         call table_terms(self, gap, energy, slope, value)
       end select
    end function adhesive_curvature
 
@@ -159,7 +226,7 @@ contains
       energy = 0.0_dp
       slope = 0.0_dp
       curvature = 0.0_dp
-      if (gap >= far*self%range) return
+      if (is_far(self, gap)) return
       x = gap/self%range
       select case (self%kind)
       case (potential_exponential)
@@ -173,8 +240,42 @@ contains
          curvature = (1.0_dp - 2.0_dp*x**2)*y/self%range
       case (potential_maugis_dugdale)
          call constant_terms(self, gap, energy, slope, curvature)
+      case (potential_table)
+         call table_terms(self, gap, energy, slope, curvature)
       end select
    end subroutine adhesive_terms
+
+   !> Is there no attraction at a gap?
+   pure function is_far(self, gap)
+      type(adhesion_potential_type), intent(in) :: self
+      real(dp), intent(in) :: gap              !! m, >= 0
+      logical :: is_far
+
+      if (self%kind == potential_table) then
+         is_far = gap >= size(self%table, 2)*self%spacing
+      else
+         is_far = gap >= far*self%range
+      end if
+   end function is_far
+
+   !> The terms of a table at a gap within it.
+   pure subroutine table_terms(self, gap, energy, slope, curvature)
+      type(adhesion_potential_type), intent(in) :: self
+      real(dp), intent(in) :: gap              !! m, >= 0
+      real(dp), intent(out) :: energy, slope, curvature
+      real(dp) :: t, c(4)
+      integer :: k
+
+      t = gap/self%spacing
+      k = min(int(t) + 1, size(self%table, 2))
+      t = t - (k - 1)
+      c = self%table(1:4, k)
+      slope = c(1) + t*(c(2) + t*(c(3) + t*c(4)))
+      curvature = (c(2) + t*(2.0_dp*c(3) + t*3.0_dp*c(4)))/self%spacing
+      ! table(0, k) is the energy at the end of the interval: the attraction from here to there is missing.
+      energy = self%table(0, k) - self%spacing*(c(1) + c(2)/2.0_dp + c(3)/3.0_dp + c(4)/4.0_dp &
+         - t*(c(1) + t*(c(2)/2.0_dp + t*(c(3)/3.0_dp + t*c(4)/4.0_dp))))
+   end subroutine table_terms
 
    !> The same of maugis_dugdale: a constant attraction, and the edge of its range.
    pure subroutine constant_terms(self, gap, energy, slope, curvature)

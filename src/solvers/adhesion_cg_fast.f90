@@ -34,7 +34,7 @@ module adhesion_cg_fast
    use adhesion_directions, only : adhesion_iteration_type, adhesion_work_type, find_direction, fresh, &
       measure, updated
    use adhesion_patch, only : is_detached, new_adhesion_patch
-   use adhesion_potential, only : potential_gauss
+   use adhesion_potential, only : stiffens
    use adhesion_preconditioner, only : new_adhesion_preconditioner
    use adhesion_state, only : adhesion_method_type, adhesion_problem_type, control_approach, &
       reason_closed, reason_converged, reason_detached, reason_limit, reason_stalled
@@ -146,7 +146,7 @@ contains
       type(step_type) :: step
 
       self%work%scaling = 0.0_dp
-      if (now%problem%potential%kind == potential_gauss) &
+      if (stiffens(now%problem%potential)) &
          self%work%scaling = 0.02_dp*now%problem%modulus*self%work%patch%nyquist
       self%work%direction = 0.0_dp
       self%work%residual = 0.0_dp

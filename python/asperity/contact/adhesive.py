@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,6 +18,7 @@ __all__ = ["AdhesiveNormalContact", "solve_adhesive"]
 
 POTENTIALS = ("exponential", "gauss", "maugis_dugdale")
 STARTS = ("non_adhesive", "full_contact")
+INTERVALS = 4096  # of the table of an attraction that is a function
 
 _solve = library.call("contact_adhesive")
 
@@ -50,8 +52,8 @@ def solve_adhesive(
     ly: float | None,
     modulus: float,
     *,
-    potential: str = "exponential",
-    energy: float,
+    potential: str | Callable[[FloatArray], ArrayLike] = "exponential",
+    energy: float | None = None,
     range: float,
     pressure: float | None = None,
     force: float | None = None,
@@ -75,14 +77,18 @@ def solve_adhesive(
         Lengths, m; ``ly = None`` means square cells.
     modulus : float
         Contact modulus E* = E/(1 - nu^2) = 2 G/(1 - nu), Pa.
-    potential : str
-        'exponential', 'gauss' or 'maugis_dugdale'.
+    potential : str or callable
+        'exponential', 'gauss' or 'maugis_dugdale'; or a function of your own, which takes an array
+        of gaps, m, and returns the attraction there, Pa, 0 or more. The function is called once,
+        for 4097 equidistant gaps from 0 to `range`; between them the attraction is interpolated.
     energy : float
-        Work of adhesion, J/m2, >= 0.
+        Work of adhesion, J/m2, >= 0. With a function it is the integral of the attraction, and must
+        be left out.
     range : float
-        Range of the attraction, m. Cells should be smaller than 0.7 modulus range^2/energy
-        (maugis_dugdale: modulus range^2/energy), or the edge of the contact sticks to the grid:
-        a warning says so.
+        Range of the attraction, m. With a function: the gap beyond which there is none.
+        Cells should be smaller than 0.7 modulus range^2/energy (maugis_dugdale: modulus
+        range^2/energy; a function: 0.7 modulus over the steepest fall of the attraction, Pa/m), or
+        the edge of the contact sticks to the grid: a warning says so.
     pressure, force, displacement : float
         The load, one of: mean pressure, Pa; force, N; approach from the first touch, m. Negative
         values pull.
@@ -118,13 +124,21 @@ def solve_adhesive(
     ...                                   displacement=0.0, boundary="free")
     >>> contact.force < 0 < contact.contact_area
     True
+
+    An attraction that first stays and then falls linearly to zero:
+
+    >>> import numpy as np
+    >>> contact = asperity.solve_adhesive(
+    ...     sphere, 40e-6, None, 4e6, displacement=0.0, boundary="free", range=0.6e-6,
+    ...     potential=lambda gap: 0.1e6 * np.clip(2 - gap / 0.3e-6, 0, 1))
+    >>> contact.force < 0 < contact.contact_area
+    True
     """
     array, lx, ly, free = library.contact_map(height, lx, ly, boundary)
     shape = np.shape(height)
     modulus = positive("modulus", modulus)
-    choice("potential", potential, POTENTIALS)
-    energy = number("energy", energy, 0.0)
     range = positive("range", range)
+    name, energy, table = _attraction(potential, energy, range)
     tolerance = positive("tolerance", tolerance)
     steps = whole("max_iterations", max_iterations)
     thesis = choice("method", method, ("fast", "thesis")) == "thesis"
@@ -139,12 +153,12 @@ def solve_adhesive(
     if control == "force":
         load /= lx * ly
 
-    _look_at_cells(array.shape, lx, ly, modulus, potential, energy, range)
+    _look_at_cells(array.shape, lx, ly, modulus, name, energy, range, table)
     traction, gap, attraction = (np.zeros_like(array) for _ in "pga")
     level, origin = _start_from(start, shape, top, traction, gap)
     level, stuck, area, iterations, ffts, residual, seconds, converged, reason = _solve(
-        array.T, traction.T, gap.T, attraction.T, lx, ly, free, modulus, potential, energy, range,
-        int(control == "displacement"), load, origin, int(thesis), tolerance, steps, level)
+        array.T, traction.T, gap.T, attraction.T, lx, ly, free, modulus, name, energy, range,
+        table, int(control == "displacement"), load, origin, int(thesis), tolerance, steps, level)
     mean = float(traction.mean())
     displaced = gap + array + level
     result = AdhesiveNormalContact(
@@ -161,17 +175,60 @@ def solve_adhesive(
     return result
 
 
+def _attraction(potential: str | Callable[[FloatArray], ArrayLike], energy: float | None,
+                reach: float) -> tuple[str, float, FloatArray]:
+    """Return the name of a potential, its energy and the table of a function; (1, 2) without."""
+    if not callable(potential):
+        if energy is None:
+            raise ValueError("energy: is missing: the work of adhesion, J/m2")
+        choice("potential", potential, POTENTIALS)
+        return potential, number("energy", energy, 0.0), np.zeros((1, 2), order="F")
+    if energy is not None:
+        raise ValueError(f"energy = {energy!r}: must be left out where the potential is a function:"
+                         " it is the integral of the attraction")
+    from scipy.interpolate import Akima1DInterpolator, CubicHermiteSpline
+
+    gaps = np.linspace(0.0, reach, INTERVALS + 1)
+    try:
+        values = np.array(potential(gaps), dtype=np.float64)
+    except TypeError as error:
+        raise ValueError(f"potential: the function must take an array of gaps and return an array"
+                         f" of real numbers: {error}") from error
+    if values.shape != gaps.shape:
+        raise ValueError(f"potential: the function returns shape {values.shape} for gaps of shape"
+                         f" {gaps.shape}: must be the same")
+    wrong = np.flatnonzero(~((values >= 0.0) & np.isfinite(values)))
+    if wrong.size:
+        first = wrong[0]
+        raise ValueError(f"potential: the attraction at the gap {gaps[first]:g} m is"
+                         f" {values[first]:g} Pa: must be finite and 0 or more")
+    values[-1] = 0.0  # the attraction ends there, if it has not before
+    # Akima's slopes do not overshoot beside a jump; within these bounds no cubic falls below zero.
+    slopes = Akima1DInterpolator(gaps, values).derivative()(gaps)
+    steepest = 3.0 * values * INTERVALS / reach
+    slopes[:-1] = np.maximum(slopes[:-1], -steepest[:-1])
+    slopes[1:] = np.minimum(slopes[1:], steepest[1:])
+    work = float(CubicHermiteSpline(gaps, values, slopes).integrate(0.0, reach))
+    return "exponential", work, np.asfortranarray(np.stack([values, slopes], axis=1))
+
+
 def _look_at_cells(shape: tuple[int, int], lx: float, ly: float, modulus: float, potential: str,
-                   energy: float, reach: float) -> None:
+                   energy: float, reach: float, table: FloatArray) -> None:
     """Warn if the cells are too large for the range of the attraction."""
     if energy <= 0.0:
         return
     cell = lx / shape[1] if shape[0] == 1 else max(lx / shape[1], ly / shape[0])
-    share, formula = (1.0, "") if potential == "maugis_dugdale" else (0.7, "0.7 ")
-    limit = share * modulus * reach**2 / energy
+    if len(table) > 1:
+        fall = -float(np.diff(table[:, 0]).min()) * (len(table) - 1) / reach
+        limit = 0.7 * modulus / fall
+        formula = "0.7 modulus over the steepest fall of the attraction"
+    elif potential == "maugis_dugdale":
+        limit, formula = modulus * reach**2 / energy, "modulus range^2/energy"
+    else:
+        limit, formula = 0.7 * modulus * reach**2 / energy, "0.7 modulus range^2/energy"
     if cell > limit:
         warnings.warn(
-            f"cells of {cell:.4g} m are larger than {formula}modulus range^2/energy ="
+            f"cells of {cell:.4g} m are larger than {formula} ="
             f" {limit:.4g} m: the edge of the contact sticks to the grid",
             UserWarning, stacklevel=3)
 
