@@ -31,6 +31,8 @@ LONG_STEPS = "longer than the shortest active relaxation time"
 LONG_WAYS = "a step moves the road by"
 #: Waves of few cells, in short forms.
 FEW_CELLS = "the shortest wave has"
+#: Contacts of few cells.
+SMALL_CONTACTS = "cells across on average"
 #: Waves as long as the map.
 LONG_WAVES = "is not below the side of"
 #: Cells too wide for the range of adhesion.

@@ -46,8 +46,12 @@ class Road:
             solver=dict(tolerance=tolerance, threads=1), output=dict(snapshot_every=0))
 
 
-def sweep(case: asperity.Case, parameters: dict[Any, Any], folder: Any) -> asperity.Sweep:
-    """Run a case with other values; results that are there are kept."""
+def sweep(case: asperity.Case, parameters: dict[Any, Any], folder: Any,
+          *said: str) -> asperity.Sweep:
+    """Run a case with other values; results that are there are kept.
+
+    `said` are warnings that are expected beside that of long steps.
+    """
     # At rest the steps grow with the time that has passed, and arm after arm falls still.
-    with common.expected(common.LONG_STEPS):
+    with common.expected(common.LONG_STEPS, *said):
         return asperity.sweep(case, parameters, folder=folder, jobs=common.jobs, quiet=True)

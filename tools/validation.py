@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import sys
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -27,6 +28,9 @@ import asperity
 from asperity import theory
 from asperity.material import Prony
 from asperity.plot import COLOURS
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python" / "tests"))
+from coupled_reference import Block
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 DOCS = Path(__file__).resolve().parents[1] / "docs"
@@ -658,6 +662,145 @@ def block() -> Chapter:
         "| --- | --- | --- | --- | --- |\n" + "\n".join(lines))
 
 
+def steep_map(slope: float, nx: int = 9, ny: int = 6, length: float = 1e-3) -> FloatArray:
+    """Return a periodic map of three waves with an rms slope."""
+    dx = length / nx
+    x, y = np.meshgrid(np.arange(nx) * dx, np.arange(ny) * dx)
+    height, square = np.zeros_like(x), 0.0
+    for i, j, phase in ((1, 0, 3.0), (1, 1, 1.0), (2, 0, 5.0)):
+        k = 2 * math.pi * np.array([i / length, j / (ny * dx)])
+        height += np.cos(k[0] * x + k[1] * y + phase) / np.hypot(*k)
+        square += 0.5
+    return height * slope / math.sqrt(square)
+
+
+def steep() -> Chapter:
+    """Drive a block over steep roads: whole steps against a dense Newton method."""
+    nx, ny, length, mu, dt = 9, 6, 1e-3, 0.8, 5e-4
+    arms = [(2e6, 2e-4), (1e6, 3e-3)]
+    rows, lines = [], []
+    for slope in (0.2, 0.3, 0.4, 0.5):
+        height = steep_map(slope, nx, ny, length)
+        path = Path(run.folder) / f"steep_{slope}.h5"
+        with h5py.File(path, "w") as file:
+            file["surface"] = height
+        pressure = 1.6e6 * slope
+        text = f"""&grid nx = {nx}, ny = {ny}, lx = {length}, ly = {ny * length / nx!r} /
+&surface shape = 'file', file = '{path}' /
+&material poisson = 0.4, shear_modulus = 1e6, thickness = 0.5e-3, prony_g = 2e6, 1e6,
+          prony_tau = 2e-4, 3e-3 /
+&friction law = 'coulomb', coefficient = {mu} /
+&phase pressure = {pressure!r} /
+&phase velocity_x = 0.1, velocity_y = 0.04, duration = {6 * dt}, steps = 6 /
+&phase pressure = {pressure / 2!r} /
+&solver tolerance = 1e-9, time_scheme = 'exponential', passes = PASSES /
+&output snapshot_every = 1 /
+"""
+        result = run(text.replace("PASSES", "0"))
+        block = Block(height, length / nx, poisson=0.4, thickness=0.5e-3, long_term=1e6, arms=arms,
+                      coefficient=mu)
+        steps = [(pressure, (0.0, 0.0), 0.0)] + 6 * [(pressure, (0.1 * dt, 0.04 * dt), dt)] + [
+            (pressure / 2, (0.0, 0.0), 0.0)]
+        worst = left = 0.0
+        known = []
+        for snapshot, step in zip(result.snapshots, steps, strict=True):
+            left = max(left, block.step(*step))
+            known.append(block.traction[0].mean())
+            worst = max(worst, *(
+                np.abs(found.ravel() - exact).max() / block.pressure.max() for found, exact in (
+                    (snapshot.pressure, block.pressure), (snapshot.traction_x, block.traction[0]),
+                    (snapshot.traction_y, block.traction[1]))))
+        history = result.history
+        rows += [Row(f"traction along x, rms slope {slope}, step 6", history["traction_x"][6] / 1e3,
+                     known[6] / 1e3, "kPa"),
+                 Row(f"traction along x, rms slope {slope}, half the load",
+                     history["traction_x"][7] / 1e3, known[7] / 1e3, "kPa")]
+        two = run(text.replace("PASSES", "2, coupling_tolerance = 1")).history["traction_x"]
+        lines.append(f"| {slope} | {history['passes'][1:].max()} | {worst:.1e} | {left:.1e} "
+                     f"| {100 * (two[6] / known[6] - 1):+.2g} % "
+                     f"| {100 * (two[7] / known[7] - 1):+.2g} % |")
+    return Chapter(
+        "A steep road",
+        "Three waves under a viscoelastic block (ν = 0.4, two arms, half a wavelength thick, µ ="
+        " 0.8): pressed, driven obliquely for six steps of a third of a cell, then half the load is"
+        " taken away at once. The reference knows nothing of the program: Newton's method on the"
+        " pressures and tractions of all cells together, with dense matrices, for each whole step"
+        " (python/tests/coupled_reference.py). The table has the most passes that a row took, the"
+        " largest difference of pressure and traction of any cell in any row, relative to the"
+        " largest pressure, the residual of the reference, and the error of the mean traction,"
+        " after six steps and under half the load, where only two passes are allowed"
+        " (`passes = 2`).\n\n"
+        "| rms slope | passes | all cells, all rows | reference | two passes | two passes, half the"
+        " load |\n| --- | --- | --- | --- | --- | --- |\n" + "\n".join(lines), rows)
+
+
+def drop() -> Chapter:
+    """Take away a part of the load of a sphere in partial slip: Cattaneo and Mindlin."""
+    radius, modulus, mu, side = 10e-3, 1e6, 0.01, 2.7e-3
+    load = 8 * modulus * 1e-9 / (3 * radius)
+    shift = 0.4 * mu * 1e-6 / radius
+    rows = []
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+    for factor, colour in ((0.9, GREEN), (0.5, BLUE)):
+        result = run(f"""&grid nx = 192, ny = 192, lx = {side}, boundary = 'free' /
+&surface shape = 'paraboloid', radius = {radius} /
+&material poisson = 0, shear_modulus = {modulus} /
+&friction law = 'coulomb', coefficient = {mu}, slope_effect = .false. /
+&phase force = {load!r} /
+&phase velocity_x = 1e-3, duration = {shift / 1e-3!r}, steps = 8 /
+&phase force = {factor * load!r}, velocity_x = 1e-3, duration = {shift / 1e-3!r}, steps = 8 /
+&solver tolerance = 1e-8 /
+&output snapshot_every = 1 /
+""")
+        history = result.history
+        found, way = history["traction_x"] * side**2, history["road_x"]
+
+        def known(force: float, way: FloatArray) -> tuple[FloatArray, FloatArray]:
+            """Return force and stick radius, from the depths: d(c) = d(a) - shift/mu."""
+            depth = 1e-4 * (force / load) ** (2 / 3)
+            return (theory.mindlin(radius, modulus, 0.0, mu, force, shift=way).tangential,
+                    np.sqrt(radius * np.maximum(depth - way / mu, 0.0)))
+
+        fine = np.linspace(shift, 2 * shift, 60)
+        left.plot(np.linspace(0, shift, 60) * 1e6, known(load, np.linspace(0, shift, 60))[0] * 1e6,
+                  color="grey")
+        left.plot(fine * 1e6, known(factor * load, fine)[0] * 1e6, color=colour,
+                  label=f"theory, {factor} of the load")
+        left.plot(way * 1e6, found * 1e6, "o", ms=4, mfc="none", color=colour)
+        snapshot = next(one for one in result.snapshots if one.step == 9)
+        x = result.grid.x - side / 2
+        middle = snapshot.traction_x[95:97].mean(axis=0)
+        near = np.abs(x) < 1.1e-3
+        right.plot(x[near] * 1e3, middle[near] / 1e3, color=colour,
+                   label=f"traction, {factor} of the load")
+        right.plot(x[near] * 1e3, mu * snapshot.pressure[95:97].mean(axis=0)[near] / 1e3, ":",
+                   color=colour)
+        stick = np.sqrt(history["stick_area"] / math.pi) * side
+        for row, when in ((9, "at once"), (13, f"shift {way[13] * 1e6:.3g} µm"),
+                          (17, f"shift {way[17] * 1e6:.3g} µm")):
+            force, radius_known = known(factor * load, way[row])
+            rows.append(Row(f"tangential force, {factor} of the load, {when}", found[row] * 1e6,
+                            float(force) * 1e6, "µN"))
+            if radius_known > 0 and row == 9:
+                rows.append(Row(f"stick radius, {factor} of the load, {when}", stick[row] * 1e3,
+                                float(radius_known) * 1e3, "mm"))
+    left.set(xlabel="Shift of the sphere (µm)", ylabel="Tangential force (µN)")
+    left.legend(title="circles: Asperity")
+    right.set(xlabel="x (mm), right after the drop", ylabel="kPa")
+    right.legend(title="dotted: bound")
+    return Chapter(
+        "A drop of the load in partial slip",
+        "A sphere (R = 10 mm, G = 1 MPa, ν = 0, µ = 0.01, contact radius 1 mm) is moved sideways by"
+        f" {shift * 1e9:.3g} nm, four tenths of the way to full sliding; then a tenth or half of"
+        " the load is taken away at once, and the sphere is moved on. No time passes in the drop"
+        " and the sphere does not move, yet the points whose traction exceeds the bound slip back,"
+        " and they load their neighbours. With proportional slip the state is that of Cattaneo and"
+        " Mindlin under the new load. Free boundary, 192 x 192 cells, 142 over the contact at"
+        " first. The stick radius counts cells.",
+        rows, finish(figure, "drop.png"),
+        "Tangential force against the shift; tractions on the middle line right after the drop.")
+
+
 CHAPTERS: dict[str, Callable[[], Chapter]] = {
     "hertz": hertz,
     "westergaard": westergaard,
@@ -668,6 +811,8 @@ CHAPTERS: dict[str, Callable[[], Chapter]] = {
     "adhesion": adhesion,
     "mindlin": mindlin,
     "cylinder": cylinder,
+    "steep": steep,
+    "drop": drop,
     "books": books,
     "kink": kink,
     "block": block,
