@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from browser import BROWSER, Browser
 from conftest import PATIENCE
+from slurm import HAS_SLURM, Slurm
 
 import asperity
 from asperity.__main__ import main
@@ -257,6 +258,20 @@ def test_a_job_array_fills_the_folder(tmp_path, monkeypatch):
     gathered = run_curve(plan, tmp_path / "runs", slurm, quiet=True)
     assert (tmp_path / "calls").read_text() == call  # nothing was submitted again
     same(gathered, curve_of(plan, tmp_path / "here"))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not HAS_SLURM, reason="no Slurm that this user may start")
+def test_the_same_through_slurm(tmp_path):
+    """A real one, of this machine: submitted, waited for, gathered."""
+    plan = small_plan()
+    with Slurm() as slurm:
+        means = Means(1, slurm="--time=10 --partition=short")
+        with pytest.raises(SubmittedError, match="2 runs submitted to Slurm as job"):
+            run_curve(plan, tmp_path / "runs", means, quiet=True)
+        slurm.drain()
+        found = run_curve(plan, tmp_path / "runs", means, quiet=True)
+    same(found, curve_of(plan, tmp_path / "alone"))
 
 
 def test_jobs_in_the_queue_are_not_submitted_again(tmp_path, monkeypatch):

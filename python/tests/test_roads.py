@@ -6,10 +6,18 @@ import pytest
 
 import asperity
 from asperity import theory
-from asperity.roads.joins import JOINS, join, load_at_join, margin_of, smooth_part, strip
+from asperity.roads.joins import (
+    JOINS,
+    _cheapest_line,
+    join,
+    load_at_join,
+    margin_of,
+    smooth_part,
+    strip,
+)
 from asperity.roads.measured import MeasuredSurface
 from asperity.roads.outliers import find_outliers
-from asperity.roads.patches import MeasuredRoad, low_pass
+from asperity.roads.patches import MeasuredRoad, low_pass, rested
 from asperity.roads.spectra import Spectrum, isotropic_of_profile, join_spectra, spectrum_of_map
 
 
@@ -26,10 +34,10 @@ def jump(height):
     return across / inside
 
 
-@pytest.mark.parametrize("method", JOINS[:4])
+@pytest.mark.parametrize("method", JOINS[:5])
 def test_joined_patches_are_periodic(method):
     height, _ = road()
-    margin = margin_of(96) if method == "blend" else 0
+    margin = margin_of(96, method)
     part = height[20 : 116 + margin, 30 : 126 + margin]
     assert jump(part[:96, :96]) > 2.0
     joined = join(part, method, (96, 96))
@@ -38,7 +46,7 @@ def test_joined_patches_are_periodic(method):
     # the inside is that of the road, but for what carries the jumps
     inner = slice(24, 72)
     change = joined[inner, inner] - part[inner, inner]
-    if method in ("blend", "mirror"):
+    if method in ("seam", "blend", "mirror"):
         np.testing.assert_allclose(change, 0.0, atol=1e-15)
     assert np.std(change) < 0.5 * np.std(part)
 
@@ -64,9 +72,9 @@ def test_blending_keeps_the_roughness():
     heights = []
     for seed in range(6):
         height, spectrum = road(seed=seed, long=0.1)
-        part = height[: 96 + margin_of(96), : 96 + margin_of(96)]
+        part = height[: 96 + margin_of(96, "blend"), : 96 + margin_of(96, "blend")]
         joined = join(part - part.mean(), "blend", (96, 96))
-        heights.append(np.var(joined[: margin_of(96)]))
+        heights.append(np.var(joined[: margin_of(96, "blend")]))
     expected = theory.psd_moments(spectrum.wavenumber, spectrum.psd)[0] ** 2
     assert np.mean(heights) == pytest.approx(expected, rel=0.2)
 
@@ -74,29 +82,101 @@ def test_blending_keeps_the_roughness():
 def test_load_at_the_join():
     """A uniform pressure has equal shares; a frame that carries all is seen."""
     even = np.ones((64, 64))
-    for method in JOINS[:4]:
+    for method in JOINS[:5]:
         load, area = load_at_join(even, method)
         assert load == pytest.approx(area) and 0.1 < area < 0.45
     frame = strip((64, 64), 0.125).astype(float)
     assert load_at_join(frame, "smooth") == (1.0, pytest.approx(frame.mean()))
 
 
-def test_the_window_unloads_its_frame_and_blending_does_not():
+def test_the_window_unloads_its_frame_and_the_default_does_not():
     """What tools/joins.py measures on larger maps, for one map of short waves."""
     shares = {}
-    for method in ("blend", "window"):
+    for method in ("seam", "blend", "window"):
         found = []
         for seed in range(12):
             height, _ = road(seed=seed, long=0.1)
-            part = height[: 96 + margin_of(96), : 96 + margin_of(96)]
-            part = part if method == "blend" else part[:96, :96]
+            need = 96 + margin_of(96, method)
+            part = height[:need, :need]
             map_ = low_pass(join(part, method, (96, 96)), 0.375, 0.375, 6 / 256)
             solved = asperity.solve_normal(map_, 0.375, 0.375, 1.0, pressure=2e-3, tolerance=1e-4)
             load, area = load_at_join(solved.pressure, method)
             found.append(load / area)
         shares[method] = np.mean(found)
+    assert 0.85 < shares["seam"] < 1.15
     assert 0.75 < shares["blend"] < 1.25
     assert shares["window"] < 0.7
+
+
+def stones(cells=288, seed=1):
+    """Return a road of stones with flat tops: the upper envelope of paraboloids, cut off."""
+    random = np.random.default_rng(seed)
+    place = np.arange(cells) / 96
+    height = np.full((cells, cells), -np.inf)
+    for x, y, top in zip(*(3.0 * random.random((2, 144))), 0.02 * random.standard_normal(144),
+                         strict=True):
+        square = (place - x) ** 2 + (place[:, None] - y) ** 2
+        np.maximum(height, top - 1.8 * square, out=height)
+    return np.minimum(height, np.quantile(height, 0.7)) + 0.05 * road(cells, seed=seed)[0]
+
+
+def test_the_seam_makes_no_summits_that_the_road_lacks():
+    """Tops on both sides of a join stay in their plane; blending lifts them above it."""
+    height = stones()
+    for method, low, high in (("seam", 0.0, 0.05), ("blend", 0.2, 1.0)):
+        need = 96 + margin_of(96, method)
+        part = height[:need, 40 : 40 + need]
+        part = part - part.mean()
+        joined = join(part, method, (96, 96))
+        excess = (joined.max() - part.max()) / part.std()
+        assert low <= max(excess, 0.0) <= high, method
+        if method == "seam":
+            assert jump(joined) < 1.3 and joined.min() > part.min() - 1e-12
+
+
+def test_the_line_of_a_seam_is_the_cheapest_and_closed():
+    """Where both sides agree in a winding valley, the line follows it."""
+    rows = np.arange(96)
+    valley = np.round(12 + 4 * np.sin(2 * np.pi * rows / 96)).astype(int)
+    cost = np.ones((96, 24))
+    cost[rows, valley] = 0.0
+    np.testing.assert_array_equal(_cheapest_line(cost, closed=True), valley)
+    np.testing.assert_array_equal(_cheapest_line(cost[:70], closed=False), valley[:70])
+    slanted = np.ones((20, 24))
+    slanted[np.arange(20), np.arange(20)] = 0.0
+    line = _cheapest_line(slanted, closed=True)
+    assert line[0] == line[-1] and np.abs(np.diff(line)).max() <= 1
+    assert slanted[np.arange(20), line].sum() == min(
+        slanted[np.arange(20), path].sum() for path in _closed_paths(slanted))
+
+
+def _closed_paths(cost):
+    """Yield, for each start, the best path by another program: relaxation until it settles."""
+    rows, columns = cost.shape
+    for start in range(columns):
+        best = {(0, start): (cost[0, start], [start])}
+        for row in range(1, rows):
+            for column in range(columns):
+                found = [best[row - 1, at] for at in (column - 1, column, column + 1)
+                         if (row - 1, at) in best]
+                if found:
+                    value, path = min(found, key=lambda one: one[0])
+                    best[row, column] = (value + cost[row, column], [*path, column])
+        if (rows - 1, start) in best:
+            yield np.array(best[rows - 1, start][1])
+
+
+def test_patches_rest_on_their_tops():
+    """Valleys on one side only do not tilt a road whose tops lie in a plane."""
+    x = np.linspace(0.0, 1.0, 96)
+    road_ = np.where(np.arange(96) % 12 < 6, 0.0, -0.2 * x) + np.zeros((96, 1))
+    def tilt(map_):
+        return np.ptp(map_[0, ::12])
+    assert tilt(rested(road_, 0.5)) > 0.08 and tilt(rested(road_)) < 0.01
+    tilted = road_ + 0.3 * x + 0.1 * x[:, None]
+    np.testing.assert_allclose(rested(tilted), rested(road_), atol=1e-12)
+    profile = (0.3 * x)[None, :]
+    np.testing.assert_allclose(rested(profile), 0.0, atol=1e-12)
 
 
 def test_outliers_are_single_cells_and_not_steep_edges():
@@ -173,7 +253,7 @@ def measured(cells=256, periodic=False, seed=1):
 
 def test_patches_are_apart_and_the_same_again(tmp_path):
     made = MeasuredRoad([measured()], 64)
-    assert made.join == "blend" and made.count == 9
+    assert made.join == "seam" and made.count == 9
     codes = [made.patch(number).code for number in range(9)]
     assert len(set(codes)) == 9
     again = MeasuredRoad([measured()], 64)
@@ -193,7 +273,7 @@ def test_patches_are_apart_and_the_same_again(tmp_path):
 
 def test_small_maps_and_periodic_maps_are_taken_as_they_are():
     few = MeasuredRoad([measured(64)], 512)
-    assert few.cells == 56 and few.count == 1 and few.join == "blend"
+    assert few.cells == 50 and few.count == 1 and few.join == "seam"
     assert any("no room for 512" in note for note in few.notes)
     whole = MeasuredRoad([measured(64, periodic=True), measured(64, periodic=True, seed=2)], 64)
     assert whole.join == "none" and whole.count == 2

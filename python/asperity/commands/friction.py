@@ -91,8 +91,8 @@ def _add_road(parser: argparse.ArgumentParser) -> None:
                              " the left-out waves would add")
     parser.add_argument("--angle", type=float, metavar="DEGREES",
                         help="between the velocity and x (default: 0 on maps, 31.7 on drawn roads)")
-    parser.add_argument("--join", choices=("blend", "smooth", "mirror", "window"),
-                        help="how patches are made periodic (default: blend)")
+    parser.add_argument("--join", choices=("seam", "blend", "smooth", "mirror", "window"),
+                        help="how patches are made periodic (default: seam)")
     parser.add_argument("--outliers", choices=("report", "remove"), default="report",
                         help="single cells far off their neighbours (default: report)")
     parser.add_argument("--draw", action="store_true",

@@ -86,7 +86,8 @@ def friction_curve(
     angle : float, optional
         Between the road's velocity and x, degrees; 0 on measured maps, 31.7 on drawn ones.
     join : str, optional
-        How patches of measured maps are made periodic: 'blend', 'smooth', 'mirror', 'window'.
+        How patches of measured maps are made periodic: 'seam', 'blend', 'smooth', 'mirror',
+        'window'.
     outliers : {'report', 'remove'}
         What to do about single cells that lie far off their neighbours.
     draw : bool

@@ -3,8 +3,12 @@
 A contact with periodic boundaries needs a map that goes on at the opposite edge. Several methods
 make one of a measured part; none may carry more load at the join than elsewhere.
 
-* ``'blend'`` takes a margin of real road beyond two edges and fades it into the opposite edges,
-  with weights whose squares sum to 1, so that the roughness keeps its size.
+* ``'seam'`` takes a margin of real road beyond two edges and lays it over the opposite edges. Both
+  are cut along the line on which their heights differ least, and change over within some cells.
+  All heights are those of the road: no summit and no valley arises that the road does not have.
+* ``'blend'`` fades such a margin into the opposite edges, with weights whose squares sum to 1, so
+  that the roughness keeps its size. Where both parts are high together, as on a road with flat
+  tops, it makes summits that rise above the road and carry too much load.
 * ``'smooth'`` takes off the smooth part that carries the jumps between opposite edges
   (periodic-plus-smooth decomposition).
 * ``'mirror'`` puts the map beside its mirror images: twice as long along each axis.
@@ -13,6 +17,8 @@ make one of a measured part; none may carry more load at the join than elsewhere
 References
 ----------
 L. Moisan, Periodic plus smooth image decomposition, J. Math. Imaging Vis. 39 (2011) 161.
+A. A. Efros and W. T. Freeman, Image quilting for texture synthesis and transfer, SIGGRAPH 2001,
+for the line of least difference.
 """
 
 from __future__ import annotations
@@ -28,14 +34,26 @@ __all__ = ["JOINS", "join", "load_at_join", "margin_of", "smooth_part", "strip"]
 
 FloatArray = NDArray[np.float64]
 
-JOINS = ("blend", "smooth", "mirror", "window", "none")
+JOINS = ("seam", "blend", "smooth", "mirror", "window", "none")
 MARGIN = 0.125          # of the length, that 'blend' fades into the opposite edge
+OVERLAP = 0.25          # of the length, in which 'seam' looks for its line
+CHANGE = 3.0            # cells, the standard deviation of the step from one side to the other
+STARTS = 64             # that are tried for a closed line
 TAPER = 0.2             # of the length, that 'window' tapers
 
 
-def margin_of(cells: int) -> int:
-    """Return how many cells of real road 'blend' needs beyond a patch of so many cells."""
-    return max(1, round(MARGIN * cells)) if cells > 1 else 0
+def margin_of(cells: int, method: str) -> int:
+    """Return how many cells of real road a join needs beyond a patch of so many cells.
+
+    Parameters
+    ----------
+    cells : int
+        Of the patch along one axis.
+    method : str
+        One of `JOINS`.
+    """
+    share = {"seam": OVERLAP, "blend": MARGIN}.get(method, 0.0)
+    return max(1, round(share * cells)) if share > 0.0 and cells > 1 else 0
 
 
 def join(height: FloatArray, method: str, shape: tuple[int, int] | None = None) -> FloatArray:
@@ -44,23 +62,23 @@ def join(height: FloatArray, method: str, shape: tuple[int, int] | None = None) 
     Parameters
     ----------
     height : ndarray, shape (ny, nx)
-        Heights, m. For 'blend' with its margin: the shape is that of the periodic map plus
-        `margin_of` along each axis.
+        Heights, m. For 'seam' and 'blend' with their margin: the shape is that of the periodic map
+        plus `margin_of` along each axis.
     method : str
         One of `JOINS`; 'none' returns the map as it is.
     shape : (int, int), optional
-        Cells (ny, nx) of the periodic map, for 'blend'.
+        Cells (ny, nx) of the periodic map, for 'seam' and 'blend'.
 
     Returns
     -------
     ndarray
-        Heights, m: shape (ny, nx), for 'mirror' (2 ny, 2 nx) (a profile stays one), for 'blend'
-        `shape`.
+        Heights, m: shape (ny, nx), for 'mirror' (2 ny, 2 nx) (a profile stays one), for 'seam' and
+        'blend' `shape`.
 
     Raises
     ------
     ValueError
-        If the method is unknown, or 'blend' lacks its margin.
+        If the method is unknown, or a margin is missing.
 
     Examples
     --------
@@ -81,10 +99,10 @@ def join(height: FloatArray, method: str, shape: tuple[int, int] | None = None) 
         ny, nx = height.shape
         rows = np.ones(1) if ny == 1 else _taper(ny)
         return mean + rows[:, None] * _taper(nx) * (height - mean)
-    if method == "blend":
+    if method in ("seam", "blend"):
         if shape is None:
-            raise ValueError("shape: 'blend' needs the cells of the periodic map")
-        return _blend(height, shape)
+            raise ValueError(f"shape: {method!r} needs the cells of the periodic map")
+        return _overlaid(height, method, shape)
     return height
 
 
@@ -159,11 +177,10 @@ def load_at_join(pressure: FloatArray, method: str) -> tuple[float, float]:
     if method == "mirror":
         half = (max(ny // 2, 1), nx // 2)
         near = np.tile(strip(half, MARGIN), (2 if ny > 1 else 1, 2))
-    elif method == "blend":
+    elif method in ("seam", "blend"):
         near = np.zeros(pressure.shape, dtype=bool)
-        near[:, : margin_of(nx)] = True
-        if ny > 1:
-            near[: margin_of(ny)] = True
+        near[:, : margin_of(nx, method)] = True
+        near[: margin_of(ny, method)] = True
     else:
         near = strip(pressure.shape, TAPER if method == "window" else MARGIN)
     return float(pressure[near].sum() / pressure.sum()), float(near.mean())
@@ -176,24 +193,90 @@ def _taper(count: int) -> FloatArray:
     return 0.5 * (1.0 - np.cos(math.pi * ramp))
 
 
-def _blend(height: FloatArray, shape: tuple[int, int]) -> FloatArray:
-    """Fade what lies beyond the far edges into the near ones."""
-    wanted = tuple(count + margin_of(count) for count in shape)
+def _overlaid(height: FloatArray, method: str, shape: tuple[int, int]) -> FloatArray:
+    """Lay what lies beyond the far edges over the near ones."""
+    wanted = tuple(count + margin_of(count, method) for count in shape)
     if height.shape != wanted:
-        raise ValueError(f"height: has the shape {height.shape}: 'blend' needs {wanted} for a map"
-                         f" of {shape}")
+        raise ValueError(f"height: has the shape {height.shape}: {method!r} needs {wanted} for a"
+                         f" map of {shape}")
     mean = float(height.mean())
     part = height - mean
     for axis, count in enumerate(shape):
-        margin = margin_of(count)
+        margin = margin_of(count, method)
         if not margin:
             continue
-        angle = 0.5 * math.pi * (np.arange(margin) + 0.5) / margin
-        turn = np.sin(angle) if axis else np.sin(angle)[:, None]
-        fade = np.cos(angle) if axis else np.cos(angle)[:, None]
-        near, beyond = ((part[:, :margin], part[:, count:]) if axis else
-                        (part[:margin], part[count:]))
-        joined = turn * near + fade * beyond
-        part = (np.concatenate([joined, part[:, margin:count]], axis=1) if axis else
-                np.concatenate([joined, part[margin:count]], axis=0))
+        along = np.moveaxis(part, axis, 1)
+        near, beyond = along[:, :margin], along[:, count:]
+        if method == "blend":
+            angle = 0.5 * math.pi * (np.arange(margin) + 0.5) / margin
+            joined = np.sin(angle) * near + np.cos(angle) * beyond
+        else:
+            # After the first axis the lines along the other one go on at their ends.
+            weight = _seam(near - beyond, closed=axis == 1)
+            joined = beyond + weight * (near - beyond)
+        part = np.moveaxis(np.concatenate([joined, along[:, margin:count]], axis=1), 1, axis)
     return mean + part
+
+
+def _seam(difference: FloatArray, closed: bool) -> FloatArray:
+    """Return the weight of the second side: 0 before and 1 beyond the line of least difference.
+
+    Parameters
+    ----------
+    difference : ndarray, shape (n, margin)
+        Of the heights of both sides, m.
+    closed : bool
+        Whether the last row is beside the first one.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    margin = difference.shape[1]
+    change = min(CHANGE, margin / 12.0)
+    mode = ("wrap" if closed else "nearest", "nearest")
+    cost = gaussian_filter(difference**2, 0.7 * change, mode=mode)
+    # the change from one side to the other has to end within the margin
+    end = min(math.ceil(3.0 * change), (margin - 1) // 2)
+    cost[:, :end] = cost[:, margin - end :] = math.inf
+    line = _cheapest_line(cost, closed)
+    weight = (np.arange(-margin, 2 * margin) > line[:, None]).astype(float)
+    return gaussian_filter(weight, change, mode=mode)[:, margin : 2 * margin]
+
+
+def _cheapest_line(cost: FloatArray, closed: bool) -> NDArray[np.intp]:
+    """Return the column in each row of the line of least cost, which turns by one column at most.
+
+    Parameters
+    ----------
+    cost : ndarray, shape (n, m)
+        Of each cell; infinite where the line must not go.
+    closed : bool
+        Whether the line has to end in the column where it began.
+    """
+    rows, columns = cost.shape
+    allowed = np.flatnonzero(np.isfinite(cost[0]))
+    starts = allowed
+    if closed and allowed.size > STARTS:
+        starts = allowed[np.linspace(0, allowed.size - 1, STARTS).round().astype(int)]
+    # least[s, c]: of the lines from start s to column c of the row; a single open start without s
+    least = np.full((starts.size if closed else 1, columns), math.inf)
+    if closed:
+        least[np.arange(starts.size), starts] = cost[0, starts]
+    else:
+        least[0] = cost[0]
+    turns = np.zeros((rows, *least.shape), dtype=np.int8)
+    for row in range(1, rows):
+        wide = np.pad(least, ((0, 0), (1, 1)), constant_values=math.inf)
+        before = np.stack([wide[:, :-2], wide[:, 1:-1], wide[:, 2:]])
+        which = before.argmin(axis=0)
+        turns[row] = which - 1
+        least = np.take_along_axis(before, which[None], axis=0)[0] + cost[row]
+    if closed:
+        start = int(least[np.arange(starts.size), starts].argmin())
+        column = int(starts[start])
+    else:
+        start, column = 0, int(least[0].argmin())
+    line = np.empty(rows, dtype=np.intp)
+    for row in range(rows - 1, -1, -1):
+        line[row] = column
+        column += turns[row, start, column]
+    return line

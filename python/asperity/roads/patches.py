@@ -21,7 +21,7 @@ from .measured import MeasuredSurface
 from .outliers import find_outliers
 from .spectra import Spectrum, join_spectra, spectrum_of_map
 
-__all__ = ["DrawnRoad", "MeasuredRoad", "Patch", "low_pass"]
+__all__ = ["DrawnRoad", "MeasuredRoad", "Patch", "low_pass", "rested"]
 
 FloatArray = NDArray[np.float64]
 
@@ -92,6 +92,48 @@ def low_pass(height: FloatArray, lx: float, ly: float, short: float) -> FloatArr
     return np.fft.irfft2(modes, s=height.shape)
 
 
+def rested(height: FloatArray, weight: float = 0.98) -> FloatArray:
+    """Return a map without the tilt of the plane that rests on its tops.
+
+    The plane is fitted by least squares in which heights above it count `weight` and those below it
+    1 - `weight`. A block that is pressed on the road lies on the tops; the mean plane of a patch,
+    in contrast, depends on valleys that nothing touches, and tilts tops that lie level.
+
+    Parameters
+    ----------
+    height : ndarray, shape (ny, nx)
+        Heights, m.
+    weight : float
+        0.5 gives the mean plane; 1 would be a plane above all heights.
+
+    Returns
+    -------
+    ndarray, shape (ny, nx)
+        Heights, m; their mean is zero.
+
+    Examples
+    --------
+    >>> tops = np.where(np.arange(64) % 8 < 4, 0.0, -np.arange(64.0))[None, :]
+    >>> bool(np.ptp(rested(tops)[0, ::8]) < 0.05 * 56)
+    True
+    """
+    ny, nx = height.shape
+    height = height - height.mean()
+    planes = np.stack(np.broadcast_arrays(1.0, np.linspace(-1.0, 1.0, nx),
+                                          np.linspace(-1.0, 1.0, ny)[:, None])).reshape(3, -1)
+    planes = planes if ny > 1 else planes[:2]
+    flat = height.ravel()
+    above = np.ones(flat.size, dtype=bool)
+    for _ in range(50):
+        weights = np.where(above, weight, 1.0 - weight)
+        plane = np.linalg.solve((planes * weights) @ planes.T, (planes * weights) @ flat)
+        last, above = above, flat > plane @ planes
+        if (last == above).all():
+            break
+    tilted = flat - plane[1:] @ planes[1:]
+    return (tilted - tilted.mean()).reshape(ny, nx)
+
+
 class DrawnRoad:
     """Maps drawn from a spectrum, one for each number of a patch.
 
@@ -144,6 +186,8 @@ class DrawnRoad:
 class MeasuredRoad:
     """Patches cut from measured maps.
 
+    Each patch is levelled by the plane that rests on its tops, see `rested`.
+
     Parameters
     ----------
     maps : sequence of MeasuredSurface
@@ -151,7 +195,7 @@ class MeasuredRoad:
     cells : int
         Cells of a side of a patch, those of the map; fewer where the map is smaller.
     method : str, optional
-        How a patch is made periodic, one of `asperity.roads.joins.JOINS`. Default: 'blend', whose
+        How a patch is made periodic, one of `asperity.roads.joins.JOINS`. Default: 'seam', whose
         join carries the load that belongs there (``tools/joins.py`` measures it); 'none' for maps
         that are periodic and no larger than a patch.
     short : float, optional
@@ -174,7 +218,7 @@ class MeasuredRoad:
         self._maps = [self._clean(one, outliers) for one in maps]
         fewest = min(min(one.height.shape) for one in maps)
         whole_maps = all(one.periodic and max(one.height.shape) <= cells for one in maps)
-        self.join = choice("join", method or ("none" if whole_maps else "blend"), JOINS)
+        self.join = choice("join", method or ("none" if whole_maps else "seam"), JOINS)
         self.cells = self._cells(fewest, cells)
         self._places = self._cut(seed)
         self.count = len(self._places)
@@ -201,9 +245,9 @@ class MeasuredRoad:
             height, rows, columns = one.height, ny, nx
         else:
             rows = columns = self.cells
-            margin = margin_of(self.cells) if self.join == "blend" else 0
-            part = one.height[row : row + rows + margin, column : column + columns + margin]
-            height = join(_levelled(part), self.join, (rows, columns))
+            need = rows + margin_of(rows, self.join)
+            part = one.height[row : row + need, column : column + need]
+            height = join(rested(part), self.join, (rows, columns))
             rows, columns = height.shape
         lx, ly = columns * step_x, rows * step_y
         height = low_pass(height, lx, ly, self.short)
@@ -229,9 +273,7 @@ class MeasuredRoad:
 
     def _cells(self, fewest: int, cells: int) -> int:
         """Return the cells of a side that the maps have room for; an even number."""
-        room = fewest
-        if self.join == "blend":
-            room = math.floor(fewest / (margin_of(1000) / 1000 + 1.0))
+        room = math.floor(fewest / (margin_of(1000, self.join) / 1000 + 1.0))
         found = min(cells, room)
         found -= found % 2
         if found < 16:
@@ -242,7 +284,7 @@ class MeasuredRoad:
 
     def _cut(self, seed: int) -> list[tuple[int, int, int]]:
         """Return which map and where: parts that do not overlap, in an order of the seed."""
-        need = self.cells + (margin_of(self.cells) if self.join == "blend" else 0)
+        need = self.cells + margin_of(self.cells, self.join)
         places = []
         for which, one in enumerate(self._maps):
             ny, nx = one.height.shape
@@ -260,12 +302,3 @@ def _starts(count: int, cells: int, need: int) -> list[int]:
     fit = max(1, (count - (need - cells)) // cells)
     return [round(place) for place in np.linspace(0, count - need, fit)] if fit > 1 else [
         (count - need) // 2]
-
-
-def _levelled(part: FloatArray) -> FloatArray:
-    """Return a part without its mean plane."""
-    ny, nx = part.shape
-    x, y = np.linspace(-1.0, 1.0, nx), np.linspace(-1.0, 1.0, ny)[:, None]
-    part = part - part.mean()
-    part = part - x * float(np.sum(part * x) / (ny * np.sum(x**2)))
-    return part - y * float(np.sum(part * y) / (nx * np.sum(y**2)))
