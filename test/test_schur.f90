@@ -26,7 +26,7 @@ module test_schur
 contains
 
    subroutine run_schur()
-      call begin_suite('normal_cg')
+      call begin_suite('schur')
       if (selected('test_dense')) call test_dense(boundary_periodic, 24, 16, 1.0_dp)
       if (selected('test_dense')) call test_dense(boundary_periodic, 23, 17, 1.5_dp)
       if (selected('test_dense')) call test_dense(boundary_free, 19, 21, 1.0_dp)

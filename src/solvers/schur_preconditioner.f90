@@ -235,6 +235,8 @@ contains
          self%image_off(:, :) = self%image_off + length*(self%response_off + addition*self%cells_off)
          self%length = real(length, sp)
          self%pending(:, :) = length*addition
+         ! Single precision cannot resolve smaller gains: further directions would be round-off.
+         if (length*product <= epsilon(1.0_sp)*form) exit
       end do
    end subroutine extend
 
