@@ -45,16 +45,9 @@ contains
       integer :: i
 
       command%help_of = ''
-      if (command_argument_count() > 0) then
-         command%handed_over = argument_text(1)
-         if (any(python_verbs == command%handed_over)) then
-            ! What follows is for Python to read.
-            command%verb = 'python'
-            return
-         end if
-         deallocate (command%handed_over)
-      end if
       command%verb = ''
+      call look_for_python(command)
+      if (command%verb == 'python') return
       help = .false.
       options_end = .false.
       done = .false.
@@ -203,6 +196,18 @@ contains
       end subroutine take_time_limit
 
    end subroutine read_command_line
+
+   !> Is the first word a command of the Python package? What follows it is then for Python to read.
+   subroutine look_for_python(command)
+      type(command_type), intent(inout) :: command
+      character(:), allocatable :: word
+
+      if (command_argument_count() == 0) return
+      word = argument_text(1)
+      if (.not. any(python_verbs == word)) return
+      command%verb = 'python'
+      command%handed_over = word
+   end subroutine look_for_python
 
    !> Do options and arguments fit the verb?
    subroutine check_fit(command, error)

@@ -1,7 +1,8 @@
 !> The program `asperity`: it reads the command line, carries out the command, and ends with an exit
 !> status. No other place ends the program.
 program main
-   use case_input, only : overwritten_file, read_case
+   use case_files, only : overwritten_file
+   use case_input, only : read_case
    use case_run, only : run_type
    use case_report, only : case_summary, resolved_input
    use case_settings, only : case_type, path_length
@@ -11,7 +12,7 @@ program main
    use command_line, only : command_type, help_text, read_command_line
    use asperity_errors, only : error_file, error_input, error_memory, error_type, fail
    use hand_over, only : become_python
-   use input_reference, only : reference_markdown
+   use reference_page, only : reference_markdown
    use asperity_progress, only : progress_type
    use result_summary, only : summarise_result
    use asperity_signals, only : catch_signals, checkpoint_asked, forget_checkpoint, stop_signal, &

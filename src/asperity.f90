@@ -10,7 +10,7 @@
 !> * solvers: normal contact (`new_normal_solver`, or `new_contact_solver` by the name of a method),
 !>   adhesion (`new_adhesion_solver`), friction (`new_friction_solver`); each returns a record
 !>   (`solver_result_type`);
-!> * the material in time (`new_zener`, `new_history`, `history_field`, `commit_history`) and its energy
+!> * the material in time (`new_zener`, `new_arm_state`, `past_traction`, `commit_arms`) and its energy
 !>   books (`new_books`, `book_step`).
 !>
 !> Everything is SI. Errors are values (`error_type`), an unconverged solve is an outcome.
@@ -45,8 +45,9 @@ module asperity
    use surface_settings, only : default_surface, surface_settings_type
    use asperity_version, only : version_number
    use viscoelastic_energy, only : book_step, energy_books_type, new_books
-   use zener, only : commit_history, finish_step, history_field, history_type, new_history, &
-      new_products, new_zener, products_type, start_jump, start_relaxed, start_step, zener_type
+   use arm_state, only : arm_state_type, commit_arms, new_arm_state, new_products, past_traction, &
+      products_type
+   use zener, only : finish_step, new_zener, start_jump, start_relaxed, start_step, zener_type
    implicit none
    public
 

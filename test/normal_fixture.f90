@@ -33,13 +33,13 @@ module normal_fixture
 contains
 
    !> Solve with a solver made for this one problem; `start` makes it a warm start.
-   subroutine run_problem(grid, problem, height, solution, thesis, history, start, mixed)
+   subroutine run_problem(grid, problem, height, solution, thesis, past, start, mixed)
       type(grid_type), intent(in) :: grid
       type(normal_problem_type), intent(in) :: problem
       real(dp), intent(in) :: height(:, :)
       type(solution_type), intent(out) :: solution
       logical, intent(in), optional :: thesis
-      real(dp), intent(in), optional :: history(:, :)
+      real(dp), intent(in), optional :: past(:, :)
       real(dp), intent(in), optional :: start(:, :)
       logical, intent(in), optional :: mixed           !! in mixed precision
       class(contact_solver_type), allocatable :: solver
@@ -61,7 +61,7 @@ contains
       call new_contact_solver(solver, method, grid, normal_half_space(poisson), error, mixed)
       call check_no_error(error, 'a solver')
       call solver%solve(task, height, solution%pressure, solution%gap, solution%level, &
-         solution%outcome, history)
+         solution%outcome, past)
       call solver%destroy()
    end subroutine run_problem
 

@@ -123,15 +123,15 @@ contains
    end function stiffness_sum
 
    !> E(g) by that sum; history and load as given.
-   function energy_sum(grid, problem, height, gap, history, load) result(energy)
+   function energy_sum(grid, problem, height, gap, past, load) result(energy)
       type(grid_type), intent(in) :: grid
       type(adhesion_problem_type), intent(in) :: problem
-      real(dp), intent(in) :: height(:, :), gap(:, :), history(:, :)
+      real(dp), intent(in) :: height(:, :), gap(:, :), past(:, :)
       real(dp), intent(in) :: load
       real(dp) :: energy
 
       energy = sum(0.5_dp*problem%modulus*(height + gap)*stiffness_sum(grid, height + gap) &
-         - history*gap + adhesive_energy(problem%potential, gap) + load*gap)
+         - past*gap + adhesive_energy(problem%potential, gap) + load*gap)
    end function energy_sum
 
    !> The pressure of any state is the gradient of the energy, less e': central differences.
@@ -142,7 +142,7 @@ contains
       type(adhesion_problem_type) :: problem
       type(solver_result_type) :: outcome
       type(error_type), allocatable :: error
-      real(dp), allocatable :: height(:, :), gap(:, :), start(:, :), pressure(:, :), history(:, :)
+      real(dp), allocatable :: height(:, :), gap(:, :), start(:, :), pressure(:, :), past(:, :)
       real(dp) :: level, h, slope
       integer :: k, i, j
 
@@ -151,15 +151,15 @@ contains
       call check_no_error(error, 'solver')
       height = waves(grid, 0.01_dp)
       start = 0.02_dp*(1.2_dp + noise(9, 7))
-      history = 0.05_dp*noise(9, 7)
-      history = history - sum(history)/size(history)
+      past = 0.05_dp*noise(9, 7)
+      past = past - sum(past)/size(past)
       gap = start
       pressure = 0.0_dp*gap
       problem%potential = potential_of(name, 5e-4_dp, 0.02_dp)
       problem%modulus = modulus
       problem%target = 0.03_dp
       problem%max_iterations = 0
-      call solver%solve(problem, height, gap, pressure, level, outcome, history)
+      call solver%solve(problem, height, gap, pressure, level, outcome, past)
       call check_that(outcome%iterations == 0 .and. .not. outcome%converged, 'no iteration')
       call check_that(all(gap == start), 'no iteration leaves the gap')
       h = 1e-6_dp
@@ -167,9 +167,9 @@ contains
          i = 1 + modulo(5*k, 9)
          j = 1 + modulo(3*k, 7)
          start(i, j) = gap(i, j) + h
-         slope = energy_sum(grid, problem, height, start, history, 0.03_dp)
+         slope = energy_sum(grid, problem, height, start, past, 0.03_dp)
          start(i, j) = gap(i, j) - h
-         slope = (slope - energy_sum(grid, problem, height, start, history, 0.03_dp))/(2*h)
+         slope = (slope - energy_sum(grid, problem, height, start, past, 0.03_dp))/(2*h)
          start(i, j) = gap(i, j)
          ! Pressures are of order 0.1; h^2/6 e''' = 1e-9 of gamma/z_0, round-off 1e-16/1e-6.
          call check_close(pressure(i, j) + adhesive_slope(problem%potential, gap(i, j)), slope, &
@@ -188,7 +188,7 @@ contains
       type(adhesion_problem_type) :: problem
       type(solver_result_type) :: outcome
       type(error_type), allocatable :: error
-      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :), history(:, :), other(:, :), &
+      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :), past(:, :), other(:, :), &
          traction(:, :), shifted(:, :)
       type(convolution_type) :: operator
       real(dp), allocatable :: symbol(:, :)
@@ -200,17 +200,17 @@ contains
       call new_adhesion_solver(solver, grid, normal_half_space(poisson), error, preconditioner=preconditioner)
       call check_no_error(error, 'solver')
       height = waves(grid, 0.01_dp)
-      history = 0.05_dp*waves(grid, 1.0_dp)
+      past = 0.05_dp*waves(grid, 1.0_dp)
       problem%potential = potential_of(name, 3e-4_dp, range)
       problem%modulus = modulus
       problem%target = 0.05_dp
       problem%tolerance = 1e-8_dp
       gap = maxval(height) - height
       pressure = 0.0_dp*gap
-      call solver%solve(problem, height, gap, pressure, level, outcome, history)
+      call solver%solve(problem, height, gap, pressure, level, outcome, past)
       call check_that(outcome%converged, name//': '//trim(outcome%reason))
       scale = 3e-4_dp/range
-      traction = modulus*stiffness_sum(grid, height + gap) - history
+      traction = modulus*stiffness_sum(grid, height + gap) - past
       traction = traction - sum(traction)/size(traction) + 0.05_dp
       call check_close(maxval(abs(traction - pressure)), 0.0_dp, 1e-11_dp, name//': pressure')
       call check_that(minval(gap) >= 0.0_dp .and. any(gap == 0.0_dp) .and. any(gap > 0.0_dp), &
@@ -230,7 +230,7 @@ contains
       problem%target = level
       other = gap
       again = 0.0_dp
-      call solver%solve(problem, height, other, pressure, again, outcome, history)
+      call solver%solve(problem, height, other, pressure, again, outcome, past)
       call check_that(outcome%converged, name//': level prescribed: '//trim(outcome%reason))
       call check_close(sum(pressure)/size(pressure), 0.05_dp, 1e-7_dp, name//': multiplier')
       call check_close(again, level, 1e-14_dp, name//': level kept')
@@ -245,7 +245,7 @@ contains
       end do
       call new_symbol_operator(operator, nx, ny, symbol, error)
       shifted = height
-      call operator%apply(history, shifted)
+      call operator%apply(past, shifted)
       shifted = height - shifted/modulus
       problem%control = control_pressure
       problem%target = 0.05_dp
@@ -265,7 +265,7 @@ contains
       type(adhesion_problem_type) :: problem
       type(solver_result_type) :: outcome
       type(error_type), allocatable :: error
-      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :), history(:, :), other(:, :)
+      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :), past(:, :), other(:, :)
       real(dp) :: level, again
 
       grid = new_grid(35, 28, 1.0_dp, 0.9_dp, boundary_periodic)
@@ -273,7 +273,7 @@ contains
       call new_adhesion_solver(thesis, grid, normal_half_space(poisson), error, method='thesis')
       call check_no_error(error, 'thesis')
       height = waves(grid, 0.02_dp)
-      history = 0.02_dp*noise(35, 28)
+      past = 0.02_dp*noise(35, 28)
       problem%potential = potential_of(name, 2e-4_dp, 0.02_dp)
       problem%modulus = modulus
       problem%target = 0.02_dp
@@ -281,20 +281,20 @@ contains
       gap = maxval(height) - height
       other = gap
       pressure = 0.0_dp*gap
-      call fast%solve(problem, height, gap, pressure, level, outcome, history)
+      call fast%solve(problem, height, gap, pressure, level, outcome, past)
       call check_that(outcome%converged, name//': fast: '//trim(outcome%reason))
       ! Cells beside the kink of Maugis-Dugdale make many minima, close together: begin near this one.
       if (name == 'maugis_dugdale') other = max(gap - 1e-3_dp*0.02_dp, 0.0_dp)
-      call thesis%solve(problem, height, other, pressure, again, outcome, history)
+      call thesis%solve(problem, height, other, pressure, again, outcome, past)
       call check_that(outcome%converged, name//': thesis: '//trim(outcome%reason))
       call check_that(outcome%iterations > 10 .and. outcome%ffts >= 4*outcome%iterations, 'its cost')
       call check_close(maxval(abs(other - gap)), 0.0_dp, 1e-4_dp*0.02_dp, name//': fast and thesis')
       call check_close(again, level, 1e-5_dp*0.02_dp, name//': fast and thesis: level')
       problem%control = control_approach
       problem%target = level + 0.01_dp
-      call fast%solve(problem, height, gap, pressure, level, outcome, history)
+      call fast%solve(problem, height, gap, pressure, level, outcome, past)
       call check_that(outcome%converged, name//': fast, level: '//trim(outcome%reason))
-      call thesis%solve(problem, height, other, pressure, again, outcome, history)
+      call thesis%solve(problem, height, other, pressure, again, outcome, past)
       call check_that(outcome%converged, name//': thesis, level: '//trim(outcome%reason))
       call check_close(maxval(abs(other - gap)), 0.0_dp, 1e-4_dp*0.02_dp, name//': the same, level')
       call fast%destroy()

@@ -95,7 +95,7 @@ contains
       type(adhesion_problem_type) :: problem
       type(solver_result_type) :: outcome
       type(error_type), allocatable :: error
-      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :), history(:, :), true_gap(:, :), &
+      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :), past(:, :), true_gap(:, :), &
          other(:, :)
       real(dp) :: level, scale, force, deep
       integer :: i, j
@@ -109,7 +109,7 @@ contains
             height(i, j) = height(i, j) + 0.1_dp*cos(3.0_dp*i*grid%dx + 2.0_dp*j*grid%dy)
          end do
       end do
-      history = 0.05_dp*cos(height)
+      past = 0.05_dp*cos(height)
       call new_adhesion_potential(problem%potential, name, 1.0_dp/pi, 0.6_dp, error)
       problem%modulus = modulus
       force = 0.4_dp
@@ -118,10 +118,10 @@ contains
       pressure = 0.0_dp*height
       gap = pressure
       level = 0.0_dp
-      call solver%solve(problem, height, gap, pressure, level, outcome, history)
+      call solver%solve(problem, height, gap, pressure, level, outcome, past)
       call check_that(outcome%converged, name//': '//trim(outcome%reason))
       call check_close(sum(pressure)*grid%dx*grid%dy, force, 1e-6_dp, name//': load')
-      true_gap = displacement_sum(grid, pressure + history)/modulus - height - level
+      true_gap = displacement_sum(grid, pressure + past)/modulus - height - level
       scale = 1.0_dp/(pi*0.6_dp)
       call check_close(maxval(abs(true_gap - gap)), 0.0_dp, 3e-7_dp*0.6_dp, name//': gap')
       call check_that(any(gap == 0.0_dp) .and. any(gap > 0.0_dp), name//': a partial contact')
@@ -133,16 +133,16 @@ contains
       problem%control = control_approach
       problem%target = level
       other = pressure
-      call solver%solve(problem, height, gap, other, level, outcome, history)
+      call solver%solve(problem, height, gap, other, level, outcome, past)
       call check_that(outcome%converged, name//': level: '//trim(outcome%reason))
       call check_close(maxval(abs(other - pressure)), 0.0_dp, 1e-5_dp*scale, name//': controls')
       deep = level + 0.3_dp
       problem%target = deep
-      call solver%solve(problem, height, gap, other, level, outcome, history)
+      call solver%solve(problem, height, gap, other, level, outcome, past)
       call check_that(outcome%converged .and. sum(other) > sum(pressure), name//': deeper')
       problem%full_contact = .true.
       gap = 0.0_dp
-      call solver%solve(problem, height, gap, other, level, outcome, history)
+      call solver%solve(problem, height, gap, other, level, outcome, past)
       call check_that(outcome%converged, name//': from full contact: '//trim(outcome%reason))
       call check_close(level, deep, 0.0_dp, name//': the level is kept')
       call solver%destroy()

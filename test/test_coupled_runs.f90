@@ -9,7 +9,7 @@ module test_coupled_runs
    use case_input, only : parse_case
    use case_settings, only : case_type
    use check, only : begin_suite, check_close, check_no_error, check_that, selected
-   use history_row, only : column_count, column_type, history_columns, row_values
+   use history_row, only : column_type, history_columns, row_values
    use simulation_runs, only : last, nl, record_type, run_case
    use simulation_state, only : load_state, save_state
    use text_tools, only : to_text
@@ -86,7 +86,7 @@ contains
       type(error_type), allocatable :: error
       integer :: rows
 
-      allocate (values(column_count, 0))
+      allocate (values(size(history_columns()), 0))
       call parse_case(text, 'test.nml', case, error)
       call check_no_error(error, what//': input')
       if (allocated(error)) return
@@ -101,7 +101,7 @@ contains
          if (allocated(error)) exit
          call check_that(sim%converged, what//': converged: '//trim(sim%reason))
          if (.not. sim%converged) exit
-         values = reshape([values, row_values(sim%state%row)], [column_count, rows + 1])
+         values = reshape([values, row_values(sim%state%row)], [size(values, 1), rows + 1])
          rows = rows + 1
       end do
       call sim%destroy()
@@ -133,13 +133,13 @@ contains
    subroutine check_same_bits(one, other, what)
       real(dp), intent(in) :: one(:, :), other(:, :)
       character(*), intent(in) :: what
-      type(column_type) :: columns(column_count)
+      type(column_type), allocatable :: columns(:)
       integer :: i
 
       call check_that(size(one, 2) > 4 .and. size(one, 2) == size(other, 2), what//': number of rows')
       if (size(one, 2) /= size(other, 2)) return
       columns = history_columns()
-      do i = 1, column_count
+      do i = 1, size(columns)
          if (columns(i)%name == 'seconds') cycle
          call check_close(maxval(abs(one(i, :) - other(i, :))), 0.0_dp, 0.0_dp, &
             what//': '//trim(columns(i)%name))

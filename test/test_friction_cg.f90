@@ -85,16 +85,16 @@ contains
    !> Solve.
    subroutine solve_case(self, past)
       type(case_type), intent(inout), target :: self
-      real(dp), intent(in), contiguous, target, optional :: past(:, :, :)   !! T_h, [nx, ny, 2]
+      real(dp), intent(in), contiguous, target, optional :: past(:, :, :)   !! T_h, [nx, 2, ny]
       type(friction_fields_type) :: fields
       real(dp), allocatable, target :: drive(:, :, :), traction(:, :, :), slip(:, :, :)
 
-      allocate (drive(self%grid%nx, self%grid%ny, 2))
+      allocate (drive(self%grid%nx, 2, self%grid%ny))
       allocate (traction, slip, mold=drive)
-      drive(:, :, 1) = self%drive_x
-      drive(:, :, 2) = self%drive_y
-      traction(:, :, 1) = self%tx
-      traction(:, :, 2) = self%ty
+      drive(:, 1, :) = self%drive_x
+      drive(:, 2, :) = self%drive_y
+      traction(:, 1, :) = self%tx
+      traction(:, 2, :) = self%ty
       fields%pressure => self%p
       fields%slope_x => self%hx
       fields%slope_y => self%hy
@@ -104,10 +104,10 @@ contains
       fields%slip => slip
       fields%contact => self%contact
       call self%solver%solve(self%operator, self%law, fields, self%result)
-      self%tx = traction(:, :, 1)
-      self%ty = traction(:, :, 2)
-      self%rx = slip(:, :, 1)
-      self%ry = slip(:, :, 2)
+      self%tx = traction(:, 1, :)
+      self%ty = traction(:, 2, :)
+      self%rx = slip(:, 1, :)
+      self%ry = slip(:, 2, :)
    end subroutine solve_case
 
    !> Solve, and prove the result without the solver: bound, stick, direction, no reversed slip, and
@@ -795,7 +795,7 @@ contains
       past_x = 0.1_dp*self%p**2
       past_y = -0.05_dp*self%p
       allocate (ux, uy, mold=self%tx)
-      call solve_case(self, reshape([past_x, past_y], [36, 30, 2]))
+      call solve_case(self, reshape([past_x, past_y], [36, 2, 30], order=[1, 3, 2]))
       call check_that(self%result%converged, 'memory: converged')
       tx = self%tx
       ty = self%ty

@@ -187,21 +187,21 @@ contains
       type(solution_type) :: s, t
       type(convolution_type) :: operator
       type(error_type), allocatable :: error
-      real(dp), allocatable :: h(:, :), history(:, :), u(:, :)
+      real(dp), allocatable :: h(:, :), past(:, :), u(:, :)
       real(dp) :: d
       integer :: i, j, k
       logical :: thesis
 
       call set_problem(boundary, 60, 75, grid, problem, h)
-      allocate (history(60, 75), u(60, 75))
+      allocate (past(60, 75), u(60, 75))
       do j = 1, 75
          do i = 1, 60
-            history(i, j) = 0.01_dp*sin(0.31_dp*i + 0.17_dp*j) - 0.003_dp
+            past(i, j) = 0.01_dp*sin(0.31_dp*i + 0.17_dp*j) - 0.003_dp
          end do
       end do
       call new_convolution(operator, grid, normal_half_space(poisson), error)
       call check_no_error(error, 'an operator')
-      call operator%apply(history, u)
+      call operator%apply(past, u)
       call operator%destroy()
       do k = 1, 3
          thesis = k == 2
@@ -209,7 +209,7 @@ contains
             problem%control = control_approach
             problem%target = s%level
          end if
-         call run_problem(grid, problem, h, s, thesis, history=history)
+         call run_problem(grid, problem, h, s, thesis, past=past)
          call run_problem(grid, problem, h - u/unit_modulus, t)
          call check_that(s%outcome%converged, 'memory: '//s%outcome%reason)
          call distance(grid, unit_modulus, h, s%pressure, t%pressure, d)

@@ -6,7 +6,7 @@ module test_result_file
    use asperity_errors, only : error_file, error_type
    use file_system, only : file_exists, remove_file
    use hdf5_file, only : hdf5_file_type
-   use history_row, only : column_count, column_type, history_columns
+   use history_row, only : column_type, history_columns
    use asperity_precision, only : dp
    use regular_grid, only : boundary_free, grid_type, new_grid
    use result_file, only : result_file_type, result_plan_type
@@ -37,7 +37,7 @@ contains
    subroutine layout_is_kept()
       type(hdf5_file_type) :: file
       type(error_type), allocatable :: error
-      type(column_type) :: columns(column_count)
+      type(column_type), allocatable :: columns(:)
       character(:), allocatable :: text
       character(256), allocatable :: names(:)
       character(24), parameter :: root_texts(*) = [character(24) :: &
@@ -75,7 +75,7 @@ contains
       call check_that(file%has_dataset('/material/poisson'), 'poisson')
 
       columns = history_columns()
-      do i = 1, column_count
+      do i = 1, size(columns)
          call file%read('/history/'//trim(columns(i)%name), x, error)
          call check_no_error(error, 'column '//trim(columns(i)%name))
          call check_that(size(x) == 13, 'length of '//trim(columns(i)%name))

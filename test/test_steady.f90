@@ -291,7 +291,7 @@ contains
             call check_close(norm2(sim%state%pressure - found%pressure)/norm2(found%pressure), 0.0_dp, tolerance, &
                'long run: pressure, '//what//' '//trim(laws(law)))
             do c = 1, merge(2, 0, law > 1)
-               call check_close(norm2(sim%state%tangential%traction(:, :, c) - found%traction(:, c, :)) &
+               call check_close(norm2(sim%state%tangential%traction(:, c, :) - found%traction(:, c, :)) &
                   /norm2(found%traction), 0.0_dp, tolerance, 'long run: traction, '//what//' '// &
                   trim(laws(law)))
             end do

@@ -6,9 +6,10 @@ module test_viscoelastic_energy
    use prony, only : zener_to_prony
    use viscoelastic_energy, only : book_step, &
       energy_books_type, new_books
-   use zener, only : commit_history, finish_step, history_field, history_type, new_history, &
-      new_products, new_zener, products_type, restart_order, start_jump, start_relaxed, &
-      start_step, zener_type
+   use arm_state, only : arm_state_type, commit_arms, new_arm_state, new_products, past_traction, &
+      products_type
+   use zener, only : finish_step, new_zener, restart_order, start_jump, start_relaxed, start_step, &
+      zener_type
    implicit none
    private
 
@@ -20,7 +21,7 @@ module test_viscoelastic_energy
    !> A body of a few cells with a dense elastic operator.
    type :: body_type
       type(zener_type) :: material
-      type(history_type) :: history
+      type(arm_state_type) :: arms
       type(energy_books_type) :: books
       real(dp) :: a(cells, cells) = 0.0_dp
       real(dp) :: u(cells) = 0.0_dp
@@ -61,7 +62,7 @@ contains
       integer :: i, j
 
       call new_zener(self%material, g_e, g, tau, trim(scheme), error)
-      call new_history(self%history, self%material, cells, 1, 1, error)
+      call new_arm_state(self%arms, self%material, cells, 1, 1, error)
       call new_books(self%books, self%material, 0.25_dp)
       do j = 1, cells
          do i = 1, cells
@@ -80,13 +81,13 @@ contains
       real(dp), intent(in) :: p(cells)
       real(dp), intent(in), optional :: damage     ! a wrong displacement of one cell
       type(products_type) :: products
-      real(dp) :: hist(cells), u(cells)
+      real(dp) :: past(cells), u(cells)
 
-      call history_field(self%history, self%material, hist)
-      u = matmul(self%a, p + hist)/self%material%q
+      call past_traction(self%arms, self%material, past)
+      u = matmul(self%a, p + past)/self%material%q
       if (present(damage)) u(2) = u(2) + damage
       products = new_products(self%material)
-      call commit_history(self%history, self%material, p, self%u, u, products)
+      call commit_arms(self%arms, self%material, p, self%u, u, products)
       call book_step(self%books, self%material, products)
       call finish_step(self%material)
       self%u = u
@@ -139,10 +140,10 @@ contains
                call check_order(body%books%numerical, '>=', before%numerical - 1.0e-14_dp*scale, &
                   'own loss of '//schemes(i))
                stored = 0.5_dp*body%material%g_e &
-                  *dot_product(body%history%s(:, 1), matmul(body%a, body%history%s(:, 1)))
+                  *dot_product(body%arms%s(:, 1), matmul(body%a, body%arms%s(:, 1)))
                do k = 1, 3
-                  stored = stored + dot_product(body%history%arm(:, k, 1), &
-                     matmul(body%a, body%history%arm(:, k, 1)))/(2.0_dp*g(k))
+                  stored = stored + dot_product(body%arms%arm(:, k, 1), &
+                     matmul(body%a, body%arms%arm(:, k, 1)))/(2.0_dp*g(k))
                end do
                ! a fluid may have flowed far: U has the round-off of its size
                scale = max(scale, sum(abs(body%p*body%u)))
@@ -181,7 +182,7 @@ contains
       real(dp), parameter :: g_e = 0.4_dp, g(2) = [1.0_dp, 3.0_dp], tau(2) = [0.3_dp, 6.0_dp]
       real(dp), parameter :: dts(0:5) = [1.0_dp, 0.2_dp, 0.3_dp, 0.5_dp, 0.15_dp, 1.4_dp]
       type(zener_type) :: material
-      type(history_type) :: history
+      type(arm_state_type) :: arms
       type(energy_books_type) :: books, before
       type(products_type) :: products
       type(error_type), allocatable :: error
@@ -190,7 +191,7 @@ contains
 
       do i = 2, 3
          call new_zener(material, g_e, g, tau, trim(schemes(i)), error)
-         call new_history(history, material, 1, 1, 1, error)
+         call new_arm_state(arms, material, 1, 1, 1, error)
          call new_books(books, material, 2.0_dp)
          u = 0.0_dp
          m = 0.0_dp
@@ -198,11 +199,11 @@ contains
          do n = 1, 5
             before = books
             call start_step(material, dts(n))
-            call history_field(history, material, h)
+            call past_traction(arms, material, h)
             v = sin(2.0_dp*n)
             p = material%q*v - h
             products = new_products(material)
-            call commit_history(history, material, p, u, v, products)
+            call commit_arms(arms, material, p, u, v, products)
             call book_step(books, material, products)
             curve = 0.0_dp
             if (i == 3 .and. n > 1) curve = 2.0_dp*((v(1) - u(1))/dts(n) - rate_old) &
@@ -266,7 +267,7 @@ contains
       real(dp) :: g_e, g(2), tau(2), dt, u(1), u_new(1), p(1), h(1), pk(2), v(2), dv(2), dpk(2)
       real(dp) :: viscous, own, stored
       type(zener_type) :: material
-      type(history_type) :: history
+      type(arm_state_type) :: arms
       type(energy_books_type) :: books, before
       type(products_type) :: products
       type(error_type), allocatable :: error
@@ -274,7 +275,7 @@ contains
 
       call zener_to_prony(g_inf, g0, g1, eta, g_e, g, tau)
       call new_zener(material, g_e, g, tau, 'backward_euler', error)
-      call new_history(history, material, 1, 1, 1, error)
+      call new_arm_state(arms, material, 1, 1, 1, error)
       call new_books(books, material, area)
       u = 0.0_dp
       pk = 0.0_dp                                ! A P_k of the branches
@@ -284,10 +285,10 @@ contains
          dt = 10.0_dp**(-2.0_dp + 0.15_dp*mod(7*n, 31))
          p = sin(1.0_dp*n)
          call start_step(material, dt)
-         call history_field(history, material, h)
+         call past_traction(arms, material, h)
          u_new = a*(p + h)/material%q
          products = new_products(material)
-         call commit_history(history, material, p, u, u_new, products)
+         call commit_arms(arms, material, p, u, u_new, products)
          call book_step(books, material, products)
          call finish_step(material)
 
@@ -376,7 +377,7 @@ contains
          integer, intent(in) :: n                  ! steps a cycle
          real(dp) :: loss
          type(zener_type) :: material
-         type(history_type) :: history
+         type(arm_state_type) :: arms
          type(energy_books_type) :: books
          type(products_type) :: products
          type(error_type), allocatable :: error
@@ -384,17 +385,17 @@ contains
          integer :: step
 
          call new_zener(material, 1.0_dp, g, tau, trim(scheme), error)
-         call new_history(history, material, 1, 1, 1, error)
+         call new_arm_state(arms, material, 1, 1, 1, error)
          call new_books(books, material, 1.0_dp)
          u = 0.0_dp
          loss = 0.0_dp
          do step = 1, 16*n
             if (step == 15*n + 1) loss = books%dissipated
             call start_step(material, 1.0_dp/n)
-            call history_field(history, material, h)
+            call past_traction(arms, material, h)
             v = sin(w*step/n)
             products = new_products(material)
-            call commit_history(history, material, material%q*v - h, u, v, products)
+            call commit_arms(arms, material, material%q*v - h, u, v, products)
             call book_step(books, material, products)
             call finish_step(material)
             u = v
@@ -438,9 +439,9 @@ contains
       call new_body(other, 0.5_dp, [1.0_dp, 2.0_dp], [0.1_dp, 3.0_dp], 'exponential2', state)
       other%a = body%a
       other%u = body%u
-      other%history%s = body%history%s
-      other%history%ds = body%history%ds
-      other%history%arm = body%history%arm
+      other%arms%s = body%arms%s
+      other%arms%ds = body%arms%ds
+      other%arms%arm = body%arms%arm
       other%material%dt_old = body%material%dt_old
       other%books = body%books
       do n = 1, 3

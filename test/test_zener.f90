@@ -8,9 +8,10 @@ module test_zener
    use prony, only : creep_compliance, relaxation_modulus, retardation_spectrum, zener_to_prony
    use relaxation_functions, only : mean_decay, mean_rise, parabola_work, slope_response, &
       steady_loss
-   use zener, only : commit_history, destroy_history, finish_step, history_field, history_type, &
-      is_elastic, new_history, new_products, new_zener, products_type, restart_order, start_jump, &
-      start_relaxed, start_step, zener_type
+   use arm_state, only : arm_state_type, commit_arms, destroy_arm_state, new_arm_state, &
+      new_products, past_traction, products_type
+   use zener, only : finish_step, is_elastic, new_zener, restart_order, start_jump, start_relaxed, &
+      start_step, zener_type
    implicit none
    private
 
@@ -21,7 +22,7 @@ module test_zener
    !> One cell with A = 1, driven by P or by U.
    type :: point_type
       type(zener_type) :: material
-      type(history_type) :: history
+      type(arm_state_type) :: arms
       real(dp) :: u(1) = 0.0_dp
       real(dp) :: p(1) = 0.0_dp
    end type point_type
@@ -52,7 +53,7 @@ contains
 
       call new_zener(self%material, g_e, g, tau, trim(scheme), error)
       call check_no_error(error, 'a material')
-      call new_history(self%history, self%material, 1, 1, 1, error)
+      call new_arm_state(self%arms, self%material, 1, 1, 1, error)
       call check_no_error(error, 'a history')
    end subroutine new_point
 
@@ -61,19 +62,19 @@ contains
       type(point_type), intent(inout) :: self
       real(dp), intent(in), optional :: p, u
       type(products_type) :: products
-      real(dp) :: hist(1), u_old(1)
+      real(dp) :: past(1), u_old(1)
 
       u_old = self%u
-      call history_field(self%history, self%material, hist)
+      call past_traction(self%arms, self%material, past)
       if (present(p)) then
          self%p = p
-         self%u = (self%p + hist)/self%material%q
+         self%u = (self%p + past)/self%material%q
       else
          self%u = u
-         self%p = self%material%q*self%u - hist
+         self%p = self%material%q*self%u - past
       end if
       products = new_products(self%material)
-      call commit_history(self%history, self%material, self%p, u_old, self%u, products)
+      call commit_arms(self%arms, self%material, self%p, u_old, self%u, products)
       call finish_step(self%material)
    end subroutine reach
 
@@ -166,17 +167,17 @@ contains
       real(dp), parameter :: eta(2) = [0.7_dp, 0.02_dp]
       real(dp), parameter :: a(3, 3) = reshape([2.0_dp, 0.7_dp, 0.3_dp, 0.7_dp, 1.5_dp, 0.6_dp, &
          0.3_dp, 0.6_dp, 1.1_dp], [3, 3])
-      real(dp) :: g_e, g(2), tau(2), dt, hist(3), p(3), u(3), u_new(3), ap(3, 2), lead, past(3)
+      real(dp) :: g_e, g(2), tau(2), dt, past(3), p(3), u(3), u_new(3), ap(3, 2), lead, thesis_past(3)
       real(dp) :: thesis_u(3), thesis_new(3), bottom
       type(zener_type) :: material
-      type(history_type) :: history
+      type(arm_state_type) :: arms
       type(products_type) :: products
       type(error_type), allocatable :: error
       integer :: k, n
 
       call zener_to_prony(g_inf, g0, g1, eta, g_e, g, tau)
       call new_zener(material, g_e, g, tau, 'backward_euler', error)
-      call new_history(history, material, 3, 1, 1, error)
+      call new_arm_state(arms, material, 3, 1, 1, error)
       products = new_products(material)
       u = 0.0_dp
       thesis_u = 0.0_dp
@@ -185,20 +186,20 @@ contains
          dt = 10.0_dp**(-2.0_dp + 0.1_dp*mod(7*n, 31))
          p = [sin(1.0_dp*n), cos(2.0_dp*n), sin(3.0_dp*n)]
          call start_step(material, dt)
-         call history_field(history, material, hist)
-         u_new = matmul(a, p + hist)/material%q
-         call commit_history(history, material, p, u, u_new, products)
+         call past_traction(arms, material, past)
+         u_new = matmul(a, p + past)/material%q
+         call commit_arms(arms, material, p, u, u_new, products)
          call finish_step(material)
          u = u_new
 
          lead = g_inf
-         past = 0.0_dp
+         thesis_past = 0.0_dp
          do k = 1, 2
             bottom = 1.0_dp + g1(k)/g0(k) + eta(k)/(g0(k)*dt)
             lead = lead + (g1(k) + eta(k)/dt)/bottom
-            past = past + (eta(k)/dt*thesis_u - eta(k)/(g0(k)*dt)*ap(:, k))/bottom
+            thesis_past = thesis_past + (eta(k)/dt*thesis_u - eta(k)/(g0(k)*dt)*ap(:, k))/bottom
          end do
-         thesis_new = (matmul(a, p) + past)/lead
+         thesis_new = (matmul(a, p) + thesis_past)/lead
          do k = 1, 2
             bottom = 1.0_dp + g1(k)/g0(k) + eta(k)/(g0(k)*dt)
             ap(:, k) = (g1(k)*thesis_new + eta(k)/dt*(thesis_new - thesis_u) &
@@ -471,7 +472,7 @@ contains
    subroutine fields()
       integer, parameter :: nx = 67, ny = 43      ! more than a block, no multiple of it
       type(zener_type) :: material
-      type(history_type) :: one, two, both, single
+      type(arm_state_type) :: one, two, both, single
       type(products_type) :: a, b, c, d
       type(error_type), allocatable :: error
       real(dp), allocatable :: p(:, :, :), u(:, :, :), v(:, :, :), h1(:, :, :), h2(:, :, :)
@@ -479,39 +480,39 @@ contains
       integer :: i, j, n, s, threads
 
       threads = thread_count()
-      allocate (p(nx, ny, 2), u(nx, ny, 2), v(nx, ny, 2), h1(nx, ny, 2), h2(nx, ny, 2))
+      allocate (p(nx, 2, ny), u(nx, 2, ny), v(nx, 2, ny), h1(nx, 2, ny), h2(nx, 2, ny))
       do s = 1, 3
          call new_zener(material, 0.4_dp, [1.0_dp, 0.3_dp], [0.1_dp, 2.0_dp], &
             trim(schemes(s)), error)
-         call new_history(one, material, nx, ny, 1, error)
-         call new_history(two, material, nx, ny, 1, error)
-         call new_history(both, material, nx, ny, 2, error)
-         call new_history(single, material, 1, 1, 1, error)
+         call new_arm_state(one, material, nx, ny, 1, error)
+         call new_arm_state(two, material, nx, ny, 1, error)
+         call new_arm_state(both, material, nx, ny, 2, error)
+         call new_arm_state(single, material, 1, 1, 1, error)
          u = 0.0_dp
          w = 0.0_dp
          do n = 1, 4
             do j = 1, ny
                do i = 1, nx
-                  p(i, j, 1) = sin(0.1_dp*i*j + n)
-                  p(i, j, 2) = cos(0.2_dp*i - 0.3_dp*j*n)
+                  p(i, 1, j) = sin(0.1_dp*i*j + n)
+                  p(i, 2, j) = cos(0.2_dp*i - 0.3_dp*j*n)
                end do
             end do
             call start_step(material, 0.3_dp)
             call set_threads(1)
-            call history_field(both, material, h1)
+            call past_traction(both, material, h1)
             call set_threads(2)
-            call history_field(one, material, h2(:, :, 1))
-            call history_field(two, material, h2(:, :, 2))
+            call past_traction(one, material, h2(:, 1, :))
+            call past_traction(two, material, h2(:, 2, :))
             call check_close(maxval(abs(h1 - h2)), 0.0_dp, 1.0e-15_dp, 'components')
             v = (p + h1)/material%q
             a = new_products(material)
             b = new_products(material)
             c = new_products(material)
-            call commit_history(one, material, p(:, :, 1), u(:, :, 1), v(:, :, 1), a)
-            call commit_history(two, material, p(:, :, 2) - 0.5_dp, u(:, :, 2), v(:, :, 2), a, &
+            call commit_arms(one, material, p(:, 1, :), u(:, 1, :), v(:, 1, :), a)
+            call commit_arms(two, material, p(:, 2, :) - 0.5_dp, u(:, 2, :), v(:, 2, :), a, &
                carried=[-0.5_dp])
             call set_threads(1)
-            call commit_history(both, material, p, u, v, b)
+            call commit_arms(both, material, p, u, v, b)
             call check_close(a%u_s/b%u_s, 1.0_dp, 1.0e-15_dp, 'U.S')
             call check_close(a%p_du/b%p_du, 1.0_dp, 1.0e-14_dp, 'P.dU')
             call check_close(a%du_ds/b%du_ds, 1.0_dp, 1.0e-14_dp, 'dU.dS')
@@ -520,43 +521,43 @@ contains
             call check_close(b%du_ds, sum((v - u)**2), 1.0e-12_dp*b%du_ds, 'sum of dU.dU')
             call check_close(maxval(abs(a%arm_du - b%arm_du)), 0.0_dp, 1.0e-10_dp, 'p_k.dU')
 
-            call history_field(single, material, h)        ! the cell (11, 37) for itself
-            q = p(11, 37, 1)
+            call past_traction(single, material, h)        ! the cell (11, 37) for itself
+            q = p(11, 1, 37)
             w_old = w
             w = (q + h)/material%q
             d = new_products(material)
-            call commit_history(single, material, q, w_old, w, d)
-            call check_close(w(1), v(11, 37, 1), 1.0e-15_dp, 'a cell knows only itself')
+            call commit_arms(single, material, q, w_old, w, d)
+            call check_close(w(1), v(11, 1, 37), 1.0e-15_dp, 'a cell knows only itself')
             call finish_step(material)
             u = v
          end do
-         call destroy_history(both)
+         call destroy_arm_state(both)
          call check_that(.not. allocated(both%arm), 'freed')
          call check_that((size(one%ds) > 0) .eqv. s == 3, 'only exponential2 keeps the last step')
-         call commit_threads(one, material, p(:, :, 1), u(:, :, 1))
+         call commit_threads(one, material, p(:, 1, :), u(:, 1, :))
       end do
       call set_threads(threads)
    end subroutine fields
 
    !> The same commit with one and with two threads: the same bits.
-   subroutine commit_threads(history, material, p, u)
-      type(history_type), intent(in) :: history
+   subroutine commit_threads(arms, material, p, u)
+      type(arm_state_type), intent(in) :: arms
       type(zener_type), intent(inout) :: material
       real(dp), intent(in) :: p(:, :), u(:, :)
-      type(history_type) :: copies(2)
+      type(arm_state_type) :: copies(2)
       type(products_type) :: products(2)
-      real(dp) :: hist(size(p, 1), size(p, 2), 2)
+      real(dp) :: past(size(p, 1), size(p, 2), 2)
       integer :: i
 
       call start_step(material, 0.2_dp)
       do i = 1, 2
-         copies(i) = history
+         copies(i) = arms
          products(i) = new_products(material)
          call set_threads(i)
-         call history_field(copies(i), material, hist(:, :, i))
-         call commit_history(copies(i), material, p, u, p, products(i))
+         call past_traction(copies(i), material, past(:, :, i))
+         call commit_arms(copies(i), material, p, u, p, products(i))
       end do
-      call check_close(maxval(abs(hist(:, :, 1) - hist(:, :, 2))), 0.0_dp, 0.0_dp, 'hist, threads')
+      call check_close(maxval(abs(past(:, :, 1) - past(:, :, 2))), 0.0_dp, 0.0_dp, 'hist, threads')
       call check_close(products(1)%p_du, products(2)%p_du, 0.0_dp, 'P.dU, threads')
       call check_close(products(1)%u_s, products(2)%u_s, 0.0_dp, 'U.S, threads')
       call check_close(sum(abs(products(1)%arm_du - products(2)%arm_du)), 0.0_dp, 0.0_dp, &
@@ -568,7 +569,7 @@ contains
    subroutine elastic()
       type(point_type) :: point
       type(products_type) :: products
-      real(dp) :: hist(1)
+      real(dp) :: past(1)
       integer :: i
 
       do i = 1, 3
@@ -576,16 +577,16 @@ contains
          call check_that(is_elastic(point%material), 'elastic')
          call start_step(point%material, 0.1_dp)
          call check_close(point%material%q, 4.0_dp, 0.0_dp, 'Q = G')
-         hist = 1.0_dp
-         call history_field(point%history, point%material, hist)
-         call check_close(hist(1), 0.0_dp, 0.0_dp, 'no history')
+         past = 1.0_dp
+         call past_traction(point%arms, point%material, past)
+         call check_close(past(1), 0.0_dp, 0.0_dp, 'no history')
          products = new_products(point%material)
-         call commit_history(point%history, point%material, [2.5_dp], [0.1_dp], [0.5_dp], &
+         call commit_arms(point%arms, point%material, [2.5_dp], [0.1_dp], [0.5_dp], &
             products, carried=[0.5_dp])
          call check_close(products%u_s, 0.25_dp, 1.0e-16_dp, 'U.S of an elastic body')
          call check_close(products%p_du, 0.8_dp, 1.0e-15_dp, 'P.dU of an elastic body')
-         call check_that(size(point%history%s) + size(point%history%arm) &
-            + size(point%history%ds) == 0, 'no memory')
+         call check_that(size(point%arms%s) + size(point%arms%arm) &
+            + size(point%arms%ds) == 0, 'no memory')
       end do
    end subroutine elastic
 

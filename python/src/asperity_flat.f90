@@ -220,9 +220,8 @@ contains
       use contact_solver, only : contact_solver_type
       use normal_solvers, only : new_contact_solver
       use kernels, only : normal_half_space
-      use normal_state, only : control_approach, control_pressure, normal_problem_type, &
-         rms_about_mean
-      use asperity_parallel, only : thread_count
+      use field_sums, only : field_mean, field_rms
+      use normal_state, only : control_approach, control_pressure, normal_problem_type
       use asperity_precision, only : dp
       use regular_grid, only : grid_type
       use solver_result, only : solver_result_type
@@ -265,7 +264,7 @@ contains
          problem%tolerance = tolerance
          problem%max_iterations = max_iterations
          problem%warm = warm == 1
-         problem%rms_height = rms_about_mean(height, thread_count())
+         problem%rms_height = field_rms(height, field_mean(height))
          call solver%solve(problem, height, pressure, gap, level, outcome)
          call solver%destroy()
       end if
@@ -370,7 +369,8 @@ contains
    !> Read a case and prepare its run: the handle is for the calls that follow.
    subroutine run_open(path, text, output, threads, restart, overwrite, handle, rows, first, &
       result_path, warnings, status, message)
-      use case_input, only : overwritten_file, parse_case, read_case
+      use case_files, only : overwritten_file
+      use case_input, only : parse_case, read_case
       use case_run, only : run_type
       use case_settings, only : case_type
       use asperity_errors, only : error_input, error_type, fail
@@ -514,17 +514,17 @@ contains
 
    !> The columns of a row: lines 'name units whole long_name', with whole = 1 for whole numbers.
    subroutine row_columns(most, buffer, length)
-      use history_row, only : column_count, column_type, history_columns
+      use history_row, only : column_type, history_columns
       integer(c_int), intent(in) :: most                       !! characters that the buffer holds
       integer(c_int), intent(inout) :: buffer(most)             !! codes of the characters
       integer(c_int), intent(out) :: length                    !! of the text; above `most`: none is written
-      type(column_type) :: columns(column_count)
+      type(column_type), allocatable :: columns(:)
       character(:), allocatable :: text
       integer :: i
 
       columns = history_columns()
       text = ''
-      do i = 1, column_count
+      do i = 1, size(columns)
          text = text//trim(columns(i)%name)//' '//trim(columns(i)%units)//' '// &
             merge('1', '0', columns(i)%whole)//' '//trim(columns(i)%long_name)//new_line('a')
       end do
@@ -534,7 +534,7 @@ contains
    !> The last row of a run or a simulation, in the order of `row_columns`.
    subroutine run_row(handle, n, values, status, message)
       use asperity_errors, only : error_input, error_type, fail
-      use history_row, only : column_count, row_values
+      use history_row, only : row_values
       use run_handles, only : sim_of
       use asperity_simulation, only : simulation_type
       integer(c_int), intent(in) :: handle
@@ -544,14 +544,15 @@ contains
       character(len=2000), intent(out) :: message
       type(error_type), allocatable :: error
       type(simulation_type), pointer :: sim
+      real(c_double), allocatable :: found(:)
 
       sim => sim_of(int(handle))
       if (.not. associated(sim)) then
          call fail(error, error_input, 'the simulation is closed')
-      else if (n /= column_count) then
-         call fail(error, error_input, 'a row has another number of columns')
       else
-         values = row_values(sim%state%row)
+         found = row_values(sim%state%row)
+         if (size(found) /= n) call fail(error, error_input, 'a row has another number of columns')
+         if (size(found) == n) values = found
       end if
       call report(error, status, message)
    end subroutine run_row
@@ -597,7 +598,7 @@ contains
       use case_identity, only : identity_of
       use case_input, only : parse_case, read_case
       use case_report, only : memory_needed, resolved_input
-      use case_run, only : map_lines
+      use case_record, only : map_lines
       use case_settings, only : case_type
       use asperity_errors, only : error_input, error_type, fail
       use memory_limits, only : need_memory

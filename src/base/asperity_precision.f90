@@ -4,11 +4,22 @@ module asperity_precision
    implicit none
    private
 
-   public :: int8, int64
+   public :: int8, int64, power_of_two
 
    integer, parameter, public :: sp = real32   !! single precision, where speed allows it
    integer, parameter, public :: dp = real64   !! double precision, the default
 
    real(dp), parameter, public :: pi = 3.14159265358979323846_dp
+
+contains
+
+   !> The power of two above a positive number, 1 for others.
+   elemental function power_of_two(x)
+      real(dp), intent(in) :: x
+      real(dp) :: power_of_two
+
+      power_of_two = 1.0_dp
+      if (x > 0.0_dp) power_of_two = scale(1.0_dp, exponent(x))
+   end function power_of_two
 
 end module asperity_precision

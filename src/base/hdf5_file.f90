@@ -10,7 +10,7 @@
 !> a single small block that the next `flush` writes.
 module hdf5_file
    use, intrinsic :: iso_c_binding, only : c_loc, c_null_ptr, c_ptr
-   use asperity_errors, only : error_file, error_input, error_memory, error_type, fail
+   use asperity_errors, only : error_file, error_input, error_type, fail
    use asperity_precision, only : dp, int8
    use hdf5_attributes, only : hdf5_attributes_type
    use hdf5_c_objects, only : h5oclose
@@ -20,7 +20,7 @@ module hdf5_file
    use hdf5_values, only : get_reals, kind_int8, kind_integer, kind_real, new_column, new_dataset, &
       put_rows, shape_of_dataset
    use hdf5_virtual, only : check_sources
-   use memory_limits, only : memory_text
+   use memory_limits, only : check_allocation
    use text_tools, only : to_text
    implicit none
    private
@@ -311,18 +311,6 @@ contains
       ignored = h5oclose(dataset)
    end subroutine load
 
-   !> A fault if memory for a dataset could not be allocated.
-   subroutine check_memory(self, path, extent, status, fault)
-      class(hdf5_file_type), intent(in) :: self
-      character(*), intent(in) :: path
-      integer, intent(in) :: extent(:)
-      integer, intent(in) :: status         !! of the allocation
-      type(error_type), allocatable, intent(out) :: fault
-
-      if (status /= 0) call fail(fault, error_memory, self%path//': '//trim(path)// &
-         ': not enough memory: the values take '//memory_text(8.0_dp*product(real(extent, dp))))
-   end subroutine check_memory
-
    !> Read a single real; 0 after a fault.
    subroutine read_real_0(self, path, value, error)
       class(hdf5_file_type), intent(inout) :: self
@@ -358,7 +346,7 @@ contains
       if (.not. allocated(fault)) then
          deallocate (values)
          allocate (values(extent(1)), stat=status)
-         call check_memory(self, path, extent, status, fault)
+         call check_allocation(self%path//': '//trim(path), extent, status, fault)
       end if
       if (.not. allocated(fault) .and. all(extent > 0)) call load(self, path, c_loc(values), fault)
       call self%settle(fault, error)
@@ -379,7 +367,7 @@ contains
       if (.not. allocated(fault)) then
          deallocate (values)
          allocate (values(extent(1), extent(2)), stat=status)
-         call check_memory(self, path, extent, status, fault)
+         call check_allocation(self%path//': '//trim(path), extent, status, fault)
       end if
       if (.not. allocated(fault) .and. all(extent > 0)) call load(self, path, c_loc(values), fault)
       call self%settle(fault, error)
@@ -400,7 +388,7 @@ contains
       if (.not. allocated(fault)) then
          deallocate (values)
          allocate (values(extent(1), extent(2), extent(3)), stat=status)
-         call check_memory(self, path, extent, status, fault)
+         call check_allocation(self%path//': '//trim(path), extent, status, fault)
       end if
       if (.not. allocated(fault) .and. all(extent > 0)) call load(self, path, c_loc(values), fault)
       call self%settle(fault, error)

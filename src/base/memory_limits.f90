@@ -10,13 +10,24 @@ module memory_limits
    implicit none
    private
 
-   public :: memory_limit, memory_text, need_memory
+   public :: check_allocation, memory_limit, memory_text, need_memory
 
    !> Address space that is needed in addition to the fields, for libraries and for the stacks and
    !> heaps of threads, bytes.
    real(dp), parameter :: address_reserve = 256.0e6_dp
 
 contains
+
+   !> An error if memory for values could not be allocated.
+   subroutine check_allocation(place, extent, status, error)
+      character(*), intent(in) :: place             !! where the values come from, for the message
+      integer, intent(in) :: extent(:)              !! of the array of doubles
+      integer, intent(in) :: status                 !! of the allocation
+      type(error_type), allocatable, intent(out) :: error
+
+      if (status /= 0) call fail(error, error_memory, place//': not enough memory: the values take '// &
+         memory_text(8.0_dp*product(real(extent, dp))))
+   end subroutine check_allocation
 
    !> An error if a task needs more memory than this process can get.
    subroutine need_memory(bytes, task, error)

@@ -14,14 +14,14 @@ module field_sums
    implicit none
    private
 
-   public :: cell_count, field_count, field_maximum, field_mean, field_minimum, field_product, &
+   public :: cell_count, field_count, field_magnitude, field_maximum, field_mean, field_minimum, field_product, &
       field_rms, field_sum, largest_of_rows, least_of_rows, row_total, row_totals, threads_for
 
    integer, parameter :: small = 16384          !! cells below which one thread is faster
 
-   !> Total of one sum per row: of `rows(j)`, or of `rows(k, j)` for a given k.
+   !> Total of one sum or count per row: of `rows(j)`, or of `rows(k, j)` for a given k.
    interface row_total
-      module procedure :: total_of_rows, total_of_row_sums
+      module procedure :: total_of_rows, total_of_row_counts, total_of_row_sums
    end interface row_total
 
 contains
@@ -39,7 +39,15 @@ contains
       total = global_sum(total)
    end function total_of_rows
 
-   !> The same for the k-th of several sums per row.
+   !> Total of one count per row.
+   pure function total_of_row_counts(rows) result(total)
+      integer, intent(in) :: rows(:)           !! one count for each row of this process
+      integer :: total
+
+      total = global_sum(sum(rows))
+   end function total_of_row_counts
+
+   !> The same as `total_of_rows` for the k-th of several sums per row.
    pure function total_of_row_sums(rows, k) result(total)
       real(dp), intent(in) :: rows(:, :)       !! [sums, rows of this process]
       integer, intent(in) :: k
@@ -168,6 +176,21 @@ contains
       end do
       largest = largest_of_rows(rows)
    end function field_maximum
+
+   !> Largest magnitude of a field; not quite zero where the field is zero.
+   function field_magnitude(field) result(largest)
+      real(dp), intent(in) :: field(:, :)
+      real(dp) :: largest
+      real(dp), allocatable :: rows(:)
+      integer :: j
+
+      allocate (rows(size(field, 2)))
+      !$omp parallel do default(none) shared(field, rows) private(j) num_threads(threads_for(field))
+      do j = 1, size(field, 2)
+         rows(j) = maxval(abs(field(:, j)))
+      end do
+      largest = max(largest_of_rows(rows), tiny(1.0_dp))
+   end function field_magnitude
 
    !> Least value of a field.
    function field_minimum(field) result(least)

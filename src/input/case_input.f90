@@ -1,28 +1,26 @@
 !> Reads a case: a file of namelists becomes checked settings, or one error with all its faults.
 module case_input
    use adhesion_advice, only : adhesion_warning
+   use case_files, only : default_result, overwritten_file
    use case_material, only : resolve_material
    use case_phases, only : resolve_phases
    use case_settings, only : case_type, output_settings_type, path_length, word_length
    use case_surfaces, only : resolve_path, resolve_surfaces
-   use asperity_errors, only : error_file, error_type, fail
+   use asperity_errors, only : error_type
    use input_faults, only : faults_type
    use input_group, only : group_values_type
    use input_reference, only : group_entries, group_entry_type
    use input_values, only : default_group, read_groups
-   use path_identity, only : same_file
    use asperity_precision, only : dp
-   use result_names, only : side_file, side_files
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use surface_warnings, only : find_warnings, warning_length
+   use asperity_text_file, only : read_text_file
    use text_tools, only : to_text
    use transform_lengths, only : length_warning
    implicit none
    private
 
-   public :: overwritten_file, parse_case, read_case, read_text_file
-
-   integer, parameter :: largest_file = 4000000      !! characters of an input
+   public :: parse_case, read_case
 
 contains
 
@@ -37,52 +35,6 @@ contains
       if (allocated(error)) return
       call parse_case(text, path, case, error)
    end subroutine read_case
-
-   !> The content of a file, byte by byte.
-   subroutine read_text_file(path, text, error)
-      character(*), intent(in) :: path
-      character(:), allocatable, intent(out) :: text
-      type(error_type), allocatable, intent(out) :: error
-      character(:), allocatable :: larger
-      character(256) :: message
-      character :: letter
-      integer :: count, status, unit
-      logical :: exists
-
-      inquire (file=path, exist=exists)
-      if (.not. exists) then
-         call fail(error, error_file, path//': there is no such file')
-         return
-      end if
-      message = ''
-      open (newunit=unit, file=path, access='stream', form='unformatted', status='old', action='read', &
-         iostat=status, iomsg=message)
-      if (status /= 0) then
-         call fail(error, error_file, path//': cannot be read: '//trim(message))
-         return
-      end if
-      allocate (character(4096) :: text)
-      count = 0
-      do
-         read (unit, iostat=status, iomsg=message) letter
-         if (status /= 0) exit
-         if (count == len(text)) then
-            allocate (character(2*count) :: larger)
-            larger(:count) = text
-            call move_alloc(larger, text)
-         end if
-         count = count + 1
-         text(count:count) = letter
-         if (count > largest_file) exit
-      end do
-      close (unit)
-      if (.not. is_iostat_end(status)) then
-         if (status == 0) message = 'it is longer than '//to_text(largest_file)//' characters'
-         call fail(error, error_file, path//': cannot be read: '//trim(message))
-         return
-      end if
-      text = text(:count)
-   end subroutine read_text_file
 
    !> Read a case from a text.
    subroutine parse_case(text, path, case, error)
@@ -402,56 +354,11 @@ contains
       case%output = output
    end subroutine resolve_output
 
-   !> What the result, or a file that is written beside it, would be written over: the input, a
-   !> height map, or '' for neither.
-   function overwritten_file(case) result(what)
-      type(case_type), intent(in) :: case
-      character(:), allocatable :: what
-      integer :: n
-
-      what = ''
-      if (case%output%file == '') return
-      what = used_file(case, trim(case%output%file))
-      do n = 1, side_files
-         if (what == '') what = used_file(case, side_file(case%output%file, n))
-      end do
-   end function overwritten_file
-
-   !> What a case reads from a file of this name: the input, a height map, or '' for nothing.
-   function used_file(case, name) result(what)
-      type(case_type), intent(in) :: case
-      character(*), intent(in) :: name
-      character(:), allocatable :: what
-      integer :: i
-
-      what = ''
-      if (same_file(name, case%path)) what = 'the input'
-      do i = 1, size(case%surfaces)
-         if (case%surfaces(i)%file == '') cycle
-         if (same_file(name, case%surfaces(i)%file)) what = 'the height map of a &surface'
-      end do
-   end function used_file
-
    !> Is this a field of friction?
    elemental logical function is_tangential(field)
       character(*), intent(in) :: field
 
       is_tangential = index(field, '_x') > 0 .or. index(field, '_y') > 0
    end function is_tangential
-
-   !> The input's path with .h5 in place of its ending.
-   pure function default_result(path) result(file)
-      character(*), intent(in) :: path
-      character(:), allocatable :: file
-      integer :: point, slash
-
-      slash = index(path, '/', back=.true.)
-      point = index(path, '.', back=.true.)
-      if (point > slash + 1) then
-         file = path(:point - 1)//'.h5'
-      else
-         file = path//'.h5'
-      end if
-   end function default_result
 
 end module case_input

@@ -2,14 +2,11 @@
 !> values and meaning. The reader checks against it, templates take their comments from it, and the
 !> documentation prints it.
 module input_reference
-   use asperity_precision, only : dp
    use surface_shapes, only : all_shapes, shape_type, shape_words
-   use text_tools, only : to_text
    implicit none
    private
 
-   public :: allowed_phrase, group_entries, group_entry_type, is_array, is_required, reference_markdown, &
-      value_range, variable_entries, variable_entry_type, word_is_allowed
+   public :: group_entries, group_entry_type, is_array, is_required, variable_entries, variable_entry_type
 
    integer, parameter, public :: kind_integer = 1
    integer, parameter, public :: kind_real = 2
@@ -309,154 +306,5 @@ contains
 
       is_array = entry%kind == kind_reals .or. entry%kind == kind_words
    end function is_array
-
-   !> The range of a number.
-   pure subroutine value_range(entry, low, high, low_open, high_open)
-      type(variable_entry_type), intent(in) :: entry
-      real(dp), intent(out) :: low, high
-      logical, intent(out) :: low_open, high_open     !! the end itself is not allowed
-      integer :: comma, last
-
-      low = -huge(1.0_dp)
-      high = huge(1.0_dp)
-      low_open = .false.
-      high_open = .false.
-      select case (entry%allowed)
-      case ('any')
-      case ('positive')
-         low = 0.0_dp
-         low_open = .true.
-      case ('not negative')
-         low = 0.0_dp
-      case default
-         comma = index(entry%allowed, ',')
-         last = len_trim(entry%allowed)
-         read (entry%allowed(2:comma - 1), *) low
-         if (index(entry%allowed, 'inf') == 0) read (entry%allowed(comma + 1:last - 1), *) high
-         low_open = entry%allowed(1:1) == '('
-         high_open = entry%allowed(last:last) == ')'
-      end select
-   end subroutine value_range
-
-   !> What must be, for a message: 'must be a positive integer'.
-   pure function allowed_phrase(entry) result(phrase)
-      type(variable_entry_type), intent(in) :: entry
-      character(:), allocatable :: phrase
-      character(:), allocatable :: noun
-      real(dp) :: high, low
-      logical :: high_open, low_open
-
-      select case (entry%kind)
-      case (kind_logical)
-         phrase = 'must be .true. or .false.'
-         return
-      case (kind_text)
-         phrase = 'must be a string in quotes'
-         return
-      case (kind_word)
-         phrase = 'must be one of '//trim(entry%allowed)
-         return
-      case (kind_words)
-         phrase = 'every value must be one of '//trim(entry%allowed)
-         return
-      case (kind_integer)
-         noun = 'integer'
-      case default
-         noun = 'number'
-      end select
-
-      select case (entry%allowed)
-      case ('any')
-         phrase = 'a finite '//noun
-         if (noun == 'integer') phrase = 'an integer'
-      case ('positive')
-         phrase = 'a positive '//noun
-      case ('not negative')
-         phrase = '0 or a positive '//noun
-      case default
-         call value_range(entry, low, high, low_open, high_open)
-         phrase = 'a '//noun
-         if (noun == 'integer') phrase = 'an '//noun
-         if (low_open) then
-            phrase = phrase//' above'
-         else
-            phrase = phrase//' of at least'
-         end if
-         phrase = phrase//' '//to_text(low)
-         if (high < huge(1.0_dp)) then
-            if (high_open) then
-               phrase = phrase//' and below '//to_text(high)
-            else
-               phrase = phrase//' and at most '//to_text(high)
-            end if
-         end if
-      end select
-      if (is_array(entry)) then
-         phrase = 'every value must be '//phrase
-      else
-         phrase = 'must be '//phrase
-      end if
-   end function allowed_phrase
-
-   !> Is this word among the allowed ones?
-   pure logical function word_is_allowed(entry, word)
-      type(variable_entry_type), intent(in) :: entry
-      character(*), intent(in) :: word
-
-      word_is_allowed = index(entry%allowed, ''''//trim(word)//'''') > 0 .and. scan(trim(word), '|''') == 0
-   end function word_is_allowed
-
-   !> The whole table in Markdown.
-   function reference_markdown() result(text)
-      character(:), allocatable :: text
-      type(group_entry_type), allocatable :: groups(:)
-      type(variable_entry_type), allocatable :: variables(:)
-      character(*), parameter :: nl = new_line('a')
-      character(8), parameter :: kinds(7) = [character(8) :: 'integer', 'real', 'logical', 'string', &
-         'string', 'reals', 'strings']
-      integer :: i, j
-
-      allocate (groups, source=group_entries())
-      allocate (variables, source=variable_entries())
-      text = '# Input reference'//nl//nl// &
-         'An input file consists of Fortran namelists in any order; all numbers are in SI units.'//nl// &
-         'Defaults in parentheses are derived, or there is none. In an interval a parenthesis excludes'//nl// &
-         'the end and a bracket includes it. `asperity template --reference` prints this page.'//nl//nl
-      do i = 1, size(groups)
-         text = text//'## `&'//trim(groups(i)%name)//'`'//nl//nl//trim(groups(i)%meaning)
-         if (groups(i)%required) text = text//' Required.'
-         if (groups(i)%repeatable) text = text//' May be repeated.'
-         text = text//nl//nl//'| variable | type | default | units | allowed | meaning |'//nl// &
-            '| --- | --- | --- | --- | --- | --- |'//nl
-         do j = 1, size(variables)
-            associate (entry => variables(j))
-               if (entry%group /= groups(i)%name) cycle
-               text = text//'| `'//trim(entry%name)//'` | '//trim(kinds(entry%kind))//' | '// &
-                  trim(entry%default)//' | '//trim(entry%units)//' | '//bars(trim(entry%allowed))// &
-                  ' | '//trim(entry%meaning)//' |'//nl
-            end associate
-         end do
-         if (i < size(groups)) text = text//nl
-      end do
-   end function reference_markdown
-
-   !> Bars as commas, for a cell of a table.
-   pure function bars(text) result(cell)
-      character(*), intent(in) :: text
-      character(:), allocatable :: cell
-      integer :: i
-
-      cell = ''
-      i = 1
-      do while (i <= len(text))
-         if (text(i:min(i + 2, len(text))) == ' | ') then
-            cell = cell//', '
-            i = i + 3
-         else
-            cell = cell//text(i:i)
-            i = i + 1
-         end if
-      end do
-   end function bars
 
 end module input_reference

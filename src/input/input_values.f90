@@ -1,23 +1,20 @@
 !> From scanned namelists to values: names are checked, each value is read by Fortran's own rules and
 !> held against the table of the input reference; defaults come from that table too.
 module input_values
-   use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use case_settings, only : path_length
    use input_faults, only : faults_type
    use input_group, only : group_values_type, in_line, item_type, line_note, place, position, value_type
-   use input_reference, only : allowed_phrase, group_entries, group_entry_type, is_array, &
-      kind_integer, kind_logical, kind_real, kind_reals, kind_text, kind_word, kind_words, value_range, &
-      variable_entries, variable_entry_type, word_is_allowed
-   use namelist_file, only : assignment_type, namelists_type, scan_namelists, shown_tokens, &
-      token_broken, token_comma, token_equals, token_string, token_type, token_word, tokenise
-   use asperity_precision, only : dp
-   use text_tools, only : lower, nearest_name, to_text
+   use input_conversion, only : convert, longest_list, repeat_count
+   use input_ranges, only : allowed_phrase
+   use input_reference, only : group_entries, group_entry_type, is_array, variable_entries, variable_entry_type
+   use namelist_file, only : assignment_type, namelists_type, scan_namelists, shown_tokens
+   use namelist_tokens, only : token_broken, token_comma, token_string, token_type, token_word, &
+      tokenise
+   use text_tools, only : nearest_name, to_text
    implicit none
    private
 
    public :: default_group, read_groups
-
-   integer, parameter :: longest_list = 10000      !! values of a variable
 
 contains
 
@@ -317,99 +314,6 @@ contains
          end associate
       end do
    end subroutine finish_group
-
-   !> Read a repeat count; 0 where it is none.
-   subroutine repeat_count(word, repeats)
-      character(*), intent(in) :: word
-      integer, intent(out) :: repeats
-      integer :: status
-
-      repeats = 0
-      if (verify(word, '0123456789') > 0 .or. len(word) > 30) return
-      read (word, *, iostat=status) repeats
-      if (status /= 0) repeats = 0
-      if (repeats > longest_list) repeats = longest_list + 1
-   end subroutine repeat_count
-
-   !> Read one value by Fortran's rules, and hold it against the table.
-   subroutine convert(text, token, entry, item, good)
-      character(*), intent(in) :: text
-      type(token_type), intent(in) :: token
-      type(variable_entry_type), intent(in) :: entry
-      type(item_type), intent(out) :: item
-      logical, intent(out) :: good
-      integer, parameter :: longest_word = 400      !! of a number
-      integer :: status
-      logical :: wants_string
-      character(:), allocatable :: word
-
-      good = .false.
-      wants_string = any(entry%kind == [kind_text, kind_word, kind_words])
-      if (wants_string .neqv. token%kind == token_string) return
-      if (wants_string) then
-         call unquote(text(token%first:token%last), item%text, good)
-         if (good .and. entry%kind /= kind_text) then
-            item%text = lower(item%text)
-            good = word_is_allowed(entry, item%text) .and. len_trim(item%text) > 0
-         end if
-         return
-      end if
-
-      if (token%kind /= token_word .or. token%last - token%first >= longest_word) return
-      word = lower(text(token%first:token%last))
-      select case (entry%kind)
-      case (kind_integer)
-         if (verify(word, '+-0123456789') > 0) return
-         read (word, *, iostat=status) item%integer
-         item%real = real(item%integer, dp)
-      case (kind_real, kind_reals)
-         if (verify(word, '+-.0123456789ed') > 0) return
-         read (word, *, iostat=status) item%real
-      case (kind_logical)
-         if (verify(word, '.abcdefghijklmnopqrstuvwxyz') > 0) return
-         read (word, *, iostat=status) item%logical
-      case default
-         return
-      end select
-      if (status /= 0) return
-      good = entry%kind == kind_logical
-      if (.not. good) good = in_range(entry, item%real)
-   end subroutine convert
-
-   !> Is the number finite and within the range of the table?
-   logical function in_range(entry, number)
-      type(variable_entry_type), intent(in) :: entry
-      real(dp), intent(in) :: number
-      real(dp) :: high, low
-      logical :: high_open, low_open
-
-      in_range = .false.
-      if (.not. ieee_is_finite(number)) return
-      call value_range(entry, low, high, low_open, high_open)
-      if (number < low .or. number > high) return
-      if (low_open .and. number <= low) return
-      if (high_open .and. number >= high) return
-      in_range = .true.
-   end function in_range
-
-   !> The content of a string in quotes; a doubled quote stands for one.
-   subroutine unquote(quoted, content, good)
-      character(*), intent(in) :: quoted
-      character(path_length), intent(out) :: content
-      logical, intent(out) :: good               !! false: too long
-      integer :: i, n
-
-      content = ''
-      n = 0
-      i = 2
-      do while (i < len(quoted))
-         n = n + 1
-         if (n <= len(content)) content(n:n) = quoted(i:i)
-         if (quoted(i:i) == quoted(1:1)) i = i + 1
-         i = i + 1
-      end do
-      good = n <= len(content)
-   end subroutine unquote
 
    !> A proposal, if there is one.
    pure function hint(prefix, name) result(text)

@@ -1,7 +1,8 @@
 !> A row of the history: what is known of a step, with its names, units and meanings.
 !>
-!> A column is a component of `history_row_type` and a line in the lists below. The result file, the
-!> checkpoint, Python and the documentation's test walk the table that the lists make.
+!> A column is a component of `history_row_type` and a line in the lists below; its value is set in module
+!> `row_account`. The result file, the checkpoint, Python and the documentation's test walk the table that the
+!> lists make.
 !>
 !> Lengths, works and energies are those of the whole cell lx by ly; works and energies are
 !> cumulative.
@@ -12,8 +13,6 @@ module history_row
    private
 
    public :: column_type, history_columns, history_row_type, list_columns, row_values
-
-   integer, parameter, public :: column_count = 38     !! number of lines in the lists below
 
    !> What a column holds.
    type :: column_type

@@ -12,14 +12,15 @@ module result_file
    use asperity_precision, only : dp, int8
    use file_system, only : name_of, remove_file, rename_file
    use hdf5_file, only : hdf5_file_type
-   use history_row, only : column_count, history_row_type, row_values
+   use history_row, only : history_row_type, row_values
    use random_id, only : new_id
    use regular_grid, only : grid_type
-   use result_frame, only : read_grid, result_plan_type, write_axes, write_grid, write_origin
+   use result_frame, only : read_grid, result_plan_type, write_axes, write_frame
+   use result_losses, only : drop_losses, put_losses
    use result_history, only : append_values, count_history_rows, create_history_columns, &
       shorten_history
    use result_names, only : sibling_path
-   use result_restart, only : drop_losses, drop_snapshots, stop_mark
+   use result_restart, only : drop_snapshots, stop_mark
    use result_target, only : check_place
    use snapshot_fields, only : field_type, find_field
    use xdmf, only : snapshot_name, snapshot_type, write_xdmf
@@ -91,7 +92,10 @@ contains
       call check_place(self%path, error)
       if (allocated(error)) return
       temporary = self%path//'.new'
-      call write_frame(self, temporary, height, plan)
+      call write_frame(self%file, temporary, self%id, grid, height, plan)
+      ! The link is made and removed, so that the root group keeps the room for its name.
+      call self%link_checkpoint()
+      call self%unlink_checkpoint()
       call self%file%report(error)
       if (allocated(error)) then
          ! The user knows the file by its own name.
@@ -107,35 +111,6 @@ contains
       if (allocated(error)) return
       self%file%path = self%path
    end subroutine create_result
-
-   !> Write everything that is known before the first row, except for the numbers of the material.
-   subroutine write_frame(self, path, height, plan)
-      class(result_file_type), intent(inout) :: self
-      character(*), intent(in) :: path
-      real(dp), intent(in), contiguous :: height(:, :)
-      type(result_plan_type), intent(in) :: plan
-
-      ! The groups that grow are made first, in pages of their own.
-      call self%file%open(path, 'create', alignment=4096)
-      call self%file%create_group('/snapshots', expected=plan%snapshots)
-      if (plan%losses > 0) call self%file%create_group('/losses', expected=plan%losses)
-      if (self%file%has_failed()) return             ! opening again would forget the fault
-      call self%file%close()
-      if (self%file%has_failed()) return
-      call self%file%open(path, 'append')
-
-      call write_origin(self%file, self%id, plan)
-      call write_grid(self%file, self%grid, self%compression)
-      call self%file%write('/surface/height', height, 'm', 'height of the road', &
-         compression=self%compression)
-      call write_axes(self%file, '/surface', self%grid, ['height'], self%compression)
-      call self%file%create_group('/material')
-      call self%file%create_group('/history', expected=column_count + 1)
-      call create_history_columns(self%file, self%expected_rows)
-      ! The link is made and removed, so that the root group keeps the room for its name.
-      call self%link_checkpoint()
-      call self%unlink_checkpoint()
-   end subroutine write_frame
 
    !> Write a text as an attribute of the file, such as the name of a case.
    subroutine write_text(self, name, value, error)
@@ -313,23 +288,8 @@ contains
       real(dp), intent(in), contiguous :: prony_tau(:)     !! relaxation time of each arm, s
       real(dp), intent(in), contiguous :: arm(:)           !! rate of loss of each arm, W
       type(error_type), allocatable, intent(out) :: error
-      character(:), allocatable :: path
 
-      path = '/losses/'//snapshot_name(step)
-      call self%file%stage_group(path)
-      call self%file%write_attribute(path, 'step', step)
-      call self%file%write(path//'/wavelength', wavelength, 'm', &
-         'longest wavelength of each octave', compression=self%compression)
-      call self%file%write(path//'/octave', octave, 'W', 'rate of loss in the rubber by octaves', &
-         compression=self%compression)
-      call self%file%name_axes(path, ['wavelength'], ['octave'])
-      if (size(arm) > 0) then
-         call self%file%write(path//'/prony_tau', prony_tau, 's', 'relaxation times of the arms', &
-            compression=self%compression)
-         call self%file%write(path//'/arm', arm, 'W', &
-            'rate of loss in the rubber by arms of the material', compression=self%compression)
-         call self%file%name_axes(path, ['prony_tau'], ['arm'])
-      end if
+      call put_losses(self%file, step, wavelength, octave, prony_tau, arm, self%compression)
       call self%file%publish_group(error)
    end subroutine write_losses
 

@@ -6,12 +6,14 @@ module result_frame
    use asperity_precision, only : dp
    use asperity_version, only : version_number
    use hdf5_file, only : hdf5_file_type
+   use history_row, only : history_columns
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
+   use result_history, only : create_history_columns
    use utc_clock, only : utc_time
    implicit none
    private
 
-   public :: read_grid, result_plan_type, write_axes, write_grid, write_origin
+   public :: read_grid, result_plan_type, write_axes, write_frame
 
    character(*), parameter, public :: axes(2) = ['x', 'y']    !! of every field, in the same group
 
@@ -27,6 +29,34 @@ module result_frame
    end type result_plan_type
 
 contains
+
+   !> Write everything that is known before the first row, except for the numbers of the material.
+   subroutine write_frame(file, path, id, grid, height, plan)
+      type(hdf5_file_type), intent(inout) :: file
+      character(*), intent(in) :: path                 !! name of the file
+      character(*), intent(in) :: id                   !! identity of the result
+      type(grid_type), intent(in) :: grid
+      real(dp), intent(in), contiguous :: height(:, :) !! height map before any sliding, m [nx, ny]
+      type(result_plan_type), intent(in) :: plan
+
+      ! The groups that grow are made first, in pages of their own.
+      call file%open(path, 'create', alignment=4096)
+      call file%create_group('/snapshots', expected=plan%snapshots)
+      if (plan%losses > 0) call file%create_group('/losses', expected=plan%losses)
+      if (file%has_failed()) return             ! opening again would forget the fault
+      call file%close()
+      if (file%has_failed()) return
+      call file%open(path, 'append')
+
+      call write_origin(file, id, plan)
+      call write_grid(file, grid, plan%compression)
+      call file%write('/surface/height', height, 'm', 'height of the road', &
+         compression=plan%compression)
+      call write_axes(file, '/surface', grid, ['height'], plan%compression)
+      call file%create_group('/material')
+      call file%create_group('/history', expected=size(history_columns()) + 1)
+      call create_history_columns(file, plan%rows)
+   end subroutine write_frame
 
    !> Write where the result comes from.
    subroutine write_origin(file, id, plan)

@@ -12,7 +12,7 @@ module result_history
    use asperity_errors, only : error_type
    use asperity_precision, only : dp
    use hdf5_file, only : hdf5_file_type
-   use history_row, only : column_count, column_type, history_columns
+   use history_row, only : column_type, history_columns
    use text_tools, only : to_text
    implicit none
    private
@@ -31,14 +31,14 @@ contains
    subroutine create_history_columns(file, expected_rows)
       type(hdf5_file_type), intent(inout) :: file
       integer, intent(in) :: expected_rows
-      type(column_type) :: columns(column_count)
+      type(column_type), allocatable :: columns(:)
       integer :: i, j
 
       columns = history_columns()
       call file%create_column(group//'/'//checksum_name, .false., expected_rows, '1', &
          'CRC-32 of the values of the row')
-      do i = 1, column_count
-         j = mod(i, column_count) + 1
+      do i = 1, size(columns)
+         j = mod(i, size(columns)) + 1
          call file%create_column(group//'/'//trim(columns(j)%name), columns(j)%whole, expected_rows, &
             trim(columns(j)%units), trim(columns(j)%long_name))
       end do
@@ -52,14 +52,14 @@ contains
    subroutine append_values(file, row, values)
       type(hdf5_file_type), intent(inout) :: file
       integer, intent(in) :: row                      !! from 0
-      real(dp), intent(in) :: values(column_count)    !! in the order of `history_columns`
-      type(column_type) :: columns(column_count)
+      real(dp), intent(in) :: values(:)               !! in the order of `history_columns`
+      type(column_type), allocatable :: columns(:)
       integer :: i
 
       columns = history_columns()
       call file%append(group//'/'//checksum_name, row, &
          [real(crc32_of_values(values(covered_columns())), dp)])
-      do i = 1, column_count
+      do i = 1, size(columns)
          call file%append(group//'/'//trim(columns(i)%name), row, values(i:i))
       end do
    end subroutine append_values
@@ -68,14 +68,14 @@ contains
    function count_history_rows(file) result(rows)
       type(hdf5_file_type), intent(inout) :: file
       integer :: rows
-      type(column_type) :: columns(column_count)
+      type(column_type), allocatable :: columns(:)
       integer, allocatable :: extent(:)
       integer :: i
 
       columns = history_columns()
       call file%dataset_shape(group//'/'//checksum_name, extent)
       rows = sum(extent)                              ! a column has one extent
-      do i = 1, column_count
+      do i = 1, size(columns)
          call file%dataset_shape(group//'/'//trim(columns(i)%name), extent)
          rows = min(rows, sum(extent))
       end do
@@ -87,7 +87,7 @@ contains
       type(hdf5_file_type), intent(inout) :: file
       integer, intent(in) :: rows                     !! to be kept; at most those that there are
       integer, intent(in) :: expected_rows            !! when the history is complete
-      type(column_type) :: columns(column_count)
+      type(column_type), allocatable :: columns(:)
       real(dp), allocatable :: values(:, :), sums(:)
       integer :: i
 
@@ -97,7 +97,7 @@ contains
       call file%stage_group(group)
       call create_history_columns(file, expected_rows)
       call file%append(group//'/'//checksum_name, 0, sums(:rows))
-      do i = 1, column_count
+      do i = 1, size(columns)
          call file%append(group//'/'//trim(columns(i)%name), 0, values(:rows, i))
       end do
       call file%flush()
@@ -144,14 +144,14 @@ contains
       type(hdf5_file_type), intent(inout) :: file
       real(dp), allocatable, intent(out) :: values(:, :)   !! [rows, columns]
       real(dp), allocatable, intent(out) :: sums(:)
-      type(column_type) :: columns(column_count)
+      type(column_type), allocatable :: columns(:)
       real(dp), allocatable :: column(:)
       integer :: i, rows
 
       columns = history_columns()
       rows = count_history_rows(file)
-      allocate (values(rows, column_count), sums(0))
-      do i = 1, column_count
+      allocate (values(rows, size(columns)), sums(0))
+      do i = 1, size(columns)
          call file%read(group//'/'//trim(columns(i)%name), column)
          if (file%has_failed()) return
          values(:, i) = column(:rows)
@@ -164,8 +164,8 @@ contains
    !> their names, so that readers need not know the order in which they are written.
    function covered_columns() result(order)
       integer, allocatable :: order(:)
-      type(column_type) :: columns(column_count)
-      logical :: done(column_count)
+      type(column_type), allocatable :: columns(:)
+      logical, allocatable :: done(:)
       integer :: i, next
 
       columns = history_columns()
@@ -173,7 +173,7 @@ contains
       allocate (order(0))
       do while (.not. all(done))
          next = 0
-         do i = 1, column_count
+         do i = 1, size(columns)
             if (done(i)) cycle
             if (next == 0) then
                next = i

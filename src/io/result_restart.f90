@@ -11,27 +11,12 @@ module result_restart
    implicit none
    private
 
-   public :: drop_losses, drop_snapshots
+   public :: drop_snapshots
 
    !> Attribute of a snapshot that was written because the run was stopped
    character(*), parameter, public :: stop_mark = 'at_stop'
 
 contains
-
-   !> Remove the losses of later rows.
-   subroutine drop_losses(file, last_step)
-      type(hdf5_file_type), intent(inout) :: file
-      integer, intent(in) :: last_step
-      character(name_length), allocatable :: names(:)
-      integer :: i, step
-
-      if (.not. file%has_link('/losses')) return
-      call file%members('/losses', names)
-      do i = 1, size(names)
-         call file%read_attribute('/losses/'//trim(names(i)), 'step', step)
-         if (step > last_step) call file%remove('/losses/'//trim(names(i)))
-      end do
-   end subroutine drop_losses
 
    !> Remove the snapshots of later rows and that of a stop, and list the others.
    subroutine drop_snapshots(file, last_step, kept)

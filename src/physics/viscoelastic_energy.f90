@@ -18,8 +18,8 @@ module viscoelastic_energy
    use asperity_precision, only : dp
    use relaxation_functions, only : mean_decay, mean_rise, parabola_work, slope_response, &
       steady_loss
-   use zener, only : is_elastic, products_type, scheme_backward_euler, step_regular, &
-      step_relaxed, zener_type
+   use arm_state, only : products_type
+   use zener, only : is_elastic, scheme_backward_euler, step_regular, step_relaxed, zener_type
    implicit none
    private
 

@@ -33,7 +33,8 @@ module asperity_simulation
    use steady_step, only : new_steady_step, steady_step_type
    use step_watches, only : add_warning, watch_cells, watch_edge, watch_stick_slip
    use text_tools, only : to_text
-   use zener, only : extrapolates, history_field, is_elastic, needs_start, restart_order, start_jump, &
+   use arm_state, only : past_traction
+   use zener, only : extrapolates, is_elastic, needs_start, restart_order, start_jump, &
       start_relaxed, start_step
    implicit none
    private
@@ -235,7 +236,7 @@ contains
          state%steady%now = .false.
          road = [state%row%road_x, state%row%road_y]
          motion = [plan%road_x, plan%road_y] - road
-         if (.not. is_elastic(self%material)) call history_field(state%history, self%material, self%past)
+         if (.not. is_elastic(self%material)) call past_traction(state%arms, self%material, self%past)
          if (self%frictional) call self%tangential%begin(state%tangential, self%material, motion, &
             plan%dt, plan%pulled, plan%pull)
          call move_road(self, plan)
@@ -330,9 +331,9 @@ contains
          allocate (values(self%grid%nx, self%grid%ny), source=0.0_dp)
          if (.not. self%frictional) return
          c = merge(1, 2, index(name, '_x') > 0)
-         if (index(name, 'traction') == 1) values = self%state%tangential%traction(:, :, c)
-         if (index(name, 'displacement') == 1) values = self%state%tangential%displacement(:, :, c)
-         if (index(name, 'slip') == 1) values = self%tangential%slip(:, :, c)
+         if (index(name, 'traction') == 1) values = self%state%tangential%traction(:, c, :)
+         if (index(name, 'displacement') == 1) values = self%state%tangential%displacement(:, c, :)
+         if (index(name, 'slip') == 1) values = self%tangential%slip(:, c, :)
       end select
    end subroutine field
 

@@ -6,7 +6,7 @@
 !>    v' = v + dt ((1 - gamma) a + gamma a')
 !>    x' = x + dt v + dt^2 ((1/2 - beta) a + beta a'),    x' - x = U' - U - (D' - D)
 !>
-!> with the traction T_h of the history, the height h and the step's modulus Q of the block, and x, v, a
+!> with the traction T_h of the past, the height h and the step's modulus Q of the block, and x, v, a
 !> the motion of the interface over the road (the top of the block moves by -(D' - D)). With gamma = 1/2
 !> - alpha and beta = (1 - alpha)^2/4 this is the rule of Wood, Bossak and Zienkiewicz (Int. J. Numer.
 !> Methods Eng. 15 (1980) 1562): second order, stable for any step; what swings far faster than the

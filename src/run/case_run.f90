@@ -5,11 +5,11 @@
 module case_run
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use case_identity, only : identity_of
+   use case_record, only : checksums_of_maps, map_lines, write_material
    use case_report, only : memory_needed, resolved_input
    use case_settings, only : case_type
    use asperity_checkpoint, only : checkpoint_path, checkpoint_reader_type, checkpoint_writer_type, &
       remove_checkpoint
-   use asperity_checksum, only : hexadecimal
    use asperity_errors, only : error_convergence, error_input, error_type, fail
    use file_lock, only : file_lock_type
    use history_row, only : row_values
@@ -28,7 +28,7 @@ module case_run
    implicit none
    private
 
-   public :: map_lines, run_type
+   public :: run_type
 
    !> A run in hand. Not to be copied.
    type :: run_type
@@ -127,30 +127,13 @@ contains
          plan%compression = case%output%compression
          call self%result%create(self%path, self%sim%grid, self%sim%height, plan, error)
          if (allocated(error)) return
-         call write_material(self)
+         call write_material(self%result, case%material)
          call self%result%write_text('height_maps', checksums_of_maps(self%sim))
          call self%result%write_text('warnings', case%warnings)
          call self%result%write_text('outcome', 'running')
       end associate
       call self%result%report(error)
    end subroutine create_result
-
-   !> Write the material as it is at the temperature of the case.
-   subroutine write_material(self)
-      type(run_type), intent(inout) :: self
-
-      associate (m => self%sim%case%material, result => self%result)
-         call result%write_material('shear_modulus', m%shear_modulus, 'Pa', 'long-term shear modulus')
-         call result%write_material('poisson', m%poisson, '1', 'Poisson ratio')
-         call result%write_material('prony_g', m%prony_g, 'Pa', 'moduli of the arms')
-         call result%write_material('prony_tau', m%prony_tau, 's', &
-            'relaxation times of the arms at the temperature of the case')
-         call result%pair_arms()
-         call result%write_material('thickness', m%thickness, 'm', 'thickness of the block')
-         call result%write_material('density', m%density, 'kg/m3', 'density')
-         call result%write_material('temperature', m%temperature, 'C', 'temperature')
-      end associate
-   end subroutine write_material
 
    !> Go on from the checkpoint: the state, and a result without what came later.
    subroutine take_up(self, error)
@@ -409,32 +392,5 @@ contains
       self%told = self%told//self%sim%warnings
       self%sim%warnings = ''
    end subroutine collect_warnings
-
-   !> The checksums of the height maps that are files, as lines of the identity.
-   function map_lines(sim) result(lines)
-      type(simulation_type), intent(in) :: sim
-      character(:), allocatable :: lines
-      integer :: i
-
-      lines = ''
-      do i = 1, size(sim%case%surfaces)
-         if (sim%case%surfaces(i)%shape == 'file') lines = lines//'&surface '//to_text(i)// &
-            ': checksum of the height map = '//hexadecimal(sim%map_checksums(i))//new_line('a')
-      end do
-   end function map_lines
-
-   !> The same checksums with blanks between them.
-   function checksums_of_maps(sim) result(text)
-      type(simulation_type), intent(in) :: sim
-      character(:), allocatable :: text
-      integer :: i
-
-      text = ''
-      do i = 1, size(sim%case%surfaces)
-         if (sim%case%surfaces(i)%shape == 'file') &
-            text = trim(text//' '//hexadecimal(sim%map_checksums(i)))
-      end do
-      text = adjustl(text)
-   end function checksums_of_maps
 
 end module case_run

@@ -5,7 +5,7 @@
 !> `asperity_simulation` runs them.
 !>
 !> Fields of doubles besides the state and the normal solver: H; with sliding also the original map and the
-!> two slopes; with Prony arms the traction of the history; with friction those of the modules
+!> two slopes; with Prony arms the traction of the past; with friction those of the modules
 !> `tangential_step` and `coupled_passes`.
 module contact_model
    use adhesion_advice, only : adhesion_edge
@@ -13,19 +13,20 @@ module contact_model
    use asperity_interpolation, only : interpolation_type, new_interpolation, shifted
    use asperity_precision, only : dp
    use asperity_schedule, only : planned_row_type
-   use case_settings, only : case_type, road_moves
+   use case_settings, only : case_type
    use contact_rule, only : touches
    use field_sums, only : field_product, row_totals
-   use kernels, only : normal_half_space
    use normal_step, only : new_normal_step, normal_step_type, normal_task_type
    use regular_grid, only : grid_type
    use row_state, only : state_type
+   use rubber_kernels, only : normal_kernel
    use solver_result, only : solver_result_type
    use tangential_state, only : new_tangential_state
    use tangential_step, only : new_tangential_step, tangential_step_type
    use viscoelastic_energy, only : book_step, new_books
-   use zener, only : add_rows, commit_row, finish_step, is_elastic, new_history, new_products, &
-      new_row_sums, new_zener, products_type, zener_type
+   use arm_state, only : add_rows, commit_arm_row, new_arm_state, new_products, new_row_sums, &
+      products_type
+   use zener, only : finish_step, is_elastic, new_zener, zener_type
    implicit none
    private
 
@@ -43,7 +44,7 @@ module contact_model
       real(dp), allocatable :: height(:, :)         !! H under the rubber in the step in hand, m
       real(dp), allocatable :: slope_x(:, :)        !! of the road under the rubber, -
       real(dp), allocatable :: slope_y(:, :)
-      real(dp), allocatable :: past(:, :)           !! traction of the history, Pa
+      real(dp), allocatable :: past(:, :)           !! P_h, traction of the past, Pa
       real(dp) :: drift(2) = 0.0_dp                 !! expected motion of the surface in the step, m
       real(dp) :: summit = 0.0_dp                   !! highest point of the original map, m
       real(dp) :: rms_height = 0.0_dp               !! of the original map about its mean, m
@@ -69,8 +70,8 @@ contains
       associate (case => self%case)
          edge = 0.0_dp
          if (case%adhesion%potential /= 'none') edge = adhesion_edge(case)
-         call new_normal_step(self%side, self%grid, normal_half_space(case%material%poisson), &
-            case%solver, case%adhesion, edge, self%height, error)
+         call new_normal_step(self%side, self%grid, normal_kernel(case%material), case%solver, &
+            case%adhesion, edge, self%height, error)
          if (allocated(error)) return
          call new_zener(self%material, case%material%shear_modulus, case%material%prony_g, &
             case%material%prony_tau, trim(case%solver%time_scheme), error)
@@ -78,7 +79,7 @@ contains
       end associate
       self%summit = self%side%summit
       self%rms_height = self%side%rms_height
-      call new_history(self%state%history, self%material, nx, ny, 1, error)
+      call new_arm_state(self%state%arms, self%material, nx, ny, 1, error)
       if (allocated(error)) return
       call new_books(self%state%books, self%material, self%grid%cell_area())
       allocate (self%state%pressure(nx, ny), self%state%gap(nx, ny), self%state%displacement(nx, ny), &
@@ -149,7 +150,7 @@ contains
       self%state%first = .false.
    end subroutine solve_normal
 
-   !> End the step: displacements, histories and energies of both directions.
+   !> End the step: displacements, arms and energies of both directions.
    subroutine commit_step(self)
       class(contact_type), intent(inout) :: self
       type(products_type) :: products
@@ -161,7 +162,7 @@ contains
       !$omp parallel do default(none) shared(self, sums) private(j) firstprivate(displacement)
       do j = 1, self%grid%rows()
          displacement(:) = self%state%gap(:, j) + self%height(:, j) + self%state%level
-         call commit_row(self%state%history, self%material, 1, j, self%state%pressure(:, j), &
+         call commit_arm_row(self%state%arms, self%material, 1, j, self%state%pressure(:, j), &
             self%state%displacement(:, j), displacement, sums(:, j))
          self%state%displacement(:, j) = displacement
       end do

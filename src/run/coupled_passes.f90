@@ -164,7 +164,7 @@ contains
       integer :: c
 
       do c = 1, 2
-         call carry(contact%state%tangential%displacement(:, :, c), contact%drift - motion, &
+         call carry(contact%state%tangential%displacement(:, c, :), contact%drift - motion, &
             [contact%grid%dx, contact%grid%dy], contact%grid%boundary /= boundary_free, &
             self%place(:, c, :))
          self%place(:, c, :) = self%place(:, c, :) + contact%drift(c)
@@ -187,11 +187,11 @@ contains
       end if
       !$omp parallel do default(none) shared(self, contact) private(j)
       do j = 1, contact%grid%ny
-         self%residuals(:, :, j) = contact%tangential%trial(:, j, :) - self%place(:, :, j)
+         self%residuals(:, :, j) = contact%tangential%trial(:, :, j) - self%place(:, :, j)
       end do
       motion = contact_mean(contact, self%residuals)
       do c = 1, 2
-         call carry(contact%tangential%trial(:, :, c), motion, [contact%grid%dx, contact%grid%dy], &
+         call carry(contact%tangential%trial(:, c, :), motion, [contact%grid%dx, contact%grid%dy], &
             contact%grid%boundary /= boundary_free, self%residuals(:, c, :))
       end do
       !$omp parallel do default(none) shared(self, contact) private(j)
@@ -219,8 +219,8 @@ contains
       real(dp) :: sums(4)
       integer :: j
 
-      call displaced(contact%road, plan%road_x, plan%road_y, contact%tangential%trial(:, :, 1), &
-         contact%tangential%trial(:, :, 2), self%height, self%slope_x, self%slope_y)
+      call displaced(contact%road, plan%road_x, plan%road_y, contact%tangential%trial(:, 1, :), &
+         contact%tangential%trial(:, 2, :), self%height, self%slope_x, self%slope_y)
       allocate (rows(4, contact%grid%ny))
       !$omp parallel do default(none) shared(self, contact, rows) private(j)
       do j = 1, contact%grid%ny

@@ -92,7 +92,7 @@ contains
       real(dp), intent(inout) :: gap(:, :)             !! m
       real(dp), intent(inout) :: level                 !! U - H where the gap is zero, m
       type(solver_result_type), intent(out) :: outcome
-      real(dp), intent(in), optional :: past(:, :)     !! traction of the history, Pa
+      real(dp), intent(in), optional :: past(:, :)     !! P_h, traction of the past, Pa
       type(adhesion_problem_type) :: problem
       type(solver_result_type) :: before
       integer :: j

@@ -57,8 +57,8 @@ contains
       if (self%side%adhesive .and. .not. free) call shift_field(cells, free, self%state%gap)
       if (.not. self%rubs()) return
       do c = 1, 2
-         call shift_field(cells, free, self%state%tangential%traction(:, :, c))
-         call shift_field(cells, free, self%state%tangential%before(:, :, c))
+         call shift_field(cells, free, self%state%tangential%traction(:, c, :))
+         call shift_field(cells, free, self%state%tangential%before(:, c, :))
       end do
       call shift_states(cells, free, self%state%tangential%contact)
    end subroutine shift_fields

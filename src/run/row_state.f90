@@ -4,7 +4,7 @@
 !> units and meaning. The checkpoint, the restart and Python walk that list. A new variable of the state
 !> is a component and one line of the list.
 !>
-!> Fields of doubles: P, gap and U; with Prony arms the history (S, S - S_old and one field per arm); with
+!> Fields of doubles: P, gap and U; with Prony arms their state (S, S - S_old and one field per arm); with
 !> friction those of module `tangential_state`; with steady phases the last two steady states.
 module row_state
    use asperity_precision, only : dp
@@ -15,7 +15,7 @@ module row_state
    use stick_slip_watch, only : stick_slip_watch_type
    use tangential_state, only : tangential_state_type
    use viscoelastic_energy, only : energy_books_type
-   use zener, only : history_type
+   use arm_state, only : arm_state_type
    implicit none
    private
 
@@ -54,7 +54,7 @@ module row_state
       real(dp), allocatable :: gap(:, :)            !! m
       real(dp), allocatable :: displacement(:, :)   !! U_z, m
       type(energy_books_type) :: books              !! of the normal traction
-      type(history_type) :: history                 !! of the normal traction
+      type(arm_state_type) :: arms                 !! of the normal traction
       type(tangential_state_type) :: tangential     !! with friction
       type(steady_state_type) :: steady             !! with steady phases
    end type state_type
@@ -92,7 +92,7 @@ contains
       call table%add('displacement', state%displacement, 'm', 'displacement of the rubber along z')
       call table%add('dt_old', state%dt_old, 's', 'length of the last step, 0 after a jump')
       call list_books('books', state%books, table)
-      call list_history('history', state%history, table)
+      call list_arms('arms', state%arms, table)
       if (allocated(state%tangential%traction)) call list_tangential(state%tangential, table)
       if (.not. allocated(state%steady%last%pressure)) return
       call table%add('steady/now', state%steady%now, 'the last row was one of steady sliding')
@@ -151,16 +151,16 @@ contains
       call table%add(prefix//'/arm_du', books%arm_du, 'J', 'p_k.dU of the last step')
    end subroutine list_books
 
-   !> The history of the arms.
-   subroutine list_history(prefix, history, table)
+   !> The state of the arms.
+   subroutine list_arms(prefix, arms, table)
       character(*), intent(in) :: prefix
-      type(history_type), intent(in), target :: history
+      type(arm_state_type), intent(in), target :: arms
       type(state_table_type), intent(inout) :: table
 
-      call table%add(prefix//'/s', history%s, '1', 'S = P over a modulus')
-      call table%add(prefix//'/ds', history%ds, '1', 'S less that of the step before')
-      call table%add(prefix//'/arm', history%arm, 'Pa', 'tractions of the arms')
-   end subroutine list_history
+      call table%add(prefix//'/s', arms%s, '1', 'S = P over a modulus')
+      call table%add(prefix//'/ds', arms%ds, '1', 'S less that of the step before')
+      call table%add(prefix//'/arm', arms%arm, 'Pa', 'tractions of the arms')
+   end subroutine list_arms
 
    !> A state of steady sliding from which the next row may start.
    subroutine list_start(prefix, start, table)
@@ -198,7 +198,7 @@ contains
       call table%add('tangential/contact', t%contact, '0 open, 1 stick, 2 slip')
       call table%add('tangential/rubbed', t%rubbed, 'contact of the last step at the rubber''s own points')
       call list_books('tangential/books', t%books, table)
-      call list_history('tangential/history', t%history, table)
+      call list_arms('tangential/arms', t%arms, table)
    end subroutine list_tangential
 
 end module row_state

@@ -35,7 +35,7 @@ module starting_steps
       real(dp) :: lost_friction = 0.0_dp           !! time times power_friction, J
       real(dp) :: residual_normal = 0.0_dp         !! largest
       real(dp) :: residual_tangential = 0.0_dp     !! largest
-      real(dp), allocatable :: slip(:, :, :)       !! m
+      real(dp), allocatable :: slip(:, :, :)       !! m [nx, 2, ny]
    contains
       procedure :: add
       procedure :: hand_out
@@ -106,8 +106,8 @@ contains
          return
       end if
       !$omp parallel do default(none) shared(self, slip) private(j)
-      do j = 1, size(slip, 2)
-         self%slip(:, j, :) = self%slip(:, j, :) + slip(:, j, :)
+      do j = 1, size(slip, 3)
+         self%slip(:, :, j) = self%slip(:, :, j) + slip(:, :, j)
       end do
    end subroutine add_slip
 

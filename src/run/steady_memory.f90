@@ -5,13 +5,13 @@
 !> step dt earlier a field was the same, moved back by V dt: S_old = rho S with rho = exp(i q.V dt), so
 !> that the first step in time has a step before it.
 module steady_memory
-   use asperity_parallel, only : global_sum
    use asperity_precision, only : dp
+   use field_sums, only : row_totals
    use steady_losses, only : elastic_forms
    use steady_operator, only : steady_operator_type
    use steady_symbols, only : medium_type, mode_waves, steady_modulus
    use viscoelastic_energy, only : energy_books_type, book_state
-   use zener, only : history_type
+   use arm_state, only : arm_state_type
    implicit none
    private
 
@@ -23,13 +23,13 @@ module steady_memory
 contains
 
    !> The memory of one component of a field of tractions.
-   subroutine remember_field(operator, medium, dt, field, component, history)
+   subroutine remember_field(operator, medium, dt, field, component, arms)
       type(steady_operator_type), intent(inout) :: operator
       type(medium_type), intent(in) :: medium
       real(dp), intent(in) :: dt                       !! of the step to come, s; 0: none
       real(dp), intent(in) :: field(:, :)              !! P or a component of T, Pa
       integer, intent(in) :: component
-      type(history_type), intent(inout) :: history
+      type(arm_state_type), intent(inout) :: arms
       real(dp), allocatable :: result(:, :)
       integer :: k, shape_1d(1)
 
@@ -37,14 +37,14 @@ contains
       allocate (result(size(field, 1), size(field, 2)))
       shape_1d = size(field)
       call respond(whole)
-      history%s(:, component) = reshape(result, shape_1d)
-      if (size(history%ds) > 0) then
+      arms%s(:, component) = reshape(result, shape_1d)
+      if (size(arms%ds) > 0) then
          call respond(increment)
-         history%ds(:, component) = reshape(result, shape_1d)
+         arms%ds(:, component) = reshape(result, shape_1d)
       end if
       do k = 1, size(medium%g)
          call respond(k)
-         history%arm(:, k, component) = reshape(result, shape_1d)
+         arms%arm(:, k, component) = reshape(result, shape_1d)
       end do
 
    contains
@@ -102,10 +102,9 @@ contains
    end function arm_ratio
 
    !> The stored energy, and what the books keep from the last step.
-   subroutine book_memory(medium, dt, thickness, p, t, books)
+   subroutine book_memory(medium, dt, p, t, books)
       type(medium_type), intent(in) :: medium
       real(dp), intent(in) :: dt
-      real(dp), intent(in) :: thickness                !! of the block: its mean shear, m
       complex(dp), intent(in) :: p(0:, 0:)             !! transform of the pressure, or of no extent
       complex(dp), intent(in) :: t(0:, 0:, :)          !! of the traction, or of no extent
       type(energy_books_type), intent(inout) :: books
@@ -120,14 +119,10 @@ contains
          if (size(p) > 0) call row_products(medium, dt, j, rows(:, j), p=p(:, j))
          if (size(t) > 0) call row_products(medium, dt, j, rows(:, j), t=t(:, j, :))
       end do
-      allocate (total(size(rows, 1)), source=0.0_dp)
-      do j = 0, medium%grid%ny - 1
-         total = total + rows(:, j)
-      end do
-      total = global_sum(total)
-      if (size(t) > 0) total(1) = total(1) + thickness*sum(abs(t(0, 0, :))**2) &
-         /(real(medium%grid%nx, dp)*medium%grid%ny)**2/medium%modulus**2
-      area = medium%grid%lx*medium%grid%ly
+      total = row_totals(rows)
+      if (size(t) > 0) total(1) = total(1) + medium%tangential%mean_mode*sum(abs(t(0, 0, :))**2) &
+         /medium%grid%cells()**2/medium%modulus**2
+      area = medium%grid%area()
       call book_state(books, medium%modulus, medium%g, area*total(1), area*total(2), &
          area*total(3:2 + arms), area*total(3 + arms:))
    end subroutine book_memory

@@ -1,10 +1,13 @@
 !> A row of steady sliding within a run: its state, and what the arms remember of it where time goes on.
 module steady_row
-   use asperity_precision, only : dp
+   use asperity_precision, only : dp, int8
    use asperity_schedule, only : planned_row_type
    use contact_model, only : contact_type
    use row_account, only : found_step_type
+   use steady_contact, only : steady_contact_type
    use steady_step, only : steady_step_type
+   use tangential_state, only : tangential_state_type
+   use tangential_step, only : tangential_step_type
    use zener, only : finish_step
    implicit none
    private
@@ -74,6 +77,45 @@ contains
       end associate
    end subroutine take_fields
 
+   !> The tangential side of the state, but for what the arms remember.
+   subroutine take_tractions(tangential, state, found, velocity)
+      type(tangential_step_type), intent(inout) :: tangential
+      type(tangential_state_type), intent(inout) :: state
+      type(steady_contact_type), intent(in) :: found
+      real(dp), intent(in) :: velocity(2)             !! of the road, m/s
+      real(dp), parameter :: within = 1.0_dp + 1e-6_dp  !! s of the bound from which a point sticks
+      real(dp) :: slope(2), star(2), before
+      integer :: i, j
+
+      before = state%block%kinetic()
+      state%moved = .true.
+      state%pace = 0.0_dp
+      state%rate = 0.0_dp
+      state%block%speed = -velocity
+      state%block%fresh = .true.
+      state%block%work = state%block%work + state%block%kinetic() - before
+      !$omp parallel do default(none) shared(tangential, state, found) private(i, j, slope, star)
+      do j = 1, tangential%grid%ny
+         do i = 1, tangential%grid%nx
+            state%traction(i, :, j) = found%traction(i, :, j)
+            state%displacement(i, :, j) = found%displacement(i, :, j)
+            slope = [found%slope_x(i, j), found%slope_y(i, j)]
+            star = tangential%law%normal_traction(found%pressure(i, j), slope)
+            state%contact(i, j) = 0_int8
+            state%rubbing(i, :, j) = 0.0_dp
+            if (found%pressure(i, j) <= 0.0_dp) cycle
+            state%rubbing(i, :, j) = state%traction(i, :, j) - star
+            state%contact(i, j) = 2_int8
+            if (tangential%law%bound_ratio(found%pressure(i, j), slope, state%traction(i, :, j) - star) > within) &
+               state%contact(i, j) = 1_int8
+         end do
+      end do
+      state%rubbed(:, :) = state%contact
+      state%before(:, :, :) = state%traction
+      tangential%trial(:, :, :) = state%displacement
+      tangential%slip(:, :, :) = 0.0_dp
+   end subroutine take_tractions
+
    !> What the arms remember of the state, and its energies.
    subroutine take_memory(contact, steady, plan)
       class(contact_type), intent(inout) :: contact
@@ -82,12 +124,12 @@ contains
       real(dp) :: next_dt
 
       next_dt = 0.0_dp
-      if (size(contact%state%history%ds) > 0) next_dt = plan%next_dt
-      call steady%remember_normal(next_dt, contact%state%history, contact%state%books)
+      if (size(contact%state%arms%ds) > 0) next_dt = plan%next_dt
+      call steady%remember_normal(next_dt, contact%state%arms, contact%state%books)
       if (contact%frictional) then
          associate (tangential => contact%state%tangential)
-            call contact%tangential%take_steady(tangential, steady%contact, contact%state%velocity)
-            call steady%remember_tangential(next_dt, tangential%history, tangential%books)
+            call take_tractions(contact%tangential, tangential, steady%contact, contact%state%velocity)
+            call steady%remember_tangential(next_dt, tangential%arms, tangential%books)
          end associate
       end if
       call finish_step(contact%material)

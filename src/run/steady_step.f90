@@ -18,22 +18,24 @@
 module steady_step
    use case_settings, only : case_type
    use asperity_errors, only : error_type
+   use field_sums, only : field_mean, field_sum, row_totals
    use friction_law, only : friction_law_type, new_friction_law
    use asperity_interpolation, only : interpolation_type, shifted
    use normal_state, only : normal_problem_type
-   use asperity_parallel, only : global_sum
    use asperity_precision, only : dp, int8
    use regular_grid, only : grid_type
    use asperity_schedule, only : planned_row_type
    use solver_result, only : solver_result_type
-   use steady_friction, only : new_steady_friction, steady_contact_type, steady_friction_type
+   use rubber_kernels, only : normal_kernel, tangential_kernel
+   use steady_contact, only : steady_contact_type
+   use steady_friction, only : new_steady_friction, steady_friction_type
    use steady_losses, only : steady_losses_type, sum_losses
    use steady_memory, only : book_memory, remember_field
    use steady_normal, only : new_steady_normal, steady_normal_type
    use steady_operator, only : new_steady_operator, steady_operator_type
    use steady_symbols, only : medium_type, new_steady_symbols, steady_symbols_type
    use viscoelastic_energy, only : energy_books_type
-   use zener, only : history_type
+   use arm_state, only : arm_state_type
    implicit none
    private
 
@@ -55,7 +57,6 @@ module steady_step
       logical :: frictional = .false.
       type(friction_law_type) :: law
       type(medium_type) :: medium
-      real(dp) :: thickness = 0.0_dp                   !! of the block, m
       type(steady_contact_type) :: contact             !! the state of the last row
       type(steady_losses_type) :: losses               !! of that state
       real(dp) :: base(2) = 0.0_dp                     !! place of the road without the offset, m
@@ -96,9 +97,9 @@ contains
       self%tolerance = case%solver%tolerance
       self%max_iterations = case%solver%max_iterations
       self%rms_height = rms_height
-      self%thickness = case%material%thickness
       self%medium%grid = case%grid
-      self%medium%poisson = case%material%poisson
+      self%medium%normal = normal_kernel(case%material)
+      self%medium%tangential = tangential_kernel(case%material)
       self%medium%modulus = case%material%shear_modulus
       allocate (self%medium%g, source=case%material%prony_g)
       allocate (self%medium%tau, source=case%material%prony_tau)
@@ -152,7 +153,7 @@ contains
       call self%operator%set_symbols(symbols)
       problem%modulus = self%medium%modulus
       problem%target = plan%load
-      if (plan%control == 'force') problem%target = plan%load/(self%grid%lx*self%grid%ly)
+      if (plan%control == 'force') problem%target = plan%load/self%grid%area()
       problem%tolerance = self%tolerance
       problem%max_iterations = self%max_iterations
       problem%rms_height = self%rms_height
@@ -179,14 +180,10 @@ contains
    subroutine add_mean_shear(self)
       type(steady_step_type), intent(inout) :: self
       real(dp) :: mean
-      integer :: c, j
+      integer :: c
 
       do c = 1, 2
-         mean = 0.0_dp
-         do j = 1, self%grid%ny
-            mean = mean + sum(self%contact%traction(:, c, j))
-         end do
-         mean = global_sum(mean)/(real(self%grid%nx, dp)*self%grid%ny)*self%thickness/self%medium%modulus
+         mean = field_mean(self%contact%traction(:, c, :))*self%medium%tangential%mean_mode/self%medium%modulus
          self%contact%displacement(:, c, :) = self%contact%displacement(:, c, :) + mean
          self%contact%offset(c) = self%contact%offset(c) + mean
       end do
@@ -203,7 +200,7 @@ contains
       if (.not. problem%warm) return
       part = onward(self, problem%target)
       associate (c => self%contact, a => self%last, b => self%before)
-         scale = sum(a%pressure)/max(sum(a%gap), tiny(1.0_dp))
+         scale = field_sum(a%pressure)/max(field_sum(a%gap), tiny(1.0_dp))
          do j = 1, self%grid%ny
             ! Pressure and gap are one quantity on both sides of zero.
             c%pressure(:, j) = a%pressure(:, j) - scale*a%gap(:, j)
@@ -216,7 +213,7 @@ contains
             if (part > 0.0_dp .or. part < 0.0_dp) &
                c%traction(:, :, j) = c%traction(:, :, j) + part*(a%traction(:, :, j) - b%traction(:, :, j))
          end do
-         problem%warm = sum(c%pressure) > 0.0_dp
+         problem%warm = field_sum(c%pressure) > 0.0_dp
       end associate
    end subroutine start_from
 
@@ -280,14 +277,10 @@ contains
       do j = 1, self%grid%ny
          call row_forces(self, j, rows(:, j))
       end do
-      sums = 0.0_dp
-      do j = 1, self%grid%ny
-         sums = sums + rows(:, j)
-      end do
-      sums = global_sum(sums)/(real(self%grid%nx, dp)*self%grid%ny)
+      sums = row_totals(rows)/self%grid%cells()
       speed = norm2(self%medium%velocity)
       direction = self%medium%velocity/speed
-      area = self%grid%lx*self%grid%ly
+      area = self%grid%area()
       self%power_friction = sums(4)*speed*area
       ! Across the motion the slopes of the mesh are all there is.
       self%viscous_force = -sums(1:2)
@@ -320,30 +313,30 @@ contains
    end subroutine row_forces
 
    !> The memory of the normal side, and its stored energy.
-   subroutine remember_normal(self, dt, history, books)
+   subroutine remember_normal(self, dt, arms, books)
       class(steady_step_type), intent(inout) :: self
       real(dp), intent(in) :: dt                       !! of the step to come, s; 0: none
-      type(history_type), intent(inout) :: history
+      type(arm_state_type), intent(inout) :: arms
       type(energy_books_type), intent(inout) :: books
       complex(dp) :: none(0:-1, 0:-1, 2)
 
-      call remember_field(self%operator, self%medium, dt, self%contact%pressure, 1, history)
-      call book_memory(self%medium, dt, 0.0_dp, self%p_modes, none, books)
+      call remember_field(self%operator, self%medium, dt, self%contact%pressure, 1, arms)
+      call book_memory(self%medium, dt, self%p_modes, none, books)
    end subroutine remember_normal
 
    !> The same of the tangential side.
-   subroutine remember_tangential(self, dt, history, books)
+   subroutine remember_tangential(self, dt, arms, books)
       class(steady_step_type), intent(inout) :: self
       real(dp), intent(in) :: dt
-      type(history_type), intent(inout) :: history
+      type(arm_state_type), intent(inout) :: arms
       type(energy_books_type), intent(inout) :: books
       complex(dp) :: none(0:-1, 0:-1)
       integer :: c
 
       do c = 1, 2
-         call remember_field(self%operator, self%medium, dt, self%contact%traction(:, c, :), c, history)
+         call remember_field(self%operator, self%medium, dt, self%contact%traction(:, c, :), c, arms)
       end do
-      call book_memory(self%medium, dt, self%thickness, none, self%t_modes, books)
+      call book_memory(self%medium, dt, none, self%t_modes, books)
    end subroutine remember_tangential
 
    !> Free plans and memory.

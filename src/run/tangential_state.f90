@@ -3,14 +3,15 @@
 !> Plain data. Module `tangential_step` solves a step with it.
 !>
 !> Fields of doubles, two components each: T, that of the step before, U, T - T* of the step before at
-!> the rubber's own points; the history (S, S - S_old, one field per arm).
+!> the rubber's own points; the state of the arms (S, S - S_old, one field per arm).
 module tangential_state
    use asperity_errors, only : error_type
    use asperity_precision, only : dp, int8
    use block_motion, only : block_motion_type
    use case_settings, only : case_type
    use viscoelastic_energy, only : energy_books_type, new_books
-   use zener, only : history_type, new_history, zener_type
+   use arm_state, only : arm_state_type, new_arm_state
+   use zener, only : zener_type
    implicit none
    private
 
@@ -20,14 +21,14 @@ module tangential_state
    type :: tangential_state_type
       logical :: moved = .false.                      !! the road has moved: friction acts
       type(block_motion_type) :: block                !! mean motion of the block
-      real(dp), allocatable :: traction(:, :, :)      !! T, Pa [nx, ny, 2]
+      real(dp), allocatable :: traction(:, :, :)      !! T, Pa [nx, 2, ny]
       real(dp), allocatable :: before(:, :, :)        !! T of the step before, seen from where T is, Pa
       real(dp) :: pace = 0.0_dp                       !! length of the step that led from it to T, s; 0: none
       real(dp), allocatable :: displacement(:, :, :)  !! U_T, m
       real(dp), allocatable :: rubbing(:, :, :)       !! T - T* at the end of the last step, Pa
       integer(int8), allocatable :: contact(:, :)     !! 0 open, 1 stick, 2 slip
       integer(int8), allocatable :: rubbed(:, :)      !! the same at the end of the last step
-      type(history_type) :: history
+      type(arm_state_type) :: arms
       type(energy_books_type) :: books                !! of the strain of the rubber
       real(dp) :: rate(2) = 0.0_dp                    !! mean speed of the surface in the contact, m/s
       real(dp) :: lost_friction = 0.0_dp              !! J
@@ -45,11 +46,11 @@ contains
       self%block%height = case%material%thickness
       self%block%mass = 0.5_dp*case%material%density*case%material%thickness
       self%block%area = case%grid%area()
-      allocate (self%traction(case%grid%nx, case%grid%ny, 2), source=0.0_dp)
+      allocate (self%traction(case%grid%nx, 2, case%grid%ny), source=0.0_dp)
       allocate (self%before, self%displacement, self%rubbing, source=self%traction)
       allocate (self%contact(case%grid%nx, case%grid%ny), self%rubbed(case%grid%nx, case%grid%ny), &
          source=0_int8)
-      call new_history(self%history, material, case%grid%nx, case%grid%ny, 2, error)
+      call new_arm_state(self%arms, material, case%grid%nx, case%grid%ny, 2, error)
       if (allocated(error)) return
       call new_books(self%books, material, case%grid%cell_area())
    end subroutine new_tangential_state

@@ -2,7 +2,7 @@
 !> a road, with the block's viscoelasticity and the inertia of its mean motion.
 !>
 !> Slip of a step: r = DX - U', DX = U + (D' - D), U' = A(T + T_h)/Q with the traction T_h of the
-!> history. The solver works with Q r = DX' - A(T + T_h), DX' = Q DX. The mean of a block
+!> past. The solver works with Q r = DX' - A(T + T_h), DX' = Q DX. The mean of a block
 !> with mass moves by the rule of module block_motion; the part of the mean traction that accelerates the
 !> mass does not strain the rubber.
 !>
@@ -14,19 +14,20 @@ module tangential_step
    use case_settings, only : case_type
    use contact_rule, only : touches
    use asperity_errors, only : error_type
+   use friction_books, only : book_friction, rubbed_type
    use field_sums, only : field_count, field_mean, row_totals
    use fft_conv, only : convolution_type, new_convolution
    use friction_cg, only : friction_fast, friction_fields_type, friction_solver_type, friction_thesis, &
       new_friction_solver
    use friction_law, only : friction_law_type, new_friction_law
    use asperity_precision, only : dp, int8
-   use kernels, only : tangential_half_space
    use regular_grid, only : boundary_periodic, grid_type
+   use rubber_kernels, only : tangential_kernel
    use solver_result, only : solver_result_type
-   use steady_friction, only : steady_contact_type
    use tangential_state, only : tangential_state_type
    use viscoelastic_energy, only : book_step
-   use zener, only : commit_history, history_field, new_products, products_type, zener_type
+   use arm_state, only : commit_arms, new_products, past_traction, products_type
+   use zener, only : zener_type
    implicit none
    private
 
@@ -39,7 +40,7 @@ module tangential_step
       logical :: adhesive = .false.                   !! the contact has an adhesive potential
       real(dp) :: tolerance = 1e-6_dp                 !! of the next solve
       logical :: settle = .true.                      !! T has to settle too, not only the displacements
-      real(dp), allocatable :: trial(:, :, :)         !! U_T at the end of the step, m [nx, ny, 2]
+      real(dp), allocatable :: trial(:, :, :)         !! U_T at the end of the step, m [nx, 2, ny]
       real(dp), allocatable :: slip(:, :, :)          !! of the step, m
       logical :: pulled(2) = .false.                  !! the road hangs on a force along x, y
       real(dp) :: pull(2) = 0.0_dp                    !! that force, over the cell, Pa
@@ -60,7 +61,6 @@ module tangential_step
       procedure :: begin
       procedure :: extrapolate
       procedure :: solve
-      procedure :: take_steady
       procedure :: take_motion
       procedure :: commit
       procedure :: sums
@@ -83,14 +83,13 @@ contains
       self%law = new_friction_law(trim(case%friction%law), case%friction%coefficient, &
          case%friction%shear_strength, adhesive, case%friction%slope_effect, &
          case%solver%slip_law == 'physical')
-      call new_convolution(self%operator, self%grid, &
-         tangential_half_space(case%material%poisson, case%material%thickness), error)
+      call new_convolution(self%operator, self%grid, tangential_kernel(case%material), error)
       if (allocated(error)) return
       call new_friction_solver(self%solver, self%grid, self%operator, error, &
          merge(friction_thesis, friction_fast, case%solver%method == 'thesis'))
       if (allocated(error)) return
       self%solver%max_iterations = case%solver%max_iterations
-      allocate (self%trial(self%grid%nx, self%grid%ny, 2), source=0.0_dp)
+      allocate (self%trial(self%grid%nx, 2, self%grid%ny), source=0.0_dp)
       allocate (self%slip, self%drive, self%past, source=self%trial)
    end subroutine new_tangential_step
 
@@ -119,7 +118,7 @@ contains
       ! A road that goes back where it began leaves displacements of round-off.
       self%solver%least_scale = self%q*norm2(merge(0.0_dp, motion, pulled))
       if (.not. dt > 0.0_dp) state%pace = 0.0_dp
-      call history_field(state%history, material, self%past)
+      call past_traction(state%arms, material, self%past)
       self%past_mean = means(self%past)
       height = state%block%height
       shift = self%q*motion
@@ -133,10 +132,10 @@ contains
          shift = shift - self%q*means(state%displacement)
       end if
       where (pulled) shift = 0.0_dp
-      do c = 1, 2
-         !$omp parallel do default(none) shared(self, state, c, shift) private(j)
-         do j = 1, self%grid%ny
-            self%drive(:, j, c) = self%q*state%displacement(:, j, c) + shift(c)
+      !$omp parallel do default(none) shared(self, state, shift) private(c, j)
+      do j = 1, self%grid%ny
+         do c = 1, 2
+            self%drive(:, c, j) = self%q*state%displacement(:, c, j) + shift(c)
          end do
       end do
       call set_thickness(self, height)
@@ -240,7 +239,7 @@ contains
          if (.not. self%pulled(c)) cycle
          !$omp parallel do default(none) shared(self, c) private(j)
          do j = 1, self%grid%ny
-            self%trial(:, j, c) = self%trial(:, j, c) + (self%found(c) - self%motion(c))
+            self%trial(:, c, j) = self%trial(:, c, j) + (self%found(c) - self%motion(c))
          end do
       end do
       self%motion = self%found
@@ -260,10 +259,10 @@ contains
       !$omp parallel do default(none) shared(self, state, factor) private(i, j, t)
       do j = 1, self%grid%ny
          do i = 1, self%grid%nx
-            t = state%traction(i, j, :)
+            t = state%traction(i, :, j)
             if (state%contact(i, j) == 1_int8) &
-               state%traction(i, j, :) = t + factor*(t - state%before(i, j, :))
-            state%before(i, j, :) = t
+               state%traction(i, :, j) = t + factor*(t - state%before(i, :, j))
+            state%before(i, :, j) = t
          end do
       end do
       state%pace = self%dt
@@ -280,10 +279,10 @@ contains
 
    !> Means of a vector field over the grid.
    function means(field) result(mean)
-      real(dp), intent(in) :: field(:, :, :)
+      real(dp), intent(in) :: field(:, :, :)          !! [nx, 2, ny]
       real(dp) :: mean(2)
 
-      mean = [field_mean(field(:, :, 1)), field_mean(field(:, :, 2))]
+      mean = [field_mean(field(:, 1, :)), field_mean(field(:, 2, :))]
    end function means
 
    !> Solve for the traction under a pressure: T, the trial displacement, the slip. Where the road is
@@ -313,11 +312,11 @@ contains
       fields%contact => state%contact
       call self%solver%solve(self%operator, self%law, fields, outcome)
       call find_motion(self, state)
-      do c = 1, 2
-         !$omp parallel do default(none) shared(self, state, c) private(j)
-         do j = 1, self%grid%ny
-            self%slip(:, j, c) = self%slip(:, j, c)/self%q
-            self%trial(:, j, c) = state%displacement(:, j, c) + self%motion(c) - self%slip(:, j, c)
+      !$omp parallel do default(none) shared(self, state) private(c, j)
+      do j = 1, self%grid%ny
+         do c = 1, 2
+            self%slip(:, c, j) = self%slip(:, c, j)/self%q
+            self%trial(:, c, j) = state%displacement(:, c, j) + self%motion(c) - self%slip(:, c, j)
          end do
       end do
    end subroutine solve
@@ -341,46 +340,7 @@ contains
       end do
    end subroutine mark_contact
 
-   !> Take a state of steady sliding. Its history and energies are set by the caller.
-   subroutine take_steady(self, state, found, velocity)
-      class(tangential_step_type), intent(inout) :: self
-      type(tangential_state_type), intent(inout) :: state
-      type(steady_contact_type), intent(in) :: found
-      real(dp), intent(in) :: velocity(2)             !! of the road, m/s
-      real(dp), parameter :: within = 1.0_dp + 1e-6_dp  !! s of the bound from which a point sticks
-      real(dp) :: slope(2), star(2), before
-      integer :: i, j
-
-      before = state%block%kinetic()
-      state%moved = .true.
-      state%pace = 0.0_dp
-      state%rate = 0.0_dp
-      state%block%speed = -velocity
-      state%block%fresh = .true.
-      state%block%work = state%block%work + state%block%kinetic() - before
-      !$omp parallel do default(none) shared(self, state, found) private(i, j, slope, star)
-      do j = 1, self%grid%ny
-         do i = 1, self%grid%nx
-            state%traction(i, j, :) = found%traction(i, :, j)
-            state%displacement(i, j, :) = found%displacement(i, :, j)
-            slope = [found%slope_x(i, j), found%slope_y(i, j)]
-            star = self%law%normal_traction(found%pressure(i, j), slope)
-            state%contact(i, j) = 0_int8
-            state%rubbing(i, j, :) = 0.0_dp
-            if (found%pressure(i, j) <= 0.0_dp) cycle
-            state%rubbing(i, j, :) = state%traction(i, j, :) - star
-            state%contact(i, j) = 2_int8
-            if (self%law%bound_ratio(found%pressure(i, j), slope, state%traction(i, j, :) - star) > within) &
-               state%contact(i, j) = 1_int8
-         end do
-      end do
-      state%rubbed(:, :) = state%contact
-      state%before(:, :, :) = state%traction
-      self%trial(:, :, :) = state%displacement
-      self%slip(:, :, :) = 0.0_dp
-   end subroutine take_steady
-
-   !> End the step: history, energies, the motion of the mass.
+   !> End the step: arms, energies, the motion of the mass.
    subroutine commit(self, state, material, pressure, slope_x, slope_y)
       class(tangential_step_type), intent(inout) :: self
       type(tangential_state_type), intent(inout) :: state
@@ -388,6 +348,7 @@ contains
       real(dp), intent(in) :: pressure(:, :)
       real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)
       type(products_type) :: products
+      type(rubbed_type) :: rubbed
       real(dp) :: carried(2), before(2), after(2)
 
       if (.not. state%moved) return
@@ -399,64 +360,14 @@ contains
          carried = means(state%traction) + self%past_mean - self%q*after/state%block%height
          call state%block%finish(after - before - self%motion, carried, self%dt)
       end if
-      call commit_history(state%history, material, state%traction, state%displacement, self%trial, &
+      call commit_arms(state%arms, material, state%traction, state%displacement, self%trial, &
          products, carried)
       call book_step(state%books, material, products)
-      call book_friction(self, state, pressure, slope_x, slope_y)
+      call book_friction(state, self%law, self%trial, self%slip, pressure, slope_x, slope_y, rubbed)
+      state%lost_friction = state%lost_friction + rubbed%loss*self%grid%cell_area()
+      if (self%dt > 0.0_dp .and. rubbed%cells > 0.0_dp) state%rate = rubbed%way/(rubbed%cells*self%dt)
       state%displacement(:, :, :) = self%trial
    end subroutine commit
-
-   !> Energy lost by friction, and the mean speed of the surface in the contact.
-   subroutine book_friction(self, state, pressure, slope_x, slope_y)
-      class(tangential_step_type), intent(inout) :: self
-      type(tangential_state_type), intent(inout) :: state
-      real(dp), intent(in) :: pressure(:, :)
-      real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)
-      real(dp), allocatable :: rows(:, :)
-      real(dp) :: rubbing(2), slope(2), total(4)
-      integer :: i, j
-
-      allocate (rows(4, self%grid%ny), source=0.0_dp)
-      slope = 0.0_dp
-      !$omp parallel do default(none) shared(self, state, pressure, slope_x, slope_y, rows) &
-      !$omp private(i, j, rubbing) firstprivate(slope)
-      do j = 1, self%grid%ny
-         do i = 1, self%grid%nx
-            rubbing = 0.0_dp
-            if (state%contact(i, j) /= 0_int8) then
-               if (self%law%slope) slope = [slope_x(i, j), slope_y(i, j)]
-               rubbing = state%traction(i, j, :) - self%law%normal_traction(pressure(i, j), slope)
-               rows(2:3, j) = rows(2:3, j) + self%trial(i, j, :) - state%displacement(i, j, :)
-               rows(4, j) = rows(4, j) + 1.0_dp
-            end if
-            ! The slip of a point that sticks is what the solver's tolerance left: it loses nothing.
-            if (state%contact(i, j) /= 1_int8) rows(1, j) = rows(1, j) &
-               + rubbed_off(state%rubbed(i, j) == 1_int8, state%rubbing(i, j, :), rubbing, self%slip(i, j, :))
-            state%rubbing(i, j, :) = rubbing
-            state%rubbed(i, j) = state%contact(i, j)
-         end do
-      end do
-      total = row_totals(rows)
-      state%lost_friction = state%lost_friction + total(1)*self%grid%cell_area()
-      if (self%dt > 0.0_dp .and. total(4) > 0.0_dp) state%rate = total(2:3)/(total(4)*self%dt)
-   end subroutine book_friction
-
-   !> What a cell loses by friction in a step, J/m2: the mean of the frictional tractions at both ends times
-   !> the slip. A cell that enters or leaves the contact has none at one end. A cell that stuck at the start
-   !> slips only once its traction has reached its bound, so that the traction of the end counts alone; so it
-   !> does where the slip has turned against the traction of the start, since the cell has stuck in between.
-   pure function rubbed_off(stuck, before, after, slip) result(loss)
-      logical, intent(in) :: stuck                    !! at the start of the step
-      real(dp), intent(in) :: before(2)               !! T - T* at the start of the step, Pa
-      real(dp), intent(in) :: after(2)                !! and at its end, Pa
-      real(dp), intent(in) :: slip(2)                 !! m
-      real(dp) :: loss
-      real(dp) :: first
-
-      loss = max(dot_product(after, slip), 0.0_dp)
-      first = dot_product(before, slip)
-      if (first >= 0.0_dp .and. .not. stuck) loss = 0.5_dp*(first + loss)
-   end function rubbed_off
 
    !> Means of the traction, part of the grid that sticks, mean slip of the step.
    subroutine sums(self, state, traction, stick, slip)

@@ -8,7 +8,8 @@ module adhesion_cg
    use adhesion_state, only : adhesion_method_type, adhesion_problem_type, control_approach
    use finite_fields, only : reject_overflow
    use asperity_errors, only : error_input, error_type, fail
-   use asperity_parallel, only : global_max, thread_count
+   use asperity_parallel, only : thread_count
+   use field_sums, only : field_maximum
    use kernels, only : kernel_type
    use asperity_precision, only : dp
    use regular_grid, only : grid_type
@@ -64,7 +65,7 @@ contains
    !>
    !> Start: in periodic mode `gap`; in free mode `pressure` with `level` (the level is the target where
    !> that is prescribed). With problem%full_contact from there instead.
-   subroutine solve(self, problem, height, gap, pressure, level, outcome, history)
+   subroutine solve(self, problem, height, gap, pressure, level, outcome, past)
       class(adhesion_solver_type), intent(inout) :: self
       type(adhesion_problem_type), intent(in) :: problem
       real(dp), intent(in), contiguous, target :: height(:, :)       !! H, [nx, ny], m
@@ -72,14 +73,14 @@ contains
       real(dp), intent(inout), contiguous, target :: pressure(:, :)  !! P, attraction included, Pa
       real(dp), intent(inout) :: level                 !! U - H where the gap is zero, m
       type(solver_result_type), intent(out) :: outcome
-      real(dp), intent(in), target, optional :: history(:, :)  !! P_h, Pa
+      real(dp), intent(in), target, optional :: past(:, :)  !! P_h, Pa
       type(adhesion_problem_type) :: task
 
       task = problem
-      task%datum = global_max(maxval(height))
+      task%datum = field_maximum(height)
       if (problem%control == control_approach) task%target = problem%target + task%datum
       level = level + task%datum
-      call self%method%solve(task, height, gap, pressure, level, outcome, history)
+      call self%method%solve(task, height, gap, pressure, level, outcome, past)
       call reject_overflow(outcome, gap, pressure, thread_count())
       level = level - task%datum
       if (problem%control == control_approach) level = problem%target

@@ -27,7 +27,7 @@
 !> gaps are so wide that the attraction, which falls with the gap, no longer balances the pull anywhere,
 !> the reason is 'detached'.
 !>
-!> Fields of doubles: H, g, P, and the work fields gradient, residual, direction, old residual; the
+!> Fields of doubles: H, g, P, and the work fields exchange, residual, direction, old residual; the
 !> spectrum of B and with 'full' of M. In free mode the work fields, the spectra and three more fields
 !> (state, traction, psi) have 4 times the cells, and the transforms counted are of the doubled grid.
 module adhesion_cg_fast
@@ -36,6 +36,7 @@ module adhesion_cg_fast
    use adhesion_patch, only : is_detached, new_adhesion_patch
    use adhesion_potential, only : stiffens
    use adhesion_preconditioner, only : new_adhesion_preconditioner
+   use adhesion_start, only : begin_contact
    use adhesion_state, only : adhesion_method_type, adhesion_problem_type, control_approach, &
       reason_closed, reason_converged, reason_detached, reason_limit, reason_stalled
    use adhesion_steps, only : choose_step, clipped_step, form_step_row, known_of_step, step_sums_type, &
@@ -91,7 +92,7 @@ contains
             call new_adhesion_preconditioner(work%preconditioner, preconditioner, mx, my, compliance, &
                stiffness, work%patch%nyquist, error)
             if (allocated(error)) return
-            allocate (work%gradient(mx, my), work%residual(mx, my), work%direction(mx, my), &
+            allocate (work%exchange(mx, my), work%residual(mx, my), work%direction(mx, my), &
                work%old(mx, my), source=0.0_dp)
             if (.not. work%patch%periodic) &
                allocate (self%state(mx, my), self%traction(mx, my), source=0.0_dp)
@@ -100,7 +101,7 @@ contains
    end subroutine new_adhesion_fast
 
    !> Solve an adhesive contact problem, as `adhesion_method_type` says.
-   subroutine solve(self, problem, height, gap, pressure, level, outcome, history)
+   subroutine solve(self, problem, height, gap, pressure, level, outcome, past)
       class(adhesion_fast_type), intent(inout), target :: self
       type(adhesion_problem_type), intent(in) :: problem
       real(dp), intent(in), contiguous, target :: height(:, :)
@@ -108,7 +109,7 @@ contains
       real(dp), intent(inout), contiguous, target :: pressure(:, :)
       real(dp), intent(inout) :: level
       type(solver_result_type), intent(out) :: outcome
-      real(dp), intent(in), target, optional :: history(:, :)
+      real(dp), intent(in), target, optional :: past(:, :)
       type(adhesion_iteration_type) :: now
       real(dp) :: transforms_before
 
@@ -116,7 +117,7 @@ contains
       transforms_before = transforms(self)
       now%problem = problem
       now%height => height
-      if (present(history)) now%history => history
+      if (present(past)) now%past => past
       now%level = level
       if (problem%control == control_approach) now%level = problem%target
       if (self%work%patch%periodic) then
@@ -130,7 +131,7 @@ contains
          outcome%reason = reason_closed
          level = problem%target
       else
-         call self%work%patch%begin(now, gap, pressure)
+         call begin_contact(self%work%patch, now, gap, pressure)
          call minimise(self, now, outcome)
          call self%work%patch%hand_out(now, gap, pressure, level, outcome%load_error)
       end if
@@ -326,7 +327,7 @@ contains
 
       call self%work%patch%destroy()
       call self%work%preconditioner%destroy()
-      if (allocated(self%work%gradient)) deallocate (self%work%gradient, self%work%residual, &
+      if (allocated(self%work%exchange)) deallocate (self%work%exchange, self%work%residual, &
          self%work%direction, self%work%old)
       if (allocated(self%state)) deallocate (self%state, self%traction)
    end subroutine destroy

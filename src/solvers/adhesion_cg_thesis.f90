@@ -14,11 +14,12 @@ module adhesion_cg_thesis
    use adhesion_patch, only : adhesion_contact_type, adhesion_patch_type, evaluate_gradient, is_detached, &
       natural_residual, new_adhesion_patch
    use adhesion_potential, only : adhesive_energy, adhesive_terms
+   use adhesion_start, only : begin_contact
    use adhesion_state, only : adhesion_method_type, adhesion_problem_type, control_approach, &
       reason_closed, reason_converged, reason_detached, reason_limit, reason_stalled
    use adhesion_steps, only : stepped_gap, sum_shift
    use asperity_errors, only : error_input, error_type, fail
-   use asperity_parallel, only : global_max, global_min, global_sum
+   use field_sums, only : largest_of_rows, least_of_rows, row_total
    use kernels, only : kernel_type
    use asperity_precision, only : dp, int64
    use omp_lib, only : omp_get_wtime
@@ -68,7 +69,7 @@ contains
    end subroutine new_adhesion_thesis
 
    !> Solve an adhesive contact problem, as `adhesion_method_type` says.
-   subroutine solve(self, problem, height, gap, pressure, level, outcome, history)
+   subroutine solve(self, problem, height, gap, pressure, level, outcome, past)
       class(adhesion_thesis_type), intent(inout), target :: self
       type(adhesion_problem_type), intent(in) :: problem
       real(dp), intent(in), contiguous, target :: height(:, :)
@@ -76,7 +77,7 @@ contains
       real(dp), intent(inout), contiguous, target :: pressure(:, :)
       real(dp), intent(inout) :: level
       type(solver_result_type), intent(out) :: outcome
-      real(dp), intent(in), target, optional :: history(:, :)
+      real(dp), intent(in), target, optional :: past(:, :)
       type(adhesion_contact_type) :: now, trial
       integer(int64) :: before
 
@@ -84,14 +85,14 @@ contains
       before = self%patch%transforms()
       now%problem = problem
       now%height => height
-      if (present(history)) now%history => history
+      if (present(past)) now%past => past
       now%state => gap
       now%traction => pressure
       if (self%patch%is_closed_up(problem, height)) then
          outcome%reason = reason_closed
          level = problem%target
       else
-         call self%patch%begin(now, gap, pressure)
+         call begin_contact(self%patch, now, gap, pressure)
          trial = now
          trial%state => self%trial_gap
          trial%traction => self%trial_traction
@@ -185,8 +186,8 @@ contains
             self%residual(i, j) = merge(-g, 0.0_dp, now%state(i, j) > 0.0_dp .or. g < 0.0_dp)
          end do
       end do
-      natural = global_max(worst)
-      least = global_min(lowest)
+      natural = largest_of_rows([worst])
+      least = least_of_rows([lowest])
    end subroutine measure
 
    !> r.(Q B + e'') d, the numerator of eq. 2.28.
@@ -209,7 +210,7 @@ contains
          end do
          rows(j) = s1
       end do
-      total = global_sum(sum(rows))
+      total = row_total(rows)
    end function coupling
 
    !> d.e'' d (eq. 2.27).
@@ -232,7 +233,7 @@ contains
          end do
          rows(j) = s1
       end do
-      total = global_sum(sum(rows))
+      total = row_total(rows)
    end function adhesive_part
 
    !> d = r + beta d outside the contact, of zero sum where the level is prescribed; r.d.
@@ -259,7 +260,7 @@ contains
       end do
       mean = 0.0_dp
       if (now%problem%control == control_approach) &
-         mean = global_sum(sum(sums))/max(global_sum(sum(counts)), 1.0_dp)
+         mean = row_total(sums)/max(row_total(counts), 1.0_dp)
       !$omp parallel do default(none) shared(self, now, mean, products) private(i, j) &
       !$omp num_threads(self%patch%threads)
       do j = 1, self%patch%ny
@@ -272,7 +273,7 @@ contains
             products(j) = products(j) + self%residual(i, j)*self%direction(i, j)
          end do
       end do
-      rd = global_sum(sum(products))
+      rd = row_total(products)
    end subroutine new_direction
 
    !> Q B d and d.Q B d.
@@ -331,7 +332,7 @@ contains
             sizes(j) = sizes(j) + abs(before)
          end do
       end do
-      yes = global_sum(sum(changes)) <= 4.0_dp*epsilon(1.0_dp)*global_sum(sum(sizes))
+      yes = row_total(changes) <= 4.0_dp*epsilon(1.0_dp)*row_total(sizes)
    end function falls
 
    !> Make the trial contact the contact.

@@ -8,7 +8,7 @@ module adhesion_directions
       natural_residual
    use adhesion_preconditioner, only : adhesion_preconditioner_type
    use adhesion_state, only : control_approach, control_pressure, diagonal_scaling
-   use asperity_parallel, only : global_max, global_min, global_sum
+   use field_sums, only : largest_of_rows, least_of_rows, row_total
    use asperity_precision, only : dp
    implicit none
    private
@@ -27,7 +27,8 @@ module adhesion_directions
    type :: adhesion_work_type
       type(adhesion_patch_type) :: patch
       type(adhesion_preconditioner_type) :: preconditioner
-      real(dp), allocatable :: gradient(:, :)        !! G; then M's input; then z = M r
+      !> What is exchanged with the preconditioner: G, of which `measure` makes the input of M, and then z = M r.
+      real(dp), allocatable :: exchange(:, :)
       real(dp), allocatable :: residual(:, :)        !! r
       real(dp), allocatable :: old(:, :)             !! r of the iteration before
       real(dp), allocatable :: direction(:, :)       !! d
@@ -70,7 +71,7 @@ contains
       real(dp) :: worst, least
       integer :: j
 
-      call evaluate_gradient(self%patch, now, self%gradient)
+      call evaluate_gradient(self%patch, now, self%exchange)
       allocate (loads(self%patch%my), paddings(self%patch%my))
       worst = 0.0_dp
       least = huge(1.0_dp)
@@ -79,15 +80,15 @@ contains
       do j = 1, self%patch%my
          call measure_row(self, now, j, worst, least, paddings(j))
          loads(j) = sum(now%traction(1:self%patch%inner(j), j))
-         call self%preconditioner%put_row(j, self%gradient(:, j))
+         call self%preconditioner%put_row(j, self%exchange(:, j))
       end do
-      now%residual = global_max(worst)
-      now%least = global_min(least)
+      now%residual = largest_of_rows([worst])
+      now%least = least_of_rows([least])
       if (self%patch%periodic) return
-      now%psi_r = global_sum(sum(paddings))
+      now%psi_r = row_total(paddings)
       if (now%problem%control /= control_pressure) return
       now%old_missing = now%missing
-      now%missing = now%force - global_sum(sum(loads))
+      now%missing = now%force - row_total(loads)
       now%residual = max(now%residual, abs(now%missing)/max(abs(now%force), now%units%traction))
    end subroutine measure
 
@@ -105,7 +106,7 @@ contains
       n = self%patch%inner(j)
       do i = 1, n
          gap = now%state(i, j)
-         g = self%gradient(i, j) + now%load
+         g = self%exchange(i, j) + now%load
          worst = max(worst, natural_residual(now%units, gap, g))
          least = min(least, gap)
          r = 0.0_dp
@@ -113,7 +114,7 @@ contains
          self%old(i, j) = self%residual(i, j)
          self%residual(i, j) = r
          if (self%scaling > 0.0_dp) r = r*diagonal_scaling(now%problem, gap, self%scaling)
-         self%gradient(i, j) = r
+         self%exchange(i, j) = r
       end do
       padding = 0.0_dp
       do i = n + 1, self%patch%mx
@@ -122,7 +123,7 @@ contains
          padding = padding + self%patch%psi(i, j)*r
          self%old(i, j) = self%residual(i, j)
          self%residual(i, j) = r
-         self%gradient(i, j) = r
+         self%exchange(i, j) = r
       end do
    end subroutine measure_row
 
@@ -167,7 +168,7 @@ contains
       allocate (z(self%patch%mx))
       !$omp do
       do j = 1, self%patch%my
-         call self%preconditioner%get_row(j, self%gradient(:, j), z)
+         call self%preconditioner%get_row(j, self%exchange(:, j), z)
          call take_z_row(self, now, level_z, j, z)
          call center_row(self, now, first, 0.0_dp, j, rows(j))
       end do
@@ -202,7 +203,7 @@ contains
          if (self%scaling > 0.0_dp) z(i) = z(i)*diagonal_scaling(now%problem, now%state(i, j), self%scaling)
       end do
       if (n < self%patch%mx) z(n + 1:) = z(n + 1:) + level_z*self%patch%psi(n + 1:, j)
-      self%gradient(:, j) = z
+      self%exchange(:, j) = z
    end subroutine take_z_row
 
    !> Take the mean off a row of z, and keep cells in contact from closing; the sums of the row.
@@ -218,7 +219,7 @@ contains
       integer :: i
 
       do i = 1, self%patch%mx
-         z = self%gradient(i, j)
+         z = self%exchange(i, j)
          if (i <= self%patch%inner(j)) then
             open = now%state(i, j) > 0.0_dp
             opening = self%residual(i, j) > 0.0_dp
@@ -229,7 +230,7 @@ contains
                opening = z > 0.0_dp
             end if
             if (open .or. opening) sums%moving = sums%moving + 1.0_dp
-            self%gradient(i, j) = z
+            self%exchange(i, j) = z
             sums%total = sums%total + z
          end if
          sums%rz = sums%rz + z*self%residual(i, j)
@@ -242,10 +243,10 @@ contains
       type(z_sums_type), intent(in) :: rows(:)
       type(z_sums_type) :: sums
 
-      sums%rz = global_sum(sum(rows%rz))
-      sums%old_rz = global_sum(sum(rows%old_rz))
-      sums%total = global_sum(sum(rows%total))
-      sums%moving = global_sum(sum(rows%moving))
+      sums%rz = row_total(rows%rz)
+      sums%old_rz = row_total(rows%old_rz)
+      sums%total = row_total(rows%total)
+      sums%moving = row_total(rows%moving)
    end function sum_of
 
    !> d = z + beta d on the free cells and in the padding, 0 elsewhere; the level's alike. The change of
@@ -269,9 +270,9 @@ contains
          n = self%patch%inner(j)
          slopes(j) = 0.0_dp
          do i = 1, self%patch%mx
-            d = self%gradient(i, j) + beta*self%direction(i, j)
+            d = self%exchange(i, j) + beta*self%direction(i, j)
             if (i <= n) then
-               if (.not. (now%state(i, j) > 0.0_dp .or. self%gradient(i, j) > 0.0_dp)) d = 0.0_dp
+               if (.not. (now%state(i, j) > 0.0_dp .or. self%exchange(i, j) > 0.0_dp)) d = 0.0_dp
             end if
             slopes(j) = slopes(j) + self%residual(i, j)*d
             self%direction(i, j) = d
@@ -282,8 +283,8 @@ contains
       end do
       !$omp end do
       !$omp end parallel
-      now%slope = global_sum(sum(slopes)) + now%missing*now%lift
-      now%squares = global_sum(sum(squares))
+      now%slope = row_total(slopes) + now%missing*now%lift
+      now%squares = row_total(squares)
    end subroutine turn
 
 end module adhesion_directions

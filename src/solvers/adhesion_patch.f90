@@ -18,14 +18,12 @@
 !> checked with the displacement of its pressure by the true free operator: there the padding drops out.
 module adhesion_patch
    use adhesion_potential, only : adhesive_slope
-   use adhesion_state, only : adhesion_problem_type, close_gaps, control_approach, control_pressure, &
-      resolved_traction, traction_scale
-   use adhesion_steps, only : stepped_gap, sum_shift
+   use adhesion_state, only : adhesion_problem_type, close_gaps, control_approach, control_pressure
    use asperity_errors, only : error_input, error_type, fail
-   use asperity_parallel, only : global_max, global_min, global_sum
-   use kernels, only : kernel_type
    use asperity_precision, only : dp, int64
    use fft_conv, only : columns_apply, convolution_type, new_convolution, new_symbol_operator
+   use field_sums, only : field_magnitude, field_mean, field_minimum, field_sum, largest_of_rows, row_total
+   use kernels, only : kernel_type
    use regular_grid, only : boundary_periodic, grid_type
    implicit none
    private
@@ -43,7 +41,7 @@ module adhesion_patch
    type :: adhesion_contact_type
       type(adhesion_problem_type) :: problem
       real(dp), pointer, contiguous :: height(:, :) => null()    !! H on the patch, m
-      real(dp), pointer :: history(:, :) => null()               !! P_h on the patch, Pa; may be missing
+      real(dp), pointer :: past(:, :) => null()                  !! P_h on the patch, Pa; may be missing
       real(dp), pointer, contiguous :: state(:, :) => null()     !! g on the patch, u in the padding, m
       real(dp), pointer, contiguous :: traction(:, :) => null()  !! P; in periodic mode P - p, Pa
       real(dp) :: load = 0.0_dp          !! p in periodic mode, Pa; else 0
@@ -51,7 +49,7 @@ module adhesion_patch
       real(dp) :: gap_sum = 0.0_dp       !! prescribed sum of g in periodic mode at a prescribed level, m
       real(dp) :: level = 0.0_dp         !! U - H where the gap is zero, free mode, m
       real(dp) :: mean_height = 0.0_dp   !! of the patch above the datum, m
-      real(dp) :: mean_history = 0.0_dp  !! what of the history does not matter, Pa
+      real(dp) :: past_mean = 0.0_dp     !! mean of P_h, which does not matter in periodic mode, Pa
       type(residual_units_type) :: units
    end type adhesion_contact_type
 
@@ -71,7 +69,6 @@ module adhesion_patch
    contains
       procedure :: inner
       procedure :: is_closed_up
-      procedure :: begin
       procedure :: evaluate_traction
       procedure :: true_residual
       procedure :: hand_out
@@ -135,7 +132,7 @@ contains
       allocate (pressure(self%mx, self%my), self%psi(self%mx, self%my), source=0.0_dp)
       pressure(1:self%nx, 1:self%ny) = 1.0_dp
       call self%stiffness%apply_inverse(pressure, self%psi)
-      least = global_min(minval(self%psi(1:self%nx, 1:self%ny)))
+      least = field_minimum(self%psi(1:self%nx, 1:self%ny))
       do j = 1, self%my
          self%psi(:, j) = min(self%psi(:, j)/least, 1.0_dp)
       end do
@@ -160,99 +157,8 @@ contains
 
       closed = .false.
       if (self%periodic .and. problem%control == control_approach) closed = .not. problem%target &
-         + (field_sum(height, self%threads)/self%cells - problem%datum) < 0.0_dp
+         + (field_mean(height) - problem%datum) < 0.0_dp
    end function is_closed_up
-
-   !> Put a contact at its start, in `gap` (periodic) or in `pressure` and `level` (free), or in full
-   !> contact; and settle the units of the residual.
-   subroutine begin(self, contact, gap, pressure)
-      class(adhesion_patch_type), intent(inout) :: self
-      class(adhesion_contact_type), intent(inout) :: contact    !! with its fields and the level set
-      real(dp), intent(in) :: gap(:, :), pressure(:, :)        !! of the patch; free mode only
-      real(dp) :: deviation, spread, round_off, greatest
-
-      contact%mean_height = field_sum(contact%height, self%threads)/self%cells - contact%problem%datum
-      deviation = rms(contact%height, contact%mean_height + contact%problem%datum, self%cells, self%threads)
-      spread = contact%problem%datum - global_min(minval(contact%height))
-      contact%units%length = contact%problem%potential%range
-      if (.not. contact%units%length > 0.0_dp) contact%units%length = deviation
-      if (self%periodic) then
-         call begin_periodic(self, contact)
-      else
-         round_off = 20.0_dp*epsilon(1.0_dp)*(abs(contact%level) + spread)
-         contact%units%length = max(contact%units%length, round_off/contact%problem%tolerance)
-         call begin_free(self, contact, gap, pressure)
-      end if
-      call self%evaluate_traction(contact)
-      greatest = max(abs(contact%load), largest(contact%traction, self%threads))
-      contact%units%traction = max(resolved_traction(contact%problem, greatest, self%nyquist, spread), &
-         traction_scale(contact%problem%potential, &
-         max(greatest, contact%problem%modulus*self%longest*deviation)))
-   end subroutine begin
-
-   !> The load or the sum of the gap that is prescribed, and the gap on what is allowed.
-   subroutine begin_periodic(self, contact)
-      type(adhesion_patch_type), intent(in) :: self
-      class(adhesion_contact_type), intent(inout) :: contact
-      real(dp) :: shift
-      integer :: j
-
-      contact%level = 0.0_dp
-      if (associated(contact%history)) &
-         contact%mean_history = field_sum(contact%history, self%threads)/self%cells
-      if (contact%problem%control == control_pressure) contact%load = contact%problem%target
-      !$omp parallel do default(none) shared(contact) private(j) num_threads(self%threads)
-      do j = 1, self%ny
-         contact%state(:, j) = max(contact%state(:, j), 0.0_dp)
-         if (contact%problem%full_contact) contact%state(:, j) = 0.0_dp
-      end do
-      if (contact%problem%control /= control_approach) return
-      contact%gap_sum = -self%cells*(contact%problem%target + contact%mean_height)
-      if (field_sum(contact%state, self%threads) > 0.0_dp) then
-         shift = sum_shift(contact%state, contact%state, 0.0_dp, contact%gap_sum, self%threads)
-         !$omp parallel do default(none) shared(contact, shift) private(j) num_threads(self%threads)
-         do j = 1, self%ny
-            contact%state(:, j) = stepped_gap(contact%state(:, j), 0.0_dp, 0.0_dp, shift)
-         end do
-      else
-         contact%state(:, :) = contact%gap_sum/self%cells
-      end if
-   end subroutine begin_periodic
-
-   !> The state of the pressure and the level handed in, or full contact. The gap of a pressure is not
-   !> sharp: gaps within the tolerance count as none, so that a contact that is handed in stays one.
-   subroutine begin_free(self, contact, gap, pressure)
-      type(adhesion_patch_type), intent(inout) :: self
-      class(adhesion_contact_type), intent(inout) :: contact
-      real(dp), intent(in) :: gap(:, :), pressure(:, :)
-      real(dp) :: g
-      integer :: i, j
-
-      if (contact%problem%control == control_pressure) contact%force = contact%problem%target*self%cells
-      if (contact%problem%full_contact) then
-         if (contact%problem%control /= control_approach) contact%level = -contact%mean_height
-         do j = 1, self%my
-            contact%state(:, j) = (contact%level + contact%mean_height)*self%psi(:, j)
-            if (j <= self%ny) contact%state(1:self%nx, j) = max(gap(:, j), 0.0_dp)
-         end do
-         return
-      end if
-      do j = 1, self%my
-         contact%traction(:, j) = 0.0_dp
-         if (j > self%ny) cycle
-         contact%traction(1:self%nx, j) = pressure(:, j)
-         if (associated(contact%history)) contact%traction(1:self%nx, j) = pressure(:, j) &
-            + contact%history(:, j)
-      end do
-      call self%stiffness%apply_inverse(contact%traction, contact%state)
-      do j = 1, self%my
-         contact%state(:, j) = contact%state(:, j)/contact%problem%modulus
-         do i = 1, self%inner(j)
-            g = contact%state(i, j) - (contact%height(i, j) - contact%problem%datum) - contact%level
-            contact%state(i, j) = merge(g, 0.0_dp, g > contact%problem%tolerance*contact%units%length)
-         end do
-      end do
-   end subroutine begin_free
 
    !> The traction from the state by a product with B.
    subroutine evaluate_traction(self, contact)
@@ -279,8 +185,8 @@ contains
          do j = 1, self%my
             call self%stiffness%backward_row(1, j, contact%traction(:, j))
             contact%traction(:, j) = contact%problem%modulus*contact%traction(:, j)
-            if (j <= self%ny .and. associated(contact%history)) contact%traction(1:nx, j) = &
-               contact%traction(1:nx, j) - (contact%history(:, j) - contact%mean_history)
+            if (j <= self%ny .and. associated(contact%past)) contact%traction(1:nx, j) = &
+               contact%traction(1:nx, j) - (contact%past(:, j) - contact%past_mean)
          end do
       end associate
    end subroutine evaluate_traction
@@ -307,7 +213,7 @@ contains
          end do
       end associate
       if (self%periodic .and. contact%problem%control == control_approach) &
-         contact%load = -global_sum(sum(sums))/global_sum(sum(counts))
+         contact%load = -row_total(sums)/row_total(counts)
    end subroutine evaluate_gradient
 
    !> Is the solid pulled, and are all gaps so wide that no cell attracts as much as the mean pull?
@@ -340,8 +246,8 @@ contains
       class(adhesion_patch_type), intent(inout) :: self
       class(adhesion_contact_type), intent(in) :: contact
       real(dp) :: natural
-      real(dp), allocatable :: row(:)
-      real(dp) :: form, worst, load
+      real(dp), allocatable :: row(:), worst(:)
+      real(dp) :: form, load
       integer :: j
 
       !$omp parallel default(none) shared(self, contact) private(j, row) num_threads(self%operator%threads)
@@ -349,28 +255,28 @@ contains
       !$omp do
       do j = 1, self%ny
          row(:) = contact%traction(1:self%nx, j)
-         if (associated(contact%history)) row(:) = row + contact%history(:, j)
+         if (associated(contact%past)) row(:) = row + contact%past(:, j)
          call self%operator%forward_row(1, j, row)
       end do
       !$omp end do
       !$omp end parallel
       call self%operator%columns(columns_apply, form)
-      worst = 0.0_dp
-      !$omp parallel default(none) shared(self, contact) private(j, row) &
-      !$omp reduction(max: worst) num_threads(self%operator%threads)
+      allocate (worst(self%ny))
+      !$omp parallel default(none) shared(self, contact, worst) private(j, row) &
+      !$omp num_threads(self%operator%threads)
       allocate (row(self%nx))
       !$omp do
       do j = 1, self%ny
          call self%operator%backward_row(1, j, row)
          row(:) = row/contact%problem%modulus - (contact%height(:, j) - contact%problem%datum) - contact%level
-         worst = max(worst, maxval(natural_residual(contact%units, row, contact%traction(1:self%nx, j) &
-            + adhesive_slope(contact%problem%potential, max(row, 0.0_dp)))))
+         worst(j) = maxval(natural_residual(contact%units, row, contact%traction(1:self%nx, j) &
+            + adhesive_slope(contact%problem%potential, max(row, 0.0_dp))))
       end do
       !$omp end do
       !$omp end parallel
-      natural = global_max(worst)
+      natural = largest_of_rows(worst)
       if (contact%problem%control /= control_pressure) return
-      load = field_sum(contact%traction(1:self%nx, 1:self%ny), self%threads)
+      load = field_sum(contact%traction(1:self%nx, 1:self%ny))
       natural = max(natural, abs(load - contact%force)/max(abs(contact%force), contact%units%traction))
    end function true_residual
 
@@ -393,11 +299,11 @@ contains
          pressure(:, j) = contact%traction(1:self%nx, j) + contact%load
       end do
       load_error = 0.0_dp
-      sum_of_pressure = field_sum(pressure, self%threads)
+      sum_of_pressure = field_sum(pressure)
       if (self%periodic) then
-         sum_of_gap = field_sum(gap, self%threads)
+         sum_of_gap = field_sum(gap)
          level = -contact%mean_height - sum_of_gap/self%cells
-         scale = max(abs(contact%load), epsilon(1.0_dp)*largest(pressure, self%threads), tiny(1.0_dp))
+         scale = max(abs(contact%load), epsilon(1.0_dp)*field_magnitude(pressure), tiny(1.0_dp))
          load_error = abs(sum_of_pressure/self%cells - contact%load)/scale
          if (contact%problem%control == control_approach) &
             load_error = abs(sum_of_gap - contact%gap_sum)/contact%gap_sum
@@ -417,55 +323,6 @@ contains
 
       count = self%stiffness%ffts + self%operator%ffts
    end function transforms
-
-   !> Sum of a field, by rows in order.
-   function field_sum(field, threads) result(total)
-      real(dp), intent(in) :: field(:, :)
-      integer, intent(in) :: threads
-      real(dp) :: total
-      real(dp), allocatable :: rows(:)
-      integer :: j
-
-      allocate (rows(size(field, 2)))
-      !$omp parallel do default(none) shared(rows, field) private(j) num_threads(threads)
-      do j = 1, size(field, 2)
-         rows(j) = sum(field(:, j))
-      end do
-      total = global_sum(sum(rows))
-   end function field_sum
-
-   !> Largest magnitude of a field.
-   function largest(field, threads) result(value)
-      real(dp), intent(in) :: field(:, :)
-      integer, intent(in) :: threads
-      real(dp) :: value
-      integer :: j
-
-      value = tiny(1.0_dp)
-      !$omp parallel do default(none) shared(field) private(j) reduction(max: value) num_threads(threads)
-      do j = 1, size(field, 2)
-         value = max(value, maxval(abs(field(:, j))))
-      end do
-      value = global_max(value)
-   end function largest
-
-   !> Root mean square of a field about its mean.
-   function rms(field, mean, cells, threads) result(value)
-      real(dp), intent(in) :: field(:, :)
-      real(dp), intent(in) :: mean
-      real(dp), intent(in) :: cells
-      integer, intent(in) :: threads
-      real(dp) :: value
-      real(dp), allocatable :: rows(:)
-      integer :: j
-
-      allocate (rows(size(field, 2)))
-      !$omp parallel do default(none) shared(rows, field, mean) private(j) num_threads(threads)
-      do j = 1, size(field, 2)
-         rows(j) = sum((field(:, j) - mean)**2)
-      end do
-      value = max(sqrt(global_sum(sum(rows))/cells), tiny(1.0_dp))
-   end function rms
 
    !> Free plans and memory.
    subroutine destroy(self)

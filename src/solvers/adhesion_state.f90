@@ -1,7 +1,7 @@
 !> What the methods for adhesive contact share: the problem, its equations, and what a method is.
 !>
-!> The energy of a state with the gap g >= 0 (equations for one cell area; modulus Q, traction history
-!> P_h of a viscoelastic material, mean pressure p; elastic: Q = G and P_h = 0)
+!> The energy of a state with the gap g >= 0 (equations for one cell area; modulus Q, traction of the
+!> past P_h of a viscoelastic material, mean pressure p; elastic: Q = G and P_h = 0)
 !>     E(g) = Q/2 (H+g).B(H+g) - P_h.g + sum e(g) + p sum g,      B = A^-1 for G = 1
 !> has the gradient G = Q B(H+g) - P_h + e'(g) + p; a solution has G = 0 where g > 0 and G >= 0 where
 !> g = 0. The contact pressure, attraction included, is P = p + Q B(H+g) - P_h = G - e'(g).
@@ -56,7 +56,7 @@ module adhesion_state
 
       !> Solve an adhesive contact problem. Not converging is an outcome: the state reached, lowest in
       !> energy so far, is handed out.
-      subroutine solve_contact(self, problem, height, gap, pressure, level, outcome, history)
+      subroutine solve_contact(self, problem, height, gap, pressure, level, outcome, past)
          import :: adhesion_method_type, adhesion_problem_type, dp, solver_result_type
          implicit none
          class(adhesion_method_type), intent(inout), target :: self
@@ -67,7 +67,7 @@ module adhesion_state
          real(dp), intent(inout) :: level                              !! m: a start in free mode
          type(solver_result_type), intent(out) :: outcome
          !> P_h, Pa. Not contiguous: gfortran 12 would pack it even where it is absent.
-         real(dp), intent(in), target, optional :: history(:, :)
+         real(dp), intent(in), target, optional :: past(:, :)
       end subroutine solve_contact
 
       !> Free plans and memory.

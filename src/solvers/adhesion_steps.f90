@@ -8,7 +8,7 @@
 module adhesion_steps
    use adhesion_potential, only : adhesive_terms, has_smooth_potential
    use adhesion_state, only : adhesion_problem_type
-   use asperity_parallel, only : global_max, global_min, global_sum
+   use field_sums, only : largest_of_rows, least_of_rows, row_total
    use asperity_precision, only : dp
    implicit none
    private
@@ -117,9 +117,9 @@ contains
                end if
             end do
          end do
-         open = global_sum(sum(counts))
+         open = row_total(counts)
          if (open == 0) exit
-         next = (global_sum(sum(sums)) - total)/open
+         next = (row_total(sums) - total)/open
          if (next <= shift) then
             ! The sum is too small: all that is open is lifted.
             if (shift == 0.0_dp) shift = next
@@ -189,8 +189,8 @@ contains
             slopes(j) = s1
             curvatures(j) = s2
          end do
-         first = global_sum(sum(slopes))
-         second = global_sum(sum(curvatures))
+         first = row_total(slopes)
+         second = row_total(curvatures)
       end subroutine adhesive_part
 
    end function clipped_step
@@ -236,13 +236,13 @@ contains
       type(step_sums_type), intent(in) :: rows(:)
       type(step_sums_type) :: known
 
-      known%slope = global_sum(sum(rows%slope))
-      known%adhesive_slope = global_sum(sum(rows%adhesive_slope))
-      known%curvature = global_sum(sum(rows%curvature))
-      known%energy = global_sum(sum(rows%energy))
-      known%squares = global_sum(sum(rows%squares))
-      known%longest = global_min(minval(rows%longest))
-      known%clipped = global_max(merge(1.0_dp, 0.0_dp, any(rows%clipped))) > 0.0_dp
+      known%slope = row_total(rows%slope)
+      known%adhesive_slope = row_total(rows%adhesive_slope)
+      known%curvature = row_total(rows%curvature)
+      known%energy = row_total(rows%energy)
+      known%squares = row_total(rows%squares)
+      known%longest = least_of_rows(rows%longest)
+      known%clipped = largest_of_rows(merge(1.0_dp, 0.0_dp, rows%clipped)) > 0.0_dp
    end function known_of_step
 
    !> How far to go along the segment s: t near the first minimum of the energy, never where the
@@ -327,8 +327,8 @@ contains
             slopes(j) = s1
             energies(j) = s2
          end do
-         slope_sum = global_sum(sum(slopes))
-         energy_sum = global_sum(sum(energies))
+         slope_sum = row_total(slopes)
+         energy_sum = row_total(energies)
       end subroutine adhesive_part
 
    end function choose_step

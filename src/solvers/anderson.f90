@@ -17,7 +17,8 @@
 !> Memory: for each pair two fields of single precision per component, which is enough because the
 !> residual itself is never taken from them; and two fields of doubles per component.
 module anderson
-   use asperity_parallel, only : global_sum, thread_count
+   use asperity_parallel, only : thread_count
+   use field_sums, only : row_totals
    use asperity_precision, only : dp, sp
    implicit none
    private
@@ -152,7 +153,7 @@ contains
          rows(2, j) = sum(f(:, :, j)**2)
          rows(3, j) = sum(self%last_f(:, :, j)**2)
       end do
-      sums = global_sum([sum(rows(1, :)), sum(rows(2, :)), sum(rows(3, :))])
+      sums = row_totals(rows)
       if (min(sums(2), sums(3)) > 0.0_dp) cosine = sums(1)/(sqrt(sums(2))*sqrt(sums(3)))
    end function turn
 
@@ -199,11 +200,7 @@ contains
       do j = 1, self%ny
          call learn_row(self, weights, j, f(:, :, j), x(:, :, j), rows(:, j))
       end do
-      sums = 0.0_dp
-      do j = 1, self%ny
-         sums = sums + rows(:, j)
-      end do
-      sums = global_sum(sums)
+      sums = row_totals(rows)
       do k = 1, self%used
          self%gram(k, self%newest) = sums(k)
          self%gram(self%newest, k) = sums(k)

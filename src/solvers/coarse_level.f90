@@ -15,7 +15,7 @@ module coarse_level
    implicit none
    private
 
-   public :: coarse_level_type, new_coarse_level
+   public :: coarse_level_type, edge_rows, inner_rows, new_coarse_level
 
    real(dp), parameter :: ratio = 8.0_dp                    !! cells of a block along a side, if square
 
@@ -133,5 +133,24 @@ contains
 
       call self%normal%destroy()
    end subroutine destroy
+
+   !> The rows of a block whose neighbours belong to it, too: first, last, distance.
+   pure function inner_rows(coarse, jb) result(which)
+      type(coarse_level_type), intent(in) :: coarse
+      integer, intent(in) :: jb
+      integer :: which(3)
+
+      which = [coarse%first_y(jb) + 1, coarse%first_y(jb + 1) - 2, 1]
+   end function inner_rows
+
+   !> The first and the last row of a block, which may be the same: first, last, distance.
+   pure function edge_rows(coarse, jb) result(which)
+      type(coarse_level_type), intent(in) :: coarse
+      integer, intent(in) :: jb
+      integer :: which(3)
+
+      which = [coarse%first_y(jb), coarse%first_y(jb + 1) - 1, 1]
+      which(3) = max(which(2) - which(1), 1)
+   end function edge_rows
 
 end module coarse_level

@@ -26,7 +26,7 @@ module contact_solver
       !> Find the pressure P >= 0 under which gap >= 0 and P gap = 0.
       !>
       !> Not converging is an outcome, not an error: the state reached is handed out.
-      subroutine solve_contact(self, problem, height, pressure, gap, level, outcome, history)
+      subroutine solve_contact(self, problem, height, pressure, gap, level, outcome, past)
          import :: contact_solver_type, dp, normal_problem_type, solver_result_type
          class(contact_solver_type), intent(inout), target :: self
          type(normal_problem_type), intent(in) :: problem
@@ -35,7 +35,7 @@ module contact_solver
          real(dp), contiguous, intent(inout) :: gap(:, :)        !! U - H - level, m
          real(dp), intent(out) :: level                          !! U - H where the gap is zero, m
          type(solver_result_type), intent(out) :: outcome
-         real(dp), intent(in), optional :: history(:, :)         !! P_h, traction of the past, Pa
+         real(dp), intent(in), optional :: past(:, :)         !! P_h, traction of the past, Pa
       end subroutine solve_contact
    end interface
 

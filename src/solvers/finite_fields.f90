@@ -4,7 +4,7 @@
 !> error may look small where fields have overflowed. The solvers look at the fields that they hand out.
 module finite_fields
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
-   use asperity_parallel, only : global_sum
+   use field_sums, only : row_total
    use asperity_precision, only : dp
    use solver_result, only : solver_result_type
    implicit none
@@ -30,7 +30,7 @@ contains
          if (.not. (all(ieee_is_finite(one(:, j))) .and. all(ieee_is_finite(other(:, j))))) &
             lost = lost + 1
       end do
-      if (global_sum(lost) == 0) return
+      if (row_total([lost]) == 0) return
       outcome%converged = .false.
       outcome%reason = reason_overflow
    end subroutine reject_overflow

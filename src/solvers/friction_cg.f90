@@ -37,9 +37,10 @@ module friction_cg
    use friction_cg_fast, only : friction_fast_type, new_friction_fast
    use friction_cg_gradient, only : friction_gradient_type
    use friction_cg_thesis, only : friction_thesis_type
+   use friction_fields, only : friction_fields_type, friction_work_type
    use friction_law, only : friction_law_type
    use friction_method, only : friction_goal_type, friction_method_type
-   use friction_problem, only : friction_fields_type, friction_problem_type, friction_work_type
+   use friction_problem, only : friction_problem_type
    use friction_pull, only : friction_pull_type
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use kernels, only : kernel_type
@@ -98,7 +99,7 @@ contains
       self%compliance = operator%self_compliance()
       if (self%compliance <= 0.0_dp) self%compliance = self%length     ! one cell has no modes
       allocate (self%work%bound(grid%nx, 2, grid%ny), self%work%tangent(grid%nx, 3, grid%ny), &
-         self%work%old(grid%nx, 2, grid%ny), self%work%level(grid%nx), source=0.0_dp)
+         self%work%old(grid%nx, 2, grid%ny), source=0.0_dp)
       if (present(method)) then
          call choose_method(self, method, grid, operator%kernel, error)
       else
@@ -267,8 +268,7 @@ contains
       class(friction_solver_type), intent(inout) :: self
 
       if (allocated(self%method)) call self%method%destroy()
-      if (allocated(self%work%old)) deallocate (self%work%bound, self%work%tangent, self%work%old, &
-         self%work%level)
+      if (allocated(self%work%old)) deallocate (self%work%bound, self%work%tangent, self%work%old)
    end subroutine destroy
 
 end module friction_cg

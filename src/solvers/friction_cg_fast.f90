@@ -41,15 +41,16 @@
 !> (module `friction_cg_gradient`) follow, and then it goes on.
 module friction_cg_fast
    use asperity_errors, only : error_type
-   use asperity_parallel, only : global_sum
    use kernels, only : kernel_type
    use asperity_precision, only : dp, pi
    use fft_conv, only : columns_apply, columns_form, convolution_type, new_inverse_convolution
+   use field_sums, only : row_total
    use friction_cg_gradient, only : friction_gradient_type
+   use friction_directions, only : scaled_row, total_of, turn_sums_type, turned_row, uniform_type, &
+      unscaled_row, z_sums_type
    use friction_method, only : friction_goal_type, friction_method_type
    use friction_moves, only : move, move_total, pseudo_inverse
    use friction_problem, only : friction_problem_type
-   use friction_rows, only : scaled_row, total_of, turned_row, uniform_type, unscaled_row, z_sums_type
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use regular_grid, only : boundary_periodic, grid_type
    implicit none
@@ -273,7 +274,7 @@ contains
          call scale_row(self, problem, uniform, j, crosses(j))
       end do
       now%cross = 0.0_dp
-      if (.not. now%restart) now%cross = global_sum(sum(crosses))
+      if (.not. now%restart) now%cross = row_total(crosses)
       call self%preconditioner%columns(columns_apply, form)
       !$omp parallel do default(none) shared(self, problem, uniform, rows) private(j) &
       !$omp num_threads(problem%threads)
@@ -320,8 +321,8 @@ contains
       real(dp), intent(out) :: cross               !! g.z_old
       real(dp) :: g(problem%nx, 2)
 
-      call scaled_row(problem%nx, problem%compliance, uniform, problem%slip(:, j, 1), &
-         problem%slip(:, j, 2), problem%work%tangent(:, :, j), self%z(:, :, j), g, cross)
+      call scaled_row(problem%compliance, uniform, problem%slip(:, :, j), &
+         problem%work%tangent(:, :, j), self%z(:, :, j), g, cross)
       call self%preconditioner%forward_row(1, j, g(:, 1))
       call self%preconditioner%forward_row(2, j, g(:, 2))
    end subroutine scale_row
@@ -336,8 +337,8 @@ contains
 
       call self%preconditioner%backward_row(1, j, self%z(:, 1, j))
       call self%preconditioner%backward_row(2, j, self%z(:, 2, j))
-      call unscaled_row(problem%nx, problem%compliance, uniform, problem%slip(:, j, 1), &
-         problem%slip(:, j, 2), problem%work%tangent(:, :, j), self%z(:, :, j), sums)
+      call unscaled_row(problem%compliance, uniform, problem%slip(:, :, j), &
+         problem%work%tangent(:, :, j), self%z(:, :, j), sums)
    end subroutine unscale_row
 
    !> d = z + beta Z d with its transform, its slope g.d and the part of its curvature by the bounds.
@@ -347,21 +348,22 @@ contains
       type(convolution_type), intent(inout) :: operator
       real(dp), intent(in) :: beta
       type(iteration_type), intent(inout) :: now
-      real(dp), allocatable :: slopes(:), curvatures(:)
+      type(turn_sums_type), allocatable :: rows(:)
+      type(turn_sums_type) :: sums
       integer :: j
 
-      allocate (slopes(problem%ny), curvatures(problem%ny))
-      !$omp parallel do default(none) shared(self, problem, operator, beta, now, slopes, curvatures) &
+      allocate (rows(problem%ny))
+      !$omp parallel do default(none) shared(self, problem, operator, beta, now, rows) &
       !$omp private(j) num_threads(problem%threads)
       do j = 1, problem%ny
-         call turned_row(problem%nx, problem%compliance, beta, now%shift, problem%slip(:, j, 1), &
-            problem%slip(:, j, 2), problem%work%tangent(:, :, j), self%z(:, :, j), self%d(:, :, j), &
-            slopes(j), curvatures(j))
+         call turned_row(problem%compliance, beta, now%shift, problem%slip(:, :, j), &
+            problem%work%tangent(:, :, j), self%z(:, :, j), self%d(:, :, j), rows(j))
          call operator%forward_row(1, j, self%d(:, 1, j))
          call operator%forward_row(2, j, self%d(:, 2, j))
       end do
-      now%slope = global_sum(sum(slopes))
-      now%curvature = global_sum(sum(curvatures))
+      sums = total_of(rows)
+      now%slope = sums%slope
+      now%curvature = sums%curvature
    end subroutine turn
 
    !> Free the preconditioner and the work fields.

@@ -8,9 +8,9 @@
 !> projection where the slope counts, but its fixed points are the solution: T + alpha r returns to
 !> T where r = 0, and where T is on the bound and r is along D.
 module friction_cg_gradient
-   use asperity_parallel, only : global_sum
    use asperity_precision, only : dp
    use fft_conv, only : convolution_type
+   use field_sums, only : row_total
    use friction_law, only : contact_open, contact_stick
    use friction_method, only : friction_goal_type, friction_method_type
    use friction_moves, only : move
@@ -72,11 +72,11 @@ contains
          do i = 1, problem%nx
             if (problem%contact(i, j) == contact_open) cycle
             slope = problem%slope_at(i, j)
-            r = problem%law%slip_along_slope(slope, problem%slip(i, j, :))
-            t = problem%traction(i, j, :) + alpha*r
+            r = problem%law%slip_along_slope(slope, problem%slip(i, :, j))
+            t = problem%traction(i, :, j) + alpha*r
             call problem%law%return_to_bound(problem%pressure(i, j), slope, t, returned)
             self%slip(i, :, j) = r
-            self%step(i, :, j) = t - problem%traction(i, j, :)
+            self%step(i, :, j) = t - problem%traction(i, :, j)
             problem%contact(i, j) = contact_stick
          end do
       end do
@@ -99,14 +99,14 @@ contains
          do i = 1, problem%nx
             if (problem%contact(i, j) == contact_open) cycle
             y = self%slip(i, :, j) &
-               - problem%law%slip_along_slope(problem%slope_at(i, j), problem%slip(i, j, :))
+               - problem%law%slip_along_slope(problem%slope_at(i, j), problem%slip(i, :, j))
             s = self%step(i, :, j)
             ss(j) = ss(j) + s(1)**2 + s(2)**2
             sy(j) = sy(j) + s(1)*y(1) + s(2)*y(2)
             yy(j) = yy(j) + y(1)**2 + y(2)**2
          end do
       end do
-      products = global_sum([sum(ss), sum(sy), sum(yy)])
+      products = [row_total(ss), row_total(sy), row_total(yy)]
       shortest = 0.0_dp
       longest = 0.0_dp
       if (products(3) > 0.0_dp) shortest = products(2)/products(3)

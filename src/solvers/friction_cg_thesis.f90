@@ -14,9 +14,9 @@
 !> both sides; K_1 and K_2 are in closed form (module `friction_law`). Restarts with d = g where t.g
 !> <= 0. Two products of the operator an iteration, the first without its inverse transform.
 module friction_cg_thesis
-   use asperity_parallel, only : global_sum
    use asperity_precision, only : dp
    use fft_conv, only : columns_form, convolution_type
+   use field_sums, only : row_total
    use friction_law, only : contact_open, contact_slip
    use friction_method, only : friction_goal_type, friction_method_type
    use friction_moves, only : move
@@ -111,8 +111,8 @@ contains
          call operator%forward_row(1, j, self%tangent(:, 1, j))
          call operator%forward_row(2, j, self%tangent(:, 2, j))
       end do
-      ascent = global_sum(sum(ascents))
-      bend = global_sum(sum(bends))
+      ascent = row_total(ascents)
+      bend = row_total(bends)
    end subroutine new_direction
 
    !> beta of eq. 3.14, with y = g' - g; the old g is in `gradient` still.
@@ -139,7 +139,7 @@ contains
             yy(j) = yy(j) + dot_product(y, y)
          end do
       end do
-      products = global_sum([sum(ty), sum(yg), sum(tg), sum(yy)])
+      products = [row_total(ty), row_total(yg), row_total(tg), row_total(yy)]
       beta = 0.0_dp
       if (abs(products(1)) > 0.0_dp) &
          beta = -products(2)/products(1) + theta*products(3)*products(4)/products(1)**2
@@ -154,8 +154,8 @@ contains
       real(dp) :: slope(2), dd
 
       slope = problem%slope_at(i, j)
-      d = problem%traction(i, j, :) - problem%law%normal_traction(problem%pressure(i, j), slope)
-      r = problem%law%slip_along_slope(slope, problem%slip(i, j, :))
+      d = problem%traction(i, :, j) - problem%law%normal_traction(problem%pressure(i, j), slope)
+      r = problem%law%slip_along_slope(slope, problem%slip(i, :, j))
       g = r
       if (problem%contact(i, j) /= contact_slip) return
       dd = d(1)**2 + d(2)**2

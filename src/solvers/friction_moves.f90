@@ -3,7 +3,7 @@ module friction_moves
    use asperity_precision, only : dp, int8
    use fft_conv, only : convolution_type
    use friction_problem, only : friction_problem_type
-   use friction_rows, only : move_sums_type, move_type, moved_row, total_of
+   use friction_rows, only : move_sums_type, move_type, returned_row, site_columns, stepped_row, total_of
    implicit none
    private
 
@@ -142,16 +142,14 @@ contains
       real(dp), intent(in) :: d(problem%nx, 2)
       integer, intent(in) :: j
       type(move_sums_type), intent(out) :: sums
-      real(dp), pointer, contiguous :: hx(:), hy(:)
-      real(dp) :: state(problem%nx)
+      real(dp) :: site(problem%nx, site_columns), state(problem%nx), slips(problem%nx)
 
-      call problem%slope_rows(j, hx, hy)
+      call problem%gather_site(j, site)
       state = problem%contact(:, j)
-      associate (work => problem%work)
-         call moved_row(problem%nx, problem%constants, how, problem%pressure(:, j), hx, hy, &
-            work%bound(:, :, j), d, work%tangent(:, :, j), problem%traction(:, j, 1), &
-            problem%traction(:, j, 2), work%old(:, :, j), state, sums)
-      end associate
+      call stepped_row(how, d, problem%work%tangent(:, :, j), state, problem%traction(:, :, j), &
+         problem%work%old(:, :, j), slips)
+      call returned_row(problem%constants, how%uniform, site, slips, problem%work%old(:, :, j), &
+         problem%traction(:, :, j), state, sums)
       problem%contact(:, j) = int(state, int8)
    end subroutine move_row
 

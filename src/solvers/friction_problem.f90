@@ -27,44 +27,21 @@
 !> Each pass over the fields is one loop over rows, fused with the transforms of its row. Sums are
 !> formed by row and added up in order: the results do not depend on the number of threads.
 module friction_problem
-   use asperity_parallel, only : global_sum
    use asperity_precision, only : dp, int8
    use fft_conv, only : columns_apply, convolution_type
+   use friction_fields, only : friction_fields_type, friction_work_type
    use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type
-   use friction_rows, only : measure_sums_type, measured_row, row_constants_type, total_of
+   use field_sums, only : field_sum, row_total
+   use friction_rows, only : measure_sums_type, measured_row, row_constants_type, site_columns, &
+      tangent_row, total_of
    implicit none
    private
 
-   public :: friction_fields_type, friction_problem_type, friction_work_type
+   public :: friction_problem_type
 
    real(dp), parameter :: on_bound = 1.0_dp + 1.0e-9_dp   !! a point with s below it is on its bound
    real(dp), parameter :: outermost = 4.0_dp              !! no point is moved out by more than this
    real(dp), parameter :: stiffest = 1.0e15_dp            !! curvature of a bound, in units of a_0
-
-   !> The caller's fields.
-   type :: friction_fields_type
-      real(dp), pointer, contiguous :: pressure(:, :) => null()    !! [nx, ny] P, Pa
-      real(dp), pointer, contiguous :: slope_x(:, :) => null()     !! [nx, ny] H_x; any size without slope
-      real(dp), pointer, contiguous :: slope_y(:, :) => null()     !! [nx, ny] H_y
-      real(dp), pointer, contiguous :: drive(:, :, :) => null()    !! [nx, ny, 2] DX', m
-      !> [nx, ny, 2] T_h, a given traction, Pa: r = DX' - A (T + T_h) at no cost of a product. May be
-      !> missing.
-      real(dp), pointer, contiguous :: past(:, :, :) => null()
-      real(dp), pointer, contiguous :: traction(:, :, :) => null() !! [nx, ny, 2] T, Pa; in: the start
-      real(dp), pointer, contiguous :: slip(:, :, :) => null()     !! [nx, ny, 2] out: r, everywhere, m
-      !> [nx, ny] In: 0 open, 1 in contact, 2 in contact and likely to slip, as it did in the step
-      !> before: its traction starts on the bound. Without adhesion a point with P <= 0 is taken as
-      !> open. Out: 0 open, 1 stick, 2 slip.
-      integer(int8), pointer, contiguous :: contact(:, :) => null()
-   end type friction_fields_type
-
-   !> Fields of a solution beside the caller's; module `friction_rows` says what they hold.
-   type :: friction_work_type
-      real(dp), allocatable :: bound(:, :, :)      !! [nx, 2, ny] F, Pa, and N_z of the road
-      real(dp), allocatable :: tangent(:, :, :)    !! [nx, 3, ny] direction of slip and weight
-      real(dp), allocatable :: old(:, :, :)        !! [nx, 2, ny] T before the last move, Pa
-      real(dp), allocatable :: level(:)            !! [nx] grad H where the slope does not count: 0
-   end type friction_work_type
 
    !> The problem, and the state of its solution.
    type, extends(friction_fields_type) :: friction_problem_type
@@ -99,7 +76,7 @@ module friction_problem
    contains
       procedure :: start
       procedure :: slope_at
-      procedure :: slope_rows
+      procedure :: gather_site
       procedure :: update_slip
       procedure :: refresh_slip
       procedure :: advance_slip
@@ -131,9 +108,9 @@ contains
          call start_row(self, j, cells(j), sizes(j))
          call self%transform_row(operator, j)
       end do
-      self%cells = global_sum(sum(cells))
+      self%cells = row_total(cells)
       self%change = 0.0_dp
-      if (global_sum(sum(sizes)) > 0.0_dp .or. associated(self%past)) then
+      if (row_total(sizes) > 0.0_dp .or. associated(self%past)) then
          call self%update_slip(operator)
       else
          call start_from_rest(self)
@@ -146,12 +123,11 @@ contains
       integer, intent(in) :: j
       integer, intent(out) :: cells                !! in contact
       real(dp), intent(out) :: size                !! |T|^2, Pa^2
-      real(dp), pointer, contiguous :: hx(:), hy(:)
-      real(dp) :: t(2)
+      real(dp) :: site(self%nx, site_columns), t(2)
       integer :: i
 
-      call self%slope_rows(j, hx, hy)
-      call self%law%bound_row(self%nx, self%pressure(:, j), hx, hy, self%work%bound(:, :, j))
+      call self%gather_site(j, site)
+      call self%law%bound_row(self%nx, site(:, 1), site(:, 2), site(:, 3), self%work%bound(:, :, j))
       cells = 0
       size = 0.0_dp
       do i = 1, self%nx
@@ -159,12 +135,12 @@ contains
             self%contact(i, j) = contact_open
          t = 0.0_dp
          if (self%contact(i, j) /= contact_open) then
-            t = self%traction(i, j, :)
+            t = self%traction(i, :, j)
             call put_back(self, i, j, t, self%contact(i, j))
             cells = cells + 1
             size = size + (t(1)**2 + t(2)**2)
          end if
-         self%traction(i, j, :) = t
+         self%traction(i, :, j) = t
          self%work%old(i, :, j) = t
       end do
    end subroutine start_row
@@ -193,20 +169,21 @@ contains
       if (self%law%slope) slope = [self%slope_x(i, j), self%slope_y(i, j)]
    end function slope_at
 
-   !> grad H of a row, 0 where the slope does not count.
-   subroutine slope_rows(self, j, hx, hy)
+   !> What does not change in a solve at the points of a row, as module `friction_rows` wants it.
+   pure subroutine gather_site(self, j, site)
       class(friction_problem_type), intent(in) :: self
       integer, intent(in) :: j
-      real(dp), pointer, contiguous, intent(out) :: hx(:), hy(:)
+      real(dp), intent(out) :: site(self%nx, site_columns)
 
+      site(:, 1) = self%pressure(:, j)
       if (self%law%slope) then
-         hx => self%slope_x(:, j)
-         hy => self%slope_y(:, j)
+         site(:, 2) = self%slope_x(:, j)
+         site(:, 3) = self%slope_y(:, j)
       else
-         hx => self%work%level
-         hy => self%work%level
+         site(:, 2:3) = 0.0_dp
       end if
-   end subroutine slope_rows
+      site(:, 4:5) = self%work%bound(:, :, j)
+   end subroutine gather_site
 
    !> Transform a row of T, or of T + T_h.
    subroutine transform_row(self, operator, j)
@@ -217,9 +194,9 @@ contains
 
       do c = 1, 2
          if (associated(self%past)) then
-            call operator%forward_row(c, j, self%traction(:, j, c) + self%past(:, j, c))
+            call operator%forward_row(c, j, self%traction(:, c, j) + self%past(:, c, j))
          else
-            call operator%forward_row(c, j, self%traction(:, j, c))
+            call operator%forward_row(c, j, self%traction(:, c, j))
          end if
       end do
    end subroutine transform_row
@@ -298,9 +275,9 @@ contains
       do c = 1, 2
          call operator%backward_row(c, j, u)
          if (self%fresh) then
-            self%slip(:, j, c) = self%drive(:, j, c) + self%offset(c) - u
+            self%slip(:, c, j) = self%drive(:, c, j) + self%offset(c) - u
          else
-            self%slip(:, j, c) = self%slip(:, j, c) + self%offset_step(c) - factor*u
+            self%slip(:, c, j) = self%slip(:, c, j) + self%offset_step(c) - factor*u
          end if
       end do
    end subroutine take_slip_row
@@ -315,7 +292,7 @@ contains
       do c = 1, 2
          !$omp parallel do default(none) shared(self, c) private(j) num_threads(self%threads)
          do j = 1, self%ny
-            self%slip(:, j, c) = self%drive(:, j, c)
+            self%slip(:, c, j) = self%drive(:, c, j)
          end do
       end do
       call shift_slip(self, self%offset)
@@ -341,8 +318,8 @@ contains
       allocate (rows(self%ny))
       !$omp parallel do default(none) shared(self, way, rows) private(j) num_threads(self%threads)
       do j = 1, self%ny
-         self%slip(:, j, 1) = self%slip(:, j, 1) + way(1)
-         self%slip(:, j, 2) = self%slip(:, j, 2) + way(2)
+         self%slip(:, 1, j) = self%slip(:, 1, j) + way(1)
+         self%slip(:, 2, j) = self%slip(:, 2, j) + way(2)
          call measure_row(self, j, rows(j))
       end do
       call finish_measure(self, rows)
@@ -355,7 +332,7 @@ contains
 
       if (.not. any(self%pulled)) return
       before = self%offset
-      self%total = [component_sum(self, self%traction(:, :, 1)), component_sum(self, self%traction(:, :, 2))]
+      self%total = [field_sum(self%traction(:, 1, :)), field_sum(self%traction(:, 2, :))]
       where (self%pulled) self%offset = self%spring_end - self%spring*(self%total - self%pull)
       self%offset_step = self%offset - before
    end subroutine follow_total
@@ -368,40 +345,24 @@ contains
       real(dp) :: total(2)
 
       if (.not. any(self%pulled)) return
-      total = [component_sum(self, direction(:, 1, :)), component_sum(self, direction(:, 2, :))]
+      total = [field_sum(direction(:, 1, :)), field_sum(direction(:, 2, :))]
       form = form + sum(self%spring*total**2, self%pulled)
    end subroutine add_spring
-
-   !> Sum of a component of a vector field, by rows in order.
-   function component_sum(self, component) result(total)
-      type(friction_problem_type), intent(in) :: self
-      real(dp), intent(in) :: component(:, :)      !! [nx, ny]
-      real(dp) :: total
-      real(dp), allocatable :: rows(:)
-      integer :: j
-
-      allocate (rows(self%ny))
-      !$omp parallel do default(none) shared(self, component, rows) private(j) num_threads(self%threads)
-      do j = 1, self%ny
-         rows(j) = sum(component(:, j))
-      end do
-      total = global_sum(sum(rows))
-   end function component_sum
 
    !> Release the points of a row that slip against their traction, and sum its residuals.
    subroutine measure_row(self, j, sums)
       type(friction_problem_type), intent(inout) :: self
       integer, intent(in) :: j
       type(measure_sums_type), intent(out) :: sums
-      real(dp), pointer, contiguous :: hx(:), hy(:)
-      real(dp) :: state(self%nx)
+      real(dp) :: site(self%nx, site_columns), state(self%nx), released
 
-      call self%slope_rows(j, hx, hy)
+      call self%gather_site(j, site)
       state = self%contact(:, j)
-      call measured_row(self%nx, self%constants, self%pressure(:, j), hx, hy, self%work%bound(:, :, j), &
-         self%traction(:, j, 1), self%traction(:, j, 2), self%work%old(:, :, j), self%slip(:, j, 1), &
-         self%slip(:, j, 2), self%drive(:, j, 1), self%drive(:, j, 2), state, &
-         self%work%tangent(:, :, j), sums)
+      call tangent_row(self%constants, site, self%traction(:, :, j), self%slip(:, :, j), state, &
+         self%work%tangent(:, :, j), released)
+      call measured_row(self%compliance, self%traction(:, :, j), self%work%old(:, :, j), &
+         self%slip(:, :, j), self%drive(:, :, j), state, self%work%tangent(:, :, j), sums)
+      sums%released = released
       self%contact(:, j) = int(state, int8)
    end subroutine measure_row
 

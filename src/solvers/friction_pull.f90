@@ -13,9 +13,9 @@
 !> the road by offset = (offset given) - yielding (mean T - traction), which is a spring of its own.
 module friction_pull
    use fft_conv, only : convolution_type
+   use field_sums, only : field_count, field_sum
    use friction_law, only : contact_open
    use friction_problem, only : friction_problem_type
-   use asperity_parallel, only : global_sum
    use asperity_precision, only : dp
    implicit none
    private
@@ -55,7 +55,7 @@ contains
       self%slides_off = .false.
       if (.not. any(self%along)) return
       cells = real(operator%nx, dp)*operator%ny
-      touching = max(1.0_dp, real(count(problem%contact /= contact_open), dp))
+      touching = max(1.0_dp, field_count(problem%contact /= contact_open))
       problem%pulled = self%along
       do c = 1, 2
          if (.not. self%along(c)) cycle
@@ -95,14 +95,9 @@ contains
       type(friction_problem_type), intent(in) :: problem
       integer, intent(in) :: c
       real(dp) :: total
-      integer :: j
 
       total = 0.0_dp
-      if (.not. associated(problem%past)) return
-      do j = 1, problem%ny
-         total = total + sum(problem%past(:, j, c))
-      end do
-      total = global_sum(total)
+      if (associated(problem%past)) total = field_sum(problem%past(:, c, :))
    end function past_total
 
    !> What the total of T lacks of the pull, Pa; 0 along a direction that has none or yields.

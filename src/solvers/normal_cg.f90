@@ -117,7 +117,7 @@ contains
    end subroutine new_normal_solver
 
    !> Solve a contact problem by the fast method.
-   subroutine solve(self, problem, height, pressure, gap, level, outcome, history)
+   subroutine solve(self, problem, height, pressure, gap, level, outcome, past)
       class(normal_solver_type), intent(inout), target :: self
       type(normal_problem_type), intent(in) :: problem
       real(dp), contiguous, intent(in) :: height(:, :)             !! H, [nx, ny], m
@@ -125,7 +125,7 @@ contains
       real(dp), contiguous, intent(inout) :: gap(:, :)             !! U - H - level, m
       real(dp), intent(out) :: level                   !! U - H where the gap is zero, m
       type(solver_result_type), intent(out) :: outcome
-      real(dp), intent(in), optional :: history(:, :)  !! P_h, Pa
+      real(dp), intent(in), optional :: past(:, :)  !! P_h, Pa
       type(normal_problem_type) :: task                !! the problem, completed for its fields
       type(gap_measure_type) :: measure
       type(gap_watch_type) :: watch
@@ -164,7 +164,7 @@ contains
          call new_gap_watch(watch, self%mixed, task%tolerance)
          product => self%operator
          if (watch%single) product => self%quick
-         call first_pressure(task, self%grid, product, height, pressure, history)
+         call first_pressure(task, self%grid, product, height, pressure, past)
          call compute_gap()
          if (.not. determined) call end_loop(now, reason_undetermined)
       end subroutine start_solve
@@ -201,7 +201,7 @@ contains
       subroutine compute_gap()
          type(state_sums_type) :: sums
 
-         call evaluate_gap(task, self%operator, height, pressure, gap, history)
+         call evaluate_gap(task, self%operator, height, pressure, gap, past)
          call survey(self%work, task%target, pressure, gap)
          sums = total(self%work%state)
          measure = combine_measures(task, cells, sums)

@@ -13,7 +13,7 @@ module normal_cg_thesis
       measure_gap, narrow_scale, normal_problem_type, prepare_problem, reason_converged, &
       reason_iterations, reason_undetermined
    use omp_lib, only : omp_get_wtime
-   use asperity_parallel, only : global_sum
+   use field_sums, only : cell_count, row_total
    use kernels, only : kernel_type
    use asperity_precision, only : dp, int64
    use regular_grid, only : grid_type
@@ -45,7 +45,7 @@ contains
    end subroutine new_thesis_solver
 
    !> Solve a contact problem.
-   subroutine solve(self, problem, height, pressure, gap, level, outcome, history)
+   subroutine solve(self, problem, height, pressure, gap, level, outcome, past)
       class(thesis_solver_type), intent(inout), target :: self
       type(normal_problem_type), intent(in) :: problem
       real(dp), contiguous, intent(in) :: height(:, :)           !! H, [nx, ny], m
@@ -53,7 +53,7 @@ contains
       real(dp), contiguous, intent(inout) :: gap(:, :)           !! U - H - level, m
       real(dp), intent(out) :: level                             !! m
       type(solver_result_type), intent(out) :: outcome
-      real(dp), intent(in), optional :: history(:, :)            !! P_h, Pa
+      real(dp), intent(in), optional :: past(:, :)            !! P_h, Pa
       type(normal_problem_type) :: task
       type(gap_measure_type) :: measure
       real(dp), allocatable :: residual(:, :), previous(:, :), direction(:, :)
@@ -68,11 +68,11 @@ contains
       alpha = 0.0_dp
       form = 0.0_dp
       call prepare_problem(problem, self%grid, self%operator%threads, height, task, determined)
-      call first_pressure(task, self%grid, self%operator, height, pressure, history)
+      call first_pressure(task, self%grid, self%operator, height, pressure, past)
       outcome%reason = reason_iterations
       if (.not. determined) outcome%reason = reason_undetermined
       do
-         call evaluate_gap(task, self%operator, height, pressure, gap, history)
+         call evaluate_gap(task, self%operator, height, pressure, gap, past)
          measure = measure_gap(task, pressure, gap, self%operator%threads)
          if (measure%error <= task%tolerance .and. determined) &
             call narrow_scale(task, height, pressure, self%operator%threads, measure)
@@ -136,7 +136,7 @@ contains
             rows(1, j) = sum(gap(:, j), pressure(:, j) > 0.0_dp .or. gap(:, j) < level)
             rows(2, j) = count(pressure(:, j) > 0.0_dp .or. gap(:, j) < level)
          end do
-         mean = global_sum(sum(rows(1, :)))/global_sum(sum(rows(2, :)))
+         mean = row_total(rows(1, :))/row_total(rows(2, :))
       end if
       !$omp parallel do default(none) shared(pressure, gap, level, mean, residual, previous, rows) &
       !$omp private(i, j)
@@ -150,8 +150,8 @@ contains
             rows(2, j) = rows(2, j) + residual(i, j)*(residual(i, j) - previous(i, j))
          end do
       end do
-      slope = global_sum(sum(rows(1, :)))
-      change = global_sum(sum(rows(2, :)))
+      slope = row_total(rows(1, :))
+      change = row_total(rows(2, :))
    end subroutine new_residual
 
    !> direction = residual + beta direction on the contact; its product with the residual.
@@ -173,7 +173,7 @@ contains
             rows(j) = rows(j) + residual(i, j)*direction(i, j)
          end do
       end do
-      slope = global_sum(sum(rows))
+      slope = row_total(rows)
    end subroutine turn
 
    !> P = P + alpha direction, clipped, and rescaled where the load is prescribed.
@@ -194,12 +194,12 @@ contains
          do j = 1, size(pressure, 2)
             rows(j) = sum(max(pressure(:, j) + alpha*direction(:, j), 0.0_dp))
          end do
-         load = global_sum(sum(rows))
+         load = row_total(rows)
          if (load <= 0.0_dp) then
             outcome%reason = 'a step emptied the contact'
             return
          end if
-         factor = problem%target*size(pressure)/load
+         factor = problem%target*cell_count(pressure)/load
       end if
       !$omp parallel do default(none) shared(alpha, direction, pressure, factor) private(j)
       do j = 1, size(pressure, 2)

@@ -12,7 +12,7 @@ module normal_passes
       total, trial_sums_type
    use normal_sweeps, only : above_cells, clip_cells, direction_cells, load_cells, &
       longest_cells, trial_cells
-   use asperity_parallel, only : global_min
+   use field_sums, only : least_of_rows
    use kernels, only : kernel_type
    use asperity_precision, only : dp, sp
    use regular_grid, only : boundary_periodic, grid_type
@@ -285,7 +285,7 @@ contains
                pressure(self%active%first(k, j), j), step(self%active%first(k, j), j), longest)
          end do
       end do
-      longest = global_min(longest)
+      longest = least_of_rows([longest])
    end function longest_multiple
 
    !> P = P + alpha step, gap = gap + factor A step, and the survey of the new state.

@@ -1,7 +1,7 @@
 !> What the methods for normal contact share: the problem, the start, the gap, the measure of error.
 module normal_state
    use fft_conv, only : columns_apply, convolution_type
-   use asperity_parallel, only : global_max, global_min, global_sum
+   use field_sums, only : cell_count, field_mean, field_rms, largest_of_rows, least_of_rows, row_total
    use asperity_precision, only : dp, pi
    use normal_sums, only : state_sums_type, total
    use projection, only : project_simplex
@@ -10,7 +10,7 @@ module normal_state
    private
 
    public :: combine_measures, evaluate_gap, first_pressure, gap_measure_type, measure_gap, &
-      narrow_scale, normal_problem_type, prepare_problem, row_measure, rms_about_mean
+      narrow_scale, normal_problem_type, prepare_problem, row_measure
 
    character(*), parameter, public :: reason_converged = 'converged'
    character(*), parameter, public :: reason_iterations = 'the limit of iterations was reached'
@@ -73,14 +73,14 @@ contains
       do j = 1, size(height, 2)
          rows(:, j) = row_extent(height(:, j))
       end do
-      highest = global_max(maxval(rows(1, :)))
-      lowest = global_min(minval(rows(2, :)))
-      mean = global_sum(sum(rows(3, :)))/(real(grid%nx, dp)*grid%ny)
+      highest = largest_of_rows(rows(1, :))
+      lowest = least_of_rows(rows(2, :))
+      mean = row_total(rows(3, :))/grid%cells()
 
       task = problem
       task%datum = highest
       if (problem%control == control_approach) task%target = problem%target + highest
-      if (task%rms_height <= 0.0_dp) task%rms_height = rms_about_mean(height, threads)
+      if (task%rms_height <= 0.0_dp) task%rms_height = field_rms(height, field_mean(height))
       determined = .true.
       if (problem%control == control_pressure) then
          moved = problem%target*max(grid%lx, grid%ly)/problem%modulus
@@ -120,7 +120,7 @@ contains
       do j = 1, size(height, 2)
          rows(j) = dot_product(height(:, j) - task%datum, pressure(:, j))
       end do
-      displacement = global_sum(sum(rows))/measure%load + measure%weighted_level
+      displacement = row_total(rows)/measure%load + measure%weighted_level
       task%scale = task%rms_height
       if (displacement > 0.0_dp) &
          task%scale = min(task%rms_height, max(shallow*displacement, task%least_scale))
@@ -220,26 +220,26 @@ contains
          rows(j) = row_measure(pressure(:, j), gap(:, j), problem%target)
          rows(j)%least = minval(gap(:, j))
       end do
-      measure = combine_measures(problem, real(size(gap), dp), total(rows))
+      measure = combine_measures(problem, cell_count(gap), total(rows))
    end function measure_gap
 
    !> gap = A(P + P_h)/modulus - H, H counted from the datum.
-   subroutine evaluate_gap(problem, operator, height, pressure, gap, history)
+   subroutine evaluate_gap(problem, operator, height, pressure, gap, past)
       type(normal_problem_type), intent(in) :: problem
       type(convolution_type), intent(inout) :: operator
       real(dp), intent(in) :: height(:, :), pressure(:, :)
       real(dp), intent(inout) :: gap(:, :)
-      real(dp), intent(in), optional :: history(:, :)
+      real(dp), intent(in), optional :: past(:, :)
       real(dp) :: form
       logical :: remembers
       integer :: j
 
-      remembers = present(history)
-      !$omp parallel do default(none) shared(operator, pressure, history, remembers) private(j) &
+      remembers = present(past)
+      !$omp parallel do default(none) shared(operator, pressure, past, remembers) private(j) &
       !$omp num_threads(operator%threads)
       do j = 1, operator%ny
          if (remembers) then
-            call operator%forward_row(1, j, pressure(:, j) + history(:, j))
+            call operator%forward_row(1, j, pressure(:, j) + past(:, j))
          else
             call operator%forward_row(1, j, pressure(:, j))
          end if
@@ -255,13 +255,13 @@ contains
 
    !> The start: the pressure handed in, or that of full contact (Westergaard) in periodic mode and a
    !> cap of the height in free mode, put on what is allowed.
-   subroutine first_pressure(problem, grid, operator, height, pressure, history)
+   subroutine first_pressure(problem, grid, operator, height, pressure, past)
       type(normal_problem_type), intent(in) :: problem
       type(grid_type), intent(in) :: grid
       type(convolution_type), intent(inout) :: operator
       real(dp), intent(in) :: height(:, :)
       real(dp), intent(inout) :: pressure(:, :)
-      real(dp), intent(in), optional :: history(:, :)
+      real(dp), intent(in), optional :: past(:, :)
       real(dp) :: factor, base
       logical :: warm
       integer :: j
@@ -290,9 +290,9 @@ contains
       do j = 1, operator%ny
          pressure(:, j) = base + factor*pressure(:, j)
       end do
-      if (present(history)) pressure(:, :) = pressure - history
+      if (present(past)) pressure(:, :) = pressure - past
       if (problem%control == control_pressure) then
-         call project_simplex(pressure, problem%target*grid%nx*grid%ny)
+         call project_simplex(pressure, problem%target*grid%cells())
       else
          !$omp parallel do default(none) shared(pressure, operator) private(j) &
          !$omp num_threads(operator%threads)
@@ -320,38 +320,15 @@ contains
          pressure(:, j) = max(pressure(:, j), 0.0_dp)
          rows(j) = sum(pressure(:, j))
       end do
-      load = global_sum(sum(rows))
+      load = row_total(rows)
       usable = load > 0.0_dp
       if (.not. usable .or. problem%control /= control_pressure) return
-      target = problem%target*grid%nx*grid%ny
+      target = problem%target*grid%cells()
       if (abs(load - target) <= 1e-14_dp*target) return
       !$omp parallel do default(none) shared(pressure, load, target) private(j) num_threads(threads)
       do j = 1, size(pressure, 2)
          pressure(:, j) = (target/load)*pressure(:, j)
       end do
    end subroutine rescale
-
-   !> Root mean square of a field about its mean.
-   function rms_about_mean(field, threads) result(rms)
-      real(dp), intent(in) :: field(:, :)
-      integer, intent(in) :: threads
-      real(dp) :: rms
-      real(dp), allocatable :: rows(:)
-      real(dp) :: mean, cells
-      integer :: j
-
-      cells = global_sum(real(size(field), dp))
-      allocate (rows(size(field, 2)))
-      !$omp parallel do default(none) shared(field, rows) private(j) num_threads(threads)
-      do j = 1, size(field, 2)
-         rows(j) = sum(field(:, j))
-      end do
-      mean = global_sum(sum(rows))/cells
-      !$omp parallel do default(none) shared(field, rows, mean) private(j) num_threads(threads)
-      do j = 1, size(field, 2)
-         rows(j) = sum((field(:, j) - mean)**2)
-      end do
-      rms = sqrt(global_sum(sum(rows))/cells)
-   end function rms_about_mean
 
 end module normal_state

@@ -3,7 +3,7 @@
 !> A pass fills one record per row, whichever thread works on the row. `total` adds the records in
 !> the order of the rows, so that a result does not depend on the number of threads.
 module normal_sums
-   use asperity_parallel, only : global_min, global_sum
+   use field_sums, only : least_of_rows, row_total
    use asperity_precision, only : dp
    implicit none
    private
@@ -55,11 +55,11 @@ contains
       type(direction_sums_type), intent(in) :: rows(:)
       type(direction_sums_type) :: sums
 
-      sums%value = ordered(rows%value)
-      sums%cells = ordered(rows%cells)
-      sums%slope = ordered(rows%slope)
-      sums%residual = ordered(rows%residual)
-      sums%square = ordered(rows%square)
+      sums%value = row_total(rows%value)
+      sums%cells = row_total(rows%cells)
+      sums%slope = row_total(rows%slope)
+      sums%residual = row_total(rows%residual)
+      sums%square = row_total(rows%square)
    end function total_direction
 
    !> Sums of a trial pressure over the grid.
@@ -67,9 +67,9 @@ contains
       type(trial_sums_type), intent(in) :: rows(:)
       type(trial_sums_type) :: sums
 
-      sums%above = ordered(rows%above)
-      sums%cells = ordered(rows%cells)
-      sums%least = global_min(minval(rows%least))
+      sums%above = row_total(rows%above)
+      sums%cells = row_total(rows%cells)
+      sums%least = least_of_rows(rows%least)
    end function total_trial
 
    !> Sums of a step over the grid.
@@ -77,8 +77,8 @@ contains
       type(step_sums_type), intent(in) :: rows(:)
       type(step_sums_type) :: sums
 
-      sums%slope = ordered(rows%slope)
-      sums%square = ordered(rows%square)
+      sums%slope = row_total(rows%slope)
+      sums%square = row_total(rows%square)
    end function total_step
 
    !> Sums of a state over the grid.
@@ -86,25 +86,12 @@ contains
       type(state_sums_type), intent(in) :: rows(:)
       type(state_sums_type) :: sums
 
-      sums%load = ordered(rows%load)
-      sums%work = ordered(rows%work)
-      sums%touched = ordered(rows%touched)
-      sums%cells = ordered(rows%cells)
-      sums%distance = ordered(rows%distance)
-      sums%least = global_min(minval(rows%least))
+      sums%load = row_total(rows%load)
+      sums%work = row_total(rows%work)
+      sums%touched = row_total(rows%touched)
+      sums%cells = row_total(rows%cells)
+      sums%distance = row_total(rows%distance)
+      sums%least = least_of_rows(rows%least)
    end function total_state
-
-   !> The sum of the rows' values, in their order.
-   pure function ordered(values) result(sum)
-      real(dp), intent(in) :: values(:)
-      real(dp) :: sum
-      integer :: j
-
-      sum = 0.0_dp
-      do j = 1, size(values)
-         sum = sum + values(j)
-      end do
-      sum = global_sum(sum)
-   end function ordered
 
 end module normal_sums

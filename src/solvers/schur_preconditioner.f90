@@ -25,10 +25,10 @@
 !> rim around the contact (the wide blocks of module active_blocks). Memory: four such fields.
 module schur_preconditioner
    use active_blocks, only : active_blocks_type
-   use coarse_level, only : coarse_level_type
+   use coarse_level, only : coarse_level_type, edge_rows, inner_rows
    use asperity_errors, only : error_type
    use normal_sweeps, only : residual_cells
-   use asperity_parallel, only : global_sum
+   use field_sums, only : row_total
    use asperity_precision, only : dp, sp
    use regular_grid, only : boundary_periodic, grid_type
    use schur_coarse, only : new_schur_coarse, om, schur_coarse_type, stencil_c1
@@ -151,13 +151,8 @@ contains
          call image_rows(self, coarse, active, jb, edge_rows(coarse, jb), rows)
       end do
       !$omp end parallel
-      self%sums = image_sums_type()
-      do j = 1, self%grid%ny
-         self%sums%form = self%sums%form + rows(j)%form
-         self%sums%square = self%sums%square + rows(j)%square
-      end do
-      self%sums%form = global_sum(self%sums%form)
-      self%sums%square = global_sum(self%sums%square)
+      self%sums%form = row_total(rows%form)
+      self%sums%square = row_total(rows%square)
    end subroutine set_residual
 
    !> K of the residual in some rows of a block.
@@ -270,15 +265,9 @@ contains
          call response_rows(self, coarse, active, jb, edge_rows(coarse, jb), step%last, rows)
       end do
       !$omp end parallel
-      sums = response_sums_type()
-      do j = 1, self%grid%ny
-         sums%form = sums%form + rows(j)%form
-         sums%cross = sums%cross + rows(j)%cross
-         sums%square = sums%square + rows(j)%square
-      end do
-      sums%form = global_sum(sums%form)
-      sums%cross = global_sum(sums%cross)
-      sums%square = global_sum(sums%square)
+      sums%form = row_total(rows%form)
+      sums%cross = row_total(rows%cross)
+      sums%square = row_total(rows%square)
    end subroutine search_pass
 
    !> The image and the search direction in the rows of a block.
@@ -342,25 +331,6 @@ contains
       end do
       if (.not. last) call add_blocks(coarse, column, self%response_off(:, jb))
    end subroutine response_rows
-
-   !> The rows of a block whose neighbours belong to it, too: first, last, distance.
-   pure function inner_rows(coarse, jb) result(which)
-      type(coarse_level_type), intent(in) :: coarse
-      integer, intent(in) :: jb
-      integer :: which(3)
-
-      which = [coarse%first_y(jb) + 1, coarse%first_y(jb + 1) - 2, 1]
-   end function inner_rows
-
-   !> The first and the last row of a block, which may be the same: first, last, distance.
-   pure function edge_rows(coarse, jb) result(which)
-      type(coarse_level_type), intent(in) :: coarse
-      integer, intent(in) :: jb
-      integer :: which(3)
-
-      which = [coarse%first_y(jb), coarse%first_y(jb + 1) - 1, 1]
-      which(3) = max(which(2) - which(1), 1)
-   end function edge_rows
 
    !> Add sums over the blocks along x.
    pure subroutine add_blocks(coarse, column, blocks)

@@ -11,6 +11,7 @@
 !> small system of their own (module `changed_set`), which makes the rounds after the first cheap.
 module steady_active
    use changed_set, only : changed_set_type, new_changed_set
+   use field_sums, only : cell_count, field_count
    use normal_state, only : gap_measure_type, measure_gap, narrow_scale, normal_problem_type
    use asperity_precision, only : dp
    use steady_operator, only : steady_operator_type
@@ -28,7 +29,7 @@ contains
 
    !> Is a dense system cheap beside the transforms spent so far, and small beside the solver's fields?
    pure function worthwhile(cells_in_contact, cells, transforms) result(cheap)
-      integer, intent(in) :: cells_in_contact, cells
+      real(dp), intent(in) :: cells_in_contact, cells
       integer, intent(in) :: transforms                !! real transforms since the solve began
       logical :: cheap
       real(dp), parameter :: factoring = 3.0_dp        !! measured: m^3 of a factoring over n log2(n) of a transform
@@ -37,7 +38,7 @@ contains
       real(dp) :: m, n
 
       m = cells_in_contact
-      n = max(cells, 2)
+      n = max(cells, 2.0_dp)
       cheap = m**2 <= fields*n .and. m**3 <= part*transforms*factoring*n*log(n)/log(2.0_dp)
    end function worthwhile
 
@@ -59,9 +60,9 @@ contains
       integer :: fewest, joining, most, round, since
 
       success = .false.
-      call new_changed_set(set, operator, height, task%target*size(height), pressure > 0.0_dp, gap)
+      call new_changed_set(set, operator, height, task%target*cell_count(height), pressure > 0.0_dp, gap)
       allocate (trial, mold=pressure)
-      most = 2*count(pressure > 0.0_dp) + 50
+      most = 2*nint(field_count(pressure > 0.0_dp)) + 50
       fewest = huge(fewest)
       since = 0
       do round = 1, most_rounds
@@ -81,7 +82,7 @@ contains
          since = since + 1
          if (joining < fewest) since = 0
          fewest = min(fewest, joining)
-         if (joining == 0 .or. since > patience .or. count(trial > 0.0_dp) + joining > most) return
+         if (joining == 0 .or. since > patience .or. nint(field_count(trial > 0.0_dp)) + joining > most) return
       end do
    end subroutine finish_on_contact
 

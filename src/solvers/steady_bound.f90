@@ -14,8 +14,8 @@
 !> With the thesis's direction of slip r is parallel to D, and D is w - T* shortened to the bound.
 module steady_bound
    use friction_law, only : friction_law_type, law_constant_shear
-   use asperity_parallel, only : thread_count
    use asperity_precision, only : dp
+   use field_sums, only : threads_for
    implicit none
    private
 
@@ -80,14 +80,6 @@ contains
          end do
       end do
    end subroutine compare_tractions
-
-   !> Small fields are done by one thread.
-   function threads_for(field) result(threads)
-      real(dp), intent(in) :: field(:, :)
-      integer :: threads
-
-      threads = merge(1, thread_count(), size(field) < 16384)
-   end function threads_for
 
    !> bound(w) of one cell.
    pure function bounded(law, pressure, slope, w) result(traction)

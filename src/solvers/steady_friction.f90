@@ -22,40 +22,28 @@
 !> Memory beside the caller's: 19 fields, 50 for the acceleration in single precision, and 10 of doubles.
 module steady_friction
    use anderson, only : anderson_type, new_anderson
+   use field_sums, only : field_count, field_mean, field_sum, row_total, row_totals
    use friction_law, only : friction_law_type, law_constant_shear
    use asperity_interpolation, only : displaced, interpolation_type
    use normal_state, only : gap_measure_type, measure_gap, normal_problem_type, prepare_problem, &
       reason_converged, reason_iterations
-   use asperity_parallel, only : global_sum
    use asperity_precision, only : dp, int64
    use projection, only : project_simplex
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
    use steady_bound, only : bound_tractions, compare_tractions, largest_force
-   use steady_normal, only : mean_of, new_steady_normal, steady_measure_type, steady_normal_type
+   use steady_contact, only : contact_mean, explain, read_road, steady_contact_type
+   use steady_normal, only : new_steady_normal, steady_measure_type, steady_normal_type
    use steady_operator, only : steady_operator_type
    implicit none
    private
 
-   public :: new_steady_friction, steady_contact_type, steady_friction_type
+   public :: new_steady_friction, steady_friction_type
 
    integer, parameter :: pairs = 10              !! of the acceleration
    integer, parameter :: components = 5          !! of a state: z, u, r
    integer, parameter :: doubtful = 100          !! rounds after which the best contact is kept
    integer, parameter :: looks = 25              !! rounds between two looks at it
-
-   !> A steady contact with friction.
-   type :: steady_contact_type
-      real(dp), allocatable :: pressure(:, :)          !! P, Pa
-      real(dp), allocatable :: gap(:, :)               !! m
-      real(dp), allocatable :: height(:, :)            !! H of the road at x + u, m
-      real(dp), allocatable :: slope_x(:, :), slope_y(:, :)   !! grad H there
-      real(dp), allocatable :: traction(:, :, :)       !! T, Pa [nx, 2, ny]
-      real(dp), allocatable :: displacement(:, :, :)   !! A_T T without its mean mode, m [nx, 2, ny]
-      real(dp), allocatable :: slip(:, :, :)           !! r, the slip speed over the road's speed
-      real(dp) :: level = 0.0_dp                       !! U - H where the gap is zero, m
-      real(dp) :: offset(2) = 0.0_dp                   !! mean displacement of the contact, m
-   end type steady_contact_type
 
    !> How the rounds go: what is relaxed by how much, and whether they are accelerated.
    type :: pace_type
@@ -141,7 +129,7 @@ contains
          if (rubbing%iterations >= task%max_iterations) then
             call finish(self, operator, task, road, contact, normal, rubbing)
             call return_to_best(self, operator, task, road, pace, contact, normal, rubbing)
-            call explain(self, contact, normal, rubbing)
+            call explain(contact, self%law, normal, rubbing)
             exit
          end if
          if (rubbing%iterations >= doubtful .and. mod(rubbing%iterations, looks) == 0) &
@@ -190,7 +178,8 @@ contains
          self%state(:, 1 + c, :) = contact%displacement(:, c, :) - contact%offset(c)
          self%state(:, 3 + c, :) = self%direction(c) + contact%slip(:, c, :)
       end do
-      self%c = 5.0_dp*largest_force(self%law, sum(contact%pressure)/max(count(contact%pressure > 0.0_dp), 1))
+      self%c = 5.0_dp*largest_force(self%law, field_sum(contact%pressure) &
+         /max(field_count(contact%pressure > 0.0_dp), 1.0_dp))
    end subroutine begin
 
    !> One round: from the state to its residual. The contact takes P, T, A_T T and the road at u+.
@@ -207,7 +196,7 @@ contains
       integer :: c, j, k
 
       contact%pressure(:, :) = self%state(:, 1, :)
-      call project_simplex(contact%pressure, task%target*size(contact%pressure))
+      call project_simplex(contact%pressure, task%target*self%grid%cells())
       call bound_tractions(self%law, self%c, contact%pressure, contact%slope_x, contact%slope_y, &
          self%ratio, self%state(:, 4:5, :), contact%traction)
       call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio)
@@ -226,7 +215,7 @@ contains
       change = relative_change(self, pace%beta)
       call displaced(road, self%base(1), self%base(2), self%place(:, 1, :), self%place(:, 2, :), &
          contact%height, contact%slope_x, contact%slope_y)
-      mean = mean_of(contact%height)
+      mean = field_mean(contact%height)
       self%normal%z(:, :) = self%state(:, 1, :)
       do k = 1, pace%inner
          call self%normal%evaluate(operator, task, contact%height, mean, self%normal%z, measure)
@@ -277,15 +266,16 @@ contains
       class(steady_friction_type), intent(in) :: self
       real(dp), intent(in) :: beta
       real(dp) :: change
+      real(dp), allocatable :: rows(:, :)
       real(dp) :: sums(2)
       integer :: j
 
-      sums = 0.0_dp
+      allocate (rows(2, self%grid%ny))
       do j = 1, self%grid%ny
-         sums(1) = sums(1) + sum(self%residual(:, 2:3, j)**2)
-         sums(2) = sums(2) + sum((self%state(:, 2:3, j) + self%residual(:, 2:3, j)/beta)**2)
+         rows(1, j) = sum(self%residual(:, 2:3, j)**2)
+         rows(2, j) = sum((self%state(:, 2:3, j) + self%residual(:, 2:3, j)/beta)**2)
       end do
-      sums = global_sum(sums)
+      sums = row_totals(rows)
       change = sqrt(sums(1)/max(sums(2), tiny(1.0_dp)))/beta
    end function relative_change
 
@@ -334,36 +324,18 @@ contains
       call self%memory%forget()
    end subroutine advance
 
-   !> Why there may be no solution. A constant shear stress jumps at the rim of the contact: the cell
-   !> that it takes out of contact is drawn into it again without it. Uphill the law on the slope gives
-   !> T = P tan(atan(mu) + alpha), which has no bound where mu tan(alpha) reaches 1: the road wedges.
-   subroutine explain(self, contact, normal, rubbing)
-      type(steady_friction_type), intent(in) :: self
-      type(steady_contact_type), intent(in) :: contact
-      type(solver_result_type), intent(inout) :: normal, rubbing
-
-      if (normal%converged .and. rubbing%converged) return
-      if (self%law%law == law_constant_shear) then
-         normal%reason = 'cells at the rim of the contact come and go'
-      else if (self%law%slope) then
-         if (any(contact%pressure > 0.0_dp .and. self%law%coefficient*hypot(contact%slope_x, &
-            contact%slope_y) >= 1.0_dp)) &
-            normal%reason = 'the road wedges: slopes in contact exceed 1/coefficient'
-      end if
-      rubbing%reason = normal%reason
-   end subroutine explain
-
    !> |u| of the state.
    function length_of(self) result(length)
       class(steady_friction_type), intent(in) :: self
       real(dp) :: length
+      real(dp), allocatable :: rows(:)
       integer :: j
 
-      length = 0.0_dp
+      allocate (rows(self%grid%ny))
       do j = 1, self%grid%ny
-         length = length + sum(self%state(:, 2:3, j)**2)
+         rows(j) = sum(self%state(:, 2:3, j)**2)
       end do
-      length = sqrt(global_sum(length))
+      length = sqrt(row_total(rows))
    end function length_of
 
    !> Hand out: P, T within its bound and that of the slopes, and what follows from them.
@@ -376,7 +348,7 @@ contains
       type(solver_result_type), intent(inout) :: normal, rubbing
 
       contact%pressure(:, :) = self%normal%pressure
-      call read_road(self, road, contact)
+      call read_road(contact, road, self%base, self%direction)
       call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio)
       call bound_tractions(self%law, self%c, contact%pressure, contact%slope_x, contact%slope_y, &
          self%ratio, contact%slip, contact%traction)
@@ -392,10 +364,12 @@ contains
       type(steady_contact_type), intent(inout) :: contact
       type(solver_result_type), intent(inout) :: normal, rubbing
       type(gap_measure_type) :: found
-      real(dp), allocatable :: again(:, :, :)
+      real(dp), allocatable :: again(:, :, :), rows(:, :)
+      real(dp) :: sums(2)
+      integer :: j
 
       call operator%shear(contact%traction, contact%displacement, contact%slip)
-      call read_road(self, road, contact)
+      call read_road(contact, road, self%base, self%direction)
       call operator%displace(contact%pressure, contact%gap)
       contact%gap = contact%gap - contact%height
       found = measure_gap(task, contact%pressure, contact%gap, operator%threads)
@@ -410,43 +384,15 @@ contains
       allocate (again, mold=contact%traction)
       call bound_tractions(self%law, self%c, contact%pressure, contact%slope_x, contact%slope_y, &
          self%ratio, contact%slip, again)
-      rubbing%residual = sqrt(sum((again - contact%traction)**2)/max(sum(contact%traction**2), tiny(1.0_dp)))
+      allocate (rows(2, self%grid%ny))
+      do j = 1, self%grid%ny
+         rows(1, j) = sum((again(:, :, j) - contact%traction(:, :, j))**2)
+         rows(2, j) = sum(contact%traction(:, :, j)**2)
+      end do
+      sums = row_totals(rows)
+      rubbing%residual = sqrt(sums(1)/max(sums(2), tiny(1.0_dp)))
       rubbing%converged = rubbing%residual <= task%tolerance
       if (rubbing%converged) rubbing%reason = reason_converged
    end subroutine judge
-
-   !> The road at x + u, u = A_T T less its mean over the contact; and r. In: slip holds d(A_T T)/ds.
-   subroutine read_road(self, road, contact)
-      type(steady_friction_type), intent(in) :: self
-      type(interpolation_type), intent(in) :: road
-      type(steady_contact_type), intent(inout) :: contact
-      integer :: c
-
-      contact%offset = contact_mean(contact)
-      do c = 1, 2
-         contact%slip(:, c, :) = self%direction(c) + contact%slip(:, c, :)
-      end do
-      call displaced(road, self%base(1) + contact%offset(1), self%base(2) + contact%offset(2), &
-         contact%displacement(:, 1, :), contact%displacement(:, 2, :), contact%height, contact%slope_x, &
-         contact%slope_y)
-   end subroutine read_road
-
-   !> Mean of the displacement weighted by the pressure.
-   function contact_mean(contact) result(mean)
-      type(steady_contact_type), intent(in) :: contact
-      real(dp) :: mean(2)
-      real(dp) :: sums(3)
-      integer :: c, j
-
-      sums = 0.0_dp
-      do j = 1, size(contact%pressure, 2)
-         do c = 1, 2
-            sums(c) = sums(c) + dot_product(contact%pressure(:, j), contact%displacement(:, c, j))
-         end do
-         sums(3) = sums(3) + sum(contact%pressure(:, j))
-      end do
-      sums = global_sum(sums)
-      mean = sums(1:2)/max(sums(3), tiny(1.0_dp))
-   end function contact_mean
 
 end module steady_friction

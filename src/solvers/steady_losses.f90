@@ -7,10 +7,10 @@
 !> and an arm's part of it is g omega tau/(1 + (omega tau)^2) over Im G*(omega). No further solve is
 !> needed. An octave holds the wavelengths 2 pi/|q| in (L/2^k, L/2^(k-1)], L the longest of the cell.
 module steady_losses
-   use asperity_parallel, only : global_sum
    use asperity_precision, only : dp, pi
+   use field_sums, only : row_totals
    use regular_grid, only : grid_type
-   use steady_symbols, only : medium_type, mode_waves, steady_modulus
+   use steady_symbols, only : medium_type, mode_compliance, mode_waves, steady_modulus
    implicit none
    private
 
@@ -72,25 +72,17 @@ contains
       complex(dp), intent(in) :: p                     !! transform of the pressure, sum over the cells
       complex(dp), intent(in) :: t(2)                  !! of the traction
       real(dp) :: forms(2)
-      real(dp) :: waves(2, 4), q, cells
-      complex(dp) :: across
+      real(dp) :: waves(2, 4), a(3)
       integer :: count
 
       forms = 0.0_dp
       if (i + j == 0) return
       call mode_waves(medium%grid, i, j, waves, count)
-      q = norm2(waves(:, 1))
-      cells = real(medium%grid%nx, dp)*medium%grid%ny
-      forms(1) = (1.0_dp - medium%poisson)/q*abs(p)**2
-      forms(2) = sum(abs(t)**2)
-      if (count > 1) then
-         forms(2) = forms(2) - medium%poisson*sum(abs(t*waves(:, 1)/q)**2)
-      else
-         across = sum(t*waves(:, 1))/q
-         forms(2) = forms(2) - medium%poisson*abs(across)**2
-      end if
-      forms(2) = forms(2)/q
-      forms = forms*mode_weight(medium%grid, i)/cells**2
+      a = mode_compliance(medium%normal, waves(:, 1), count)
+      forms(1) = a(1)*abs(p)**2
+      a = mode_compliance(medium%tangential, waves(:, 1), count)
+      forms(2) = a(1)*abs(t(1))**2 + a(2)*abs(t(2))**2 + 2.0_dp*a(3)*real(conjg(t(1))*t(2), dp)
+      forms = forms*mode_weight(medium%grid, i)/medium%grid%cells()**2
    end function elastic_forms
 
    !> The losses of a state from the transforms of its pressure and traction.
@@ -113,11 +105,7 @@ contains
             call row_losses(medium, j, octaves, p(:, j), rows(:, j))
          end if
       end do
-      allocate (total(size(rows, 1)), source=0.0_dp)
-      do j = 0, medium%grid%ny - 1
-         total = total + rows(:, j)
-      end do
-      total = global_sum(total)*medium%grid%lx*medium%grid%ly
+      total = row_totals(rows)*medium%grid%area()
       losses%normal = total(1)
       losses%tangential = total(2)
       allocate (losses%octave(octaves), source=total(3:2 + octaves))

@@ -19,10 +19,10 @@
 !> Memory: z, its residual, P; seven fields for the acceleration, and what `steady_operator` takes.
 module steady_normal
    use anderson, only : anderson_type, new_anderson
-   use normal_state, only : combine_measures, gap_measure_type, measure_gap, narrow_scale, &
-      normal_problem_type, prepare_problem, reason_converged, reason_iterations
-   use asperity_parallel, only : global_sum
+   use normal_state, only : gap_measure_type, measure_gap, narrow_scale, normal_problem_type, &
+      prepare_problem, reason_converged, reason_iterations
    use asperity_precision, only : dp, int64
+   use field_sums, only : cell_count, field_count, field_mean, field_sum, least_of_rows, row_totals
    use projection, only : project_simplex
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
@@ -31,7 +31,7 @@ module steady_normal
    implicit none
    private
 
-   public :: mean_of, new_steady_normal, steady_normal_type
+   public :: new_steady_normal, steady_normal_type
 
    integer, parameter :: pairs = 6               !! of the acceleration
    integer, parameter :: sums_count = 7
@@ -45,6 +45,16 @@ module steady_normal
       real(dp) :: size = 0.0_dp                  !! |P| alike, Pa
       real(dp) :: scale = 0.0_dp                 !! c that would fit this state, Pa/m; 0: not known
    end type steady_measure_type
+
+   !> How a solve is getting on.
+   type :: progress_type
+      type(steady_measure_type) :: measure       !! of the state in hand
+      real(dp) :: least = huge(1.0_dp)           !! least error so far
+      real(dp) :: reference = huge(1.0_dp)       !! residual that later ones are compared to, Pa
+      integer :: checks = 0                      !! times that the error was within the tolerance
+      integer :: trial = first_trial             !! iteration at which finishing on few cells is tried next
+      integer(int64) :: ffts_before = 0          !! of the operator, before the solve
+   end type progress_type
 
    !> Work fields. Not to be copied.
    type :: steady_normal_type
@@ -88,47 +98,22 @@ contains
       type(solver_result_type), intent(out) :: outcome
       type(normal_problem_type) :: task
       type(gap_measure_type) :: found
-      type(steady_measure_type) :: measure
-      real(dp) :: least, reference, mean
-      integer(int64) :: before
-      integer :: checks, trial
-      logical :: determined, finished
+      type(progress_type) :: progress
+      real(dp) :: mean
+      logical :: determined
 
-      before = operator%ffts
+      progress%ffts_before = operator%ffts
       call prepare_problem(problem, self%grid, operator%threads, height, task, determined)
-      mean = mean_of(height)
+      mean = field_mean(height)
       call self%start(operator, task, height, pressure, gap)
-      least = huge(1.0_dp)
-      reference = huge(1.0_dp)
-      checks = 0
-      trial = first_trial
       outcome%reason = reason_iterations
       do
-         call self%evaluate(operator, task, height, mean, self%z, measure)
+         call self%evaluate(operator, task, height, mean, self%z, progress%measure)
          outcome%iterations = outcome%iterations + 1
-         if (measure%error <= task%tolerance) then
-            if (mod(checks, 4) == 0) then
-               call check(self, operator, task, height, gap, found)
-               if (found%strict <= task%tolerance) outcome%reason = reason_converged
-            end if
-            checks = checks + 1
-         end if
-         if (measure%error < 0.7_dp*least) then
-            least = measure%error
-            self%best(:, :) = self%pressure
-         end if
-         if (outcome%reason /= reason_converged .and. outcome%iterations >= trial) then
-            if (worthwhile(count(self%pressure > 0.0_dp), size(self%pressure), &
-               int(operator%ffts - before))) then
-               trial = outcome%iterations + outcome%iterations/2
-               call finish_on_contact(operator, task, height, self%pressure, gap, found, finished)
-               if (finished) outcome%reason = reason_converged
-            end if
-         end if
-         outcome%converged = outcome%reason == reason_converged
+         call judge(self, operator, task, height, progress, gap, found, outcome)
          if (outcome%converged .or. outcome%iterations >= task%max_iterations) exit
 
-         call advance(self, operator, task, measure, outcome%iterations, reference)
+         call advance(self, operator, task, outcome%iterations, progress)
       end do
       if (.not. outcome%converged) then
          self%pressure(:, :) = self%best
@@ -141,26 +126,61 @@ contains
       gap(:, :) = gap - level
       outcome%residual = found%error
       outcome%load_error = found%load_error
-      outcome%ffts = operator%ffts - before
+      outcome%ffts = operator%ffts - progress%ffts_before
    end subroutine solve
 
+   !> Is the pressure in hand the solution? The error of an evaluation is a cheap estimate: where it is small,
+   !> the pressure is checked. Now and then the solution is tried on the cells in contact alone. The best
+   !> pressure so far is kept.
+   subroutine judge(self, operator, task, height, progress, gap, found, outcome)
+      class(steady_normal_type), intent(inout) :: self
+      type(steady_operator_type), intent(inout) :: operator
+      type(normal_problem_type), intent(inout) :: task
+      real(dp), intent(in) :: height(:, :)
+      type(progress_type), intent(inout) :: progress           !! with the measure of the pressure
+      real(dp), intent(inout) :: gap(:, :)
+      type(gap_measure_type), intent(inout) :: found
+      type(solver_result_type), intent(inout) :: outcome       !! converged, and the reason
+      logical :: finished
+
+      if (progress%measure%error <= task%tolerance) then
+         if (mod(progress%checks, 4) == 0) then
+            call check(self, operator, task, height, gap, found)
+            outcome%converged = found%strict <= task%tolerance
+         end if
+         progress%checks = progress%checks + 1
+      end if
+      if (progress%measure%error < 0.7_dp*progress%least) then
+         progress%least = progress%measure%error
+         self%best(:, :) = self%pressure
+      end if
+      if (.not. outcome%converged .and. outcome%iterations >= progress%trial) then
+         if (worthwhile(field_count(self%pressure > 0.0_dp), self%grid%cells(), &
+            int(operator%ffts - progress%ffts_before))) then
+            progress%trial = outcome%iterations + outcome%iterations/2
+            call finish_on_contact(operator, task, height, self%pressure, gap, found, finished)
+            outcome%converged = finished
+         end if
+      end if
+      if (outcome%converged) outcome%reason = reason_converged
+   end subroutine judge
+
    !> The next z: an accelerated step, a plain one after the residual has grown, or with another c.
-   subroutine advance(self, operator, task, measure, iteration, reference)
+   subroutine advance(self, operator, task, iteration, progress)
       class(steady_normal_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
       type(normal_problem_type), intent(in) :: task
-      type(steady_measure_type), intent(in) :: measure
       integer, intent(in) :: iteration
-      real(dp), intent(inout) :: reference             !! residual that later ones are compared to, Pa
+      type(progress_type), intent(inout) :: progress
 
-      if (any(iteration == [8, 16, 32, 64]) .and. misfit(measure%scale, self%c) > 1.5_dp) then
+      if (any(iteration == [8, 16, 32, 64]) .and. misfit(progress%measure%scale, self%c) > 1.5_dp) then
          self%z = self%z + self%residual
-         call self%take_scale(operator, task, measure%scale)
-         reference = huge(1.0_dp)
+         call self%take_scale(operator, task, progress%measure%scale)
+         progress%reference = huge(1.0_dp)
       else
          call self%memory%step([1.0_dp], self%residual, self%z, &
-            plain=measure%change > cautious*reference)
-         reference = min(measure%change, 1.02_dp*reference)
+            plain=progress%measure%change > cautious*progress%reference)
+         progress%reference = min(progress%measure%change, 1.02_dp*progress%reference)
       end if
    end subroutine advance
 
@@ -179,12 +199,13 @@ contains
          call operator%press(height, pressure)
          pressure = pressure + task%target
       end if
-      call project_simplex(pressure, task%target*size(pressure))
+      call project_simplex(pressure, task%target*self%grid%cells())
       if (.not. task%warm) then
          call operator%displace(pressure, gap)
          gap = gap - height
       end if
-      level = sum(gap, pressure > 0.0_dp)/max(count(pressure > 0.0_dp), 1)
+      level = field_sum(merge(gap, 0.0_dp, pressure > 0.0_dp)) &
+         /max(field_count(pressure > 0.0_dp), 1.0_dp)
       self%c = 1.0_dp/operator%longest
       call scale_of(pressure, gap - level, measure)
       if (measure%scale > 0.0_dp) self%c = bounded(operator, measure%scale)
@@ -203,11 +224,12 @@ contains
       type(steady_measure_type), intent(inout) :: measure
       real(dp) :: open_gap, touching
 
-      touching = real(count(pressure > 0.0_dp), dp)
-      open_gap = sum(max(gap, 0.0_dp), pressure <= 0.0_dp)/max(size(pressure) - touching, 1.0_dp)
+      touching = field_count(pressure > 0.0_dp)
+      open_gap = field_sum(merge(max(gap, 0.0_dp), 0.0_dp, pressure <= 0.0_dp)) &
+         /max(cell_count(pressure) - touching, 1.0_dp)
       measure%scale = 0.0_dp
       if (open_gap > 0.0_dp .and. touching > 0.0_dp) &
-         measure%scale = 2.0_dp*(sum(pressure, pressure > 0.0_dp)/touching)/open_gap
+         measure%scale = 2.0_dp*(field_sum(max(pressure, 0.0_dp))/touching)/open_gap
    end subroutine scale_of
 
    !> Bounds that keep c in the range of the compliances.
@@ -238,11 +260,11 @@ contains
       real(dp), intent(in) :: z(:, :)
       type(steady_measure_type), intent(out) :: measure
       real(dp), allocatable :: rows(:, :)
-      real(dp) :: sums(sums_count), least, opened
+      real(dp) :: sums(sums_count), least, opened, open_cells
       integer :: j
 
       self%pressure(:, :) = z
-      call project_simplex(self%pressure, task%target*size(z))
+      call project_simplex(self%pressure, task%target*self%grid%cells())
       !$omp parallel do default(none) shared(self, height, mean, z) private(j) &
       !$omp num_threads(operator%threads)
       do j = 1, self%grid%ny
@@ -254,17 +276,14 @@ contains
       do j = 1, self%grid%ny
          call measure_row(self%c, self%pressure(:, j), z(:, j), self%residual(:, j), rows(:, j))
       end do
-      sums = 0.0_dp
-      do j = 1, self%grid%ny
-         sums = sums + rows(:sums_count, j)
-      end do
-      sums = global_sum(sums)
-      least = minval(rows(sums_count + 1, :))
+      sums = row_totals(rows(:sums_count, :))
+      least = least_of_rows(rows(sums_count + 1, :))
       measure%error = (sums(2)/sums(1) - least)/task%scale
       measure%change = sqrt(sums(3))
       measure%size = sqrt(sums(4))
-      if (sums(5) > 0.0_dp .and. sums(5) < size(z)) then
-         opened = (sums(7) - sums(6)/sums(5)*(size(z) - sums(5)))/(size(z) - sums(5))
+      open_cells = self%grid%cells() - sums(5)
+      if (sums(5) > 0.0_dp .and. open_cells > 0.0_dp) then
+         opened = (sums(7) - sums(6)/sums(5)*open_cells)/open_cells
          if (opened > 0.0_dp) measure%scale = bounded(operator, 2.0_dp*sums(1)/sums(5)/opened)
       end if
    end subroutine evaluate
@@ -325,7 +344,7 @@ contains
       real(dp), intent(in) :: scale
 
       self%pressure(:, :) = self%z
-      call project_simplex(self%pressure, task%target*size(self%z))
+      call project_simplex(self%pressure, task%target*self%grid%cells())
       self%z = self%pressure + (scale/self%c)*(self%z - self%pressure)
       self%c = scale
       call operator%set_scale(self%c)
@@ -347,18 +366,5 @@ contains
       if (found%error <= task%tolerance) &
          call narrow_scale(task, height, self%pressure, operator%threads, found)
    end subroutine check
-
-   !> Mean of a field.
-   function mean_of(field) result(mean)
-      real(dp), intent(in) :: field(:, :)
-      real(dp) :: mean
-      integer :: j
-
-      mean = 0.0_dp
-      do j = 1, size(field, 2)
-         mean = mean + sum(field(:, j))
-      end do
-      mean = global_sum(mean)/size(field)
-   end function mean_of
 
 end module steady_normal

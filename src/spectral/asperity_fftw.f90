@@ -37,24 +37,6 @@ module asperity_fftw
          type(c_ptr), value :: p
       end subroutine fftwf_free
 
-      integer(c_int) function fftw_init_threads() bind(c, name='fftw_init_threads')
-         import :: c_int
-      end function fftw_init_threads
-
-      integer(c_int) function fftwf_init_threads() bind(c, name='fftwf_init_threads')
-         import :: c_int
-      end function fftwf_init_threads
-
-      subroutine fftw_plan_with_nthreads(n) bind(c, name='fftw_plan_with_nthreads')
-         import :: c_int
-         integer(c_int), value :: n
-      end subroutine fftw_plan_with_nthreads
-
-      subroutine fftwf_plan_with_nthreads(n) bind(c, name='fftwf_plan_with_nthreads')
-         import :: c_int
-         integer(c_int), value :: n
-      end subroutine fftwf_plan_with_nthreads
-
       type(c_ptr) function fftw_plan_many_dft_r2c(rank, n, howmany, in, inembed, istride, idist, &
          out, onembed, ostride, odist, flags) bind(c, name='fftw_plan_many_dft_r2c')
          import :: c_int, c_ptr

@@ -16,7 +16,7 @@ module fft_conv
    use influence, only : transform_length
    use kernels, only : kernel_type
    use asperity_parallel, only : global_sum, thread_count
-   use asperity_precision, only : dp, int64, sp
+   use asperity_precision, only : dp, int64, sp, power_of_two
    use regular_grid, only : boundary_periodic, grid_type
    use row_column_double, only : new_row_column_double => new_row_column, &
       row_column_double_type => row_column_type
@@ -132,15 +132,6 @@ contains
       self%low_symbol = real(self%symbol/self%symbol_unit, sp)
       deallocate (self%symbol)
    end subroutine finish_symbol
-
-   !> The power of two above a positive number, 1 for others.
-   elemental function power_of_two(x)
-      real(dp), intent(in) :: x
-      real(dp) :: power_of_two
-
-      power_of_two = 1.0_dp
-      if (x > 0.0_dp) power_of_two = scale(1.0_dp, exponent(x))
-   end function power_of_two
 
    !> Sizes, buffers and plans.
    subroutine plan(self, nx, ny, boundary, components, error, single)

@@ -22,6 +22,6 @@ module row_column_single
 
    public :: new_row_column, row_column_type
 
-   include 'row_column.inc'      ! state ac168372, written by tools/check_sources.py --update
+   include 'row_column.inc'      ! state 9cce9a63, written by tools/check_sources.py --update
 
 end module row_column_single

@@ -1,11 +1,11 @@
-!> The half-space in steady sliding: complex compliances of the modes that travel with the road.
+!> A solid in steady sliding: complex compliances of the modes that travel with the road.
 !>
 !> In steady sliding every field keeps its shape and moves with the road's velocity V over the rubber,
 !> f(X, t) = f(X - V t). A mode exp(i q.X) therefore oscillates at omega = -q.V, and the elastic
-!> coefficients of `influence` are divided by the complex modulus G*(omega):
+!> compliances A of a kernel (module `kernels`) are divided by the complex modulus G*(omega):
 !>
-!>     U_z = K P,    K = (1-nu)/(q G*)
-!>     U_T = A_T T,  A_T = [1 - nu q q/q^2]/(q G*)
+!>     U_z = K P,    K = A/G* of the normal kernel
+!>     U_T = A_T T,  A_T = A/G* of the tangential kernel
 !>     the slip speed of the road over the rubber is V + (V.grad) U_T = |V| (e + dU_T/ds), e = V/|V|
 !>
 !> so the derivative along the motion is the symbol i q.e. Modes of zero wave number are left out: the
@@ -22,18 +22,20 @@
 !> zero beyond nx/2.
 module steady_symbols
    use asperity_precision, only : dp, pi
+   use kernels, only : kernel_type
    use prony, only : complex_modulus
    use regular_grid, only : grid_type
    use relaxation_functions, only : mean_decay, slope_response
    implicit none
    private
 
-   public :: medium_type, mode_waves, new_steady_symbols, steady_modulus, steady_symbols_type
+   public :: medium_type, mode_compliance, mode_waves, new_steady_symbols, steady_modulus, steady_symbols_type
 
    !> What the symbols depend on.
    type :: medium_type
       type(grid_type) :: grid
-      real(dp) :: poisson = 0.5_dp
+      type(kernel_type) :: normal                      !! what the solid is, for the pressure
+      type(kernel_type) :: tangential                  !! and for the traction; with friction
       real(dp) :: modulus = 0.0_dp                     !! long-term shear modulus, Pa, > 0
       real(dp), allocatable :: g(:), tau(:)            !! arms, Pa and s
       real(dp) :: velocity(2) = 0.0_dp                 !! V, m/s; not zero
@@ -85,19 +87,17 @@ contains
       logical, intent(in) :: frictional
       integer, intent(in) :: i, j
       complex(dp) :: compliance, derivative
-      real(dp) :: waves(2, 4), q, elastic(3)
+      real(dp) :: waves(2, 4), elastic(3)
       integer :: k, count
 
       call mode_waves(medium%grid, i, j, waves, count)
       do k = 1, count
-         q = norm2(waves(:, k))
-         compliance = 1.0_dp/(count*q*steady_modulus(medium, dot_product(waves(:, k), medium%velocity)))
-         self%normal(i, j) = self%normal(i, j) + (1.0_dp - medium%poisson)*compliance
+         compliance = 1.0_dp/(count*steady_modulus(medium, dot_product(waves(:, k), medium%velocity)))
+         elastic = mode_compliance(medium%normal, waves(:, k), count)
+         self%normal(i, j) = self%normal(i, j) + elastic(1)*compliance
          if (.not. frictional) cycle
          derivative = along_motion(medium, dot_product(waves(:, k), medium%velocity))
-         elastic = [1.0_dp - medium%poisson*(waves(1, k)/q)**2, &
-            1.0_dp - medium%poisson*(waves(2, k)/q)**2, -medium%poisson*product(waves(:, k)/q)]
-         if (count > 1) elastic(3) = 0.0_dp
+         elastic = mode_compliance(medium%tangential, waves(:, k), count)
          self%tangential(:, i, j) = self%tangential(:, i, j) + elastic*compliance
          self%stretch(:, i, j) = self%stretch(:, i, j) + elastic*compliance*derivative
       end do
@@ -126,6 +126,18 @@ contains
          count = 2*count
       end if
    end subroutine mode_waves
+
+   !> The elastic compliance of a mode for unit modulus. A mode that stands for both signs of a wave number
+   !> has no xy, which is odd in both.
+   pure function mode_compliance(kernel, wave, count) result(a)
+      type(kernel_type), intent(in) :: kernel
+      real(dp), intent(in) :: wave(2)                  !! q, rad/m
+      integer, intent(in) :: count                     !! wave vectors that the mode stands for
+      real(dp) :: a(3)                                 !! as `wave_response` says, m/Pa
+
+      a = kernel%wave(wave(1), wave(2))
+      if (count > 1) a(3) = 0.0_dp
+   end function mode_compliance
 
    !> G* of a mode with the rate q.V.
    pure function steady_modulus(medium, rate) result(modulus)

@@ -11,9 +11,10 @@
 program bench_normal
    use asperity_errors, only : error_type
    use fft_conv, only : convolution_type
+   use field_sums, only : field_mean, field_rms
    use kernels, only : normal_half_space
    use normal_cg, only : new_normal_solver, normal_solver_type
-   use normal_state, only : normal_problem_type, rms_about_mean
+   use normal_state, only : normal_problem_type
    use omp_lib, only : omp_get_wtime
    use asperity_parallel, only : set_threads
    use asperity_precision, only : dp, int64
@@ -58,7 +59,7 @@ program bench_normal
    if (allocated(error)) error stop 'no solver'
    problem%modulus = 0.25_dp
    problem%target = 0.1_dp*load
-   problem%rms_height = rms_about_mean(height, threads)
+   problem%rms_height = field_rms(height, field_mean(height))
 
    transform = products(solver%operator)
    transform = products(solver%operator)

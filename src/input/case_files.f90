@@ -1,0 +1,58 @@
+!> The files of a case: where its result goes by default, and which of its files the result would replace.
+module case_files
+   use case_settings, only : case_type
+   use path_identity, only : same_file
+   use result_names, only : side_file, side_files
+   implicit none
+   private
+
+   public :: default_result, overwritten_file
+
+contains
+
+   !> What the result, or a file that is written beside it, would be written over: the input, a
+   !> height map, or '' for neither.
+   function overwritten_file(case) result(what)
+      type(case_type), intent(in) :: case
+      character(:), allocatable :: what
+      integer :: n
+
+      what = ''
+      if (case%output%file == '') return
+      what = used_file(case, trim(case%output%file))
+      do n = 1, side_files
+         if (what == '') what = used_file(case, side_file(case%output%file, n))
+      end do
+   end function overwritten_file
+
+   !> What a case reads from a file of this name: the input, a height map, or '' for nothing.
+   function used_file(case, name) result(what)
+      type(case_type), intent(in) :: case
+      character(*), intent(in) :: name
+      character(:), allocatable :: what
+      integer :: i
+
+      what = ''
+      if (same_file(name, case%path)) what = 'the input'
+      do i = 1, size(case%surfaces)
+         if (case%surfaces(i)%file == '') cycle
+         if (same_file(name, case%surfaces(i)%file)) what = 'the height map of a &surface'
+      end do
+   end function used_file
+
+   !> The input's path with .h5 in place of its ending.
+   pure function default_result(path) result(file)
+      character(*), intent(in) :: path
+      character(:), allocatable :: file
+      integer :: point, slash
+
+      slash = index(path, '/', back=.true.)
+      point = index(path, '.', back=.true.)
+      if (point > slash + 1) then
+         file = path(:point - 1)//'.h5'
+      else
+         file = path//'.h5'
+      end if
+   end function default_result
+
+end module case_files

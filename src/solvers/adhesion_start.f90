@@ -1,0 +1,106 @@
+!> The start of an adhesive contact: the state that an iteration begins with, and the units of its residual.
+module adhesion_start
+   use adhesion_patch, only : adhesion_contact_type, adhesion_patch_type
+   use adhesion_state, only : control_approach, control_pressure, resolved_traction, traction_scale
+   use adhesion_steps, only : stepped_gap, sum_shift
+   use asperity_precision, only : dp
+   use field_sums, only : field_magnitude, field_mean, field_minimum, field_rms, field_sum
+   implicit none
+   private
+
+   public :: begin_contact
+
+contains
+
+   !> Put a contact at its start, in `gap` (periodic) or in `pressure` and `level` (free), or in full
+   !> contact; and settle the units of the residual.
+   subroutine begin_contact(self, contact, gap, pressure)
+      class(adhesion_patch_type), intent(inout) :: self
+      class(adhesion_contact_type), intent(inout) :: contact    !! with its fields and the level set
+      real(dp), intent(in) :: gap(:, :), pressure(:, :)        !! of the patch; free mode only
+      real(dp) :: deviation, spread, round_off, greatest
+
+      contact%mean_height = field_mean(contact%height) - contact%problem%datum
+      deviation = max(field_rms(contact%height, contact%mean_height + contact%problem%datum), tiny(1.0_dp))
+      spread = contact%problem%datum - field_minimum(contact%height)
+      contact%units%length = contact%problem%potential%range
+      if (.not. contact%units%length > 0.0_dp) contact%units%length = deviation
+      if (self%periodic) then
+         call begin_periodic(self, contact)
+      else
+         round_off = 20.0_dp*epsilon(1.0_dp)*(abs(contact%level) + spread)
+         contact%units%length = max(contact%units%length, round_off/contact%problem%tolerance)
+         call begin_free(self, contact, gap, pressure)
+      end if
+      call self%evaluate_traction(contact)
+      greatest = max(abs(contact%load), field_magnitude(contact%traction))
+      contact%units%traction = max(resolved_traction(contact%problem, greatest, self%nyquist, spread), &
+         traction_scale(contact%problem%potential, &
+         max(greatest, contact%problem%modulus*self%longest*deviation)))
+   end subroutine begin_contact
+
+   !> The load or the sum of the gap that is prescribed, and the gap on what is allowed.
+   subroutine begin_periodic(self, contact)
+      type(adhesion_patch_type), intent(in) :: self
+      class(adhesion_contact_type), intent(inout) :: contact
+      real(dp) :: shift
+      integer :: j
+
+      contact%level = 0.0_dp
+      if (associated(contact%past)) &
+         contact%past_mean = field_mean(contact%past)
+      if (contact%problem%control == control_pressure) contact%load = contact%problem%target
+      !$omp parallel do default(none) shared(contact) private(j) num_threads(self%threads)
+      do j = 1, self%ny
+         contact%state(:, j) = max(contact%state(:, j), 0.0_dp)
+         if (contact%problem%full_contact) contact%state(:, j) = 0.0_dp
+      end do
+      if (contact%problem%control /= control_approach) return
+      contact%gap_sum = -self%cells*(contact%problem%target + contact%mean_height)
+      if (field_sum(contact%state) > 0.0_dp) then
+         shift = sum_shift(contact%state, contact%state, 0.0_dp, contact%gap_sum, self%threads)
+         !$omp parallel do default(none) shared(contact, shift) private(j) num_threads(self%threads)
+         do j = 1, self%ny
+            contact%state(:, j) = stepped_gap(contact%state(:, j), 0.0_dp, 0.0_dp, shift)
+         end do
+      else
+         contact%state(:, :) = contact%gap_sum/self%cells
+      end if
+   end subroutine begin_periodic
+
+   !> The state of the pressure and the level handed in, or full contact. The gap of a pressure is not
+   !> sharp: gaps within the tolerance count as none, so that a contact that is handed in stays one.
+   subroutine begin_free(self, contact, gap, pressure)
+      type(adhesion_patch_type), intent(inout) :: self
+      class(adhesion_contact_type), intent(inout) :: contact
+      real(dp), intent(in) :: gap(:, :), pressure(:, :)
+      real(dp) :: g
+      integer :: i, j
+
+      if (contact%problem%control == control_pressure) contact%force = contact%problem%target*self%cells
+      if (contact%problem%full_contact) then
+         if (contact%problem%control /= control_approach) contact%level = -contact%mean_height
+         do j = 1, self%my
+            contact%state(:, j) = (contact%level + contact%mean_height)*self%psi(:, j)
+            if (j <= self%ny) contact%state(1:self%nx, j) = max(gap(:, j), 0.0_dp)
+         end do
+         return
+      end if
+      do j = 1, self%my
+         contact%traction(:, j) = 0.0_dp
+         if (j > self%ny) cycle
+         contact%traction(1:self%nx, j) = pressure(:, j)
+         if (associated(contact%past)) contact%traction(1:self%nx, j) = pressure(:, j) &
+            + contact%past(:, j)
+      end do
+      call self%stiffness%apply_inverse(contact%traction, contact%state)
+      do j = 1, self%my
+         contact%state(:, j) = contact%state(:, j)/contact%problem%modulus
+         do i = 1, self%inner(j)
+            g = contact%state(i, j) - (contact%height(i, j) - contact%problem%datum) - contact%level
+            contact%state(i, j) = merge(g, 0.0_dp, g > contact%problem%tolerance*contact%units%length)
+         end do
+      end do
+   end subroutine begin_free
+
+end module adhesion_start

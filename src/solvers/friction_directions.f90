@@ -1,0 +1,183 @@
+!> The sweeps of the preconditioned directions of `friction_cg_fast`, at the points of one row.
+!>
+!> Like those of module `friction_rows`, which explains `tangent`, they are loops without branches or
+!> structures that the compiler can turn into vector instructions.
+module friction_directions
+   use asperity_precision, only : dp
+   use field_sums, only : row_totals
+   implicit none
+   private
+
+   public :: scaled_row, total_of, turn_sums_type, turned_row, uniform_type, unscaled_row, z_sums_type
+
+   !> The part of the mean mode that is treated apart from the preconditioner (module
+   !> `friction_cg_fast`): c, and what it displaces on average, (h/N) E c.
+   type :: uniform_type
+      real(dp) :: traction(2) = 0.0_dp       !! c, Pa
+      real(dp) :: displacement(2) = 0.0_dp   !! m
+   end type uniform_type
+
+   !> Sums of `unscaled_row`.
+   type :: z_sums_type
+      real(dp) :: gz = 0.0_dp                !! g.z
+      real(dp) :: total(2) = 0.0_dp          !! z
+      real(dp) :: bent(2) = 0.0_dp           !! (curvature of the bound) w z
+   end type z_sums_type
+
+   !> Sums of `turned_row`.
+   type :: turn_sums_type
+      real(dp) :: slope = 0.0_dp             !! g.d
+      real(dp) :: curvature = 0.0_dp         !! of the bounds along d
+   end type turn_sums_type
+
+   !> Sums over all rows, in order.
+   interface total_of
+      module procedure :: total_of_z, total_of_turns
+   end interface total_of
+
+contains
+
+   !> w Z (g - H e c) of a row, and g.z_old.
+   pure subroutine scaled_row(compliance, uniform, r, tangent, z, a, cross)
+      real(dp), intent(in) :: compliance             !! a_0
+      type(uniform_type), intent(in) :: uniform
+      real(dp), intent(in), contiguous :: r(:, :)          !! [nx, 2] m
+      real(dp), intent(in), contiguous :: tangent(:, :)    !! [nx, 3]
+      real(dp), intent(in), contiguous :: z(:, :)          !! [nx, 2] z_old
+      real(dp), intent(out), contiguous :: a(:, :)         !! [nx, 2] w Z (g - H e c)
+      real(dp), intent(out) :: cross
+      real(dp) :: rv, gx, gy, bent, cx, cy, mean_x, mean_y
+      integer :: i
+
+      cx = uniform%traction(1)
+      cy = uniform%traction(2)
+      mean_x = uniform%displacement(1)
+      mean_y = uniform%displacement(2)
+      cross = 0.0_dp
+      !$omp simd private(rv, gx, gy, bent) reduction(+: cross)
+      do i = 1, size(r, 1)
+         rv = r(i, 1)*tangent(i, 1) + r(i, 2)*tangent(i, 2)
+         cross = cross + merge((r(i, 1) - rv*tangent(i, 1))*z(i, 1) + (r(i, 2) - rv*tangent(i, 2))*z(i, 2), &
+            0.0_dp, tangent(i, 3) > 0.0_dp)
+         bent = compliance*(1.0_dp - tangent(i, 3))
+         gx = r(i, 1) - mean_x - bent*cx
+         gy = r(i, 2) - mean_y - bent*cy
+         rv = gx*tangent(i, 1) + gy*tangent(i, 2)
+         a(i, 1) = tangent(i, 3)*(gx - rv*tangent(i, 1))
+         a(i, 2) = tangent(i, 3)*(gy - rv*tangent(i, 2))
+      end do
+   end subroutine scaled_row
+
+   !> z of a row from the preconditioned field; g.z, the sums of z and of lam w z.
+   pure subroutine unscaled_row(compliance, uniform, r, tangent, z, sums)
+      real(dp), intent(in) :: compliance
+      type(uniform_type), intent(in) :: uniform
+      real(dp), intent(in), contiguous :: r(:, :)          !! [nx, 2] m
+      real(dp), intent(in), contiguous :: tangent(:, :)    !! [nx, 3]
+      real(dp), intent(inout), contiguous :: z(:, :)       !! [nx, 2] in: the preconditioned field
+      type(z_sums_type), intent(out) :: sums
+      real(dp) :: rv, rx_z, ry_z, gx, gy, bent, over, rz, sx, sy, bx, by, cx, cy, mean_x, mean_y
+      integer :: i
+
+      cx = uniform%traction(1)
+      cy = uniform%traction(2)
+      mean_x = uniform%displacement(1)
+      mean_y = uniform%displacement(2)
+      rz = 0.0_dp
+      sx = 0.0_dp
+      sy = 0.0_dp
+      bx = 0.0_dp
+      by = 0.0_dp
+      !$omp simd private(rv, rx_z, ry_z, gx, gy, bent, over) reduction(+: rz, sx, sy, bx, by)
+      do i = 1, size(r, 1)
+         over = (1.0_dp - tangent(i, 3))/compliance
+         bent = compliance*(1.0_dp - tangent(i, 3))
+         ! The part of r along v goes first: beside a long slip, g is otherwise lost in its round-off.
+         rv = r(i, 1)*tangent(i, 1) + r(i, 2)*tangent(i, 2)
+         rx_z = r(i, 1) - rv*tangent(i, 1)
+         ry_z = r(i, 2) - rv*tangent(i, 2)
+         gx = z(i, 1) + over*(rx_z - mean_x - bent*cx)
+         gy = z(i, 2) + over*(ry_z - mean_y - bent*cy)
+         rv = gx*tangent(i, 1) + gy*tangent(i, 2)
+         gx = tangent(i, 3)*(gx - rv*tangent(i, 1))
+         gy = tangent(i, 3)*(gy - rv*tangent(i, 2))
+         z(i, 1) = gx
+         z(i, 2) = gy
+         rz = rz + rx_z*gx + ry_z*gy
+         sx = sx + gx
+         sy = sy + gy
+         bx = bx + bent*gx
+         by = by + bent*gy
+      end do
+      sums = z_sums_type(rz, [sx, sy], [bx, by])
+   end subroutine unscaled_row
+
+   !> d = z + w Z c + beta Z d of a row, z' = z + w Z c; g.d and the curvature of the bounds along d.
+   pure subroutine turned_row(compliance, beta, c, r, tangent, z, d, sums)
+      real(dp), intent(in) :: compliance
+      real(dp), intent(in) :: beta
+      real(dp), intent(in) :: c(2)                   !! Pa
+      real(dp), intent(in), contiguous :: r(:, :)          !! [nx, 2] m
+      real(dp), intent(in), contiguous :: tangent(:, :)    !! [nx, 3]
+      real(dp), intent(inout), contiguous :: z(:, :)       !! [nx, 2]
+      real(dp), intent(inout), contiguous :: d(:, :)       !! [nx, 2] Pa
+      type(turn_sums_type), intent(out) :: sums
+      real(dp) :: slope, curvature
+      real(dp) :: av, ax, ay, cx, cy, weight
+      integer :: i
+
+      cx = c(1)
+      cy = c(2)
+      slope = 0.0_dp
+      curvature = 0.0_dp
+      !$omp simd private(av, ax, ay, weight) reduction(+: slope, curvature)
+      do i = 1, size(r, 1)
+         av = cx*tangent(i, 1) + cy*tangent(i, 2)
+         z(i, 1) = z(i, 1) + tangent(i, 3)*(cx - av*tangent(i, 1))
+         z(i, 2) = z(i, 2) + tangent(i, 3)*(cy - av*tangent(i, 2))
+         av = d(i, 1)*tangent(i, 1) + d(i, 2)*tangent(i, 2)
+         ax = z(i, 1) + merge(beta*(d(i, 1) - av*tangent(i, 1)), 0.0_dp, tangent(i, 3) > 0.0_dp)
+         ay = z(i, 2) + merge(beta*(d(i, 2) - av*tangent(i, 2)), 0.0_dp, tangent(i, 3) > 0.0_dp)
+         av = r(i, 1)*tangent(i, 1) + r(i, 2)*tangent(i, 2)
+         slope = slope + (r(i, 1) - av*tangent(i, 1))*ax + (r(i, 2) - av*tangent(i, 2))*ay
+         weight = merge(tangent(i, 3), 1.0_dp, tangent(i, 3) > 0.0_dp)
+         curvature = curvature + compliance*(1.0_dp/weight - 1.0_dp)*(ax**2 + ay**2)
+         d(i, 1) = ax
+         d(i, 2) = ay
+      end do
+      sums = turn_sums_type(slope, curvature)
+   end subroutine turned_row
+
+   !> Sums of a preconditioned field.
+   function total_of_z(rows) result(total)
+      type(z_sums_type), intent(in) :: rows(:)
+      type(z_sums_type) :: total
+      real(dp), allocatable :: packed(:, :)
+      real(dp) :: sums(5)
+      integer :: j
+
+      allocate (packed(5, size(rows)))
+      do j = 1, size(rows)
+         packed(:, j) = [rows(j)%gz, rows(j)%total, rows(j)%bent]
+      end do
+      sums = row_totals(packed)
+      total = z_sums_type(sums(1), sums(2:3), sums(4:5))
+   end function total_of_z
+
+   !> Sums of a direction.
+   function total_of_turns(rows) result(total)
+      type(turn_sums_type), intent(in) :: rows(:)
+      type(turn_sums_type) :: total
+      real(dp), allocatable :: packed(:, :)
+      real(dp) :: sums(2)
+      integer :: j
+
+      allocate (packed(2, size(rows)))
+      do j = 1, size(rows)
+         packed(:, j) = [rows(j)%slope, rows(j)%curvature]
+      end do
+      sums = row_totals(packed)
+      total = turn_sums_type(sums(1), sums(2))
+   end function total_of_turns
+
+end module friction_directions

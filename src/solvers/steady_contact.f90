@@ -1,0 +1,83 @@
+!> A contact in steady sliding with friction: its fields, where it reads the road, and why there may be none.
+module steady_contact
+   use asperity_interpolation, only : displaced, interpolation_type
+   use asperity_precision, only : dp
+   use field_sums, only : field_count, row_totals
+   use friction_law, only : friction_law_type, law_constant_shear
+   use solver_result, only : solver_result_type
+   implicit none
+   private
+
+   public :: contact_mean, explain, read_road, steady_contact_type
+
+   !> A steady contact with friction.
+   type :: steady_contact_type
+      real(dp), allocatable :: pressure(:, :)          !! P, Pa
+      real(dp), allocatable :: gap(:, :)               !! m
+      real(dp), allocatable :: height(:, :)            !! H of the road at x + u, m
+      real(dp), allocatable :: slope_x(:, :), slope_y(:, :)   !! grad H there
+      real(dp), allocatable :: traction(:, :, :)       !! T, Pa [nx, 2, ny]
+      real(dp), allocatable :: displacement(:, :, :)   !! A_T T without its mean mode, m [nx, 2, ny]
+      real(dp), allocatable :: slip(:, :, :)           !! r, the slip speed over the road's speed
+      real(dp) :: level = 0.0_dp                       !! U - H where the gap is zero, m
+      real(dp) :: offset(2) = 0.0_dp                   !! mean displacement of the contact, m
+   end type steady_contact_type
+
+contains
+
+   !> The road at x + u, u = A_T T less its mean over the contact; and r. In: slip holds d(A_T T)/ds.
+   subroutine read_road(contact, road, base, direction)
+      type(steady_contact_type), intent(inout) :: contact
+      type(interpolation_type), intent(in) :: road
+      real(dp), intent(in) :: base(2)                  !! displacement of the road, m
+      real(dp), intent(in) :: direction(2)             !! e
+      integer :: c
+
+      contact%offset = contact_mean(contact)
+      do c = 1, 2
+         contact%slip(:, c, :) = direction(c) + contact%slip(:, c, :)
+      end do
+      call displaced(road, base(1) + contact%offset(1), base(2) + contact%offset(2), &
+         contact%displacement(:, 1, :), contact%displacement(:, 2, :), contact%height, contact%slope_x, &
+         contact%slope_y)
+   end subroutine read_road
+
+   !> Mean of the displacement weighted by the pressure.
+   function contact_mean(contact) result(mean)
+      type(steady_contact_type), intent(in) :: contact
+      real(dp) :: mean(2)
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: sums(3)
+      integer :: c, j
+
+      allocate (rows(3, size(contact%pressure, 2)))
+      do j = 1, size(contact%pressure, 2)
+         do c = 1, 2
+            rows(c, j) = dot_product(contact%pressure(:, j), contact%displacement(:, c, j))
+         end do
+         rows(3, j) = sum(contact%pressure(:, j))
+      end do
+      sums = row_totals(rows)
+      mean = sums(1:2)/max(sums(3), tiny(1.0_dp))
+   end function contact_mean
+
+   !> Why there may be no solution. A constant shear stress jumps at the rim of the contact: the cell
+   !> that it takes out of contact is drawn into it again without it. Uphill the law on the slope gives
+   !> T = P tan(atan(mu) + alpha), which has no bound where mu tan(alpha) reaches 1: the road wedges.
+   subroutine explain(contact, law, normal, rubbing)
+      type(steady_contact_type), intent(in) :: contact
+      type(friction_law_type), intent(in) :: law
+      type(solver_result_type), intent(inout) :: normal, rubbing
+
+      if (normal%converged .and. rubbing%converged) return
+      if (law%law == law_constant_shear) then
+         normal%reason = 'cells at the rim of the contact come and go'
+      else if (law%slope) then
+         if (field_count(contact%pressure > 0.0_dp .and. law%coefficient*hypot(contact%slope_x, &
+            contact%slope_y) >= 1.0_dp) > 0.0_dp) &
+            normal%reason = 'the road wedges: slopes in contact exceed 1/coefficient'
+      end if
+      rubbing%reason = normal%reason
+   end subroutine explain
+
+end module steady_contact
