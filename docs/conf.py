@@ -58,8 +58,9 @@ ORDER = {
               "docs/driving", "docs/long_runs", "docs/results", "docs/troubleshooting",
               "docs/coming_from"],
     "Reference": ["docs/input_reference", "docs/result_file", "docs/api/python",
-                  "docs/api/python_models", "docs/api/python_tools", "docs/api/fortran",
-                  "docs/glossary"],
+                  "docs/api/python_contact", "docs/api/python_roads", "docs/api/python_rubber",
+                  "docs/api/python_runs", "docs/api/python_friction", "docs/api/python_results",
+                  "docs/api/python_theory", "docs/api/fortran", "docs/glossary"],
     "Background": ["docs/theory", "docs/validation", "docs/benchmarks"],
     "Examples": ["docs/gallery"],
     "Development": ["docs/developer", "CONTRIBUTING", "CHANGELOG", "README"],
@@ -92,7 +93,7 @@ AT_THE_TOP = ("adhesive_contact", "case", "errors", "runner", "sweep_table", "sw
 
 def _add_modules(app, name, source):
     """Append the public modules that no page of the Python interface names."""
-    if name != "docs/api/python_tools":
+    if name != "docs/api/python_results":
         return
     named = "".join(path.read_text() for path in (ROOT / "docs" / "api").glob("*.rst"))
     for address in sorted(MODULES):
@@ -100,8 +101,6 @@ def _add_modules(app, name, source):
         if address in AT_THE_TOP or f"automodule:: {module}\n" in named:
             continue
         source[0] += f"\n{module}\n{'-' * len(module)}\n\n.. automodule:: {module}\n   :members:\n"
-        if address == "measured":  # what asperity.surface shows already
-            source[0] += "   :exclude-members: MeasuredSurface, import_topography, load\n"
 
 
 def _prepare_docstring(app, what, name, thing, options, lines):
