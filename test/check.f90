@@ -96,15 +96,19 @@ contains
    end subroutine begin_suite
 
    !> Pass if the condition holds.
-   subroutine check_that(condition, what)
+   subroutine check_that(condition, what, values)
       logical, intent(in) :: condition
       character(*), intent(in) :: what
+      real(dp), intent(in), optional :: values(:)      !! what the condition is about, for the message
+      character(400) :: numbers
 
       if (condition) then
          passed = passed + 1
       else
          failed = failed + 1
-         write (error_unit, '(a)') 'FAILED '//suite//': '//what
+         numbers = ''
+         if (present(values)) write (numbers, '(": ", *(es15.7, :, ","))') values(:min(size(values), 20))
+         write (error_unit, '(a)') 'FAILED '//suite//': '//what//trim(numbers)
       end if
    end subroutine check_that
 

@@ -95,8 +95,10 @@ contains
       call run_problem(grid, problem, height, t, thesis, mixed=mixed)
       call set_threads(threads)
       call check_that(s%outcome%converged, 'threads: '//s%outcome%reason)
-      call check_that(all(abs(s%pressure - t%pressure) <= 0.0_dp), 'threads: the same pressure')
-      call check_that(all(abs(s%gap - t%gap) <= 0.0_dp), 'threads: the same gap')
+      call check_that(all(abs(s%pressure - t%pressure) <= 0.0_dp), 'threads: the same pressure', &
+         [maxval(abs(s%pressure - t%pressure))])
+      call check_that(all(abs(s%gap - t%gap) <= 0.0_dp), 'threads: the same gap', &
+         [maxval(abs(s%gap - t%gap))])
       call check_that(s%outcome%iterations == t%outcome%iterations, 'threads: iterations')
    end subroutine check_threads
 

@@ -31,20 +31,26 @@ contains
 
       call begin_suite('adhesion_cg')
       do k = 1, size(potentials)
-         if (selected('test_gradient')) call test_gradient(trim(potentials(k)))
-         if (selected('test_solution')) call test_solution(36, 25, 1.0_dp, 0.6_dp, trim(potentials(k)), 'coarse')
-         if (selected('test_solution')) call test_solution(31, 48, 0.5_dp, 1.0_dp, trim(potentials(k)), 'full')
-         if (selected('test_energy_falls')) call test_energy_falls(trim(potentials(k)), 'fast')
-         if (selected('test_energy_falls')) call test_energy_falls(trim(potentials(k)), 'thesis')
-         if (selected('test_thesis')) call test_thesis(trim(potentials(k)))
+         if (selected('pressure_is_gradient_of_energy')) &
+            call pressure_is_gradient_of_energy(trim(potentials(k)))
+         if (selected('solution_meets_its_conditions')) &
+            call solution_meets_its_conditions(36, 25, 1.0_dp, 0.6_dp, trim(potentials(k)), 'coarse')
+         if (selected('solution_meets_its_conditions')) &
+            call solution_meets_its_conditions(31, 48, 0.5_dp, 1.0_dp, trim(potentials(k)), 'full')
+         if (selected('energy_falls_with_the_iterations')) &
+            call energy_falls_with_the_iterations(trim(potentials(k)), 'fast')
+         if (selected('energy_falls_with_the_iterations')) &
+            call energy_falls_with_the_iterations(trim(potentials(k)), 'thesis')
+         if (selected('thesis_method_agrees')) call thesis_method_agrees(trim(potentials(k)))
       end do
-      if (selected('test_force_from_energy')) call test_force_from_energy()
-      if (selected('test_wave_without_adhesion')) call test_wave_without_adhesion()
-      if (selected('test_johnson_wave')) call test_johnson_wave()
-      if (selected('test_strong_and_rough')) call test_strong_and_rough()
-      if (selected('test_load_unload')) call test_load_unload()
-      if (selected('test_outcomes')) call test_outcomes()
-      if (selected('test_threads')) call test_threads()
+      if (selected('force_is_derivative_of_energy')) call force_is_derivative_of_energy()
+      if (selected('westergaard_wave_without_adhesion')) call westergaard_wave_without_adhesion()
+      if (selected('johnson_adhesive_wave')) call johnson_adhesive_wave()
+      if (selected('strong_attraction_on_rough_surface')) call strong_attraction_on_rough_surface()
+      if (selected('pull_off_takes_more_work_than_approach')) &
+         call pull_off_takes_more_work_than_approach()
+      if (selected('detached_closed_and_refused')) call detached_closed_and_refused()
+      if (selected('same_bits_on_two_threads')) call same_bits_on_two_threads()
    end subroutine run_adhesion_cg
 
    !> Adhesive energy gamma_0 with the range z_0 in units of E* = 1 and of the length of the cell.
@@ -135,7 +141,7 @@ contains
    end function energy_sum
 
    !> The pressure of any state is the gradient of the energy, less e': central differences.
-   subroutine test_gradient(name)
+   subroutine pressure_is_gradient_of_energy(name)
       character(*), intent(in) :: name
       type(grid_type) :: grid
       type(adhesion_solver_type) :: solver
@@ -176,10 +182,10 @@ contains
             2e-9_dp, name//': gradient by differences')
       end do
       call solver%destroy()
-   end subroutine test_gradient
+   end subroutine pressure_is_gradient_of_energy
 
    !> Conditions of a solution, recomputed; both controls, both starts of the control, a history.
-   subroutine test_solution(nx, ny, lx, ly, name, preconditioner)
+   subroutine solution_meets_its_conditions(nx, ny, lx, ly, name, preconditioner)
       integer, intent(in) :: nx, ny
       real(dp), intent(in) :: lx, ly
       character(*), intent(in) :: name, preconditioner
@@ -255,10 +261,10 @@ contains
       call check_close(maxval(abs(other - gap)), 0.0_dp, 1e-6_dp*range, name//': history as height')
       call operator%destroy()
       call solver%destroy()
-   end subroutine test_solution
+   end subroutine solution_meets_its_conditions
 
    !> The thesis's method finds the same where the minimum is unique, at prescribed load and level.
-   subroutine test_thesis(name)
+   subroutine thesis_method_agrees(name)
       character(*), intent(in) :: name
       type(grid_type) :: grid
       type(adhesion_solver_type) :: fast, thesis
@@ -287,7 +293,8 @@ contains
       if (name == 'maugis_dugdale') other = max(gap - 1e-3_dp*0.02_dp, 0.0_dp)
       call thesis%solve(problem, height, other, pressure, again, outcome, past)
       call check_that(outcome%converged, name//': thesis: '//trim(outcome%reason))
-      call check_that(outcome%iterations > 10 .and. outcome%ffts >= 4*outcome%iterations, 'its cost')
+      call check_that(outcome%iterations > 10 .and. outcome%ffts >= 4*outcome%iterations, 'its cost', &
+         [real(outcome%iterations, dp), real(outcome%ffts, dp)])
       call check_close(maxval(abs(other - gap)), 0.0_dp, 1e-4_dp*0.02_dp, name//': fast and thesis')
       call check_close(again, level, 1e-5_dp*0.02_dp, name//': fast and thesis: level')
       problem%control = control_approach
@@ -299,10 +306,10 @@ contains
       call check_close(maxval(abs(other - gap)), 0.0_dp, 1e-4_dp*0.02_dp, name//': the same, level')
       call fast%destroy()
       call thesis%destroy()
-   end subroutine test_thesis
+   end subroutine thesis_method_agrees
 
    !> The energy after k iterations falls with k.
-   subroutine test_energy_falls(name, method)
+   subroutine energy_falls_with_the_iterations(name, method)
       character(*), intent(in) :: name, method
       type(grid_type) :: grid
       type(adhesion_solver_type) :: solver
@@ -334,10 +341,10 @@ contains
          if (outcome%converged) exit
       end do
       call solver%destroy()
-   end subroutine test_energy_falls
+   end subroutine energy_falls_with_the_iterations
 
    !> dE/d(level) = N p along the states of prescribed level.
-   subroutine test_force_from_energy()
+   subroutine force_is_derivative_of_energy()
       type(grid_type) :: grid
       type(adhesion_solver_type) :: solver
       type(adhesion_problem_type) :: problem
@@ -370,10 +377,10 @@ contains
          call check_close((energy(1) - energy(-1))/(2*h), load, 1e-4_dp, 'force from the energy')
       end do
       call solver%destroy()
-   end subroutine test_force_from_energy
+   end subroutine force_is_derivative_of_energy
 
    !> Without adhesion: Westergaard's wave, mean pressure p* sin^2(pi a/L), a line contact.
-   subroutine test_wave_without_adhesion()
+   subroutine westergaard_wave_without_adhesion()
       type(grid_type) :: grid
       type(adhesion_solver_type) :: solver
       type(adhesion_problem_type) :: problem
@@ -407,11 +414,11 @@ contains
       call check_that(outcome%converged, 'no energy: '//trim(outcome%reason))
       call check_close(maxval(abs(other - gap)), 0.0_dp, 1e-8_dp, 'no energy is no adhesion')
       call solver%destroy()
-   end subroutine test_wave_without_adhesion
+   end subroutine westergaard_wave_without_adhesion
 
    !> Johnson's (1995) adhesive wave, a line contact of short range: at the half-width a
    !>     p = p* sin^2(psi) - sqrt(2 E* gamma tan(psi)/L),  psi = pi a/L.
-   subroutine test_johnson_wave()
+   subroutine johnson_adhesive_wave()
       real(dp) :: coarse, fine
 
       call wave(200, 6e-3_dp, coarse)
@@ -457,10 +464,10 @@ contains
          call solver%destroy()
       end subroutine wave
 
-   end subroutine test_johnson_wave
+   end subroutine johnson_adhesive_wave
 
    !> Strong attraction of short range on a rough surface: the solver gets there, by both forms.
-   subroutine test_strong_and_rough()
+   subroutine strong_attraction_on_rough_surface()
       type(grid_type) :: grid
       type(adhesion_solver_type) :: solver
       type(adhesion_problem_type) :: problem
@@ -484,15 +491,16 @@ contains
             call solver%solve(problem, height, gap, pressure, level, outcome)
             call check_that(outcome%converged .and. outcome%residual <= 1e-6_dp, &
                'strong '//trim(potentials(l))//' '//trim(forms(k))//': '//trim(outcome%reason))
-            call check_that(all(abs(pressure) < 1e3_dp) .and. all(gap >= 0.0_dp), 'no NaN')
+            call check_that(all(abs(pressure) < 1e3_dp) .and. all(gap >= 0.0_dp), 'no NaN', &
+               [maxval(abs(pressure)), minval(gap)])
             call solver%destroy()
          end do
       end do
-   end subroutine test_strong_and_rough
+   end subroutine strong_attraction_on_rough_surface
 
    !> In and out at prescribed level, each from the state before: attraction before contact, pull-off,
    !> and the way out needs more work than the way in gives.
-   subroutine test_load_unload()
+   subroutine pull_off_takes_more_work_than_approach()
       type(grid_type) :: grid
       type(adhesion_solver_type) :: solver
       type(adhesion_problem_type) :: problem
@@ -517,16 +525,16 @@ contains
          call check_that(outcome%converged, 'loop: '//trim(outcome%reason))
          loads(k) = sum(pressure)/size(pressure)
       end do
-      call check_that(all(abs(loads([0, 40])) < 1e-3_dp), 'apart at the ends')
+      call check_that(all(abs(loads([0, 40])) < 1e-3_dp), 'apart at the ends', loads([0, 40]))
       call check_order(minval(loads), '<', -5e-3_dp, 'there is a pull-off')
       call check_order(maxval(abs(loads - loads(40:0:-1))), '>', 1e-3_dp, 'there is hysteresis')
       work = sum(0.5_dp*(loads(1:) + loads(:39))*(levels(1:) - levels(:39)))
       call check_order(work, '>', 0.0_dp, 'the loop loses energy')
       call solver%destroy()
-   end subroutine test_load_unload
+   end subroutine pull_off_takes_more_work_than_approach
 
    !> Detachment, a closed gap, a wrong preconditioner.
-   subroutine test_outcomes()
+   subroutine detached_closed_and_refused()
       type(grid_type) :: grid
       type(adhesion_solver_type) :: solver
       type(adhesion_problem_type) :: problem
@@ -572,10 +580,10 @@ contains
       call new_adhesion_solver(solver, grid, normal_half_space(poisson), error, method='thesis')
       call check_error(error, 'free', 'thesis on a free grid')
       call solver%destroy()
-   end subroutine test_outcomes
+   end subroutine detached_closed_and_refused
 
    !> The same bits with one and with two threads.
-   subroutine test_threads()
+   subroutine same_bits_on_two_threads()
       type(grid_type) :: grid
       real(dp), allocatable :: height(:, :), first(:, :), second(:, :)
 
@@ -610,6 +618,6 @@ contains
          call solver%destroy()
       end subroutine one
 
-   end subroutine test_threads
+   end subroutine same_bits_on_two_threads
 
 end module test_adhesion_cg

@@ -29,23 +29,29 @@ contains
 
    subroutine run_adhesion_free()
       call begin_suite('adhesion_free')
-      if (selected('test_solution')) call test_solution('exponential', 'coarse')
-      if (selected('test_solution')) call test_solution('gauss', 'full')
-      if (selected('test_solution')) call test_solution('maugis_dugdale', 'coarse')
-      if (selected('test_sphere_limits')) call test_sphere_limits()
-      if (selected('test_sphere_mesh')) call test_sphere_mesh()
+      if (selected('solution_meets_its_conditions')) &
+         call solution_meets_its_conditions('exponential', 'coarse')
+      if (selected('solution_meets_its_conditions')) &
+         call solution_meets_its_conditions('gauss', 'full')
+      if (selected('solution_meets_its_conditions')) &
+         call solution_meets_its_conditions('maugis_dugdale', 'coarse')
+      if (selected('hertz_jkr_and_dmt_limits')) call hertz_jkr_and_dmt_limits()
+      if (selected('sphere_converges_with_the_mesh')) call sphere_converges_with_the_mesh()
       ! Long range: a sharp minimum at first touch, where half a step of 0.02 costs 0.003; and a disc of
       ! 25 cells' radius is full of cells to 0.6 %: 1 % in all.
-      if (selected('test_pull_off')) call test_pull_off('maugis_dugdale', 0.1_dp, 32, -0.38_dp, 0.02_dp, 0.02_dp)
-      ! First order in the cell (pinned edge of the cohesive zone, see test_sphere_mesh); the minimum
+      if (selected('pull_off_force_of_maugis')) &
+         call pull_off_force_of_maugis('maugis_dugdale', 0.1_dp, 32, -0.38_dp, 0.02_dp, 0.02_dp)
+      ! First order in the cell (pinned edge of the cohesive zone, see sphere_converges_with_the_mesh); the minimum
       ! is smooth: steps of 0.1 miss it by less than 1e-3.
-      if (selected('test_pull_off')) call test_pull_off('maugis_dugdale', 1.0_dp, 40, 0.0_dp, 0.1_dp, 0.05_dp)
+      if (selected('pull_off_force_of_maugis')) &
+         call pull_off_force_of_maugis('maugis_dugdale', 1.0_dp, 40, 0.0_dp, 0.1_dp, 0.05_dp)
       ! Another potential; beyond Tabor 1 its form matters little: 3 % of 1.5.
-      if (selected('test_pull_off')) call test_pull_off('exponential', 3.5_dp, 40, 0.0_dp, 0.1_dp, 0.04_dp)
-      if (selected('test_force_from_energy')) call test_force_from_energy()
-      if (selected('test_strong')) call test_strong()
-      if (selected('test_threads')) call test_threads()
-      if (selected('test_outcomes')) call test_outcomes()
+      if (selected('pull_off_force_of_maugis')) &
+         call pull_off_force_of_maugis('exponential', 3.5_dp, 40, 0.0_dp, 0.1_dp, 0.04_dp)
+      if (selected('force_is_derivative_of_energy')) call force_is_derivative_of_energy()
+      if (selected('strong_attraction_on_coarse_mesh')) call strong_attraction_on_coarse_mesh()
+      if (selected('same_bits_on_two_threads')) call same_bits_on_two_threads()
+      if (selected('held_detached_and_refused')) call held_detached_and_refused()
    end subroutine run_adhesion_free
 
    !> A paraboloid of radius 1 with its summit, height 0, on a cell.
@@ -88,7 +94,7 @@ contains
    end function displacement_sum
 
    !> Conditions of a solution by that sum; both controls; a history; from full contact.
-   subroutine test_solution(name, preconditioner)
+   subroutine solution_meets_its_conditions(name, preconditioner)
       character(*), intent(in) :: name, preconditioner
       type(grid_type) :: grid
       type(adhesion_solver_type) :: solver
@@ -139,14 +145,15 @@ contains
       deep = level + 0.3_dp
       problem%target = deep
       call solver%solve(problem, height, gap, other, level, outcome, past)
-      call check_that(outcome%converged .and. sum(other) > sum(pressure), name//': deeper')
+      call check_that(outcome%converged .and. sum(other) > sum(pressure), name//': deeper', &
+         [sum(other), sum(pressure)])
       problem%full_contact = .true.
       gap = 0.0_dp
       call solver%solve(problem, height, gap, other, level, outcome, past)
       call check_that(outcome%converged, name//': from full contact: '//trim(outcome%reason))
       call check_close(level, deep, 0.0_dp, name//': the level is kept')
       call solver%destroy()
-   end subroutine test_solution
+   end subroutine solution_meets_its_conditions
 
    !> One sphere under a load: contact radius from the number of cells in contact.
    subroutine solve_sphere(n, side, name, range, load, radius, level)
@@ -180,7 +187,7 @@ contains
    end subroutine solve_sphere
 
    !> Hertz, JKR and DMT: a^3 = F, a^3 - sqrt(6) a^1.5 = F, a^3 - 2 = F.
-   subroutine test_sphere_limits()
+   subroutine hertz_jkr_and_dmt_limits()
       real(dp) :: radius, level, jkr
 
       call solve_sphere(64, 4.0_dp, 'none', 0.0_dp, 1.0_dp, radius, level)
@@ -195,12 +202,12 @@ contains
       ! Long range: DMT. The attraction reaches as far as sqrt(2 z_0): a wide patch.
       call solve_sphere(64, 24.0_dp, 'maugis_dugdale', 20.0_dp, 4.0_dp, radius, level)
       call check_close(radius, 6.0_dp**(1.0_dp/3.0_dp), 0.1_dp, 'DMT: radius')
-   end subroutine test_sphere_limits
+   end subroutine hertz_jkr_and_dmt_limits
 
    !> The approach converges with the mesh to Maugis's, lambda = 0.5. The cells pin the edge of the
    !> cohesive zone: a cell that leaves it springs back by about 1.1 gamma_0/z_0 dx/E*, here 0.03 at the
    !> finest mesh.
-   subroutine test_sphere_mesh()
+   subroutine sphere_converges_with_the_mesh()
       real(dp) :: radius, a, m, load, lambda, approach, levels(3)
       integer :: k
 
@@ -217,7 +224,7 @@ contains
          'Maugis: converges with the mesh')
       call check_close(levels(3), approach, 0.03_dp, 'Maugis: approach')
       call check_close(radius, a, 0.05_dp, 'Maugis: radius')
-   end subroutine test_sphere_mesh
+   end subroutine sphere_converges_with_the_mesh
 
    !> Maugis's condition for the outer radius c = m a of the cohesive zone, zero where it holds.
    pure function maugis_condition(a, m, lambda) result(value)
@@ -259,7 +266,7 @@ contains
    end function maugis_load
 
    !> The least load while the sphere is drawn off, against Maugis's, from two meshes.
-   subroutine test_pull_off(name, lambda, n, first, step, tolerance)
+   subroutine pull_off_force_of_maugis(name, lambda, n, first, step, tolerance)
       character(*), intent(in) :: name
       real(dp), intent(in) :: lambda
       integer, intent(in) :: n                     !! cells of the coarser mesh
@@ -278,7 +285,7 @@ contains
       call check_close(loads(2), exact, tolerance, 'pull-off '//name)
       call check_order(abs(loads(2) - exact), '<', 0.65_dp*abs(loads(1) - exact) + 3e-3_dp, &
          'pull-off '//name//': converges with the mesh')
-   end subroutine test_pull_off
+   end subroutine pull_off_force_of_maugis
 
    !> The least load on the way from contact to nothing, at prescribed level, in steps.
    subroutine draw_off(name, lambda, n, first, step, least)
@@ -319,7 +326,7 @@ contains
    end subroutine draw_off
 
    !> dE/d(level) = sum P.
-   subroutine test_force_from_energy()
+   subroutine force_is_derivative_of_energy()
       type(grid_type) :: grid
       type(adhesion_solver_type) :: solver
       type(adhesion_problem_type) :: problem
@@ -352,22 +359,22 @@ contains
          call check_close((energy(1) - energy(-1))/(2*h), load, 2e-3_dp, 'force from the energy')
       end do
       call solver%destroy()
-   end subroutine test_force_from_energy
+   end subroutine force_is_derivative_of_energy
 
    !> Tabor 5 and 8 on a mesh too coarse for them: the solver gets there all the same.
-   subroutine test_strong()
+   subroutine strong_attraction_on_coarse_mesh()
       real(dp) :: radius, level
 
       call solve_sphere(48, 8.0_dp, 'exponential', 0.113_dp, 1.0_dp, radius, level)
-      call check_that(radius > 1.2_dp .and. radius < 2.1_dp, 'Tabor 5')
+      call check_that(radius > 1.2_dp .and. radius < 2.1_dp, 'Tabor 5', [radius])
       call solve_sphere(48, 8.0_dp, 'exponential', 0.07_dp, 1.0_dp, radius, level)
-      call check_that(radius > 1.1_dp .and. radius < 2.1_dp, 'Tabor 8')
+      call check_that(radius > 1.1_dp .and. radius < 2.1_dp, 'Tabor 8', [radius])
       call solve_sphere(48, 8.0_dp, 'maugis_dugdale', 0.113_dp, 1.0_dp, radius, level)
-      call check_that(radius > 1.1_dp .and. radius < 2.1_dp, 'Tabor 5, Maugis')
-   end subroutine test_strong
+      call check_that(radius > 1.1_dp .and. radius < 2.1_dp, 'Tabor 5, Maugis', [radius])
+   end subroutine strong_attraction_on_coarse_mesh
 
    !> The same bits with one and with two threads.
-   subroutine test_threads()
+   subroutine same_bits_on_two_threads()
       real(dp) :: radius(2), level(2)
       integer :: k
 
@@ -377,10 +384,10 @@ contains
       end do
       call set_threads(0)
       call check_that(level(1) == level(2), 'threads do not matter')
-   end subroutine test_threads
+   end subroutine same_bits_on_two_threads
 
    !> Held, and detached, under a prescribed pull; a line contact is refused.
-   subroutine test_outcomes()
+   subroutine held_detached_and_refused()
       type(grid_type) :: grid
       type(adhesion_solver_type) :: solver
       type(adhesion_problem_type) :: problem
@@ -411,6 +418,6 @@ contains
       grid = new_grid(40, 1, 5.0_dp, 5.0_dp, boundary_free)
       call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
       call check_error(error, 'ny > 1', 'free line contact')
-   end subroutine test_outcomes
+   end subroutine held_detached_and_refused
 
 end module test_adhesion_free

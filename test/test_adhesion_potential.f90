@@ -17,11 +17,16 @@ contains
 
    subroutine run_adhesion_potential()
       call begin_suite('adhesion_potential')
-      if (selected('test_derivatives')) call test_derivatives('exponential', -energy/range)
-      if (selected('test_derivatives')) call test_derivatives('gauss', 0.0_dp)
-      if (selected('test_derivatives')) call test_derivatives('maugis_dugdale', -energy/range)
-      if (selected('test_derivatives')) call test_derivatives('maugis_dugdale', -energy/range, edge=0.4_dp*range)
-      if (selected('test_derivatives')) call test_derivatives('maugis_dugdale', -energy/range, edge=range)
+      if (selected('derivatives_match_differences')) &
+         call derivatives_match_differences('exponential', -energy/range)
+      if (selected('derivatives_match_differences')) &
+         call derivatives_match_differences('gauss', 0.0_dp)
+      if (selected('derivatives_match_differences')) &
+         call derivatives_match_differences('maugis_dugdale', -energy/range)
+      if (selected('derivatives_match_differences')) &
+         call derivatives_match_differences('maugis_dugdale', -energy/range, edge=0.4_dp*range)
+      if (selected('derivatives_match_differences')) &
+         call derivatives_match_differences('maugis_dugdale', -energy/range, edge=range)
       if (selected('bounds_of_the_range')) call bounds_of_the_range()
       if (selected('table')) call table()
       if (selected('table_of_a_line')) call table_of_a_line()
@@ -71,7 +76,7 @@ contains
             end do
          end do
          call check_that(miss(2) < 1e-6_dp*energy/range .and. miss(2) < miss(1)/12.0_dp, &
-            trim(names(which))//': fourth order')
+            trim(names(which))//': fourth order', miss)
          ! What the table leaves out beyond its end is exp(-10) of the exponential.
          call check_close(made%energy, energy, 1e-4_dp*energy, trim(names(which))//': work of separation')
          h = 1e-3_dp*reach/n
@@ -109,7 +114,7 @@ contains
    end subroutine table_of_a_line
 
    !> e' and e'' against central differences, the values at contact, and the area under e'.
-   subroutine test_derivatives(name, release, edge)
+   subroutine derivatives_match_differences(name, release, edge)
       character(*), intent(in) :: name
       real(dp), intent(in) :: release          !! -e'(0+), Pa
       real(dp), intent(in), optional :: edge   !! m
@@ -147,6 +152,6 @@ contains
          work = work + adhesive_slope(potential, (k - 0.5_dp)*40*range/n)*40*range/n
       end do
       call check_close(work, energy, 1e-4_dp*energy, name//': work of separation')
-   end subroutine test_derivatives
+   end subroutine derivatives_match_differences
 
 end module test_adhesion_potential

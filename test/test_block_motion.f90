@@ -35,15 +35,15 @@ contains
 
    subroutine run_block_motion()
       call begin_suite('block_motion')
-      if (selected('test_rule')) call test_rule()
-      if (selected('test_stuck')) call test_stuck()
-      if (selected('test_exact_motion')) call test_exact_motion()
-      if (selected('test_flat_books')) call test_flat_books()
+      if (selected('rule_of_motion_is_second_order')) call rule_of_motion_is_second_order()
+      if (selected('held_block_comes_to_rest')) call held_block_comes_to_rest()
+      if (selected('motion_of_a_block_is_second_order')) call motion_of_a_block_is_second_order()
+      if (selected('books_of_a_flat_block_close')) call books_of_a_flat_block_close()
    end subroutine run_block_motion
 
    !> The rule against a given force m a(t), a = cos(w t): second order through steps of two lengths; work =
    !> kinetic energy + loss, exactly.
-   subroutine test_rule()
+   subroutine rule_of_motion_is_second_order()
       type(block_motion_type) :: block
       real(dp) :: errors(3), t, dt, advance, known(2), force
       integer :: i, k, n
@@ -65,11 +65,11 @@ contains
          errors(k) = abs(block%speed(1) - sin(t))
       end do
       call check_that(errors(2) < errors(1)/3.5_dp .and. errors(3) < errors(2)/3.5_dp, 'rule: second order '// &
-         to_text(errors(1))//', '//to_text(errors(2))//', '//to_text(errors(3)))
-   end subroutine test_rule
+         to_text(errors(1))//', '//to_text(errors(2))//', '//to_text(errors(3)), errors)
+   end subroutine rule_of_motion_is_second_order
 
    !> A block that is held comes to rest: what is left of speed and force halves from step to step.
-   subroutine test_stuck()
+   subroutine held_block_comes_to_rest()
       type(block_motion_type) :: block
       real(dp) :: known(2), force
       integer :: i
@@ -84,10 +84,10 @@ contains
       end do
       call check_close(force, 0.0_dp, 1e-5_dp, 'stuck: no force is left')
       call check_order(block%lost, '>=', 0.0_dp, 'stuck: the loss is positive')
-   end subroutine test_stuck
+   end subroutine held_block_comes_to_rest
 
    !> Stick, slip, a drop and a rise of the load: displacement and speed of second order, rms over all rows.
-   subroutine test_exact_motion()
+   subroutine motion_of_a_block_is_second_order()
       integer, parameter :: steps(3) = [40, 80, 160]        !! per period
       real(dp) :: error_u(3), error_v(3), lost, viscous
       integer :: k
@@ -98,12 +98,14 @@ contains
             'numerical over viscous loss at 40 steps per period')
       end do
       call check_that(error_u(2) < error_u(1)/2.5_dp .and. error_u(3) < error_u(1)/10.0_dp, &
-         'displacement: '//to_text(error_u(1))//', '//to_text(error_u(2))//', '//to_text(error_u(3)))
+         'displacement: '//to_text(error_u(1))//', '//to_text(error_u(2))//', '//to_text(error_u(3)), &
+         error_u)
       call check_that(error_v(2) < error_v(1)/2.5_dp .and. error_v(3) < error_v(1)/10.0_dp, &
-         'speed: '//to_text(error_v(1))//', '//to_text(error_v(2))//', '//to_text(error_v(3)))
+         'speed: '//to_text(error_v(1))//', '//to_text(error_v(2))//', '//to_text(error_v(3)), &
+         error_v)
       call check_close(error_v(1), 0.0_dp, 0.02_dp, 'speed at 40 steps per period')
       call check_close(error_v(3), 0.0_dp, 2e-3_dp, 'speed at 160 steps per period')
-   end subroutine test_exact_motion
+   end subroutine motion_of_a_block_is_second_order
 
    !> Run the flat block beside the exact one: rms errors over the largest values.
    subroutine compare(steps, error_u, error_v, lost, viscous)
@@ -242,7 +244,7 @@ contains
    end function step
 
    !> Both books of the flat block: the fields' to round-off, work of the drive to the step's error.
-   subroutine test_flat_books()
+   subroutine books_of_a_flat_block_close()
       type(record_type) :: record
       real(dp) :: missing(2)
       integer :: k
@@ -255,7 +257,7 @@ contains
       call check_order(maxval(record%rows%energy_kinetic), '>', 0.05_dp*maxval(record%rows%energy_elastic), &
          'the block swings')
       call check_close(missing(2), 0.0_dp, 0.01_dp, 'flat block: missing work')
-   end subroutine test_flat_books
+   end subroutine books_of_a_flat_block_close
 
    !> The case: pressure so that the friction is that of the phase at a coefficient of 0.5.
    function flat(steps) result(text)

@@ -25,21 +25,22 @@ contains
 
    subroutine run_case_input()
       call begin_suite('case_input')
-      if (selected('test_defaults')) call test_defaults()
-      if (selected('test_given_values')) call test_given_values()
-      if (selected('test_phases')) call test_phases()
-      if (selected('test_steps')) call test_steps()
-      if (selected('test_materials')) call test_materials()
-      if (selected('test_bad_inputs')) call test_bad_inputs()
-      if (selected('test_many_faults')) call test_many_faults()
-      if (selected('test_files')) call test_files()
-      if (selected('test_features')) call test_features()
-      if (selected('test_report')) call test_report()
-      if (selected('test_templates')) call test_templates()
+      if (selected('defaults_of_a_short_input')) call defaults_of_a_short_input()
+      if (selected('values_in_all_forms_of_fortran')) call values_in_all_forms_of_fortran()
+      if (selected('phases_inherit_from_earlier_ones')) call phases_inherit_from_earlier_ones()
+      if (selected('time_steps_given_and_derived')) call time_steps_given_and_derived()
+      if (selected('materials_of_arms_and_branches')) call materials_of_arms_and_branches()
+      if (selected('each_fault_has_its_message')) call each_fault_has_its_message()
+      if (selected('all_faults_are_reported_at_once')) call all_faults_are_reported_at_once()
+      if (selected('files_that_exist_or_not')) call files_that_exist_or_not()
+      if (selected('options_that_exclude_each_other')) call options_that_exclude_each_other()
+      if (selected('resolved_settings_give_the_same_case')) &
+         call resolved_settings_give_the_same_case()
+      if (selected('every_template_is_a_good_input')) call every_template_is_a_good_input()
    end subroutine run_case_input
 
    !> What is not given.
-   subroutine test_defaults()
+   subroutine defaults_of_a_short_input()
       type(case_type) :: case
       type(error_type), allocatable :: error
 
@@ -76,10 +77,10 @@ contains
       call check_close(case%surfaces(1)%centre_x, 2.0_dp, 1.0e-15_dp, 'centre_x on a cell')
       call check_close(case%surfaces(1)%centre_y, 2.0_dp, 1.0e-15_dp, 'centre_y on a cell')
       call check_that(case%output%file == 'road.h5', 'result of an input without an ending')
-   end subroutine test_defaults
+   end subroutine defaults_of_a_short_input
 
    !> Values in all the forms that Fortran allows.
-   subroutine test_given_values()
+   subroutine values_in_all_forms_of_fortran()
       type(case_type) :: case
       type(error_type), allocatable :: error
       character(*), parameter :: cr = achar(13)//nl, tab = achar(9)
@@ -113,10 +114,10 @@ contains
       call check_that(case%surfaces(1)%seed == -7, 'seed')
       call check_close(case%surfaces(1)%rms_slope, 0.1_dp, 0.0_dp, 'rms_slope')
       call check_close(case%surfaces(1)%rms_height, 0.0_dp, 0.0_dp, 'no rms_height')
-   end subroutine test_given_values
+   end subroutine values_in_all_forms_of_fortran
 
    !> Phases that inherit and derive.
-   subroutine test_phases()
+   subroutine phases_inherit_from_earlier_ones()
       type(case_type) :: case
       type(error_type), allocatable :: error
 
@@ -131,10 +132,10 @@ contains
          .not. case%phases(3)%given, 'inherits')
       call check_close(case%phases(3)%target, 2.0_dp, 0.0_dp, 'inherits the force')
       call check_close(case%phases(4)%target, -1.0e-6_dp, 0.0_dp, 'a negative displacement')
-   end subroutine test_phases
+   end subroutine phases_inherit_from_earlier_ones
 
    !> Time steps, given and derived. Cells are 2e-3/64 m.
-   subroutine test_steps()
+   subroutine time_steps_given_and_derived()
       type(case_type) :: case
       type(error_type), allocatable :: error
       real(dp), parameter :: dx = 2.0e-3_dp/64
@@ -185,10 +186,10 @@ contains
          call check_close(case%phases(i)%dt, dt, 1.0e-14_dp*dt, what//': dt')
       end subroutine check_steps
 
-   end subroutine test_steps
+   end subroutine time_steps_given_and_derived
 
    !> Adhesion allows pulling; mixed precision goes with the fast method alone.
-   subroutine test_features()
+   subroutine options_that_exclude_each_other()
       type(case_type) :: case
       type(error_type), allocatable :: error
 
@@ -203,10 +204,10 @@ contains
       call check_error(error, 'precision', 'mixed precision of the thesis''s method')
       call check_error(error, 'thesis', 'mixed precision of the thesis''s method')
       if (allocated(error)) call check_that(error%status == error_input, 'its status')
-   end subroutine test_features
+   end subroutine options_that_exclude_each_other
 
    !> The resolved settings are an input of the same case.
-   subroutine test_report()
+   subroutine resolved_settings_give_the_same_case()
       type(case_type) :: again, case
       type(error_type), allocatable :: error
       character(:), allocatable :: text
@@ -250,10 +251,10 @@ contains
          'summary: '//case_summary(case))
       call check_order(index(case_summary(case), 'memory: about 26.2 MB'), '>', 0, &
          'summary: '//case_summary(case))
-   end subroutine test_report
+   end subroutine resolved_settings_give_the_same_case
 
    !> Every template is a good input, or waits for a feature; those of the elastic spine are there.
-   subroutine test_templates()
+   subroutine every_template_is_a_good_input()
       type(case_type) :: case
       type(error_type), allocatable :: error
       character(16), allocatable :: names(:)
@@ -278,7 +279,7 @@ contains
          call check_that(template_is_available(trim(names(i))), trim(names(i))//' is available')
       end do
       call check_that(template_text('nothing') == '', 'no such template')
-   end subroutine test_templates
+   end subroutine every_template_is_a_good_input
 
    !> How often a piece occurs in a text.
    pure integer function occurrences(text, piece)
@@ -292,7 +293,7 @@ contains
    end function occurrences
 
    !> Arms are parsed and checked, and then refused as long as they are not available.
-   subroutine test_materials()
+   subroutine materials_of_arms_and_branches()
       type(case_type) :: case
       type(error_type), allocatable :: error
 
@@ -313,10 +314,10 @@ contains
          call check_close(case%material%prony_tau(1), 1.0e-3_dp, 1.0e-17_dp, 'its relaxation time')
          call check_close(case%material%shear_modulus, 2.75e6_dp*0.25e6_dp/3.0e6_dp, 1.0e-8_dp, 'long term')
       end if
-   end subroutine test_materials
+   end subroutine materials_of_arms_and_branches
 
    !> Each of these is one fault with a known message.
-   subroutine test_bad_inputs()
+   subroutine each_fault_has_its_message()
       character(*), parameter :: no_grid = sphere//steel//press
       character(*), parameter :: no_surface = grid//steel//press
       character(*), parameter :: no_material = grid//sphere//press
@@ -444,7 +445,7 @@ contains
       call refuse(body//'&friction law = ''coulomb'' /', 'coefficient: is missing: coulomb needs it')
       call refuse(body//'&friction coefficient = 0.3 /', '&friction: law: is missing')
       call refuse(body//'&adhesion potential = ''gauss'', energy = 0.05 /', 'range: is missing')
-   end subroutine test_bad_inputs
+   end subroutine each_fault_has_its_message
 
    !> An input must give exactly one fault, which holds the fragment.
    subroutine refuse(text, fragment)
@@ -474,7 +475,7 @@ contains
    end function lines
 
    !> Faults of one input, all reported.
-   subroutine test_many_faults()
+   subroutine all_faults_are_reported_at_once()
       type(case_type) :: case
       type(error_type), allocatable :: error
       character(*), parameter :: expected(7) = [character(60) :: &
@@ -492,10 +493,10 @@ contains
       end do
       if (allocated(error)) call check_that(lines(error%message) == size(expected), &
          'no fault is invented: '//error%message)
-   end subroutine test_many_faults
+   end subroutine all_faults_are_reported_at_once
 
    !> Files that are there or not.
-   subroutine test_files()
+   subroutine files_that_exist_or_not()
       type(case_type) :: case
       type(error_type), allocatable :: error
       integer :: unit
@@ -516,6 +517,6 @@ contains
       if (.not. allocated(error)) call check_that(case%input == body, 'its text')
       open (newunit=unit, file=path)
       close (unit, status='delete')
-   end subroutine test_files
+   end subroutine files_that_exist_or_not
 
 end module test_case_input

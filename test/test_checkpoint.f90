@@ -44,7 +44,8 @@ contains
       if (selected('other_cases_are_refused')) call other_cases_are_refused()
       if (selected('old_one_stays_until_commit')) call old_one_stays_until_commit()
       if (selected('damage_is_found')) call damage_is_found()
-      if (selected('values_that_are_no_numbers_are_refused')) call values_that_are_no_numbers_are_refused()
+      if (selected('values_that_are_no_numbers_are_refused')) &
+         call values_that_are_no_numbers_are_refused()
       call remove_checkpoint(path)
       call check_that(.not. file_exists(checkpoint_path(path)), 'removed')
    end subroutine run_checkpoint
@@ -147,9 +148,12 @@ contains
       call check_no_error(error, 'get the state')
       call check_that(found%truth .and. found%whole == 12 .and. all(found%wholes == [7, -3]), 'integers')
       call check_that(all(found%bytes == state%bytes) .and. found%text == 'slide', 'bytes and text')
-      call check_that(all(abs(found%field - state%field) <= 0.0_dp), 'field')
-      call check_that(all(abs(found%layers - state%layers) <= 0.0_dp), 'layers')
-      call check_that(all(abs(found%vector - state%vector) <= 0.0_dp), 'vector')
+      call check_that(all(abs(found%field - state%field) <= 0.0_dp), 'field', &
+         [maxval(abs(found%field - state%field))])
+      call check_that(all(abs(found%layers - state%layers) <= 0.0_dp), 'layers', &
+         [maxval(abs(found%layers - state%layers))])
+      call check_that(all(abs(found%vector - state%vector) <= 0.0_dp), 'vector', &
+         [maxval(abs(found%vector - state%vector))])
       call check_close(found%number, 0.1_dp, 0.0_dp, 'number')
 
       deallocate (found%field)
@@ -235,7 +239,8 @@ contains
          end if
          write (unit, pos=place) bytes(place)
       end do
-      call check_that(refused == tried .and. tried > 100, 'every flipped bit is found')
+      call check_that(refused == tried .and. tried > 100, 'every flipped bit is found', &
+         [real(refused, dp), real(tried, dp)])
       write (unit, pos=length + 1) 0_int8
       flush (unit)
       call reader%open(path, error)

@@ -15,15 +15,17 @@ contains
 
    subroutine run_coupled_passes()
       call begin_suite('coupled_passes')
-      if (selected('test_carry')) call test_carry()
-      if (selected('test_mixing')) call test_mixing()
-      if (selected('test_control')) call test_control()
-      if (selected('test_thick_block')) call test_thick_block()
-      if (selected('test_steep_road')) call test_steep_road()
+      if (selected('carried_fields_move_with_the_contact')) &
+         call carried_fields_move_with_the_contact()
+      if (selected('mixing_settles_where_plain_passes_fail')) &
+         call mixing_settles_where_plain_passes_fail()
+      if (selected('accuracy_follows_the_mismatch')) call accuracy_follows_the_mismatch()
+      if (selected('thick_block_on_steep_wave_settles')) call thick_block_on_steep_wave_settles()
+      if (selected('steep_road_settles_and_books_close')) call steep_road_settles_and_books_close()
    end subroutine run_coupled_passes
 
    !> Whole cells exactly, parts bilinearly, round a periodic map and on to the rim of a free one.
-   subroutine test_carry()
+   subroutine carried_fields_move_with_the_contact()
       integer, parameter :: nx = 9, ny = 5
       real(dp), parameter :: cell(2) = [0.5_dp, 0.3_dp]
       real(dp) :: field(nx, ny), moved(nx, ny), expected(nx, ny)
@@ -43,11 +45,11 @@ contains
       call carry(field, [1.5_dp, 0.0_dp]*cell, cell, .false., moved)
       call check_close(moved(3, 2), 0.5_dp*(field(4, 2) + field(5, 2)), 1.0e-14_dp, 'free, inside')
       call check_close(moved(nx, 2), field(nx, 2), 1.0e-14_dp, 'free, at the rim')
-   end subroutine test_carry
+   end subroutine carried_fields_move_with_the_contact
 
    !> Maps that plain iteration does not settle: with gains of -2.5 and 1.5 in six directions, and
    !> one that depends on a field nonlinearly.
-   subroutine test_mixing()
+   subroutine mixing_settles_where_plain_passes_fail()
       integer, parameter :: nx = 8, ny = 5
       type(anderson_type) :: mixing
       real(dp), parameter :: even(2) = 1.0_dp
@@ -82,10 +84,10 @@ contains
       f = z
       call mixing%step(even, 0.0_dp*f, z, plain=.false.)
       call check_close(maxval(abs(z - f)), 0.0_dp, 0.0_dp, 'a place that is found stays')
-   end subroutine test_mixing
+   end subroutine mixing_settles_where_plain_passes_fail
 
    !> The accuracy follows the mismatch, and becomes finer where it does not fall.
-   subroutine test_control()
+   subroutine accuracy_follows_the_mismatch()
       type(pass_control_type) :: control
       integer :: i
 
@@ -99,7 +101,8 @@ contains
       call check_close(control%accuracy, 1.0e-4_dp, 1.0e-18_dp, 'a tenth of what is left')
       call check_that(control%best_yet .and. .not. (control%forget .or. control%go_back), 'goes on')
       call control%judge(1.0e-3_dp)
-      call check_that(.not. control%best_yet .and. control%damping < 1.0_dp, 'shorter where it is slow')
+      call check_that(.not. control%best_yet .and. control%damping < 1.0_dp, 'shorter where it is slow', &
+         [control%damping])
       call control%judge(1.0e-3_dp)
       call check_close(control%accuracy, 1.0e-5_dp, 1.0e-18_dp, 'finer where the mismatch stays')
       call control%judge(0.1_dp)
@@ -108,14 +111,14 @@ contains
          call control%judge(1.0e-3_dp)
          if (control%go_back) exit
       end do
-      call check_that(control%go_back .and. i < 15, 'back to the best place')
+      call check_that(control%go_back .and. i < 15, 'back to the best place', [real(i, dp)])
       call check_order(control%damping, '<', 0.5_dp, 'shorter steps from there')
-   end subroutine test_control
+   end subroutine accuracy_follows_the_mismatch
 
    !> A steep wave under a massless block of forty wavelengths, once sheared: with the strains read
    !> one pass behind the contact no number of passes ended its jumps (mean change of the speed above
    !> 1 m/s with 2 passes as with 30).
-   subroutine test_thick_block()
+   subroutine thick_block_on_steep_wave_settles()
       type(record_type) :: record
       real(dp) :: swing
       integer :: n
@@ -133,10 +136,10 @@ contains
          call check_order(swing, '<', 1.0e-3_dp, 'a thick block slides')
          call check_close(sum(speed)/size(speed), 1.0_dp, 1.0e-3_dp, 'its mean speed')
       end associate
-   end subroutine test_thick_block
+   end subroutine thick_block_on_steep_wave_settles
 
    !> rms slope 0.45 and coefficient 0.8, on which plain passes flip: settled, and the books close.
-   subroutine test_steep_road()
+   subroutine steep_road_settles_and_books_close()
       type(record_type) :: record
 
       call run_case('&grid nx = 32, ny = 32, lx = 1e-3, ly = 1e-3 /'//nl// &
@@ -152,8 +155,9 @@ contains
       call check_order(maxval(record%rows%passes), '>', 3, 'it is a hard case')
       call check_books(record, 'steep road', 1.0e-6_dp)
       associate (lost => record%rows%dissipated_friction)
-         call check_that(all(lost(2:) >= lost(:size(lost) - 1)), 'friction takes energy, in the jump, too')
+         call check_that(all(lost(2:) >= lost(:size(lost) - 1)), 'friction takes energy, in the jump, too', &
+            lost)
       end associate
-   end subroutine test_steep_road
+   end subroutine steep_road_settles_and_books_close
 
 end module test_coupled_passes

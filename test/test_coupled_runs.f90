@@ -24,10 +24,12 @@ contains
 
    subroutine run_coupled_runs()
       call begin_suite('coupled_runs')
-      if (selected('test_to_the_bit')) call test_to_the_bit(steep(), 'steep road')
-      if (selected('test_to_the_bit')) call test_to_the_bit(swinging(), 'swinging block')
-      if (selected('test_order')) call test_order()
-      if (selected('test_flat_law')) call test_flat_law()
+      if (selected('same_bits_on_threads_and_after_restart')) &
+         call same_bits_on_threads_and_after_restart(steep(), 'steep road')
+      if (selected('same_bits_on_threads_and_after_restart')) &
+         call same_bits_on_threads_and_after_restart(swinging(), 'swinging block')
+      if (selected('orders_in_time_with_friction')) call orders_in_time_with_friction()
+      if (selected('missing_work_of_the_flat_law')) call missing_work_of_the_flat_law()
    end subroutine run_coupled_runs
 
    !> A steep road under a viscoelastic block, with a drop of the load: rows of many passes.
@@ -61,7 +63,7 @@ contains
    end function swinging
 
    !> One and two threads give the same bits; so does a run that is taken up from a checkpoint in its middle.
-   subroutine test_to_the_bit(text, what)
+   subroutine same_bits_on_threads_and_after_restart(text, what)
       character(*), intent(in) :: text
       character(*), intent(in) :: what
       real(dp), allocatable :: one(:, :), two(:, :), parts(:, :)
@@ -73,7 +75,7 @@ contains
       call set_threads(2)
       call run_rows(text, what, huge(0), two)
       call check_same_bits(one, two, what//': threads')
-   end subroutine test_to_the_bit
+   end subroutine same_bits_on_threads_and_after_restart
 
    !> All rows of a run, [column, row]; it is stopped and taken up again after a number of rows.
    subroutine run_rows(text, what, stop_after, values)
@@ -136,7 +138,8 @@ contains
       type(column_type), allocatable :: columns(:)
       integer :: i
 
-      call check_that(size(one, 2) > 4 .and. size(one, 2) == size(other, 2), what//': number of rows')
+      call check_that(size(one, 2) > 4 .and. size(one, 2) == size(other, 2), what//': number of rows', &
+         [real(size(one, 2), dp), real(size(other, 2), dp)])
       if (size(one, 2) /= size(other, 2)) return
       columns = history_columns()
       do i = 1, size(columns)
@@ -150,7 +153,7 @@ contains
    !> friction, approach and losses are of second order. On a map each point slips in its own direction,
    !> which the mean slip of a step knows half a step late: the traction across the motion is of first order,
    !> and with it, by a small factor, all else.
-   subroutine test_order()
+   subroutine orders_in_time_with_friction()
       integer, parameter :: steps(3) = [16, 64, 256]
       type(record_type) :: record
       real(dp) :: found(3, 3), order(3), coarse(3)
@@ -174,7 +177,7 @@ contains
             call check_close(coarse(1)/found(1, 3), 0.0_dp, 4e-4_dp, 'a map at half a cell per step: friction')
          end if
       end do
-   end subroutine test_order
+   end subroutine orders_in_time_with_friction
 
    !> A viscoelastic block that starts to slide along x and goes on over a third of the road.
    function order_case(profile, steps) result(text)
@@ -198,14 +201,14 @@ contains
    !> Without `slope_effect` the road also pushes the rubber with -P grad H, whose work on the motion of the
    !> rubber's surface is in no book. The work missing is then of second order in the slope, however short
    !> the steps; with `slope_effect` it falls with them.
-   subroutine test_flat_law()
+   subroutine missing_work_of_the_flat_law()
       type(record_type) :: record
       real(dp) :: missing(2), steeper
 
       call miss('.true.', 0.25_dp, 64, missing(1))
       call miss('.true.', 0.25_dp, 256, missing(2))
       call check_that(abs(missing(2)) < 0.2_dp*abs(missing(1)) .and. abs(missing(1)) < 1e-3_dp, &
-         'with slope_effect: '//to_text(missing(1))//', '//to_text(missing(2)))
+         'with slope_effect: '//to_text(missing(1))//', '//to_text(missing(2)), missing)
       call miss('.false.', 0.25_dp, 64, missing(1))
       call miss('.false.', 0.25_dp, 256, missing(2))
       call check_close(missing(2)/missing(1), 1.0_dp, 0.02_dp, 'without: the same in short steps')
@@ -229,7 +232,7 @@ contains
          end associate
       end subroutine miss
 
-   end subroutine test_flat_law
+   end subroutine missing_work_of_the_flat_law
 
    !> A rough road under a viscoelastic block.
    function flat_case(effect, slope, steps) result(text)

@@ -18,25 +18,39 @@ contains
    subroutine run_fft_conv()
       call begin_suite('fft_conv')
       if (selected('good_lengths')) call good_lengths()
-      if (selected('test_quadrature')) call test_quadrature()
-      if (selected('test_waves')) call test_waves(8, 6, 3.0_dp, 2.0_dp, .false.)
-      if (selected('test_waves')) call test_waves(8, 6, 3.0_dp, 2.0_dp, .true.)
-      if (selected('test_waves')) call test_waves(9, 5, 1.0_dp, 2.0_dp, .false.)
-      if (selected('test_waves')) call test_waves(9, 5, 1.0_dp, 2.0_dp, .true.)
-      if (selected('test_waves')) call test_waves(16, 1, 1.0_dp, 2.0_dp, .false.)
-      if (selected('test_waves')) call test_waves(16, 1, 1.0_dp, 2.0_dp, .true.)
-      if (selected('test_waves')) call test_waves(160, 131, 1.0_dp, 0.7_dp, .false.)
-      if (selected('test_waves')) call test_waves(160, 131, 1.0_dp, 0.7_dp, .true.)
-      if (selected('test_free_sums')) call test_free_sums(7, 5, .false.)
-      if (selected('test_free_sums')) call test_free_sums(7, 5, .true.)
-      if (selected('test_free_sums')) call test_free_sums(6, 8, .false.)
-      if (selected('test_free_sums')) call test_free_sums(6, 8, .true.)
-      if (selected('test_free_sums')) call test_free_sums(1, 3, .false.)
-      if (selected('test_free_sums')) call test_free_sums(1, 3, .true.)
-      if (selected('test_inverse')) call test_inverse(.false.)
-      if (selected('test_inverse')) call test_inverse(.true.)
-      if (selected('test_range')) call test_range()
-      if (selected('test_periodic_against_free')) call test_periodic_against_free()
+      if (selected('coefficients_match_quadrature')) call coefficients_match_quadrature()
+      if (selected('oblique_waves_are_eigenfunctions')) &
+         call oblique_waves_are_eigenfunctions(8, 6, 3.0_dp, 2.0_dp, .false.)
+      if (selected('oblique_waves_are_eigenfunctions')) &
+         call oblique_waves_are_eigenfunctions(8, 6, 3.0_dp, 2.0_dp, .true.)
+      if (selected('oblique_waves_are_eigenfunctions')) &
+         call oblique_waves_are_eigenfunctions(9, 5, 1.0_dp, 2.0_dp, .false.)
+      if (selected('oblique_waves_are_eigenfunctions')) &
+         call oblique_waves_are_eigenfunctions(9, 5, 1.0_dp, 2.0_dp, .true.)
+      if (selected('oblique_waves_are_eigenfunctions')) &
+         call oblique_waves_are_eigenfunctions(16, 1, 1.0_dp, 2.0_dp, .false.)
+      if (selected('oblique_waves_are_eigenfunctions')) &
+         call oblique_waves_are_eigenfunctions(16, 1, 1.0_dp, 2.0_dp, .true.)
+      if (selected('oblique_waves_are_eigenfunctions')) &
+         call oblique_waves_are_eigenfunctions(160, 131, 1.0_dp, 0.7_dp, .false.)
+      if (selected('oblique_waves_are_eigenfunctions')) &
+         call oblique_waves_are_eigenfunctions(160, 131, 1.0_dp, 0.7_dp, .true.)
+      if (selected('free_operator_is_the_double_sum')) &
+         call free_operator_is_the_double_sum(7, 5, .false.)
+      if (selected('free_operator_is_the_double_sum')) &
+         call free_operator_is_the_double_sum(7, 5, .true.)
+      if (selected('free_operator_is_the_double_sum')) &
+         call free_operator_is_the_double_sum(6, 8, .false.)
+      if (selected('free_operator_is_the_double_sum')) &
+         call free_operator_is_the_double_sum(6, 8, .true.)
+      if (selected('free_operator_is_the_double_sum')) &
+         call free_operator_is_the_double_sum(1, 3, .false.)
+      if (selected('free_operator_is_the_double_sum')) &
+         call free_operator_is_the_double_sum(1, 3, .true.)
+      if (selected('inverse_undoes_the_operator')) call inverse_undoes_the_operator(.false.)
+      if (selected('inverse_undoes_the_operator')) call inverse_undoes_the_operator(.true.)
+      if (selected('units_beyond_single_precision')) call units_beyond_single_precision()
+      if (selected('large_periodic_cell_is_like_free')) call large_periodic_cell_is_like_free()
       if (selected('transform_lengths_of_grids')) call transform_lengths_of_grids()
    end subroutine run_fft_conv
 
@@ -70,7 +84,7 @@ contains
    end function divides_a_power_of_60
 
    !> Love's coefficients against midpoint quadrature of the point solutions.
-   subroutine test_quadrature()
+   subroutine coefficients_match_quadrature()
       integer, parameter :: m = 400
       real(dp), parameter :: dx = 0.7_dp, dy = 1.3_dp, nu = 0.3_dp
       real(dp) :: x, y, a, b, r, zz, xx, xy, yy, l_xx, l_xy, l_yy
@@ -103,10 +117,10 @@ contains
       ! At the centre of a square cell: 4 asinh(1) dx (1-nu)/(2 pi).
       call check_close(love_normal(0.0_dp, 0.0_dp, 2.0_dp, 2.0_dp, 0.5_dp), &
          4.0_dp*asinh(1.0_dp)*2.0_dp*0.5_dp/(2.0_dp*pi), 1e-15_dp, 'a_zz of a cell on itself')
-   end subroutine test_quadrature
+   end subroutine coefficients_match_quadrature
 
    !> Oblique waves are eigenfunctions of the periodic operators.
-   subroutine test_waves(nx, ny, lx, ly, single)
+   subroutine oblique_waves_are_eigenfunctions(nx, ny, lx, ly, single)
       integer, intent(in) :: nx, ny
       real(dp), intent(in) :: lx, ly
       real(dp), parameter :: nu = 0.3_dp, h = 0.25_dp
@@ -164,10 +178,10 @@ contains
       end do
       call normal%destroy()
       call tangential%destroy()
-   end subroutine test_waves
+   end subroutine oblique_waves_are_eigenfunctions
 
    !> The free operators against the double sum.
-   subroutine test_free_sums(nx, ny, single)
+   subroutine free_operator_is_the_double_sum(nx, ny, single)
       integer, intent(in) :: nx, ny
       real(dp), parameter :: nu = 0.4_dp
       logical, intent(in) :: single            !! in single precision: to 1e-6 of the values
@@ -215,10 +229,10 @@ contains
       end do
       call normal%destroy()
       call tangential%destroy()
-   end subroutine test_free_sums
+   end subroutine free_operator_is_the_double_sum
 
    !> The inverse undoes the periodic operator on what has no mean, and a symbol of one is the identity.
-   subroutine test_inverse(single)
+   subroutine inverse_undoes_the_operator(single)
       logical, intent(in) :: single            !! in single precision: to 1e-6 of the values
       type(grid_type) :: grid
       type(convolution_type) :: normal, identity
@@ -248,10 +262,10 @@ contains
          'single precision is at work')
       call normal%destroy()
       call identity%destroy()
-   end subroutine test_inverse
+   end subroutine inverse_undoes_the_operator
 
    !> Values whose squares leave the range of single precision, in their unit.
-   subroutine test_range()
+   subroutine units_beyond_single_precision()
       type(grid_type) :: grid
       type(convolution_type) :: exact, single
       type(error_type), allocatable :: error
@@ -279,10 +293,10 @@ contains
       call check_that(single%ffts == 5*3, 'transforms are counted')
       call exact%destroy()
       call single%destroy()
-   end subroutine test_range
+   end subroutine units_beyond_single_precision
 
    !> In a large cell the periodic operator gives the free one's displacement differences.
-   subroutine test_periodic_against_free()
+   subroutine large_periodic_cell_is_like_free()
       integer, parameter :: n = 512, m = 9
       type(grid_type) :: large, small
       type(convolution_type) :: periodic, free
@@ -320,6 +334,6 @@ contains
          value = cos(pi*(k - 5)/10.0_dp)**2
       end function bump
 
-   end subroutine test_periodic_against_free
+   end subroutine large_periodic_cell_is_like_free
 
 end module test_fft_conv

@@ -94,7 +94,8 @@ contains
          results(4, k) = field_product(field, other)
       end do
       call set_threads(0)
-      call check_that(all(abs(results(:, 1) - results(:, 2)) <= 0.0_dp), 'same bits with three threads')
+      call check_that(all(abs(results(:, 1) - results(:, 2)) <= 0.0_dp), 'same bits with three threads', &
+         [maxval(abs(results(:, 1) - results(:, 2)))])
    end subroutine threads_do_not_matter
 
    !> Numbers between 0 and 1 without a pattern.

@@ -34,26 +34,28 @@ contains
 
    subroutine run_friction_cg()
       call begin_suite('friction_cg')
-      if (selected('test_mindlin_exact')) call test_mindlin_exact()
-      if (selected('test_mindlin_poisson')) call test_mindlin_poisson()
-      if (selected('test_unloading')) call test_unloading()
-      if (selected('test_pulled_sphere')) call test_pulled_sphere()
-      if (selected('test_pulled_rough')) call test_pulled_rough()
-      if (selected('test_pulled_off')) call test_pulled_off()
-      if (selected('test_products')) call test_products()
-      if (selected('test_limits')) call test_limits()
-      if (selected('test_isotropy')) call test_isotropy()
-      if (selected('test_rough')) call test_rough()
-      if (selected('test_methods')) call test_methods()
-      if (selected('test_frictionless_slope')) call test_frictionless_slope()
-      if (selected('test_constant_shear')) call test_constant_shear()
-      if (selected('test_adhesion')) call test_adhesion()
-      if (selected('test_line')) call test_line()
-      if (selected('test_mean_mode')) call test_mean_mode()
-      if (selected('test_warm_start')) call test_warm_start()
-      if (selected('test_memory')) call test_memory()
-      if (selected('test_slide')) call test_slide()
-      if (selected('test_threads')) call test_threads()
+      if (selected('mindlin_sphere_without_poisson_effect')) &
+         call mindlin_sphere_without_poisson_effect()
+      if (selected('mindlin_sphere_with_poisson_effect')) call mindlin_sphere_with_poisson_effect()
+      if (selected('mindlin_unloading_and_reloading')) call mindlin_unloading_and_reloading()
+      if (selected('pulled_sphere_meets_its_force')) call pulled_sphere_meets_its_force()
+      if (selected('pulled_rough_road_finds_its_place')) call pulled_rough_road_finds_its_place()
+      if (selected('pull_beyond_friction_is_reported')) call pull_beyond_friction_is_reported()
+      if (selected('number_of_products_is_bounded')) call number_of_products_is_bounded()
+      if (selected('full_stick_and_full_slip')) call full_stick_and_full_slip()
+      if (selected('turned_and_mirrored_contacts_agree')) call turned_and_mirrored_contacts_agree()
+      if (selected('rough_contacts_meet_the_law')) call rough_contacts_meet_the_law()
+      if (selected('methods_agree')) call methods_agree()
+      if (selected('frictionless_traction_on_slopes')) call frictionless_traction_on_slopes()
+      if (selected('constant_shear_up_to_the_edge')) call constant_shear_up_to_the_edge()
+      if (selected('adhesion_widens_the_bound')) call adhesion_widens_the_bound()
+      if (selected('line_contacts_along_x_and_y_agree')) call line_contacts_along_x_and_y_agree()
+      if (selected('uniform_contact_moves_by_mean_mode')) call uniform_contact_moves_by_mean_mode()
+      if (selected('own_solution_is_kept')) call own_solution_is_kept()
+      if (selected('past_traction_is_like_a_drive')) call past_traction_is_like_a_drive()
+      if (selected('block_dragged_into_full_slip_and_back')) &
+         call block_dragged_into_full_slip_and_back()
+      if (selected('two_threads_agree_to_round_off')) call two_threads_agree_to_round_off()
    end subroutine run_friction_cg
 
    !> Fields, operator and solver.
@@ -202,7 +204,7 @@ contains
    end function full_slip
 
    !> Cattaneo (1938), Mindlin (1949): exact for nu = 0. Force, traction, radius of stick; oblique.
-   subroutine test_mindlin_exact()
+   subroutine mindlin_sphere_without_poisson_effect()
       type(case_type) :: self
       real(dp), parameter :: mu = 0.4_dp, angle = 0.7_dp
       real(dp) :: delta, ratio, force, load, stick, x, y, expected, error, q, area
@@ -242,11 +244,11 @@ contains
       area = count(self%contact == contact_stick)*self%grid%dx*self%grid%dy
       call check_close(sqrt(area/pi), stick, 0.5_dp*self%grid%dx, 'Mindlin, radius of stick')
       call end_case(self)
-   end subroutine test_mindlin_exact
+   end subroutine mindlin_sphere_without_poisson_effect
 
    !> Mindlin's sphere under a prescribed total force, oblique, from rest each time: the total to the
    !> tolerance, the place of the road, the radius of stick; nu = 0, so that the solution is exact.
-   subroutine test_pulled_sphere()
+   subroutine pulled_sphere_meets_its_force()
       type(case_type) :: self
       real(dp), parameter :: mu = 0.4_dp, angle = 0.7_dp
       real(dp), parameter :: part(6) = [0.1_dp, 0.3_dp, 0.5_dp, 0.7_dp, 0.9_dp, 0.99_dp]
@@ -276,7 +278,7 @@ contains
             'pulled sphere, radius of stick')
       end do
       call end_case(self)
-   end subroutine test_pulled_sphere
+   end subroutine pulled_sphere_meets_its_force
 
    !> Solve with a prescribed total, and prove the result as that of a road at the place found.
    subroutine run_pulled(self, what, accuracy)
@@ -296,7 +298,7 @@ contains
 
    !> Rough roads, flat and with slope, thin and thick blocks and half-spaces, periodic and free: the
    !> place found by a pull is that whose road pulls so; also with one direction pulled only.
-   subroutine test_pulled_rough()
+   subroutine pulled_rough_road_finds_its_place()
       type(case_type) :: self
       real(dp), parameter :: thickness(4) = [0.0_dp, 0.05_dp, 2.0_dp, 50.0_dp]
       real(dp), allocatable :: tx(:, :), ty(:, :)
@@ -339,10 +341,10 @@ contains
          deallocate (tx, ty)
          call end_case(self)
       end do
-   end subroutine test_pulled_rough
+   end subroutine pulled_rough_road_finds_its_place
 
    !> A pull beyond the friction is reported, with all contact at its limit.
-   subroutine test_pulled_off()
+   subroutine pull_beyond_friction_is_reported()
       type(case_type) :: self
       integer :: boundary
 
@@ -359,12 +361,12 @@ contains
          call check_close(hypot(sum(self%tx), sum(self%ty))/sum(self%p), 0.4_dp, 1e-8_dp, 'pulled off, limit')
          call end_case(self)
       end do
-   end subroutine test_pulled_off
+   end subroutine pull_beyond_friction_is_reported
 
    !> nu = 0.42 and 0.5: Mindlin's solution leaves out the slip across the load. That is an effect
    !> of second order in nu/(2-nu), the ratio of the two kernels: 1.05e-3 of full slip for 0.42 and
    !> 1.66e-3 for 0.5, at n = 128 and 256 alike.
-   subroutine test_mindlin_poisson()
+   subroutine mindlin_sphere_with_poisson_effect()
       type(case_type) :: self
       real(dp), parameter :: mu = 0.4_dp, poisson(2) = [0.42_dp, 0.5_dp]
       real(dp) :: ratio
@@ -383,12 +385,12 @@ contains
          end do
          call end_case(self)
       end do
-   end subroutine test_mindlin_poisson
+   end subroutine mindlin_sphere_with_poisson_effect
 
    !> Loading, unloading and reloading (Mindlin and Deresiewicz, 1953), nu = 0: with the curve of
    !> loading Q = f(u), unloading from u1 follows Q1 - 2 f((u1 - u)/2), reloading from u2 goes back
    !> up by Q2 + 2 f((u - u2)/2), and closes the loop at u1.
-   subroutine test_unloading()
+   subroutine mindlin_unloading_and_reloading()
       type(case_type) :: self
       real(dp), parameter :: mu = 0.4_dp
       real(dp), parameter :: path(6) = [0.4_dp, 0.8_dp, 0.3_dp, -0.4_dp, 0.2_dp, 0.8_dp]
@@ -417,7 +419,7 @@ contains
          call check_close(force, expected(k), 2e-4_dp, 'Mindlin-Deresiewicz')
       end do
       call end_case(self)
-   end subroutine test_unloading
+   end subroutine mindlin_unloading_and_reloading
 
    !> Q/(mu F) of first loading by u of full slip.
    pure function loading(u) result(q)
@@ -428,7 +430,7 @@ contains
    end function loading
 
    !> Products of the operator (4 transforms each) for a sphere at half of full slip.
-   subroutine test_products()
+   subroutine number_of_products_is_bounded()
       type(case_type) :: self
       integer, parameter :: sizes(3) = [64, 128, 256]
       real(dp), parameter :: tolerances(2) = [1e-5_dp, 1e-8_dp], mu = 0.4_dp
@@ -451,10 +453,10 @@ contains
          end do
          call end_case(self)
       end do
-   end subroutine test_products
+   end subroutine number_of_products_is_bounded
 
    !> Full stick and full slip.
-   subroutine test_limits()
+   subroutine full_stick_and_full_slip()
       type(case_type) :: self
       real(dp), parameter :: mu = 0.4_dp
       real(dp) :: big, bad
@@ -479,7 +481,7 @@ contains
       call run_case(self, 'no contact', 1e-8_dp)
       call check_that(self%result%reason == 'no contact', 'no contact is named')
       call end_case(self)
-   end subroutine test_limits
+   end subroutine full_stick_and_full_slip
 
    !> A rough problem: waves of wave numbers 2 to 6, its pressure where it stands out by
    !> `threshold`.
@@ -520,7 +522,7 @@ contains
    end subroutine set_rough
 
    !> Rough, periodic and free, flat and sloping, both laws of slip, weak and strong friction.
-   subroutine test_rough()
+   subroutine rough_contacts_meet_the_law()
       type(case_type) :: self
       real(dp), parameter :: mu(4) = [0.05_dp, 0.2_dp, 0.7_dp, 1.5_dp]
       real(dp), parameter :: slopes(3) = [0.0_dp, 0.1_dp, 0.2_dp], drives(2) = [0.03_dp, 0.4_dp]
@@ -547,10 +549,10 @@ contains
             end do
          end do
       end do
-   end subroutine test_rough
+   end subroutine rough_contacts_meet_the_law
 
    !> The methods agree.
-   subroutine test_methods()
+   subroutine methods_agree()
       type(case_type) :: self
       real(dp), allocatable :: tx(:, :), ty(:, :)
       integer, parameter :: methods(3) = [friction_fast, friction_thesis, friction_gradient]
@@ -589,10 +591,10 @@ contains
             call end_case(self)
          end do
       end do
-   end subroutine test_methods
+   end subroutine methods_agree
 
    !> A turn by 90 degrees and a mirror, on a grid with nx /= ny, dx /= dy.
-   subroutine test_isotropy()
+   subroutine turned_and_mirrored_contacts_agree()
       type(case_type) :: self, turned
       integer, parameter :: nx = 36, ny = 27
       real(dp), parameter :: drive = 0.02_dp
@@ -644,10 +646,10 @@ contains
          call end_case(turned)
          call end_case(self)
       end do
-   end subroutine test_isotropy
+   end subroutine turned_and_mirrored_contacts_agree
 
    !> mu = 0 with slope: the traction of a frictionless contact, whatever the motion.
-   subroutine test_frictionless_slope()
+   subroutine frictionless_traction_on_slopes()
       type(case_type) :: self
 
       call new_case(self, 40, 25, 1.0_dp, 1.0_dp, boundary_periodic, 0.5_dp, 0.2_dp)
@@ -659,10 +661,10 @@ contains
       call check_close(sum(self%tx), -sum(self%p*self%hx), 1e-12_dp*sum(self%p), 'sum T_x = -sum P H_x')
       call check_close(sum(self%ty), -sum(self%p*self%hy), 1e-12_dp*sum(self%p), 'sum T_y = -sum P H_y')
       call end_case(self)
-   end subroutine test_frictionless_slope
+   end subroutine frictionless_traction_on_slopes
 
    !> Constant shear: sigma_max up to the edge of the contact where P goes to 0, nothing outside.
-   subroutine test_constant_shear()
+   subroutine constant_shear_up_to_the_edge()
       type(case_type) :: self
       real(dp), parameter :: strength = 0.3_dp
 
@@ -680,10 +682,10 @@ contains
       call check_that(any(self%contact == contact_stick) .and. any(self%contact == contact_slip), &
          'constant shear: stick and slip')
       call end_case(self)
-   end subroutine test_constant_shear
+   end subroutine constant_shear_up_to_the_edge
 
    !> Adhesion: the bound is mu (P + p_a), where the pressure is negative too; no load needed.
-   subroutine test_adhesion()
+   subroutine adhesion_widens_the_bound()
       type(case_type) :: self
       real(dp), parameter :: mu = 0.5_dp, pa = 0.3_dp
 
@@ -701,10 +703,10 @@ contains
       call check_that(any(self%contact == contact_stick) .and. any(self%contact == contact_slip), &
          'adhesion: stick and slip')
       call end_case(self)
-   end subroutine test_adhesion
+   end subroutine adhesion_widens_the_bound
 
    !> One row along x or along y: the same problem, the line contact.
-   subroutine test_line()
+   subroutine line_contacts_along_x_and_y_agree()
       type(case_type) :: self, other
       integer, parameter :: n = 60
       integer :: i
@@ -731,10 +733,10 @@ contains
          'lines: stick and slip')
       call end_case(self)
       call end_case(other)
-   end subroutine test_line
+   end subroutine line_contacts_along_x_and_y_agree
 
    !> A uniform contact in full stick moves by the mean mode alone: T = DX/compliance.
-   subroutine test_mean_mode()
+   subroutine uniform_contact_moves_by_mean_mode()
       type(case_type) :: self
       real(dp) :: measured
 
@@ -759,11 +761,11 @@ contains
       call run_case(self, 'one cell', 1e-8_dp)
       call check_close(self%tx(1, 1), 0.5_dp, 1e-12_dp, 'one cell: slips')
       call end_case(self)
-   end subroutine test_mean_mode
+   end subroutine uniform_contact_moves_by_mean_mode
 
    !> From its own solution it comes back at once; a return to a lower pressure stays within the
    !> bound.
-   subroutine test_warm_start()
+   subroutine own_solution_is_kept()
       type(case_type) :: self
 
       call new_case(self, 40, 32, 1.0_dp, 0.8_dp, boundary_periodic, 0.5_dp, 0.5_dp)
@@ -780,10 +782,10 @@ contains
          self%ty) < 1e-14_dp, 'returned to the bound of a new pressure')
       call check_that(all((self%contact /= contact_open) .eqv. self%p > 0.0_dp), 'contact of it')
       call end_case(self)
-   end subroutine test_warm_start
+   end subroutine own_solution_is_kept
 
    !> A given traction T_h of the memory is the same as -A T_h in the drive.
-   subroutine test_memory()
+   subroutine past_traction_is_like_a_drive()
       type(case_type) :: self
       real(dp), allocatable :: past_x(:, :), past_y(:, :), ux(:, :), uy(:, :), tx(:, :), ty(:, :)
       real(dp) :: largest
@@ -812,11 +814,11 @@ contains
       largest = maxval(hypot(self%tx - tx, self%ty - ty))/maxval(hypot(tx, ty))
       call check_order(largest, '<', 1e-6_dp, 'memory: the two ways agree')
       call end_case(self)
-   end subroutine test_memory
+   end subroutine past_traction_is_like_a_drive
 
    !> A block dragged over a moving pressure in small steps, from rest into full slip and back: each
    !> step proved, and the total traction of full slip, without slope, mu times the load.
-   subroutine test_slide()
+   subroutine block_dragged_into_full_slip_and_back()
       type(case_type) :: self
       real(dp), parameter :: mu = 0.5_dp, step = 0.02_dp
       integer :: k
@@ -846,10 +848,10 @@ contains
       call check_order(sum(self%tx), '<', mu*sum(self%p), 'slide: unloads after the turn')
       call check_order(iterations, '<', 60*40, 'slide: iterations')
       call end_case(self)
-   end subroutine test_slide
+   end subroutine block_dragged_into_full_slip_and_back
 
    !> One thread and two give the same: FFTW may plan anew, so to round-off.
-   subroutine test_threads()
+   subroutine two_threads_agree_to_round_off()
       type(case_type) :: self
       real(dp), allocatable :: tx(:, :)
       integer :: k, threads
@@ -872,6 +874,6 @@ contains
          call end_case(self)
       end do
       call set_threads(threads)
-   end subroutine test_threads
+   end subroutine two_threads_agree_to_round_off
 
 end module test_friction_cg

@@ -16,17 +16,18 @@ contains
 
    subroutine run_friction_law()
       call begin_suite('friction_law')
-      if (selected('test_flat')) call test_flat()
-      if (selected('test_cone')) call test_cone()
-      if (selected('test_slope_formula')) call test_slope_formula()
-      if (selected('test_direction')) call test_direction()
-      if (selected('test_variation')) call test_variation()
-      if (selected('test_limits')) call test_limits()
-      if (selected('test_fields')) call test_fields()
+      if (selected('bounds_without_slope')) call bounds_without_slope()
+      if (selected('returned_traction_lies_on_the_cone')) call returned_traction_lies_on_the_cone()
+      if (selected('friction_uphill_and_downhill')) call friction_uphill_and_downhill()
+      if (selected('slip_is_along_the_force_on_the_slope')) &
+         call slip_is_along_the_force_on_the_slope()
+      if (selected('derivatives_of_the_bound')) call derivatives_of_the_bound()
+      if (selected('zero_traction_and_zero_strength')) call zero_traction_and_zero_strength()
+      if (selected('fields_return_to_a_new_pressure')) call fields_return_to_a_new_pressure()
    end subroutine run_friction_law
 
    !> Without slope: |T| <= mu P, sigma_max, or the smaller; adhesion adds p_a to P.
-   subroutine test_flat()
+   subroutine bounds_without_slope()
       type(friction_law_type) :: law
       real(dp), parameter :: none(2) = [5.0_dp, -3.0_dp]     ! a slope that must not count
       real(dp) :: t(2)
@@ -59,11 +60,11 @@ contains
       t = [3.0_dp, 4.0_dp]
       call law%return_to_bound(-3.5_dp, none, t, returned)
       call check_close(hypot(t(1), t(2)), 0.0_dp, 0.0_dp, 'no traction below -gamma_0/z_0')
-   end subroutine test_flat
+   end subroutine bounds_without_slope
 
    !> With slope: the returned traction meets the law for the force (T_x, T_y, P) split by the true
    !> normal, lies on the right nappe, and on the ray from T*.
-   subroutine test_cone()
+   subroutine returned_traction_lies_on_the_cone()
       type(friction_law_type) :: law
       real(dp) :: u(8), slope(2), p, pa, mu, strength, star(2), d(2), t(2), s
       real(dp) :: normal(3), force(3), push, along
@@ -105,7 +106,7 @@ contains
          end do
       end do
       call check_order(hits, '>', 1000, 'most rays meet the bound')
-   end subroutine test_cone
+   end subroutine returned_traction_lies_on_the_cone
 
    !> `bound_ratio` from what the loops over rows have: F and N_z of a cell, mu, and a strength beside.
    function row_ratio(law, p, slope, d) result(s)
@@ -125,7 +126,7 @@ contains
 
    !> One slope in the direction of the traction: P (mu + tan)/(1 - mu tan) (thesis, eq. 3.2),
    !> uphill and downhill; no bound above mu tan = 1.
-   subroutine test_slope_formula()
+   subroutine friction_uphill_and_downhill()
       type(friction_law_type) :: law
       real(dp), parameter :: mu = 0.7_dp, h = 0.3_dp, p = 2.0_dp
       real(dp) :: t(2)
@@ -147,10 +148,10 @@ contains
       call law%return_to_bound(p, [-0.3_dp, 0.2_dp], t, returned)
       call check_close(t(1), 0.6_dp, 1e-15_dp, 'no friction: T* = -P H_x')
       call check_close(t(2), -0.4_dp, 1e-15_dp, 'no friction: T* = -P H_y')
-   end subroutine test_slope_formula
+   end subroutine friction_uphill_and_downhill
 
    !> The slip of the physical law, seen along the slope, is parallel to the force along it.
-   subroutine test_direction()
+   subroutine slip_is_along_the_force_on_the_slope()
       type(friction_law_type) :: law
       real(dp), parameter :: slope(2) = [0.4_dp, -0.25_dp], d(2) = [0.3_dp, 0.9_dp]
       real(dp) :: r(2), normal(3), force(3), slip(3), s(2)
@@ -167,10 +168,10 @@ contains
       law = new_friction_law('coulomb', 0.5_dp, 0.0_dp, 0.0_dp, .true., .false.)
       call check_close(norm2(law%slip_direction(slope, d) - d), 0.0_dp, 0.0_dp, 'thesis: along D')
       call check_close(norm2(law%slip_along_slope(slope, d) - d), 0.0_dp, 0.0_dp, 'thesis: r itself')
-   end subroutine test_direction
+   end subroutine slip_is_along_the_force_on_the_slope
 
    !> First and second derivative of s against differences.
-   subroutine test_variation()
+   subroutine derivatives_of_the_bound()
       type(friction_law_type) :: law
       real(dp), parameter :: a = 1e-4_dp
       real(dp) :: u(8), slope(2), d(2), v(2), p, s, up, down, first, second
@@ -195,10 +196,10 @@ contains
             call check_close(second, (up - 2.0_dp + down)/a**2, 1e-5_dp, 'second derivative of s')
          end do
       end do
-   end subroutine test_variation
+   end subroutine derivatives_of_the_bound
 
    !> Zero traction and zero strength.
-   subroutine test_limits()
+   subroutine zero_traction_and_zero_strength()
       type(friction_law_type) :: law
       real(dp), parameter :: none(2) = 0.0_dp
 
@@ -208,10 +209,10 @@ contains
       call check_close(law%bound_ratio(0.0_dp, none, none), 1.0_dp, 0.0_dp, 'T* alone is on the bound')
       call check_order(law%bound_ratio(1.0_dp, none, [1e-320_dp, 0.0_dp]), '>', 1.0_dp, &
          'a denormal')
-   end subroutine test_limits
+   end subroutine zero_traction_and_zero_strength
 
    !> Returning fields to a new pressure.
-   subroutine test_fields()
+   subroutine fields_return_to_a_new_pressure()
       type(friction_law_type) :: law
       real(dp) :: p(3, 2), tx(3, 2), ty(3, 2), none(0, 0)
       integer(int8) :: contact(3, 2)
@@ -233,7 +234,7 @@ contains
       call check_that(contact(1, 1) == contact_slip .and. contact(2, 1) == contact_open, 'contact map')
       call check_close(largest_excess(law, p, none, none, contact, tx, ty), 0.0_dp, 1e-15_dp, &
          'excess after')
-   end subroutine test_fields
+   end subroutine fields_return_to_a_new_pressure
 
    !> Numbers in [0, 1) that are the same everywhere.
    subroutine sequence(k, u)

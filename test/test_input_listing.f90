@@ -17,15 +17,15 @@ contains
 
    subroutine run_input_listing()
       call begin_suite('input_listing')
-      if (selected('test_table')) call test_table()
-      if (selected('test_values')) call test_values()
-      if (selected('test_digits')) call test_digits()
-      if (selected('test_long_list')) call test_long_list()
-      if (selected('test_faults')) call test_faults()
+      if (selected('every_group_and_variable_is_listed')) call every_group_and_variable_is_listed()
+      if (selected('values_come_in_order')) call values_come_in_order()
+      if (selected('reals_come_back_to_the_bit')) call reals_come_back_to_the_bit()
+      if (selected('long_lists_are_kept')) call long_lists_are_kept()
+      if (selected('faults_are_those_of_the_reader')) call faults_are_those_of_the_reader()
    end subroutine run_input_listing
 
    !> A line for each group and each variable.
-   subroutine test_table()
+   subroutine every_group_and_variable_is_listed()
       character(:), allocatable :: text
       integer :: i, lines
 
@@ -39,10 +39,10 @@ contains
          'the entry of grid: nx')
       call check_that(index(text, 'group'//field_separator//'phase'//field_separator//'yes'// &
          field_separator//'yes'//field_separator) > 0, 'a phase is required and repeatable')
-   end subroutine test_table
+   end subroutine every_group_and_variable_is_listed
 
    !> Values of all kinds, in the order of the table, groups in that of the text.
-   subroutine test_values()
+   subroutine values_come_in_order()
       character(:), allocatable :: listing
       type(error_type), allocatable :: error
 
@@ -57,10 +57,10 @@ contains
       call list_values('', 'a.nml', listing, error)
       call check_no_error(error, 'an empty text')
       call check_that(len(listing) == 0, 'an empty text lists nothing')
-   end subroutine test_values
+   end subroutine values_come_in_order
 
    !> Reals come back to the same bits.
-   subroutine test_digits()
+   subroutine reals_come_back_to_the_bit()
       real(dp), parameter :: numbers(6) = [0.1_dp, 1.0_dp/3.0_dp, -4.9406564584124654e-324_dp, huge(1.0_dp), &
          2.2250738585072014e-308_dp, -0.0_dp]
       character(:), allocatable :: listing
@@ -78,10 +78,10 @@ contains
          call check_that(status == 0 .and. transfer(again, 0_int64) == transfer(numbers(i), 0_int64), &
             'the same bits: '//digits)
       end do
-   end subroutine test_digits
+   end subroutine reals_come_back_to_the_bit
 
    !> Long lists are kept whole.
-   subroutine test_long_list()
+   subroutine long_lists_are_kept()
       character(:), allocatable :: listing
       type(error_type), allocatable :: error
       integer :: i, n
@@ -94,10 +94,10 @@ contains
          if (listing(i:i) == field_separator) n = n + 1
       end do
       call check_that(n == 5000, 'all values of a long list')
-   end subroutine test_long_list
+   end subroutine long_lists_are_kept
 
    !> Faults are those of the input's reader.
-   subroutine test_faults()
+   subroutine faults_are_those_of_the_reader()
       character(:), allocatable :: listing
       type(error_type), allocatable :: error
 
@@ -106,7 +106,7 @@ contains
       call check_error(error, 'lx = -1: must be a positive number', 'a wrong value')
       call list_values('&case title = '''//field_separator//''' /', 'a.nml', listing, error)
       call check_error(error, 'a character that is not text', 'the separator cannot be given')
-   end subroutine test_faults
+   end subroutine faults_are_those_of_the_reader
 
    !> Fields of a line, each followed by the separator.
    function fields(a, b, c, d, e, f, g) result(line)

@@ -20,19 +20,20 @@ contains
 
    subroutine run_interpolation()
       call begin_suite('interpolation')
-      if (selected('test_whole_cells')) call test_whole_cells()
-      if (selected('test_free_whole_cells')) call test_free_whole_cells()
-      if (selected('test_polynomials')) call test_polynomials()
-      if (selected('test_order')) call test_order()
-      if (selected('test_fields')) call test_fields()
-      if (selected('test_smoothness')) call test_smoothness()
-      if (selected('test_rim')) call test_rim()
-      if (selected('test_small_grids')) call test_small_grids()
-      if (selected('test_slopes')) call test_slopes()
-      if (selected('test_wave_factors')) call test_wave_factors()
-      if (selected('test_jump')) call test_jump()
-      if (selected('test_threads')) call test_threads()
-      if (selected('test_faults')) call test_faults()
+      if (selected('periodic_map_moves_by_whole_cells')) call periodic_map_moves_by_whole_cells()
+      if (selected('free_map_moves_by_whole_cells')) call free_map_moves_by_whole_cells()
+      if (selected('exact_for_polynomials_on_free_maps')) call exact_for_polynomials_on_free_maps()
+      if (selected('orders_of_heights_and_slopes')) call orders_of_heights_and_slopes()
+      if (selected('displaced_reading_has_the_right_sign')) &
+         call displaced_reading_has_the_right_sign()
+      if (selected('slope_is_derivative_of_height')) call slope_is_derivative_of_height()
+      if (selected('height_falls_beyond_a_free_rim')) call height_falls_beyond_a_free_rim()
+      if (selected('maps_of_few_cells')) call maps_of_few_cells()
+      if (selected('slopes_of_waves')) call slopes_of_waves()
+      if (selected('slope_factor_of_a_coarse_wave')) call slope_factor_of_a_coarse_wave()
+      if (selected('overshoot_beside_a_jump')) call overshoot_beside_a_jump()
+      if (selected('same_bits_on_two_threads')) call same_bits_on_two_threads()
+      if (selected('wrong_maps_are_refused')) call wrong_maps_are_refused()
    end subroutine run_interpolation
 
    !> A rough map.
@@ -50,7 +51,7 @@ contains
    end subroutine noise
 
    !> Whole cells move a periodic map bit for bit, far shifts and shifts with round-off, too.
-   subroutine test_whole_cells()
+   subroutine periodic_map_moves_by_whole_cells()
       type(grid_type) :: grid
       type(interpolation_type) :: map
       type(error_type), allocatable :: error
@@ -84,10 +85,10 @@ contains
          call shifted(map, -13*grid%dx - 1.0e-8_dp*grid%dx, 0.0_dp, h)
          call check_close(maxval(abs(h - h_0)), 0.0_dp, 1.0e-10_dp, methods(m)//': just past a wrap')
       end do
-   end subroutine test_whole_cells
+   end subroutine periodic_map_moves_by_whole_cells
 
    !> On a free map whole cells move the map and leave its lowest value behind.
-   subroutine test_free_whole_cells()
+   subroutine free_map_moves_by_whole_cells()
       type(grid_type) :: grid
       type(interpolation_type) :: map
       type(error_type), allocatable :: error
@@ -112,11 +113,11 @@ contains
          call shifted(map, 1.0e12_dp, 0.0_dp, h)
          call check_close(maxval(abs(h - minval(h_0))), 0.0_dp, 0.0_dp, methods(m)//': far away')
       end do
-   end subroutine test_free_whole_cells
+   end subroutine free_map_moves_by_whole_cells
 
    !> Bounded maps: 'linear' is exact for planes (slopes for quadratics), 'cubic' for bicubics, height
    !> and slope, up to the rim.
-   subroutine test_polynomials()
+   subroutine exact_for_polynomials_on_free_maps()
       type(grid_type) :: grid
       type(interpolation_type) :: map
       type(error_type), allocatable :: error
@@ -160,10 +161,10 @@ contains
       call check_close(maxval(abs(h_y - (1.0_dp - x + 2.0_dp*x**2 - x**3) &
          *(1.0_dp - 2.0_dp*y + 9.0_dp*y**2)), mask=x < 1.6_dp .and. y < 1.1_dp), 0.0_dp, &
          1.0e-13_dp, 'cubic: its slope along y')
-   end subroutine test_polynomials
+   end subroutine exact_for_polynomials_on_free_maps
 
    !> Errors on an oblique wave under an oblique shift fall with the orders 2 and 4; slopes 2 and 3.
-   subroutine test_order()
+   subroutine orders_of_heights_and_slopes()
       real(dp) :: coarse(2), fine(2)
 
       call wave_error('linear', 32, 27, coarse)
@@ -177,7 +178,7 @@ contains
       ! the spline's leading error, h^4 f'''' u^2 (1 - u)^2/24 a direction
       call check_close(fine(1), ((2.0_dp*pi*3/64)**4*(0.4_dp*0.6_dp)**2 &
          + (2.0_dp*pi*2/54)**4*(0.3_dp*0.7_dp)**2)/24.0_dp, 1.0e-6_dp, 'cubic: its error')
-   end subroutine test_order
+   end subroutine orders_of_heights_and_slopes
 
    !> Largest error of height and slope of a wave of amplitude 1, by shift and by fields.
    subroutine wave_error(method, nx, ny, errors)
@@ -218,7 +219,7 @@ contains
    end subroutine wave_error
 
    !> Fields of displacement: the sign, the place, and agreement with a uniform shift.
-   subroutine test_fields()
+   subroutine displaced_reading_has_the_right_sign()
       type(grid_type) :: grid
       type(interpolation_type) :: map
       type(error_type), allocatable :: error
@@ -265,10 +266,10 @@ contains
          call check_close(maxval(abs(h - g)), 0.0_dp, 1.0e-16_dp, &
             methods(m)//': a uniform field is a shift')
       end do
-   end subroutine test_fields
+   end subroutine displaced_reading_has_the_right_sign
 
    !> The spline's slope is the derivative of its height, and continuous across a cell.
-   subroutine test_smoothness()
+   subroutine slope_is_derivative_of_height()
       type(grid_type) :: grid
       type(interpolation_type) :: map
       type(error_type), allocatable :: error
@@ -294,10 +295,10 @@ contains
       call shifted(map, -1.0e-7_dp, -1.0e-7_dp, ahead, x_ahead, y_ahead)
       call check_close(maxval(hypot(x_ahead - h_x, y_ahead - h_y)), 0.0_dp, 1.0e-8_dp, &
          'the slope is continuous across a cell')
-   end subroutine test_smoothness
+   end subroutine slope_is_derivative_of_height
 
    !> Beyond a free rim the height falls over one cell, continuously, and makes no summit.
-   subroutine test_rim()
+   subroutine height_falls_beyond_a_free_rim()
       type(grid_type) :: grid
       type(interpolation_type) :: map
       type(error_type), allocatable :: error
@@ -320,10 +321,10 @@ contains
                *(h_0(:, 6) - lowest))), 0.0_dp, 1.0e-17_dp, methods(m)//': beyond the upper rim')
          end do
       end do
-   end subroutine test_rim
+   end subroutine height_falls_beyond_a_free_rim
 
    !> A profile, and grids of a few cells: the map is met at the cells, and moves as it should.
-   subroutine test_small_grids()
+   subroutine maps_of_few_cells()
       integer, parameter :: sizes(2, 7) = reshape([7, 1, 1, 1, 2, 1, 2, 3, 3, 2, 3, 5, 4, 4], [2, 7])
       type(grid_type) :: grid
       type(interpolation_type) :: map
@@ -352,10 +353,10 @@ contains
             deallocate (h, h_x, h_y, zero)
          end do
       end do
-   end subroutine test_small_grids
+   end subroutine maps_of_few_cells
 
    !> Spectral slopes of waves, Nyquist modes; central slopes and their order.
-   subroutine test_slopes()
+   subroutine slopes_of_waves()
       type(grid_type) :: grid
       type(error_type), allocatable :: error
       real(dp), allocatable :: h(:, :), h_x(:, :), h_y(:, :), phase(:, :)
@@ -393,11 +394,11 @@ contains
          'a free plane has its slope up to the rim')
       call spectral_slopes(grid, h, h_x, h_y, error)
       call check_error(error, 'periodic', 'spectral slopes of a free map')
-   end subroutine test_slopes
+   end subroutine slopes_of_waves
 
    !> The slope at the cells of a wave with 8 cells is too low by a factor that is known for both
    !> methods, along x and along y, and of the spline only by 0.2 %.
-   subroutine test_wave_factors()
+   subroutine slope_factor_of_a_coarse_wave()
       type(grid_type) :: grid
       type(interpolation_type) :: map
       type(error_type), allocatable :: error
@@ -431,11 +432,11 @@ contains
          call check_close(maxval(abs(h_y(7, :) + [(factor(m)*theta/grid%dy*sin(theta*(j - 1)), j = 1, 16)])), &
             0.0_dp, 1.0e-13_dp, methods(m)//': the slope of a wave along y at the cells')
       end do
-   end subroutine test_wave_factors
+   end subroutine slope_factor_of_a_coarse_wave
 
    !> Beside a jump of the map the spline overshoots by 11 % of it, by 0.1 % three cells farther;
    !> 'linear' stays between the heights of the cells.
-   subroutine test_jump()
+   subroutine overshoot_beside_a_jump()
       type(grid_type) :: grid
       type(interpolation_type) :: map
       type(error_type), allocatable :: error
@@ -462,13 +463,13 @@ contains
          else
             call check_close(beside, 0.108_dp, 1.0e-3_dp, 'cubic: overshoot beside a jump')
             call check_that(farther < 3.0e-3_dp .and. farther > 1.0e-4_dp, &
-               'cubic: overshoot three cells from a jump')
+               'cubic: overshoot three cells from a jump', [farther])
          end if
       end do
-   end subroutine test_jump
+   end subroutine overshoot_beside_a_jump
 
    !> The same numbers on one and two threads, bit for bit.
-   subroutine test_threads()
+   subroutine same_bits_on_two_threads()
       type(grid_type) :: grid
       type(interpolation_type) :: map
       type(error_type), allocatable :: error
@@ -489,9 +490,9 @@ contains
          call check_close(maxval(abs(one - two)), 0.0_dp, 0.0_dp, methods(m)//': threads')
       end do
       call omp_set_num_threads(threads)
-   end subroutine test_threads
+   end subroutine same_bits_on_two_threads
 
-   subroutine test_faults()
+   subroutine wrong_maps_are_refused()
       type(grid_type) :: grid
       type(interpolation_type) :: map
       type(error_type), allocatable :: error
@@ -503,6 +504,6 @@ contains
       call check_error(error, 'quintic', 'unknown method')
       call new_interpolation(map, grid, h(:3, :), 'linear', error)
       call check_error(error, 'shape', 'wrong shape')
-   end subroutine test_faults
+   end subroutine wrong_maps_are_refused
 
 end module test_interpolation

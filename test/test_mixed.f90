@@ -17,17 +17,20 @@ contains
 
    subroutine run_mixed()
       call begin_suite('mixed')
-      if (selected('test_tolerances')) call test_tolerances(boundary_periodic, 140, 90)
-      if (selected('test_tolerances')) call test_tolerances(boundary_free, 63, 80)
-      if (selected('test_scales')) call test_scales()
-      if (selected('test_threads')) call test_threads(boundary_periodic)
-      if (selected('test_threads')) call test_threads(boundary_free)
-      if (selected('test_round_off')) call test_round_off()
-      if (selected('test_case')) call test_case()
+      if (selected('all_tolerances_are_reached')) &
+         call all_tolerances_are_reached(boundary_periodic, 140, 90)
+      if (selected('all_tolerances_are_reached')) &
+         call all_tolerances_are_reached(boundary_free, 63, 80)
+      if (selected('units_change_no_step')) call units_change_no_step()
+      if (selected('same_bits_on_two_threads')) call same_bits_on_two_threads(boundary_periodic)
+      if (selected('same_bits_on_two_threads')) call same_bits_on_two_threads(boundary_free)
+      if (selected('tolerance_near_round_off')) call tolerance_near_round_off()
+      if (selected('case_with_sliding_in_both_precisions')) &
+         call case_with_sliding_in_both_precisions()
    end subroutine run_mixed
 
    !> Every tolerance that double precision reaches, in about as many iterations; the error is true.
-   subroutine test_tolerances(boundary, nx, ny)
+   subroutine all_tolerances_are_reached(boundary, nx, ny)
       integer, intent(in) :: boundary, nx, ny
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
@@ -64,11 +67,12 @@ contains
             if (k == 1) call check_close(sum(t%pressure)/(0.01_dp*nx*ny), 1.0_dp, 1e-12_dp, what//': load')
          end do
       end do
-      call check_that(any(abs(s%pressure - t%pressure) > 0.0_dp), 'single precision is at work')
-   end subroutine test_tolerances
+      call check_that(any(abs(s%pressure - t%pressure) > 0.0_dp), 'single precision is at work', &
+         [maxval(abs(s%pressure - t%pressure))])
+   end subroutine all_tolerances_are_reached
 
    !> Units that single precision does not know: the same steps.
-   subroutine test_scales()
+   subroutine units_change_no_step()
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
       type(solution_type) :: s, t
@@ -94,10 +98,10 @@ contains
             'other units: the same pressure')
          deallocate (small)
       end do
-   end subroutine test_scales
+   end subroutine units_change_no_step
 
    !> One thread and two: the same bits.
-   subroutine test_threads(boundary)
+   subroutine same_bits_on_two_threads(boundary)
       integer, intent(in) :: boundary
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
@@ -107,10 +111,10 @@ contains
       call rough_problem(grid, 6.0_dp, 0.02_dp, problem, h)
       problem%tolerance = 1e-7_dp
       call check_threads(grid, problem, h, thesis=.false., mixed=.true.)
-   end subroutine test_threads
+   end subroutine same_bits_on_two_threads
 
    !> A tolerance near the round-off of double precision.
-   subroutine test_round_off()
+   subroutine tolerance_near_round_off()
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
       type(solution_type) :: s, t
@@ -128,10 +132,10 @@ contains
       call check_close(t%outcome%residual, e1, 1e-13_dp, 'the error reported is true')
       call check_order(e1, '<=', 10.0_dp*s%outcome%residual + 1e-13_dp, &
          'as good as double precision')
-   end subroutine test_round_off
+   end subroutine tolerance_near_round_off
 
    !> A case with sliding and an arm, in both precisions.
-   subroutine test_case()
+   subroutine case_with_sliding_in_both_precisions()
       character(*), parameter :: text = '&grid nx = 48, ny = 45, lx = 1.2e-3, ly = 1.0e-3 /'//nl// &
          '&surface shape = ''self_affine'', hurst = 0.8, wavelength_long = 0.6e-3, '// &
          'wavelength_short = 0.12e-3, rms_height = 5e-6, seed = 3 /'//nl// &
@@ -145,6 +149,6 @@ contains
       call check_that(last(a) == 8 .and. last(b) == 8, 'all rows')
       call check_same_rows(a, b, 1e-4_dp, 'double and mixed precision')
       call check_that(any(abs(a%rows%mean_gap - b%rows%mean_gap) > 0.0_dp), 'both precisions are at work')
-   end subroutine test_case
+   end subroutine case_with_sliding_in_both_precisions
 
 end module test_mixed

@@ -21,15 +21,16 @@ contains
 
    subroutine run_namelist()
       call begin_suite('namelist')
-      if (selected('test_form')) call test_form()
-      if (selected('test_broken_form')) call test_broken_form()
-      if (selected('test_table')) call test_table()
-      if (selected('test_words')) call test_words()
-      if (selected('test_numbers')) call test_numbers()
+      if (selected('any_layout_is_read')) call any_layout_is_read()
+      if (selected('broken_form_is_found_and_the_rest_read')) &
+         call broken_form_is_found_and_the_rest_read()
+      if (selected('table_of_the_input_is_consistent')) call table_of_the_input_is_consistent()
+      if (selected('words_and_their_nearest_names')) call words_and_their_nearest_names()
+      if (selected('texts_of_numbers')) call texts_of_numbers()
    end subroutine run_namelist
 
    !> Groups and assignments, whatever the layout.
-   subroutine test_form()
+   subroutine any_layout_is_read()
       type(namelists_type) :: file
       type(faults_type) :: faults
 
@@ -63,10 +64,10 @@ contains
          shown = shown_tokens(file, file%assignments(i)%first, file%assignments(i)%last)
       end function shown
 
-   end subroutine test_form
+   end subroutine any_layout_is_read
 
    !> What is wrong with the form is found, and the rest is still read.
-   subroutine test_broken_form()
+   subroutine broken_form_is_found_and_the_rest_read()
       call broken('&a x = 1'//nl//'&b /', 1, 'f: &a: the group that starts in line 1 is not closed')
       call broken('&a x = 1', 1, 'is missing before the end of the file')
       call broken('hello'//nl//'&a /'//nl//'world', 2, 'f: line 3: text outside of a group: world')
@@ -77,7 +78,7 @@ contains
       call broken('&a /'//achar(27), 1, 'code 27')
       call broken(repeat('x', 100000), 1, '...: a group is &name')
       call broken(repeat('&a x'//nl, 500), 100, 'there are more faults')
-   end subroutine test_broken_form
+   end subroutine broken_form_is_found_and_the_rest_read
 
    !> A text has so many faults, one of them with this fragment.
    subroutine broken(text, count, fragment)
@@ -94,7 +95,7 @@ contains
    end subroutine broken
 
    !> Every entry of the table makes sense; defaults are allowed values.
-   subroutine test_table()
+   subroutine table_of_the_input_is_consistent()
       type(variable_entry_type), allocatable :: entries(:)
       type(group_values_type) :: group
       character(:), allocatable :: markdown
@@ -156,10 +157,10 @@ contains
             'solver', 'output']
       end function group_entries_names
 
-   end subroutine test_table
+   end subroutine table_of_the_input_is_consistent
 
    !> Words.
-   subroutine test_words()
+   subroutine words_and_their_nearest_names()
       character(16), parameter :: names(4) = [character(16) :: 'prony_g', 'prony_tau', 'poisson', 'thickness']
 
       call check_that(lower('ABC_xyz9') == 'abc_xyz9', 'lower')
@@ -172,10 +173,10 @@ contains
       call check_that(ordinary('a'//nl//achar(9)//'  b'//achar(0), 10) == 'a b', 'ordinary')
       call check_that(ordinary('abcdefghijk', 10) == 'abcdefg...', 'a long text is cut')
       call check_that(ordinary('abcdefghij', 10) == 'abcdefghij', 'a text of full length is not')
-   end subroutine test_words
+   end subroutine words_and_their_nearest_names
 
    !> Numbers.
-   subroutine test_numbers()
+   subroutine texts_of_numbers()
       real(dp), parameter :: numbers(9) = [0.1_dp, -1.0_dp/3.0_dp, 1.0e-300_dp, 6.02214076e23_dp, &
          123456.789_dp, huge(1.0_dp), tiny(1.0_dp), 1.0e7_dp, 999999.95_dp]
       real(dp) :: again
@@ -195,6 +196,6 @@ contains
          read (text, *) again
          call check_close(again, numbers(i), 0.0_dp, 'exact: '//text)
       end do
-   end subroutine test_numbers
+   end subroutine texts_of_numbers
 
 end module test_namelist

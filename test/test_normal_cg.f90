@@ -19,27 +19,31 @@ contains
 
    subroutine run_normal_cg()
       call begin_suite('normal_cg')
-      if (selected('test_simplex')) call test_simplex()
-      if (selected('test_hertz_free')) call test_hertz_free()
-      if (selected('test_hertz_periodic')) call test_hertz_periodic()
-      if (selected('test_hertz_line')) call test_hertz_line()
-      if (selected('test_westergaard')) call test_westergaard(512, 1, 1.0_dp, 1.0_dp, 1, 0)
-      if (selected('test_westergaard')) call test_westergaard(243, 1, 2.0_dp, 1.0_dp, 2, 0)
-      if (selected('test_westergaard')) call test_westergaard(96, 6, 1.0_dp, 0.5_dp, 1, 0)
-      if (selected('test_westergaard')) call test_westergaard(5, 129, 1.0_dp, 2.0_dp, 0, 1)
-      if (selected('test_westergaard')) call test_westergaard(1, 128, 1.0_dp, 2.0_dp, 0, 1)
-      if (selected('test_westergaard')) call test_westergaard(120, 90, 1.0_dp, 1.2_dp, 2, 1)
-      if (selected('test_westergaard')) call test_westergaard(101, 127, 1.0_dp, 1.2_dp, 1, -1)
-      if (selected('test_full_contact')) call test_full_contact()
-      if (selected('test_round_trip')) call test_round_trip(boundary_periodic, 96, 70)
-      if (selected('test_round_trip')) call test_round_trip(boundary_free, 45, 64)
-      if (selected('test_error_measure')) call test_error_measure(boundary_periodic, 90, 64)
-      if (selected('test_error_measure')) call test_error_measure(boundary_free, 33, 48)
-      if (selected('test_area_bracket')) call test_area_bracket()
+      if (selected('projection_is_the_nearest_field')) call projection_is_the_nearest_field()
+      if (selected('hertz_sphere_on_a_free_grid')) call hertz_sphere_on_a_free_grid()
+      if (selected('hertz_sphere_in_a_periodic_square')) call hertz_sphere_in_a_periodic_square()
+      if (selected('hertz_cylinder_in_plane_strain')) call hertz_cylinder_in_plane_strain()
+      if (selected('westergaard_wave')) call westergaard_wave(512, 1, 1.0_dp, 1.0_dp, 1, 0)
+      if (selected('westergaard_wave')) call westergaard_wave(243, 1, 2.0_dp, 1.0_dp, 2, 0)
+      if (selected('westergaard_wave')) call westergaard_wave(96, 6, 1.0_dp, 0.5_dp, 1, 0)
+      if (selected('westergaard_wave')) call westergaard_wave(5, 129, 1.0_dp, 2.0_dp, 0, 1)
+      if (selected('westergaard_wave')) call westergaard_wave(1, 128, 1.0_dp, 2.0_dp, 0, 1)
+      if (selected('westergaard_wave')) call westergaard_wave(120, 90, 1.0_dp, 1.2_dp, 2, 1)
+      if (selected('westergaard_wave')) call westergaard_wave(101, 127, 1.0_dp, 1.2_dp, 1, -1)
+      if (selected('full_contact_is_exact')) call full_contact_is_exact()
+      if (selected('load_to_approach_and_back')) &
+         call load_to_approach_and_back(boundary_periodic, 96, 70)
+      if (selected('load_to_approach_and_back')) &
+         call load_to_approach_and_back(boundary_free, 45, 64)
+      if (selected('error_is_that_of_the_definition')) &
+         call error_is_that_of_the_definition(boundary_periodic, 90, 64)
+      if (selected('error_is_that_of_the_definition')) &
+         call error_is_that_of_the_definition(boundary_free, 33, 48)
+      if (selected('area_at_small_loads_in_its_bracket')) call area_at_small_loads_in_its_bracket()
    end subroutine run_normal_cg
 
    !> The projection against a search over all numbers of positive cells.
-   subroutine test_simplex()
+   subroutine projection_is_the_nearest_field()
       real(dp) :: x(13, 9), y(13, 9), best(13, 9), level, total, least
       integer :: k, trial, n
       real(dp), allocatable :: sorted(:)
@@ -67,7 +71,8 @@ contains
          call check_order(minval(y), '>=', 0.0_dp, 'nothing negative')
          best = y
          call project_simplex(y, sum(y))
-         call check_that(all(abs(y - best) <= 0.0_dp), 'a feasible field is left alone')
+         call check_that(all(abs(y - best) <= 0.0_dp), 'a feasible field is left alone', &
+            [maxval(abs(y - best))])
       end do
       x = 0.3_dp
       call project_simplex(x, 1e-30_dp)
@@ -76,10 +81,10 @@ contains
       x(3, 2) = 0.4_dp
       call project_simplex(x, 1e-30_dp)
       call check_close(sum(x), 1e-30_dp, 1e-43_dp, 'a small load on one summit')
-      call check_that(count(x > 0.0_dp) == 1, 'one cell carries it')
+      call check_that(count(x > 0.0_dp) == 1, 'one cell carries it', [real(count(x > 0.0_dp), dp)])
       call project_simplex(x, 0.0_dp)
-      call check_that(all(abs(x) <= 0.0_dp), 'no load')
-   end subroutine test_simplex
+      call check_that(all(abs(x) <= 0.0_dp), 'no load', [maxval(abs(x))])
+   end subroutine projection_is_the_nearest_field
 
    pure function descending(x) result(y)
       real(dp), intent(in) :: x(:)
@@ -96,7 +101,7 @@ contains
    end function descending
 
    !> Paraboloid, free, by approach and by load; the error falls with the mesh.
-   subroutine test_hertz_free()
+   subroutine hertz_sphere_on_a_free_grid()
       real(dp), parameter :: radius = 10.0_dp, a = 1.0_dp
       real(dp), parameter :: force = 4.0_dp*a**3/(3.0_dp*radius), delta = a**2/radius
       real(dp), parameter :: p0 = 2.0_dp*a/(pi*radius)
@@ -130,18 +135,20 @@ contains
          error(4) = abs(count(s%pressure > 0.0_dp)*grid%dx*grid%dy/(pi*a**2) - 1.0_dp)
          ! A strip of about half a cell along the contact's edge is in error: its share of the area is
          ! dx/a, of the force (there P ~ sqrt) (dx/a)^(3/2).
-         call check_that(all(error(1:3) <= 0.35_dp*ratio**1.5_dp), 'Hertz: error of order dx^(3/2)')
+         call check_that(all(error(1:3) <= 0.35_dp*ratio**1.5_dp), 'Hertz: error of order dx^(3/2)', &
+            error)
          call check_order(error(4), '<=', 1.2_dp*ratio, 'Hertz: area')
-         call check_that(all(error([1, 3]) < 0.6_dp*before([1, 3])), 'Hertz: errors fall with the mesh')
+         call check_that(all(error([1, 3]) < 0.6_dp*before([1, 3])), 'Hertz: errors fall with the mesh', &
+            [error, before])
          before = error
          n = 2*n
       end do
       call check_close(s%level, delta, 2e-3_dp*delta, 'Hertz: approach at dx = a/24')
-   end subroutine test_hertz_free
+   end subroutine hertz_sphere_on_a_free_grid
 
    !> Paraboloid in a big periodic square: the images and the background move the summit by
    !> -3.900265 F/(pi E* L) (the potential of a square lattice in a uniform background).
-   subroutine test_hertz_periodic()
+   subroutine hertz_sphere_in_a_periodic_square()
       real(dp), parameter :: radius = 10.0_dp, a = 1.0_dp, length = 12.0_dp*a
       real(dp), parameter :: force = 4.0_dp*a**3/(3.0_dp*radius), delta = a**2/radius
       type(grid_type) :: grid
@@ -170,10 +177,10 @@ contains
       call run_problem(grid, problem, h, s)
       call check_close(sum(s%pressure)*grid%dx*grid%dy/force, 1.0_dp, 1e-6_dp, &
          'Hertz, periodic: load from approach')
-   end subroutine test_hertz_periodic
+   end subroutine hertz_sphere_in_a_periodic_square
 
    !> Cylinder in plane strain, L = 64 a: images change the curvature by pi^2/6 (a/L)^2 = 4e-4.
-   subroutine test_hertz_line()
+   subroutine hertz_cylinder_in_plane_strain()
       real(dp), parameter :: radius = 10.0_dp, a = 1.0_dp, length = 64.0_dp*a
       real(dp), parameter :: load = pi*a**2/(4.0_dp*radius)
       type(grid_type) :: grid
@@ -198,10 +205,10 @@ contains
       i = 1025 + nint(0.5_dp*a/grid%dx)
       call check_close(s%pressure(i, 1), 2.0_dp*load/(pi*a)*sqrt(0.75_dp), &
          5e-3_dp*2.0_dp*load/(pi*a), 'line: pressure at a/2')
-   end subroutine test_hertz_line
+   end subroutine hertz_cylinder_in_plane_strain
 
    !> A wave with kx and ky periods along the sides: Westergaard's pressure and mean gap.
-   subroutine test_westergaard(nx, ny, lx, ly, kx, ky)
+   subroutine westergaard_wave(nx, ny, lx, ly, kx, ky)
       integer, intent(in) :: nx, ny
       real(dp), intent(in) :: lx, ly
       integer, intent(in) :: kx, ky
@@ -242,10 +249,10 @@ contains
       call check_close(sum(s%gap)/size(p), gap, 2.0_dp*d*1.0_dp/cells, trim(name)//' mean gap')
       call check_close(count(s%pressure > 0.0_dp)/real(size(p), dp), 2.0_dp*half_width, &
          2.0_dp/cells, trim(name)//' contact')
-   end subroutine test_westergaard
+   end subroutine westergaard_wave
 
    !> Above the pressure that closes it, the pressure is p + A^-1 H, to round-off, at once.
-   subroutine test_full_contact()
+   subroutine full_contact_is_exact()
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
       type(solution_type) :: s
@@ -280,10 +287,10 @@ contains
       call run_problem(grid, problem, h, s)
       call check_that(s%outcome%converged, s%outcome%reason)
       call check_order(minval(s%pressure), '<=', 0.0_dp, 'not quite full contact')
-   end subroutine test_full_contact
+   end subroutine full_contact_is_exact
 
    !> Load to approach and back.
-   subroutine test_round_trip(boundary, nx, ny)
+   subroutine load_to_approach_and_back(boundary, nx, ny)
       integer, intent(in) :: boundary, nx, ny
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
@@ -316,10 +323,10 @@ contains
          call check_that(t%outcome%converged, 'thesis, approach: '//t%outcome%reason)
          call check_close(sum(t%pressure)/size(h)/load, 1.0_dp, 1e-5_dp, 'the same by the thesis')
       end do
-   end subroutine test_round_trip
+   end subroutine load_to_approach_and_back
 
    !> The error handed out is that of the definition; all tolerances are reached.
-   subroutine test_error_measure(boundary, nx, ny)
+   subroutine error_is_that_of_the_definition(boundary, nx, ny)
       integer, intent(in) :: boundary, nx, ny
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
@@ -334,7 +341,8 @@ contains
          problem%tolerance = 10.0_dp**(-k)
          call run_problem(grid, problem, h, s)
          call duality_gap(grid, unit_modulus, h, s%pressure, e1)
-         call check_that(s%outcome%converged .and. e1 <= problem%tolerance, 'a tolerance is reached')
+         call check_that(s%outcome%converged .and. e1 <= problem%tolerance, 'a tolerance is reached', &
+            [e1])
          call check_close(s%outcome%residual, max(e1, s%outcome%load_error), 1e-13_dp, 'e1')
          call check_close(sum(s%pressure)/size(h)/problem%target, 1.0_dp, &
             min(problem%tolerance, 1e-12_dp), 'the load')
@@ -345,14 +353,15 @@ contains
       problem%tolerance = 1e-6_dp
       call run_problem(grid, problem, h, s, .true.)
       call duality_gap(grid, unit_modulus, h, s%pressure, e1)
-      call check_that(s%outcome%converged .and. e1 <= problem%tolerance, 'thesis: the tolerance')
+      call check_that(s%outcome%converged .and. e1 <= problem%tolerance, 'thesis: the tolerance', &
+         [e1])
       call check_close(s%outcome%residual, max(e1, s%outcome%load_error), 1e-13_dp, 'thesis: e1')
-   end subroutine test_error_measure
+   end subroutine error_is_that_of_the_definition
 
    !> Small loads: A/A0 = kappa p/(E* h'rms), kappa between Persson's sqrt(8/pi) and Bush, Gibson and
    !> Thomas's sqrt(2 pi), once the strip of cells along the contact's edge is taken off: the part
    !> (pi - 1 + ln 2)/24 of the perimeter times dx (Yastrebov, Anciaux, Molinari 2017).
-   subroutine test_area_bracket()
+   subroutine area_at_small_loads_in_its_bracket()
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
       type(solution_type) :: s
@@ -374,7 +383,7 @@ contains
          call check_order(kappa, '>', sqrt(8.0_dp/pi), 'more than Persson''s area')
          call check_order(kappa, '<', sqrt(2.0_dp*pi), 'less than Bush, Gibson and Thomas''s area')
       end do
-   end subroutine test_area_bracket
+   end subroutine area_at_small_loads_in_its_bracket
 
    !> H = -r^2/(2R) about a centre, the nearest image along x.
    function paraboloid(grid, radius, centre_x, centre_y) result(h)

@@ -25,12 +25,15 @@ contains
 
       call begin_suite('normal_invariance')
       do boundary = boundary_periodic, boundary_free
-         if (selected('test_moves')) call test_moves(boundary)
-         if (selected('test_scales')) call test_scales(boundary)
-         if (selected('test_threads')) call test_threads(boundary)
-         if (selected('test_methods')) call test_methods(boundary)
-         if (selected('test_starts')) call test_starts(boundary)
-         if (selected('test_history')) call test_history(boundary)
+         if (selected('shifted_mirrored_and_transposed_agree')) &
+            call shifted_mirrored_and_transposed_agree(boundary)
+         if (selected('scaled_units_give_the_same_bits')) &
+            call scaled_units_give_the_same_bits(boundary)
+         if (selected('same_bits_on_two_threads')) call same_bits_on_two_threads(boundary)
+         if (selected('fast_and_thesis_agree')) call fast_and_thesis_agree(boundary)
+         if (selected('warm_starts_reach_the_same')) call warm_starts_reach_the_same(boundary)
+         if (selected('past_traction_is_like_a_height')) &
+            call past_traction_is_like_a_height(boundary)
       end do
    end subroutine run_normal_invariance
 
@@ -48,7 +51,7 @@ contains
    end subroutine set_problem
 
    !> Shift by whole cells, mirror, transpose.
-   subroutine test_moves(boundary)
+   subroutine shifted_mirrored_and_transposed_agree(boundary)
       integer, intent(in) :: boundary
       type(grid_type) :: grid, turned
       type(normal_problem_type) :: problem
@@ -74,10 +77,10 @@ contains
       call distance(grid, unit_modulus, h, s%pressure, transpose(t%pressure), d)
       call check_close(d, 0.0_dp, bound, 'transposed: the pressure')
       call check_close(t%level, s%level, 1e-6_dp*rms(h), 'transposed: the level')
-   end subroutine test_moves
+   end subroutine shifted_mirrored_and_transposed_agree
 
    !> Lengths by 4, moduli by 8: the same bits but for these factors.
-   subroutine test_scales(boundary)
+   subroutine scaled_units_give_the_same_bits(boundary)
       integer, intent(in) :: boundary
       type(grid_type) :: grid, large
       type(normal_problem_type) :: problem, scaled
@@ -104,10 +107,10 @@ contains
             1e-12_dp*maxval(s%pressure), 'scaled: the pressure')
          call check_close(maxval(abs(t%gap/4.0_dp - s%gap)), 0.0_dp, 1e-12_dp*rms(h), 'scaled: the gap')
       end do
-   end subroutine test_scales
+   end subroutine scaled_units_give_the_same_bits
 
    !> One thread and two: the same bits.
-   subroutine test_threads(boundary)
+   subroutine same_bits_on_two_threads(boundary)
       integer, intent(in) :: boundary
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
@@ -119,10 +122,10 @@ contains
          problem%tolerance = merge(1e-9_dp, 1e-4_dp, k == 1)
          call check_threads(grid, problem, h, thesis=k == 2, mixed=.false.)
       end do
-   end subroutine test_threads
+   end subroutine same_bits_on_two_threads
 
    !> 'fast' against 'thesis', from few to many contacts.
-   subroutine test_methods(boundary)
+   subroutine fast_and_thesis_agree(boundary)
       integer, intent(in) :: boundary
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
@@ -143,10 +146,10 @@ contains
          call check_order(s%outcome%iterations, '<', t%outcome%iterations, &
             'fast needs fewer iterations')
       end do
-   end subroutine test_methods
+   end subroutine fast_and_thesis_agree
 
    !> Warm starts: from the solution, from another load, from another place.
-   subroutine test_starts(boundary)
+   subroutine warm_starts_reach_the_same(boundary)
       integer, intent(in) :: boundary
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
@@ -159,7 +162,8 @@ contains
       call run_problem(grid, problem, h, s)
       call run_problem(grid, problem, h, t, start=s%pressure)
       call check_that(t%outcome%iterations == 0 .and. t%outcome%converged, 'from the solution: at once')
-      call check_that(all(abs(s%pressure - t%pressure) <= 0.0_dp), 'from the solution: untouched')
+      call check_that(all(abs(s%pressure - t%pressure) <= 0.0_dp), 'from the solution: untouched', &
+         [maxval(abs(s%pressure - t%pressure))])
       do k = 1, 3
          if (k == 1) call run_problem(grid, problem, h, t, start=1.001_dp*s%pressure)
          if (k == 2) call run_problem(grid, problem, h, t, start=cshift(s%pressure, 1, 1) - 1e-3_dp)
@@ -177,10 +181,10 @@ contains
       call check_close(d, 0.0_dp, bound, 'a little more load: the pressure')
       call check_order(t%outcome%iterations, '<', s%outcome%iterations, &
          'a little more load: fewer iterations')
-   end subroutine test_starts
+   end subroutine warm_starts_reach_the_same
 
    !> A memory P_h acts as a change of height A P_h/Q.
-   subroutine test_history(boundary)
+   subroutine past_traction_is_like_a_height(boundary)
       integer, intent(in) :: boundary
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
@@ -217,6 +221,6 @@ contains
          call check_close(d, 0.0_dp, bound, 'memory: the pressure')
          call check_close(s%level, t%level, 1e-6_dp*rms(h), 'memory: the level')
       end do
-   end subroutine test_history
+   end subroutine past_traction_is_like_a_height
 
 end module test_normal_invariance

@@ -25,25 +25,27 @@ contains
       call begin_suite('normal_limits')
       do k = 1, 2
          thesis = k == 2
-         if (selected('test_one_cell')) call test_one_cell(thesis)
-         if (selected('test_flat')) call test_flat(thesis)
-         if (selected('test_two_summits')) call test_two_summits(thesis)
-         if (selected('test_no_load')) call test_no_load(thesis)
-         if (selected('test_no_contact')) call test_no_contact(thesis)
-         if (selected('test_closed_gap')) call test_closed_gap(thesis)
-         if (selected('test_few_iterations')) call test_few_iterations(thesis)
+         if (selected('spike_carries_load_on_one_cell')) call spike_carries_load_on_one_cell(thesis)
+         if (selected('flat_surface_and_flat_punch')) call flat_surface_and_flat_punch(thesis)
+         if (selected('two_summits_share_the_load')) call two_summits_share_the_load(thesis)
+         if (selected('zero_load_just_touches')) call zero_load_just_touches(thesis)
+         if (selected('approach_that_does_not_reach')) call approach_that_does_not_reach(thesis)
+         if (selected('approach_that_closes_the_gap')) call approach_that_closes_the_gap(thesis)
+         if (selected('two_iterations_leave_a_usable_state')) &
+            call two_iterations_leave_a_usable_state(thesis)
       end do
-      if (selected('test_small_load')) call test_small_load()
-      if (selected('test_drowned_load')) call test_drowned_load()
-      if (selected('test_small_contact')) call test_small_contact()
-      if (selected('test_offset')) call test_offset()
-      if (selected('test_edge_of_map')) call test_edge_of_map()
-      if (selected('test_shapes')) call test_shapes()
-      if (selected('test_same_solver_again')) call test_same_solver_again()
+      if (selected('tiny_loads_end_on_the_highest_cell')) call tiny_loads_end_on_the_highest_cell()
+      if (selected('load_below_round_off_is_met')) call load_below_round_off_is_met()
+      if (selected('small_contact_on_a_tall_map')) call small_contact_on_a_tall_map()
+      if (selected('zero_of_heights_does_not_matter')) call zero_of_heights_does_not_matter()
+      if (selected('contact_at_the_edge_of_a_free_patch')) &
+         call contact_at_the_edge_of_a_free_patch()
+      if (selected('odd_prime_thin_and_stretched_grids')) call odd_prime_thin_and_stretched_grids()
+      if (selected('used_solver_starts_afresh')) call used_solver_starts_afresh()
    end subroutine run_normal_limits
 
    !> A spike: one cell carries the load, with its own influence coefficient as the compliance.
-   subroutine test_one_cell(thesis)
+   subroutine spike_carries_load_on_one_cell(thesis)
       logical, intent(in) :: thesis
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
@@ -74,10 +76,10 @@ contains
       end do
       ! In free mode it is Love's 4 (asinh(r) + r asinh(1/r)) of sides, here by the test of the operator.
       call check_order(own, '>', 0.0_dp, 'the compliance of a cell')
-   end subroutine test_one_cell
+   end subroutine spike_carries_load_on_one_cell
 
    !> A flat surface: uniform pressure where periodic, a punch with its singular edge where free.
-   subroutine test_flat(thesis)
+   subroutine flat_surface_and_flat_punch(thesis)
       logical, intent(in) :: thesis
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
@@ -101,7 +103,7 @@ contains
       problem%target = 0.02_dp
       call run_problem(grid, problem, h, s, thesis)
       call check_that(s%outcome%converged, 'punch: '//s%outcome%reason)
-      call check_that(all(s%pressure > 0.0_dp), 'punch: all in contact')
+      call check_that(all(s%pressure > 0.0_dp), 'punch: all in contact', [minval(s%pressure)])
       ! The map is one cell wider than its centres; the singular edge errs by ~ dx/L.
       call check_close(0.02_dp/(s%level - 2.0_dp), 1.153_dp, 0.03_dp, 'punch: stiffness')
       force = sum(s%pressure)
@@ -110,10 +112,10 @@ contains
       call run_problem(grid, problem, h, s, thesis)
       call check_that(s%outcome%converged, 'punch by approach: '//s%outcome%reason)
       call check_close(sum(s%pressure)/force, 1.0_dp, 1e-5_dp, 'punch: the load again')
-   end subroutine test_flat
+   end subroutine flat_surface_and_flat_punch
 
    !> Two equal summits share the load.
-   subroutine test_two_summits(thesis)
+   subroutine two_summits_share_the_load(thesis)
       logical, intent(in) :: thesis
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
@@ -136,10 +138,10 @@ contains
          call check_that(s%outcome%converged, 'two summits: '//s%outcome%reason)
          call check_close(sum(s%pressure(1:20, :))/sum(s%pressure), 0.5_dp, 1e-4_dp, 'half on each')
       end do
-   end subroutine test_two_summits
+   end subroutine two_summits_share_the_load
 
    !> A load of zero: first touch.
-   subroutine test_no_load(thesis)
+   subroutine zero_load_just_touches(thesis)
       logical, intent(in) :: thesis
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
@@ -152,14 +154,15 @@ contains
          call rough_problem(grid, 4.0_dp, 0.0_dp, problem, h)
          call run_problem(grid, problem, h, s, thesis)
          call check_that(s%outcome%converged, 'no load: '//s%outcome%reason)
-         call check_that(all(abs(s%pressure) <= 0.0_dp), 'no load: no pressure')
+         call check_that(all(abs(s%pressure) <= 0.0_dp), 'no load: no pressure', &
+            [maxval(abs(s%pressure))])
          call check_close(s%level, -maxval(h), 1e-15_dp, 'no load: first touch')
          call check_close(minval(s%gap), 0.0_dp, 1e-15_dp, 'no load: touching')
       end do
-   end subroutine test_no_load
+   end subroutine zero_load_just_touches
 
    !> An approach that does not reach.
-   subroutine test_no_contact(thesis)
+   subroutine approach_that_does_not_reach(thesis)
       logical, intent(in) :: thesis
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
@@ -174,13 +177,14 @@ contains
          problem%target = -maxval(h) - 0.01_dp
          call run_problem(grid, problem, h, s, thesis)
          call check_that(s%outcome%converged, 'no contact: '//s%outcome%reason)
-         call check_that(all(abs(s%pressure) <= 0.0_dp), 'no contact: no pressure')
+         call check_that(all(abs(s%pressure) <= 0.0_dp), 'no contact: no pressure', &
+            [maxval(abs(s%pressure))])
          call check_close(minval(s%gap), 0.01_dp, 1e-14_dp, 'no contact: the distance')
       end do
-   end subroutine test_no_contact
+   end subroutine approach_that_does_not_reach
 
    !> An approach that would leave no gap: nothing to be solved in periodic mode, and it says so.
-   subroutine test_closed_gap(thesis)
+   subroutine approach_that_closes_the_gap(thesis)
       logical, intent(in) :: thesis
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
@@ -196,17 +200,18 @@ contains
       call check_order(index(s%outcome%reason, 'full contact'), '>', 0, &
          'it says why: '//s%outcome%reason)
       call check_that(s%outcome%iterations == 0, 'it does not try')
-      call check_that(all(s%pressure >= 0.0_dp) .and. all(abs(s%gap) < 1.0_dp), 'a usable state')
+      call check_that(all(s%pressure >= 0.0_dp) .and. all(abs(s%gap) < 1.0_dp), 'a usable state', &
+         [minval(s%pressure), maxval(abs(s%gap))])
       ! A gap that is nearly closed has one. (The mean gap is 1 % of the rms height.)
       problem%target = -sum(h)/size(h) - 1e-2_dp*rms(h)
       problem%tolerance = 1e-8_dp
       call run_problem(grid, problem, h, s, thesis)
       call check_that(s%outcome%converged, 'nearly closed: '//s%outcome%reason)
       call check_close(sum(s%gap)/size(h), 1e-2_dp*rms(h), 1e-12_dp*rms(h), 'the mean gap')
-   end subroutine test_closed_gap
+   end subroutine approach_that_closes_the_gap
 
    !> Two iterations are not enough: the state is usable, better than the start, and honest.
-   subroutine test_few_iterations(thesis)
+   subroutine two_iterations_leave_a_usable_state(thesis)
       logical, intent(in) :: thesis
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
@@ -226,7 +231,7 @@ contains
       call check_close(s%outcome%residual, e1, 1e-12_dp*max(e1, 1.0_dp), 'the true error')
       call check_order(e1, '>', problem%tolerance, 'which is larger than wanted')
       call check_close(sum(s%pressure)/size(h), 0.005_dp, 1e-15_dp, 'the load is kept')
-      call check_that(all(s%pressure >= 0.0_dp), 'no tension')
+      call check_that(all(s%pressure >= 0.0_dp), 'no tension', [minval(s%pressure)])
       ! It is a start for going on.
       problem%max_iterations = 500
       call run_problem(grid, problem, h, t, thesis, start=s%pressure)
@@ -235,10 +240,10 @@ contains
       call run_problem(grid, problem, h, t, thesis)
       call check_that(.not. t%outcome%converged .and. t%outcome%iterations == 0, 'no iteration')
       call check_close(sum(t%pressure)/size(h), 0.005_dp, 1e-15_dp, 'the load of the start')
-   end subroutine test_few_iterations
+   end subroutine two_iterations_leave_a_usable_state
 
    !> Loads down to nothing end on the highest cell.
-   subroutine test_small_load()
+   subroutine tiny_loads_end_on_the_highest_cell()
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
       type(solution_type) :: s
@@ -259,10 +264,10 @@ contains
                'a small load: first touch')
          end do
       end do
-   end subroutine test_small_load
+   end subroutine tiny_loads_end_on_the_highest_cell
 
    !> Loads that drown in the round-off of a step are met all the same: on strips, and after larger ones.
-   subroutine test_drowned_load()
+   subroutine load_below_round_off_is_met()
       real(dp), parameter :: loads(6) = [2e-2_dp, 3e-8_dp, 1e-14_dp, 1e-5_dp, 2e-13_dp, 1e-1_dp]
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
@@ -291,10 +296,10 @@ contains
             start = s%pressure
          end do
       end do
-   end subroutine test_drowned_load
+   end subroutine load_below_round_off_is_met
 
    !> A small contact on a tall map is as exact as on a small map: of a paraboloid, five cells of radius.
-   subroutine test_small_contact()
+   subroutine small_contact_on_a_tall_map()
       integer, parameter :: sides(3) = [50, 160, 400]
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
@@ -334,10 +339,10 @@ contains
             end do
          end do
       end do
-   end subroutine test_small_contact
+   end subroutine small_contact_on_a_tall_map
 
    !> The height's zero is no matter.
-   subroutine test_offset()
+   subroutine zero_of_heights_does_not_matter()
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
       type(solution_type) :: s, t
@@ -356,10 +361,10 @@ contains
          call check_close(sum(abs(s%pressure - t%pressure))/sum(s%pressure), 0.0_dp, 1e-3_dp, &
             'far from zero: the pressure')
       end do
-   end subroutine test_offset
+   end subroutine zero_of_heights_does_not_matter
 
    !> A free patch that touches at its edge and corner, by load and approach.
-   subroutine test_edge_of_map()
+   subroutine contact_at_the_edge_of_a_free_patch()
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
       type(solution_type) :: s, t
@@ -394,10 +399,10 @@ contains
       call run_problem(grid, problem, h, t)
       call check_that(t%outcome%converged, 'corner by approach: '//t%outcome%reason)
       call check_close(sum(t%pressure)/force, 1.0_dp, 1e-5_dp, 'corner: the load again')
-   end subroutine test_edge_of_map
+   end subroutine contact_at_the_edge_of_a_free_patch
 
    !> Odd, prime, thin and stretched grids converge as the others do.
-   subroutine test_shapes()
+   subroutine odd_prime_thin_and_stretched_grids()
       integer, parameter :: shapes(2, 13) = reshape([ &
          1, 1, 2, 1, 1, 2, 2, 2, 3, 5, 97, 61, 64, 64, 127, 1, 1, 127, 512, 8, 8, 512, 257, 3, &
          3, 257], [2, 13])
@@ -411,7 +416,7 @@ contains
             end do
          end do
       end do
-   end subroutine test_shapes
+   end subroutine odd_prime_thin_and_stretched_grids
 
    !> Solve on a grid with dy = ratio dx.
    subroutine solve_shape(boundary, nx, ny, ratio)
@@ -451,7 +456,7 @@ contains
    end subroutine solve_shape
 
    !> A solver that is used again starts afresh.
-   subroutine test_same_solver_again()
+   subroutine used_solver_starts_afresh()
       type(grid_type) :: grid
       type(normal_solver_type) :: solver
       type(normal_problem_type) :: problem
@@ -473,11 +478,12 @@ contains
          problem%target = merge(0.05_dp, 0.002_dp, mod(k, 2) == 1)
          call solver%solve(problem, h, p, gap, level, outcome)
          call run_problem(grid, problem, h, s)
-         call check_that(all(abs(p - s%pressure) <= 0.0_dp), 'a used solver: the same pressure')
+         call check_that(all(abs(p - s%pressure) <= 0.0_dp), 'a used solver: the same pressure', &
+            [maxval(abs(p - s%pressure))])
          call check_that(outcome%ffts == s%outcome%ffts, 'a used solver: the same count')
          call check_order(outcome%seconds, '>', 0.0_dp, 'a used solver: its time')
       end do
       call solver%destroy()
-   end subroutine test_same_solver_again
+   end subroutine used_solver_starts_afresh
 
 end module test_normal_limits

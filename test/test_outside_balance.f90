@@ -15,15 +15,16 @@ contains
 
    subroutine run_outside_balance()
       call begin_suite('outside_balance')
-      if (selected('test_one_step')) call test_one_step()
-      if (selected('test_mindlin_loop')) call test_mindlin_loop()
-      if (selected('test_rough_sliding')) call test_rough_sliding()
-      if (selected('test_loss_never_falls')) call test_loss_never_falls()
-      if (selected('test_pull_off')) call test_pull_off()
+      if (selected('excess_and_radiation_of_one_row')) call excess_and_radiation_of_one_row()
+      if (selected('loss_of_a_mindlin_loop')) call loss_of_a_mindlin_loop()
+      if (selected('balance_on_a_rough_road')) call balance_on_a_rough_road()
+      if (selected('friction_loss_never_falls')) call friction_loss_never_falls()
+      if (selected('pull_off_radiates_the_stored_energy')) &
+         call pull_off_radiates_the_stored_energy()
    end subroutine run_outside_balance
 
    !> One row: what is excess, what is radiated, what a jump does.
-   subroutine test_one_step()
+   subroutine excess_and_radiation_of_one_row()
       type(history_row_type) :: before, row
 
       before%force = 2.0_dp
@@ -50,11 +51,11 @@ contains
       row%work_missing = 0.0_dp
       call book_outside(before, [1.0_dp, 0.0_dp], [2.0_dp, 7.0_dp], [0.0_dp, 0.0_dp], .true., .true., row)
       call check_close(row%work_load, 12.5_dp, 1e-14_dp, 'a jump works what it stores')
-   end subroutine test_one_step
+   end subroutine excess_and_radiation_of_one_row
 
    !> Mindlin's sphere to and fro, nu = 0: the energy lost in a loop is the area of the exact loop of the
    !> force over the motion (Mindlin and Deresiewicz 1953), however coarse the steps; the rest is the mesh's.
-   subroutine test_mindlin_loop()
+   subroutine loss_of_a_mindlin_loop()
       real(dp), parameter :: g = 1e6_dp, radius = 10e-3_dp, a = 1e-3_dp, mu = 0.01_dp
       real(dp), parameter :: full = mu*a**2/radius     !! road's motion to full slip, m
       integer, parameter :: steps(3) = [2, 4, 8]
@@ -77,7 +78,8 @@ contains
          associate (rows => record%rows, n => steps(k))
             errors(k) = (rows(3*n)%dissipated_friction - rows(n)%dissipated_friction)/exact - 1.0_dp
             call check_that(all(rows(1:)%dissipated_friction >= rows(:3*n - 1)%dissipated_friction), &
-               'Mindlin loop: the loss never falls')
+               'Mindlin loop: the loss never falls', &
+               [minval(rows(1:)%dissipated_friction - rows(:3*n - 1)%dissipated_friction)])
          end associate
       end do
       call check_close(maxval(errors), minval(errors), 1e-5_dp, 'Mindlin loop: the same loss in coarse and fine steps')
@@ -95,10 +97,10 @@ contains
             exact_text(part*full/abs(speed))//', steps = '//to_text(n)//' /'//nl
       end function leg
 
-   end subroutine test_mindlin_loop
+   end subroutine loss_of_a_mindlin_loop
 
    !> A rough viscoelastic road with friction in steady sliding at one cell a step.
-   subroutine test_rough_sliding()
+   subroutine balance_on_a_rough_road()
       type(record_type) :: record
       real(dp) :: lost, missing
 
@@ -113,11 +115,11 @@ contains
             0.0_dp, 1e-12_dp*b%work_drive, 'rough sliding: both views agree but for the work missing')
          call check_close(b%energy_radiated, 0.0_dp, 0.0_dp, 'rough sliding: nothing is radiated')
       end associate
-   end subroutine test_rough_sliding
+   end subroutine balance_on_a_rough_road
 
    !> What friction has lost never comes back: not where the load drops or rises while the road slides, nor
    !> where it turns.
-   subroutine test_loss_never_falls()
+   subroutine friction_loss_never_falls()
       type(record_type) :: record
       integer :: k
 
@@ -132,12 +134,12 @@ contains
          call check_order(record%rows(k)%dissipated_friction, '>=', record%rows(k - 1)%dissipated_friction, &
             'jumps and turns: row '//to_text(k))
       end do
-   end subroutine test_loss_never_falls
+   end subroutine friction_loss_never_falls
 
    !> A sphere pulled off by its displacement radiates what it has stored at the point of instability less
    !> the work of adhesion. Reference: JKR, with E = E* (a d^2 - 2 a^3 d/(3 R) + a^5/(5 R^2)) - pi w a^2 at
    !> the largest stretch, where d d/d a = 0; Tabor's parameter 3, so that JKR is met to some per cent.
-   subroutine test_pull_off()
+   subroutine pull_off_radiates_the_stored_energy()
       real(dp), parameter :: radius = 20e-6_dp, w = 0.05_dp, e_star = 4e6_dp, tabor = 3.0_dp
       type(record_type) :: record
       real(dp) :: a0, range, a, d, expected
@@ -166,9 +168,10 @@ contains
          call check_order(rows(k - 1)%contact_area, '>', 0.0_dp, &
             'pull-off: there was contact before')
          call check_that(all(rows(1:)%energy_radiated >= rows(:n - 1)%energy_radiated), &
-            'pull-off: what is radiated does not come back')
+            'pull-off: what is radiated does not come back', &
+            [minval(rows(1:)%energy_radiated - rows(:n - 1)%energy_radiated)])
       end associate
-   end subroutine test_pull_off
+   end subroutine pull_off_radiates_the_stored_energy
 
    !> A rough road under a viscoelastic block.
    function rough() result(text)

@@ -102,7 +102,8 @@ contains
          g(k) = 1.0e9_dp*tau(k)**(-0.3_dp)/1.0e2_dp
       end do
       call retardation_spectrum(1.0e6_dp, g, tau, lambda, strength, fluidity)
-      call check_that(all(lambda > tau) .and. all(lambda(:19) < tau(2:)), 'times interlace')
+      call check_that(all(lambda > tau) .and. all(lambda(:19) < tau(2:)), 'times interlace', &
+         [tau, lambda])
       call check_close(1.0_dp/sum([1.0e6_dp, g]) + sum(strength), 1.0e-6_dp, 1.0e-19_dp, &
          'J of infinite time is 1/G_e')
       do i = -48, 36

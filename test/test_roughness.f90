@@ -15,15 +15,16 @@ contains
 
    subroutine run_roughness()
       call begin_suite('roughness')
-      if (selected('test_one_wave')) call test_one_wave()
-      if (selected('test_profile')) call test_profile()
-      if (selected('test_normalisation')) call test_normalisation()
-      if (selected('test_isotropic_nayak')) call test_isotropic_nayak()
-      if (selected('test_free')) call test_free()
+      if (selected('measures_of_one_oblique_wave')) call measures_of_one_oblique_wave()
+      if (selected('measures_of_a_profile')) call measures_of_a_profile()
+      if (selected('parseval_counts_all_power_once')) call parseval_counts_all_power_once()
+      if (selected('nayak_parameter_of_isotropic_waves')) call nayak_parameter_of_isotropic_waves()
+      if (selected('free_map_has_no_differences_across_edges')) &
+         call free_map_has_no_differences_across_edges()
    end subroutine run_roughness
 
    !> One oblique wave: every measure in closed form.
-   subroutine test_one_wave()
+   subroutine measures_of_one_oblique_wave()
       type(grid_type) :: grid
       type(roughness_type) :: s
       type(error_type), allocatable :: error
@@ -60,10 +61,10 @@ contains
       call check_close(psd(38, 3), 0.0025_dp*6.0_dp, 1.0e-15_dp, 'psd at (-3, 2)')
       call check_close(psd(1, 1), 25.0_dp*6.0_dp, 1.0e-11_dp, 'psd of the mean')
       call check_close(sum(psd), 156.0_dp + 0.005_dp*6.0_dp - 6.0_dp, 1.0e-10_dp, 'no other mode')
-   end subroutine test_one_wave
+   end subroutine measures_of_one_oblique_wave
 
    !> A profile.
-   subroutine test_profile()
+   subroutine measures_of_a_profile()
       type(grid_type) :: grid
       type(roughness_type) :: s
       type(error_type), allocatable :: error
@@ -86,10 +87,10 @@ contains
       call check_that(size(k) == 16 .and. all(modes == 2), 'two modes a wave number')
       call check_close(k(4), wave, 1.0e-13_dp, 'wave number')
       call check_close(mean_psd(4), psd(5, 1), 1.0e-15_dp, 'psd of a profile by rings')
-   end subroutine test_profile
+   end subroutine measures_of_a_profile
 
    !> Parseval, on white noise, with Nyquist modes and without: all power is counted once.
-   subroutine test_normalisation()
+   subroutine parseval_counts_all_power_once()
       integer, parameter :: sizes(2, 4) = reshape([16, 12, 15, 12, 16, 9, 21, 15], [2, 4])
       type(grid_type) :: grid
       type(roughness_type) :: s
@@ -129,11 +130,11 @@ contains
             'rings sum to the variance')
          deallocate (h, psd)
       end do
-   end subroutine test_normalisation
+   end subroutine parseval_counts_all_power_once
 
    !> Three waves at 120 degrees are isotropic to fourth order: Nayak's parameter of a single |k|
    !> is 3/2, and two such shells give the closed form of their moments.
-   subroutine test_isotropic_nayak()
+   subroutine nayak_parameter_of_isotropic_waves()
       type(grid_type) :: grid
       type(roughness_type) :: s
       type(error_type), allocatable :: error
@@ -159,10 +160,10 @@ contains
       h = 2.0_dp
       call height_statistics(grid, h, s, error)
       call check_close(s%nayak + s%kurtosis + s%rms_slope, 0.0_dp, 0.0_dp, 'a flat map')
-   end subroutine test_isotropic_nayak
+   end subroutine nayak_parameter_of_isotropic_waves
 
    !> A free map's differences do not reach across its edges; a wrong shape is refused.
-   subroutine test_free()
+   subroutine free_map_has_no_differences_across_edges()
       type(grid_type) :: grid
       type(roughness_type) :: s
       type(error_type), allocatable :: error
@@ -180,6 +181,6 @@ contains
       call check_close(s%rms_slope_differences, 0.5_dp, 1.0e-14_dp, 'a free plane has its slope')
       call height_statistics(grid, h(:, :6), s, error)
       call check_error(error, 'shape', 'wrong shape')
-   end subroutine test_free
+   end subroutine free_map_has_no_differences_across_edges
 
 end module test_roughness

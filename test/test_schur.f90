@@ -27,14 +27,17 @@ contains
 
    subroutine run_schur()
       call begin_suite('schur')
-      if (selected('test_dense')) call test_dense(boundary_periodic, 24, 16, 1.0_dp)
-      if (selected('test_dense')) call test_dense(boundary_periodic, 23, 17, 1.5_dp)
-      if (selected('test_dense')) call test_dense(boundary_free, 19, 21, 1.0_dp)
-      if (selected('test_counts')) call test_counts()
+      if (selected('preconditioner_is_the_schur_complement')) &
+         call preconditioner_is_the_schur_complement(boundary_periodic, 24, 16, 1.0_dp)
+      if (selected('preconditioner_is_the_schur_complement')) &
+         call preconditioner_is_the_schur_complement(boundary_periodic, 23, 17, 1.5_dp)
+      if (selected('preconditioner_is_the_schur_complement')) &
+         call preconditioner_is_the_schur_complement(boundary_free, 19, 21, 1.0_dp)
+      if (selected('iterations_stay_few_at_every_load')) call iterations_stay_few_at_every_load()
    end subroutine run_schur
 
    !> M r is the Schur complement of the model, which is a dense matrix on a small grid.
-   subroutine test_dense(boundary, nx, ny, aspect)
+   subroutine preconditioner_is_the_schur_complement(boundary, nx, ny, aspect)
       integer, intent(in) :: boundary, nx, ny
       real(dp), intent(in) :: aspect                 !! dy/dx
       type(setting_type) :: s
@@ -81,7 +84,7 @@ contains
       call check_close(form, dot_product(r(on), exact), 1e-4_dp*form, 'and its form')
       call s%preconditioner%destroy()
       call s%coarse%destroy()
-   end subroutine test_dense
+   end subroutine preconditioner_is_the_schur_complement
 
    !> z = M r for a residual on a contact set; z is B v elsewhere.
    subroutine apply(s, r, inside, steps, z, form)
@@ -144,7 +147,7 @@ contains
    end function solved
 
    !> Few iterations at every load, where the residual is extended.
-   subroutine test_counts()
+   subroutine iterations_stay_few_at_every_load()
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
       type(solution_type) :: solution
@@ -159,6 +162,6 @@ contains
          call check_that(solution%outcome%converged, solution%outcome%reason)
          call check_order(solution%outcome%iterations, '<=', 13, 'few iterations at every load')
       end do
-   end subroutine test_counts
+   end subroutine iterations_stay_few_at_every_load
 
 end module test_schur

@@ -30,21 +30,21 @@ contains
 
    subroutine run_simulation()
       call begin_suite('simulation')
-      if (selected('test_lee_radok')) call test_lee_radok()
-      if (selected('test_several_arms')) call test_several_arms()
-      if (selected('test_order_in_mesh')) call test_order_in_mesh()
-      if (selected('test_order_in_time')) call test_order_in_time()
-      if (selected('test_ramped_sphere')) call test_ramped_sphere()
-      if (selected('test_many_decades')) call test_many_decades()
-      if (selected('test_area_after_a_drop')) call test_area_after_a_drop()
-      if (selected('test_books')) call test_books()
-      if (selected('test_split_arm')) call test_split_arm()
-      if (selected('test_relaxed')) call test_relaxed()
-      if (selected('test_loads')) call test_loads()
+      if (selected('lee_radok_sphere')) call lee_radok_sphere()
+      if (selected('lee_radok_with_several_arms')) call lee_radok_with_several_arms()
+      if (selected('order_in_the_mesh')) call order_in_the_mesh()
+      if (selected('orders_in_time_of_the_schemes')) call orders_in_time_of_the_schemes()
+      if (selected('sphere_under_a_growing_force')) call sphere_under_a_growing_force()
+      if (selected('many_decades_do_not_ring')) call many_decades_do_not_ring()
+      if (selected('area_never_falls_after_a_drop')) call area_never_falls_after_a_drop()
+      if (selected('work_agrees_with_that_of_the_load')) call work_agrees_with_that_of_the_load()
+      if (selected('split_and_reordered_arms_agree')) call split_and_reordered_arms_agree()
+      if (selected('relaxed_block_does_not_creep')) call relaxed_block_does_not_creep()
+      if (selected('loads_are_as_prescribed')) call loads_are_as_prescribed()
    end subroutine run_simulation
 
    !> Lee-Radok: a sphere under a constant load, a^3 = (3/16) R F J(t), approach a^2/R (thesis, 2.2.1).
-   subroutine test_lee_radok()
+   subroutine lee_radok_sphere()
       type(record_type) :: record
       real(dp), parameter :: thesis(3) = [0.015536e-3_dp, 0.030167e-3_dp, 0.034552e-3_dp]
       real(dp) :: a
@@ -69,10 +69,10 @@ contains
       call check_close(record%rows(last(record))%displacement*radius/a**2, 1.0_dp, 2e-4_dp, &
          'Lee-Radok: approach in the end')
       call check_books(record, 'Lee-Radok')
-   end subroutine test_lee_radok
+   end subroutine lee_radok_sphere
 
    !> Lee-Radok with arms from 1 ms to 1 s, in steps that grow from phase to phase.
-   subroutine test_several_arms()
+   subroutine lee_radok_with_several_arms()
       type(record_type) :: record
       real(dp), parameter :: g(4) = [0.4e6_dp, 0.3e6_dp, 0.2e6_dp, 0.1e6_dp]
       real(dp), parameter :: tau(4) = [1e-3_dp, 1e-2_dp, 1e-1_dp, 1.0_dp]
@@ -96,10 +96,10 @@ contains
       call check_close(worst, 0.0_dp, 1e-2_dp, 'four arms: approach')
       call check_close(record%rows(last(record))%time, 4.0_dp, 1e-14_dp, 'four arms: time')
       call check_books(record, 'four arms')
-   end subroutine test_several_arms
+   end subroutine lee_radok_with_several_arms
 
    !> The approach of a sphere against the number of cells over the contact.
-   subroutine test_order_in_mesh()
+   subroutine order_in_the_mesh()
       type(record_type) :: record
       integer, parameter :: cells(3) = [24, 48, 96]
       real(dp) :: errors(3)
@@ -115,12 +115,12 @@ contains
             **(2.0_dp/3.0_dp) - 1.0_dp)
       end do
       call check_that(errors(2) < errors(1)/1.8_dp .and. errors(3) < errors(2)/1.8_dp &
-         .and. errors(3) < errors(1)/6.0_dp, 'the approach converges with the mesh')
+         .and. errors(3) < errors(1)/6.0_dp, 'the approach converges with the mesh', errors)
       call check_close(errors(3), 0.0_dp, 2e-4_dp, 'approach with 75 cells over the contact')
-   end subroutine test_order_in_mesh
+   end subroutine order_in_the_mesh
 
    !> Orders in time on one mesh, against a run with fine steps: the error of the mesh cancels.
-   subroutine test_order_in_time()
+   subroutine orders_in_time_of_the_schemes()
       type(record_type) :: record
       real(dp) :: reference, errors(3)
       real(dp), parameter :: least(3) = [0.95_dp, 1.9_dp, 1.9_dp]
@@ -136,7 +136,7 @@ contains
          end do
          orders = log(errors(1:2)/errors(2:3))/log(2.0_dp)
          call check_that(minval(orders) > least(s) .and. maxval(orders) < most(s), &
-            trim(schemes(s))//': orders '//to_text(orders(1))//', '//to_text(orders(2)))
+            trim(schemes(s))//': orders '//to_text(orders(1))//', '//to_text(orders(2)), orders)
       end do
       call check_close(errors(1), 0.0_dp, 1e-4_dp, 'exponential2, a step of half a relaxation time')
 
@@ -153,10 +153,10 @@ contains
          displacement = record%rows(last(record))%displacement
       end function displacement
 
-   end subroutine test_order_in_time
+   end subroutine orders_in_time_of_the_schemes
 
    !> A sphere under a force that grows linearly: a^3 = (3/16) R (F/T) times the integral of J.
-   subroutine test_ramped_sphere()
+   subroutine sphere_under_a_growing_force()
       type(record_type) :: record
       real(dp), parameter :: j_glassy = 1e-6_dp, j_relaxed = 11e-6_dp, creep_time = 1.0_dp
       real(dp) :: t, integral, reference, worst
@@ -176,10 +176,10 @@ contains
       call check_close(record%rows(0)%displacement, 0.0_dp, 1e-12_dp, 'ramp: first touch')
       call check_close(worst, 0.0_dp, 1e-2_dp, 'ramp: approach')
       call check_books(record, 'ramp')
-   end subroutine test_ramped_sphere
+   end subroutine sphere_under_a_growing_force
 
    !> Twenty arms over 15 decades, in steps far longer than most relaxation times: no ringing.
-   subroutine test_many_decades()
+   subroutine many_decades_do_not_ring()
       type(record_type) :: record
       integer, parameter :: arms = 20
       real(dp) :: g(arms), tau(arms), reference, worst, growth, before
@@ -218,10 +218,10 @@ contains
          call check_close(worst, 0.0_dp, 0.015_dp, '20 arms, '//trim(schemes(s))//': approach')
          call check_books(record, '20 arms, '//trim(schemes(s)))
       end do
-   end subroutine test_many_decades
+   end subroutine many_decades_do_not_ring
 
    !> After a drop of load the contact area never falls again (arXiv 2511.19402).
-   subroutine test_area_after_a_drop()
+   subroutine area_never_falls_after_a_drop()
       type(record_type) :: record
       integer :: k, s, fallen
       real(dp) :: least
@@ -242,10 +242,10 @@ contains
          call check_that(fallen == 0, 'and never falls, '//trim(schemes(s)))
          call check_books(record, 'drop of load, '//trim(schemes(s)))
       end do
-   end subroutine test_area_after_a_drop
+   end subroutine area_never_falls_after_a_drop
 
    !> Work against the load's own: equal as the steps shrink; numerical loss only of backward Euler.
-   subroutine test_books()
+   subroutine work_agrees_with_that_of_the_load()
       type(record_type) :: record
       real(dp) :: difference(2), numerical(2)
       integer :: n, s
@@ -264,18 +264,18 @@ contains
          end do
          call check_that(difference(2) < 0.6_dp*difference(1) .and. difference(2) < 0.01_dp, &
             'work of the load and of the traction, '//trim(schemes(s))//': '//to_text(difference(1))// &
-            ', '//to_text(difference(2)))
+            ', '//to_text(difference(2)), difference)
          if (s == 1) then
             call check_that(numerical(1) > 0.0_dp .and. numerical(2) < 0.7_dp*numerical(1), &
-               'the numerical loss shrinks with the step')
+               'the numerical loss shrinks with the step', numerical)
          else
             call check_close(numerical(1), 0.0_dp, 0.0_dp, 'no numerical loss')
          end if
       end do
-   end subroutine test_books
+   end subroutine work_agrees_with_that_of_the_load
 
    !> One arm and the same arm in two; Zener branches and their Prony arms; the order of the arms.
-   subroutine test_split_arm()
+   subroutine split_and_reordered_arms_agree()
       type(record_type) :: one, two
       character(*), parameter :: phases = '&phase pressure = 40e3, duration = 0.1, steps = 10 /'//nl// &
          '&phase pressure = 10e3, duration = 0.1, steps = 5 /'//nl//'&solver tolerance = 1e-8 /'
@@ -293,10 +293,10 @@ contains
       call run_case(rough//'&material shear_modulus = 0.5e6, prony_g = 0.7e6, 1.0e6, '// &
          'prony_tau = 0.1, 1e-3 /'//nl//phases, 'two arms', two)
       call check_same_rows(one, two, 1e-9_dp, 'arms in another order')
-   end subroutine test_split_arm
+   end subroutine split_and_reordered_arms_agree
 
    !> A block long at rest holds its load without creep, like an elastic one of the long-term modulus.
-   subroutine test_relaxed()
+   subroutine relaxed_block_does_not_creep()
       type(record_type) :: rested, elastic
       integer :: k
 
@@ -314,10 +314,10 @@ contains
          end associate
       end do
       call check_books(rested, 'relaxed')
-   end subroutine test_relaxed
+   end subroutine relaxed_block_does_not_creep
 
    !> Loads as prescribed: ramps in each control, changes of control, phases that inherit.
-   subroutine test_loads()
+   subroutine loads_are_as_prescribed()
       type(record_type) :: record
       real(dp), parameter :: area = 1.2e-6_dp
       real(dp) :: start
@@ -366,6 +366,6 @@ contains
             6, 7, 7, 8, 8, 8]), 'phases of the rows')
       end associate
       call check_books(record, 'loads')
-   end subroutine test_loads
+   end subroutine loads_are_as_prescribed
 
 end module test_simulation

@@ -38,20 +38,23 @@ contains
 
    subroutine run_simulation_adhesion()
       call begin_suite('simulation_adhesion')
-      if (selected('test_controls')) call test_controls('periodic', wavy, '0.01', '0.4e-6', '0.55e-6')
-      if (selected('test_controls')) call test_controls('free', free_map//sphere, '0.05', '0.1e-6', '0.5e-6')
-      if (selected('test_work_of_the_load')) call test_work_of_the_load()
-      if (selected('test_pull_off')) call test_pull_off()
-      if (selected('test_detachment')) call test_detachment()
-      if (selected('test_hysteresis')) call test_hysteresis()
-      if (selected('test_viscoelastic_loop')) call test_viscoelastic_loop()
-      if (selected('test_sliding_elastic')) call test_sliding_elastic()
-      if (selected('test_sliding_viscoelastic')) call test_sliding_viscoelastic()
-      if (selected('test_sliding_friction')) call test_sliding_friction()
-      if (selected('test_no_energy')) call test_no_energy()
-      if (selected('test_repeated_rows')) call test_repeated_rows()
-      if (selected('test_pulled_from_the_start')) call test_pulled_from_the_start()
-      if (selected('test_advice')) call test_advice()
+      if (selected('controls_go_through_the_same_states')) &
+         call controls_go_through_the_same_states('periodic', wavy, '0.01', '0.4e-6', '0.55e-6')
+      if (selected('controls_go_through_the_same_states')) &
+         call controls_go_through_the_same_states('free', free_map//sphere, '0.05', '0.1e-6', '0.5e-6')
+      if (selected('force_is_derivative_of_energy')) call force_is_derivative_of_energy()
+      if (selected('pull_off_force_in_a_run')) call pull_off_force_in_a_run()
+      if (selected('detachment_is_reported')) call detachment_is_reported()
+      if (selected('wave_at_no_load_has_two_states')) call wave_at_no_load_has_two_states()
+      if (selected('loss_of_a_viscoelastic_pull_off')) call loss_of_a_viscoelastic_pull_off()
+      if (selected('elastic_state_moves_with_the_road')) call elastic_state_moves_with_the_road()
+      if (selected('drive_is_lost_in_the_solid')) call drive_is_lost_in_the_solid()
+      if (selected('books_close_with_friction_and_slope')) &
+         call books_close_with_friction_and_slope()
+      if (selected('no_energy_is_no_adhesion')) call no_energy_is_no_adhesion()
+      if (selected('repeated_load_changes_nothing')) call repeated_load_changes_nothing()
+      if (selected('first_load_may_be_a_pull')) call first_load_may_be_a_pull()
+      if (selected('warnings_match_the_formulas')) call warnings_match_the_formulas()
    end subroutine run_simulation_adhesion
 
    !> `&adhesion`
@@ -69,7 +72,7 @@ contains
    !> Pressure, force and displacement control go through the same states, elastic and viscoelastic, with
    !> closed books: to 1e-10 of the energies at a tolerance of 1e-8 (in periodic mode to round-off, in
    !> free mode the displacement of the pressure is within the tolerance of that handed out).
-   subroutine test_controls(what, place, gamma, low, high)
+   subroutine controls_go_through_the_same_states(what, place, gamma, low, high)
       character(*), intent(in) :: what, place, gamma, low, high
       type(record_type) :: led, pressed, pushed
       character(:), allocatable :: text, material, name
@@ -117,11 +120,11 @@ contains
          end do
       end function loads
 
-   end subroutine test_controls
+   end subroutine controls_go_through_the_same_states
 
    !> Elastic: the force is the derivative of the energy, adhesion included. The error of the trapezoidal
    !> work falls with the square of the step.
-   subroutine test_work_of_the_load()
+   subroutine force_is_derivative_of_energy()
       type(record_type) :: record
       real(dp) :: errors(2), change
       integer :: k
@@ -141,13 +144,13 @@ contains
       ! the contact edge jumps from cell to cell: not a smooth second order
       call check_order(errors(2), '<', errors(1)/2.5_dp, 'work of the load converges')
       call check_close(errors(2), 0.0_dp, 4e-3_dp, 'work of the load with 16 steps')
-   end subroutine test_work_of_the_load
+   end subroutine force_is_derivative_of_energy
 
    !> A Maugis-Dugdale sphere pulled off by its displacement: smooth, and the largest pull is that of
    !> theory, -1.95059 pi gamma_0 R for lambda = 0.1 and -1.60073 for 1 (lambda = sigma_0
    !> (9 R/(2 pi gamma_0 E*^2))^(1/3)), to 2 % with cells of 0.13 E* range^2/energy and to 3 % with cells
    !> of twice that: the width of the edge of the attraction frees it from the grid.
-   subroutine test_pull_off()
+   subroutine pull_off_force_in_a_run()
       real(dp) :: pulls(3)
 
       call pull_off('44', '60e-6', 0.1_dp, '0.0', '-0.4e-6', '-3.6e-6', pulls(1))
@@ -156,7 +159,7 @@ contains
       call pull_off('64', '36e-6', 1.0_dp, '0.1e-6', '-0.9e-6', '-1.3e-6', pulls(3))
       call check_close(pulls(3), -1.60073_dp, 0.02_dp*1.6_dp, 'pull-off force, lambda = 1')
       call check_close(pulls(2), -1.60073_dp, 0.03_dp*1.6_dp, 'pull-off force, lambda = 1, coarse')
-   end subroutine test_pull_off
+   end subroutine pull_off_force_in_a_run
 
    !> Pull a sphere off; the largest pull in pi gamma_0 R.
    subroutine pull_off(n, side, lambda, first, middle, final, pull)
@@ -175,14 +178,15 @@ contains
       call check_books(record, 'pull-off', 1e-7_dp)
       low = minloc(record%rows%force, 1) - 1
       pull = minval(record%rows%force)/unit_force
-      call check_that(low > 0 .and. low < last(record), 'the largest pull is within the path')
+      call check_that(low > 0 .and. low < last(record), 'the largest pull is within the path', &
+         [real(low, dp)])
       call check_that(record%rows(0)%contact_area > 0.0_dp .and. &
          record%rows(last(record))%contact_area <= 0.0_dp, 'the sphere lets go')
       call check_close(record%rows(last(record))%force, 0.0_dp, 1e-6_dp*unit_force, 'and is free')
    end subroutine pull_off
 
    !> Under a prescribed pull there is an end: told by name, with the rows before it as they were.
-   subroutine test_detachment()
+   subroutine detachment_is_reported()
       character(*), parameter :: pulls(5) = [character(8) :: '1e-5', '-1e-5', '-2e-5', '-2.9e-5', '-3e-5']
       type(case_type) :: case
       type(simulation_type) :: sim
@@ -212,14 +216,14 @@ contains
          end do
          ! JKR holds 1.5 pi gamma_0 R = 2.36e-5 N, DMT 3.14e-5 N
          call check_that(held >= 3 .and. held < 5 .or. m == 2 .and. held >= 2 .and. held < 5, &
-            'held up to a pull between JKR and DMT: '//to_text(held))
+            'held up to a pull between JKR and DMT: '//to_text(held), [real(held, dp)])
          call check_that(sim%reason == 'detached', 'detached: '//trim(sim%reason))
          call sim%destroy()
       end do
-   end subroutine test_detachment
+   end subroutine detachment_is_reported
 
    !> A wave at no load: the state depends on where it comes from, and both are minima.
-   subroutine test_hysteresis()
+   subroutine wave_at_no_load_has_two_states()
       type(record_type) :: apart, whole, thesis
       character(:), allocatable :: text
       character(*), parameter :: phases = '&phase pressure = 0.0 /'//nl//'&phase pressure = 2e3 /'
@@ -232,7 +236,8 @@ contains
       call check_books(apart, 'from apart')
       call check_books(whole, 'from full contact')
       call check_that(apart%rows(0)%contact_area > 0.0_dp .and. apart%rows(0)%contact_area < 0.9_dp, &
-         'from apart: a partial contact '//to_text(apart%rows(0)%contact_area))
+         'from apart: a partial contact '//to_text(apart%rows(0)%contact_area), &
+         [apart%rows(0)%contact_area])
       call check_close(whole%rows(0)%contact_area, 1.0_dp, 0.0_dp, 'from full contact: it stays full')
       call check_close(whole%rows(0)%mean_gap, 0.0_dp, 0.0_dp, 'from full contact: no gap')
       ! what full contact stores: 3 pi E* A^2/(32 wavelength) an area (thesis, 4.5.1)
@@ -242,11 +247,11 @@ contains
       call run_case(text//sticky('exponential', '0.1e-6', 'start = ''full_contact''')// &
          '&solver method = ''thesis'' /'//nl//phases, 'from full contact, thesis', thesis)
       call check_same_rows(whole, thesis, 1e-6_dp, 'from full contact, both methods')
-   end subroutine test_hysteresis
+   end subroutine wave_at_no_load_has_two_states
 
    !> A viscoelastic sphere pressed and pulled off at a constant speed, twice as slow: energy is lost with
    !> and without adhesion, more with it, and more at the slower parting than an elastic one.
-   subroutine test_viscoelastic_loop()
+   subroutine loss_of_a_viscoelastic_pull_off()
       type(record_type) :: bare, adhesive
       character(:), allocatable :: text
       real(dp) :: loss(2)
@@ -296,10 +301,10 @@ contains
          end do
       end function at
 
-   end subroutine test_viscoelastic_loop
+   end subroutine loss_of_a_viscoelastic_pull_off
 
    !> Elastic, without friction, oblique, whole cells: the state moves with the road.
-   subroutine test_sliding_elastic()
+   subroutine elastic_state_moves_with_the_road()
       type(record_type) :: record
       integer :: k
 
@@ -320,10 +325,10 @@ contains
                'sliding, elastic: the start is the solution')
          end do
       end associate
-   end subroutine test_sliding_elastic
+   end subroutine elastic_state_moves_with_the_road
 
    !> Viscoelastic, without friction, oblique: what drives is lost in the solid; adhesion makes it more.
-   subroutine test_sliding_viscoelastic()
+   subroutine drive_is_lost_in_the_solid()
       type(record_type) :: adhesive, bare
       character(:), allocatable :: text, phases
       real(dp) :: errors(2)
@@ -345,15 +350,15 @@ contains
       end do
       call check_that(errors(2) < errors(1)/1.4_dp .and. errors(2) < 0.03_dp, &
          'sliding, viscoelastic: the work of the drive converges: '//to_text(errors(1))//', '// &
-         to_text(errors(2)))
+         to_text(errors(2)), errors)
       call run_case(text//phases, 'sliding, viscoelastic, bare', bare)
       call check_that(adhesive%rows(last(bare))%friction > bare%rows(last(bare))%friction .and. &
          bare%rows(last(bare))%friction > 0.0_dp, &
          'sliding, viscoelastic: friction with and without adhesion')
-   end subroutine test_sliding_viscoelastic
+   end subroutine drive_is_lost_in_the_solid
 
    !> With friction and slope, oblique: books closed, and the bound uses the pressure of the wall.
-   subroutine test_sliding_friction()
+   subroutine books_close_with_friction_and_slope()
       type(record_type) :: record
       real(dp) :: wall
       integer :: n
@@ -379,10 +384,10 @@ contains
       call check_books(record, 'sliding, friction with slope')
       call check_order(record%rows(last(record))%dissipated_friction, '>', 0.0_dp, &
          'sliding, friction with slope: heat')
-   end subroutine test_sliding_friction
+   end subroutine books_close_with_friction_and_slope
 
    !> No energy: as without adhesion.
-   subroutine test_no_energy()
+   subroutine no_energy_is_no_adhesion()
       type(record_type) :: none, zero
       character(:), allocatable :: text, ending
       integer :: k
@@ -400,10 +405,10 @@ contains
             1e-4_dp, 'no energy: pressure')
          call check_close(maxval(abs(zero%rows%energy_adhesive)), 0.0_dp, 0.0_dp, 'no energy: no energy')
       end do
-   end subroutine test_no_energy
+   end subroutine no_energy_is_no_adhesion
 
    !> The same load again changes nothing, however often.
-   subroutine test_repeated_rows()
+   subroutine repeated_load_changes_nothing()
       type(record_type) :: record
       character(:), allocatable :: place, phases
       integer :: k, m
@@ -420,10 +425,10 @@ contains
                'rest: displacement')
          end do
       end do
-   end subroutine test_repeated_rows
+   end subroutine repeated_load_changes_nothing
 
    !> The first load is a pull: held from mere touch.
-   subroutine test_pulled_from_the_start()
+   subroutine first_load_may_be_a_pull()
       type(record_type) :: record, pressed
       character(:), allocatable :: text
       integer :: m
@@ -441,10 +446,10 @@ contains
          call check_close(record%rows(0)%contact_area, pressed%rows(1)%contact_area, 0.0_dp, &
             'pulled: area as after a load')
       end do
-   end subroutine test_pulled_from_the_start
+   end subroutine first_load_may_be_a_pull
 
    !> Warnings and notes, their numbers against sums over the map and the thesis's formulas.
-   subroutine test_advice()
+   subroutine warnings_match_the_formulas()
       type(case_type) :: case
       type(error_type), allocatable :: error
       character(:), allocatable :: notes
@@ -506,6 +511,6 @@ contains
          end do
       end function spectral_sum
 
-   end subroutine test_advice
+   end subroutine warnings_match_the_formulas
 
 end module test_simulation_adhesion

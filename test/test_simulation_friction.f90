@@ -31,22 +31,23 @@ contains
 
    subroutine run_simulation_friction()
       call begin_suite('simulation_friction')
-      if (selected('test_mindlin')) call test_mindlin()
-      if (selected('test_books')) call test_books()
-      if (selected('test_frictionless_slope')) call test_frictionless_slope()
-      if (selected('test_bound')) call test_bound()
-      if (selected('test_stick_and_slip')) call test_stick_and_slip()
-      if (selected('test_threads')) call test_threads()
-      if (selected('test_stick_slip')) call test_stick_slip()
-      if (selected('test_watch_warns_once')) call test_watch_warns_once()
-      if (selected('test_before_motion')) call test_before_motion()
-      if (selected('test_cylinder')) call test_cylinder()
+      if (selected('mindlin_sphere_driven_to_and_fro')) call mindlin_sphere_driven_to_and_fro()
+      if (selected('books_close_with_friction')) call books_close_with_friction()
+      if (selected('no_friction_is_only_the_slope')) call no_friction_is_only_the_slope()
+      if (selected('traction_is_within_its_bound')) call traction_is_within_its_bound()
+      if (selected('all_sticks_or_all_slips')) call all_sticks_or_all_slips()
+      if (selected('same_result_on_two_threads')) call same_result_on_two_threads()
+      if (selected('numerical_stick_slip_is_reported')) call numerical_stick_slip_is_reported()
+      if (selected('stick_slip_is_reported_once')) call stick_slip_is_reported_once()
+      if (selected('contact_sticks_until_the_road_moves')) &
+         call contact_sticks_until_the_road_moves()
+      if (selected('cylinder_of_the_thesis')) call cylinder_of_the_thesis()
    end subroutine run_simulation_friction
 
    !> The cylinder of thesis 3.5.1 in steady sliding. The viscous force is exact (Hunter 1961), 4.7106
    !> N/m; with it the totals are 154.71 N/m without slope and 166.89 N/m with it. At 96 cells over the
    !> contact and a period of 21 contacts the mesh and the images change the viscous part by 0.6 %.
-   subroutine test_cylinder()
+   subroutine cylinder_of_the_thesis()
       real(dp), parameter :: viscous = 4.7106_dp, totals(2) = [154.71_dp, 166.89_dp]
       real(dp), parameter :: load = 100.0_dp          !! N/m
       character(7), parameter :: slope(2) = ['.false.', '.true. ']
@@ -68,11 +69,11 @@ contains
             call check_close(row%stick_area, 0.0_dp, 0.0_dp, 'cylinder: all slips')
          end associate
       end do
-   end subroutine test_cylinder
+   end subroutine cylinder_of_the_thesis
 
    !> Mindlin's sphere, nu = 0: tangential force against the motion of the road, under way, back and
    !> there again (Mindlin and Deresiewicz 1953).
-   subroutine test_mindlin()
+   subroutine mindlin_sphere_driven_to_and_fro()
       real(dp), parameter :: g = 1e6_dp, radius = 10e-3_dp, a = 1e-3_dp, mu = 0.01_dp, v = 1e-3_dp
       real(dp), parameter :: full = mu*a**2/radius     !! road's motion to full slip, m
       type(record_type) :: record
@@ -119,10 +120,10 @@ contains
          loading = 1.0_dp - (1.0_dp - x)**1.5_dp
       end function loading
 
-   end subroutine test_mindlin
+   end subroutine mindlin_sphere_driven_to_and_fro
 
    !> The books close with friction, viscoelasticity, inertia and slope, and without slope.
-   subroutine test_books()
+   subroutine books_close_with_friction()
       type(record_type) :: record
 
       call run_case(block//rubber//'&friction law = ''coulomb'', coefficient = 0.6 /'//nl//drive// &
@@ -142,10 +143,10 @@ contains
             [0.4_dp, -0.15_dp]/hypot(0.4_dp, 0.15_dp))/row%pressure + row%friction_viscous, 1e-12_dp, &
             'without slope: sum of T and of -P grad H, once')
       end associate
-   end subroutine test_books
+   end subroutine books_close_with_friction
 
    !> mu = 0 with slope: the tangential force is that of no friction.
-   subroutine test_frictionless_slope()
+   subroutine no_friction_is_only_the_slope()
       type(record_type) :: record
 
       call run_case(block//rubber//'&friction law = ''coulomb'', coefficient = 0 /'//nl//drive// &
@@ -154,10 +155,10 @@ contains
          call check_close(row%friction, row%friction_viscous, 1e-12_dp, 'mu = 0: viscous friction only')
          call check_close(row%dissipated_friction, 0.0_dp, 1e-12_dp*row%work_normal, 'mu = 0: none lost')
       end associate
-   end subroutine test_frictionless_slope
+   end subroutine no_friction_is_only_the_slope
 
    !> Each row's traction lies within the bound of its pressure.
-   subroutine test_bound()
+   subroutine traction_is_within_its_bound()
       type(case_type) :: case
       type(simulation_type) :: sim
       type(error_type), allocatable :: error
@@ -188,10 +189,10 @@ contains
       call check_order(count(contact == 2_int8), '>', 0, 'bound: points slip')
       call check_close(worst, 0.0_dp, 1e-6_dp, 'traction within the bound of its pressure in each row')
       call sim%destroy()
-   end subroutine test_bound
+   end subroutine traction_is_within_its_bound
 
    !> All sticks under a huge coefficient, all slips after a long way: friction is then the coefficient.
-   subroutine test_stick_and_slip()
+   subroutine all_sticks_or_all_slips()
       type(record_type) :: record
 
       call run_case(block//'&material poisson = 0.4, shear_modulus = 1e6, thickness = 1e-3 /'//nl// &
@@ -212,10 +213,10 @@ contains
          call check_close(row%traction_y/row%traction_x, -0.15_dp/0.4_dp, 1e-3_dp, &
             'full slip: along the road''s motion')
       end associate
-   end subroutine test_stick_and_slip
+   end subroutine all_sticks_or_all_slips
 
    !> The result does not depend on the number of threads.
-   subroutine test_threads()
+   subroutine same_result_on_two_threads()
       type(record_type) :: one, two
       character(:), allocatable :: text
 
@@ -226,12 +227,12 @@ contains
       call set_threads(2)
       call run_case(text, 'two threads', two)
       call check_same_rows(one, two, 1e-12_dp, 'threads')
-   end subroutine test_threads
+   end subroutine same_result_on_two_threads
 
    !> A thick elastic block on a short wave in one pass a step, with the ripples that linear interpolation
    !> leaves on the friction from cell to cell: the scheme sticks and slips in turn,
    !> which is reported once. A mass ends it; a smooth case is silent.
-   subroutine test_stick_slip()
+   subroutine numerical_stick_slip_is_reported()
       character(*), parameter :: report = 'numerical stick-slip'
       type(record_type) :: record
       type(stick_slip_watch_type) :: watch
@@ -283,11 +284,11 @@ contains
             'stick-slip, density '//density, record)
       end subroutine slide
 
-   end subroutine test_stick_slip
+   end subroutine numerical_stick_slip_is_reported
 
    !> The watch warns once. (That the warning comes at the same step after a restart is tested with
    !> whole runs, in python/tests/test_stops.py.)
-   subroutine test_watch_warns_once()
+   subroutine stick_slip_is_reported_once()
       type(stick_slip_watch_type) :: watch
       character(:), allocatable :: message
       integer :: k, warnings
@@ -298,10 +299,10 @@ contains
          if (len(message) > 0) warnings = warnings + 1
       end do
       call check_that(warnings == 1, 'the watch warns once')
-   end subroutine test_watch_warns_once
+   end subroutine stick_slip_is_reported_once
 
    !> Where friction is on, what touches sticks until the road moves; without friction it slips.
-   subroutine test_before_motion()
+   subroutine contact_sticks_until_the_road_moves()
       character(*), parameter :: laws(3) = [character(60) :: &
          '&friction law = ''coulomb'', coefficient = 0.6 /', &
          '&friction law = ''constant_shear'', shear_strength = 1e5 /', '']
@@ -332,6 +333,6 @@ contains
             call sim%destroy()
          end do
       end do
-   end subroutine test_before_motion
+   end subroutine contact_sticks_until_the_road_moves
 
 end module test_simulation_friction

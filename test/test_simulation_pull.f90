@@ -18,21 +18,25 @@ contains
 
    subroutine run_simulation_pull()
       call begin_suite('simulation_pull')
-      if (selected('test_mindlin_cycle')) call test_mindlin_cycle()
-      if (selected('test_creep')) call test_creep()
-      if (selected('test_as_driven')) call test_as_driven('.true.', 'fast')
-      if (selected('test_as_driven')) call test_as_driven('.false.', 'fast')
-      if (selected('test_as_driven')) call test_as_driven('.true.', 'thesis')
-      if (selected('test_as_driven')) call test_as_driven('.false.', 'thesis')
-      if (selected('test_far_way')) call test_far_way()
-      if (selected('test_beyond')) call test_beyond()
-      if (selected('test_mass')) call test_mass()
-      if (selected('test_faults')) call test_faults()
+      if (selected('mindlin_cycle_under_a_force')) call mindlin_cycle_under_a_force()
+      if (selected('sticking_block_creeps')) call sticking_block_creeps()
+      if (selected('pulled_road_goes_as_a_driven_one')) &
+         call pulled_road_goes_as_a_driven_one('.true.', 'fast')
+      if (selected('pulled_road_goes_as_a_driven_one')) &
+         call pulled_road_goes_as_a_driven_one('.false.', 'fast')
+      if (selected('pulled_road_goes_as_a_driven_one')) &
+         call pulled_road_goes_as_a_driven_one('.true.', 'thesis')
+      if (selected('pulled_road_goes_as_a_driven_one')) &
+         call pulled_road_goes_as_a_driven_one('.false.', 'thesis')
+      if (selected('far_way_is_reported_once')) call far_way_is_reported_once()
+      if (selected('pull_beyond_friction_is_reported')) call pull_beyond_friction_is_reported()
+      if (selected('pulled_mass_accelerates')) call pulled_mass_accelerates()
+      if (selected('what_a_pull_excludes')) call what_a_pull_excludes()
    end subroutine run_simulation_pull
 
    !> Mindlin and Deresiewicz's sphere, nu = 0, under a force that goes there and back: the way of the
    !> road, and a loop that closes.
-   subroutine test_mindlin_cycle()
+   subroutine mindlin_cycle_under_a_force()
       type(record_type) :: record
       real(dp), parameter :: mu = 0.4_dp, modulus = 200e6_dp, radius = 50e-3_dp, load = 10.6667_dp
       real(dp), parameter :: part = 0.9_dp
@@ -65,11 +69,11 @@ contains
       call check_close(record%rows(30)%road_x, record%rows(6)%road_x, 1e-6_dp*full, 'Mindlin: a closed loop')
       call check_close(maxval(abs(record%rows%road_y)), 0.0_dp, 1e-12_dp*full, 'Mindlin: no way along y')
       call check_books(record, 'Mindlin')
-   end subroutine test_mindlin_cycle
+   end subroutine mindlin_cycle_under_a_force
 
    !> A block that sticks all over creeps by the creep function of its shear, and recovers when the pull
    !> ends.
-   subroutine test_creep()
+   subroutine sticking_block_creeps()
       type(record_type) :: record
       real(dp), parameter :: relaxed = 1e6_dp, glassy = 4e6_dp, thickness = 2e-3_dp, pull = 3e4_dp
       real(dp), parameter :: creep_time = 1e-2_dp*glassy/relaxed, hold = 0.08_dp
@@ -100,11 +104,11 @@ contains
          compliance = 1.0_dp/relaxed - (1.0_dp/relaxed - 1.0_dp/glassy)*exp(-time/creep_time)
       end function compliance
 
-   end subroutine test_creep
+   end subroutine sticking_block_creeps
 
    !> A rough road in partial slip, pulled obliquely by steps and ramps: driven by the velocities that
    !> were found it takes the forces that were asked for.
-   subroutine test_as_driven(slope_effect, method)
+   subroutine pulled_road_goes_as_a_driven_one(slope_effect, method)
       character(*), intent(in) :: slope_effect
       character(*), intent(in) :: method            !! of the solvers
       type(record_type) :: driven, pulled
@@ -150,10 +154,10 @@ contains
          'pulled along x only: the road goes on along y')
       call check_order(pulled%rows(4)%stick_area, '<', pulled%rows(4)%contact_area, &
          'pulled: something slips')
-   end subroutine test_as_driven
+   end subroutine pulled_road_goes_as_a_driven_one
 
    !> A pull that moves the road by more than a cell in a step is warned of once, with the step that would do.
-   subroutine test_far_way()
+   subroutine far_way_is_reported_once()
       type(record_type) :: far, near
       character(*), parameter :: start = '&grid nx = 16, ny = 12, lx = 1e-3 /'//nl// &
          '&surface shape = ''flat'' /'//nl//'&material shear_modulus = 1e6, thickness = 4e-3 /'//nl// &
@@ -170,10 +174,10 @@ contains
       call run_case(start//'&phase traction_x = 8e4, duration = 1, steps = 10 /', 'jump', far)
       call check_order(index(far%warnings, 'let the pull grow along a ramp'), '>', 0, &
          'a jump of the pull')
-   end subroutine test_far_way
+   end subroutine far_way_is_reported_once
 
    !> More than the friction holds: a row that has not converged, and a reason with the limit.
-   subroutine test_beyond()
+   subroutine pull_beyond_friction_is_reported()
       type(case_type) :: case
       type(simulation_type) :: sim
       type(error_type), allocatable :: error
@@ -196,10 +200,10 @@ contains
          index(sim%reason, 'holds at most 35000 Pa') > 0, 'beyond: the reason: '//trim(sim%reason))
       call check_close(sim%state%row%traction_y/sim%state%row%traction_x, 4.0_dp/3.0_dp, 1e-6_dp, 'beyond: the direction')
       call sim%destroy()
-   end subroutine test_beyond
+   end subroutine pull_beyond_friction_is_reported
 
    !> A block with mass that is pulled off at once: m a = F - mu p, and the strain of its rubber at once.
-   subroutine test_mass()
+   subroutine pulled_mass_accelerates()
       type(record_type) :: record
       real(dp), parameter :: acceleration = 2e4_dp, strained = 6e-5_dp
       integer :: k
@@ -219,10 +223,10 @@ contains
       end do
       call check_close(record%rows(last(record))%sliding_speed, record%rows(401)%sliding_speed, 0.1_dp, &
          'mass: a pull as large as the friction keeps the speed')
-   end subroutine test_mass
+   end subroutine pulled_mass_accelerates
 
    !> What a pull excludes and needs.
-   subroutine test_faults()
+   subroutine what_a_pull_excludes()
       character(*), parameter :: start = '&grid nx = 8, ny = 8, lx = 1e-3 /'//nl//'&surface shape = ''flat'' /'// &
          nl//'&material shear_modulus = 1e6 /'//nl
       character(*), parameter :: rubs = '&friction law = ''coulomb'', coefficient = 0.5 /'//nl
@@ -249,6 +253,6 @@ contains
          call check_error(error, message, message)
       end subroutine fails
 
-   end subroutine test_faults
+   end subroutine what_a_pull_excludes
 
 end module test_simulation_pull

@@ -20,13 +20,13 @@ contains
 
    subroutine run_starting_steps()
       call begin_suite('starting_steps')
-      if (selected('test_parts')) call test_parts()
-      if (selected('test_rates')) call test_rates()
-      if (selected('test_kinks')) call test_kinks()
+      if (selected('parts_lie_on_the_line_of_the_step')) call parts_lie_on_the_line_of_the_step()
+      if (selected('steps_that_begin_with_another_rate')) call steps_that_begin_with_another_rate()
+      if (selected('error_after_a_kink')) call error_after_a_kink()
    end subroutine run_starting_steps
 
    !> Load, road and time of the parts lie on the straight line of the step, and end where it does.
-   subroutine test_parts()
+   subroutine parts_lie_on_the_line_of_the_step()
       type(planned_row_type) :: plan
       type(planned_row_type), allocatable :: parts(:)
 
@@ -54,10 +54,10 @@ contains
       plan%instantaneous = .true.
       call split_start(plan, .true., .true., [0.0_dp, 0.0_dp], parts)
       call check_that(size(parts) == 1, 'a jump is not split')
-   end subroutine test_parts
+   end subroutine parts_lie_on_the_line_of_the_step
 
    !> Which steps begin with another rate of the load: none where a ramp goes on over two phases.
-   subroutine test_rates()
+   subroutine steps_that_begin_with_another_rate()
       type(phase_settings_type) :: phases(5)
       type(schedule_type) :: schedule
       type(planned_row_type) :: row
@@ -88,11 +88,11 @@ contains
          call check_that(row%new_rate .eqv. expected(k), 'new rate in step '//to_text(k))
       end do
       call check_that(finished .or. schedule%phase > 5, 'all rows are done')
-   end subroutine test_rates
+   end subroutine steps_that_begin_with_another_rate
 
    !> Up, down more slowly, and hold: 1, 3 and 5 arms. The worst row after the first kink, relative to the largest
    !> approach, in coarse and fine steps.
-   subroutine test_kinks()
+   subroutine error_after_a_kink()
       integer, parameter :: arms(3) = [1, 3, 5]
       integer, parameter :: steps(3) = [8, 16, 32]
       !> What coarse steps may miss. Going on with the curvature from before the kink misses 2.0e-3, 3.2e-3
@@ -165,7 +165,7 @@ contains
          constant = 1e6_dp*record%rows(0)%displacement
       end function elastic_constant
 
-   end subroutine test_kinks
+   end subroutine error_after_a_kink
 
    !> The integral of J(t - s) dF(s), J the creep compliance, for a force that grows by 1/s for a second, falls by 0.7/s
    !> for a second, and rests.

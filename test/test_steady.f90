@@ -33,23 +33,25 @@ contains
 
    subroutine run_steady()
       call begin_suite('steady')
-      if (selected('test_full_contact')) call test_full_contact()
-      if (selected('test_hunter')) call test_hunter()
-      if (selected('test_speed_limits')) call test_speed_limits()
-      if (selected('test_turned')) call test_turned()
-      if (selected('test_balance')) call test_balance()
-      if (selected('test_plane_strain')) call test_plane_strain()
-      if (selected('test_onward_in_time')) call test_onward_in_time()
-      if (selected('test_curve')) call test_curve()
-      if (selected('test_threads')) call test_threads()
-      if (selected('test_long_run')) call test_long_run()
-      if (selected('test_order')) call test_order()
-      if (selected('test_starts')) call test_starts()
-      if (selected('test_best_kept')) call test_best_kept()
+      if (selected('full_contact_with_a_wave')) call full_contact_with_a_wave()
+      if (selected('hunter_cylinder_in_steady_sliding')) call hunter_cylinder_in_steady_sliding()
+      if (selected('steady_state_at_rest_and_at_high_speed')) &
+         call steady_state_at_rest_and_at_high_speed()
+      if (selected('turned_and_mirrored_road')) call turned_and_mirrored_road()
+      if (selected('power_in_is_power_out')) call power_in_is_power_out()
+      if (selected('plane_strain_with_the_flat_law')) call plane_strain_with_the_flat_law()
+      if (selected('run_goes_on_from_the_steady_state')) call run_goes_on_from_the_steady_state()
+      if (selected('rows_of_a_curve_end_alike')) call rows_of_a_curve_end_alike()
+      if (selected('same_bits_on_two_threads')) call same_bits_on_two_threads()
+      if (selected('long_run_ends_in_the_steady_state')) call long_run_ends_in_the_steady_state()
+      if (selected('error_against_a_run_falls_with_steps')) &
+         call error_against_a_run_falls_with_steps()
+      if (selected('all_starts_end_in_one_state')) call all_starts_end_in_one_state()
+      if (selected('best_state_is_kept')) call best_state_is_kept()
    end subroutine run_steady
 
    !> Full contact with a wave: P = p + K^-1 H, so that friction is k^2 h^2 G''(k V)/(2 (1-nu) p).
-   subroutine test_full_contact()
+   subroutine full_contact_with_a_wave()
       type(record_type) :: record
       real(dp), parameter :: length = 10e-3_dp, height = 20e-6_dp, load = 2e5_dp, speed = 0.3_dp
       real(dp) :: exact, k
@@ -65,11 +67,11 @@ contains
       call check_close(record%rows(0)%friction/exact, 1.0_dp, 1e-12_dp, 'full contact: friction')
       call check_close(record%rows(0)%power_viscous/(exact*record%rows(0)%force*speed), 1.0_dp, 1e-12_dp, &
          'full contact: power')
-   end subroutine test_full_contact
+   end subroutine full_contact_with_a_wave
 
    !> Hunter's cylinder (Hunter, 1961) at three speeds, as in test_simulation_sliding; the periodic cell
    !> errs by 1/L^2.
-   subroutine test_hunter()
+   subroutine hunter_cylinder_in_steady_sliding()
       real(dp), parameter :: velocity(3) = [5e-3_dp, 20e-3_dp, 100e-3_dp]
       real(dp), parameter :: half_width(3) = [0.73826627e-3_dp, 0.67155531e-3_dp, 0.39313100e-3_dp]
       real(dp), parameter :: exact(3) = [0.0043374599_dp, 0.0154266908_dp, 0.0367341527_dp]
@@ -91,10 +93,10 @@ contains
          friction(1) = friction(2) + (friction(2) - friction(1))/3.0_dp
          call check_close(friction(1)/exact(k), 1.0_dp, 5e-4_dp, 'Hunter, steady')
       end do
-   end subroutine test_hunter
+   end subroutine hunter_cylinder_in_steady_sliding
 
    !> At rest a steady state is a relaxed one, very slow and very fast it is that of G_e and of G(0).
-   subroutine test_speed_limits()
+   subroutine steady_state_at_rest_and_at_high_speed()
       type(record_type) :: slow, fast, relaxed, rest, glassy
       character(*), parameter :: case = grid//road//rubber//'&solver tolerance = 1e-9 /'//nl
       character(*), parameter :: line = '&grid nx = 256, ny = 1, lx = 64e-3 /'//nl//road//rubber// &
@@ -119,10 +121,10 @@ contains
          1e-5_dp, 'fast as glassy')
       call check_order(abs(fast%rows(0)%friction), '<', 1e-6_dp, 'fast: no friction')
       call check_books(slow, 'slow')
-   end subroutine test_speed_limits
+   end subroutine steady_state_at_rest_and_at_high_speed
 
    !> The same road turned by 90 degrees and mirrored, with friction in an oblique direction.
-   subroutine test_turned()
+   subroutine turned_and_mirrored_road()
       type(record_type) :: straight, turned, mirrored
       real(dp) :: height(40, 32)
 
@@ -139,7 +141,7 @@ contains
          'mirrored: friction')
       call check_close(maxval(abs(mirrored%pressure(40:1:-1, :) - straight%pressure)) &
          /maxval(straight%pressure), 0.0_dp, 1e-6_dp, 'mirrored: pressure')
-   end subroutine test_turned
+   end subroutine turned_and_mirrored_road
 
    !> A smooth road without symmetry, m.
    function wavy(nx, ny) result(height)
@@ -179,7 +181,7 @@ contains
    end function slid
 
    !> Power in is power out, with the slope; without it the flat law leaves out a part.
-   subroutine test_balance()
+   subroutine power_in_is_power_out()
       type(record_type) :: slope, flat
       real(dp) :: drive
 
@@ -187,7 +189,8 @@ contains
       associate (row => slope%rows(0))
          drive = row%friction*row%force*hypot(0.8_dp, 0.3_dp)
          call check_close((row%power_viscous + row%power_friction)/drive, 1.0_dp, 1e-9_dp, 'balance: slope')
-         call check_that(row%power_viscous > 0.0_dp .and. row%power_friction > 0.0_dp, 'balance: losses')
+         call check_that(row%power_viscous > 0.0_dp .and. row%power_friction > 0.0_dp, 'balance: losses', &
+            [row%power_viscous, row%power_friction])
          call check_close(row%stick_area, 0.0_dp, 0.0_dp, 'all slips')
          call check_close(row%sliding_speed, hypot(0.8_dp, 0.3_dp), 1e-12_dp, 'sliding speed')
          call check_close(row%residual_tangential, 0.0_dp, 1e-8_dp, 'tangential residual')
@@ -199,11 +202,11 @@ contains
          call check_close((row%power_viscous + row%power_friction)/drive, 1.0_dp, 0.1_dp, 'balance: flat')
       end associate
       call check_books(slope, 'steady, slope')
-   end subroutine test_balance
+   end subroutine power_in_is_power_out
 
    !> Plane strain, nu = 1/2, flat law: T = mu P and A_xx = A_zz, so that U_x = mu U_z; the road is read
    !> at x + U_x, and stands further by the mean of U_x under the pressure.
-   subroutine test_plane_strain()
+   subroutine plane_strain_with_the_flat_law()
       type(record_type) :: record
 
       call run_case('&grid nx = 256, ny = 1, lx = 64e-3 /'//nl//'&surface shape = ''sine'', amplitude = '// &
@@ -216,11 +219,11 @@ contains
          call check_close(row%road_x/(0.5_dp*sum(record%pressure*record%displacement) &
             /sum(record%pressure)), 1.0_dp, 1e-6_dp, 'plane strain: U_x = mu U_z')
       end associate
-   end subroutine test_plane_strain
+   end subroutine plane_strain_with_the_flat_law
 
    !> A steady phase with a duration goes on from its state: nothing changes but by the error of the
    !> steps, while a start from rest is far away.
-   subroutine test_onward_in_time()
+   subroutine run_goes_on_from_the_steady_state()
       type(record_type) :: steady, rest
       character(*), parameter :: steps = 'velocity_x = 0.5, duration = 12e-3, steps = 6 /'
       character(*), parameter :: laws(2) = [character(80) :: '', &
@@ -243,12 +246,12 @@ contains
             'onward: stored energy')
          call check_books(steady, 'onward')
       end do
-   end subroutine test_onward_in_time
+   end subroutine run_goes_on_from_the_steady_state
 
    !> A long run in time, one cell a step, ends in the steady state of its own scheme: with the symbols of
    !> exponential2 the solver finds the same fields. With those of the continuum it differs by the error
    !> of the steps.
-   subroutine test_long_run()
+   subroutine long_run_ends_in_the_steady_state()
       character(*), parameter :: laws(3) = [character(80) :: '', &
          '&friction law = ''coulomb'', coefficient = 0.4, slope_effect = F /', &
          '&friction law = ''coulomb'', coefficient = 0.4 /']
@@ -298,11 +301,11 @@ contains
          end associate
       end subroutine compare
 
-   end subroutine test_long_run
+   end subroutine long_run_ends_in_the_steady_state
 
    !> The state at the end of a run in time differs from that of the continuum by the error of the steps
    !> and of the mesh, one cell a step: it falls nearly with the square of the cell.
-   subroutine test_order()
+   subroutine error_against_a_run_falls_with_steps()
       type(case_type) :: case
       type(simulation_type) :: sim
       type(steady_step_type) :: steady
@@ -331,10 +334,10 @@ contains
       end do
       order = log(difference(1)/difference(2))/log(2.0_dp)
       call check_close(order, 1.9_dp, 0.4_dp, 'order of the difference to a run in time')
-   end subroutine test_order
+   end subroutine error_against_a_run_falls_with_steps
 
    !> A cold start, one from another speed and one from another load end in one state.
-   subroutine test_starts()
+   subroutine all_starts_end_in_one_state()
       type(record_type) :: cold, speed, load
       character(*), parameter :: case = '&grid nx = 32, ny = 24, lx = 64e-3, ly = 48e-3 /'//nl// &
          '&surface shape = ''self_affine'', hurst = 0.8, wavelength_long = 48e-3, wavelength_short = 16e-3,'// &
@@ -353,11 +356,11 @@ contains
          'one state from another load')
       call check_close(speed%rows(1)%friction/cold%rows(0)%friction, 1.0_dp, 1e-6_dp, 'from another speed')
       call check_close(load%rows(1)%friction/cold%rows(0)%friction, 1.0_dp, 1e-6_dp, 'from another load')
-   end subroutine test_starts
+   end subroutine all_starts_end_in_one_state
 
    !> Where friction on the slope has no solution, more rounds never hand out a worse state; and the
    !> reason names the slopes.
-   subroutine test_best_kept()
+   subroutine best_state_is_kept()
       type(solver_result_type) :: normal, rubbing
       real(dp) :: missed(2)
       integer :: k
@@ -371,7 +374,7 @@ contains
       end do
       call check_order(missed(2), '<=', missed(1), &
          'wedged road: a better state is lost: '// to_text(missed(2))//' after '//to_text(missed(1)))
-   end subroutine test_best_kept
+   end subroutine best_state_is_kept
 
    !> Some rounds on a road steeper than 1/mu in places.
    subroutine wedge(rounds, normal, rubbing)
@@ -435,7 +438,7 @@ contains
    end subroutine find_steady
 
    !> The number of threads changes no bit.
-   subroutine test_threads()
+   subroutine same_bits_on_two_threads()
       type(record_type) :: one, two
       character(*), parameter :: case = '&grid nx = 132, ny = 128, lx = 132e-3 /'//nl//road//rubber// &
          '&friction law = ''coulomb'', coefficient = 0.3 /'//nl// &
@@ -452,10 +455,10 @@ contains
       call check_that(all(abs(one%pressure - two%pressure) <= 0.0_dp) .and. &
          all(abs(one%drag - two%drag) <= 0.0_dp) .and. &
          abs(one%rows(0)%power_viscous - two%rows(0)%power_viscous) <= 0.0_dp, 'threads')
-   end subroutine test_threads
+   end subroutine same_bits_on_two_threads
 
    !> Rows of a curve start from those before, and end where a row of its own ends.
-   subroutine test_curve()
+   subroutine rows_of_a_curve_end_alike()
       type(record_type) :: curve, alone
       character(*), parameter :: case = grid//road//rubber// &
          '&friction law = ''coulomb'', coefficient = 0.4, slope_effect = F / &solver tolerance = 1e-8 /'//nl
@@ -469,6 +472,6 @@ contains
       call check_close(curve%rows(3)%friction/alone%rows(0)%friction, 1.0_dp, 1e-6_dp, 'curve: friction')
       call check_order(curve%rows(3)%ffts, '<', alone%rows(0)%ffts, &
          'curve: fewer transforms, '// to_text(curve%rows(3)%ffts)//' for '//to_text(alone%rows(0)%ffts))
-   end subroutine test_curve
+   end subroutine rows_of_a_curve_end_alike
 
 end module test_steady

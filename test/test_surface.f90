@@ -24,24 +24,25 @@ contains
 
    subroutine run_surface()
       call begin_suite('surface')
-      if (selected('test_counter_random')) call test_counter_random()
-      if (selected('test_caps')) call test_caps()
-      if (selected('test_waves')) call test_waves()
-      if (selected('test_sum_and_rim')) call test_sum_and_rim()
-      if (selected('test_spectrum')) call test_spectrum()
-      if (selected('test_rms')) call test_rms()
-      if (selected('test_same_modes')) call test_same_modes()
-      if (selected('test_threads')) call test_threads()
-      if (selected('test_noise_is_gaussian')) call test_noise_is_gaussian()
-      if (selected('test_faults')) call test_faults()
-      if (selected('every_shape_can_be_checked_and_listed')) call every_shape_can_be_checked_and_listed()
-      if (selected('test_file')) call test_file()
-      if (selected('test_warnings')) call test_warnings()
-      if (selected('test_map_warnings')) call test_map_warnings()
+      if (selected('generator_is_splitmix64')) call generator_is_splitmix64()
+      if (selected('sphere_paraboloid_and_cylinder')) call sphere_paraboloid_and_cylinder()
+      if (selected('sine_and_hexagonal_wave')) call sine_and_hexagonal_wave()
+      if (selected('terms_add_up')) call terms_add_up()
+      if (selected('spectrum_mode_by_mode')) call spectrum_mode_by_mode()
+      if (selected('rms_height_and_slope_are_exact')) call rms_height_and_slope_are_exact()
+      if (selected('finer_grid_holds_the_same_surface')) call finer_grid_holds_the_same_surface()
+      if (selected('same_bits_on_two_threads')) call same_bits_on_two_threads()
+      if (selected('filtered_noise_is_gaussian')) call filtered_noise_is_gaussian()
+      if (selected('wrong_numbers_are_named')) call wrong_numbers_are_named()
+      if (selected('every_shape_can_be_checked_and_listed')) &
+         call every_shape_can_be_checked_and_listed()
+      if (selected('height_maps_from_files')) call height_maps_from_files()
+      if (selected('warnings_name_what_is_doubtful')) call warnings_name_what_is_doubtful()
+      if (selected('map_that_contradicts_the_case')) call map_that_contradicts_the_case()
    end subroutine run_surface
 
    !> The generator is SplitMix64: the first outputs from state 0 and 1234567 are known.
-   subroutine test_counter_random()
+   subroutine generator_is_splitmix64()
       real(dp) :: mean, variance, x
       integer :: i, n
 
@@ -63,10 +64,10 @@ contains
          mean = mean + uniform_number(row_key(i, 5), 2)/n
       end do
       call check_close(mean, 0.5_dp, 5.0_dp/sqrt(12.0_dp*n), 'uniform numbers over seeds: mean')
-   end subroutine test_counter_random
+   end subroutine generator_is_splitmix64
 
    !> Sphere, paraboloid, cylinder: values, summit on a cell, beyond the radius, images.
-   subroutine test_caps()
+   subroutine sphere_paraboloid_and_cylinder()
       type(grid_type) :: grid
       type(surface_settings_type) :: term
       type(error_type), allocatable :: error
@@ -111,10 +112,10 @@ contains
       term%centre_y = 3.0_dp
       call new_height(grid, [term], h, error)
       call check_close(h(5, 1), 0.0_dp, 0.0_dp, 'summit of a line contact')
-   end subroutine test_caps
+   end subroutine sphere_paraboloid_and_cylinder
 
    !> The sine, and the period of the hexagonal wave: lambda by lambda/sqrt(3).
-   subroutine test_waves()
+   subroutine sine_and_hexagonal_wave()
       type(grid_type) :: grid, larger
       type(surface_settings_type) :: term
       type(error_type), allocatable :: error
@@ -154,10 +155,10 @@ contains
       call check_close(h(i, j), 0.075_dp*(sin(2.0_dp*k*x) &
          - sin(k*(x + sqrt(3.0_dp)*y)) - sin(k*(x - sqrt(3.0_dp)*y))), 1.0e-15_dp, 'hexagonal wave')
       call check_close(maxval(more), 0.3_dp*0.75_dp**1.5_dp, 1.0e-3_dp, 'its highest value')
-   end subroutine test_waves
+   end subroutine sine_and_hexagonal_wave
 
    !> Terms add up.
-   subroutine test_sum_and_rim()
+   subroutine terms_add_up()
       type(grid_type) :: grid
       type(surface_settings_type) :: terms(3)
       type(error_type), allocatable :: error
@@ -181,10 +182,10 @@ contains
       call check_close(maxval(abs(h)), 0.0_dp, 0.0_dp, 'flat')
       call new_height(grid, terms(1:0), h, error)
       call check_that(size(h, 1) == 12 .and. size(h, 2) == 15, 'no term: a flat map')
-   end subroutine test_sum_and_rim
+   end subroutine terms_add_up
 
    !> The spectrum of a random_phase surface is eq. 1.6, mode by mode, for a surface and a profile.
-   subroutine test_spectrum()
+   subroutine spectrum_mode_by_mode()
       type(grid_type) :: grid
       type(surface_settings_type) :: term
       type(error_type), allocatable :: error
@@ -223,10 +224,10 @@ contains
       call height_psd(grid, h, psd, error)
       call check_close(psd(4, 1)/psd(7, 1), 1.0_dp, 1.0e-12_dp, 'plateau of a profile')
       call check_close(psd(13, 1)/psd(7, 1), 2.0_dp**(-2.4_dp), 1.0e-12_dp, 'a profile: -(1 + 2 H)')
-   end subroutine test_spectrum
+   end subroutine spectrum_mode_by_mode
 
    !> rms height and rms slope are exact: both generators, odd and even, not square, profiles.
-   subroutine test_rms()
+   subroutine rms_height_and_slope_are_exact()
       integer, parameter :: sizes(2, 4) = reshape([64, 48, 45, 33, 50, 1, 31, 32], [2, 4])
       character(16), parameter :: generators(2) = [character(16) :: 'random_phase', 'filtered_noise']
       type(grid_type) :: grid
@@ -258,10 +259,10 @@ contains
             call check_close(statistics%rms_slope, 0.3_dp, 1.0e-13_dp, 'rms slope')
          end do
       end do
-   end subroutine test_rms
+   end subroutine rms_height_and_slope_are_exact
 
    !> A finer grid holds the same surface; another seed does not.
-   subroutine test_same_modes()
+   subroutine finer_grid_holds_the_same_surface()
       type(grid_type) :: fine, grid
       type(surface_settings_type) :: term
       type(error_type), allocatable :: error
@@ -282,10 +283,10 @@ contains
       term%seed = 2
       call new_height(grid, [term], refined, error)
       call check_order(maxval(abs(refined - h)), '>', 0.5_dp, 'another seed, another surface')
-   end subroutine test_same_modes
+   end subroutine finer_grid_holds_the_same_surface
 
    !> The same surface bit for bit on any number of threads.
-   subroutine test_threads()
+   subroutine same_bits_on_two_threads()
       character(16), parameter :: generators(2) = [character(16) :: 'random_phase', 'filtered_noise']
       type(grid_type) :: grid
       type(surface_settings_type) :: term
@@ -311,10 +312,10 @@ contains
             trim(generators(g))//' on one and two threads')
       end do
       call omp_set_num_threads(threads)
-   end subroutine test_threads
+   end subroutine same_bits_on_two_threads
 
    !> Filtered noise is Gaussian: skewness 0, kurtosis 3, within the scatter of its number of modes.
-   subroutine test_noise_is_gaussian()
+   subroutine filtered_noise_is_gaussian()
       type(grid_type) :: grid
       type(surface_settings_type) :: term
       type(roughness_type) :: statistics
@@ -333,7 +334,7 @@ contains
       call height_statistics(grid, h, statistics, error)
       call check_close(statistics%skewness, 0.0_dp, 0.15_dp, 'skewness')
       call check_close(statistics%kurtosis, 3.0_dp, 0.3_dp, 'kurtosis')
-   end subroutine test_noise_is_gaussian
+   end subroutine filtered_noise_is_gaussian
 
    !> Each variable in the table of shapes is a variable of `&surface` in the reference, and one that
    !> is real can be read by its name. The variables that a shape needs belong to it.
@@ -371,7 +372,7 @@ contains
    end subroutine every_shape_can_be_checked_and_listed
 
    !> Wrong numbers are named, all at once.
-   subroutine test_faults()
+   subroutine wrong_numbers_are_named()
       type(grid_type) :: grid
       type(surface_settings_type) :: terms(2)
       type(error_type), allocatable :: error
@@ -407,10 +408,10 @@ contains
       terms(2)%wavelength_long = 0.01_dp
       call new_height(grid, terms(2:2), h, error)
       call check_error(error, 'no mode', 'an empty band')
-   end subroutine test_faults
+   end subroutine wrong_numbers_are_named
 
    !> Height maps from files: values, scale, orientation, names of datasets, everything that is wrong.
-   subroutine test_file()
+   subroutine height_maps_from_files()
       character(*), parameter :: path = 'build/test_surface.h5'
       type(grid_type) :: grid
       type(surface_settings_type) :: term
@@ -489,10 +490,10 @@ contains
       call check_error(error, 'file is missing', 'no file named')
       open (newunit=unit, file=path, status='old')
       close (unit, status='delete')
-   end subroutine test_file
+   end subroutine height_maps_from_files
 
    !> Warnings name what is doubtful, and are silent otherwise.
-   subroutine test_warnings()
+   subroutine warnings_name_what_is_doubtful()
       type(grid_type) :: grid
       type(surface_settings_type) :: term
       character(warning_length), allocatable :: warnings(:)
@@ -539,10 +540,10 @@ contains
       call find_warnings(grid, [term], warnings)
       call check_that(size(warnings) == 1 .and. index(warnings(1), 'ly') > 0, &
          'a hexagonal wave on a square')
-   end subroutine test_warnings
+   end subroutine warnings_name_what_is_doubtful
 
    !> A map that says of itself that it is of another size, unit or boundary.
-   subroutine test_map_warnings()
+   subroutine map_that_contradicts_the_case()
       character(*), parameter :: path = 'build/told_map.h5'
       type(grid_type) :: grid
       type(hdf5_file_type) :: file
@@ -580,6 +581,6 @@ contains
       close (unit, status='delete')
       call find_warnings(grid, [term], warnings)
       call check_that(size(warnings) == 0, 'a missing file is an error elsewhere')
-   end subroutine test_map_warnings
+   end subroutine map_that_contradicts_the_case
 
 end module test_surface

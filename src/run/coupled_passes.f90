@@ -23,6 +23,12 @@
 !> What remains is measured by the road read at U_T against the road solved on, `mismatch` below: the
 !> column `residual_coupling`.
 !>
+!> The loop of `solve` reads: do a pass at the place, and measure the mismatch that it leaves. If the mismatch is
+!> within the tolerance, and the solves of the pass were that accurate too, let the tractions settle, and the
+!> row is solved. Otherwise `pass_control` judges the pass, which sets the accuracy of the next one and how far
+!> to go, and `choose_place` goes to the next place. When the passes run out, the row keeps what the last pass,
+!> done at the best place, has left.
+!>
 !> Fields of doubles: two components each for the place, its residual and the best place; height and
 !> slopes of the check; and those of the acceleration.
 module coupled_passes
@@ -102,13 +108,14 @@ contains
       self%passes = 0
       do
          self%passes = self%passes + 1
+         ! Early passes are solved coarsely; what the row keeps is solved to the tolerance.
          if (self%passes == most) control%accuracy = min(control%accuracy, tolerance)
          call do_pass(self, contact, plan, control%accuracy, normal, rubbing)
          if (self%passes == 1 .and. .not. plan%instantaneous) contact%state%first_mismatch = self%residual
          if (self%passes == most .or. .not. normal%converged) exit
          if (control%accuracy <= tolerance .and. self%residual <= tolerance) then
             call settle(self, contact, plan, rubbing)
-            if (self%residual <= tolerance) return
+            if (self%residual <= tolerance) return       ! settling may have moved the surface a little
          end if
          call control%judge(self%residual)
          call choose_place(self, contact, control)

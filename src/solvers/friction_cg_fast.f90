@@ -15,6 +15,14 @@
 !>
 !> beta = 0 where more than a tenth of the contact left the bound, and after a shortened step.
 !>
+!> The same in words. `precondition` turns the slip that should vanish, g, into the change of traction z that
+!> would remove it if each point kept its state (M is about the inverse of A). `turn` adds a part of the last
+!> direction. `take_step` goes along d as far as the quadratic model says, and puts every point that has left
+!> its bound back on it. This changes states: a point that was put back slips from now on, and a slipping
+!> point whose slip has turned against its traction sticks. The slip of the new traction is then computed
+!> with A, and the measure of it gives the g of the next iteration. The loop ends when g is small at all
+!> points, which also means that no state would change any more.
+!>
 !> A thick block makes the mean mode h/G of a periodic operator its largest by far, which every
 !> masked field excites. It is taken out of g and z by the two fields e = w Z of uniform traction:
 !> with E = sum of w Z, H = A + lam and A ~ h/N on the mean, H e = (h/N) E + lam w Z and
