@@ -3,10 +3,11 @@ module test_field_sums
    use asperity_parallel, only : set_threads
    use asperity_precision, only : dp
    use check, only : begin_suite, check_close, check_that, selected
-   use field_sums, only : cell_count, field_count, field_maximum, field_mean, field_minimum, &
+   use field_sums, only : cell_count, field_count, field_magnitude, field_maximum, field_mean, field_minimum, &
       field_product, field_rms, field_sum, largest_of_rows, least_of_rows, row_total, row_totals
    use projection, only : project_simplex
    use regular_grid, only : boundary_free, grid_type, new_grid
+   use workspace, only : new_workspace, workspace_type
    implicit none
    private
 
@@ -20,7 +21,46 @@ contains
       if (selected('totals_of_rows')) call totals_of_rows()
       if (selected('known_fields')) call known_fields()
       if (selected('threads_do_not_matter')) call threads_do_not_matter()
+      if (selected('counts_and_magnitudes')) call counts_and_magnitudes()
+      if (selected('returned_fields_are_lent_again')) call returned_fields_are_lent_again()
    end subroutine run_field_sums
+
+   !> Counts per row add up, and the magnitude of a field is that of its least value where that is larger.
+   subroutine counts_and_magnitudes()
+      real(dp) :: field(3, 2)
+
+      call check_close(real(row_total([3, 0, 4]), dp), 7.0_dp, 0.0_dp, 'counts of rows')
+      field = reshape([1.0_dp, -5.0_dp, 2.0_dp, 0.0_dp, 4.0_dp, -1.0_dp], [3, 2])
+      call check_close(field_magnitude(field), 5.0_dp, 0.0_dp, 'largest magnitude')
+      field = 0.0_dp
+      call check_close(field_magnitude(field), tiny(1.0_dp), 0.0_dp, 'magnitude of zero')
+   end subroutine counts_and_magnitudes
+
+   !> Two fields that are lent at once are different memory; one that was given back serves again.
+   subroutine returned_fields_are_lent_again()
+      type(workspace_type) :: work
+      real(dp), pointer, contiguous :: one(:, :), other(:, :), third(:, :)
+
+      call new_workspace(work, 5, 3)
+      call work%lend('one', one)
+      call work%lend('other', other)
+      call check_that(all(shape(one) == [5, 3]), 'shape', real(shape(one), dp))
+      one = 1.0_dp
+      other = 2.0_dp
+      call check_close(maxval(abs(one - 1.0_dp)), 0.0_dp, 0.0_dp, 'fields of their own')
+      call work%take_back(one)
+      call check_that(.not. associated(one), 'the borrower has it no more')
+      call work%lend('third', third)
+      call check_close(real(work%most_lent(), dp), 2.0_dp, 0.0_dp, 'no more memory than is needed at once')
+      third = 3.0_dp
+      call check_close(maxval(abs(other - 2.0_dp)), 0.0_dp, 0.0_dp, 'a field in use is left alone')
+      call work%take_back(third)
+      call check_close(real(work%lent(), dp), 1.0_dp, 0.0_dp, 'still lent')
+      call work%take_back(other)
+      call check_close(real(work%lent(), dp), 0.0_dp, 0.0_dp, 'all are back')
+      call work%destroy()
+      call check_close(real(work%most_lent(), dp), 0.0_dp, 0.0_dp, 'freed')
+   end subroutine returned_fields_are_lent_again
 
    !> An oblong grid whose numbers of cells exceed the integers.
    subroutine the_grid_counts()

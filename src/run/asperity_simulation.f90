@@ -363,6 +363,7 @@ contains
       class(simulation_type), intent(inout) :: self
 
       call self%side%destroy()
+      call self%work%destroy()
       if (allocated(self%state)) deallocate (self%state)
       if (allocated(self%proposed)) deallocate (self%proposed)
       if (self%frictional) call self%tangential%destroy()

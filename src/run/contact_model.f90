@@ -26,6 +26,7 @@ module contact_model
    use viscoelastic_energy, only : book_step, new_books
    use arm_state, only : add_rows, commit_arm_row, new_arm_state, new_products, new_row_sums, &
       products_type
+   use workspace, only : new_workspace, workspace_type
    use zener, only : finish_step, is_elastic, new_zener, zener_type
    implicit none
    private
@@ -41,6 +42,7 @@ module contact_model
       type(tangential_step_type) :: tangential      !! the solver of friction, and its step in hand
       type(zener_type) :: material                  !! with the coefficients of the step in hand
       type(interpolation_type) :: road              !! the original map
+      type(workspace_type) :: work                  !! scratch fields of the stages of a step
       real(dp), allocatable :: height(:, :)         !! H under the rubber in the step in hand, m
       real(dp), allocatable :: slope_x(:, :)        !! of the road under the rubber, -
       real(dp), allocatable :: slope_y(:, :)
@@ -67,6 +69,7 @@ contains
 
       nx = self%grid%nx
       ny = self%grid%ny
+      call new_workspace(self%work, nx, ny)
       associate (case => self%case)
          edge = 0.0_dp
          if (case%adhesion%potential /= 'none') edge = adhesion_edge(case)

@@ -29,8 +29,8 @@
 !> to go, and `choose_place` goes to the next place. When the passes run out, the row keeps what the last pass,
 !> done at the best place, has left.
 !>
-!> Fields of doubles: two components each for the place, its residual and the best place; height and
-!> slopes of the check; and those of the acceleration.
+!> Fields of doubles: two components each for the place, its residual and the best place; and those of the
+!> acceleration. The check borrows three from the workspace of the contact.
 module coupled_passes
    use anderson, only : anderson_type, new_anderson
    use contact_model, only : contact_mean, contact_type, solve_normal
@@ -61,8 +61,6 @@ module coupled_passes
       real(dp), allocatable, private :: place(:, :, :)      !! z, m [nx, 2, ny]
       real(dp), allocatable, private :: residuals(:, :, :)  !! U_T, carried, less z, m
       real(dp), allocatable, private :: best_place(:, :, :) !! z of the least mismatch, m
-      real(dp), allocatable, private :: height(:, :)        !! of the road at U_T, m
-      real(dp), allocatable, private :: slope_x(:, :), slope_y(:, :)
       type(anderson_type), private :: mixing
    contains
       procedure :: solve
@@ -77,7 +75,6 @@ contains
 
       allocate (self%place(nx, 2, ny), source=0.0_dp)
       allocate (self%residuals, self%best_place, source=self%place)
-      allocate (self%height(nx, ny), self%slope_x(nx, ny), self%slope_y(nx, ny), source=0.0_dp)
       call new_anderson(self%mixing, nx, 2, ny, pairs)
       self%mixing%largest = largest_factor
    end subroutine new_coupled_passes
@@ -143,7 +140,7 @@ contains
       call contact%tangential%solve(contact%state%tangential, contact%state%pressure, contact%state%gap, &
          contact%slope_x, contact%slope_y, part)
       call add_result(rubbing, part)
-      self%residual = mismatch(self, contact, plan)
+      self%residual = mismatch(contact, plan)
    end subroutine do_pass
 
    !> Let the traction itself settle, which the passes do not need.
@@ -159,7 +156,7 @@ contains
       call contact%tangential%solve(contact%state%tangential, contact%state%pressure, contact%state%gap, &
          contact%slope_x, contact%slope_y, part)
       call add_result(rubbing, part)
-      self%residual = mismatch(self, contact, plan)
+      self%residual = mismatch(contact, plan)
    end subroutine settle
 
    !> The first place of a row: the displacement of the row before, moved along with the contact, which
@@ -217,27 +214,33 @@ contains
    !> What remains of the coupling: by how much the road at U_T differs from the road solved on. The
    !> larger of two means that are weighted by the pressure: the difference of the heights over the
    !> rms height of the map, and that of the slopes over the slopes in the contact.
-   function mismatch(self, contact, plan) result(residual)
-      class(coupled_passes_type), intent(inout) :: self
-      class(contact_type), intent(in) :: contact
+   function mismatch(contact, plan) result(residual)
+      class(contact_type), intent(inout) :: contact
       type(planned_row_type), intent(in) :: plan
       real(dp) :: residual
+      real(dp), pointer, contiguous :: height(:, :), slope_x(:, :), slope_y(:, :)     ! of the road at U_T
       real(dp), allocatable :: rows(:, :)
       real(dp) :: sums(4)
       integer :: j
 
+      call contact%work%lend('height at U_T', height)
+      call contact%work%lend('slope along x at U_T', slope_x)
+      call contact%work%lend('slope along y at U_T', slope_y)
       call displaced(contact%road, plan%road_x, plan%road_y, contact%tangential%trial(:, 1, :), &
-         contact%tangential%trial(:, 2, :), self%height, self%slope_x, self%slope_y)
+         contact%tangential%trial(:, 2, :), height, slope_x, slope_y)
       allocate (rows(4, contact%grid%ny))
-      !$omp parallel do default(none) shared(self, contact, rows) private(j)
+      !$omp parallel do default(none) shared(contact, height, slope_x, slope_y, rows) private(j)
       do j = 1, contact%grid%ny
          rows(1, j) = sum(abs(contact%state%pressure(:, j)))
-         rows(2, j) = sum(abs(contact%state%pressure(:, j)*(self%height(:, j) - contact%height(:, j))))
-         rows(3, j) = sum(abs(contact%state%pressure(:, j))*hypot(self%slope_x(:, j) - contact%slope_x(:, j), &
-            self%slope_y(:, j) - contact%slope_y(:, j)))
+         rows(2, j) = sum(abs(contact%state%pressure(:, j)*(height(:, j) - contact%height(:, j))))
+         rows(3, j) = sum(abs(contact%state%pressure(:, j))*hypot(slope_x(:, j) - contact%slope_x(:, j), &
+            slope_y(:, j) - contact%slope_y(:, j)))
          rows(4, j) = sum(abs(contact%state%pressure(:, j))*hypot(contact%slope_x(:, j), contact%slope_y(:, j)))
       end do
       sums = row_totals(rows)
+      call contact%work%take_back(height)
+      call contact%work%take_back(slope_x)
+      call contact%work%take_back(slope_y)
       residual = 0.0_dp
       if (.not. sums(1) > 0.0_dp) return
       residual = max(sums(2)/max(contact%rms_height*sums(1), tiny(1.0_dp)), &

@@ -49,31 +49,34 @@ contains
    subroutine shift_fields(self, cells)
       class(contact_type), intent(inout) :: self
       integer, intent(in) :: cells(2)
+      real(dp), pointer, contiguous :: moved(:, :)
       logical :: free
       integer :: c
 
       free = self%grid%boundary == boundary_free
-      call shift_field(cells, free, self%state%pressure)
-      if (self%side%adhesive .and. .not. free) call shift_field(cells, free, self%state%gap)
-      if (.not. self%rubs()) return
-      do c = 1, 2
-         call shift_field(cells, free, self%state%tangential%traction(:, c, :))
-         call shift_field(cells, free, self%state%tangential%before(:, c, :))
-      end do
-      call shift_states(cells, free, self%state%tangential%contact)
+      call self%work%lend('moved field', moved)
+      call shift_field(cells, free, self%state%pressure, moved)
+      if (self%side%adhesive .and. .not. free) call shift_field(cells, free, self%state%gap, moved)
+      if (self%rubs()) then
+         do c = 1, 2
+            call shift_field(cells, free, self%state%tangential%traction(:, c, :), moved)
+            call shift_field(cells, free, self%state%tangential%before(:, c, :), moved)
+         end do
+         call shift_states(cells, free, self%state%tangential%contact)
+      end if
+      call self%work%take_back(moved)
    end subroutine shift_fields
 
    !> Shift a field by whole cells; what enters a free map is zero.
-   subroutine shift_field(cells, free, field)
+   subroutine shift_field(cells, free, field, moved)
       integer, intent(in) :: cells(2)
       logical, intent(in) :: free
       real(dp), intent(inout) :: field(:, :)
-      real(dp), allocatable :: moved(:, :)
+      real(dp), intent(inout) :: moved(:, :)           !! scratch
       integer :: i, j, from_i, from_j, nx, ny
 
       nx = size(field, 1)
       ny = size(field, 2)
-      allocate (moved(nx, ny))
       !$omp parallel do default(none) shared(field, moved, cells, free, nx, ny) &
       !$omp private(i, j, from_i, from_j)
       do j = 1, ny

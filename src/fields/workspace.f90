@@ -1,0 +1,115 @@
+!> Scratch memory with an owner: fields that a procedure borrows under a name and gives back.
+!>
+!> The owner of a workspace hands it to the stages of its work. A stage borrows a field for as long as it needs
+!> one, under the name of what the field will hold, and gives it back before it ends. Fields that are given
+!> back serve the next stage, so that the memory is that of the stage that needs most. No stage therefore has
+!> to use a field of another one, or to keep a field that it needs for a moment only.
+!>
+!> A borrowed field holds what its last user has left. A workspace is not to be copied, and not to be used by
+!> several threads at once; the fields that it lends may be.
+module workspace
+   use asperity_precision, only : dp
+   implicit none
+   private
+
+   public :: workspace_type, new_workspace
+
+   !> A field that is lent, or waits for the next borrower.
+   type :: field_type
+      character(:), allocatable :: name                !! what it holds; '' while nobody has it
+      real(dp), pointer, contiguous :: values(:, :) => null()
+   end type field_type
+
+   !> The fields of one shape.
+   type :: workspace_type
+      private
+      integer :: nx = 0, ny = 0
+      type(field_type), allocatable :: fields(:)
+   contains
+      procedure :: lend
+      procedure :: take_back
+      procedure :: lent
+      procedure :: most_lent
+      procedure :: destroy
+   end type workspace_type
+
+contains
+
+   !> A workspace without fields. Each is made when it is first needed.
+   subroutine new_workspace(self, nx, ny)
+      type(workspace_type), intent(out) :: self
+      integer, intent(in) :: nx, ny                    !! shape of the fields
+
+      self%nx = nx
+      self%ny = ny
+      allocate (self%fields(0))
+   end subroutine new_workspace
+
+   !> Lend a field.
+   subroutine lend(self, name, field)
+      class(workspace_type), intent(inout) :: self
+      character(*), intent(in) :: name                 !! what it will hold
+      real(dp), pointer, contiguous, intent(out) :: field(:, :)   !! [nx, ny]
+      type(field_type), allocatable :: more(:)
+      integer :: k
+
+      do k = 1, size(self%fields)
+         if (self%fields(k)%name == '') exit
+      end do
+      if (k > size(self%fields)) then
+         allocate (more(k))
+         more(:k - 1) = self%fields
+         allocate (more(k)%values(self%nx, self%ny))
+         call move_alloc(more, self%fields)
+      end if
+      self%fields(k)%name = name
+      field => self%fields(k)%values
+   end subroutine lend
+
+   !> Take a field back from its borrower.
+   subroutine take_back(self, field)
+      class(workspace_type), intent(inout) :: self
+      real(dp), pointer, contiguous, intent(inout) :: field(:, :)
+      integer :: k
+
+      do k = 1, size(self%fields)
+         if (associated(field, self%fields(k)%values)) self%fields(k)%name = ''
+      end do
+      nullify (field)
+   end subroutine take_back
+
+   !> Number of fields that are lent.
+   pure function lent(self) result(number)
+      class(workspace_type), intent(in) :: self
+      integer :: number
+      integer :: k
+
+      number = 0
+      if (.not. allocated(self%fields)) return
+      do k = 1, size(self%fields)
+         if (self%fields(k)%name /= '') number = number + 1
+      end do
+   end function lent
+
+   !> Most fields that were ever lent at once: the memory of the workspace.
+   pure function most_lent(self) result(number)
+      class(workspace_type), intent(in) :: self
+      integer :: number
+
+      number = 0
+      if (allocated(self%fields)) number = size(self%fields)
+   end function most_lent
+
+   !> Free the fields; nobody may use them any more.
+   subroutine destroy(self)
+      class(workspace_type), intent(inout) :: self
+      integer :: k
+
+      if (.not. allocated(self%fields)) return
+      do k = 1, size(self%fields)
+         deallocate (self%fields(k)%values)
+      end do
+      deallocate (self%fields)
+   end subroutine destroy
+
+end module workspace
