@@ -2,8 +2,8 @@
 module test_friction_law
    use check, only : begin_suite, check_close, check_order, check_that, selected
    use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type, &
-      new_friction_law, return_tractions, unbounded
-   use friction_bounds, only : largest_excess
+      new_friction_law, unbounded
+   use friction_bounds, only : largest_excess, return_tractions
    use asperity_precision, only : dp, int8
    implicit none
    private

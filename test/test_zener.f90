@@ -8,7 +8,7 @@ module test_zener
    use prony, only : creep_compliance, relaxation_modulus, retardation_spectrum, zener_to_prony
    use relaxation_functions, only : mean_decay, mean_rise, parabola_work, slope_response, &
       steady_loss
-   use arm_state, only : arm_state_type, commit_arms, destroy_arm_state, new_arm_state, &
+   use arm_state, only : arm_state_type, commit_arms, new_arm_state, &
       new_products, past_traction, products_type
    use zener, only : finish_step, is_elastic, new_zener, restart_order, start_jump, start_relaxed, &
       start_step, zener_type
@@ -531,8 +531,6 @@ contains
             call finish_step(material)
             u = v
          end do
-         call destroy_arm_state(both)
-         call check_that(.not. allocated(both%arm), 'freed')
          call check_that((size(one%ds) > 0) .eqv. s == 3, 'only exponential2 keeps the last step')
          call commit_threads(one, material, p(:, 1, :), u(:, 1, :))
       end do

@@ -52,7 +52,7 @@ contains
          to_text(limit)//' m'//with_modulus(case)//': the edge of the contact sticks to the grid'
    end function adhesion_warning
 
-   !> Numbers that tell what adhesion will do, a line each without its end mark; empty without adhesion.
+   !> Numbers that show what adhesion will do, a line each without its end mark; empty without adhesion.
    function adhesion_notes(case) result(text)
       type(case_type), intent(in) :: case
       character(:), allocatable :: text
@@ -229,7 +229,7 @@ contains
       do i = 1, size(case%phases)
          if (case%phases(i)%control == 'pressure') pressure = max(pressure, case%phases(i)%target)
          if (case%phases(i)%control == 'force') pressure = max(pressure, &
-            case%phases(i)%target/(case%grid%lx*case%grid%ly))
+            case%phases(i)%target/case%grid%area())
       end do
    end function largest_pressure
 

@@ -279,7 +279,7 @@ contains
       if (self%entered) then
          self%speed_changed = self%speed_changed .or. abs(velocity(1) - self%velocity_x) > 0.0_dp .or. &
             abs(velocity(2) - self%velocity_y) > 0.0_dp
-         ! The road's place is reckoned from the start of the phase, as if it had always moved so.
+         ! The road's place is computed from the start of the phase, as if it had always moved so.
          elapsed = real(self%step, dp)/phases(self%phase)%steps*phases(self%phase)%duration
          self%start_x = road(1) - elapsed*velocity(1)
          self%start_y = road(2) - elapsed*velocity(2)

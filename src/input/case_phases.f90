@@ -151,7 +151,7 @@ contains
          if (phase%steady) call group%fault(name, 'excludes steady = .true., which needs a velocity', faults)
          if (group%bad(name)) cycle
          phase%pull(c) = group%real_value(name)
-         if (name == force .and. grid%nx > 0) phase%pull(c) = phase%pull(c)/(grid%lx*grid%ly)
+         if (name == force .and. grid%nx > 0) phase%pull(c) = phase%pull(c)/grid%area()
       end do
    end subroutine resolve_pull
 

@@ -15,7 +15,7 @@ module arm_state
    implicit none
    private
 
-   public :: add_rows, arm_state_type, commit_arm_row, commit_arms, destroy_arm_state, new_arm_state, &
+   public :: add_rows, arm_state_type, commit_arm_row, commit_arms, new_arm_state, &
       new_products, new_row_sums, past_traction, products_type
 
    integer, parameter :: piece = 1024               !! most cells of a row that are swept at once
@@ -70,16 +70,6 @@ contains
       self%ds = 0.0_dp
       self%arm = 0.0_dp
    end subroutine new_arm_state
-
-   !> Free the fields.
-   subroutine destroy_arm_state(self)
-      type(arm_state_type), intent(inout) :: self
-
-      self%cells = 0
-      self%row = 0
-      self%components = 0
-      if (allocated(self%s)) deallocate (self%s, self%ds, self%arm)
-   end subroutine destroy_arm_state
 
    !> Sums of zero.
    pure function new_products(material) result(products)

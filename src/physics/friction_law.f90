@@ -26,7 +26,7 @@ module friction_law
    implicit none
    private
 
-   public :: friction_law_type, new_friction_law, return_tractions
+   public :: friction_law_type, new_friction_law
 
    integer, parameter, public :: law_coulomb = 1            !! |T| <= mu P
    integer, parameter, public :: law_constant_shear = 2     !! |T| <= sigma_max
@@ -289,44 +289,5 @@ contains
          slip = r + slope*(slope(1)*r(1) + slope(2)*r(2))
       end if
    end function slip_along_slope
-
-   !> Give tractions to a new pressure: return them to its bound, and clear them outside the
-   !> contact. Points that were returned become slip points.
-   subroutine return_tractions(law, p, slope_x, slope_y, contact, tx, ty)
-      type(friction_law_type), intent(in) :: law
-      real(dp), intent(in) :: p(:, :)                       !! [nx, ny], Pa
-      real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)  !! [nx, ny]; any size without slope
-      !> [nx, ny] In: 0 open, else in contact; out: 0 open, 1 stick, 2 slip. Without adhesion a
-      !> point with p <= 0 is taken as open.
-      integer(int8), intent(inout) :: contact(:, :)
-      real(dp), intent(inout) :: tx(:, :), ty(:, :)         !! [nx, ny], Pa
-      real(dp) :: slope(2), t(2)
-      logical :: returned
-      integer :: i, j
-
-      slope = 0.0_dp
-      !$omp parallel do default(none) shared(law, p, slope_x, slope_y, contact, tx, ty) &
-      !$omp private(i, j, t, returned) firstprivate(slope)
-      do j = 1, size(p, 2)
-         do i = 1, size(p, 1)
-            if (p(i, j) <= 0.0_dp .and. law%adhesive_pressure <= 0.0_dp) then
-               contact(i, j) = contact_open
-            end if
-            if (contact(i, j) == contact_open) then
-               tx(i, j) = 0.0_dp
-               ty(i, j) = 0.0_dp
-            else
-               if (law%slope) slope = [slope_x(i, j), slope_y(i, j)]
-               t = [tx(i, j), ty(i, j)]
-               call law%return_to_bound(p(i, j), slope, t, returned)
-               if (returned) then
-                  contact(i, j) = contact_slip
-                  tx(i, j) = t(1)
-                  ty(i, j) = t(2)
-               end if
-            end if
-         end do
-      end do
-   end subroutine return_tractions
 
 end module friction_law

@@ -42,7 +42,7 @@ module asperity_simulation
    public :: new_simulation, simulation_type
 
    !> What may remain of the coupling where the case limits the passes and gives no `coupling_tolerance`:
-   !> the mean friction of a run is then right within 1 %. Above this a warning tells of what remains.
+   !> the mean friction of a run is then right within 1 %. Above this a warning says what remains.
    real(dp), parameter :: large_mismatch = 1.0e-2_dp
 
    !> A run in hand. Not to be copied; its state may be.
@@ -249,7 +249,7 @@ contains
          end if
          if (self%frictional) then
             call take_road(plan, state%schedule, self%tangential, self%rubs(), road, state%velocity)
-            call watch_way(plan, self%grid, road, state%told_way, message)
+            call watch_way(plan, self%grid, road, state%way_reported, message)
             call add_warning(self%warnings, state%schedule%row, plan%time, message)
          end if
       end associate
@@ -276,7 +276,7 @@ contains
    end subroutine judge
 
    !> A row whose passes leave more than the case allows has not converged. Where the case allows
-   !> much, a warning tells of what remains.
+   !> much, a warning says what remains.
    subroutine look_at_passes(self, plan, found)
       type(simulation_type), intent(inout) :: self
       type(planned_row_type), intent(in) :: plan
@@ -292,8 +292,8 @@ contains
             self%converged = .false.
             self%residual = left
             self%reason = 'the '//to_text(found%passes)//' passes of the step did not settle. '//advice
-         else if (left > large_mismatch .and. .not. self%state%told_passes) then
-            self%state%told_passes = .true.
+         else if (left > large_mismatch .and. .not. self%state%passes_reported) then
+            self%state%passes_reported = .true.
             message = 'the passes of the step did not settle: residual_coupling is '//to_text(left)// &
                ' after '//to_text(found%passes)//'. '//advice
             call add_warning(self%warnings, self%state%schedule%row, plan%time, message)

@@ -36,7 +36,7 @@ module case_run
       integer :: rows = 0                          !! rows of the whole run
       logical :: finished = .false.
       character(:), allocatable :: warnings        !! new ones, a line each; the caller clears them
-      character(:), allocatable, private :: told   !! all of them
+      character(:), allocatable, private :: all_warnings
       type(result_file_type), private :: result
       type(file_lock_type), private :: lock        !! no other run writes this result meanwhile
       character(:), allocatable, private :: path   !! of the result
@@ -66,7 +66,7 @@ contains
       call set_threads(case%solver%threads)
       self%path = trim(case%output%file)
       self%warnings = ''
-      self%told = ''
+      self%all_warnings = ''
       self%rows = count_rows(case%phases)
       self%finished = .false.
       self%next_time = 1
@@ -203,8 +203,8 @@ contains
          at = at + next
          read (line(min(6, len(line)):max(5, index(line, ',') - 1)), *, iostat=status) step
          if (status == 0 .and. step > self%sim%state%row%step) cycle
-         if (len(self%told) > 0) self%told = self%told//new_line('a')
-         self%told = self%told//line
+         if (len(self%all_warnings) > 0) self%all_warnings = self%all_warnings//new_line('a')
+         self%all_warnings = self%all_warnings//line
       end do
    end subroutine take_up_warnings
 
@@ -214,7 +214,7 @@ contains
       character(*), intent(in) :: outcome
       type(error_type), allocatable, intent(out) :: error
 
-      if (len(self%told) > 0) call self%result%write_text('run_warnings', self%told, error)
+      if (len(self%all_warnings) > 0) call self%result%write_text('run_warnings', self%all_warnings, error)
       if (.not. allocated(error)) call self%result%write_text('outcome', outcome, error)
    end subroutine leave_word
 
@@ -388,8 +388,8 @@ contains
       if (len(self%sim%warnings) == 0) return
       if (len(self%warnings) > 0) self%warnings = self%warnings//new_line('a')
       self%warnings = self%warnings//self%sim%warnings
-      if (len(self%told) > 0) self%told = self%told//new_line('a')
-      self%told = self%told//self%sim%warnings
+      if (len(self%all_warnings) > 0) self%all_warnings = self%all_warnings//new_line('a')
+      self%all_warnings = self%all_warnings//self%sim%warnings
       self%sim%warnings = ''
    end subroutine collect_warnings
 

@@ -4,7 +4,7 @@
 !> cells, 25 % at one and 55 % at 0.6, and on a rough road the contact area is then 10 % or more above
 !> that of a fine grid; at six cells across it is 3 to 8 % above it (tools/campaign_contact.py).
 !>
-!> How large the patches are is told by the runs of neighbouring cells that touch: a round patch of the
+!> The size of the patches follows from the runs of neighbouring cells that touch: a round patch of the
 !> diameter d has a mean chord of pi/4 d. The direction in which the patches are fewer cells across
 !> counts.
 module contact_size

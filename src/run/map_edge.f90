@@ -28,7 +28,7 @@ contains
       real(dp), intent(in) :: range                  !! of adhesion, m; 0: there is none
       real(dp), intent(in) :: rms_height             !! of the road, m
       real(dp), intent(in) :: move(2)                !! of the road in the step, m
-      type(state_type), intent(inout) :: state       !! `edge` says what was found so far; only worse is told
+      type(state_type), intent(inout) :: state       !! `edge` says what was found so far; only a worse finding is reported
       character(:), allocatable, intent(inout) :: message   !! a line is added; without the time
       real(dp) :: depth, least, near, reach
       logical :: adhesive
@@ -41,7 +41,7 @@ contains
       call scan_edge(grid, adhesive, [wx, wy], state, touching, least)
       if (touching > 0 .and. state%edge < edge_touches) then
          state%edge = edge_touches
-         call tell(to_text(touching)//' cells at the edge of the free map touch; what touches beyond '// &
+         call add_line(to_text(touching)//' cells at the edge of the free map touch; what touches beyond '// &
             'the map is left out: a larger map is needed')
       else if (any(abs(move) > 0.0_dp) .and. state%edge < edge_near) then
          reach = out_of_reach*range
@@ -50,7 +50,7 @@ contains
          near = max(well_below*min(depth, rms_height), reach)
          if (least >= near) return
          state%edge = edge_near
-         call tell('points enter or leave the free map only '//to_text(least)// &
+         call add_line('points enter or leave the free map only '//to_text(least)// &
             ' m below the rubber, which is displaced by '//to_text(depth)//' m under the load: less than '// &
             to_text(near)//' m is near, a larger map is needed')
       end if
@@ -58,12 +58,12 @@ contains
    contains
 
       !> Add a line.
-      subroutine tell(line)
+      subroutine add_line(line)
          character(*), intent(in) :: line
 
          if (len(message) > 0) message = message//new_line('a')
          message = message//line
-      end subroutine tell
+      end subroutine add_line
 
    end subroutine look_at_edge
 

@@ -17,7 +17,7 @@
 !>   step leads a little further to the other state. The passes go back to the best place and on without
 !>   acceleration (`plain`), with a momentum that grows as long as the residual keeps its direction and
 !>   vanishes where it turns. When the mismatch has fallen to a tenth, or after `stalled_plain` passes,
-!>   the acceleration begins anew from the place reached; what was the best place before is forgotten,
+!>   the acceleration begins again from the place reached; what was the best place before is forgotten,
 !>   since it belongs to the state that ended.
 module pass_control
    use asperity_precision, only : dp
@@ -47,7 +47,7 @@ module pass_control
       real(dp) :: accuracy = coarsest               !! of the solves of the next pass
       real(dp) :: damping = 1.0_dp                  !! of the step to the next place
       real(dp) :: momentum = 0.0_dp                 !! of the plain steps
-      logical :: forget = .false.                   !! the acceleration starts anew
+      logical :: forget = .false.                   !! the acceleration starts again
       logical :: go_back = .false.                  !! to the best place so far
       logical :: plain = .false.                    !! the steps are not accelerated
       logical :: best_yet = .false.                 !! the last pass was the best
@@ -129,7 +129,7 @@ contains
       self%plain_start = self%least
    end subroutine go_plain
 
-   !> End the plain steps: the acceleration begins anew from here.
+   !> End the plain steps: the acceleration begins again from here.
    pure subroutine accelerate(self, mismatch)
       class(pass_control_type), intent(inout) :: self
       real(dp), intent(in) :: mismatch

@@ -2,7 +2,7 @@
 !> it has been found.
 !>
 !> The tangential solver finds how far the road has moved in a row (modules `friction_pull`,
-!> `tangential_step`). Until then the row is reckoned with a guess, the motion of the last step. The
+!> `tangential_step`). Until then the row is computed with a guess, the motion of the last step. The
 !> guess changes no result beyond the tolerance: heights are read at U_T - D, which the tangential
 !> solver returns without the guess.
 module pulled_road
@@ -75,21 +75,21 @@ contains
 
    !> Warn once where a pull moves the road so far in a step that the contact is not followed. The steps of
    !> a road that is driven are known beforehand (module `case_phases`); those of a pulled one are not.
-   subroutine watch_way(plan, grid, road, told, message)
+   subroutine watch_way(plan, grid, road, reported, message)
       type(planned_row_type), intent(in) :: plan
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: road(2)               !! displacement of the road at the last row, m
-      logical, intent(inout) :: told                !! the warning has been given
+      logical, intent(inout) :: reported            !! the warning has been given
       character(:), allocatable, intent(out) :: message
       real(dp), parameter :: followed = 1.0_dp      !! cells per step
       real(dp) :: cells
 
       message = ''
-      if (told .or. .not. any(plan%pulled)) return
+      if (reported .or. .not. any(plan%pulled)) return
       cells = abs(plan%road_x - road(1))/grid%dx
       if (grid%ny > 1) cells = max(cells, abs(plan%road_y - road(2))/grid%dy)
       if (cells <= followed) return
-      told = .true.
+      reported = .true.
       message = 'the pull moves the road by '//to_text(cells)//' cells in a step; the contact is well '// &
          'followed up to one cell per step: '
       if (plan%dt > 0.0_dp) then

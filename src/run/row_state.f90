@@ -44,8 +44,8 @@ module row_state
       real(dp) :: drifted(2) = 0.0_dp               !! sum of the expected motions of the surface, m
       integer :: moved_cells(2) = 0                 !! by which P has been shifted so far
       real(dp) :: first_mismatch = 1.0_dp           !! left by the first pass of the last step
-      logical :: told_passes = .false.              !! a warning has told of passes that did not settle
-      logical :: told_way = .false.                 !! a warning has told of a pull that moves the road far
+      logical :: passes_reported = .false.              !! passes that did not settle have been warned of
+      logical :: way_reported = .false.                 !! a pull that moves the road far has been warned of
       type(stick_slip_watch_type) :: watch          !! what has been seen of the mean slip
       real(dp) :: widest = 0.0_dp                   !! cells across a patch of contact, at the end of a phase
       integer :: edge = edge_clear                  !! worst found at the edge of a free map
@@ -81,9 +81,9 @@ contains
       call table%add('stick_slip/speed', state%watch%speed, 'm/s', 'mean slip speed')
       call table%add('stick_slip/change', state%watch%change, 'm/s', 'its change in the last step')
       call table%add('stick_slip/turns', state%watch%turns, 'alternations of that change')
-      call table%add('passes/reported', state%told_passes, &
+      call table%add('passes/reported', state%passes_reported, &
          'passes that did not settle have been warned of')
-      call table%add('pull/reported', state%told_way, 'a pull that moves the road far has been warned of')
+      call table%add('pull/reported', state%way_reported, 'a pull that moves the road far has been warned of')
       call table%add('passes/first_mismatch', state%first_mismatch, '1', &
          'mismatch that the first pass of the last step left')
 

@@ -46,7 +46,7 @@ contains
    !> The parts of a step, or the step itself where it needs none.
    pure subroutine split_start(plan, starts, extrapolates, road, parts)
       type(planned_row_type), intent(in) :: plan
-      logical, intent(in) :: starts                !! there is no step before that tells the curvature
+      logical, intent(in) :: starts                !! there is no step before from which the curvature is known
       logical, intent(in) :: extrapolates          !! the scheme takes the curvature from the step before
       real(dp), intent(in) :: road(2)              !! displacement of the road before the step, m
       type(planned_row_type), allocatable, intent(out) :: parts(:)

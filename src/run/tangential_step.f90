@@ -228,7 +228,7 @@ contains
    end function outside_force
 
    !> The step is solved: take over how far the pulled road has moved, which the displacements were
-   !> reckoned without.
+   !> computed without.
    subroutine take_motion(self, motion)
       class(tangential_step_type), intent(inout) :: self
       real(dp), intent(out) :: motion(2)              !! of the road in the step, m
@@ -286,7 +286,7 @@ contains
    end function means
 
    !> Solve for the traction under a pressure: T, the trial displacement, the slip. Where the road is
-   !> pulled, the trial displacement is reckoned as if the road had moved by the guess: U - (D' - D) is
+   !> pulled, the trial displacement is computed as if the road had moved by the guess: U - (D' - D) is
    !> right, and the road is read by that. `take_motion` ends this.
    subroutine solve(self, state, pressure, gap, slope_x, slope_y, outcome)
       class(tangential_step_type), intent(inout), target :: self

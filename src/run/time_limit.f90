@@ -1,6 +1,6 @@
 !> The wall time that a run may take, and whether another step still fits into it.
 !>
-!> The limit is given (`--time-limit`), or it is the end of the job as Slurm tells it in the
+!> The limit is given (`--time-limit`), or it is the end of the job as Slurm gives it in the
 !> environment variable SLURM_JOB_END_TIME. A run has to stop before the limit, with time for its
 !> checkpoint: the reserve is twice the longest step so far (with what it writes), twice the longest
 !> checkpoint, and a twentieth of the limit, at most half a minute.

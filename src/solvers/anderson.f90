@@ -65,7 +65,7 @@ contains
       allocate (self%last_f(nx, components, ny), self%last_g(nx, components, ny))
    end subroutine new_anderson
 
-   !> Begin anew: what was learnt does not apply any more.
+   !> Start again: what was learnt does not apply any more.
    pure subroutine forget(self)
       class(anderson_type), intent(inout) :: self
 

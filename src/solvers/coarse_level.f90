@@ -57,7 +57,7 @@ contains
       ! Blocks about as long as wide, in metres, of whole cells.
       self%nx = min(max(1, nint(grid%lx/(ratio*h))), grid%nx)
       self%ny = min(max(1, nint(grid%ly/(ratio*h))), grid%ny)
-      self%cells = real(grid%nx, dp)*grid%ny/(real(self%nx, dp)*self%ny)
+      self%cells = grid%cells()/(real(self%nx, dp)*self%ny)
       self%h = h
       self%fine_symbol = kernel%compliance(2.0_dp*pi/(ratio*h))
 

@@ -11,7 +11,7 @@ module friction_moves
 
    real(dp), parameter :: few = 1.0e-6_dp      !! points that cannot make good for all others
    integer, parameter :: corrections = 12       !! of a total, at most
-   !> What of a total may be missed: the slip that it makes over the largest residual.
+   !> The part of a total that may be missing: the slip that it makes over the largest residual.
    real(dp), parameter :: negligible = 0.1_dp
 
 contains

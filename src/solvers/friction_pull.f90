@@ -54,7 +54,7 @@ contains
 
       self%slides_off = .false.
       if (.not. any(self%along)) return
-      cells = real(operator%nx, dp)*operator%ny
+      cells = operator%grid%cells()
       touching = max(1.0_dp, field_count(problem%contact /= contact_open))
       problem%pulled = self%along
       do c = 1, 2

@@ -35,7 +35,7 @@ module friction_rows
       real(dp) :: changed = 0.0_dp           !! |T' - T|^2
       real(dp) :: size = 0.0_dp              !! |T'|^2
       real(dp) :: missed(2) = 0.0_dp         !! T' - T - step d of the points that stuck
-      real(dp) :: arriving(3) = 0.0_dp       !! what of a uniform traction arrives there: xx, xy, yy
+      real(dp) :: arriving(3) = 0.0_dp       !! part of a uniform traction that they take: xx, xy, yy
    end type move_sums_type
 
    !> Sums of `tangent_row` and `measured_row`; symmetric matrices as xx, xy, yy.

@@ -159,7 +159,7 @@ contains
             self%work%preconditioner%search, self%step)
          self%work%scale = 0.0_dp
          self%work%offset = 0.0_dp
-         cells = real(self%grid%nx, dp)*self%grid%ny
+         cells = self%grid%cells()
          call prepare_problem(problem, self%grid, self%operator%threads, height, task, determined)
          call new_gap_watch(watch, self%mixed, task%tolerance)
          product => self%operator

@@ -64,7 +64,7 @@ contains
       integer :: longest
       logical :: planned
 
-      self%cells = real(grid%nx, dp)*grid%ny/(real(blocks(1), dp)*blocks(2))
+      self%cells = grid%cells()/(real(blocks(1), dp)*blocks(2))
       self%threads = merge(1, threads, blocks(1)*blocks(2) < 16384)
       allocate (self%weight(blocks(1), blocks(2)), source=0.0_dp)
       allocate (symbol(0:blocks(1)/2, 0:blocks(2)/2), self%model(0:blocks(1)/2, 0:blocks(2)/2))

@@ -92,7 +92,7 @@ contains
 
       self%grid = grid
       self%threads = threads
-      self%extends = min(grid%nx, grid%ny) > 1 .and. real(grid%nx, dp)*grid%ny >= least_cells &
+      self%extends = min(grid%nx, grid%ny) > 1 .and. grid%cells() >= least_cells &
          .and. max(grid%dx/grid%dy, grid%dy/grid%dx) <= largest_aspect
       if (present(extends)) self%extends = extends
       c0 = merge(c0_extended, c0_plain, self%extends)

@@ -1,4 +1,4 @@
-!> What a solver tells its caller: an outcome, not an error.
+!> What a solver returns to its caller: an outcome, not an error.
 module solver_result
    use asperity_precision, only : dp, int64
    implicit none

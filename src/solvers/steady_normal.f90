@@ -38,7 +38,7 @@ module steady_normal
    integer, parameter :: first_trial = 16        !! iteration at which finishing on few cells is first tried
    real(dp), parameter :: cautious = 2.0_dp      !! growth of the residual that stops accelerating
 
-   !> What one evaluation of the fixed-point map tells.
+   !> What one evaluation of the fixed-point map measures.
    type, public :: steady_measure_type
       real(dp) :: error = huge(1.0_dp)           !! duality gap over the scale of the problem
       real(dp) :: change = 0.0_dp                !! |y - P|, root of the sum of squares, Pa
