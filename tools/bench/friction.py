@@ -3,6 +3,7 @@
 
     . tools/setup.sh && . tools/install_editable.sh
     python tools/bench/friction.py [--cells 64 128 256] [--steps 0] [--threads 2]
+    python tools/bench/friction.py --result build/examples/two_scale_road/two_scale_road.h5
 
 First Mindlin's sphere (G = 200 MPa, nu = 0.42, R = 50 mm, 9.196 N; thesis, fig. 3.5) brought to
 half of full slip in one step with one pass, on meshes that grow: iterations and transforms of its
@@ -10,8 +11,9 @@ two tangential solves, of which the first needs the displacements only. An itera
 and a half of the operator (six transforms) and the preconditioner (four).
 
 Then the road of two scales (examples/two_scale_road), whole or its first steps of sliding: what a
-step costs, by the part of the contact that sticks. All figures are of one run on one machine:
-compare ratios.
+step costs, by the part of the contact that sticks. With `--result` the table is that of a run that
+is there, as examples/make.py leaves it. All figures are of one run on one machine: compare ratios,
+and on a busy machine only the counts.
 """
 
 from __future__ import annotations
@@ -60,30 +62,35 @@ def full_slip() -> float:
     return 3 * friction * force * (2 - poisson) / (16 * contact * shear)
 
 
-def road(folder: Path, steps: int, threads: int) -> None:
-    """Run the road of two scales and print what its steps cost."""
+def road(folder: Path, steps: int, threads: int) -> asperity.Run:
+    """Run the road of two scales."""
     case = asperity.Case.read(ROOT / "examples/two_scale_road/input.nml")
     case.solver.threads = threads
     if steps:
         slide = case.phase[1]
         cell = case.grid.lx / case.grid.nx
         slide.duration = steps * cell / slide.velocity_x
-    history = case.run(output=folder / "road.h5", quiet=True).history
-    slides = history["phase"] == 2
+    return case.run(output=folder / "road.h5", quiet=True)
+
+
+def print_steps(run: asperity.Run) -> None:
+    """Print what the steps of a run cost."""
+    history = run.history
+    slides = history["phase"] >= 2
     part = np.divide(history["stick_area"], history["contact_area"])
     print("\n| sticking part of the contact, % | steps | normal iterations |"
-          " tangential iterations | transforms | seconds per step |\n"
-          "| --- | --- | --- | --- | --- | --- |")
+          " tangential iterations | passes | transforms | seconds per step |\n"
+          "| --- | --- | --- | --- | --- | --- | --- |")
     for low, high, name in ((0.75, 2, "more than 75"), (0.25, 0.75, "25 to 75"),
                             (1e-12, 0.25, "below 25"), (-1, 1e-12, "0"), (-1, 2, "all")):
         rows = slides & (part >= low) & (part < high)
         if rows.any():
             means = [history[key][rows].mean() for key in
-                     ("iterations_normal", "iterations_tangential", "ffts", "seconds")]
-            print(f"| {name} | {rows.sum()} | {means[0]:.1f} | {means[1]:.1f} | {means[2]:.0f} |"
-                  f" {means[3]:.3f} |")
+                     ("iterations_normal", "iterations_tangential", "passes", "ffts", "seconds")]
+            print(f"| {name} | {rows.sum()} | {means[0]:.1f} | {means[1]:.1f} | {means[2]:.1f} |"
+                  f" {means[3]:.0f} | {means[4]:.3f} |")
     print(f"\nThe whole run has {len(history['step'])} rows and took "
-          f"{history['seconds'].sum():.0f} s on {threads} threads.")
+          f"{history['seconds'].sum():.0f} s.")
 
 
 def main() -> None:
@@ -94,7 +101,11 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=0,
                         help="steps of sliding on the road; 0: all; below 0: not the road")
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--result", type=Path, help="only the table of the steps of this run")
     given = parser.parse_args()
+    if given.result:
+        print_steps(asperity.open(given.result))
+        return
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         print("| cells along a side | method | tolerance | iterations | transforms |"
@@ -105,7 +116,7 @@ def main() -> None:
                     iterations, ffts = sphere(folder, n, tolerance, method, given.threads)
                     print(f"| {n} | {method} | {tolerance:g} | {iterations} | {ffts:.0f} |")
         if given.steps >= 0:
-            road(folder, given.steps, given.threads)
+            print_steps(road(folder, given.steps, given.threads))
 
 
 if __name__ == "__main__":
