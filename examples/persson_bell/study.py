@@ -55,7 +55,7 @@ def _steady(folder: Path, road: Road, speeds: list[float], seeds: int = 1,
         {("phase[2].velocity_x", "phase[2].duration"): [(v, travel * road.side / v)
                                                         for v in speeds],
          "surface.seed": list(range(1, seeds + 1))}, folder,
-        # At high speed the rubber is stiff, and the spots of contact are small.
+        # At high speed the rubber is stiff, and patches of contact are three cells across.
         common.SMALL_CONTACTS)
     found = []
     for run in table.runs:
