@@ -179,7 +179,7 @@ def picture(data: dict[str, Any]) -> Figure:
     axes[1, 1].set(xlabel="thickness of the block, mm", ylabel="friction coefficient")
     for panel in axes.flat[1:]:
         panel.legend(fontsize="small")
-        panel.set_ylim(1.0, 1.21)
+        panel.set_ylim(1.0, 1.23)
     for panel in axes.flat:
         panel.grid(alpha=0.3)
     return figure
