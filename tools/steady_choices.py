@@ -2,16 +2,19 @@
 """Print what mesh and patches do to a curve of steady friction, for docs/choosing.md.
 
     . tools/setup.sh && . tools/install_editable.sh
-    python tools/steady_choices.py
+    python tools/steady_choices.py [--time]
 
 A road of three octaves (rms slope 0.2) slides under a rubber with twelve arms that soften it by
 100. First the same road on finer and finer meshes: viscous friction by the losses of the waves and
 by the slopes under the pressure, and contact area, each over that of the finest mesh. Then the
 scatter of friction between roads of other seeds, and the patches for an interval of 5 %.
+With --time instead: the viscous friction of a run in time, by the slopes and by the loss of the
+arms, over that of the steady state, in the third lap.
 """
 
 from __future__ import annotations
 
+import argparse
 import math
 import tempfile
 import warnings
@@ -57,11 +60,41 @@ def solve(folder: Path, cells: int, seed: int) -> tuple[np.ndarray, np.ndarray, 
     return (run.history["friction_viscous"], np.abs(slopes), run.history["contact_area"])
 
 
+def compare_in_time(folder: Path) -> None:
+    """Print both measures of viscous friction in steps of time."""
+    side, pressure, speed = 64e-3, 3e5, 0.1
+    for cells in (64, 128):
+        found = []
+        for drive in (dict(steady=True), dict(duration=3 * side / speed, steps=3 * cells)):
+            one = asperity.Case(
+                grid=dict(nx=cells, ny=cells, lx=side),
+                surface=dict(shape="self_affine", hurst=0.8, wavelength_long=side / 2,
+                             wavelength_short=side / 8, rms_slope=0.2, seed=3),
+                material=dict(shear_modulus=1e6, prony_g=[5e6, 4e6], prony_tau=[3e-2, 3e-3]),
+                phase=dict(pressure=pressure, velocity_x=speed, **drive),
+                output=dict(snapshot_every=0))
+            history = asperity.run(one, output=folder / f"time{len(found)}.h5", threads=1,
+                                   overwrite=True).history
+            lap = slice(-min(cells, history.rows), None)
+            found.append((history["friction_viscous"][lap].mean(),
+                          history["power_viscous"][lap].mean() / (pressure * side**2 * speed)))
+        (steady, _), in_time = found
+        slopes, loss = (100 * (value / steady - 1) for value in in_time)
+        print(f"{cells // 8} cells in the shortest wave, in time over steady: by slopes"
+              f" {slopes:+.2f} %, by loss {loss:+.2f} %")
+
+
 def main() -> None:
     """Run and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--time", action="store_true", help="compare with a run in time")
+    chosen = parser.parse_args()
     warnings.simplefilter("ignore", UserWarning)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
+        if chosen.time:
+            compare_in_time(folder)
+            return
         meshes = [64, 128, 256]
         found = [solve(folder, cells, 1) for cells in meshes]
         print("| cells in the shortest wave | friction by losses | by slopes | contact area |")

@@ -3,16 +3,19 @@
 
     . tools/setup.sh && . tools/install_editable.sh
     python tools/bench/steady.py [--cells 128] [--speeds 7] [--laws none flat slope] [--cold]
+    python tools/bench/steady.py --cells 256 --speeds 25 --laws none flat --only 12,1000,1
 
 A rough road of rms slope 0.3 with waves down to four cells slides under a rubber with one or
 twelve arms that soften it by 10 or 1000. Each line is a curve: for each speed the transforms of its
 row and the contact area; ! marks a row that did not converge, which ends the curve. By default each
-row starts from those before it; with --cold each is a run of its own.
+row starts from those before it; with --cold each is a run of its own. At the end of the line: all
+transforms, and the seconds of processor time.
 """
 
 from __future__ import annotations
 
 import argparse
+import resource
 import tempfile
 from pathlib import Path
 
@@ -50,6 +53,12 @@ def case(cells: int, arms: int, ratio: float, pressure: float, law: str, speeds:
     )
 
 
+def seconds() -> float:
+    """Return the processor time of this process so far."""
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    return used.ru_utime + used.ru_stime
+
+
 def count(folder: Path, text: str) -> tuple[list[int], list[float], bool]:
     """Return transforms and contact area of the rows, and whether all converged."""
     path = folder / "case.nml"
@@ -72,6 +81,7 @@ def main() -> None:
     parser.add_argument("--laws", nargs="+", default=["none", "flat", "slope"], choices=LAWS)
     parser.add_argument("--coefficient", type=float, default=0.5)
     parser.add_argument("--cold", action="store_true", help="every row on its own")
+    parser.add_argument("--only", metavar="ARMS,RATIO,P", help="one of the curves, as 12,1000,0.1")
     chosen = parser.parse_args()
 
     print("law, arms, ratio, p/G: transforms (area) ...; ! not converged")
@@ -85,6 +95,9 @@ def main() -> None:
             (12, 1000, 0.1, -5, 1),
             (12, 1000, 1, -5, 1),
         ):
+            if chosen.only not in (None, f"{arms},{ratio},{pressure}"):
+                continue
+            begun = seconds()
             speeds = np.logspace(low, high, chosen.speeds)
             told, total = [], 0
             with tempfile.TemporaryDirectory() as folder:
@@ -104,7 +117,9 @@ def main() -> None:
                     told += [f"{n} ({a:.3f})" for n, a in zip(ffts, area, strict=True)]
                     told[-1] += "" if good else "!"
             print(
-                f"{law}, {arms}, {ratio}, {pressure}: {' '.join(told)}; {total} in all", flush=True
+                f"{law}, {arms}, {ratio}, {pressure}: {' '.join(told)}; {total} in all,"
+                f" {seconds() - begun:.1f} s",
+                flush=True,
             )
 
 
