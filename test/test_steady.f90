@@ -48,6 +48,7 @@ contains
          call error_against_a_run_falls_with_steps()
       if (selected('all_starts_end_in_one_state')) call all_starts_end_in_one_state()
       if (selected('best_state_is_kept')) call best_state_is_kept()
+      if (selected('constant_shear_at_the_rim')) call constant_shear_at_the_rim()
    end subroutine run_steady
 
    !> Full contact with a wave: P = p + K^-1 H, so that friction is k^2 h^2 G''(k V)/(2 (1-nu) p).
@@ -366,7 +367,7 @@ contains
       integer :: k
 
       do k = 1, 2
-         call wedge(merge(100, 300, k == 1), normal, rubbing)
+         call slide_uphill('law = ''coulomb'', coefficient = 1.5', merge(100, 300, k == 1), normal, rubbing)
          missed(k) = max(normal%residual, rubbing%residual)
          call check_that(.not. (normal%converged .and. rubbing%converged), 'wedged road: no solution')
          call check_order(index(normal%reason, 'wedges'), '>', 0, &
@@ -376,8 +377,22 @@ contains
          'wedged road: a better state is lost: '// to_text(missed(2))//' after '//to_text(missed(1)))
    end subroutine best_state_is_kept
 
-   !> Some rounds on a road steeper than 1/mu in places.
-   subroutine wedge(rounds, normal, rubbing)
+   !> A constant shear stress jumps at the rim, and no steady state is found; the reason says so. The
+   !> law that it is with a bound of mu P near the rim has one.
+   subroutine constant_shear_at_the_rim()
+      type(solver_result_type) :: normal, rubbing
+
+      call slide_uphill('law = ''constant_shear'', shear_strength = 3e5, slope_effect = F', 150, normal, rubbing)
+      call check_that(.not. (normal%converged .and. rubbing%converged), 'rim: a jump has a solution')
+      call check_order(index(normal%reason, 'coulomb_orowan'), '>', 0, 'rim: reason: '//trim(normal%reason))
+      call slide_uphill('law = ''coulomb_orowan'', coefficient = 1, shear_strength = 3e5, slope_effect = F', &
+         150, normal, rubbing)
+      call check_that(normal%converged .and. rubbing%converged, 'rim: a stress that grows with the pressure')
+   end subroutine constant_shear_at_the_rim
+
+   !> Some rounds of a law of friction on a steep road.
+   subroutine slide_uphill(law, rounds, normal, rubbing)
+      character(*), intent(in) :: law                  !! as in the group of the input
       integer, intent(in) :: rounds
       type(solver_result_type), intent(out) :: normal, rubbing
       type(case_type) :: case
@@ -390,20 +405,20 @@ contains
       call parse_case('&grid nx = 32, ny = 32, lx = 32e-3 /'//nl//'&surface shape = ''self_affine'', '// &
          'hurst = 0.8, wavelength_long = 16e-3, wavelength_short = 4e-3, rms_slope = 0.3, seed = 1 /'//nl// &
          '&material shear_modulus = 1e6, prony_g = 9e6, prony_tau = 1e-2 /'//nl// &
-         '&friction law = ''coulomb'', coefficient = 1.5 /'//nl//'&solver max_iterations = '// &
+         '&friction '//law//' /'//nl//'&solver max_iterations = '// &
          to_text(rounds)//' /'//nl//'&phase steady = T, pressure = 2e5, velocity_x = 0.1 /', 'test.nml', &
          case, error)
-      call check_no_error(error, 'wedged road: input')
+      call check_no_error(error, 'uphill: input')
       call new_height(case%grid, case%surfaces, height, error)
       call new_interpolation(road, case%grid, height, 'cubic', error)
       call new_steady_step(steady, case, 1e-3_dp, error)
-      call check_no_error(error, 'wedged road: steady')
+      call check_no_error(error, 'uphill: steady')
       plan%load = case%phases(1)%target
       plan%velocity_x = case%phases(1)%velocity_x
       call steady%begin_curve([0.0_dp, 0.0_dp])
       call steady%solve(plan, road, normal, rubbing)
       call steady%destroy()
-   end subroutine wedge
+   end subroutine slide_uphill
 
    !> The steady state of a case with the road where a run in time has left it.
    subroutine find_steady(case, sim, dt, steady)

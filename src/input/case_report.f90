@@ -98,7 +98,8 @@ contains
    !> each arm one field, and three for the steps before and their traction; sliding four, the
    !> original map and its slopes; adhesion 6 fields and a second buffer; friction 42 fields, two
    !> buffers, and with arms four fields and two an arm; mixed precision 0.6 of a buffer;
-   !> steady phases 28 fields, 133 with friction. The rest:
+   !> steady phases 34 fields, 143 with friction (not counted: a dense system of few cells in contact,
+   !> module `steady_active`, at most 20 fields for as long as it is solved). The rest:
    !> 26 MB. Measured at 1024 x 1024 cells on one thread, MB: 118 for 119 (elastic), 202 for 202 (three
    !> arms, sliding), 431 for 437 (friction), 742 for 747 (friction, ten arms).
    pure function memory_needed(case) result(bytes)
@@ -123,7 +124,7 @@ contains
          if (arms > 0) fields = fields + 4.0_dp
          buffers = buffers + 2.0_dp
       end if
-      if (any(case%phases%steady)) fields = fields + merge(133.0_dp, 28.0_dp, case%friction%law /= 'none')
+      if (any(case%phases%steady)) fields = fields + merge(143.0_dp, 34.0_dp, case%friction%law /= 'none')
       if (case%solver%precision == 'mixed') buffers = buffers + 0.6_dp
       bytes = 8.0_dp*(real(case%grid%nx, dp)*real(case%grid%ny, dp)*fields + &
          padding*buffers*real(case%grid%nx + 2, dp)*real(case%grid%ny, dp)) + program_itself

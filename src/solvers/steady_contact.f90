@@ -62,7 +62,8 @@ contains
    end function contact_mean
 
    !> Why there may be no solution. A constant shear stress jumps at the rim of the contact: the cell
-   !> that it takes out of contact is drawn into it again without it. Uphill the law on the slope gives
+   !> that it takes out of contact is drawn into it again without it. With `coulomb_orowan` the stress
+   !> grows from zero with the pressure, and the rim has a solution. Uphill the law on the slope gives
    !> T = P tan(atan(mu) + alpha), which has no bound where mu tan(alpha) reaches 1: the road wedges.
    subroutine explain(contact, law, normal, rubbing)
       type(steady_contact_type), intent(in) :: contact
@@ -71,7 +72,7 @@ contains
 
       if (normal%converged .and. rubbing%converged) return
       if (law%law == law_constant_shear) then
-         normal%reason = 'cells at the rim of the contact come and go'
+         normal%reason = 'cells at the rim come and go; law = ''coulomb_orowan'' avoids this'
       else if (law%slope) then
          if (field_count(contact%pressure > 0.0_dp .and. law%coefficient*hypot(contact%slope_x, &
             contact%slope_y) >= 1.0_dp) > 0.0_dp) &
