@@ -188,7 +188,12 @@ def gallery() -> str:
              " order: what is", "computed, what the thesis says of it, and where we differ and"
              " why. Each has a page with its numbers and the", "commands that make it;"
              " `python examples/make.py --list` lists them all. This page is made by",
-             "`python examples/make.py --gallery`.", ""]
+             "`python examples/make.py --gallery`.", "",
+             "![A film of a sliding contact: the parts that stick and slip, and the friction]"
+             "(figures/sliding.gif)", "",
+             "*The contact of the [case in ten lines](../README.md#a-case-in-ten-lines) while its"
+             " road starts to move: what sticks", "(blue) and what slips (orange). `asperity plot"
+             " road.h5 --film` makes such a film of any result with snapshots.*", ""]
     chapter = 0
     for study in sorted(studies(), key=lambda one: (one.section(), one.name)):
         if study.section()[0] != chapter:

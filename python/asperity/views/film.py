@@ -121,6 +121,9 @@ def _animation(run: Run, field: str) -> tuple[FuncAnimation, Any]:
     curve.set_ylabel(axis_text(LABELS[column], ""))
     curve.grid(alpha=0.3)
     title = panel.set_title(when(snapshots[0]))
+    # The layout is found once: for every frame it would take most of the time.
+    figure.canvas.draw()
+    figure.set_layout_engine("none")
 
     def draw(number: int) -> Any:
         snapshot = snapshots[number]
