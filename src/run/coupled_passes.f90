@@ -1,33 +1,37 @@
 !> The passes of a row in which friction acts.
 !>
 !> Pressure, traction and the place where the rubber's surface reads the road depend on each other.
-!> With the displacement z of the surface with which the road is read (the place), a pass does
+!> Let D be the displacement of the road, U_T the tangential displacement of the rubber's surface, and z
+!> (the place) the guess of U_T with which the road is read. A pass does
 !>
 !>    H, grad H  from the original map at X + z - D
 !>    P          the normal contact on H
 !>    T, U_T     the tangential contact under P, on the slopes grad H
 !>
-!> and the row is solved where U_T = z: pressure, traction, heights and slopes then belong together.
-!> The fixed point need not attract: T holds -P grad H, which gives a pass the gain -(1..2) |grad H|^2,
-!> friction adds mu |grad H|, and a thick block multiplies the mean of both by its compliance. The
-!> passes therefore use Anderson acceleration on the whole field z (module `anderson`);
-!> `pass_control` says how accurate their solves are and how long their steps.
+!> and the row is solved where U_T = z: pressure, traction, heights and slopes then belong together. The
+!> plain iteration z <- U_T need not converge. T contains -P grad H, which contributes eigenvalues
+!> between -1 and -2 times |grad H|^2 to dU_T/dz; friction adds some of the order of mu |grad H|; and a
+!> thick block multiplies the mean of both by its compliance. The passes therefore use Anderson
+!> acceleration on the whole field z (module `anderson`); `pass_control` says how accurate their solves
+!> are and how long their steps.
 !>
-!> The strains around the contact come with tractions that were found before the pass moved the
-!> contact. Read at U_T, the road would be stretched beside where the contact now is, so `carry` moves
-!> U_T along with the contact. At the fixed point it does nothing.
+!> The traction T was found at the place z. If U_T - z moves the contact along the rubber, the strains
+!> around the contact move with it. Otherwise the road would be read as stretched beside the contact.
+!> `carry` therefore moves U_T along with the contact; at the fixed point it does nothing.
 !>
 !> The first place comes from the row before: the displacement moves with the road, and its mean goes
-!> on as in the last step. A jump of the load is a row like any other, without motion and time.
+!> on as in the last step. A jump of the load is solved by the same loop, without motion and time, and its
+!> tractions are not extrapolated.
 !>
 !> What remains is measured by the road read at U_T against the road solved on, `mismatch` below: the
 !> column `residual_coupling`.
 !>
-!> The loop of `solve` reads: do a pass at the place, and measure the mismatch that it leaves. If the mismatch is
-!> within the tolerance, and the solves of the pass were that accurate too, let the tractions settle, and the
-!> row is solved. Otherwise `pass_control` judges the pass, which sets the accuracy of the next one and how far
-!> to go, and `choose_place` goes to the next place. When the passes run out, the row keeps what the last pass,
-!> done at the best place, has left.
+!> The loop of `solve` reads: do a pass at the place, and measure the mismatch that it leaves. If the
+!> mismatch is within the tolerance, and the solves of the pass were asked to be that accurate too, let
+!> the tractions settle, and the row is solved. Otherwise `pass_control` judges the pass, which sets the
+!> accuracy of the next one and how far to go, and `choose_place` goes to the next place. When the
+!> passes run out, the row keeps what the last pass has left; the last of more than ten passes is done
+!> at the best place so far. A normal solve that does not converge ends the loop.
 !>
 !> Fields of doubles: two components each for the place, its residual and the best place; and those of the
 !> acceleration. The check borrows three from the workspace of the contact.
@@ -48,8 +52,8 @@ module coupled_passes
 
    integer, parameter, public :: most_passes = 400      !! where the case leaves the number open
 
-   integer, parameter :: pairs = 6                      !! of the acceleration
-   real(dp), parameter :: largest_factor = 1.0e3_dp     !! of the acceleration; a larger one is round-off
+   integer, parameter :: pairs = 6                      !! of passes that the acceleration remembers
+   real(dp), parameter :: largest_factor = 1.0e3_dp     !! of a remembered pair; a larger one is round-off
 
    !> Slopes in the contact count as at least this part of the rms slope of the map.
    real(dp), parameter :: least_slope = 0.1_dp
@@ -90,7 +94,7 @@ contains
       type(pass_control_type) :: control
       real(dp) :: tolerance
       integer :: most
-      logical :: unlike                                  !! the row before
+      logical :: unlike                                  !! this row goes on differently from the last one
 
       tolerance = contact%case%solver%tolerance
       most = contact%case%solver%passes
@@ -160,7 +164,7 @@ contains
    end subroutine settle
 
    !> The first place of a row: the displacement of the row before, moved along with the contact, which
-   !> the road takes over the rubber, and with the rubber's mean motion.
+   !> follows the road over the rubber, plus the mean motion of the rubber's surface.
    subroutine predict(self, contact, motion)
       class(coupled_passes_type), intent(inout) :: self
       class(contact_type), intent(in) :: contact

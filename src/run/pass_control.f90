@@ -5,9 +5,10 @@
 !> the last pass left (`share`). Three things go wrong on hard roads, and each has its answer:
 !>
 !> * The solves return with nothing done, since their start is within the accuracy asked for. The
-!>   mismatch then holds no information, least where a thick block turns a small error of the
-!>   friction into a long displacement. So where the mismatch does not fall in `patience` passes, the
-!>   share falls tenfold, and the accuracy may become better than the tolerance.
+!>   mismatch then says little, and least of all where a thick block turns a small error of the
+!>   friction into a long displacement. So where `patience` passes in turn have not brought the mismatch
+!>   below the part `falls` of the least one before, the share falls tenfold, and the accuracy may become
+!>   better than the tolerance.
 !> * An extrapolation goes astray. Where the mismatch is ten times the least so far, the
 !>   acceleration forgets what it has seen.
 !> * The passes do not come closer: the mismatch has not been halved in `stalled` passes. Either cells
@@ -16,9 +17,9 @@
 !>   another one). The residual then keeps its direction and hardly changes from pass to pass, while each
 !>   step leads a little further to the other state. The passes go back to the best place and on without
 !>   acceleration (`plain`), with a momentum that grows as long as the residual keeps its direction and
-!>   vanishes where it turns. When the mismatch has fallen to a tenth, or after `stalled_plain` passes,
-!>   the acceleration begins again from the place reached; what was the best place before is forgotten,
-!>   since it belongs to the state that ended.
+!>   vanishes where it turns. When the mismatch has fallen to a tenth, or after `stalled_plain` passes
+!>   without halving it, the acceleration begins again from the place reached; what was the best place
+!>   before is forgotten, since it belongs to the state that ended.
 module pass_control
    use asperity_precision, only : dp
    implicit none
@@ -38,7 +39,7 @@ module pass_control
    real(dp), parameter :: grows = 1.2_dp, shrinks = 0.5_dp, gathers = 0.7_dp          !! how they change
    real(dp), parameter :: most_momentum = 0.95_dp
    real(dp), parameter :: straight = 0.8_dp, bent = 0.2_dp  !! cosine of the angle between two residuals
-   real(dp), parameter :: gained = 0.1_dp           !! part of the first mismatch at which plain steps end
+   real(dp), parameter :: gained = 0.1_dp           !! part of the mismatch at their start at which plain steps end
    integer, parameter :: patience = 2
    integer, parameter :: stalled = 15, stalled_plain = 60
 

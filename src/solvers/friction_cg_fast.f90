@@ -13,20 +13,21 @@
 !>     alpha = g.d/(d.A d + sum lam |d|^2)
 !>     T' = put back(T + alpha d)            r from A T', or by recurrence where all points stick
 !>
-!> beta = 0 where more than a tenth of the contact left the bound, and after a shortened step.
+!> beta = 0 in the first iteration, also after the fallback; where more than a tenth of the contact was
+!> released from its bound to stick; after a shortened step; and where d would not point downhill.
 !>
-!> The same in words. `precondition` turns the slip that should vanish, g, into the change of traction z that
-!> would remove it if each point kept its state (M is about the inverse of A). `turn` adds a part of the last
-!> direction. `take_step` goes along d as far as the quadratic model says, and puts every point that has left
-!> its bound back on it. This changes states: a point that was put back slips from now on, and a slipping
-!> point whose slip has turned against its traction sticks. The slip of the new traction is then computed
-!> with A, and the measure of it gives the g of the next iteration. The loop ends when g is small at all
-!> points, which also means that no state would change any more.
+!> The same in words. `precondition` turns the slip that should vanish, g, into the change of traction z
+!> that would remove it if each point kept its state (M is about the inverse of A). `turn` adds a part
+!> of the last direction. `take_step` goes along d as far as the quadratic model says, and puts every
+!> point that now lies outside its bound back on it. This changes states: a point that was put back
+!> slips from now on, and a slipping point whose slip has turned against its traction sticks. The slip
+!> of the new traction is then computed with A, and the measure of it gives the g of the next iteration.
+!> The loop ends when g is small at all points; where g vanishes, the guess of the states holds.
 !>
-!> A thick block makes the mean mode h/G of a periodic operator its largest by far, which every
-!> masked field excites. It is taken out of g and z by the two fields e = w Z of uniform traction:
-!> with E = sum of w Z, H = A + lam and A ~ h/N on the mean, H e = (h/N) E + lam w Z and
-!> K = e.H e = (h/N) E E + sum of lam w^2 Z,
+!> A thick block makes the mean mode h of a periodic operator (for G = 1) its largest by far. Every
+!> field that is zero outside the contact excites it. It is taken out of g and z by the two fields e = w
+!> Z of uniform traction: with E = sum of w Z, H = A + lam and A ~ h/N on the mean, H e = (h/N) E + lam
+!> w Z and K = e.H e = (h/N) E E + sum of lam w^2 Z,
 !>
 !>     c = K^-1 sum(w g)
 !>     Z (g - H e c) goes through the preconditioner to z0
@@ -34,19 +35,20 @@
 !>
 !> Points that are put back in great number change the total traction, and a stiff mean mode then
 !> throws the slip to the other side. The points that stuck therefore keep their total of T + alpha d:
-!> a uniform c is added to it before they are put back, found without a transform. Else the set of
-!> slipping points can go back and forth for ever.
+!> a uniform c is added to it before they are put back, found without a transform. Without this c, the set
+!> of slipping points can go back and forth for ever.
 !>
 !> Where a move has overshot still, g'.(T' - T) < -alpha g.d/2 (from a good start -2 alpha g.d), a
 !> shorter one along the same path is taken, to where a secant sees g'.(T' - T) vanish. This needs no
 !> energy, which does not exist where the slope counts.
 !>
 !> An iteration costs two operator products, of which the first needs no inverse transform where
-!> points slip, and one preconditioner. beta is formed with z_old (M is symmetric), so that no old g
-!> is kept: the work fields are z and d.
+!> points slip, and one preconditioner; each shortened step costs one product more. beta is formed with
+!> z_old instead of the old g, which is not kept: M is symmetric, so that both agree as long as w and Z do
+!> not change. The work fields are z and d.
 !>
-!> There is no proof that this converges. Where it stalls, some steps of spectral projected gradients
-!> (module `friction_cg_gradient`) follow, and then it goes on.
+!> There is no proof that this converges. Where it stalls, or finds no step downhill, some steps of
+!> spectral projected gradients (module `friction_cg_gradient`) follow, and then it goes on.
 module friction_cg_fast
    use asperity_errors, only : error_type
    use kernels, only : kernel_type
@@ -68,8 +70,8 @@ module friction_cg_fast
 
    integer, parameter :: patience = 30      !! iterations in which the residual has to fall tenfold
    integer, parameter :: trials = 2         !! of a shorter step
-   !> A move is shortened where it leaves less than -overshoot*alpha*g.d: in the first iterations of a
-   !> step that goes on from another seldom, for that costs more than it gains.
+   !> A move is shortened where g'.(T' - T) is below -overshoot*alpha*g.d. The first iterations of a step
+   !> that continues another one may overshoot more, because shortening costs more there than it gains.
    real(dp), parameter :: overshoot = 0.5_dp, overshoot_near = 2.0_dp
    integer, parameter :: near_steps = 15
    integer, parameter :: gradient_steps = 100    !! of the fallback at a time

@@ -40,7 +40,7 @@ module friction_problem
    public :: friction_problem_type
 
    real(dp), parameter :: on_bound = 1.0_dp + 1.0e-9_dp   !! a point with s below it is on its bound
-   real(dp), parameter :: outermost = 4.0_dp              !! no point is moved out by more than this
+   real(dp), parameter :: outermost = 4.0_dp              !! a slipping point with s beyond it sticks
    real(dp), parameter :: stiffest = 1.0e15_dp            !! curvature of a bound, in units of a_0
 
    !> The problem, and the state of its solution.

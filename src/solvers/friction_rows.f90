@@ -40,7 +40,7 @@ module friction_rows
 
    !> Sums of `tangent_row` and `measured_row`; symmetric matrices as xx, xy, yy.
    type :: measure_sums_type
-      real(dp) :: released = 0.0_dp          !! points that left their bound
+      real(dp) :: released = 0.0_dp          !! points that were on their bound and stick now
       real(dp) :: slipping = 0.0_dp          !! points on their bound
       real(dp) :: drive = 0.0_dp             !! |DX|^2 in the contact
       real(dp) :: displaced = 0.0_dp         !! |U|^2 in the contact
