@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 import asperity
 
 #: Minutes of the full form on two cores.
-MINUTES = 4
+MINUTES = 8
 HERE = Path(__file__).resolve().parent
 
 
@@ -41,7 +41,9 @@ def check(data: dict[str, Any], quick: bool) -> None:
     driven = after > 1e-9
     # The block sticks at first, and its mean shear stress is that of plain shear: what slips at
     # the edges of the contact moves less than 2 % of the drive until half of the area slips.
-    early = driven & (data["stick_area"] > 0.5 * data["contact_area"])
+    # The first step is left out: it is as short as the time that a shear wave takes through the
+    # block (0.9 us), whose mass is still being accelerated then.
+    early = (after > 1.5e-6) & (data["stick_area"] > 0.5 * data["contact_area"])
     rubber = road.compound()
     time = after[early][:, None]
     strain_rate = road.SPEED / road.THICKNESS
