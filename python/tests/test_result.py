@@ -10,6 +10,7 @@ import pytest
 from conftest import frictional_result, write_result
 
 import asperity
+from asperity.views.film import film
 
 
 def test_reads_what_was_written(result):
@@ -70,13 +71,29 @@ def test_a_run_that_is_still_going(tmp_path):
     assert not run.finished
     assert {len(column) for column in run.history.values()} == {5}
     with h5py.File(path, "a", locking=False) as writer:
-        assert len(asperity.open(path).snapshots) == 2
+        assert len(asperity.open(path).snapshots) == 1
         for column in writer["history"].values():
             column.resize((7,))
+        writer["history/step"][-1] = 6
         writer["history/pressure"][-1] = 6e4
         writer.flush()
         assert run.refresh().history.rows == 7
         assert run.history["pressure"][-1] == 6e4
+        assert run.snapshots.steps == (0, 5)
+
+
+def test_snapshots_and_losses_of_rows_that_were_not_read(tmp_path):
+    """A run may write a row with its snapshot between the reading of rows and of snapshots."""
+    path = frictional_result(tmp_path / "going.h5")
+    with h5py.File(path, "a") as file:
+        for step in (6, 7):
+            file.copy("snapshots/000005", file["snapshots"], name=f"{step:06d}")
+        for step in (5, 6):
+            file[f"losses/{step:06d}/octave"] = np.ones(3)
+    run = asperity.open(path)
+    assert run.snapshots.steps == (0, 5)
+    assert list(run.losses) == [5]
+    assert film(run, tmp_path / "film.gif", "pressure").stat().st_size > 0
 
 
 def test_reprs_say_what_is_there(result):

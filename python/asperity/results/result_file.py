@@ -100,11 +100,20 @@ class ResultFile:
                 self._compare(sums[()])
             self.losses = {int(key): Losses(*(
                 np.asarray(group[name][()]) if name in group else np.zeros(0)
-                for name in Losses._fields)) for key, group in file.get("losses", {}).items()}
-            keys = [key for key in file.get("snapshots", {}) if key.isdigit()]
-            self._snapshot_keys = sorted(keys, key=int)
+                for name in Losses._fields)) for key, group in self._of_rows(file, "losses")}
+            self._snapshot_keys = [key for key, _ in self._of_rows(file, "snapshots")]
 
         read_file(self.path, read)
+
+    def _of_rows(self, file: h5py.File, name: str) -> list[tuple[str, h5py.Group]]:
+        """Return the members of a group that belong to rows, in order of their steps.
+
+        A run that goes on may have added more of them since its rows were read.
+        """
+        steps = self.history["step"]
+        last = int(steps.max()) if steps.size else -1
+        keys = [key for key in file.get(name, {}) if key.isdigit() and int(key) <= last]
+        return [(key, file[name][key]) for key in sorted(keys, key=int)]
 
     def _compare(self, sums: NDArray[np.float64]) -> None:
         """Warn of rows of the history that do not agree with their checksums."""
