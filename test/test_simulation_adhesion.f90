@@ -49,6 +49,12 @@ contains
       if (selected('loss_of_a_viscoelastic_pull_off')) call loss_of_a_viscoelastic_pull_off()
       if (selected('elastic_state_moves_with_the_road')) call elastic_state_moves_with_the_road()
       if (selected('drive_is_lost_in_the_solid')) call drive_is_lost_in_the_solid()
+      if (selected('friction_by_the_pressure_of_the_wall')) then
+         call friction_by_the_pressure_of_the_wall('exponential', 0.05_dp/0.4e-6_dp)
+         call friction_by_the_pressure_of_the_wall('gauss', 0.0_dp)
+         call friction_by_the_pressure_of_the_wall('maugis_dugdale', 0.05_dp/0.4e-6_dp)
+      end if
+      if (selected('passes_settle_with_gauss')) call passes_settle_with_gauss()
       if (selected('books_close_with_friction_and_slope')) &
          call books_close_with_friction_and_slope()
       if (selected('no_energy_is_no_adhesion')) call no_energy_is_no_adhesion()
@@ -357,26 +363,44 @@ contains
          'sliding, viscoelastic: friction with and without adhesion')
    end subroutine drive_is_lost_in_the_solid
 
-   !> With friction and slope, oblique: books closed, and the bound uses the pressure of the wall.
-   subroutine books_close_with_friction_and_slope()
+   !> In full sliding without slope the traction is mu (P - P_adh) (thesis, 4.5.1): the attraction P_adh in
+   !> a closed cell, which differs between the potentials, presses it on the wall.
+   subroutine friction_by_the_pressure_of_the_wall(potential, attraction)
+      character(*), intent(in) :: potential
+      real(dp), intent(in) :: attraction           !! at touch, Pa
       type(record_type) :: record
       real(dp) :: wall
-      integer :: n
 
       call run_case(wavy//'&material shear_modulus = 1e6, thickness = 20e-6 /'//nl// &
-         sticky('exponential', '0.4e-6')//'&friction law = ''coulomb'', coefficient = 0.3, '// &
+         sticky(potential, '0.4e-6')//'&friction law = ''coulomb'', coefficient = 0.3, '// &
          'slope_effect = .false. /'//nl//'&phase pressure = 2e4 /'//nl// &
          '&phase duration = 0.1, steps = 8, velocity_x = 8e-5, velocity_y = 4e-5 /', &
-         'sliding, friction', record)
-      call check_books(record, 'sliding, friction')
-      n = last(record)
-      associate (row => record%rows(n))
-         call check_close(row%stick_area, 0.0_dp, 0.0_dp, 'sliding, friction: all slips')
-         ! mu (P - P_adh), with P_adh = -gamma_0/z_0 in contact (thesis, 4.5.1)
-         wall = sum(record%pressure + 0.05_dp/0.4e-6_dp, mask=record%gap <= 0.0_dp)/size(record%pressure)
+         'sliding, friction, '//potential, record)
+      call check_books(record, 'sliding, friction, '//potential)
+      associate (row => record%rows(last(record)))
+         call check_close(row%stick_area, 0.0_dp, 0.0_dp, 'sliding, friction, '//potential//': all slips')
+         wall = sum(record%pressure + attraction, mask=record%gap <= 0.0_dp)/size(record%pressure)
          call check_close(hypot(row%traction_x, row%traction_y)/(0.3_dp*wall), 1.0_dp, 1e-4_dp, &
-            'sliding, friction: mean traction')
+            'sliding, friction, '//potential//': mean traction')
       end associate
+   end subroutine friction_by_the_pressure_of_the_wall
+
+   !> The bound of the friction must not jump where a cell opens: the passes of the step would not settle.
+   !> With Gauss a cell opens at the pressure 0.
+   subroutine passes_settle_with_gauss()
+      type(record_type) :: record
+
+      call run_case(wavy//elastic//sticky('gauss', '0.4e-6')// &
+         '&friction law = ''coulomb_orowan'', coefficient = 0.5, shear_strength = 5e4 /'//nl// &
+         '&phase pressure = 2e4, duration = 0.1, steps = 4, velocity_x = -2e-5, velocity_y = -5e-5 /', &
+         'gauss, Coulomb-Orowan', record)
+      call check_that(all(record%rows%passes <= 20), 'gauss, Coulomb-Orowan: the passes settle')
+   end subroutine passes_settle_with_gauss
+
+   !> With friction and slope, oblique: books closed.
+   subroutine books_close_with_friction_and_slope()
+      type(record_type) :: record
+
       call run_case(wavy//soft//sticky('exponential', '0.4e-6')// &
          '&friction law = ''coulomb'', coefficient = 0.3 /'//nl//'&phase pressure = 2e4 /'//nl// &
          '&phase duration = 0.05, steps = 8, velocity_x = 1e-4, velocity_y = 4e-5 /', &

@@ -13,6 +13,10 @@
 !>     constant shear   s = sigma_max/m
 !>     Coulomb-Orowan   the smaller of the two
 !>
+!> p_a is the attraction at touch, e'(0) of the potential (module `adhesion_potential`): P + p_a is the
+!> pressure of the wall alone in a closed cell, which is not negative and is zero where the cell opens.
+!> The thesis has p_a = gamma_0/z_0, which is e'(0) of its exponential potential.
+!>
 !> T is out of bounds where s < 1; T* + s D is then the returned traction. This is the admissible
 !> root of the quadratic equation of the thesis (eq. 3.10 and B.5), without its second nappe.
 !> Without slope n = 0 and T* = 0.
@@ -43,7 +47,7 @@ module friction_law
       integer :: law = law_coulomb
       real(dp) :: coefficient = 0.0_dp           !! mu; not used by constant shear
       real(dp) :: shear_strength = 0.0_dp        !! sigma_max, Pa; not used by Coulomb
-      real(dp) :: adhesive_pressure = 0.0_dp     !! p_a = gamma_0/z_0, Pa; 0 without adhesion
+      real(dp) :: adhesive_pressure = 0.0_dp     !! p_a = e'(0), Pa; 0 without adhesion
       logical :: slope = .false.                 !! the slope of the road counts
       logical :: physical_slip = .true.          !! direction of slip: physical, or the thesis's
    contains

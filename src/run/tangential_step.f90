@@ -11,6 +11,7 @@
 !> Fields of doubles besides the state, two components each: the trial U', slip, DX', T_h; those of the
 !> solver.
 module tangential_step
+   use adhesion_potential, only : adhesion_potential_type, adhesive_slope, new_adhesion_potential
    use case_settings, only : case_type
    use contact_rule, only : touches
    use asperity_errors, only : error_type
@@ -74,14 +75,15 @@ contains
       type(tangential_step_type), intent(out) :: self
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
-      real(dp) :: adhesive
+      type(adhesion_potential_type) :: potential
 
       self%grid = case%grid
-      adhesive = 0.0_dp
       self%adhesive = case%adhesion%potential /= 'none'
-      if (self%adhesive) adhesive = case%adhesion%energy/case%adhesion%range
+      call new_adhesion_potential(potential, trim(case%adhesion%potential), case%adhesion%energy, &
+         case%adhesion%range, error)
+      if (allocated(error)) return
       self%law = new_friction_law(trim(case%friction%law), case%friction%coefficient, &
-         case%friction%shear_strength, adhesive, case%friction%slope_effect, &
+         case%friction%shear_strength, adhesive_slope(potential, 0.0_dp), case%friction%slope_effect, &
          case%solver%slip_law == 'physical')
       call new_convolution(self%operator, self%grid, tangential_kernel(case%material), error)
       if (allocated(error)) return
