@@ -2,7 +2,7 @@
 module test_coupled_passes
    use anderson, only : anderson_type, new_anderson
    use check, only : begin_suite, check_close, check_order, check_that, selected
-   use coupled_passes, only : carry
+   use carried_field, only : carry
    use pass_control, only : pass_control_type
    use asperity_precision, only : dp
    use simulation_runs, only : check_books, nl, record_type, run_case

@@ -96,7 +96,7 @@ contains
    !>
    !> Normal solver: 10 fields and one padded buffer (one field in periodic mode, four in free mode);
    !> each arm one field, and three for the steps before and their traction; sliding four, the
-   !> original map and its slopes; adhesion 6 fields and a second buffer; friction 42 fields, two
+   !> original map and its slopes; adhesion 6 fields and a second buffer; friction 48 fields, two
    !> buffers, and with arms four fields and two an arm; mixed precision 0.6 of a buffer;
    !> steady phases 34 fields, 143 with friction (not counted: a dense system of few cells in contact,
    !> module `steady_active`, at most 20 fields for as long as it is solved). The rest:
@@ -120,7 +120,7 @@ contains
          buffers = buffers + 1.0_dp
       end if
       if (case%friction%law /= 'none') then
-         fields = fields + 42.0_dp + 2.0_dp*arms
+         fields = fields + 48.0_dp + 2.0_dp*arms
          if (arms > 0) fields = fields + 4.0_dp
          buffers = buffers + 2.0_dp
       end if

@@ -268,8 +268,6 @@ contains
       if (found%normal%converged .and. .not. found%rubbing%converged) then
          self%reason = 'friction: '//trim(found%rubbing%reason)
          self%residual = found%rubbing%residual
-         if (found%rubbing%residual <= self%case%solver%tolerance) &
-            self%reason = trim(self%reason)//' before the tractions settled'
          if (self%tangential%slides_off) self%reason = pull_outcome(plan, self%tangential)
       end if
       if (found%passes > 0) call look_at_passes(self, plan, found)

@@ -19,24 +19,25 @@
 !> around the contact move with it. Otherwise the road would be read as stretched beside the contact.
 !> `carry` therefore moves U_T along with the contact; at the fixed point it does nothing.
 !>
-!> The first place comes from the row before: the displacement moves with the road, and its mean goes
-!> on as in the last step. A jump of the load is solved by the same loop, without motion and time, and its
+!> The first place comes from the rows before: the displacement moves with the road, its mean goes on
+!> as in the last step, and `place_forecast` adds what the last rows have changed in it. A jump of the load is solved by the same loop, without motion and time, and its
 !> tractions are not extrapolated.
 !>
 !> What remains is measured by the road read at U_T against the road solved on, `mismatch` below: the
 !> column `residual_coupling`.
 !>
 !> The loop of `solve` reads: do a pass at the place, and measure the mismatch that it leaves. If the
-!> mismatch is within the tolerance, and the solves of the pass were asked to be that accurate too, let
-!> the tractions settle, and the row is solved. Otherwise `pass_control` judges the pass, which sets the
+!> mismatch is within the tolerance, and the solves of the pass were asked to be that accurate too, the
+!> row is solved. Otherwise `pass_control` judges the pass, which sets the
 !> accuracy of the next one and how far to go, and `choose_place` goes to the next place. When the
 !> passes run out, the row keeps what the last pass has left; the last of more than ten passes is done
 !> at the best place so far. A normal solve that does not converge ends the loop.
 !>
-!> Fields of doubles: two components each for the place, its residual and the best place; and those of the
-!> acceleration. The check borrows three from the workspace of the contact.
+!> Fields of doubles: two components each for the place, its residual, the best place and the displacement
+!> carried along; and those of the acceleration. The check borrows three from the workspace of the contact.
 module coupled_passes
    use anderson, only : anderson_type, new_anderson
+   use carried_field, only : carry
    use contact_model, only : contact_mean, contact_type, solve_normal
    use asperity_interpolation, only : displaced
    use field_sums, only : row_totals
@@ -48,7 +49,7 @@ module coupled_passes
    implicit none
    private
 
-   public :: carry, coupled_passes_type, new_coupled_passes
+   public :: coupled_passes_type, new_coupled_passes
 
    integer, parameter, public :: most_passes = 400      !! where the case leaves the number open
 
@@ -63,6 +64,7 @@ module coupled_passes
       integer :: passes = 0                             !! done in the last row
       real(dp) :: residual = 0.0_dp                     !! mismatch that the last row left
       real(dp), allocatable, private :: place(:, :, :)      !! z, m [nx, 2, ny]
+      real(dp), allocatable, private :: carried(:, :, :)    !! U_T of the row before, carried along, m
       real(dp), allocatable, private :: residuals(:, :, :)  !! U_T, carried, less z, m
       real(dp), allocatable, private :: best_place(:, :, :) !! z of the least mismatch, m
       type(anderson_type), private :: mixing
@@ -78,7 +80,7 @@ contains
       integer, intent(in) :: nx, ny
 
       allocate (self%place(nx, 2, ny), source=0.0_dp)
-      allocate (self%residuals, self%best_place, source=self%place)
+      allocate (self%carried, self%residuals, self%best_place, source=self%place)
       call new_anderson(self%mixing, nx, 2, ny, pairs)
       self%mixing%largest = largest_factor
    end subroutine new_coupled_passes
@@ -100,8 +102,8 @@ contains
       most = contact%case%solver%passes
       if (most == 0) most = most_passes
       call self%mixing%forget()
-      call predict(self, contact, motion)
       unlike = plan%instantaneous .or. plan%new_speed
+      call predict(self, contact, plan%dt, motion, goes_on=.not. unlike)
       call control%start(tolerance, merge(1.0_dp, contact%state%first_mismatch, unlike))
       if (.not. plan%instantaneous) &
          call contact%tangential%extrapolate(contact%state%tangential, .not. plan%new_speed)
@@ -114,16 +116,14 @@ contains
          call do_pass(self, contact, plan, control%accuracy, normal, rubbing)
          if (self%passes == 1 .and. .not. plan%instantaneous) contact%state%first_mismatch = self%residual
          if (self%passes == most .or. .not. normal%converged) exit
-         if (control%accuracy <= tolerance .and. self%residual <= tolerance) then
-            call settle(self, contact, plan, rubbing)
-            if (self%residual <= tolerance) return       ! settling may have moved the surface a little
-         end if
+         if (control%accuracy <= tolerance .and. self%residual <= tolerance) exit
          call control%judge(self%residual)
          call choose_place(self, contact, control)
          ! The last of many passes is for the best place that was found.
          if (self%passes == most - 1 .and. most > 10) self%place(:, :, :) = self%best_place
       end do
-      call settle(self, contact, plan, rubbing)
+      call contact%state%tangential%forecast%learn(contact%tangential%trial, self%carried, &
+         contact%state%pressure)
    end subroutine solve
 
    !> One pass at the place, and the mismatch that it leaves.
@@ -140,43 +140,37 @@ contains
       call solve_normal(contact, plan, accuracy, part)
       call add_result(normal, part)
       contact%tangential%tolerance = accuracy
-      contact%tangential%settle = .false.
       call contact%tangential%solve(contact%state%tangential, contact%state%pressure, contact%state%gap, &
          contact%slope_x, contact%slope_y, part)
       call add_result(rubbing, part)
       self%residual = mismatch(contact, plan)
    end subroutine do_pass
 
-   !> Let the traction itself settle, which the passes do not need.
-   subroutine settle(self, contact, plan, rubbing)
+   !> The first place of a row: the displacement of the row before, moved along with the contact, which
+   !> follows the road over the rubber, plus the mean motion of the rubber's surface; and what the last rows
+   !> have changed in it.
+   subroutine predict(self, contact, dt, motion, goes_on)
       class(coupled_passes_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact
-      type(planned_row_type), intent(in) :: plan
-      type(solver_result_type), intent(inout) :: rubbing
-      type(solver_result_type) :: part
-
-      contact%tangential%tolerance = contact%case%solver%tolerance
-      contact%tangential%settle = .true.
-      call contact%tangential%solve(contact%state%tangential, contact%state%pressure, contact%state%gap, &
-         contact%slope_x, contact%slope_y, part)
-      call add_result(rubbing, part)
-      self%residual = mismatch(contact, plan)
-   end subroutine settle
-
-   !> The first place of a row: the displacement of the row before, moved along with the contact, which
-   !> follows the road over the rubber, plus the mean motion of the rubber's surface.
-   subroutine predict(self, contact, motion)
-      class(coupled_passes_type), intent(inout) :: self
-      class(contact_type), intent(in) :: contact
+      real(dp), intent(in) :: dt                         !! s
       real(dp), intent(in) :: motion(2)                  !! of the road, m
+      logical, intent(in) :: goes_on                     !! the row goes on as the last one did
+      real(dp) :: cell(2)
+      logical :: periodic
       integer :: c
 
+      cell = [contact%grid%dx, contact%grid%dy]
+      periodic = contact%grid%boundary /= boundary_free
       do c = 1, 2
-         call carry(contact%state%tangential%displacement(:, c, :), contact%drift - motion, &
-            [contact%grid%dx, contact%grid%dy], contact%grid%boundary /= boundary_free, &
-            self%place(:, c, :))
-         self%place(:, c, :) = self%place(:, c, :) + contact%drift(c)
+         call carry(contact%state%tangential%displacement(:, c, :), contact%drift - motion, cell, periodic, &
+            self%carried(:, c, :))
+         self%carried(:, c, :) = self%carried(:, c, :) + contact%drift(c)
       end do
+      self%place(:, :, :) = self%carried
+      associate (forecast => contact%state%tangential%forecast)
+         call forecast%follow(dt, goes_on, contact%drift - motion, cell, periodic)
+         call forecast%add(self%place)
+      end associate
    end subroutine predict
 
    !> The next place, from what the last pass found.
@@ -262,49 +256,5 @@ contains
       total%iterations = before%iterations + part%iterations
       total%ffts = before%ffts + part%ffts
    end subroutine add_result
-
-   !> A field around the contact after the contact has moved along the rubber by -motion, bilinear.
-   subroutine carry(field, motion, cell, periodic, moved)
-      real(dp), intent(in) :: field(:, :)        !! [nx, ny]
-      real(dp), intent(in) :: motion(2)          !! of the rubber over the road, m
-      real(dp), intent(in) :: cell(2)            !! dx, dy, m
-      logical, intent(in) :: periodic            !! else the rim goes on outside
-      real(dp), intent(out) :: moved(:, :)       !! [nx, ny]
-      real(dp) :: u, v
-      integer :: cells(2), nx, ny, i, j, i0, i1, j0, j1
-
-      nx = size(field, 1)
-      ny = size(field, 2)
-      cells = floor(motion/cell)
-      u = motion(1)/cell(1) - cells(1)
-      v = motion(2)/cell(2) - cells(2)
-      !$omp parallel do default(none) shared(field, moved, cells, u, v, nx, ny, periodic) &
-      !$omp private(i, j, i0, i1, j0, j1)
-      do j = 1, ny
-         j0 = within(j + cells(2), ny, periodic)
-         j1 = within(j + cells(2) + 1, ny, periodic)
-         do i = 1, nx
-            i0 = within(i + cells(1), nx, periodic)
-            i1 = within(i + cells(1) + 1, nx, periodic)
-            moved(i, j) = (1.0_dp - v)*((1.0_dp - u)*field(i0, j0) + u*field(i1, j0)) &
-               + v*((1.0_dp - u)*field(i0, j1) + u*field(i1, j1))
-         end do
-      end do
-   end subroutine carry
-
-   !> The cell itself, its image, or the nearest at the rim.
-   elemental function within(i, n, periodic) result(k)
-      integer, intent(in) :: i, n
-      logical, intent(in) :: periodic
-      integer :: k
-
-      k = i
-      if (k >= 1 .and. k <= n) return
-      if (periodic) then
-         k = modulo(i - 1, n) + 1
-      else
-         k = min(max(i, 1), n)
-      end if
-   end function within
 
 end module coupled_passes

@@ -197,6 +197,13 @@ contains
       call table%add('tangential/rubbing', t%rubbing, 'Pa', 'frictional traction T - T* of the last step')
       call table%add('tangential/contact', t%contact, '0 open, 1 stick, 2 slip')
       call table%add('tangential/rubbed', t%rubbed, 'contact of the last step at the rubber''s own points')
+      call table%add('tangential/forecast/dt', t%forecast%dt, 's', 'length of the last step of the forecast')
+      call table%add('tangential/forecast/known', t%forecast%known, 'differences that the forecast knows')
+      call table%add('tangential/forecast/order', t%forecast%order, 'order of the forecast')
+      call table%add('tangential/forecast/change', t%forecast%change, 'm', &
+         'change of the displacement around the contact in the last step')
+      call table%add('tangential/forecast/more', t%forecast%more, 'm', &
+         'by how much this was more than in the step before')
       call list_books('tangential/books', t%books, table)
       call list_arms('tangential/arms', t%arms, table)
    end subroutine list_tangential

@@ -3,12 +3,13 @@
 !> Plain data. Module `tangential_step` solves a step with it.
 !>
 !> Fields of doubles, two components each: T, that of the step before, U, T - T* of the step before at
-!> the rubber's own points; the state of the arms (S, S - S_old, one field per arm).
+!> the rubber's own points; those of the forecast of U_T; the state of the arms (S, S - S_old, one field per arm).
 module tangential_state
    use asperity_errors, only : error_type
    use asperity_precision, only : dp, int8
    use block_motion, only : block_motion_type
    use case_settings, only : case_type
+   use place_forecast, only : new_place_forecast, place_forecast_type
    use viscoelastic_energy, only : energy_books_type, new_books
    use arm_state, only : arm_state_type, new_arm_state
    use zener, only : zener_type
@@ -28,6 +29,7 @@ module tangential_state
       real(dp), allocatable :: rubbing(:, :, :)       !! T - T* at the end of the last step, Pa
       integer(int8), allocatable :: contact(:, :)     !! 0 open, 1 stick, 2 slip
       integer(int8), allocatable :: rubbed(:, :)      !! the same at the end of the last step
+      type(place_forecast_type) :: forecast           !! of U_T in the next step
       type(arm_state_type) :: arms
       type(energy_books_type) :: books                !! of the strain of the rubber
       real(dp) :: rate(2) = 0.0_dp                    !! mean speed of the surface in the contact, m/s
@@ -50,6 +52,7 @@ contains
       allocate (self%before, self%displacement, self%rubbing, source=self%traction)
       allocate (self%contact(case%grid%nx, case%grid%ny), self%rubbed(case%grid%nx, case%grid%ny), &
          source=0_int8)
+      call new_place_forecast(self%forecast, case%grid%nx, case%grid%ny)
       call new_arm_state(self%arms, material, case%grid%nx, case%grid%ny, 2, error)
       if (allocated(error)) return
       call new_books(self%books, material, case%grid%cell_area())

@@ -40,7 +40,6 @@ module tangential_step
       type(friction_law_type) :: law
       logical :: adhesive = .false.                   !! the contact has an adhesive potential
       real(dp) :: tolerance = 1e-6_dp                 !! of the next solve
-      logical :: settle = .true.                      !! T has to settle too, not only the displacements
       real(dp), allocatable :: trial(:, :, :)         !! U_T at the end of the step, m [nx, 2, ny]
       real(dp), allocatable :: slip(:, :, :)          !! of the step, m
       logical :: pulled(2) = .false.                  !! the road hangs on a force along x, y
@@ -91,6 +90,8 @@ contains
          merge(friction_thesis, friction_fast, case%solver%method == 'thesis'))
       if (allocated(error)) return
       self%solver%max_iterations = case%solver%max_iterations
+      ! The passes of a step measure by the displacements whether the step is solved.
+      self%solver%settle = .false.
       allocate (self%trial(self%grid%nx, 2, self%grid%ny), source=0.0_dp)
       allocate (self%slip, self%drive, self%past, source=self%trial)
    end subroutine new_tangential_step
@@ -301,7 +302,6 @@ contains
       integer :: j, c
 
       self%solver%tolerance = self%tolerance
-      self%solver%settle = self%settle
       call mark_contact(self, state, pressure, gap)
       call hang_road(self, state, pressure, slope_x, slope_y)
       fields%pressure => pressure

@@ -135,7 +135,8 @@ contains
       x = next
    end subroutine glide_row
 
-   !> The cosine of the angle between a residual and the last one; 0 where there is none.
+   !> The cosine of the angle between a residual and the last one. Where there is none, 0.5, which calls
+   !> the step neither straight nor bent.
    function turn(self, f) result(cosine)
       class(anderson_type), intent(in) :: self
       real(dp), intent(in) :: f(self%nx, self%components, self%ny)  !! g(x) - x
@@ -144,7 +145,7 @@ contains
       real(dp) :: sums(3)
       integer :: j
 
-      cosine = 0.0_dp
+      cosine = 0.5_dp
       if (.not. self%begun) return
       allocate (rows(3, self%ny))
       !$omp parallel do default(none) shared(self, f, rows) private(j) num_threads(self%threads)
