@@ -5,6 +5,7 @@ module test_coupled_passes
    use carried_field, only : carry
    use pass_control, only : pass_control_type
    use asperity_precision, only : dp
+   use place_forecast, only : new_place_forecast, place_forecast_type
    use simulation_runs, only : check_books, nl, record_type, run_case
    implicit none
    private
@@ -17,6 +18,8 @@ contains
       call begin_suite('coupled_passes')
       if (selected('carried_fields_move_with_the_contact')) &
          call carried_fields_move_with_the_contact()
+      if (selected('forecast_finds_quadratic_changes')) call forecast_finds_quadratic_changes()
+      if (selected('forecast_leaves_erratic_changes_alone')) call forecast_leaves_erratic_changes_alone()
       if (selected('mixing_settles_where_plain_passes_fail')) &
          call mixing_settles_where_plain_passes_fail()
       if (selected('accuracy_follows_the_mismatch')) call accuracy_follows_the_mismatch()
@@ -46,6 +49,56 @@ contains
       call check_close(moved(3, 2), 0.5_dp*(field(4, 2) + field(5, 2)), 1.0e-14_dp, 'free, inside')
       call check_close(moved(nx, 2), field(nx, 2), 1.0e-14_dp, 'free, at the rim')
    end subroutine carried_fields_move_with_the_contact
+
+   !> A displacement that moves along by a cell a step and grows with the square of the time is forecast
+   !> exactly after four steps; after a step of another length nothing is taken for granted.
+   subroutine forecast_finds_quadratic_changes()
+      integer, parameter :: nx = 12, ny = 5
+      real(dp), parameter :: cell(2) = [0.5_dp, 0.3_dp], motion(2) = [0.5_dp, 0.0_dp]
+      type(place_forecast_type) :: forecast
+      real(dp) :: pattern(nx, 2, ny), found(nx, 2, ny), carried(nx, 2, ny), place(nx, 2, ny), pressure(nx, ny)
+      integer :: n
+
+      call random_number(pattern)
+      call random_number(pressure)
+      call new_place_forecast(forecast, nx, ny)
+      found = pattern
+      do n = 1, 8
+         carried = cshift(found, 1, dim=1)
+         place = carried
+         call forecast%follow(merge(0.2_dp, 0.1_dp, n == 8), .true., motion, cell, .true.)
+         call forecast%add(place)
+         found = cshift(pattern, n, dim=1)*(1.0_dp + 0.3_dp*n - 0.02_dp*n**2)
+         if (n == 7) call check_close(maxval(abs(place - found)), 0.0_dp, 1.0e-14_dp, 'third order')
+         if (n == 8) call check_close(maxval(abs(place - carried)), 0.0_dp, 0.0_dp, 'another length of step')
+         call forecast%learn(found, carried, pressure)
+      end do
+   end subroutine forecast_finds_quadratic_changes
+
+   !> Changes that alternate make differences larger with each order: the displacement of the row before
+   !> remains the forecast. Outside the contact nothing counts.
+   subroutine forecast_leaves_erratic_changes_alone()
+      integer, parameter :: nx = 8, ny = 6
+      type(place_forecast_type) :: forecast
+      real(dp) :: pattern(nx, 2, ny), found(nx, 2, ny), carried(nx, 2, ny), place(nx, 2, ny), pressure(nx, ny)
+      integer :: n
+
+      call random_number(pattern)
+      pressure = 1.0_dp
+      pressure(:, 4:) = 0.0_dp
+      call new_place_forecast(forecast, nx, ny)
+      found = 0.0_dp
+      do n = 1, 6
+         carried = found
+         place = carried
+         call forecast%follow(0.1_dp, .true., [0.0_dp, 0.0_dp], [0.5_dp, 0.5_dp], .true.)
+         call forecast%add(place)
+         call check_close(maxval(abs(place - carried)), 0.0_dp, 0.0_dp, 'the row before')
+         found(:, :, :3) = carried(:, :, :3) + (-1)**n*pattern(:, :, :3)
+         found(:, :, 4:) = pattern(:, :, 4:)*n
+         call forecast%learn(found, carried, pressure)
+      end do
+   end subroutine forecast_leaves_erratic_changes_alone
 
    !> Maps that plain iteration does not settle: with gains of -2.5 and 1.5 in six directions, and
    !> one that depends on a field nonlinearly.

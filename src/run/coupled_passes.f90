@@ -20,8 +20,8 @@
 !> `carry` therefore moves U_T along with the contact; at the fixed point it does nothing.
 !>
 !> The first place comes from the rows before: the displacement moves with the road, its mean goes on
-!> as in the last step, and `place_forecast` adds what the last rows have changed in it. A jump of the load is solved by the same loop, without motion and time, and its
-!> tractions are not extrapolated.
+!> as in the last step, and `place_forecast` adds what the last rows have changed in it. A jump of the
+!> load is solved by the same loop, without motion and time, and its tractions are not extrapolated.
 !>
 !> What remains is measured by the road read at U_T against the road solved on, `mismatch` below: the
 !> column `residual_coupling`.

@@ -1,8 +1,9 @@
 !> How accurate the solves of the next pass of a coupled step must be, and how far the step to the
 !> next place is damped.
 !>
-!> A pass needs its solves no better than the passes have settled: to a tenth of the mismatch that
-!> the last pass left (`share`). Three things go wrong on hard roads, and each has its answer:
+!> A pass needs its solves no better than the passes have settled: to a tenth of the mismatch that the
+!> last pass left (`share`); a pass that comes close to the tolerance is solved to the tolerance. Three
+!> things go wrong on hard roads, and each has its answer:
 !>
 !> * The solves return with nothing done, since their start is within the accuracy asked for. The
 !>   mismatch then says little, and least of all where a thick block turns a small error of the
@@ -30,6 +31,7 @@ module pass_control
    real(dp), parameter :: coarsest = 1.0e-3_dp      !! accuracy of a solve
    real(dp), parameter :: finest = 1.0e-4_dp        !! accuracy of a solve, in tolerances
    real(dp), parameter :: round_off = 1.0e-11_dp    !! accuracy that double precision can reach
+   real(dp), parameter :: nearly = 3.0_dp           !! an accuracy within this factor of the tolerance nearly meets it
    real(dp), parameter :: usual_share = 0.1_dp, least_share = 1.0e-6_dp
    real(dp), parameter :: falls = 0.3_dp            !! a mismatch below this part of the least one falls
    real(dp), parameter :: slow = 0.5_dp             !! a mismatch above this part of the last falls slowly
@@ -78,6 +80,7 @@ contains
 
       self%tolerance = tolerance
       self%accuracy = min(max(coarsest, tolerance), max(tolerance, usual_share*expected))
+      call spare_a_pass(self)
    end subroutine start
 
    !> After a pass.
@@ -99,6 +102,7 @@ contains
       self%accuracy = max(finest*self%tolerance, round_off, self%share*mismatch)
       if (self%share >= usual_share) self%accuracy = max(self%accuracy, self%tolerance)
       self%accuracy = min(self%accuracy, max(coarsest, self%tolerance))
+      call spare_a_pass(self)
 
       self%forget = mismatch > astray*self%least .and. .not. self%plain
       self%go_back = .false.
@@ -115,6 +119,14 @@ contains
          call go_plain(self)
       end if
    end subroutine judge
+
+   !> Ask a pass that would be solved nearly to the tolerance for the tolerance itself: it may then be the
+   !> last one.
+   pure subroutine spare_a_pass(self)
+      class(pass_control_type), intent(inout) :: self
+
+      if (self%accuracy <= nearly*self%tolerance) self%accuracy = min(self%accuracy, self%tolerance)
+   end subroutine spare_a_pass
 
    !> Go back to the best place, and on in plain steps.
    pure subroutine go_plain(self)
