@@ -106,12 +106,13 @@ contains
       logical, intent(in), optional :: mixed           !! in mixed precision
 
       self%grid = grid
-      call new_convolution(self%operator, grid, kernel, error)
-      if (allocated(error)) return
       if (present(mixed)) self%mixed = mixed
-      if (self%mixed) call new_convolution(self%quick, grid, kernel, error, single=.true.)
+      call new_convolution(self%operator, grid, kernel, error, lean=self%mixed)
       if (allocated(error)) return
-      call new_normal_work(self%work, grid, kernel, self%operator%threads, error)
+      if (self%mixed) call new_convolution(self%quick, grid, kernel, error, single=.true., &
+         memory=self%operator%spectrum_memory())
+      if (allocated(error)) return
+      call new_normal_work(self%work, self%operator, error)
       if (allocated(error)) return
       allocate (self%step(grid%nx, grid%ny), source=0.0_dp)
    end subroutine new_normal_solver
@@ -268,7 +269,7 @@ contains
       type(normal_work_type), intent(inout) :: work
       type(normal_problem_type), intent(in) :: task
       type(gap_measure_type), intent(in) :: measure
-      real(dp), intent(in) :: pressure(:, :), gap(:, :)
+      real(dp), contiguous, intent(in) :: pressure(:, :), gap(:, :)
       type(iteration_type), intent(inout) :: now
       real(dp) :: rz, beta
       logical :: fixed_load
@@ -302,7 +303,7 @@ contains
       type(convolution_type), intent(inout) :: product
       type(normal_problem_type), intent(in) :: task
       real(dp), intent(in) :: level                    !! m
-      real(dp), intent(in) :: pressure(:, :), gap(:, :)
+      real(dp), contiguous, intent(in) :: pressure(:, :), gap(:, :)
       type(iteration_type), intent(inout) :: now
       type(trial_sums_type) :: trial
       type(step_sums_type) :: step
@@ -332,7 +333,7 @@ contains
       class(normal_solver_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: product
       real(dp), intent(in) :: modulus                  !! Pa
-      real(dp), intent(in) :: pressure(:, :)
+      real(dp), contiguous, intent(in) :: pressure(:, :)
       logical, intent(in) :: clipped
       type(step_sums_type), intent(in) :: step
       type(iteration_type), intent(inout) :: now

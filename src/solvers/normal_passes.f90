@@ -13,7 +13,6 @@ module normal_passes
    use normal_sweeps, only : above_cells, clip_cells, direction_cells, load_cells, &
       longest_cells, trial_cells
    use field_sums, only : least_of_rows
-   use kernels, only : kernel_type
    use asperity_precision, only : dp, sp
    use regular_grid, only : boundary_periodic, grid_type
    use schur_preconditioner, only : new_schur_preconditioner, schur_preconditioner_type
@@ -52,24 +51,26 @@ module normal_passes
 
 contains
 
-   !> Allocate the work fields.
-   subroutine new_normal_work(self, grid, kernel, threads, error)
+   !> Allocate the work fields. Some of them lie in the memory of the operator's spectrum: the choice of a
+   !> direction uses them, and has ended before the step is transformed.
+   subroutine new_normal_work(self, operator, error)
       type(normal_work_type), intent(out) :: self
-      type(grid_type), intent(in) :: grid
-      type(kernel_type), intent(in) :: kernel          !! what the solid is, normal
-      integer, intent(in) :: threads
+      type(convolution_type), intent(in) :: operator
       type(error_type), allocatable, intent(out) :: error
 
-      self%grid = grid
-      self%threads = threads
-      call new_coarse_level(self%coarse, grid, kernel, error)
+      self%grid = operator%grid
+      self%threads = operator%threads
+      call new_coarse_level(self%coarse, self%grid, operator%kernel, error)
       if (allocated(error)) return
-      call new_schur_preconditioner(self%preconditioner, grid, self%coarse, threads, error)
+      call new_schur_preconditioner(self%preconditioner, self%grid, self%coarse, self%threads, error, &
+         memory=operator%spectrum_memory())
       if (allocated(error)) return
+      associate (grid => self%grid, threads => self%threads)
       allocate (self%direction(grid%nx, grid%ny), source=0.0_sp)
       call new_active_blocks(self%active, grid%nx, grid%ny, grid%boundary == boundary_periodic, &
          self%coarse%first_y, self%preconditioner%extends, threads)
       allocate (self%state(grid%ny))
+      end associate
    end subroutine new_normal_work
 
    !> Find which blocks hold pressure, the least gap of each, and the sums of the state.

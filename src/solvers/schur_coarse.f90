@@ -14,7 +14,7 @@
 !>
 !> All numbers were chosen by trials on rough contacts; none of them is critical.
 module schur_coarse
-   use asperity_errors, only : error_input, error_type, fail
+   use asperity_errors, only : error_type
    use fft_conv, only : convolution_type, new_symbol_operator
    use asperity_precision, only : dp, pi, sp
    use regular_grid, only : grid_type
@@ -61,8 +61,6 @@ contains
       integer, intent(in) :: threads
       type(error_type), allocatable, intent(out) :: error
       real(dp), allocatable :: symbol(:, :)
-      integer :: longest
-      logical :: planned
 
       self%cells = grid%cells()/(real(blocks(1), dp)*blocks(2))
       self%threads = merge(1, threads, blocks(1)*blocks(2) < 16384)
@@ -71,9 +69,9 @@ contains
       call model_symbols(grid, c0, h, symbol, self%model)
       call new_symbol_operator(self%missing, blocks(1), blocks(2), symbol, error, single=.true.)
       if (allocated(error)) return
-      call new_row_column(self%transform, blocks, blocks, 1, self%threads, longest, planned)
-      if (.not. planned) call fail(error, error_input, 'FFTW has no plan for the coarse grid')
-      allocate (self%symbol(0:longest, 0:blocks(2)/2, 1), source=0.0_sp)
+      call new_row_column(self%transform, blocks, blocks, 1, self%threads, error)
+      if (allocated(error)) return
+      allocate (self%symbol(0:self%transform%longest, 0:blocks(2)/2, 1), source=0.0_sp)
    end subroutine new_schur_coarse
 
    !> What the coarse level adds to the stencil, and the sum of both, at its wave vectors.

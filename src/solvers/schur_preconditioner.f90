@@ -22,8 +22,10 @@
 !> there M r = B_SS r.
 !>
 !> Fields are in single precision: errors of 1e-7 do not matter in a preconditioner. N is restricted to a
-!> rim around the contact (the wide blocks of module active_blocks). Memory: four such fields.
+!> rim around the contact (the wide blocks of module active_blocks). Memory: four such fields, of which two may be
+!> lent by others.
 module schur_preconditioner
+   use, intrinsic :: iso_c_binding, only : c_f_pointer, c_ptr
    use active_blocks, only : active_blocks_type
    use coarse_level, only : coarse_level_type, edge_rows, inner_rows
    use asperity_errors, only : error_type
@@ -54,8 +56,9 @@ module schur_preconditioner
       real(sp), private :: weights(3) = 0.0_sp           !! of the stencil: centre, along x, along y
       real(sp), allocatable :: residual(:, :)            !! (0:nx+1, 0:ny+1), v on S, 0 on N
       real(sp), allocatable :: search(:, :)              !! (0:nx+1, 0:ny+1), d, 0 on S
-      real(sp), allocatable :: image(:, :)               !! [nx, ny], b
-      real(sp), allocatable :: response(:, :)            !! [nx, ny], e of the last step
+      real(sp), pointer, contiguous :: image(:, :) => null()      !! [nx, ny], b
+      real(sp), pointer, contiguous :: response(:, :) => null()   !! [nx, ny], e of the last step
+      logical, private :: owns = .false.                 !! and frees these two
       real(sp) :: length = 0.0_sp                        !! multiple of e that is still to be added to b
       real(dp), allocatable :: pending(:, :)             !! coarse part to be added to b, of each block
       type(image_sums_type), private :: sums
@@ -80,14 +83,17 @@ module schur_preconditioner
 
 contains
 
-   !> Make the preconditioner of a grid.
-   subroutine new_schur_preconditioner(self, grid, coarse, threads, error, extends)
+   !> Make the preconditioner of a grid. The image and the response may lie in `memory` for a field of
+   !> doubles, which others may use from the last use of a direction until `set_residual`.
+   subroutine new_schur_preconditioner(self, grid, coarse, threads, error, extends, memory)
       type(schur_preconditioner_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
       type(coarse_level_type), intent(in) :: coarse
       integer, intent(in) :: threads
       type(error_type), allocatable, intent(out) :: error
       logical, intent(in), optional :: extends           !! chosen by the grid if absent
+      type(c_ptr), intent(in), optional :: memory
+      real(sp), pointer, contiguous :: pair(:, :, :)
       real(dp) :: wx, wy, c0
 
       self%grid = grid
@@ -101,7 +107,14 @@ contains
       self%weights = real([c0 + 2.0_dp*(wx + wy), wx, wy], sp)
       allocate (self%residual(0:grid%nx + 1, 0:grid%ny + 1), source=0.0_sp)
       allocate (self%search(0:grid%nx + 1, 0:grid%ny + 1), source=0.0_sp)
-      allocate (self%image(grid%nx, grid%ny), self%response(grid%nx, grid%ny), source=0.0_sp)
+      self%owns = .not. present(memory)
+      if (present(memory)) then
+         call c_f_pointer(memory, pair, [grid%nx, grid%ny, 2])
+         self%image => pair(:, :, 1)
+         self%response => pair(:, :, 2)
+      else
+         allocate (self%image(grid%nx, grid%ny), self%response(grid%nx, grid%ny))
+      end if
       allocate (self%pending(coarse%nx, coarse%ny), source=0.0_dp)
       allocate (self%cells_off, self%image_off, self%response_off, self%search_off, source=self%pending)
       call new_schur_coarse(self%model, grid, c0, coarse%h, [coarse%nx, coarse%ny], threads, error)
@@ -173,7 +186,7 @@ contains
             associate (first => active%wide_first(k, jb))
                call image_cells(active%wide_last(k, jb) - first + 1, self%weights, &
                   self%residual(first, j - 1), self%residual(first - 1, j), self%residual(first, j + 1), &
-                  self%image(first, j), column(first), count(first), rows(j))
+                  self%image(first:, j), column(first), count(first), rows(j))
             end associate
          end do
       end do
@@ -289,11 +302,11 @@ contains
                n = active%wide_last(k, jb) - first + 1
                if (step%first) then
                   call start_search_cells(n, real(om, sp), added(first), corrected(first), &
-                     self%residual(first, j), self%image(first, j), self%search(first, j))
+                     self%residual(first, j), self%image(first:, j), self%search(first, j))
                else
                   call search_cells(n, real(om, sp), self%length, step%beta, added(first), &
-                     corrected(first), self%residual(first, j), self%response(first, j), &
-                     self%image(first, j), self%search(first, j))
+                     corrected(first), self%residual(first, j), self%response(first:, j), &
+                     self%image(first:, j), self%search(first, j))
                end if
             end associate
          end do
@@ -320,11 +333,11 @@ contains
                n = active%wide_last(k, jb) - first + 1
                if (last) then
                   call last_response_cells(n, self%weights, self%search(first, j - 1), &
-                     self%search(first - 1, j), self%search(first, j + 1), self%response(first, j), rows(j))
+                     self%search(first - 1, j), self%search(first, j + 1), self%response(first:, j), rows(j))
                else
                   call response_cells(n, self%weights, self%search(first, j - 1), &
                      self%search(first - 1, j), self%search(first, j + 1), self%residual(first, j), &
-                     self%image(first, j), self%response(first, j), column(first), rows(j))
+                     self%image(first:, j), self%response(first:, j), column(first), rows(j))
                end if
             end associate
          end do
@@ -376,6 +389,9 @@ contains
       class(schur_preconditioner_type), intent(inout) :: self
 
       call self%model%destroy()
+      if (self%owns) deallocate (self%image, self%response)
+      self%owns = .false.
+      nullify (self%image, self%response)
    end subroutine destroy
 
 end module schur_preconditioner

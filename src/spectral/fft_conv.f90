@@ -10,9 +10,13 @@
 !>
 !> Memory: one field (two for a vector operator), doubled along x in free mode, and a quarter of a
 !> field (a whole one in free mode) for each symbol. An operator made with `single` takes half of that,
-!> works in single precision, and is used in the same way.
+!> works in single precision, and is used in the same way. Operators that are never in use at once can
+!> share the memory of their spectra (`spectrum_memory`). A periodic operator of a solid made with
+!> `lean` has no table of its symbol: it computes the symbol in every product, which takes longer.
 module fft_conv
+   use, intrinsic :: iso_c_binding, only : c_ptr
    use asperity_errors, only : error_input, error_type, fail
+   use computed_symbol, only : columns_computed
    use influence, only : transform_length
    use kernels, only : kernel_type
    use asperity_parallel, only : global_sum, thread_count
@@ -45,7 +49,7 @@ module fft_conv
       logical :: single = .false.           !! the transforms are in single precision
       type(grid_type) :: grid               !! of an operator of a solid
       type(kernel_type) :: kernel           !! what the solid is
-      !> Symbols over (mx my): (0:, 0:my/2, 1) or xx, yy, xy; zero beyond mx/2. Not there if single.
+      !> Symbols over (mx my): (0:, 0:my/2, 1) or xx, yy, xy; zero beyond mx/2. Not there if single or lean.
       real(dp), allocatable, private :: symbol(:, :, :)
       type(row_column_double_type), private :: high        !! does the work if not single
       type(row_column_single_type), private :: low         !! does the work if single
@@ -62,6 +66,7 @@ module fft_conv
       procedure :: backward_row
       procedure :: add_backward_row
       procedure :: set_unit
+      procedure :: spectrum_memory
       procedure :: symbol_of
       procedure :: self_compliance
       procedure :: mean_mode
@@ -73,21 +78,29 @@ module fft_conv
 contains
 
    !> The operator of a solid of unit shear modulus, m/Pa.
-   subroutine new_convolution(self, grid, kernel, error, single)
+   subroutine new_convolution(self, grid, kernel, error, single, memory, lean)
       type(convolution_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
       type(kernel_type), intent(in) :: kernel      !! what the solid is
       type(error_type), allocatable, intent(out) :: error
       logical, intent(in), optional :: single      !! work in single precision
+      type(c_ptr), intent(in), optional :: memory  !! of an operator that is never in use meanwhile
+      logical, intent(in), optional :: lean        !! no table of the symbol, where that is possible
+      logical :: tabulated
 
       if (grid%boundary /= boundary_periodic .and. .not. associated(kernel%cell)) then
          call fail(error, error_input, 'this solid is for periodic boundaries only')
          return
       end if
-      call plan(self, grid%nx, grid%ny, grid%boundary, kernel%components, error, single)
+      call plan(self, grid%nx, grid%ny, grid%boundary, kernel%components, error, single, memory)
       if (allocated(error)) return
       self%grid = grid
       self%kernel = kernel
+      tabulated = .true.
+      if (present(lean)) tabulated = .not. lean
+      if (grid%boundary /= boundary_periodic .or. kernel%components > 1 .or. self%single) tabulated = .true.
+      if (.not. tabulated) return
+      call new_table(self)
       call kernel%symbols(grid, self%mx, self%my, self%symbol(0:self%mx/2, :, :))
       call finish_symbol(self)
    end subroutine new_convolution
@@ -103,6 +116,7 @@ contains
       if (allocated(error)) return
       self%grid = grid
       self%kernel = kernel
+      call new_table(self)
       call kernel%inverse_symbols(grid, self%symbol(0:self%mx/2, :, :))
       call finish_symbol(self)
    end subroutine new_inverse_convolution
@@ -117,6 +131,7 @@ contains
 
       call plan(self, nx, ny, boundary_periodic, 1, error, single)
       if (allocated(error)) return
+      call new_table(self)
       self%symbol(0:nx/2, :, 1) = symbol
       call finish_symbol(self)
    end subroutine new_symbol_operator
@@ -134,14 +149,12 @@ contains
    end subroutine finish_symbol
 
    !> Sizes, buffers and plans.
-   subroutine plan(self, nx, ny, boundary, components, error, single)
+   subroutine plan(self, nx, ny, boundary, components, error, single, memory)
       type(convolution_type), intent(inout) :: self
       integer, intent(in) :: nx, ny, boundary, components
       type(error_type), allocatable, intent(out) :: error
       logical, intent(in), optional :: single
-      integer :: longest
-      logical :: planned
-      character(80) :: text
+      type(c_ptr), intent(in), optional :: memory
 
       self%nx = nx
       self%ny = ny
@@ -152,19 +165,30 @@ contains
       if (present(single)) self%single = single
       if (self%single) then
          call new_row_column_single(self%low, [nx, ny], [self%mx, self%my], components, self%threads, &
-            longest, planned)
+            error, memory=memory)
       else
          call new_row_column_double(self%high, [nx, ny], [self%mx, self%my], components, self%threads, &
-            longest, planned)
+            error, memory=memory)
       end if
-      if (.not. planned) then
-         write (text, '("FFTW has no plan for a grid of ", i0, " x ", i0)') self%mx, self%my
-         call fail(error, error_input, trim(text))
-         call self%destroy()
-         return
-      end if
-      allocate (self%symbol(0:longest, 0:self%my/2, merge(1, 3, components == 1)), source=0.0_dp)
    end subroutine plan
+
+   !> Room for the symbols.
+   subroutine new_table(self)
+      type(convolution_type), intent(inout) :: self
+
+      allocate (self%symbol(0:max(self%low%longest, self%high%longest), 0:self%my/2, &
+         merge(1, 3, self%components == 1)), source=0.0_dp)
+   end subroutine new_table
+
+   !> The memory of the spectrum, aligned for FFTW, of at least a field of doubles (half of that if
+   !> single). Others may use it while the operator is not at work.
+   pure function spectrum_memory(self) result(memory)
+      class(convolution_type), intent(in) :: self
+      type(c_ptr) :: memory
+
+      memory = self%high%spectrum_memory
+      if (self%single) memory = self%low%spectrum_memory
+   end function spectrum_memory
 
    !> u = A p.
    subroutine apply(self, p, u, form)
@@ -309,7 +333,7 @@ contains
    end subroutine set_unit
 
    !> One part of the symbol for a field and its transform without factors, in the first quarter of the
-   !> plane of wave numbers. Not for a single operator.
+   !> plane of wave numbers. Not for a single or lean operator.
    pure function symbol_of(self, part) result(table)
       class(convolution_type), intent(in) :: self
       integer, intent(in) :: part                  !! 1; of a vector operator 1: xx, 2: yy, 3: xy
@@ -319,7 +343,8 @@ contains
    end function symbol_of
 
    !> Displacement of a cell under a unit traction on that cell alone, the mean of both components: the
-   !> mean of the symbols over the whole spectrum; without the mean mode where periodic.
+   !> mean of the symbols over the whole spectrum; without the mean mode where periodic. Not for a single
+   !> or lean operator.
    pure function self_compliance(self) result(compliance)
       class(convolution_type), intent(in) :: self
       real(dp) :: compliance
@@ -339,6 +364,7 @@ contains
    end function self_compliance
 
    !> The mean mode: the uniform displacement that goes with tractions whose sum over the cells is 1 Pa.
+   !> Not for a single or lean operator, nor the procedures that set it.
    pure function mean_mode(self, component) result(mode)
       class(convolution_type), intent(in) :: self
       integer, intent(in) :: component             !! 1, or 2 of a vector operator
@@ -380,6 +406,8 @@ contains
       self%ffts = self%ffts + merge(2, 1, back)*self%components
       if (self%single) then
          call self%low%columns(self%low_symbol, self%symbol_unit, inverse, back, form)
+      else if (.not. allocated(self%symbol)) then
+         call columns_computed(self%high, self%grid, self%kernel, inverse, form)
       else
          call self%high%columns(self%symbol, self%symbol_unit, inverse, back, form)
       end if

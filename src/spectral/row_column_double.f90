@@ -9,6 +9,7 @@ module row_column_double
       fft_plan_many_dft => fftw_plan_many_dft, &
       fft_plan_many_dft_c2r => fftw_plan_many_dft_c2r, &
       fft_plan_many_dft_r2c => fftw_plan_many_dft_r2c
+   use asperity_errors, only : error_input, error_memory, error_type, fail
    use omp_lib, only : omp_get_thread_num
    use asperity_precision, only : dp, wp => dp
    use wisdom, only : from_measuring, from_memory, planning_flag, save_wisdom
@@ -17,6 +18,6 @@ module row_column_double
 
    public :: new_row_column, row_column_type
 
-   include 'row_column.inc'      ! state 9cce9a63, written by tools/check_sources.py --update
+   include 'row_column.inc'      ! state 642d2a1a, written by tools/check_sources.py --update
 
 end module row_column_double

@@ -14,6 +14,7 @@ module row_column_single
       fft_plan_many_dft => fftwf_plan_many_dft, &
       fft_plan_many_dft_c2r => fftwf_plan_many_dft_c2r, &
       fft_plan_many_dft_r2c => fftwf_plan_many_dft_r2c
+   use asperity_errors, only : error_input, error_memory, error_type, fail
    use omp_lib, only : omp_get_thread_num
    use asperity_precision, only : dp, wp => sp
    use wisdom, only : from_measuring, from_memory, planning_flag, save_wisdom
@@ -22,6 +23,6 @@ module row_column_single
 
    public :: new_row_column, row_column_type
 
-   include 'row_column.inc'      ! state 9cce9a63, written by tools/check_sources.py --update
+   include 'row_column.inc'      ! state 642d2a1a, written by tools/check_sources.py --update
 
 end module row_column_single

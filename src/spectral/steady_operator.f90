@@ -9,7 +9,7 @@
 !> Memory: one field for the spectrum of the normal side and four for that of the tangential one; the
 !> symbols take one field, and six more with friction; the resolvent one.
 module steady_operator
-   use asperity_errors, only : error_input, error_type, fail
+   use asperity_errors, only : error_type
    use asperity_parallel, only : thread_count
    use asperity_precision, only : dp, int64
    use regular_grid, only : grid_type
@@ -77,17 +77,16 @@ contains
       type(grid_type), intent(in) :: grid
       logical, intent(in) :: frictional
       type(error_type), allocatable, intent(out) :: error
-      logical :: planned
 
       self%nx = grid%nx
       self%ny = grid%ny
       self%frictional = frictional
       self%threads = merge(1, thread_count(), grid%nx*grid%ny < small)
-      call new_row_column(self%scalar, [grid%nx, grid%ny], [grid%nx, grid%ny], 1, self%threads, &
-         self%last, planned)
-      if (planned .and. frictional) call new_row_column(self%vector, [grid%nx, grid%ny], &
-         [grid%nx, grid%ny], 4, self%threads, self%last, planned, inputs=2)
-      if (.not. planned) call fail(error, error_input, 'FFTW has no plan for this grid')
+      call new_row_column(self%scalar, [grid%nx, grid%ny], [grid%nx, grid%ny], 1, self%threads, error)
+      if (allocated(error)) return
+      self%last = self%scalar%longest
+      if (frictional) call new_row_column(self%vector, [grid%nx, grid%ny], [grid%nx, grid%ny], 4, &
+         self%threads, error, inputs=2)
    end subroutine new_steady_operator
 
    !> Take the symbols of a velocity.
