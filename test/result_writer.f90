@@ -116,13 +116,17 @@ contains
       subroutine write_snapshot(step)
          integer, intent(in) :: step
          integer(int8) :: contact(nx, ny)
+         integer :: rows
 
          contact = int(mod(step, 3), int8)
          contact(2, 1) = 1_int8
          call output%begin_snapshot(step, 0.25_dp*step, 1)
-         call output%write_field('pressure', pressure_of(step))
-         call output%write_field('gap', -pressure_of(step))
-         call output%write_field('contact', contact)
+         call output%start_field('pressure', rows)
+         call output%write_rows(1, pressure_of(step))
+         call output%start_field('gap', rows)
+         call output%write_rows(1, -pressure_of(step))
+         call output%start_field('contact', rows)
+         call output%write_rows(1, contact)
          call output%end_snapshot(error)
       end subroutine write_snapshot
 

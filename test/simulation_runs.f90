@@ -69,7 +69,8 @@ contains
          what//': as many rows as were counted')
       record%pressure = sim%state%pressure
       record%gap = sim%state%gap
-      record%displacement = sim%state%displacement
+      allocate (record%displacement, mold=record%pressure)
+      call sim%field_rows('displacement_z', 1, record%displacement)
       record%warnings = sim%warnings
       call sim%destroy()
    end subroutine run_case

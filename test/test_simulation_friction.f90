@@ -174,14 +174,16 @@ contains
       call check_no_error(error, 'bound: simulation')
       if (allocated(error)) return
       allocate (none(1, 1), source=0.0_dp)
+      allocate (p(sim%grid%nx, sim%grid%ny), contact(sim%grid%nx, sim%grid%ny))
+      allocate (tx, ty, mold=p)
       worst = 0.0_dp
       do while (.not. sim%finished)
          call sim%advance(error)
          if (allocated(error)) exit
-         call sim%field('pressure', p)
-         call sim%field('traction_x', tx)
-         call sim%field('traction_y', ty)
-         call sim%contact_states(contact)
+         call sim%field_rows('pressure', 1, p)
+         call sim%field_rows('traction_x', 1, tx)
+         call sim%field_rows('traction_y', 1, ty)
+         call sim%contact_rows(1, contact)
          worst = max(worst, largest_excess(sim%tangential%law, p, none, none, contact, tx, ty) &
             /maxval(0.6_dp*p))
       end do
@@ -324,7 +326,8 @@ contains
             call check_no_error(error, 'before motion: start')
             call sim%advance(error)
             call check_no_error(error, 'before motion: row')
-            call sim%contact_states(contact)
+            if (.not. allocated(contact)) allocate (contact(sim%grid%nx, sim%grid%ny))
+            call sim%contact_rows(1, contact)
             call check_order(count(sim%state%pressure > 0.0_dp), '>', 100, 'before motion: contact')
             call check_that(all(contact == merge(state, 0, sim%state%pressure > 0.0_dp)), &
                'before motion: states')

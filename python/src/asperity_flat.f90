@@ -572,7 +572,6 @@ contains
       character(len=2000), intent(out) :: message
       type(error_type), allocatable :: error
       type(simulation_type), pointer :: sim
-      real(dp), allocatable :: field(:, :)
       integer(int8), allocatable :: states(:, :)
 
       sim => sim_of(int(handle))
@@ -583,11 +582,11 @@ contains
       else if (name == 'height') then
          values(:, :) = sim%height
       else if (name == 'contact') then
-         call sim%contact_states(states)
+         allocate (states(nx, ny))
+         call sim%contact_rows(1, states)
          values(:, :) = real(states, dp)
       else
-         call sim%field(name, field)
-         values(:, :) = field
+         call sim%field_rows(name, 1, values)
       end if
       call report(error, status, message)
    end subroutine run_field

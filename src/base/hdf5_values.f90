@@ -29,7 +29,7 @@ module hdf5_values
    integer, parameter, public :: kind_integer = 2
    integer, parameter, public :: kind_int8 = 3
 
-   integer, parameter :: chunk_values = 131072        !! values in a chunk with a checksum, about 1 MiB
+   integer, parameter, public :: chunk_values = 131072   !! values in a chunk with a checksum, about 1 MiB
    integer, parameter :: column_chunk = 131072        !! rows of a column whose space is set aside
 
 contains
@@ -153,8 +153,8 @@ contains
       end do
    end subroutine get_fixed_text
 
-   !> Create a dataset and write it from memory. Groups above it that are missing are created as
-   !> well.
+   !> Create a dataset, and write it from memory if there is a buffer. Groups above it that are missing
+   !> are created as well.
    subroutine new_dataset(location, name, extent, kind, buffer, level, status)
       integer(hid_t), intent(in) :: location
       character(*), intent(in) :: name
@@ -185,7 +185,7 @@ contains
             h5p_default)
          status = status_of(dataset)
       end if
-      if (status >= 0 .and. all(extent > 0)) &
+      if (status >= 0 .and. c_associated(buffer)) &
          status = h5dwrite(dataset, memory_type, h5s_all, h5s_all, h5p_default, buffer)
       ! Compressed data leave the cache here, so that a full disk is noticed here.
       if (status >= 0) status = h5dclose(dataset)

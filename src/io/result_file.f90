@@ -12,6 +12,7 @@ module result_file
    use asperity_precision, only : dp, int8
    use file_system, only : name_of, remove_file, rename_file
    use hdf5_file, only : hdf5_file_type
+   use hdf5_slabs, only : create_field, slab_rows, write_slab
    use history_row, only : history_row_type, row_values
    use random_id, only : new_id
    use regular_grid, only : grid_type
@@ -51,10 +52,11 @@ module result_file
       procedure :: pair_arms
       procedure :: append_row
       procedure :: begin_snapshot
-      procedure, private :: write_real_field, write_state_field, write_material_value, &
+      procedure :: start_field
+      procedure, private :: write_real_rows, write_state_rows, write_material_value, &
          write_material_values
-      !> Write a field into the snapshot under construction.
-      generic :: write_field => write_real_field, write_state_field
+      !> Write rows of the field that was started last.
+      generic :: write_rows => write_real_rows, write_state_rows
       !> Write a number or numbers into /material.
       generic :: write_material => write_material_value, write_material_values
       procedure :: end_snapshot
@@ -214,47 +216,57 @@ contains
       call self%file%report(error)
    end subroutine begin_snapshot
 
-   !> Look up a field by its name, and note it as one of the present snapshot.
-   subroutine start_field(self, name, field)
+   !> Start a field of the snapshot under construction, which is then written in slabs of rows.
+   subroutine start_field(self, name, rows, error)
       class(result_file_type), intent(inout) :: self
-      character(*), intent(in) :: name
-      type(field_type), intent(out) :: field
+      character(*), intent(in) :: name      !! one of `known_fields`, such as 'pressure'
+      integer, intent(out) :: rows          !! of each slab; the last one may have fewer
+      type(error_type), allocatable, intent(out), optional :: error
       type(error_type), allocatable :: fault
+      type(field_type) :: field
 
+      rows = slab_rows(self%grid%nx)
       field = find_field(name)
       if (field%name == '') then
          call fail(fault, error_input, 'snapshots have no field "'//trim(name)//'"')
-         call self%file%settle(fault)
-      else
-         self%current%fields = [character(24) :: self%current%fields, name]
+         call self%file%settle(fault, error)
+         return
       end if
+      self%current%fields = [character(24) :: self%current%fields, name]
+      call create_field(self%file, self%current_path//'/'//trim(name), [self%grid%nx, self%grid%ny], &
+         name == 'contact', trim(field%units), trim(field%long_name), self%compression, error)
    end subroutine start_field
 
-   !> Write a field of reals.
-   subroutine write_real_field(self, name, values, error)
+   !> Write a slab of the field that was started last.
+   subroutine write_real_rows(self, first, values, error)
       class(result_file_type), intent(inout) :: self
-      character(*), intent(in) :: name      !! one of `known_fields`, such as 'pressure'
-      real(dp), intent(in), contiguous :: values(:, :) !! [nx, ny]
+      integer, intent(in) :: first                     !! first row, from 1
+      real(dp), intent(in), contiguous :: values(:, :) !! [nx, rows]
       type(error_type), allocatable, intent(out), optional :: error
-      type(field_type) :: field
 
-      call start_field(self, name, field)
-      call self%file%write(self%current_path//'/'//trim(name), values, trim(field%units), &
-         trim(field%long_name), error, self%compression)
-   end subroutine write_real_field
+      call write_slab(self%file, field_path(self), first, values, error)
+   end subroutine write_real_rows
 
-   !> Write a field of states.
-   subroutine write_state_field(self, name, values, error)
+   !> The same for a field of states.
+   subroutine write_state_rows(self, first, values, error)
       class(result_file_type), intent(inout) :: self
-      character(*), intent(in) :: name      !! 'contact'
-      integer(int8), intent(in), contiguous :: values(:, :) !! [nx, ny]
+      integer, intent(in) :: first
+      integer(int8), intent(in), contiguous :: values(:, :)
       type(error_type), allocatable, intent(out), optional :: error
-      type(field_type) :: field
 
-      call start_field(self, name, field)
-      call self%file%write(self%current_path//'/'//trim(name), values, trim(field%units), &
-         trim(field%long_name), error, self%compression)
-   end subroutine write_state_field
+      call write_slab(self%file, field_path(self), first, values, error)
+   end subroutine write_state_rows
+
+   !> Path of the field that was started last.
+   pure function field_path(self) result(path)
+      class(result_file_type), intent(in) :: self
+      character(:), allocatable :: path
+
+      associate (fields => self%current%fields)
+         path = self%current_path
+         if (size(fields) > 0) path = path//'/'//trim(fields(size(fields)))
+      end associate
+   end function field_path
 
    !> Let the snapshot appear, in the result and in the XDMF file.
    subroutine end_snapshot(self, error)

@@ -65,8 +65,8 @@ module asperity_simulation
       procedure :: accept
       procedure :: reject
       procedure :: take_up
-      procedure :: field
-      procedure :: contact_states
+      procedure :: field_rows
+      procedure :: contact_rows
       procedure :: destroy
    end type simulation_type
 
@@ -308,53 +308,62 @@ contains
       self%reason = reason_overflow
    end subroutine look_for_overflow
 
-   !> A field of the state by its name in the result.
-   subroutine field(self, name, values)
+   !> Rows of a field of the state by its name in the result.
+   subroutine field_rows(self, name, first, values)
       class(simulation_type), intent(in) :: self
-      character(*), intent(in) :: name              !! as in /snapshots; the last two parts with friction
-      real(dp), allocatable, intent(out) :: values(:, :)
-      integer :: c
+      character(*), intent(in) :: name              !! as in /snapshots, but for 'contact'
+      integer, intent(in) :: first                  !! the first row
+      real(dp), intent(out) :: values(:, :)         !! [nx, rows]
+      integer :: c, last
 
+      last = first + size(values, 2) - 1
       select case (name)
       case ('pressure')
-         values = self%state%pressure
+         values = self%state%pressure(:, first:last)
       case ('gap')
          ! Where the surfaces overlap by less than the tolerance they touch.
-         values = max(self%state%gap, 0.0_dp)
+         values = max(self%state%gap(:, first:last), 0.0_dp)
       case ('displacement_z')
-         values = self%state%displacement
+         if (allocated(self%state%displacement)) then
+            values = self%state%displacement(:, first:last)
+         else if (self%state%first) then
+            values = 0.0_dp
+         else
+            values = self%state%gap(:, first:last) + self%height(:, first:last) + self%state%level
+         end if
       case ('road_height')
-         values = self%height
+         values = self%height(:, first:last)
       case default
-         allocate (values(self%grid%nx, self%grid%ny), source=0.0_dp)
+         values = 0.0_dp
          if (.not. self%frictional) return
          c = merge(1, 2, index(name, '_x') > 0)
-         if (index(name, 'traction') == 1) values = self%state%tangential%traction(:, c, :)
-         if (index(name, 'displacement') == 1) values = self%state%tangential%displacement(:, c, :)
-         if (index(name, 'slip') == 1) values = self%tangential%slip(:, c, :)
+         if (index(name, 'traction') == 1) values = self%state%tangential%traction(:, c, first:last)
+         if (index(name, 'displacement') == 1) values = self%state%tangential%displacement(:, c, first:last)
+         if (index(name, 'slip') == 1) values = self%tangential%slip(:, c, first:last)
       end select
-   end subroutine field
+   end subroutine field_rows
 
-   !> The state of each cell: 0 open, 1 stick, 2 slip. Without friction all contact slips; with it
-   !> all sticks until the road moves.
-   subroutine contact_states(self, states)
+   !> The states of the cells of some rows: 0 open, 1 stick, 2 slip. Without friction all contact slips;
+   !> with it all sticks until the road moves.
+   subroutine contact_rows(self, first, states)
       class(simulation_type), intent(in) :: self
-      integer(int8), allocatable, intent(out) :: states(:, :)
+      integer, intent(in) :: first                  !! the first row
+      integer(int8), intent(out) :: states(:, :)    !! [nx, rows]
       integer(int8) :: touching
-      integer :: j
+      integer :: j, k
 
-      if (self%rubs()) then
-         states = self%state%tangential%contact
-         return
-      end if
       touching = 2_int8
       if (self%holds()) touching = 1_int8
-      allocate (states(self%grid%nx, self%grid%ny))
-      do j = 1, self%grid%ny
-         states(:, j) = merge(touching, 0_int8, &
-            touches(self%side%adhesive, self%state%pressure(:, j), self%state%gap(:, j)))
+      do k = 1, size(states, 2)
+         j = first + k - 1
+         if (self%rubs()) then
+            states(:, k) = self%state%tangential%contact(:, j)
+         else
+            states(:, k) = merge(touching, 0_int8, &
+               touches(self%side%adhesive, self%state%pressure(:, j), self%state%gap(:, j)))
+         end if
       end do
-   end subroutine contact_states
+   end subroutine contact_rows
 
    !> Free plans and fields.
    subroutine destroy(self)

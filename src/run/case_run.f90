@@ -16,7 +16,7 @@ module case_run
    use memory_limits, only : need_memory
    use asperity_parallel, only : set_threads
    use path_identity, only : real_path
-   use asperity_precision, only : dp, int64, int8
+   use asperity_precision, only : dp, int64
    use result_file, only : result_file_type, result_plan_type
    use result_names, only : sibling_path
    use result_target, only : check_place, check_replaced, damage_of_result
@@ -24,6 +24,7 @@ module case_run
    use steady_losses, only : longest_wave
    use asperity_simulation, only : new_simulation, simulation_type
    use simulation_state, only : load_state, save_state
+   use snapshot_writer, only : write_snapshot
    use text_tools, only : to_text
    implicit none
    private
@@ -236,7 +237,7 @@ contains
       if (allocated(error)) return
       if (self%sim%state%steady%now) call write_losses(self, error)
       if (allocated(error)) return
-      if (snapshot_due(self)) call write_snapshot(self, error)
+      if (snapshot_due(self)) call snapshot(self, error)
       if (allocated(error)) return
       if (.not. self%sim%converged) then
          outcome = 'step '//to_text(self%sim%state%row%step)//' of phase '//to_text(self%sim%state%row%phase)// &
@@ -295,30 +296,14 @@ contains
    end function snapshot_due
 
    !> Write the fields that were asked for.
-   subroutine write_snapshot(self, error, at_stop)
+   subroutine snapshot(self, error, at_stop)
       type(run_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
       logical, intent(in), optional :: at_stop     !! written for a stop only: a restart drops it
-      real(dp), allocatable :: field(:, :)
-      integer(int8), allocatable :: states(:, :)
-      integer :: k
 
-      associate (sim => self%sim, names => self%sim%case%output%snapshot_fields)
-         call self%result%begin_snapshot(sim%state%row%step, sim%state%row%time, sim%state%row%phase, &
-            at_stop=at_stop)
-         do k = 1, size(names)
-            if (names(k) == 'contact') then
-               call sim%contact_states(states)
-               call self%result%write_field('contact', states)
-            else
-               call sim%field(trim(names(k)), field)
-               call self%result%write_field(trim(names(k)), field)
-            end if
-         end do
-         call self%result%end_snapshot(error)
-         self%last_snapshot = sim%state%row%step
-      end associate
-   end subroutine write_snapshot
+      call write_snapshot(self%result, self%sim, error, at_stop)
+      self%last_snapshot = self%sim%state%row%step
+   end subroutine snapshot
 
    !> Is a checkpoint due after the last row?
    function checkpoint_due(self) result(due)
@@ -360,7 +345,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       if (self%sim%state%row%step > self%last_snapshot .and. self%sim%state%schedule%row >= 0) &
-         call write_snapshot(self, error, at_stop=.true.)
+         call snapshot(self, error, at_stop=.true.)
       if (allocated(error)) return
       if (self%sim%state%schedule%row < 0) then
          call leave_word(self, 'stopped before the first row', error)

@@ -12,7 +12,7 @@ module contact_model
    use asperity_errors, only : error_type
    use asperity_interpolation, only : interpolation_type, new_interpolation, shifted
    use asperity_precision, only : dp
-   use asperity_schedule, only : planned_row_type
+   use asperity_schedule, only : count_rows, planned_row_type
    use case_settings, only : case_type
    use contact_rule, only : touches
    use field_sums, only : field_product, row_totals
@@ -85,8 +85,10 @@ contains
       call new_arm_state(self%state%arms, self%material, nx, ny, 1, error)
       if (allocated(error)) return
       call new_books(self%state%books, self%material, self%grid%cell_area())
-      allocate (self%state%pressure(nx, ny), self%state%gap(nx, ny), self%state%displacement(nx, ny), &
-         source=0.0_dp)
+      allocate (self%state%pressure(nx, ny), self%state%gap(nx, ny), source=0.0_dp)
+      ! The displacement serves the next row only: what comes last can be formed from the gap.
+      if (self%slides .or. count_rows(self%case%phases) > 1) &
+         allocate (self%state%displacement(nx, ny), source=0.0_dp)
       if (.not. is_elastic(self%material)) allocate (self%past(nx, ny), source=0.0_dp)
       if (self%slides) call new_road(self, error)
       if (allocated(error)) return
@@ -157,17 +159,18 @@ contains
    subroutine commit_step(self)
       class(contact_type), intent(inout) :: self
       type(products_type) :: products
-      real(dp), allocatable :: displacement(:), sums(:, :)
+      real(dp), allocatable :: displacement(:), before(:), sums(:, :)
       integer :: j
 
       sums = new_row_sums(self%material, self%grid%rows())
-      allocate (displacement(self%grid%nx))
-      !$omp parallel do default(none) shared(self, sums) private(j) firstprivate(displacement)
+      allocate (displacement(self%grid%nx), before(self%grid%nx), source=0.0_dp)
+      !$omp parallel do default(none) shared(self, sums) private(j) firstprivate(displacement, before)
       do j = 1, self%grid%rows()
          displacement(:) = self%state%gap(:, j) + self%height(:, j) + self%state%level
+         if (allocated(self%state%displacement)) before(:) = self%state%displacement(:, j)
          call commit_arm_row(self%state%arms, self%material, 1, j, self%state%pressure(:, j), &
-            self%state%displacement(:, j), displacement, sums(:, j))
-         self%state%displacement(:, j) = displacement
+            before, displacement, sums(:, j))
+         if (allocated(self%state%displacement)) self%state%displacement(:, j) = displacement
       end do
       products = new_products(self%material)
       call add_rows(products, sums)

@@ -4,8 +4,9 @@
 !> units and meaning. The checkpoint, the restart and Python walk that list. A new variable of the state
 !> is a component and one line of the list.
 !>
-!> Fields of doubles: P, gap and U; with Prony arms their state (S, S - S_old and one field per arm); with
-!> friction those of module `tangential_state`; with steady phases the last two steady states.
+!> Fields of doubles: P, gap and, if there are several rows, U; with Prony arms their state (S, S - S_old
+!> and one field per arm); with friction those of module `tangential_state`; with steady phases the last
+!> two steady states.
 module row_state
    use asperity_precision, only : dp
    use asperity_schedule, only : schedule_type
@@ -52,7 +53,7 @@ module row_state
       real(dp) :: dt_old = 0.0_dp                   !! length of the last step, s; 0 after a jump
       real(dp), allocatable :: pressure(:, :)       !! P, Pa
       real(dp), allocatable :: gap(:, :)            !! m
-      real(dp), allocatable :: displacement(:, :)   !! U_z, m
+      real(dp), allocatable :: displacement(:, :)   !! U_z, m; not in a run of a single row
       type(energy_books_type) :: books              !! of the normal traction
       type(arm_state_type) :: arms                 !! of the normal traction
       type(tangential_state_type) :: tangential     !! with friction
@@ -89,7 +90,8 @@ contains
 
       call table%add('pressure', state%pressure, 'Pa', 'normal traction on the rubber')
       call table%add('gap', state%gap, 'm', 'gap between rubber and road')
-      call table%add('displacement', state%displacement, 'm', 'displacement of the rubber along z')
+      if (allocated(state%displacement)) &
+         call table%add('displacement', state%displacement, 'm', 'displacement of the rubber along z')
       call table%add('dt_old', state%dt_old, 's', 'length of the last step, 0 after a jump')
       call list_books('books', state%books, table)
       call list_arms('arms', state%arms, table)

@@ -32,9 +32,11 @@
 !> beside s. The pressure and the gap stay in double precision; module gap_watch says when the gap is
 !> computed afresh in double precision, and when single precision no longer helps.
 !>
-!> Fields of doubles: H, P, gap and step; five fields in single precision (the direction and those of the
-!> preconditioner); the operator's spectrum and a quarter for its symbol; a quarter for blocks and the
-!> coarse level: 8. In free mode spectrum and symbol take three.
+!> Fields of doubles: H, P, gap and step; three fields in single precision (the direction, the residual
+!> and the search direction of the preconditioner); the operator's spectrum, in whose memory lie two more
+!> fields of the preconditioner and, in mixed precision, the spectrum in single precision; a quarter for
+!> the operator's symbol (an eighth in mixed precision); 0.4 for blocks and the coarse level: 7.1. In free
+!> mode spectrum and symbol take three (three and a half in mixed precision).
 module normal_cg
    use contact_solver, only : contact_solver_type
    use asperity_errors, only : error_type
