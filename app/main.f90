@@ -16,7 +16,7 @@ program main
    use asperity_progress, only : progress_type
    use result_summary, only : summarise_result
    use asperity_signals, only : catch_signals, checkpoint_asked, forget_checkpoint, stop_signal, &
-      stop_signal_name
+      stop_signal_name, stop_was_asked
    use standard_streams, only : say, say_error
    use asperity_surface, only : check_files
    use time_limit, only : time_limit_type
@@ -138,7 +138,7 @@ contains
    end subroutine run
 
    !> The steps of a run. A signal or the time limit stops it after the present step, with a
-   !> checkpoint.
+   !> checkpoint; a signal also ends a step with friction that takes long.
    subroutine run_steps(case, error)
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
@@ -150,6 +150,7 @@ contains
       call limit%start(command%time_limit)
       call run%open(case, command%restart, command%overwrite, error)
       if (.not. allocated(error)) then
+         run%sim%stop%asked => stop_was_asked
          call progress%start(run%rows, max(run%sim%state%schedule%row + 1, 0), command%quiet)
          do while (.not. run%finished)
             call tell_warnings(run, progress)
@@ -170,6 +171,7 @@ contains
             call limit%step_begins()
             call run%step(error)
             call limit%step_ends(.false.)
+            if (run%sim%stop%given_up) cycle
             if (run%sim%state%schedule%row >= 0) call progress%update(run%sim%state%row)
             if (allocated(error)) exit
          end do
@@ -187,6 +189,7 @@ contains
       integer, intent(in) :: status
       character(*), intent(in) :: reason
       type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: within
 
       call run%interrupt(error)
       if (allocated(error)) return
@@ -194,8 +197,10 @@ contains
          call fail(error, status, 'asperity: '//reason//' before the first row: nothing was computed, '// &
             'and there is no checkpoint')
       else
+         within = ''
+         if (run%sim%stop%given_up) within = ', within the next one, which is lost'
          call fail(error, status, 'asperity: '//reason//' after step '//to_text(run%sim%state%row%step)// &
-            '; --restart continues from there')
+            within//'; --restart continues from there')
       end if
    end subroutine stop_run
 

@@ -1,6 +1,8 @@
-!> Tests of rows that are proposed and then accepted or rejected.
+!> Tests of rows that are proposed and then accepted or rejected, or given up.
 module test_proposal
+   use, intrinsic :: iso_c_binding, only : c_int
    use asperity_errors, only : error_type
+   use asperity_precision, only : dp
    use asperity_schedule, only : count_rows
    use asperity_simulation, only : new_simulation, simulation_type
    use case_input, only : parse_case
@@ -20,12 +22,19 @@ module test_proposal
    character(*), parameter :: rubber = &
       '&material shear_modulus = 1e6, prony_g = 2e6, 1e6, prony_tau = 1e-3, 1e-2, thickness = 2e-2'
    character(*), parameter :: rubs = '&friction law = ''coulomb'', coefficient = 0.4 /'//nl
+   character(*), parameter :: slides = grid//rubber//', density = 1e3 /'//nl//rubs// &
+      '&phase pressure = 1e5 /'//nl// &
+      '&phase velocity_x = 0.3, velocity_y = 0.1, duration = 6e-3, steps = 3 /'//nl// &
+      '&phase pressure = 1.5e5, velocity_x = 0.3, velocity_y = 0.1, duration = 4e-3, steps = 2 /'
+
+   integer :: questions = 0        !! that `asked` will still answer with no
 
 contains
 
    subroutine run_proposal()
       call begin_suite('proposal')
       if (selected('propose_reject_advance')) call propose_reject_advance()
+      if (selected('give_up_advance')) call give_up_advance()
    end subroutine run_proposal
 
    !> A row that was rejected leaves no trace, whatever acts.
@@ -33,16 +42,57 @@ contains
       ! The first row in time of each case is taken in three parts.
       call try_case(grid//rubber//' /'//nl//'&phase pressure = 1e5 /'//nl// &
          '&phase pressure = 2e5, ramp = ''linear'', duration = 4e-3, steps = 2 /', 'load')
-      call try_case(grid//rubber//', density = 1e3 /'//nl//rubs//'&phase pressure = 1e5 /'//nl// &
-         '&phase velocity_x = 0.3, velocity_y = 0.1, duration = 6e-3, steps = 3 /'//nl// &
-         '&phase pressure = 1.5e5, velocity_x = 0.3, velocity_y = 0.1, duration = 4e-3, steps = 2 /', &
-         'friction, with a jump of the load')
+      call try_case(slides, 'friction, with a jump of the load')
       call try_case(grid//rubber//' /'//nl//'&phase pressure = 1e5, velocity_x = 0.5, steady = .true., '// &
          'duration = 2e-3, steps = 2 /', 'steady sliding and the way on in time')
       call try_case(grid//'&material shear_modulus = 1e6 /'//nl//'&adhesion potential = ''exponential'', '// &
          'energy = 0.05, range = 5e-5 /'//nl//'&phase pressure = 1e5 /'//nl// &
          '&phase pressure = 2e4, velocity_x = 0.3, duration = 4e-3, steps = 2 /', 'adhesion')
    end subroutine propose_reject_advance
+
+   !> A row that is given up after any of its passes, in any part of its step, leaves the state of the row
+   !> before, and the run goes on to the same numbers.
+   subroutine give_up_advance()
+      type(simulation_type) :: plain, hesitant
+      type(state_type) :: before
+      type(case_type) :: case
+      type(error_type), allocatable :: error
+      integer :: k, passes, given_up
+
+      call parse_case(slides, 'given_up.nml', case, error)
+      call check_no_error(error, 'given up: input')
+      call new_simulation(plain, case, error)
+      call new_simulation(hesitant, case, error)
+      hesitant%stop%asked => asked
+      hesitant%stop%patience = 0.0_dp
+      given_up = 0
+      do k = 1, count_rows(case%phases)
+         call plain%advance(error)
+         before = hesitant%state
+         do passes = 0, plain%state%row%passes, 3
+            questions = passes
+            call hesitant%advance(error)
+            if (.not. hesitant%stop%given_up) exit
+            given_up = given_up + 1
+            call check_that(same(hesitant%state, before), 'given up: the state of the row before')
+         end do
+         questions = huge(1)
+         if (hesitant%stop%given_up) call hesitant%advance(error)
+         call check_that(same(hesitant%state, plain%state), 'given up: the same numbers afterwards')
+      end do
+      call check_that(given_up > 10, 'given up: many times')
+      call check_that(hesitant%finished, 'given up: finished')
+      call plain%destroy()
+      call hesitant%destroy()
+   end subroutine give_up_advance
+
+   !> Is a stop asked for? No, as often as `questions` says, then yes.
+   function asked() bind(c) result(yes)
+      integer(c_int) :: yes
+
+      yes = merge(0_c_int, 1_c_int, questions > 0)
+      questions = questions - 1
+   end function asked
 
    !> Three ways through a case: advance; propose, reject, advance; propose, accept.
    subroutine try_case(text, what)

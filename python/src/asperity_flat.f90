@@ -436,15 +436,20 @@ contains
       call report(error, status, message)
    end subroutine run_open
 
-   !> Do a row of the history; after an error the run is to be closed.
-   subroutine run_step(handle, finished, step, time, contact_area, friction, warnings, status, &
-      message)
+   !> Do a row of the history; after an error the run is to be closed. Meanwhile some signals ask the
+   !> run to stop, as they do in the program: a row that is given up leaves the run as it was. A signal
+   !> that came is sent again at the end, to whoever handles it outside of the call.
+   subroutine run_step(handle, n, signals, finished, step, time, contact_area, friction, warnings, &
+      status, message)
+      use asperity_signals, only : catch_stops, give_back_stops, stop_was_asked
       use case_run, only : run_type
       use asperity_errors, only : error_input, error_type, fail
       use run_handles, only : run_of
       integer(c_int), intent(in) :: handle
+      integer(c_int), intent(in) :: n
+      integer(c_int), intent(in) :: signals(n)             !! their numbers
       integer(c_int), intent(out) :: finished              !! 1: no row is left
-      integer(c_int), intent(out) :: step
+      integer(c_int), intent(out) :: step                  !! -1: the row was given up
       real(c_double), intent(out) :: time, contact_area, friction
       character(len=20000), intent(out) :: warnings
       integer(c_int), intent(out) :: status
@@ -461,9 +466,13 @@ contains
       warnings = ''
       run => run_of(int(handle))
       if (associated(run)) then
+         run%sim%stop%asked => stop_was_asked
+         call catch_stops(signals)
          if (.not. run%finished) call run%step(error)
+         call give_back_stops(signals)
          finished = merge(1, 0, run%finished)
          step = run%sim%state%row%step
+         if (run%sim%stop%given_up) step = -1
          time = run%sim%state%row%time
          contact_area = run%sim%state%row%contact_area
          friction = run%sim%state%row%friction

@@ -57,8 +57,8 @@ def test_ctrl_c_and_restart(case, tmp_path, monkeypatch):
     step = runner._step
     done = []
 
-    def step_with_signal(handle):
-        outputs = step(handle)
+    def step_with_signal(handle, signals):
+        outputs = step(handle, signals)
         done.append(outputs[1])
         if len(done) == 4:
             signal.raise_signal(signal.SIGINT)
@@ -90,8 +90,8 @@ def test_a_look_at_a_run_that_goes_on(case, monkeypatch):
     rows = []
     step = runner._step
 
-    def step_and_look(handle):
-        outputs = step(handle)
+    def step_and_look(handle, signals):
+        outputs = step(handle, signals)
         rows.append(asperity.open(case.with_suffix(".h5")).history.rows)
         return outputs
 
@@ -142,7 +142,7 @@ def test_a_run_that_fails_closes_no_other_run(case, tmp_path, monkeypatch):
     # an old handle means no run, also while another one is open
     handle = begin(b"case.nml", SLIDING.encode(), bytes(tmp_path / "a.h5"), 1, 0, 0)[0]
     close(opened[0])
-    assert runner._step(handle)[1] == 0
+    assert runner._step(handle, np.zeros(0, np.int32))[1] == 0
     close(handle)
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -47,6 +49,70 @@ def test_stop(program: str, case: Path, number: signal.Signals) -> None:
     assert vc.run(program, case, "--restart").returncode == 0
     assert vc.run(program, whole).returncode == 0
     vc.assert_same(result, whole.with_suffix(".h5"))
+
+
+# With a constant shear stress a step may have no solution: its passes go on for hours.
+STUCK = """
+&grid nx = 48, ny = 41, lx = 1e-3, ly = 0.9e-3 /
+&surface shape = 'self_affine', hurst = 0.8, wavelength_long = 0.5e-3,
+   wavelength_short = 0.15e-3, rms_slope = 0.5, seed = 3 /
+&material shear_modulus = 0.5e6, prony_g = 1e6, prony_tau = 1e-2, thickness = 1e-3 /
+&friction law = 'constant_shear', shear_strength = 3e5 /
+&phase pressure = 5e4, duration = 0.01, steps = 2 /
+&phase velocity_x = 10e-3, duration = 0.01, steps = 20 /
+&solver threads = 1, passes = 100000000, coupling_tolerance = 1e-8 /
+&output checkpoint_minutes = 0 /
+"""
+
+
+@pytest.fixture
+def stuck(tmp_path: Path) -> Path:
+    """Return the input of a run whose row 3 does not come to an end."""
+    path = tmp_path / "stuck.nml"
+    path.write_text(STUCK)
+    return path
+
+
+def test_stop_within_a_row(program: str, stuck: Path) -> None:
+    """A row that takes long is given up; the run goes on from the row before."""
+    result = stuck.with_suffix(".h5")
+    for restart in ([], ["--restart"]):
+        process = vc.start(program, stuck, *restart)
+        vc.wait_for_rows(process, result, 3)
+        time.sleep(1.0)
+        process.terminate()
+        start = time.monotonic()
+        _, message = process.communicate(timeout=PATIENCE)
+        assert time.monotonic() - start < 30.0  # 2 s if nothing else runs
+        assert process.returncode == 143, message
+        assert "stopped by SIGTERM after step 2, within the next one, which is lost" in message
+        run = asperity.open(result)
+        assert run.history.rows == 3
+        assert run.outcome == "stopped after step 2"
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_stop_within_a_row_of_python(stuck: Path, number: signal.Signals) -> None:
+    """The same in Python, which then acts on the signal as it would have without the run."""
+    # A shell starts background jobs with Ctrl-C ignored, and then Python does not raise.
+    script = ("import signal, asperity\n"
+              "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+              "try:\n"
+              f"    asperity.run({str(stuck)!r})\n"
+              "except KeyboardInterrupt:\n"
+              "    print('interrupted')\n")
+    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, text=True)
+    vc.wait_for_rows(process, stuck.with_suffix(".h5"), 3)
+    time.sleep(1.0)
+    process.send_signal(number)
+    told, message = process.communicate(timeout=PATIENCE)
+    if number == signal.SIGINT:
+        assert (process.returncode, told) == (0, "interrupted\n"), message
+    else:
+        assert process.returncode == -signal.SIGTERM, message
+    assert asperity.open(stuck.with_suffix(".h5")).outcome == "stopped after step 2"
+    assert stuck.with_suffix(".checkpoint.h5").exists()
 
 
 def test_stop_before_the_first_row(program: str, case: Path) -> None:

@@ -1,14 +1,15 @@
 !> Signals set flags, which a run checks between its steps.
 !>
 !> SIGINT, SIGTERM, SIGHUP (the terminal was closed) and SIGXCPU (the limit of the batch system is
-!> near) ask a run to stop after the present step. SIGUSR1 asks for a checkpoint. SIGXFSZ (a file
+!> near) ask a run to stop after the present step, or within it if it takes long. SIGUSR1 asks for a checkpoint. SIGXFSZ (a file
 !> would exceed the size limit) is ignored, so that the write that caused it fails with an error.
 module asperity_signals
-   use, intrinsic :: iso_c_binding, only : c_funloc, c_funptr, c_int, c_intptr_t
+   use, intrinsic :: iso_c_binding, only : c_funloc, c_funptr, c_int, c_int64_t, c_intptr_t, c_loc, c_null_ptr, c_ptr
    implicit none
    private
 
-   public :: catch_signals, checkpoint_asked, forget_checkpoint, stop_signal, stop_signal_name
+   public :: catch_signals, catch_stops, checkpoint_asked, forget_checkpoint, give_back_stops, &
+      stop_signal, stop_signal_name, stop_was_asked
 
    integer(c_int), parameter :: signal_hang_up = 1        !! SIGHUP
    integer(c_int), parameter :: signal_interrupt = 2      !! SIGINT
@@ -18,6 +19,11 @@ module asperity_signals
    integer(c_int), parameter :: signal_file_size = 25     !! SIGXFSZ
    integer(c_intptr_t), parameter :: ignored = 1          !! SIG_IGN
 
+   integer, parameter :: most_stops = 8                   !! signals that `catch_stops` takes
+   !> Longer than C's `struct sigaction`, which has 152 bytes on Linux, in units of 8 bytes.
+   integer, parameter :: action_length = 64
+
+   integer(c_int64_t), target :: actions(action_length, most_stops) = 0   !! of others, while a call lasts
    integer(c_int), volatile :: caught = 0
    logical, volatile :: asked = .false.
 
@@ -27,6 +33,19 @@ module asperity_signals
          integer(c_int), value :: number
          type(c_funptr), value :: handler
       end function c_signal
+      function c_raise(number) bind(c, name='raise') result(status)
+         import :: c_int
+         integer(c_int), value :: number
+         integer(c_int) :: status
+      end function c_raise
+
+      function c_sigaction(number, action, before) bind(c, name='sigaction') result(status)
+         import :: c_int, c_ptr
+         integer(c_int), value :: number
+         type(c_ptr), value :: action            !! null: the action stays
+         type(c_ptr), value :: before            !! null: not asked for
+         integer(c_int) :: status
+      end function c_sigaction
    end interface
 
 contains
@@ -46,12 +65,47 @@ contains
       before = c_signal(signal_file_size, ignore)
    end subroutine catch_signals
 
+   !> Let signals ask for a stop for the time of one call in a process that is not ours. What others
+   !> want done with these signals is kept, and `give_back_stops` restores it.
+   subroutine catch_stops(numbers)
+      integer(c_int), intent(in) :: numbers(:)
+      type(c_funptr) :: before
+      integer(c_int) :: status
+      integer :: k
+
+      caught = 0
+      do k = 1, min(size(numbers), most_stops)
+         status = c_sigaction(numbers(k), c_null_ptr, c_loc(actions(1, k)))
+         if (status == 0) before = c_signal(numbers(k), c_funloc(note_stop))
+      end do
+   end subroutine catch_stops
+
+   !> End what `catch_stops` began. A signal that came meanwhile is sent again.
+   subroutine give_back_stops(numbers)
+      integer(c_int), intent(in) :: numbers(:)   !! the same as those of `catch_stops`
+      integer(c_int) :: status
+      integer :: k
+
+      do k = 1, min(size(numbers), most_stops)
+         status = c_sigaction(numbers(k), c_loc(actions(1, k)), c_null_ptr)
+      end do
+      if (caught /= 0) status = c_raise(caught)
+      caught = 0
+   end subroutine give_back_stops
+
    !> The signal that asked the run to stop, or 0.
    function stop_signal() result(number)
       integer :: number
 
       number = caught
    end function stop_signal
+
+   !> Has a signal asked the run to stop? 1 or 0, for module `row_stop`.
+   function stop_was_asked() bind(c) result(yes)
+      integer(c_int) :: yes
+
+      yes = merge(1_c_int, 0_c_int, caught /= 0)
+   end function stop_was_asked
 
    !> The name of that signal.
    function stop_signal_name() result(name)

@@ -96,8 +96,9 @@ contains
    !>
    !> Normal solver: 10 fields and one padded buffer (one field in periodic mode, four in free mode);
    !> each arm one field, and three for the steps before and their traction; sliding four, the
-   !> original map and its slopes; adhesion 6 fields and a second buffer; friction 48 fields, two
-   !> buffers, and with arms four fields and two an arm; mixed precision 0.6 of a buffer;
+   !> original map and its slopes; adhesion 6 fields and a second buffer; friction 58 fields, of which ten
+   !> are the state before the row in hand, two buffers, and with arms four fields and two an arm; mixed
+   !> precision 0.6 of a buffer;
    !> steady phases 34 fields, 143 with friction (not counted: a dense system of few cells in contact,
    !> module `steady_active`, at most 20 fields for as long as it is solved). The rest:
    !> 26 MB. Measured at 1024 x 1024 cells on one thread, MB: 118 for 119 (elastic), 202 for 202 (three
@@ -120,7 +121,7 @@ contains
          buffers = buffers + 1.0_dp
       end if
       if (case%friction%law /= 'none') then
-         fields = fields + 48.0_dp + 2.0_dp*arms
+         fields = fields + 58.0_dp + 2.0_dp*arms
          if (arms > 0) fields = fields + 4.0_dp
          buffers = buffers + 2.0_dp
       end if

@@ -140,7 +140,8 @@ contains
       self%finished = self%state%schedule%phase > size(self%case%phases)
    end subroutine take_up
 
-   !> Do the next row. Where the solvers did not converge, the state reached is kept.
+   !> Do the next row. Where the solvers did not converge, the state reached is kept. A row that is given
+   !> up (`stop%given_up`) leaves the state of the row before.
    subroutine advance(self, error)
       class(simulation_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
@@ -150,11 +151,19 @@ contains
       integer :: k
 
       if (allocated(self%proposed)) deallocate (self%proposed)
+      if (self%frictional) call self%stop%keep(self%state)
       call plan_row(self, plan, parts)
       if (self%finished) return
+      if (self%frictional .and. size(parts) > 1) call self%stop%keep_more(self%state)
       do k = 1, size(parts)
          call take_step(self, parts(k), error)
          if (allocated(error)) return
+         if (self%stop%given_up) then
+            call self%stop%put_back(self%state)
+            call self%take_up()
+            return
+         end if
+         call self%stop%part_ends()
          call sums%add(parts(k)%dt, self%state%row, self%tangential%slip)
          if (.not. self%converged) exit
       end do
@@ -192,6 +201,7 @@ contains
       if (allocated(error)) return
       call system_clock(start, rate)
       call solve_step(self, plan, found)
+      if (self%stop%given_up) return
       call judge(self, plan, found)
       if (.not. plan%steady) call commit_step(self)
       call system_clock(now)
@@ -242,6 +252,7 @@ contains
          call move_road(self, plan)
          if (self%rubs()) then
             call self%passes%solve(self, plan, motion, found%normal, found%rubbing)
+            if (self%stop%given_up) return
             found%passes = self%passes%passes
             found%mismatch = self%passes%residual
          else

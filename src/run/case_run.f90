@@ -219,14 +219,15 @@ contains
       if (.not. allocated(error)) call self%result%write_text('outcome', outcome, error)
    end subroutine leave_word
 
-   !> Do a row, and write what is due. With status error_convergence the row is kept all the same.
+   !> Do a row, and write what is due. With status error_convergence the row is kept all the same. A row
+   !> that is given up because a stop was asked for leaves the run as it was.
    subroutine step_run(self, error)
       class(run_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
       character(:), allocatable :: outcome
 
       call self%sim%advance(error)
-      if (allocated(error)) return
+      if (allocated(error) .or. self%sim%stop%given_up) return
       if (.not. all(ieee_is_finite(row_values(self%sim%state%row)))) then
          self%sim%converged = .false.
          self%sim%reason = 'a value is not a finite number'
@@ -339,13 +340,14 @@ contains
    end subroutine save_run
 
    !> Stop between two steps: a snapshot of where the run stands, and a checkpoint. A snapshot that
-   !> is not due is dropped by a restart: the result is that of a run that never stopped.
+   !> is not due is dropped by a restart: the result is that of a run that never stopped. After a row
+   !> that was given up there is no snapshot, because slip and road are not part of the state.
    subroutine interrupt_run(self, error)
       class(run_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
 
-      if (self%sim%state%row%step > self%last_snapshot .and. self%sim%state%schedule%row >= 0) &
-         call snapshot(self, error, at_stop=.true.)
+      if (self%sim%state%row%step > self%last_snapshot .and. self%sim%state%schedule%row >= 0 .and. &
+         .not. self%sim%stop%given_up) call snapshot(self, error, at_stop=.true.)
       if (allocated(error)) return
       if (self%sim%state%schedule%row < 0) then
          call leave_word(self, 'stopped before the first row', error)

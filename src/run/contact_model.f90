@@ -19,6 +19,7 @@ module contact_model
    use normal_step, only : new_normal_step, normal_step_type, normal_task_type
    use regular_grid, only : grid_type
    use row_state, only : state_type
+   use row_stop, only : row_stop_type
    use rubber_kernels, only : normal_kernel
    use solver_result, only : solver_result_type
    use tangential_state, only : new_tangential_state
@@ -43,6 +44,7 @@ module contact_model
       type(zener_type) :: material                  !! with the coefficients of the step in hand
       type(interpolation_type) :: road              !! the original map
       type(workspace_type) :: work                  !! scratch fields of the stages of a step
+      type(row_stop_type) :: stop                   !! gives up a row with friction if a stop is asked for
       real(dp), allocatable :: height(:, :)         !! H under the rubber in the step in hand, m
       real(dp), allocatable :: slope_x(:, :)        !! of the road under the rubber, -
       real(dp), allocatable :: slope_y(:, :)

@@ -31,7 +31,8 @@
 !> row is solved. Otherwise `pass_control` judges the pass, which sets the
 !> accuracy of the next one and how far to go, and `choose_place` goes to the next place. When the
 !> passes run out, the row keeps what the last pass has left; the last of more than ten passes is done
-!> at the best place so far. A normal solve that does not converge ends the loop.
+!> at the best place so far. A normal solve that does not converge ends the loop. A row that is given up
+!> for a stop (module `row_stop`) is left as it is.
 !>
 !> Fields of doubles: two components each for the place, its residual, the best place and the displacement
 !> carried along; and those of the acceleration. The check borrows three from the workspace of the contact.
@@ -117,6 +118,8 @@ contains
          if (self%passes == 1 .and. .not. plan%instantaneous) contact%state%first_mismatch = self%residual
          if (self%passes == most .or. .not. normal%converged) exit
          if (control%accuracy <= tolerance .and. self%residual <= tolerance) exit
+         contact%stop%given_up = contact%stop%is_due()
+         if (contact%stop%given_up) return
          call control%judge(self%residual)
          call choose_place(self, contact, control)
          ! The last of many passes is for the best place that was found.

@@ -11,6 +11,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, Protocol
 
+import numpy as np
+
 from ..base import library
 from ..base.check import whole
 from ..base.errors import NotConverged
@@ -52,7 +54,8 @@ def run(
     """Run a case in this process, as the command ``asperity run`` does, and open its result.
 
     Ctrl-C finishes the step in hand, writes a checkpoint and raises KeyboardInterrupt;
-    ``restart=True`` goes on from there to the same numbers. SIGTERM, SIGHUP and SIGXCPU do the same
+    ``restart=True`` goes on from there to the same numbers. A step with friction that takes much
+    longer than two seconds is given up instead. SIGTERM, SIGHUP and SIGXCPU do the same
     in the main thread, unless the script handles them itself, and then end the process as they
     would have without the run.
 
@@ -123,8 +126,10 @@ def run(
         _warn(told)
         finished = first >= rows
         while not finished and not stops.asked:
-            finished, step, time, area, friction, told = _step(handle)
+            finished, step, time, area, friction, told = _step(handle, stops.numbers)
             _warn(told)
+            if step < 0:  # given up
+                break
             if callback is not None:
                 view = view or RunView(handle, rows, _shape(result))
                 if callback(view.row, view) is False and not finished:
@@ -158,10 +163,12 @@ class _Stops:
 
     Only those whose action is still that of the system are taken: a script that handles them itself
     keeps its handlers. `end` puts the system's action back and lets a signal that came take it.
+    `numbers` are the signals, with that of Ctrl-C, that a step in hand may be given up for.
     """
 
     def __init__(self) -> None:
         self.asked = 0
+        self.numbers = np.zeros(0, dtype=np.int32)
         self._taken: list[int] = []
         if threading.current_thread() is not threading.main_thread():
             return
@@ -170,6 +177,8 @@ class _Stops:
             if number is not None and signal.getsignal(number) == signal.SIG_DFL:
                 signal.signal(number, self._note)
                 self._taken.append(number)
+        default = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        self.numbers = np.array([*self._taken, *[signal.SIGINT] * default], dtype=np.int32)
 
     def _note(self, number: int, frame: FrameType | None) -> None:
         self.asked = number
