@@ -28,6 +28,10 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
             cells if quick or load > 50e3 else 2 * cells, road.waves(wave), pressure=load,
             distance=(0.6 if quick else 1.25) * road.LONG, shear_steps=10 if quick else 40,
             **({"fine": 0.5, "density": 100.0} if load > 1e6 else {})) for load in loads]
+        for case in cases:
+            # 148 = 4 x 37 rows would take much longer to transform.
+            if case.grid.ny == 148:
+                case.grid.ny = 150
         # Under the lowest loads a few summits touch, in contacts of few cells.
         done = road.histories(folder / name, cases, common.SMALL_CONTACTS)
         data[f"{name}_curve"] = {key: done[0][key] for key in ("slid", "friction")}
