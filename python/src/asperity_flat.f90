@@ -605,7 +605,8 @@ contains
       message)
       use case_identity, only : identity_of
       use case_input, only : parse_case, read_case
-      use case_report, only : memory_needed, resolved_input
+      use case_memory, only : memory_needed
+      use case_report, only : resolved_input
       use case_record, only : map_lines
       use case_settings, only : case_type
       use asperity_errors, only : error_input, error_type, fail

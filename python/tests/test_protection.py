@@ -367,6 +367,6 @@ def test_check_knows_the_machine(program: str, tmp_path: Path) -> None:
     case = tmp_path / "y.nml"
     case.write_text(LARGE.replace("20000", "40000"))
     done = subprocess.run([program, "check", str(case)], capture_output=True, text=True, check=True)
-    assert re.search(r"! warning: .* of memory: the run needs more", done.stdout)
+    assert re.search(r"! warning: the run needs more memory than .*: ", done.stdout)
     done = vc.run(program, case)
     assert done.returncode == 3 and "not enough memory" in done.stderr

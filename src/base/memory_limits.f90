@@ -1,8 +1,9 @@
 !> The memory that a process may use, and a clear error if a task needs more.
 !>
-!> There are three limits: the memory of the machine with its swap space, the limit of the control
-!> group (containers and batch jobs), and the limit on the address space (ulimit -v). They are read
-!> from the files of Linux. On systems without these files there is no limit.
+!> There are four limits: the memory of the machine with its swap space, the part of it that no other
+!> process uses at present, the limit of the control group (containers and batch jobs), and the limit on
+!> the address space (ulimit -v). They are read from the files of Linux. On systems without these files
+!> there is no limit.
 module memory_limits
    use asperity_errors, only : error_memory, error_type, fail
    use asperity_precision, only : dp, int64
@@ -40,7 +41,7 @@ contains
       limit = memory_limit(what)
       if (bytes > limit) then
          call fail(error, error_memory, 'not enough memory: '//task//' needs about '// &
-            memory_text(bytes)//', '//what//' '//memory_text(limit))
+            memory_text(bytes)//', which is more than '//what//': '//memory_text(limit))
          return
       end if
       limit = address_space()
@@ -51,14 +52,19 @@ contains
 
    !> The most memory that this process can have, bytes.
    function memory_limit(what) result(limit)
-      character(:), allocatable, intent(out) :: what    !! such as 'this machine has'
+      character(:), allocatable, intent(out) :: what    !! such as 'this machine has', for '... more than'
       real(dp) :: limit
-      real(dp) :: group
+      real(dp) :: free, group
 
       what = 'this machine has'
       limit = field_of('/proc/meminfo', 'MemTotal:') + field_of('/proc/meminfo', 'SwapTotal:')
       limit = 1024.0_dp*limit
       if (.not. limit > 0.0_dp) limit = huge(1.0_dp)
+      free = field_of('/proc/meminfo', 'MemAvailable:')
+      if (free > 0.0_dp) then
+         limit = 1024.0_dp*(free + field_of('/proc/meminfo', 'SwapFree:'))
+         what = 'this machine has free at present'
+      end if
       group = group_limit()
       if (group < limit) then
          limit = group

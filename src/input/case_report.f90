@@ -2,8 +2,9 @@
 module case_report
    use adhesion_advice, only : adhesion_notes
    use footprint_advice, only : footprint_note
-   use case_settings, only : case_type, phase_settings_type, road_moves
+   use case_settings, only : case_type, phase_settings_type
    use case_time, only : duration_text, seconds_needed
+   use case_memory, only : memory_needed
    use memory_limits, only : memory_limit, memory_text
    use asperity_precision, only : dp
    use regular_grid, only : boundary_free
@@ -13,7 +14,7 @@ module case_report
    implicit none
    private
 
-   public :: case_summary, memory_needed, resolved_input
+   public :: case_summary, resolved_input
 
    character(*), parameter :: nl = new_line('a')
 
@@ -70,8 +71,8 @@ contains
          counted(sum(case%phases%steps, mask=.not. case%phases%static), 'time step')//' in '// &
          to_text(sum(case%phases%duration))//' s'//nl
       text = text//'! memory: about '//to_text(real(nint(memory*10.0_dp), dp)/10.0_dp)//unit//nl
-      if (memory_needed(case) > limit) text = text//'! warning: '//whose//' '//memory_text(limit)// &
-         ' of memory: the run needs more'//nl
+      if (memory_needed(case) > limit) text = text//'! warning: the run needs more memory than '//whose// &
+         ': '//memory_text(limit)//nl
       text = text//'! time: '//duration_text(seconds_needed(case))//' on this machine, to within a factor of about three'//nl
       text = text//marked('! ', adhesion_notes(case))// &
          marked('! note: ', footprint_note(case))//marked('! warning: ', case%warnings)
@@ -91,45 +92,6 @@ contains
          at = at + next
       end do
    end function marked
-
-   !> Memory of a run, bytes: fields of doubles, transform buffers, and what the program itself takes.
-   !>
-   !> Normal solver: 10 fields and one padded buffer (one field in periodic mode, four in free mode);
-   !> each arm one field, and three for the steps before and their traction; sliding four, the
-   !> original map and its slopes; adhesion 6 fields and a second buffer; friction 58 fields, of which ten
-   !> are the state before the row in hand, two buffers, and with arms four fields and two an arm; mixed
-   !> precision 0.6 of a buffer;
-   !> steady phases 34 fields, 143 with friction (not counted: a dense system of few cells in contact,
-   !> module `steady_active`, at most 20 fields for as long as it is solved). The rest:
-   !> 26 MB. Measured at 1024 x 1024 cells on one thread, MB: 118 for 119 (elastic), 202 for 202 (three
-   !> arms, sliding), 431 for 437 (friction), 742 for 747 (friction, ten arms).
-   pure function memory_needed(case) result(bytes)
-      type(case_type), intent(in) :: case
-      real(dp) :: bytes
-      real(dp) :: buffers, fields, padding
-      real(dp), parameter :: program_itself = 26.0e6_dp
-      integer :: arms
-
-      arms = size(case%material%prony_g)
-      padding = merge(4.0_dp, 1.0_dp, case%grid%boundary == boundary_free)
-      fields = 10.0_dp + arms
-      buffers = 1.0_dp
-      if (arms > 0) fields = fields + 3.0_dp
-      if (road_moves(case%phases)) fields = fields + 4.0_dp
-      if (case%adhesion%potential /= 'none') then
-         fields = fields + 6.0_dp
-         buffers = buffers + 1.0_dp
-      end if
-      if (case%friction%law /= 'none') then
-         fields = fields + 58.0_dp + 2.0_dp*arms
-         if (arms > 0) fields = fields + 4.0_dp
-         buffers = buffers + 2.0_dp
-      end if
-      if (any(case%phases%steady)) fields = fields + merge(143.0_dp, 34.0_dp, case%friction%law /= 'none')
-      if (case%solver%precision == 'mixed') buffers = buffers + 0.6_dp
-      bytes = 8.0_dp*(real(case%grid%nx, dp)*real(case%grid%ny, dp)*fields + &
-         padding*buffers*real(case%grid%nx + 2, dp)*real(case%grid%ny, dp)) + program_itself
-   end function memory_needed
 
    !> One `&surface`, with the variables that its shape uses.
    function surface_text(case, i) result(text)

@@ -6,7 +6,8 @@ module case_run
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use case_identity, only : identity_of
    use case_record, only : checksums_of_maps, map_lines, write_material
-   use case_report, only : memory_needed, resolved_input
+   use case_memory, only : memory_needed
+   use case_report, only : resolved_input
    use case_settings, only : case_type
    use asperity_checkpoint, only : checkpoint_path, checkpoint_reader_type, checkpoint_writer_type, &
       remove_checkpoint

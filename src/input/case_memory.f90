@@ -1,0 +1,85 @@
+!> The memory that a run of a case takes: the fields of its modules, counted as their headers do.
+!>
+!> Parts of the program whose memory depends on how a run goes are taken as they were measured
+!> (`tools/bench/memory.py` compares all of it with the peak of runs, which differs by less than a tenth):
+!> the acceleration of passes, which keeps more steps where passes are many, and of steady sliding. Not
+!> counted: a dense system of few cells in contact (module `steady_active`, at most 20 fields for as long as
+!> it is solved).
+module case_memory
+   use asperity_precision, only : dp
+   use asperity_schedule, only : count_rows
+   use case_settings, only : case_type, road_moves
+   use regular_grid, only : boundary_free
+   implicit none
+   private
+
+   public :: memory_needed
+
+   real(dp), parameter :: program_itself = 26.0e6_dp  !! with its libraries, bytes
+   real(dp), parameter :: chunk = 131072.0_dp         !! most values of a chunk of the result
+   real(dp), parameter :: chunks = 4.0_dp             !! in work at a time
+
+contains
+
+   !> Memory of a run, bytes.
+   pure function memory_needed(case) result(bytes)
+      type(case_type), intent(in) :: case
+      real(dp) :: bytes
+      real(dp) :: cells, fields
+      logical :: slides
+      integer :: arms
+
+      arms = size(case%material%prony_g)
+      slides = road_moves(case%phases)
+      fields = normal_fields(case)
+      ! Without arms there is no S, no change of S, and no traction of the past.
+      if (arms > 0) fields = fields + 3.0_dp + arms
+      ! The displacement serves the next row.
+      if (slides .or. count_rows(case%phases) > 1) fields = fields + 1.0_dp
+      ! The original map and its spline, the slopes, and a field that is being shifted.
+      if (slides) fields = fields + merge(5.0_dp, 4.0_dp, case%solver%interpolation == 'cubic')
+      if (case%adhesion%potential /= 'none') fields = fields + adhesion_fields(case)
+      if (slides .and. case%friction%law /= 'none') fields = fields + friction_fields(case)
+      if (any(case%phases%steady)) &
+         fields = fields + merge(130.0_dp, 32.0_dp, slides .and. case%friction%law /= 'none')
+      cells = real(case%grid%nx, dp)*real(case%grid%ny, dp)
+      bytes = 8.0_dp*(fields*cells + chunks*min(cells, chunk)) + program_itself
+   end function memory_needed
+
+   !> Fields of the normal solver and of the state it works on (module normal_cg).
+   pure function normal_fields(case) result(fields)
+      type(case_type), intent(in) :: case
+      real(dp) :: fields
+      real(dp), parameter :: spectrum(2) = [1.0_dp, 2.0_dp]          ! periodic, free
+      real(dp), parameter :: symbol(2) = [0.25_dp, 1.0_dp]
+      real(dp), parameter :: symbols_mixed(2) = [0.125_dp, 1.5_dp]
+      integer :: kind
+
+      kind = merge(2, 1, case%grid%boundary == boundary_free)
+      fields = 5.9_dp + spectrum(kind)
+      fields = fields + merge(symbols_mixed(kind), symbol(kind), case%solver%precision == 'mixed')
+   end function normal_fields
+
+   !> Fields of the adhesive solver (module adhesion_cg_fast), with what its start needs in passing.
+   pure function adhesion_fields(case) result(fields)
+      type(case_type), intent(in) :: case
+      real(dp) :: fields
+
+      fields = 5.8_dp
+      if (case%grid%boundary == boundary_free) fields = 37.0_dp
+      if (case%solver%method == 'thesis') fields = 3.4_dp
+   end function adhesion_fields
+
+   !> Fields of friction (modules tangential_step, friction_cg, coupled_passes, row_stop).
+   pure function friction_fields(case) result(fields)
+      type(case_type), intent(in) :: case
+      real(dp) :: fields
+
+      ! Ten of them are the state before the row in hand (module row_stop).
+      fields = 54.0_dp
+      ! What the passes of steps in time remember.
+      if (any(.not. case%phases%static .and. case%phases%steps > 0)) fields = fields + 11.0_dp
+      if (size(case%material%prony_g) > 0) fields = fields + 4.0_dp + 2.0_dp*size(case%material%prony_g)
+   end function friction_fields
+
+end module case_memory
