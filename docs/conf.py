@@ -55,8 +55,8 @@ html_math_renderer = "mathml"
 ORDER = {
     "Start": ["docs/install", "docs/first_run", "docs/model"],
     "Guide": ["docs/choosing", "docs/measured_data", "docs/friction_curves", "docs/sweeps",
-              "docs/driving", "docs/long_runs", "docs/results", "docs/troubleshooting",
-              "docs/coming_from"],
+              "docs/driving", "docs/long_runs", "docs/clusters", "docs/results",
+              "docs/troubleshooting", "docs/coming_from"],
     "Reference": ["docs/input_reference", "docs/result_file", "docs/api/python",
                   "docs/api/python_contact", "docs/api/python_roads", "docs/api/python_rubber",
                   "docs/api/python_runs", "docs/api/python_friction", "docs/api/python_results",

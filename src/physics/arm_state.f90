@@ -8,7 +8,7 @@
 !> Memory: S and one field per arm; one more (S - S_old) for exponential2; none for an elastic body.
 !> Results do not depend on the number of threads or processes: sums are formed row by row.
 module arm_state
-   use asperity_errors, only : error_input, error_type, fail
+   use asperity_errors, only : error_memory, error_type, fail
    use asperity_precision, only : dp
    use field_sums, only : row_totals
    use zener, only : is_elastic, scheme_exponential2, zener_type
@@ -63,7 +63,7 @@ contains
       if (material%scheme /= scheme_exponential2) i = 0
       if (status == 0) allocate (self%ds(i, components), stat=status)
       if (status /= 0) then
-         call fail(error, error_input, 'not enough memory for the state of the arms')
+         call fail(error, error_memory, 'not enough memory for the state of the arms')
          return
       end if
       self%s = 0.0_dp

@@ -6,7 +6,7 @@
 module real_transform
    use, intrinsic :: iso_c_binding, only : c_associated, c_f_pointer, c_int, c_null_ptr, c_ptr, &
       c_size_t
-   use asperity_errors, only : error_input, error_type, fail
+   use asperity_errors, only : error_input, error_memory, error_type, fail
    use asperity_fftw, only : fftw_alloc_real, fftw_destroy_plan, fftw_estimate, fftw_execute_dft_c2r, &
       fftw_execute_dft_r2c, fftw_free, fftw_plan_many_dft_c2r, fftw_plan_many_dft_r2c
    use asperity_precision, only : dp
@@ -52,10 +52,13 @@ contains
          !$omp end critical (fftw_planner)
       end if
       if (.not. (c_associated(self%forward) .and. c_associated(self%backward))) then
+         write (text, '("a transform of ", i0, " x ", i0, " points")') nx, ny
+         if (c_associated(self%buffer)) then
+            call fail(error, error_input, 'FFTW has no plan for '//trim(text))
+         else
+            call fail(error, error_memory, 'not enough memory for '//trim(text))
+         end if
          call destroy_real_transform(self)
-         write (text, '("no memory or no plan for a transform of ", i0, " x ", i0, " points")') &
-            nx, ny
-         call fail(error, error_input, trim(text))
          return
       end if
       call c_f_pointer(self%buffer, self%space, [2*(nx/2 + 1), ny])
