@@ -74,12 +74,17 @@ contains
    pure function friction_fields(case) result(fields)
       type(case_type), intent(in) :: case
       real(dp) :: fields
+      logical :: in_time
+      integer :: arms
 
-      ! Ten of them are the state before the row in hand (module row_stop).
-      fields = 54.0_dp
+      arms = size(case%material%prony_g)
+      in_time = any(.not. case%phases%static .and. case%phases%steps > 0)
+      fields = 50.5_dp
       ! What the passes of steps in time remember.
-      if (any(.not. case%phases%static .and. case%phases%steps > 0)) fields = fields + 11.0_dp
-      if (size(case%material%prony_g) > 0) fields = fields + 4.0_dp + 2.0_dp*size(case%material%prony_g)
+      if (in_time) fields = fields + 11.0_dp
+      if (arms > 0) fields = fields + 4.0_dp + 2.0_dp*arms
+      ! The arms before a row that is taken in parts (module row_stop), of both directions.
+      if (in_time .and. arms > 0) fields = fields + 6.0_dp + 3.0_dp*arms
    end function friction_fields
 
 end module case_memory
