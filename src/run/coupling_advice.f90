@@ -24,8 +24,8 @@ contains
       jammed = jammed_part(self)
       if (self%tangential%law%law == law_constant_shear) then
          advice = 'With constant shear a cell at the edge of the contact carries the whole strength or '// &
-            'nothing, so there may be no solution; law = ''coulomb_orowan'' with a large coefficient has none '// &
-            'of these jumps'
+            'nothing, so there may be no solution; law = ''coulomb_orowan'', whose strength grows from '// &
+            'zero with the pressure, usually settles with a coefficient of up to about 1'
       else if (jammed > much) then
          advice = to_text(100.0_dp*jammed)//' % of the normal force is on slopes above '// &
             '1/coefficient, where friction holds any force uphill and there may be no solution: take a '// &
