@@ -7,8 +7,8 @@
 
 First Mindlin's sphere (G = 200 MPa, nu = 0.42, R = 50 mm, 9.196 N; thesis, fig. 3.5) brought to
 half of full slip in one step with one pass, on meshes that grow: iterations and transforms of its
-two tangential solves, of which the first needs the displacements only. An iteration takes a product
-and a half of the operator (six transforms) and the preconditioner (four).
+tangential solve. An iteration takes a product and a half of the operator (six transforms) and the
+preconditioner (four).
 
 Then the road of two scales (examples/two_scale_road), whole or its first steps of sliding: what a
 step costs, by the part of the contact that sticks. With `--result` the table is that of a run that
