@@ -125,8 +125,13 @@ contains
          ! The last of many passes is for the best place that was found.
          if (self%passes == most - 1 .and. most > 10) self%place(:, :, :) = self%best_place
       end do
-      call contact%state%tangential%forecast%learn(contact%tangential%trial, self%carried, &
-         contact%state%pressure)
+      associate (forecast => contact%state%tangential%forecast)
+         if (self%residual <= tolerance) then
+            call forecast%learn(contact%tangential%trial, self%carried, contact%state%pressure)
+         else
+            call forecast%forget()
+         end if
+      end associate
    end subroutine solve
 
    !> One pass at the place, and the mismatch that it leaves.

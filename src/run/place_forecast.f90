@@ -14,7 +14,9 @@
 !> contact only. Where the contact jumps, or where the tolerance of the solver limits the differences, this
 !> leads to a low order by itself.
 !>
-!> The differences belong to steps of one length and one speed. Where these change, they are forgotten.
+!> The differences belong to settled steps of one length and one speed. Where these change, or a row has
+!> not settled, they are forgotten: what such a row leaves over would be taken for a motion.
+!>
 !> Plain data, part of the state of a run. Fields of doubles: two components each of a and b.
 module place_forecast
    use asperity_precision, only : dp
@@ -37,6 +39,7 @@ module place_forecast
    contains
       procedure :: add
       procedure :: follow
+      procedure :: forget
       procedure :: learn
    end type place_forecast_type
 
@@ -62,10 +65,7 @@ contains
       real(dp), allocatable :: moved(:, :)
       integer :: c
 
-      if (.not. goes_on .or. abs(dt - self%dt) > same_length*dt) then
-         self%known = 0
-         self%order = 1
-      end if
+      if (.not. goes_on .or. abs(dt - self%dt) > same_length*dt) call self%forget()
       self%dt = dt
       allocate (moved(size(self%change, 1), size(self%change, 3)))
       do c = 1, 2
@@ -79,6 +79,14 @@ contains
          end if
       end do
    end subroutine follow
+
+   !> The next row cannot be foretold from the rows so far.
+   pure subroutine forget(self)
+      class(place_forecast_type), intent(inout) :: self
+
+      self%known = 0
+      self%order = 1
+   end subroutine forget
 
    !> Add what this row is expected to change to the displacement carried along.
    subroutine add(self, place)

@@ -60,7 +60,9 @@ module friction_rows
    type :: move_type
       real(dp) :: step = 0.0_dp
       real(dp) :: uniform(2) = 0.0_dp        !! Pa
-      logical :: again = .false.             !! from the T and the states before the last move
+      !> From the T before the last move; and from the states before it, unless the slip has been measured
+      !> since. Then points that the last move put back on their bound slip.
+      logical :: again = .false.
    end type move_type
 
    !> The constants of the bound and of the measures.
