@@ -83,8 +83,9 @@ contains
       ! What the passes of steps in time remember.
       if (in_time) fields = fields + 11.0_dp
       if (arms > 0) fields = fields + 4.0_dp + 2.0_dp*arms
-      ! The arms before a row that is taken in parts (module row_stop), of both directions.
-      if (in_time .and. arms > 0) fields = fields + 6.0_dp + 3.0_dp*arms
+      ! The arms before a row that is taken in parts (module row_stop), of both directions: 6 + 3 arms,
+      ! but the passes remember most in other rows.
+      if (in_time .and. arms > 0) fields = fields + min(6.0_dp + 3.0_dp*arms, 20.0_dp)
    end function friction_fields
 
 end module case_memory
