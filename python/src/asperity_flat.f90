@@ -347,7 +347,7 @@ contains
       if (approach == 1) task%control = 'displacement'
       task%load = load
       task%first = start /= 2
-      call see_memory(grid, 20, 'the contact', error)
+      call see_memory(grid, merge(32, 20, is_free == 1), 'the contact', error)
       if (.not. allocated(error)) call new_normal_step(side, grid, normal_half_space(0.0_dp), solver, &
          adhesion, edge_of_cells(energy, range_, modulus, merge(grid%dx, max(grid%dx, grid%dy), ny == 1)), &
          height, error)
@@ -852,8 +852,12 @@ contains
       handle = 0
       mx = 0
       my = 0
-      call new_operator(number)
-      if (number == 0) then
+      call see_memory(grid_of(nx, ny, lx, ly, is_free), merge(8, 4, tangential == 1), 'the operator', error)
+      number = 0
+      if (.not. allocated(error)) call new_operator(number)
+      if (allocated(error)) then
+         handle = 0
+      else if (number == 0) then
          call fail(error, error_input, 'too many operators are open')
       else
          operator => operator_of(number)

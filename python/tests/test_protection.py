@@ -329,6 +329,68 @@ def test_memory_error(tmp_path: Path) -> None:
     assert all("not enough memory" in line or "llocate" in line for line in lines[:-1]), lines
 
 
+LIMITS = """
+import asperity, numpy as np, resource, sys, warnings
+warnings.simplefilter("ignore")
+asperity.solve_normal([[0.0, 1e-3]], 1.0, 1.0, 1.0, pressure=0.1)  # loads the library
+asperity.operators, asperity.run
+n = 1100
+height = np.zeros((n, n)); height[::2] = 1e-3
+pair = np.stack([height, height])
+quick = dict(tolerance=0.5)
+CALLS = {
+    "normal": lambda: asperity.solve_normal(height, 1.0, 1.0, 1.0, pressure=0.1, **quick),
+    "free": lambda: asperity.solve_normal(height, 1.0, 1.0, 1.0, force=1e-4, boundary="free",
+                                          **quick),
+    "adhesive": lambda: asperity.solve_adhesive(height, 1.0, 1.0, 1.0, pressure=0.1, energy=1e-6,
+                                                range=1e-3, max_iterations=2, **quick),
+    "adhesive, free": lambda: asperity.solve_adhesive(
+        height, 1.0, 1.0, 1.0, displacement=1e-4, energy=1e-6, range=1e-3, boundary="free",
+        max_iterations=2, **quick),
+    "operator": lambda: asperity.operators.tangential(n, n, 1.0, modulus=1.0,
+                                                      boundary="free").apply(pair),
+    "run": lambda: asperity.run(CASE, overwrite=True),
+}
+call = CALLS[sys.argv[1]]
+before = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+resource.setrlimit(resource.RLIMIT_AS, (before + int(float(sys.argv[2])), resource.RLIM_INFINITY))
+try:
+    call()
+    print("done")
+except asperity.NotConverged:
+    print("done")
+except (MemoryError, OSError) as error:
+    print(type(error).__name__)
+"""
+
+
+@pytest.mark.parametrize("what", ["normal", "free", "adhesive", "adhesive, free", "operator",
+                                  "run"])
+def test_no_limit_of_memory_ends_the_interpreter(tmp_path: Path, what: str) -> None:
+    """From a limit that allows nothing to one that allows all: an exception, then the result."""
+    case = tmp_path / "y.nml"
+    case.write_text("""
+&grid nx = 500, ny = 480, lx = 1 /
+&surface shape = 'sine', amplitude = 1e-3, wavelength = 1 /
+&material shear_modulus = 1e6, prony_g = 1e6, prony_tau = 1, thickness = 1 /
+&friction law = 'coulomb', coefficient = 0.3 /
+&phase pressure = 1e3 /
+&phase velocity_x = 1e-3, duration = 1, steps = 1 /
+&solver tolerance = 1e-2 /
+""")
+    outcomes = []
+    for room in (1e6, 30e6, 100e6, 250e6, 300e6, 350e6, 400e6, 500e6, 650e6, 800e6, 1000e6):
+        done = subprocess.run(
+            [os.sys.executable, "-c", LIMITS.replace("CASE", repr(str(case))), what, str(room)],
+            capture_output=True, text=True, timeout=PATIENCE, check=False)
+        assert done.returncode == 0, (what, room, done.returncode, done.stderr[-500:])
+        outcomes.append(done.stdout.strip())
+        if outcomes[-1] == "done":
+            break
+    assert outcomes[-1] == "done", outcomes
+    assert "MemoryError" in outcomes
+
+
 LARGE = """
 &grid nx = 20000, ny = 20000, lx = 1 /
 &surface shape = 'sine', amplitude = 1e-3, wavelength = 1 /
