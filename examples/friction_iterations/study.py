@@ -23,7 +23,7 @@ MODULUS, POISSON, RADIUS, FORCE = 200e6, 0.42, 50e-3, 9.196
 #: Iterations depend on the slip ratio only. A small coefficient keeps the sphere in place, so that
 #: the pressure stays as it is and the count is that of the tangential problem alone.
 COEFFICIENT = 1e-4
-SIDE, SPEED, TOLERANCE, LIMIT = 2.4e-3, 1e-3, 1e-5, 2000
+SIDE, SPEED, TOLERANCE, LIMIT = 2.4e-3, 1e-3, 1e-5, 8000
 RATIOS = (0.1, 0.5, 0.9, 1.2)      # motion over that of full slip
 CELLS = {"fast": (32, 48, 64, 96, 128, 192, 256), "thesis": (32, 48, 64, 96, 128, 192, 256)}
 #: Where the summit lies in its cell: the pressure of the outermost cells depends on it.
