@@ -186,6 +186,24 @@ def test_masked_points_are_refused():
         asperity.solve_normal(np.eye(4), 1.0, 1.0, 1e6, pressure="1e4")
 
 
+def test_steps_that_end_on_the_bound_at_once():
+    # The preconditioned directions of this wave of 13 cells leave what is allowed at once: trials
+    # that hardly descend have to become shorter, like those that do not descend at all.
+    heights = """
+        0x1.b13bcfe194112p-8 0x1.86e62bc5f1e3cp-8 0x1.5c1b8a5e8baa1p-13 -0x1.7a8a356c0cee1p-8
+        -0x1.b8f2dcc7ab5d8p-8 -0x1.e9bd5ccc7b64cp-10 0x1.2dd8c4ca88328p-8 0x1.d15f3652ecd66p-8
+        0x1.c5c084e76d146p-9 -0x1.9f3908598b30dp-9 -0x1.cebfdb42e72cdp-8 -0x1.3e21c3d459d42p-8
+        0x1.953ddc7cdf619p-10"""
+    height = [float.fromhex(text) for text in heights.split()]
+    load = {"lx": 1, "ly": 1, "modulus": float.fromhex("0x1.91ad3508703fcp-6"),
+            "pressure": float.fromhex("0x1.956e32c7a86eep-14"), "tolerance": 1e-10}
+    fast = asperity.solve_normal([height], **load)
+    assert fast.iterations < 50
+    thesis = asperity.solve_normal([height], **load, method="thesis")
+    assert np.count_nonzero(thesis.pressure) == 3
+    np.testing.assert_allclose(fast.pressure, thesis.pressure, atol=1e-8 * load["pressure"])
+
+
 def test_contact_of_one_cell_grows():
     # The first state touches in one cell, where the residual and so the direction are exactly 0:
     # that cell was taken for one outside the contact, and the step did not keep the load.

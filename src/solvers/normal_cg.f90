@@ -65,11 +65,12 @@ module normal_cg
    integer, parameter :: phase_plain = 3
    integer, parameter :: phase_ended = 4
 
-   ! kappa is the ratio of the true d.A d to the predicted one. Every step that does not descend makes
-   ! it four times larger, and so the next trial shorter.
+   ! kappa is the ratio of the true d.A d to the predicted one. Every step that does not descend, or hardly
+   ! does, makes it four times larger, and so the next trial shorter.
    real(dp), parameter :: often_bent = 1e3_dp  !! kappa from which the direction is the plain residual
    real(dp), parameter :: hopeless = 1e9_dp    !! kappa from which no step is expected to descend
    real(dp), parameter :: useless = 0.1_dp     !! largest part of a clipped step that counts as little
+   real(dp), parameter :: nothing = 1e-3_dp    !! largest part that counts as nothing
 
    ! Steps by which the preconditioner extends the residual. A third one saves iterations only where most
    ! cells touch: the gaps between are then narrow, and the coarse level sees little of them.
@@ -322,13 +323,22 @@ contains
       call clip_step(self%work, product, clip, level, pressure, gap, self%step, step)
       if (step%slope > 0.0_dp) then
          call choose_length(self, product, task%modulus, pressure, clip%clipped, step, now)
-      else if (now%kappa > hopeless) then
+      else
+         call shorten(now)
+      end if
+   end subroutine choose_step
+
+   !> Make the next trial shorter, and in the end plain.
+   subroutine shorten(now)
+      type(iteration_type), intent(inout) :: now
+
+      if (now%kappa > hopeless) then
          call end_loop(now, 'no step lowers the energy')
       else
          now%kappa = 4.0_dp*now%kappa
          now%phase = merge(phase_plain, phase_restart, now%kappa > often_bent)
       end if
-   end subroutine choose_step
+   end subroutine shorten
 
    !> How much of the projected step is taken, by the product of the operator with it.
    subroutine choose_length(self, product, modulus, pressure, clipped, step, now)
@@ -339,7 +349,7 @@ contains
       logical, intent(in) :: clipped
       type(step_sums_type), intent(in) :: step
       type(iteration_type), intent(inout) :: now
-      real(dp) :: form, predicted
+      real(dp) :: form, predicted, before
 
       call product%columns(columns_apply, form)
       form = form/modulus
@@ -348,6 +358,7 @@ contains
          return
       end if
       predicted = self%work%coarse%predict_form(step%square)/modulus
+      before = now%kappa
       now%kappa = min(max(form/max(predicted, tiny(1.0_dp)), 0.1_dp), 10.0_dp)
       now%alpha = step%slope/form
       if (.not. now%alpha > 0.0_dp) then
@@ -356,6 +367,10 @@ contains
       end if
       ! A direction that points out of what is allowed would only grow: do not keep it.
       if (clipped .and. now%alpha < useless) now%phase = phase_restart
+      if (clipped .and. now%alpha < nothing) then
+         now%kappa = max(before, now%kappa)
+         call shorten(now)
+      end if
       if (clipped .and. now%alpha > 0.55_dp) then
          now%alpha = 1.0_dp
       else if (now%alpha > 1.0_dp) then
