@@ -1,10 +1,12 @@
 !> Signals set flags, which a run checks between its steps.
 !>
 !> SIGINT, SIGTERM, SIGHUP (the terminal was closed) and SIGXCPU (the limit of the batch system is
-!> near) ask a run to stop after the present step, or within it if it takes long. SIGUSR1 asks for a checkpoint. SIGXFSZ (a file
-!> would exceed the size limit) is ignored, so that the write that caused it fails with an error.
+!> near) ask a run to stop after the present step, or within it if it takes long. SIGUSR1 asks for a
+!> checkpoint. SIGXFSZ (a file would exceed the size limit) is ignored, so that the write that caused it
+!> fails with an error.
 module asperity_signals
-   use, intrinsic :: iso_c_binding, only : c_funloc, c_funptr, c_int, c_int64_t, c_intptr_t, c_loc, c_null_ptr, c_ptr
+   use, intrinsic :: iso_c_binding, only : c_funloc, c_funptr, c_int, c_int64_t, c_intptr_t, c_loc, &
+      c_null_ptr, c_ptr
    implicit none
    private
 
@@ -33,6 +35,7 @@ module asperity_signals
          integer(c_int), value :: number
          type(c_funptr), value :: handler
       end function c_signal
+
       function c_raise(number) bind(c, name='raise') result(status)
          import :: c_int
          integer(c_int), value :: number

@@ -28,11 +28,11 @@
 !>
 !> The loop of `solve` reads: do a pass at the place, and measure the mismatch that it leaves. If the
 !> mismatch is within the tolerance, and the solves of the pass were asked to be that accurate too, the
-!> row is solved. Otherwise `pass_control` judges the pass, which sets the
-!> accuracy of the next one and how far to go, and `choose_place` goes to the next place. When the
-!> passes run out, the row keeps what the last pass has left; the last of more than ten passes is done
-!> at the best place so far. A normal solve that does not converge ends the loop. A row that is given up
-!> for a stop (module `row_stop`) is left as it is.
+!> row is solved. Otherwise `pass_control` judges the pass, which sets the accuracy of the next one and
+!> how far to go, and `choose_place` goes to the next place. When the passes run out, the row keeps
+!> what the last pass has left; the last of more than ten passes is done at the best place so far. A
+!> normal solve that does not converge ends the loop. A row that is given up for a stop (module
+!> `row_stop`) is left as it is.
 !>
 !> Fields of doubles: two components each for the place, its residual, the best place and the displacement
 !> carried along; and those of the acceleration. The check borrows three from the workspace of the contact.

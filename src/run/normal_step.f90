@@ -58,7 +58,7 @@ contains
       type(solver_settings_type), intent(in) :: solver
       type(adhesion_settings_type), intent(in) :: adhesion
       real(dp), intent(in) :: edge                      !! width of a rounded jump of the attraction, m
-      real(dp), contiguous, intent(in) :: height(:, :)              !! the original map, m
+      real(dp), contiguous, intent(in) :: height(:, :)   !! the original map, m
       type(error_type), allocatable, intent(out) :: error
 
       self%grid = grid
@@ -87,9 +87,9 @@ contains
    subroutine solve(self, task, height, pressure, gap, level, outcome, past)
       class(normal_step_type), intent(inout) :: self
       type(normal_task_type), intent(in) :: task
-      real(dp), contiguous, intent(in) :: height(:, :)             !! H under the rubber, m
+      real(dp), contiguous, intent(in) :: height(:, :)   !! H under the rubber, m
       real(dp), contiguous, intent(inout) :: pressure(:, :)        !! Pa
-      real(dp), contiguous, intent(inout) :: gap(:, :)             !! m
+      real(dp), contiguous, intent(inout) :: gap(:, :)   !! m
       real(dp), intent(inout) :: level                 !! U - H where the gap is zero, m
       type(solver_result_type), intent(out) :: outcome
       real(dp), intent(in), optional :: past(:, :)     !! P_h, traction of the past, Pa
@@ -183,7 +183,7 @@ contains
    !> Energy of adhesion of a gap over the whole cell, J.
    function energy(self, gap) result(total)
       class(normal_step_type), intent(in) :: self
-      real(dp), contiguous, intent(in) :: gap(:, :)                !! m
+      real(dp), contiguous, intent(in) :: gap(:, :)   !! m
       real(dp) :: total
       real(dp), allocatable :: rows(:)
       integer :: j

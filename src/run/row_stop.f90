@@ -4,11 +4,11 @@
 !> end if that takes no longer than `patience`; otherwise the row is given up, and the state is that of the
 !> row before.
 !>
-!> For this `keep` copies, at the start of a row, what the row changes before it commits a step: P, the gap,
-!> T and T of the step before, the forecast, the states of contact, and all scalars. The fields that only the end of
-!> a step changes are not copied, because the arms may have many. A row whose step is solved in parts
-!> needs them, too, once a part is committed: `keep_more` copies them if they take no more than
-!> `most_more`. Otherwise such a row can be given up in its first part only.
+!> For this `keep` copies, at the start of a row, what the row changes before it commits a step: P, the
+!> gap, T and T of the step before, the forecast, the states of contact, and all scalars. The fields
+!> that only the end of a step changes are not copied, because the arms may have many. A row whose step
+!> is solved in parts needs them, too, once a part is committed: `keep_more` copies them if they take
+!> no more than `most_more`. Otherwise such a row can be given up in its first part only.
 module row_stop
    use, intrinsic :: iso_c_binding, only : c_int
    use asperity_precision, only : dp, int64

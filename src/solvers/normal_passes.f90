@@ -65,11 +65,11 @@ contains
       call new_schur_preconditioner(self%preconditioner, self%grid, self%coarse, self%threads, error, &
          memory=operator%spectrum_memory())
       if (allocated(error)) return
-      associate (grid => self%grid, threads => self%threads)
-      allocate (self%direction(grid%nx, grid%ny), source=0.0_sp)
-      call new_active_blocks(self%active, grid%nx, grid%ny, grid%boundary == boundary_periodic, &
-         self%coarse%first_y, self%preconditioner%extends, threads)
-      allocate (self%state(grid%ny))
+      associate (grid => self%grid)
+         allocate (self%direction(grid%nx, grid%ny), source=0.0_sp)
+         call new_active_blocks(self%active, grid%nx, grid%ny, grid%boundary == boundary_periodic, &
+            self%coarse%first_y, self%preconditioner%extends, self%threads)
+         allocate (self%state(grid%ny))
       end associate
    end subroutine new_normal_work
 
