@@ -2,14 +2,15 @@
 !>
 !> A field is summed in two stages. Each row is summed first, in parallel. The sums of the rows are then
 !> added one after the other in the order of the rows of the whole grid, so that a result does not
-!> depend, to the last bit, on how threads or processes share the rows. A loop that needs several sums
+!> depend, to the last bit, on how threads or processes share the rows. Every process gets the result, and
+!> every process must ask for it. A loop that needs several sums
 !> at once forms the sums of its rows itself, in an array with one column per row, and hands that array
 !> to `row_total`, `row_totals`, `largest_of_rows` or `least_of_rows`.
 !>
 !> A process holds only its own rows of a field, so that `size(field)` is not the number of cells:
 !> `cell_count` and the means of this module are over the whole grid.
 module field_sums
-   use asperity_parallel, only : global_max, global_min, global_sum, thread_count
+   use asperity_parallel, only : gather_rows, global_max, global_min, global_sum, process_count, thread_count
    use asperity_precision, only : dp
    implicit none
    private
@@ -27,20 +28,23 @@ module field_sums
 contains
 
    !> Total over all rows of the grid, added in the order of the rows.
-   pure function total_of_rows(rows) result(total)
+   function total_of_rows(rows) result(total)
       real(dp), intent(in) :: rows(:)          !! one sum for each row of this process
       real(dp) :: total
       integer :: j
 
+      if (process_count() > 1) then
+         total = total_of_row_sums(reshape(rows, [1, size(rows)]), 1)
+         return
+      end if
       total = 0.0_dp
       do j = 1, size(rows)
          total = total + rows(j)
       end do
-      total = global_sum(total)
    end function total_of_rows
 
    !> Total of one count per row.
-   pure function total_of_row_counts(rows) result(total)
+   function total_of_row_counts(rows) result(total)
       integer, intent(in) :: rows(:)           !! one count for each row of this process
       integer :: total
 
@@ -48,22 +52,31 @@ contains
    end function total_of_row_counts
 
    !> The same as `total_of_rows` for the k-th of several sums per row.
-   pure function total_of_row_sums(rows, k) result(total)
+   function total_of_row_sums(rows, k) result(total)
       real(dp), intent(in) :: rows(:, :)       !! [sums, rows of this process]
       integer, intent(in) :: k
       real(dp) :: total
-      integer :: j
+      real(dp) :: totals(1)
 
-      total = 0.0_dp
-      do j = 1, size(rows, 2)
-         total = total + rows(k, j)
-      end do
-      total = global_sum(total)
+      totals = row_totals(rows(k:k, :))
+      total = totals(1)
    end function total_of_row_sums
 
    !> Totals of several sums per row, each added in the order of the rows.
-   pure function row_totals(rows) result(totals)
+   function row_totals(rows) result(totals)
       real(dp), intent(in) :: rows(:, :)       !! [sums, rows of this process]
+      real(dp) :: totals(size(rows, 1))
+
+      if (process_count() > 1) then
+         totals = added(gather_rows(rows))
+      else
+         totals = added(rows)
+      end if
+   end function row_totals
+
+   !> Sums added one after the other.
+   pure function added(rows) result(totals)
+      real(dp), intent(in) :: rows(:, :)
       real(dp) :: totals(size(rows, 1))
       integer :: j
 
@@ -71,11 +84,10 @@ contains
       do j = 1, size(rows, 2)
          totals = totals + rows(:, j)
       end do
-      totals = global_sum(totals)
-   end function row_totals
+   end function added
 
    !> Largest of one number per row.
-   pure function largest_of_rows(rows) result(largest)
+   function largest_of_rows(rows) result(largest)
       real(dp), intent(in) :: rows(:)
       real(dp) :: largest
 
@@ -83,7 +95,7 @@ contains
    end function largest_of_rows
 
    !> Least of one number per row.
-   pure function least_of_rows(rows) result(least)
+   function least_of_rows(rows) result(least)
       real(dp), intent(in) :: rows(:)
       real(dp) :: least
 
@@ -91,11 +103,11 @@ contains
    end function least_of_rows
 
    !> Number of cells of the whole grid that a field lives on. Real, since it may exceed the integers.
-   pure function cell_count(field) result(cells)
+   function cell_count(field) result(cells)
       real(dp), intent(in) :: field(:, :)      !! [nx, rows of this process]
       real(dp) :: cells
 
-      cells = global_sum(real(size(field, 1), dp)*size(field, 2))
+      cells = real(size(field, 1), dp)*global_sum(size(field, 2))
    end function cell_count
 
    !> Number of threads for a loop over a field: one if the field is small.

@@ -1,7 +1,8 @@
 !> Projections of fields on what a solution must satisfy.
 module projection
+   use asperity_parallel, only : rows_before
    use asperity_precision, only : dp
-   use field_sums, only : cell_count, row_total, threads_for
+   use field_sums, only : cell_count, row_total, row_totals, threads_for
    implicit none
    private
 
@@ -18,12 +19,13 @@ contains
       real(dp), intent(inout) :: x(:, :)       !! [nx, ny]
       real(dp), intent(in) :: total            !! x becomes 0 where this is 0 or less
       real(dp), allocatable :: rows(:, :)
-      real(dp) :: cells, level, next, above, negative, kept
-      integer :: count, next_count, threads, stride
+      real(dp) :: cells, all_rows, level, next, above, negative, kept
+      integer :: count, next_count, threads, first, stride
 
       cells = cell_count(x)
       threads = threads_for(x)
       allocate (rows(3, size(x, 2)))
+      first = 1
       stride = 1
       if (total <= 0.0_dp) then
          call fill(0.0_dp)
@@ -34,7 +36,8 @@ contains
       ! The first level is below the solution; Newton's steps rise to it. From any other level the
       ! first step leads below it, too: a few rows tell one that is close.
       level = (above + negative - total)/cells
-      if (size(x, 2) >= 4*sample) call guess()
+      all_rows = cell_count(x(:1, :))
+      if (all_rows >= 4.0_dp*sample) call guess()
       call sum_above(level, above, count, negative)
       if (count == 0) then
          ! All cells are equal.
@@ -60,7 +63,8 @@ contains
          integer :: cells
 
          stride = sample
-         part = total*cell_count(x(:1, ::stride))/cell_count(x(:1, :))      ! rows of the sample, of all
+         first = 1 + modulo(-rows_before(size(x, 2)), sample)
+         part = total*cell_count(x(:1, first::stride))/all_rows
          trial = level
          do
             call sum_above(trial, above, cells, negative)
@@ -69,6 +73,7 @@ contains
             if (raised <= trial) exit
             trial = raised
          end do
+         first = 1
          stride = 1
          call sum_above(trial, above, cells, negative)
          if (cells > 0) level = max(level, (above - total)/cells)
@@ -80,12 +85,12 @@ contains
          real(dp), intent(out) :: sum
          integer, intent(out) :: number
          real(dp), intent(out) :: others
-         real(dp) :: a, b, n
+         real(dp) :: sums(3), a, b, n
          integer :: i, j
 
-         !$omp parallel do default(none) shared(x, rows, limit, stride) &
+         !$omp parallel do default(none) shared(x, rows, limit, first, stride) &
          !$omp private(i, j, n, a, b) num_threads(threads)
-         do j = 1, size(x, 2), stride
+         do j = first, size(x, 2), stride
             a = 0.0_dp
             b = 0.0_dp
             n = 0.0_dp
@@ -97,9 +102,10 @@ contains
             end do
             rows(:, j) = [a, b, n]
          end do
-         sum = row_total(rows(:, ::stride), 1)
-         others = row_total(rows(:, ::stride), 2)
-         number = nint(row_total(rows(:, ::stride), 3))
+         sums = row_totals(rows(:, first::stride))
+         sum = sums(1)
+         others = sums(2)
+         number = nint(sums(3))
       end subroutine sum_above
 
       !> x = max(x - limit, 0) and its sum.
@@ -119,7 +125,7 @@ contains
             end do
             rows(1, j) = a
          end do
-         sum = row_total(rows(:, ::stride), 1)
+         sum = row_total(rows, 1)
       end subroutine clip
 
       !> x = factor x.

@@ -1,10 +1,14 @@
 !> The regular grid of cells on which all fields live.
 !>
-!> `nx` by `ny` is the whole grid. A process holds the rows `first_row` to `last_row` of every field, so that
-!> its fields have the shape [nx, rows] and the first of their rows is row `first_row` of the grid.
+!> `nx` by `ny` is the whole grid. Several processes share its rows: each holds the rows `first_row` to
+!> `last_row` of every field, so that its fields have the shape [nx, rows()], and the first of their rows is
+!> row `first_row` of the grid. A grid that is not shared is whole on every process.
+!>
+!> Rows are shared in strips of about eight, the rows of blocks of the coarse level (module `coarse_level`),
+!> so that the cells of a block are on one process. A process may have no row at all.
 module regular_grid
-   use asperity_parallel, only : local_rows
-   use asperity_precision, only : dp
+   use asperity_parallel, only : process_count, process_number
+   use asperity_precision, only : dp, int64
    implicit none
    private
 
@@ -12,6 +16,8 @@ module regular_grid
 
    integer, parameter, public :: boundary_periodic = 1   !! the surface repeats for ever
    integer, parameter, public :: boundary_free = 2       !! a patch on an unbounded half-space
+
+   real(dp), parameter, public :: block_cells = 8.0_dp   !! cells of a block along a side, if square
 
    !> Cell (i, j), from 0, has its centre at x = i dx, y = j dy.
    type :: grid_type
@@ -22,6 +28,7 @@ module regular_grid
       real(dp) :: dx = 0.0_dp                   !! lx/nx
       real(dp) :: dy = 0.0_dp                   !! ly/ny
       integer :: boundary = boundary_periodic
+      logical :: shared = .false.               !! other processes hold the other rows
       integer :: first_row = 1                  !! first row of this process, counted from 1
       integer :: last_row = 0                   !! its last row
    contains
@@ -29,6 +36,11 @@ module regular_grid
       procedure :: cells
       procedure :: area
       procedure :: cell_area
+      procedure :: cell_side
+      procedure :: blocks
+      procedure :: strip_start
+      procedure :: share_rows
+      procedure :: rows_of
    end type grid_type
 
 contains
@@ -47,8 +59,67 @@ contains
       self%dx = lx/nx
       self%dy = ly/ny
       self%boundary = boundary
-      call local_rows(ny, self%first_row, self%last_row)
+      self%last_row = ny
    end function new_grid
+
+   !> Share the rows with the other processes, if there are any.
+   pure subroutine share_rows(self)
+      class(grid_type), intent(inout) :: self
+      integer :: range(2)
+
+      self%shared = process_count() > 1
+      if (.not. self%shared) return
+      range = self%rows_of(process_number())
+      self%first_row = range(1)
+      self%last_row = range(2)
+   end subroutine share_rows
+
+   !> First and last row of a process. The last is before the first where the process has none.
+   pure function rows_of(self, process) result(range)
+      class(grid_type), intent(in) :: self
+      integer, intent(in) :: process               !! from 0
+      integer :: range(2)
+      integer :: strips(2), blocks(2)
+
+      range = [1, self%ny]
+      if (.not. self%shared) return
+      blocks = self%blocks()
+      ! Strips before those of this process and of the next.
+      strips = int([process, process + 1]*int(blocks(2), int64)/process_count())
+      range = [self%strip_start(strips(1) + 1), self%strip_start(strips(2) + 1) - 1]
+   end function rows_of
+
+   !> Number of blocks of the coarse level along x and y: about as long as wide, in metres, of whole cells.
+   pure function blocks(self)
+      class(grid_type), intent(in) :: self
+      integer :: blocks(2)
+      real(dp) :: side
+
+      side = block_cells*self%cell_side()
+      blocks(1) = min(max(1, nint(self%lx/side)), self%nx)
+      blocks(2) = min(max(1, nint(self%ly/side)), self%ny)
+   end function blocks
+
+   !> First row of a strip, the rows of one row of blocks; of the strip after the last, ny + 1.
+   pure function strip_start(self, strip) result(row)
+      class(grid_type), intent(in) :: self
+      integer, intent(in) :: strip                 !! from 1
+      integer :: row
+      integer :: blocks(2)
+
+      blocks = self%blocks()
+      row = int((int(strip - 1, int64)*self%ny + blocks(2) - 1)/blocks(2)) + 1
+   end function strip_start
+
+   !> Side of a square cell of the same area, m; the length of a cell where the grid is a line.
+   pure function cell_side(self) result(side)
+      class(grid_type), intent(in) :: self
+      real(dp) :: side
+
+      side = sqrt(self%dx*self%dy)
+      if (self%ny == 1) side = self%dx
+      if (self%nx == 1) side = self%dy
+   end function cell_side
 
    !> Number of rows that this process holds.
    pure function rows(self)

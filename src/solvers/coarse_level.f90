@@ -11,13 +11,11 @@ module coarse_level
    use fft_conv, only : convolution_type, new_convolution
    use kernels, only : kernel_type
    use asperity_precision, only : dp, pi, sp
-   use regular_grid, only : grid_type, new_grid
+   use regular_grid, only : block_cells, grid_type, new_grid
    implicit none
    private
 
    public :: coarse_level_type, edge_rows, inner_rows, new_coarse_level
-
-   real(dp), parameter :: ratio = 8.0_dp                    !! cells of a block along a side, if square
 
    !> Not to be copied.
    type :: coarse_level_type
@@ -49,17 +47,15 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(grid_type) :: blocks
       real(dp) :: h
-      integer :: i, j
+      integer :: counts(2), i, j
 
-      h = sqrt(grid%dx*grid%dy)
-      if (grid%ny == 1) h = grid%dx
-      if (grid%nx == 1) h = grid%dy
-      ! Blocks about as long as wide, in metres, of whole cells.
-      self%nx = min(max(1, nint(grid%lx/(ratio*h))), grid%nx)
-      self%ny = min(max(1, nint(grid%ly/(ratio*h))), grid%ny)
+      h = grid%cell_side()
+      counts = grid%blocks()
+      self%nx = counts(1)
+      self%ny = counts(2)
       self%cells = grid%cells()/(real(self%nx, dp)*self%ny)
       self%h = h
-      self%fine_symbol = kernel%compliance(2.0_dp*pi/(ratio*h))
+      self%fine_symbol = kernel%compliance(2.0_dp*pi/(block_cells*h))
 
       allocate (self%block_x(grid%nx), self%last_x(self%nx), self%first_y(self%ny + 1))
       do i = 1, grid%nx
@@ -67,7 +63,7 @@ contains
          self%last_x(self%block_x(i)) = i
       end do
       do j = 1, self%ny + 1
-         self%first_y(j) = int((int(j - 1, kind=8)*grid%ny + self%ny - 1)/self%ny) + 1
+         self%first_y(j) = grid%strip_start(j)
       end do
       allocate (self%mean(self%nx, self%ny), self%share(self%nx, self%ny))
 

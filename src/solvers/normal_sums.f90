@@ -51,7 +51,7 @@ module normal_sums
 contains
 
    !> Sums of a direction over the grid.
-   pure function total_direction(rows) result(sums)
+   function total_direction(rows) result(sums)
       type(direction_sums_type), intent(in) :: rows(:)
       type(direction_sums_type) :: sums
 
@@ -63,7 +63,7 @@ contains
    end function total_direction
 
    !> Sums of a trial pressure over the grid.
-   pure function total_trial(rows) result(sums)
+   function total_trial(rows) result(sums)
       type(trial_sums_type), intent(in) :: rows(:)
       type(trial_sums_type) :: sums
 
@@ -73,7 +73,7 @@ contains
    end function total_trial
 
    !> Sums of a step over the grid.
-   pure function total_step(rows) result(sums)
+   function total_step(rows) result(sums)
       type(step_sums_type), intent(in) :: rows(:)
       type(step_sums_type) :: sums
 
@@ -82,7 +82,7 @@ contains
    end function total_step
 
    !> Sums of a state over the grid.
-   pure function total_state(rows) result(sums)
+   function total_state(rows) result(sums)
       type(state_sums_type), intent(in) :: rows(:)
       type(state_sums_type) :: sums
 

@@ -19,6 +19,7 @@ module schur_coarse
    use asperity_precision, only : dp, pi, sp
    use regular_grid, only : grid_type
    use row_column_single, only : new_row_column, row_column_type
+   use transform_shape, only : whole_shape
    implicit none
    private
 
@@ -69,7 +70,7 @@ contains
       call model_symbols(grid, c0, h, symbol, self%model)
       call new_symbol_operator(self%missing, blocks(1), blocks(2), symbol, error, single=.true.)
       if (allocated(error)) return
-      call new_row_column(self%transform, blocks, blocks, 1, self%threads, error)
+      call new_row_column(self%transform, whole_shape(blocks(1), blocks(2), 1), self%threads, error)
       if (allocated(error)) return
       allocate (self%symbol(0:self%transform%longest, 0:blocks(2)/2, 1), source=0.0_sp)
    end subroutine new_schur_coarse

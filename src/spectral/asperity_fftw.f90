@@ -149,6 +149,26 @@ module asperity_fftw
          character(kind=c_char), intent(in) :: file(*)
       end function fftw_export_wisdom_to_filename
 
+      type(c_ptr) function fftw_export_wisdom_to_string() bind(c, name='fftw_export_wisdom_to_string')
+         import :: c_ptr
+      end function fftw_export_wisdom_to_string
+
+      integer(c_int) function fftw_import_wisdom_from_string(text) &
+         bind(c, name='fftw_import_wisdom_from_string')
+         import :: c_char, c_int
+         character(kind=c_char), intent(in) :: text(*)
+      end function fftw_import_wisdom_from_string
+
+      type(c_ptr) function fftwf_export_wisdom_to_string() bind(c, name='fftwf_export_wisdom_to_string')
+         import :: c_ptr
+      end function fftwf_export_wisdom_to_string
+
+      integer(c_int) function fftwf_import_wisdom_from_string(text) &
+         bind(c, name='fftwf_import_wisdom_from_string')
+         import :: c_char, c_int
+         character(kind=c_char), intent(in) :: text(*)
+      end function fftwf_import_wisdom_from_string
+
       integer(c_int) function fftwf_import_wisdom_from_filename(file) &
          bind(c, name='fftwf_import_wisdom_from_filename')
          import :: c_char, c_int

@@ -17,15 +17,15 @@ module fft_conv
    use, intrinsic :: iso_c_binding, only : c_ptr
    use asperity_errors, only : error_input, error_type, fail
    use computed_symbol, only : columns_computed
-   use influence, only : transform_length
    use kernels, only : kernel_type
-   use asperity_parallel, only : global_sum, thread_count
+   use asperity_parallel, only : thread_count
    use asperity_precision, only : dp, int64, sp, power_of_two
    use regular_grid, only : boundary_periodic, grid_type
    use row_column_double, only : new_row_column_double => new_row_column, &
       row_column_double_type => row_column_type
    use row_column_single, only : new_row_column_single => new_row_column, &
       row_column_single_type => row_column_type
+   use transform_shape, only : shape_on_grid, transform_shape_type, whole_shape
    implicit none
    private
 
@@ -41,6 +41,7 @@ module fft_conv
    type :: convolution_type
       integer :: nx = 0                     !! cells along x
       integer :: ny = 0                     !! cells along y
+      integer :: rows = 0                   !! rows of this process
       integer :: mx = 0                     !! length of the transforms along x
       integer :: my = 0                     !! length of the transforms along y
       integer :: components = 0             !! 1 scalar, 2 vector
@@ -92,7 +93,7 @@ contains
          call fail(error, error_input, 'this solid is for periodic boundaries only')
          return
       end if
-      call plan(self, grid%nx, grid%ny, grid%boundary, kernel%components, error, single, memory)
+      call plan(self, shape_on_grid(grid, kernel%components), error, single, memory)
       if (allocated(error)) return
       self%grid = grid
       self%kernel = kernel
@@ -112,7 +113,7 @@ contains
       type(kernel_type), intent(in) :: kernel      !! what the solid is
       type(error_type), allocatable, intent(out) :: error
 
-      call plan(self, grid%nx, grid%ny, boundary_periodic, kernel%components, error)
+      call plan(self, shape_on_grid(grid, kernel%components), error)
       if (allocated(error)) return
       self%grid = grid
       self%kernel = kernel
@@ -129,7 +130,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       logical, intent(in), optional :: single      !! work in single precision
 
-      call plan(self, nx, ny, boundary_periodic, 1, error, single)
+      call plan(self, whole_shape(nx, ny, 1), error, single)
       if (allocated(error)) return
       call new_table(self)
       self%symbol(0:nx/2, :, 1) = symbol
@@ -149,26 +150,25 @@ contains
    end subroutine finish_symbol
 
    !> Sizes, buffers and plans.
-   subroutine plan(self, nx, ny, boundary, components, error, single, memory)
+   subroutine plan(self, shape, error, single, memory)
       type(convolution_type), intent(inout) :: self
-      integer, intent(in) :: nx, ny, boundary, components
+      type(transform_shape_type), intent(in) :: shape
       type(error_type), allocatable, intent(out) :: error
       logical, intent(in), optional :: single
       type(c_ptr), intent(in), optional :: memory
 
-      self%nx = nx
-      self%ny = ny
-      self%mx = transform_length(nx, boundary)
-      self%my = transform_length(ny, boundary)
-      self%components = components
-      self%threads = merge(1, thread_count(), nx*ny < small)
+      self%nx = shape%nx
+      self%ny = shape%ny
+      self%rows = shape%rows()
+      self%mx = shape%mx
+      self%my = shape%my
+      self%components = shape%components
+      self%threads = merge(1, thread_count(), shape%nx*shape%ny < small)
       if (present(single)) self%single = single
       if (self%single) then
-         call new_row_column_single(self%low, [nx, ny], [self%mx, self%my], components, self%threads, &
-            error, memory=memory)
+         call new_row_column_single(self%low, shape, self%threads, error, memory)
       else
-         call new_row_column_double(self%high, [nx, ny], [self%mx, self%my], components, self%threads, &
-            error, memory=memory)
+         call new_row_column_double(self%high, shape, self%threads, error, memory)
       end if
    end subroutine plan
 
@@ -193,20 +193,20 @@ contains
    !> u = A p.
    subroutine apply(self, p, u, form)
       class(convolution_type), intent(inout) :: self
-      real(dp), intent(in) :: p(:, :)                 !! [nx, ny], Pa
-      real(dp), intent(inout) :: u(:, :)              !! [nx, ny], m; may not be p
+      real(dp), intent(in) :: p(:, :)                 !! [nx, rows], Pa
+      real(dp), intent(inout) :: u(:, :)              !! [nx, rows], m; may not be p
       real(dp), intent(out), optional :: form         !! p.A p over the cells
       real(dp) :: sum
       integer :: j
 
       !$omp parallel do default(none) shared(self, p) private(j) num_threads(self%threads)
-      do j = 1, self%ny
+      do j = 1, self%rows
          call self%forward_row(1, j, p(:, j))
       end do
       call self%columns(columns_apply, sum)
       if (present(form)) form = sum
       !$omp parallel do default(none) shared(self, u) private(j) num_threads(self%threads)
-      do j = 1, self%ny
+      do j = 1, self%rows
          call self%backward_row(1, j, u(:, j))
       end do
    end subroutine apply
@@ -214,18 +214,18 @@ contains
    !> p = A^-1 u for a periodic operator; modes that the operator does not move are left out.
    subroutine apply_inverse(self, u, p)
       class(convolution_type), intent(inout) :: self
-      real(dp), intent(in) :: u(:, :)                 !! [nx, ny], m
-      real(dp), intent(inout) :: p(:, :)              !! [nx, ny], Pa
+      real(dp), intent(in) :: u(:, :)                 !! [nx, rows], m
+      real(dp), intent(inout) :: p(:, :)              !! [nx, rows], Pa
       real(dp) :: sum
       integer :: j
 
       !$omp parallel do default(none) shared(self, u) private(j) num_threads(self%threads)
-      do j = 1, self%ny
+      do j = 1, self%rows
          call self%forward_row(1, j, u(:, j))
       end do
       call self%columns(columns_inverse, sum)
       !$omp parallel do default(none) shared(self, p) private(j) num_threads(self%threads)
-      do j = 1, self%ny
+      do j = 1, self%rows
          call self%backward_row(1, j, p(:, j))
       end do
    end subroutine apply_inverse
@@ -233,21 +233,21 @@ contains
    !> (ux, uy) = A (px, py).
    subroutine apply_vector(self, px, py, ux, uy, form)
       class(convolution_type), intent(inout) :: self
-      real(dp), intent(in) :: px(:, :), py(:, :)          !! [nx, ny], Pa
-      real(dp), intent(inout) :: ux(:, :), uy(:, :)       !! [nx, ny], m
+      real(dp), intent(in) :: px(:, :), py(:, :)          !! [nx, rows], Pa
+      real(dp), intent(inout) :: ux(:, :), uy(:, :)       !! [nx, rows], m
       real(dp), intent(out), optional :: form             !! p.A p over the cells
       real(dp) :: sum
       integer :: j
 
       !$omp parallel do default(none) shared(self, px, py) private(j) num_threads(self%threads)
-      do j = 1, self%ny
+      do j = 1, self%rows
          call self%forward_row(1, j, px(:, j))
          call self%forward_row(2, j, py(:, j))
       end do
       call self%columns(columns_apply, sum)
       if (present(form)) form = sum
       !$omp parallel do default(none) shared(self, ux, uy) private(j) num_threads(self%threads)
-      do j = 1, self%ny
+      do j = 1, self%rows
          call self%backward_row(1, j, ux(:, j))
          call self%backward_row(2, j, uy(:, j))
       end do
@@ -261,7 +261,7 @@ contains
       integer :: j
 
       !$omp parallel do default(none) shared(self, p) private(j) num_threads(self%threads)
-      do j = 1, self%ny
+      do j = 1, self%rows
          call self%forward_row(1, j, p(:, j))
       end do
       call self%columns(columns_form, form)
@@ -271,7 +271,7 @@ contains
    subroutine forward_row(self, component, j, row)
       class(convolution_type), intent(inout) :: self
       integer, intent(in) :: component             !! 1, or 2 of a vector operator
-      integer, intent(in) :: j                     !! 1 <= j <= ny
+      integer, intent(in) :: j                     !! 1 <= j <= rows
       real(dp), intent(in) :: row(self%nx)
 
       if (self%single) then
@@ -411,7 +411,6 @@ contains
       else
          call self%high%columns(self%symbol, self%symbol_unit, inverse, back, form)
       end if
-      form = global_sum(form)
    end subroutine columns
 
    !> Free plans and memory.

@@ -14,10 +14,12 @@ module row_column_single
       fft_plan_many_dft => fftwf_plan_many_dft, &
       fft_plan_many_dft_c2r => fftwf_plan_many_dft_c2r, &
       fft_plan_many_dft_r2c => fftwf_plan_many_dft_r2c
+   use asperity_parallel, only : any_process, exchange, global_sum, is_first_process, process_number
    use asperity_errors, only : error_input, error_memory, error_type, fail
    use omp_lib, only : omp_get_thread_num
    use asperity_precision, only : dp, wp => sp
-   use wisdom, only : from_measuring, from_memory, planning_flag, save_wisdom
+   use transform_shape, only : transform_shape_type
+   use wisdom, only : from_measuring, from_memory, planning_flag, save_wisdom, share_wisdom
    implicit none
    private
 

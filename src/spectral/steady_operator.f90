@@ -15,6 +15,7 @@ module steady_operator
    use regular_grid, only : grid_type
    use row_column_double, only : multiplier_type, new_row_column, row_column_type
    use steady_symbols, only : steady_symbols_type
+   use transform_shape, only : shape_on_grid, transform_shape_type
    implicit none
    private
 
@@ -77,16 +78,19 @@ contains
       type(grid_type), intent(in) :: grid
       logical, intent(in) :: frictional
       type(error_type), allocatable, intent(out) :: error
+      type(transform_shape_type) :: vector
 
       self%nx = grid%nx
       self%ny = grid%ny
       self%frictional = frictional
       self%threads = merge(1, thread_count(), grid%nx*grid%ny < small)
-      call new_row_column(self%scalar, [grid%nx, grid%ny], [grid%nx, grid%ny], 1, self%threads, error)
+      call new_row_column(self%scalar, shape_on_grid(grid, 1), self%threads, error)
       if (allocated(error)) return
       self%last = self%scalar%longest
-      if (frictional) call new_row_column(self%vector, [grid%nx, grid%ny], [grid%nx, grid%ny], 4, &
-         self%threads, error, inputs=2)
+      if (.not. frictional) return
+      vector = shape_on_grid(grid, 4)
+      vector%inputs = 2
+      call new_row_column(self%vector, vector, self%threads, error)
    end subroutine new_steady_operator
 
    !> Take the symbols of a velocity.

@@ -4,16 +4,19 @@
 !> bits. So plans are measured only where their wisdom can be kept: a run, its restart and its
 !> repetition use the same plans. Elsewhere the planner's estimate is used, which never varies.
 !> The files are written only where something was learnt, with what other processes have learnt since.
+!> Where several processes run a case, the first one measures and keeps, and the others use what it knows.
 !> The folder is $XDG_CACHE_HOME/asperity or $HOME/.cache/asperity.
 module wisdom
-   use, intrinsic :: iso_c_binding, only : c_char, c_int, c_null_char
-   use asperity_fftw, only : fftw_estimate, fftw_export_wisdom_to_filename, &
-      fftw_import_wisdom_from_filename, fftw_measure, fftw_wisdom_only, &
-      fftwf_export_wisdom_to_filename, fftwf_import_wisdom_from_filename
+   use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_f_pointer, c_int, c_null_char, c_ptr, c_size_t
+   use asperity_fftw, only : fftw_estimate, fftw_export_wisdom_to_filename, fftw_export_wisdom_to_string, &
+      fftw_import_wisdom_from_filename, fftw_import_wisdom_from_string, fftw_measure, fftw_wisdom_only, &
+      fftwf_export_wisdom_to_filename, fftwf_export_wisdom_to_string, fftwf_import_wisdom_from_filename, &
+      fftwf_import_wisdom_from_string
+   use asperity_parallel, only : is_first_process, process_count, share
    implicit none
    private
 
-   public :: planning_flag, save_wisdom
+   public :: planning_flag, save_wisdom, share_wisdom
 
    integer, parameter, public :: from_memory = 1     !! plans that are known already, or none
    integer, parameter, public :: from_measuring = 2  !! any plan
@@ -43,6 +46,16 @@ module wisdom
       integer(c_int) function c_getpid() bind(c, name='getpid')
          import :: c_int
       end function c_getpid
+
+      integer(c_size_t) function c_strlen(text) bind(c, name='strlen')
+         import :: c_ptr, c_size_t
+         type(c_ptr), value :: text
+      end function c_strlen
+
+      subroutine c_free(memory) bind(c, name='free')
+         import :: c_ptr
+         type(c_ptr), value :: memory
+      end subroutine c_free
    end interface
 
 contains
@@ -54,7 +67,7 @@ contains
       integer(c_int), parameter :: writable = 2
       integer(c_int) :: status
 
-      if (.not. started) then
+      if (.not. started .and. is_first_process()) then
          started = .true.
          call find_folder()
          kept = len(folder) > 0
@@ -80,7 +93,7 @@ contains
       character(16) :: process
       character(:), allocatable :: temporary
 
-      if (.not. kept) return
+      if (.not. (kept .and. is_first_process())) return
       call read_wisdom()
       write (process, '(i0)') c_getpid()
       temporary = folder//'/new'//trim(process)//c_null_char
@@ -91,6 +104,38 @@ contains
          status = c_rename(temporary, folder//'/fftwf'//c_null_char)
       end if
    end subroutine save_wisdom
+
+   !> Let all processes know what the first one knows, and use it in the same way. Collective.
+   subroutine share_wisdom()
+      character(:), allocatable :: text
+      integer(c_int) :: status
+
+      if (process_count() == 1) return
+      call share(kept)
+      if (is_first_process()) text = taken_text(fftw_export_wisdom_to_string())
+      call share(text)
+      if (.not. is_first_process()) status = fftw_import_wisdom_from_string(text//c_null_char)
+      if (is_first_process()) text = taken_text(fftwf_export_wisdom_to_string())
+      call share(text)
+      if (.not. is_first_process()) status = fftwf_import_wisdom_from_string(text//c_null_char)
+   end subroutine share_wisdom
+
+   !> A text of C, whose memory is then freed.
+   function taken_text(memory) result(text)
+      type(c_ptr), intent(in) :: memory
+      character(:), allocatable :: text
+      character(kind=c_char), pointer :: letters(:)
+      integer :: i
+
+      text = ''
+      if (.not. c_associated(memory)) return
+      call c_f_pointer(memory, letters, [c_strlen(memory)])
+      text = repeat(' ', size(letters))
+      do i = 1, size(letters)
+         text(i:i) = letters(i)
+      end do
+      call c_free(memory)
+   end function taken_text
 
    !> Name the cache folder and make it where it is missing.
    subroutine find_folder()

@@ -1,0 +1,428 @@
+!> Threads and processes. This is the only module that calls MPI.
+!>
+!> Built with the macro ASPERITY_MPI, the program runs as several processes, started by mpirun or srun,
+!> that share the rows of the grid (module `regular_grid`). Without the macro, and in a program that does not
+!> call `start_processes`, there is one process, and every exchange is a copy or nothing.
+!>
+!> All processes do the same work in the same order, each on its own rows. Everything below from
+!> `global_sum` on is collective: it waits until every process has called it. Never call it where only some
+!> processes come by, nor from several threads at once.
+!>
+!> Results do not depend on the number of processes. Therefore MPI never adds numbers that round, because it
+!> may add them in any order: `gather_rows` brings the sums of all rows to every process, which adds them
+!> itself in the order of the rows (module `field_sums`).
+module asperity_parallel
+#ifdef ASPERITY_MPI
+   use mpi_f08, only : mpi_allgather, mpi_allgatherv, mpi_allreduce, mpi_alltoallv, mpi_bcast, &
+      mpi_character, mpi_comm, mpi_comm_free, mpi_comm_rank, mpi_comm_size, mpi_comm_split_type, &
+      mpi_comm_type_shared, mpi_comm_world, mpi_double_complex, mpi_double_precision, mpi_finalize, &
+      mpi_complex, mpi_get_library_version, mpi_in_place, mpi_info_null, mpi_init_thread, mpi_integer, mpi_integer1, &
+      mpi_integer8, mpi_logical, mpi_lor, mpi_max, mpi_max_library_version_string, mpi_min, mpi_recv, &
+      mpi_send, mpi_status_ignore, mpi_sum, mpi_thread_serialized
+#endif
+   use omp_lib, only : omp_get_max_threads, omp_get_num_procs, omp_pause_hard, &
+      omp_pause_resource_all, omp_set_num_threads
+   use asperity_precision, only : dp, int64, int8, sp
+   implicit none
+   private
+
+   public :: any_process, end_processes, exchange, gather_rows, global_max, global_min, global_sum, &
+      hand_to_first, is_first_process, parallel_library, process_count, process_number, processor_count, &
+      release_threads, rows_before, set_threads, share, start_processes, take_from_first, thread_count
+
+   !> Elementwise sum over the processes, of counts or of numbers of which all but one are 0: both are exact.
+   interface global_sum
+      module procedure :: global_sum_vector, global_sum_integer
+   end interface global_sum
+
+   !> Give all processes what the first one has.
+   interface share
+      module procedure :: share_integer, share_long, share_real, share_reals, share_logical, share_text
+   end interface share
+
+   !> Send every process its part of an array, and receive the parts that the others have for this one. The
+   !> parts lie one after the other in the order of the processes.
+   interface exchange
+      module procedure :: exchange_complex, exchange_complex_single, exchange_real
+   end interface exchange
+
+   !> Bring values of one process to the first one, which writes files.
+   interface hand_to_first
+      module procedure :: hand_reals, hand_bytes
+   end interface hand_to_first
+
+   integer, save :: processes = 1              !! number of processes
+   integer, save :: number = 0                 !! of this process, from 0
+   integer, save :: neighbours = 1             !! processes on this machine
+
+contains
+
+   ! Processes.
+
+   !> Join the other processes of this run. To be called once, first of all.
+   subroutine start_processes()
+#ifdef ASPERITY_MPI
+      integer :: provided
+      type(mpi_comm) :: machine
+
+      call mpi_init_thread(mpi_thread_serialized, provided)
+      call mpi_comm_size(mpi_comm_world, processes)
+      call mpi_comm_rank(mpi_comm_world, number)
+      call mpi_comm_split_type(mpi_comm_world, mpi_comm_type_shared, 0, mpi_info_null, machine)
+      call mpi_comm_size(machine, neighbours)
+      call mpi_comm_free(machine)
+#endif
+   end subroutine start_processes
+
+   !> Leave the other processes. To be called once, last of all, by every process.
+   subroutine end_processes()
+#ifdef ASPERITY_MPI
+      call mpi_finalize()
+#endif
+   end subroutine end_processes
+
+   !> Number of processes of this run.
+   pure integer function process_count()
+      process_count = processes
+   end function process_count
+
+   !> Number of this process, from 0.
+   pure integer function process_number()
+      process_number = number
+   end function process_number
+
+   !> Is this the process that reads and writes files?
+   pure logical function is_first_process()
+      is_first_process = number == 0
+   end function is_first_process
+
+   !> The MPI library that the program was built with, '' without MPI.
+   function parallel_library() result(text)
+      character(:), allocatable :: text
+#ifdef ASPERITY_MPI
+      character(mpi_max_library_version_string) :: version
+      integer :: length, last
+
+      call mpi_get_library_version(version, length)
+      last = scan(version(:length), ','//new_line('a')//achar(0)) - 1
+      if (last < 0) last = length
+      text = version(:last)
+#else
+      text = ''
+#endif
+   end function parallel_library
+
+   ! Numbers that all processes need. Collective.
+
+   !> Elementwise sums of numbers of which all but one are 0.
+   function global_sum_vector(local) result(total)
+      real(dp), intent(in) :: local(:)
+      real(dp) :: total(size(local))
+
+      total = local
+#ifdef ASPERITY_MPI
+      if (processes > 1) call mpi_allreduce(mpi_in_place, total, size(total), mpi_double_precision, mpi_sum, &
+         mpi_comm_world)
+#endif
+   end function global_sum_vector
+
+   !> Sum of a count.
+   function global_sum_integer(local) result(total)
+      integer, intent(in) :: local
+      integer :: total
+
+      total = local
+#ifdef ASPERITY_MPI
+      if (processes > 1) call mpi_allreduce(mpi_in_place, total, 1, mpi_integer, mpi_sum, mpi_comm_world)
+#endif
+   end function global_sum_integer
+
+   !> Largest of the local maxima.
+   function global_max(local) result(largest)
+      real(dp), intent(in) :: local
+      real(dp) :: largest
+
+      largest = local
+#ifdef ASPERITY_MPI
+      if (processes > 1) call mpi_allreduce(mpi_in_place, largest, 1, mpi_double_precision, mpi_max, &
+         mpi_comm_world)
+#endif
+   end function global_max
+
+   !> Smallest of the local minima.
+   function global_min(local) result(least)
+      real(dp), intent(in) :: local
+      real(dp) :: least
+
+      least = local
+#ifdef ASPERITY_MPI
+      if (processes > 1) call mpi_allreduce(mpi_in_place, least, 1, mpi_double_precision, mpi_min, &
+         mpi_comm_world)
+#endif
+   end function global_min
+
+   !> Does a condition hold on any process?
+   function any_process(condition) result(any)
+      logical, intent(in) :: condition
+      logical :: any
+
+      any = condition
+#ifdef ASPERITY_MPI
+      if (processes > 1) call mpi_allreduce(mpi_in_place, any, 1, mpi_logical, mpi_lor, mpi_comm_world)
+#endif
+   end function any_process
+
+   !> Numbers for each row, of all rows in the order of the grid.
+   function gather_rows(local) result(whole)
+      real(dp), intent(in) :: local(:, :)          !! [numbers, rows of this process]
+      real(dp), allocatable :: whole(:, :)         !! [numbers, all rows]
+#ifdef ASPERITY_MPI
+      integer :: counts(processes), starts(processes), p
+
+      if (processes > 1) then
+         call mpi_allgather(size(local), 1, mpi_integer, counts, 1, mpi_integer, mpi_comm_world)
+         starts(1) = 0
+         do p = 2, processes
+            starts(p) = starts(p - 1) + counts(p - 1)
+         end do
+         allocate (whole(size(local, 1), sum(counts)/size(local, 1)))
+         call mpi_allgatherv(local, size(local), mpi_double_precision, whole, counts, starts, &
+            mpi_double_precision, mpi_comm_world)
+         return
+      end if
+#endif
+      whole = local
+   end function gather_rows
+
+   !> Number of rows that the processes before this one hold.
+   function rows_before(rows) result(before)
+      integer, intent(in) :: rows                  !! of this process
+      integer :: before
+#ifdef ASPERITY_MPI
+      integer :: counts(processes)
+
+      if (processes > 1) then
+         call mpi_allgather(rows, 1, mpi_integer, counts, 1, mpi_integer, mpi_comm_world)
+         before = sum(counts(:number))
+         return
+      end if
+#endif
+      before = 0*rows
+   end function rows_before
+
+   !> Give all processes an integer of the first one.
+   subroutine share_integer(value)
+      integer, intent(inout) :: value
+#ifdef ASPERITY_MPI
+      if (processes > 1) call mpi_bcast(value, 1, mpi_integer, 0, mpi_comm_world)
+#endif
+   end subroutine share_integer
+
+   !> Give all processes a long integer of the first one.
+   subroutine share_long(value)
+      integer(int64), intent(inout) :: value
+#ifdef ASPERITY_MPI
+      if (processes > 1) call mpi_bcast(value, 1, mpi_integer8, 0, mpi_comm_world)
+#endif
+   end subroutine share_long
+
+   !> Give all processes a number of the first one.
+   subroutine share_real(value)
+      real(dp), intent(inout) :: value
+#ifdef ASPERITY_MPI
+      if (processes > 1) call mpi_bcast(value, 1, mpi_double_precision, 0, mpi_comm_world)
+#endif
+   end subroutine share_real
+
+   !> Give all processes an array of the first one; its size is known to all.
+   subroutine share_reals(values)
+      real(dp), intent(inout), contiguous :: values(:)
+#ifdef ASPERITY_MPI
+      if (processes > 1) call mpi_bcast(values, size(values), mpi_double_precision, 0, mpi_comm_world)
+#endif
+   end subroutine share_reals
+
+   !> Give all processes a condition of the first one.
+   subroutine share_logical(value)
+      logical, intent(inout) :: value
+#ifdef ASPERITY_MPI
+      if (processes > 1) call mpi_bcast(value, 1, mpi_logical, 0, mpi_comm_world)
+#endif
+   end subroutine share_logical
+
+   !> Give all processes a text of the first one.
+   subroutine share_text(text)
+      character(:), allocatable, intent(inout) :: text
+#ifdef ASPERITY_MPI
+      integer :: length
+
+      if (processes == 1) return
+      length = -1
+      if (is_first_process() .and. allocated(text)) length = len(text)
+      call share_integer(length)
+      if (.not. is_first_process()) then
+         if (allocated(text)) deallocate (text)
+         if (length >= 0) allocate (character(length) :: text)
+      end if
+      if (length > 0) call mpi_bcast(text, length, mpi_character, 0, mpi_comm_world)
+#endif
+   end subroutine share_text
+
+   ! Parts of fields. Collective.
+
+   !> Exchange complex numbers.
+   subroutine exchange_complex(send, send_counts, receive, receive_counts)
+      complex(dp), intent(in), contiguous :: send(:)
+      integer, intent(in) :: send_counts(:)        !! for each process
+      complex(dp), intent(inout), contiguous :: receive(:)
+      integer, intent(in) :: receive_counts(:)     !! from each process
+#ifdef ASPERITY_MPI
+      call mpi_alltoallv(send, send_counts, starts_of(send_counts), mpi_double_complex, &
+         receive, receive_counts, starts_of(receive_counts), mpi_double_complex, mpi_comm_world)
+#else
+      receive(:sum(receive_counts)) = send(:sum(send_counts))
+#endif
+   end subroutine exchange_complex
+
+   !> Exchange complex numbers in single precision.
+   subroutine exchange_complex_single(send, send_counts, receive, receive_counts)
+      complex(sp), intent(in), contiguous :: send(:)
+      integer, intent(in) :: send_counts(:)
+      complex(sp), intent(inout), contiguous :: receive(:)
+      integer, intent(in) :: receive_counts(:)
+#ifdef ASPERITY_MPI
+      call mpi_alltoallv(send, send_counts, starts_of(send_counts), mpi_complex, &
+         receive, receive_counts, starts_of(receive_counts), mpi_complex, mpi_comm_world)
+#else
+      receive(:sum(receive_counts)) = send(:sum(send_counts))
+#endif
+   end subroutine exchange_complex_single
+
+   !> Exchange real numbers.
+   subroutine exchange_real(send, send_counts, receive, receive_counts)
+      real(dp), intent(in), contiguous :: send(:)
+      integer, intent(in) :: send_counts(:)
+      real(dp), intent(inout), contiguous :: receive(:)
+      integer, intent(in) :: receive_counts(:)
+#ifdef ASPERITY_MPI
+      call mpi_alltoallv(send, send_counts, starts_of(send_counts), mpi_double_precision, &
+         receive, receive_counts, starts_of(receive_counts), mpi_double_precision, mpi_comm_world)
+#else
+      receive(:sum(receive_counts)) = send(:sum(send_counts))
+#endif
+   end subroutine exchange_real
+
+   !> Where parts that lie one after the other begin.
+   pure function starts_of(counts) result(starts)
+      integer, intent(in) :: counts(:)
+      integer :: starts(size(counts))
+      integer :: p
+
+      starts(1) = 0
+      do p = 2, size(counts)
+         starts(p) = starts(p - 1) + counts(p - 1)
+      end do
+   end function starts_of
+
+   !> Bring numbers from a process to the first one: only these two take part, and any other returns at once.
+   subroutine hand_reals(from, values)
+      integer, intent(in) :: from                  !! the process that has them
+      real(dp), intent(inout), contiguous :: values(:, :)
+#ifdef ASPERITY_MPI
+      if (from == 0) return
+      if (number == from) call mpi_send(values, size(values), mpi_double_precision, 0, 1, mpi_comm_world)
+      if (number == 0) call mpi_recv(values, size(values), mpi_double_precision, from, 1, mpi_comm_world, &
+         mpi_status_ignore)
+#endif
+   end subroutine hand_reals
+
+   !> The same for small integers.
+   subroutine hand_bytes(from, values)
+      integer, intent(in) :: from
+      integer(int8), intent(inout), contiguous :: values(:, :)
+#ifdef ASPERITY_MPI
+      if (from == 0) return
+      if (number == from) call mpi_send(values, size(values), mpi_integer1, 0, 1, mpi_comm_world)
+      if (number == 0) call mpi_recv(values, size(values), mpi_integer1, from, 1, mpi_comm_world, &
+         mpi_status_ignore)
+#endif
+   end subroutine hand_bytes
+
+   !> Bring numbers from the first process to another one: only these two take part.
+   subroutine take_from_first(to, values)
+      integer, intent(in) :: to                    !! the process that needs them
+      real(dp), intent(inout), contiguous :: values(:, :)
+#ifdef ASPERITY_MPI
+      if (to == 0) return
+      if (number == 0) call mpi_send(values, size(values), mpi_double_precision, to, 2, mpi_comm_world)
+      if (number == to) call mpi_recv(values, size(values), mpi_double_precision, 0, 2, mpi_comm_world, &
+         mpi_status_ignore)
+#endif
+   end subroutine take_from_first
+
+   ! Threads.
+
+   !> Use `n` threads from here on. 0 takes what the environment asks for: OMP_NUM_THREADS, or what
+   !> Slurm grants a task, SLURM_CPUS_PER_TASK; without them all processors, shared with the other processes
+   !> of this machine.
+   subroutine set_threads(n)
+      integer, intent(in) :: n
+
+      if (n > 0) then
+         call omp_set_num_threads(n)
+      else
+         call omp_set_num_threads(threads_of_environment())
+      end if
+   end subroutine set_threads
+
+   !> Number of threads that the environment asks for. A launcher may bind each process to processors of
+   !> its own; then it has fewer than the machine.
+   function threads_of_environment() result(n)
+      integer :: n
+
+      n = number_in_environment('OMP_NUM_THREADS')
+      if (n == 0) n = number_in_environment('SLURM_CPUS_PER_TASK')
+      if (n == 0) n = max(1, omp_get_num_procs()/neighbours)
+   end function threads_of_environment
+
+   !> The number that a variable of the environment starts with (a list of OpenMP has one for each
+   !> level); 0 where it has none.
+   function number_in_environment(name) result(n)
+      character(*), intent(in) :: name
+      integer :: n
+      character(80) :: text
+      integer :: length, status
+
+      n = 0
+      call get_environment_variable(name, text, status=status)
+      if (status /= 0) return
+      text = adjustl(text)
+      length = verify(text, '0123456789') - 1
+      if (length < 1 .or. length > 6) return
+      read (text(:length), *, iostat=status) n
+      if (status /= 0) n = 0
+   end function number_in_environment
+
+   !> End the idle threads; the next parallel region starts new ones. A copy of a process (fork) has
+   !> only the thread that made it: with the others it would wait for ever.
+   subroutine release_threads()
+      integer :: status
+
+      status = omp_pause_resource_all(omp_pause_hard)
+   end subroutine release_threads
+
+   !> Number of threads in use.
+   function thread_count() result(n)
+      integer :: n
+
+      n = omp_get_max_threads()
+   end function thread_count
+
+   !> Number of processors of this machine.
+   function processor_count() result(n)
+      integer :: n
+
+      n = omp_get_num_procs()
+   end function processor_count
+
+end module asperity_parallel

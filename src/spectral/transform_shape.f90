@@ -1,0 +1,68 @@
+!> What a transform needs to know of the grid that it is for.
+module transform_shape
+   use asperity_parallel, only : process_count, process_number
+   use influence, only : transform_length
+   use regular_grid, only : grid_type
+   implicit none
+   private
+
+   public :: shape_on_grid, transform_shape_type, whole_shape
+
+   !> Sizes of a transform.
+   type :: transform_shape_type
+      integer :: nx = 0, ny = 0            !! cells of the whole field
+      integer :: mx = 0, my = 0            !! lengths of the transforms, more than the cells where padded
+      integer :: components = 1            !! fields that come out: 1 scalar, 2 vector
+      integer :: inputs = 1                !! fields that go in
+      logical :: shared = .false.          !! processes share the rows
+      integer, allocatable :: rows_of(:)   !! rows of each process; of all where they are not shared
+   contains
+      procedure :: rows
+   end type transform_shape_type
+
+contains
+
+   !> The shape for fields on a grid, of which each process may hold a part.
+   pure function shape_on_grid(grid, components) result(self)
+      type(grid_type), intent(in) :: grid
+      integer, intent(in) :: components
+      type(transform_shape_type) :: self
+      integer :: p, range(2)
+
+      self = whole_shape(grid%nx, grid%ny, components)
+      self%mx = transform_length(grid%nx, grid%boundary)
+      self%my = transform_length(grid%ny, grid%boundary)
+      self%shared = grid%shared
+      if (.not. grid%shared) return
+      deallocate (self%rows_of)
+      allocate (self%rows_of(process_count()))
+      do p = 1, process_count()
+         range = grid%rows_of(p - 1)
+         self%rows_of(p) = range(2) - range(1) + 1
+      end do
+   end function shape_on_grid
+
+   !> The shape for periodic fields that each process holds whole.
+   pure function whole_shape(nx, ny, components) result(self)
+      integer, intent(in) :: nx, ny, components
+      type(transform_shape_type) :: self
+
+      self%nx = nx
+      self%ny = ny
+      self%mx = nx
+      self%my = ny
+      self%components = components
+      self%inputs = components
+      self%rows_of = [ny]
+   end function whole_shape
+
+   !> Number of rows that this process holds.
+   pure function rows(self)
+      class(transform_shape_type), intent(in) :: self
+      integer :: rows
+
+      rows = self%rows_of(1)
+      if (self%shared) rows = self%rows_of(process_number() + 1)
+   end function rows
+
+end module transform_shape
