@@ -10,6 +10,7 @@ program main
       template_text
    use copies_guard, only : refuse_copies
    use command_line, only : command_type, help_text, read_command_line
+   use asperity_parallel, only : end_processes, is_first_process, process_count, start_processes
    use asperity_errors, only : error_file, error_input, error_memory, error_type, fail
    use hand_over, only : become_python
    use reference_page, only : reference_markdown
@@ -33,6 +34,7 @@ program main
    integer :: status
 
    call wait_passively()
+   call start_processes()
    call read_command_line(command, error)
    if (.not. allocated(error)) then
       select case (command%verb)
@@ -62,6 +64,7 @@ program main
       status = error%status
       if (status == error_memory) status = error_file
    end if
+   call end_processes()
    stop status, quiet=.true.
 
 contains
@@ -114,7 +117,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(case_type) :: case
 
-      call refuse_copies(error)
+      if (process_count() == 1) call refuse_copies(error)
       if (allocated(error)) return
       call read_case(command%path, case, error)
       if (allocated(error)) return

@@ -15,7 +15,8 @@ module case_run
    use file_lock, only : file_lock_type
    use history_row, only : row_values
    use memory_limits, only : need_memory
-   use asperity_parallel, only : set_threads
+   use asperity_parallel, only : is_first_process, process_count, process_number, set_threads
+   use asperity_surface, only : new_height
    use path_identity, only : real_path
    use asperity_precision, only : dp, int64
    use result_file, only : result_file_type, result_plan_type
@@ -67,6 +68,7 @@ contains
 
       call set_threads(case%solver%threads)
       self%path = trim(case%output%file)
+      if (.not. is_first_process()) self%path = trim(case%output%file)//'.'//to_text(process_number())   ! TODO files
       self%warnings = ''
       self%all_warnings = ''
       self%rows = count_rows(case%phases)
@@ -116,6 +118,7 @@ contains
       type(run_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
       type(result_plan_type) :: plan
+      real(dp), allocatable :: whole(:, :)
 
       associate (case => self%sim%case)
          plan%title = trim(case%title)
@@ -127,7 +130,8 @@ contains
             plan%snapshots = plan%snapshots + self%rows/case%output%snapshot_every
          if (self%sim%has_steady) plan%losses = count(case%phases%steady)
          plan%compression = case%output%compression
-         call self%result%create(self%path, self%sim%grid, self%sim%height, plan, error)
+         call new_height(case%grid, case%surfaces, whole, error)   ! TODO files
+         call self%result%create(self%path, case%grid, whole, plan, error)
          if (allocated(error)) return
          call write_material(self%result, case%material)
          call self%result%write_text('height_maps', checksums_of_maps(self%sim))
@@ -303,7 +307,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       logical, intent(in), optional :: at_stop     !! written for a stop only: a restart drops it
 
-      call write_snapshot(self%result, self%sim, error, at_stop)
+      if (process_count() == 1) call write_snapshot(self%result, self%sim, error, at_stop)   ! TODO files
       self%last_snapshot = self%sim%state%row%step
    end subroutine snapshot
 

@@ -70,7 +70,7 @@ contains
       integer :: nx, ny
 
       nx = self%grid%nx
-      ny = self%grid%ny
+      ny = self%grid%rows()
       call new_workspace(self%work, nx, ny)
       associate (case => self%case)
          edge = 0.0_dp
@@ -109,7 +109,7 @@ contains
       call new_interpolation(self%road, self%grid, self%height, trim(self%case%solver%interpolation), &
          error)
       if (allocated(error)) return
-      allocate (self%slope_x(self%grid%nx, self%grid%ny), self%slope_y(self%grid%nx, self%grid%ny))
+      allocate (self%slope_x(self%grid%nx, self%grid%rows()), self%slope_y(self%grid%nx, self%grid%rows()))
       call place_road(self, 0.0_dp, 0.0_dp)
       self%rms_slope = sqrt((field_product(self%slope_x, self%slope_x) &
          + field_product(self%slope_y, self%slope_y))/self%grid%cells())

@@ -190,9 +190,9 @@ contains
 
       total = 0.0_dp
       if (.not. self%adhesive) return
-      allocate (rows(self%grid%ny))
+      allocate (rows(self%grid%rows()))
       !$omp parallel do default(none) shared(self, gap, rows) private(j)
-      do j = 1, self%grid%ny
+      do j = 1, self%grid%rows()
          rows(j) = sum(adhesive_energy(self%potential, gap(:, j)))
       end do
       total = row_total(rows)*self%grid%cell_area()

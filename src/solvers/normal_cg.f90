@@ -117,7 +117,7 @@ contains
       if (allocated(error)) return
       call new_normal_work(self%work, self%operator, error)
       if (allocated(error)) return
-      allocate (self%step(grid%nx, grid%ny), source=0.0_dp)
+      allocate (self%step(grid%nx, grid%rows()), source=0.0_dp)
    end subroutine new_normal_solver
 
    !> Solve a contact problem by the fast method.

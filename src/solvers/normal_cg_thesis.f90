@@ -41,7 +41,7 @@ contains
       self%grid = grid
       call new_convolution(self%operator, grid, kernel, error)
       if (allocated(error)) return
-      allocate (self%step(grid%nx, grid%ny), source=0.0_dp)
+      allocate (self%step(grid%nx, grid%rows()), source=0.0_dp)
    end subroutine new_thesis_solver
 
    !> Solve a contact problem.
@@ -63,7 +63,7 @@ contains
 
       began = omp_get_wtime()
       before = self%operator%ffts
-      allocate (residual(self%grid%nx, self%grid%ny), source=0.0_dp)
+      allocate (residual(self%grid%nx, self%grid%rows()), source=0.0_dp)
       allocate (previous, direction, source=residual)
       alpha = 0.0_dp
       form = 0.0_dp

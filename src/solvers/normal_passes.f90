@@ -66,10 +66,10 @@ contains
          memory=operator%spectrum_memory())
       if (allocated(error)) return
       associate (grid => self%grid)
-         allocate (self%direction(grid%nx, grid%ny), source=0.0_sp)
+         allocate (self%direction(grid%nx, grid%rows()), source=0.0_sp)
          call new_active_blocks(self%active, grid%nx, grid%ny, grid%boundary == boundary_periodic, &
             self%coarse%first_y, self%preconditioner%extends, self%threads)
-         allocate (self%state(grid%ny))
+         allocate (self%state(grid%rows()))
       end associate
    end subroutine new_normal_work
 
@@ -77,12 +77,12 @@ contains
    subroutine survey(self, prescribed, pressure, gap)
       type(normal_work_type), intent(inout) :: self
       real(dp), intent(in) :: prescribed             !! level, m
-      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny), gap(self%grid%nx, self%grid%ny)
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows()), gap(self%grid%nx, self%grid%rows())
       integer :: j
 
       !$omp parallel do default(none) shared(self, prescribed, pressure, gap) private(j) &
       !$omp num_threads(self%threads)
-      do j = 1, self%grid%ny
+      do j = 1, self%grid%rows()
          self%state(j) = row_measure(pressure(:, j), gap(:, j), prescribed)
          call self%active%survey_row(.true., j, pressure(:, j), gap(:, j), self%state(j)%least)
       end do
@@ -96,7 +96,7 @@ contains
       logical, intent(in) :: fixed_load              !! the direction may not change the load
       logical, intent(in) :: preconditioned          !! z = M r, else z = r
       real(dp), intent(in) :: beta
-      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny)
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows())
       real(dp), intent(out) :: slope                 !! r.d
       real(dp), intent(out) :: square                !! d.d
       type(direction_sums_type), allocatable :: rows(:)
@@ -104,7 +104,7 @@ contains
       type(strip_type) :: strip
       integer :: j, jb
 
-      allocate (rows(self%grid%ny))
+      allocate (rows(self%grid%rows()))
       !$omp parallel default(none) shared(self, preconditioned, beta, pressure, rows) &
       !$omp private(j, jb, strip) num_threads(self%threads)
       allocate (strip%correction(self%grid%nx), strip%column(self%grid%nx), strip%shares(self%grid%nx))
@@ -162,16 +162,16 @@ contains
    subroutine try_pressure(self, alpha, pressure, step, sums)
       type(normal_work_type), intent(in) :: self
       real(dp), intent(in) :: alpha
-      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny)
-      real(dp), intent(inout) :: step(self%grid%nx, self%grid%ny)
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows())
+      real(dp), intent(inout) :: step(self%grid%nx, self%grid%rows())
       type(trial_sums_type), intent(out) :: sums
       type(trial_sums_type), allocatable :: rows(:)
       integer :: j, k, n
 
-      allocate (rows(self%grid%ny))
+      allocate (rows(self%grid%rows()))
       !$omp parallel do default(none) shared(self, alpha, pressure, step, rows) &
       !$omp private(j, k, n, sums) schedule(dynamic, 8) num_threads(self%threads)
-      do j = 1, self%grid%ny
+      do j = 1, self%grid%rows()
          sums = trial_sums_type()
          do k = 1, self%active%runs(j)
             associate (first => self%active%first(k, j))
@@ -193,7 +193,7 @@ contains
       type(normal_work_type), intent(in) :: self
       logical, intent(in) :: fixed_load
       real(dp), intent(in) :: load                   !! sum of P over the cells, Pa
-      real(dp), intent(in) :: step(self%grid%nx, self%grid%ny)
+      real(dp), intent(in) :: step(self%grid%nx, self%grid%rows())
       type(trial_sums_type), intent(in) :: sums      !! of the trial pressure above 0
       type(clip_type), intent(out) :: clip
       type(trial_sums_type), allocatable :: rows(:)
@@ -203,7 +203,7 @@ contains
 
       clip%clipped = sums%least < 0.0_dp
       if (.not. (fixed_load .and. clip%clipped)) return
-      allocate (rows(self%grid%ny))
+      allocate (rows(self%grid%rows()))
       above = sums
       kept = load
       next = 0.0_dp
@@ -216,7 +216,7 @@ contains
          if (next <= clip%shift) exit                    ! all that round-off allows
          !$omp parallel do default(none) shared(self, step, next, rows) private(j, k, n) &
          !$omp schedule(dynamic, 8) num_threads(self%threads)
-         do j = 1, self%grid%ny
+         do j = 1, self%grid%rows()
             rows(j) = trial_sums_type()
             do k = 1, self%active%runs(j)
                n = self%active%last(k, j) - self%active%first(k, j) + 1
@@ -235,14 +235,14 @@ contains
       type(convolution_type), intent(inout) :: operator
       type(clip_type), intent(in) :: clip
       real(dp), intent(in) :: level                  !! m
-      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny), gap(self%grid%nx, self%grid%ny)
-      real(dp), intent(inout) :: step(self%grid%nx, self%grid%ny)
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows()), gap(self%grid%nx, self%grid%rows())
+      real(dp), intent(inout) :: step(self%grid%nx, self%grid%rows())
       type(step_sums_type), intent(out) :: sums
       type(step_sums_type), allocatable :: rows(:)
       real(dp), allocatable :: column(:)
       integer :: j, k, jb, n
 
-      allocate (rows(self%grid%ny))
+      allocate (rows(self%grid%rows()))
       !$omp parallel default(none) shared(self, operator, clip, level, pressure, gap, step, rows) &
       !$omp private(j, k, jb, n, sums, column) num_threads(self%threads)
       allocate (column(self%grid%nx))
@@ -275,12 +275,12 @@ contains
    !> The longest multiple of the step that leaves no pressure negative.
    function longest_multiple(self, pressure, step) result(longest)
       type(normal_work_type), intent(in) :: self
-      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny), step(self%grid%nx, self%grid%ny)
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows()), step(self%grid%nx, self%grid%rows())
       real(dp) :: longest
       integer :: j, k
 
       longest = huge(1.0_dp)
-      do j = 1, self%grid%ny
+      do j = 1, self%grid%rows()
          do k = 1, self%active%runs(j)
             call longest_cells(self%active%last(k, j) - self%active%first(k, j) + 1, &
                pressure(self%active%first(k, j), j), step(self%active%first(k, j), j), longest)
@@ -295,15 +295,15 @@ contains
       type(convolution_type), intent(inout) :: operator   !! holds the columns of A step
       real(dp), intent(in) :: prescribed             !! level, m
       real(dp), intent(in) :: factor, alpha
-      real(dp), intent(in) :: step(self%grid%nx, self%grid%ny)
-      real(dp), intent(inout) :: pressure(self%grid%nx, self%grid%ny)
-      real(dp), intent(inout) :: gap(self%grid%nx, self%grid%ny)
+      real(dp), intent(in) :: step(self%grid%nx, self%grid%rows())
+      real(dp), intent(inout) :: pressure(self%grid%nx, self%grid%rows())
+      real(dp), intent(inout) :: gap(self%grid%nx, self%grid%rows())
       type(state_sums_type) :: sums
       integer :: j, k, n
 
       !$omp parallel do default(none) shared(self, operator, prescribed, factor, alpha, step, pressure, gap) &
       !$omp private(j, k, n, sums) schedule(dynamic, 8) num_threads(self%threads)
-      do j = 1, self%grid%ny
+      do j = 1, self%grid%rows()
          call operator%add_backward_row(1, j, factor, gap(:, j))
          sums = state_sums_type()
          do k = 1, self%active%runs(j)

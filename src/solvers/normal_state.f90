@@ -237,7 +237,7 @@ contains
       remembers = present(past)
       !$omp parallel do default(none) shared(operator, pressure, past, remembers) private(j) &
       !$omp num_threads(operator%threads)
-      do j = 1, operator%ny
+      do j = 1, operator%rows
          if (remembers) then
             call operator%forward_row(1, j, pressure(:, j) + past(:, j))
          else
@@ -247,7 +247,7 @@ contains
       call operator%columns(columns_apply, form)
       !$omp parallel do default(none) shared(operator, height, gap, problem) private(j) &
       !$omp num_threads(operator%threads)
-      do j = 1, operator%ny
+      do j = 1, operator%rows
          gap(:, j) = problem%datum - height(:, j)
          call operator%add_backward_row(1, j, 1.0_dp/problem%modulus, gap(:, j))
       end do
@@ -287,7 +287,7 @@ contains
       end if
       !$omp parallel do default(none) shared(pressure, factor, base, operator) private(j) &
       !$omp num_threads(operator%threads)
-      do j = 1, operator%ny
+      do j = 1, operator%rows
          pressure(:, j) = base + factor*pressure(:, j)
       end do
       if (present(past)) pressure(:, :) = pressure - past
@@ -296,7 +296,7 @@ contains
       else
          !$omp parallel do default(none) shared(pressure, operator) private(j) &
          !$omp num_threads(operator%threads)
-         do j = 1, operator%ny
+         do j = 1, operator%rows
             pressure(:, j) = max(pressure(:, j), 0.0_dp)
          end do
       end if
