@@ -51,7 +51,7 @@ contains
       s%grid = new_grid(nx, ny, 1.0_dp, aspect*ny/nx, boundary)
       call new_coarse_level(s%coarse, s%grid, normal_half_space(0.3_dp), error)
       call check_no_error(error, 'a coarse level')
-      call new_active_blocks(s%active, nx, ny, boundary == boundary_periodic, s%coarse%first_y, .true., 1)
+      call new_active_blocks(s%active, s%grid, s%coarse%first_y, s%coarse%strips, .true., 1)
       call new_schur_preconditioner(s%preconditioner, s%grid, s%coarse, 1, error, extends=.true.)
       call check_no_error(error, 'a preconditioner')
       n = nx*ny

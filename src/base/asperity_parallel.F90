@@ -17,7 +17,7 @@ module asperity_parallel
       mpi_character, mpi_comm, mpi_comm_free, mpi_comm_rank, mpi_comm_size, mpi_comm_split_type, &
       mpi_comm_type_shared, mpi_comm_world, mpi_double_complex, mpi_double_precision, mpi_finalize, &
       mpi_complex, mpi_get_library_version, mpi_in_place, mpi_info_null, mpi_init_thread, mpi_integer, mpi_integer1, &
-      mpi_integer8, mpi_logical, mpi_lor, mpi_max, mpi_max_library_version_string, mpi_min, mpi_recv, &
+      mpi_integer8, mpi_logical, mpi_lor, mpi_max, mpi_max_library_version_string, mpi_min, mpi_real, mpi_recv, &
       mpi_send, mpi_status_ignore, mpi_sum, mpi_thread_serialized
 #endif
    use omp_lib, only : omp_get_max_threads, omp_get_num_procs, omp_pause_hard, &
@@ -27,7 +27,7 @@ module asperity_parallel
    private
 
    public :: any_process, end_processes, exchange, gather_rows, global_max, global_min, global_sum, &
-      hand_to_first, is_first_process, parallel_library, process_count, process_number, processor_count, &
+      hand_to_first, is_first_process, on_any_process, parallel_library, process_count, process_number, processor_count, &
       release_threads, rows_before, set_threads, share, start_processes, take_from_first, thread_count
 
    !> Elementwise sum over the processes, of counts or of numbers of which all but one are 0: both are exact.
@@ -43,7 +43,7 @@ module asperity_parallel
    !> Send every process its part of an array, and receive the parts that the others have for this one. The
    !> parts lie one after the other in the order of the processes.
    interface exchange
-      module procedure :: exchange_complex, exchange_complex_single, exchange_real
+      module procedure :: exchange_complex, exchange_complex_single, exchange_real, exchange_real_single
    end interface exchange
 
    !> Bring values of one process to the first one, which writes files.
@@ -171,6 +171,18 @@ contains
       if (processes > 1) call mpi_allreduce(mpi_in_place, any, 1, mpi_logical, mpi_lor, mpi_comm_world)
 #endif
    end function any_process
+
+   !> The conditions that hold on any process, one by one.
+   function on_any_process(conditions) result(anywhere)
+      logical, intent(in) :: conditions(:, :)      !! the same shape on all processes
+      logical :: anywhere(size(conditions, 1), size(conditions, 2))
+
+      anywhere = conditions
+#ifdef ASPERITY_MPI
+      if (processes > 1) call mpi_allreduce(mpi_in_place, anywhere, size(anywhere), mpi_logical, mpi_lor, &
+         mpi_comm_world)
+#endif
+   end function on_any_process
 
    !> Numbers for each row, of all rows in the order of the grid.
    function gather_rows(local) result(whole)
@@ -311,6 +323,20 @@ contains
       receive(:sum(receive_counts)) = send(:sum(send_counts))
 #endif
    end subroutine exchange_real
+
+   !> Exchange real numbers in single precision.
+   subroutine exchange_real_single(send, send_counts, receive, receive_counts)
+      real(sp), intent(in), contiguous :: send(:)
+      integer, intent(in) :: send_counts(:)
+      real(sp), intent(inout), contiguous :: receive(:)
+      integer, intent(in) :: receive_counts(:)
+#ifdef ASPERITY_MPI
+      call mpi_alltoallv(send, send_counts, starts_of(send_counts), mpi_real, &
+         receive, receive_counts, starts_of(receive_counts), mpi_real, mpi_comm_world)
+#else
+      receive(:sum(receive_counts)) = send(:sum(send_counts))
+#endif
+   end subroutine exchange_real_single
 
    !> Where parts that lie one after the other begin.
    pure function starts_of(counts) result(starts)

@@ -8,7 +8,9 @@
 !> in use where an active block is within the rim. With half of this rim the preconditioner needs up to
 !> a third more iterations; a wider one gains nothing.
 module active_blocks
+   use asperity_parallel, only : on_any_process
    use asperity_precision, only : dp, sp
+   use regular_grid, only : boundary_periodic, grid_type
    implicit none
    private
 
@@ -20,10 +22,12 @@ module active_blocks
 
    !> The blocks of a grid.
    type :: active_blocks_type
-      integer, private :: nx = 0, ny = 0
+      integer, private :: nx = 0
+      integer, private :: rows = 0                 !! of this process
       integer, private :: threads = 1
       logical, private :: periodic = .false.
       integer, private :: rim(2) = 0               !! along x and y
+      integer, private :: strips(2) = 0            !! first and last wide row of this process
       integer, allocatable, private :: first_y(:)  !! first row of each wide row, and the end
       integer, allocatable :: runs(:)              !! number of a row's active runs
       integer, allocatable :: first(:, :)          !! their first cells
@@ -45,26 +49,27 @@ module active_blocks
 contains
 
    !> No block is active.
-   subroutine new_active_blocks(self, nx, ny, periodic, first_y, rim, threads)
+   subroutine new_active_blocks(self, grid, first_y, strips, rim, threads)
       type(active_blocks_type), intent(out) :: self
-      integer, intent(in) :: nx, ny                !! cells of the grid
-      logical, intent(in) :: periodic              !! the grid has no edges
-      integer, intent(in) :: first_y(:)            !! first row of each wide row, and ny + 1
+      type(grid_type), intent(in) :: grid
+      integer, intent(in) :: first_y(:)            !! first row of each wide row, among those of this process
+      integer, intent(in) :: strips(2)             !! first and last wide row of this process
       logical, intent(in) :: rim                   !! there is a rim
       integer, intent(in) :: threads
       integer :: blocks, wide_rows
 
-      self%nx = nx
-      self%ny = ny
-      self%periodic = periodic
+      self%nx = grid%nx
+      self%rows = grid%rows()
+      self%periodic = grid%boundary == boundary_periodic
+      self%strips = strips
       self%first_y = first_y
       if (rim) self%rim = [rim_x, rim_y]
       self%threads = threads
-      blocks = (nx + width - 1)/width
+      blocks = (self%nx + width - 1)/width
       wide_rows = size(first_y) - 1
-      allocate (self%least(blocks, ny), self%loaded(blocks, ny))
-      allocate (self%live(blocks, ny), self%wide(blocks, wide_rows), source=.false.)
-      allocate (self%first(blocks, ny), self%last(blocks, ny), self%runs(ny))
+      allocate (self%least(blocks, self%rows), self%loaded(blocks, self%rows))
+      allocate (self%live(blocks, self%rows), self%wide(blocks, wide_rows), source=.false.)
+      allocate (self%first(blocks, self%rows), self%last(blocks, self%rows), self%runs(self%rows))
       allocate (self%wide_first(blocks, wide_rows), self%wide_last(blocks, wide_rows))
       allocate (self%wide_runs(wide_rows), source=0)
    end subroutine new_active_blocks
@@ -72,15 +77,15 @@ contains
    !> Make no block active and zero the work fields: the step, which others use between solves, wholly.
    subroutine clear(self, residual, direction, search, step)
       class(active_blocks_type), intent(inout) :: self
-      real(sp), intent(inout) :: residual(0:, 0:)  !! (0:nx+1, 0:ny+1), the rim is left
-      real(sp), intent(inout) :: direction(:, :)   !! [nx, ny]
-      real(sp), intent(inout) :: search(0:, 0:)    !! (0:nx+1, 0:ny+1)
-      real(dp), intent(inout) :: step(:, :)        !! [nx, ny]
+      real(sp), intent(inout) :: residual(0:, 0:)  !! (0:nx+1, 0:rows+1), the rim is left
+      real(sp), intent(inout) :: direction(:, :)   !! [nx, rows]
+      real(sp), intent(inout) :: search(0:, 0:)    !! (0:nx+1, 0:rows+1)
+      real(dp), intent(inout) :: step(:, :)        !! [nx, rows]
       integer :: j
 
       !$omp parallel do default(none) shared(self, residual, direction, search, step) private(j) &
       !$omp num_threads(self%threads)
-      do j = 1, self%ny
+      do j = 1, self%rows
          step(:, j) = 0.0_dp
          residual(:, j) = 0.0_sp
          direction(:, j) = 0.0_sp
@@ -128,15 +133,15 @@ contains
    subroutine list_runs(self, level, residual, direction, step)
       class(active_blocks_type), intent(inout) :: self
       real(dp), intent(in) :: level                !! m
-      real(sp), intent(inout) :: residual(0:, 0:)  !! (0:nx+1, 0:ny+1)
-      real(sp), intent(inout) :: direction(:, :)   !! [nx, ny]
-      real(dp), intent(inout) :: step(:, :)        !! [nx, ny]
+      real(sp), intent(inout) :: residual(0:, 0:)  !! (0:nx+1, 0:rows+1)
+      real(sp), intent(inout) :: direction(:, :)   !! [nx, rows]
+      real(dp), intent(inout) :: step(:, :)        !! [nx, rows]
       integer :: b, j, first, last, n
       logical :: now, before
 
       !$omp parallel do default(none) shared(self, level, residual, direction, step) &
       !$omp private(b, j, first, last, n, now, before) num_threads(self%threads)
-      do j = 1, self%ny
+      do j = 1, self%rows
          n = 0
          before = .false.
          do b = 1, size(self%least, 1)
@@ -164,7 +169,7 @@ contains
    !> List the runs of wide blocks; zero the search direction in those that left.
    subroutine list_wide_runs(self, search)
       class(active_blocks_type), intent(inout) :: self
-      real(sp), intent(inout) :: search(0:, 0:)    !! (0:nx+1, 0:ny+1)
+      real(sp), intent(inout) :: search(0:, 0:)    !! (0:nx+1, 0:rows+1)
       logical, allocatable :: holds(:, :), stretched(:, :)
       integer :: b, j, k, first, last, n, rows, blocks
       logical :: now, before
@@ -172,19 +177,23 @@ contains
       blocks = size(self%live, 1)
       rows = size(self%wide_runs)
       allocate (holds(blocks, rows), stretched(blocks, rows))
-      do j = 1, rows
-         holds(:, j) = .false.
+      holds(:, :) = .false.
+      do j = self%strips(1), self%strips(2)
          do k = self%first_y(j), self%first_y(j + 1) - 1
             holds(:, j) = holds(:, j) .or. self%live(:, k)
          end do
+      end do
+      ! The rim of a block may reach rows of other processes.
+      holds(:, :) = on_any_process(holds)
+      do j = 1, rows
          stretched(:, j) = grown(holds(:, j), self%rim(1))
       end do
       do b = 1, blocks
          holds(b, :) = grown(stretched(b, :), self%rim(2))
       end do
-      !$omp parallel do default(none) shared(self, search, holds, rows, blocks) &
+      !$omp parallel do default(none) shared(self, search, holds, blocks) &
       !$omp private(b, j, k, first, last, n, now, before) num_threads(self%threads)
-      do j = 1, rows
+      do j = self%strips(1), self%strips(2)
          n = 0
          before = .false.
          do b = 1, blocks

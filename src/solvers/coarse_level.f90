@@ -4,9 +4,13 @@
 !> * the low wave numbers of the preconditioner (module schur_preconditioner);
 !> * a prediction of p.A p, with which a step length is chosen before any transform of full size.
 !>
+!> Every process holds the whole coarse level, which is small. It sums over its own rows of blocks, and all
+!> then share the sums (`share_blocks`).
+!>
 !> Restriction (block sums over the mean block size) and prolongation (piecewise constant) are adjoint
 !> up to a factor, so that the preconditioner stays symmetric for any numbers of cells.
 module coarse_level
+   use asperity_parallel, only : gather_rows
    use asperity_errors, only : error_type
    use fft_conv, only : convolution_type, new_convolution
    use kernels, only : kernel_type
@@ -24,14 +28,17 @@ module coarse_level
       real(dp) :: h = 0.0_dp                       !! side of a square cell of the same area, m
       integer, allocatable :: block_x(:)           !! block of a cell along x, [nx of the grid]
       integer, allocatable :: last_x(:)            !! last cell of a block along x, [nx]
-      integer, allocatable :: first_y(:)           !! first row of a block, [ny + 1]
+      integer :: strips(2) = 0                     !! first and last row of blocks of this process
+      integer, allocatable :: first_y(:)           !! first row of a block among those of this process, [ny + 1]
       real(dp), allocatable :: mean(:, :)          !! block means, [nx, ny]
       real(dp), allocatable :: share(:, :)         !! part of a block that takes part, [nx, ny]
+      logical, private :: shared = .false.         !! other processes hold the other rows of blocks
       real(dp), private :: fine_symbol = 0.0_dp    !! of A at the size of a block
       type(convolution_type), private :: normal
    contains
       generic :: sum_blocks => sum_blocks_single, sum_blocks_double
       procedure, private :: sum_blocks_single, sum_blocks_double
+      procedure :: share_blocks
       procedure :: predict_form
       procedure :: transforms
       procedure :: destroy
@@ -63,8 +70,11 @@ contains
          self%last_x(self%block_x(i)) = i
       end do
       do j = 1, self%ny + 1
-         self%first_y(j) = grid%strip_start(j)
+         self%first_y(j) = grid%strip_start(j) - grid%first_row + 1
       end do
+      ! Blocks whose first row is among the rows of this process.
+      self%strips = [count(self%first_y(:self%ny) < 1) + 1, count(self%first_y(:self%ny) <= grid%rows())]
+      self%shared = grid%shared
       allocate (self%mean(self%nx, self%ny), self%share(self%nx, self%ny))
 
       blocks = new_grid(self%nx, self%ny, grid%lx, grid%ly, grid%boundary)
@@ -103,6 +113,14 @@ contains
          first = self%last_x(b) + 1
       end do
    end subroutine sum_blocks_double
+
+   !> Bring numbers for each block, which this process has for its rows of blocks, to all processes.
+   subroutine share_blocks(self, values)
+      class(coarse_level_type), intent(in) :: self
+      real(dp), intent(inout) :: values(:, :)          !! [nx, ny]
+
+      if (self%shared) values(:, :) = gather_rows(values(:, self%strips(1):self%strips(2)))
+   end subroutine share_blocks
 
    !> Estimate of d.A d over the cells, G = 1, from the block means of d.
    function predict_form(self, squares) result(form)

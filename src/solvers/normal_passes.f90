@@ -14,7 +14,7 @@ module normal_passes
       longest_cells, trial_cells
    use field_sums, only : least_of_rows
    use asperity_precision, only : dp, sp
-   use regular_grid, only : boundary_periodic, grid_type
+   use regular_grid, only : grid_type
    use schur_preconditioner, only : new_schur_preconditioner, schur_preconditioner_type
    implicit none
    private
@@ -30,9 +30,9 @@ module normal_passes
       type(active_blocks_type) :: active             !! where residual, direction and step are not 0
       type(schur_preconditioner_type) :: preconditioner   !! holds the residual
       real(dp) :: scale = 0.0_dp                     !! of the residual and the direction; 0: not chosen yet
-      real(sp), allocatable :: direction(:, :)       !! [nx, ny]
+      real(sp), allocatable :: direction(:, :)       !! [nx, rows]
       real(dp) :: offset = 0.0_dp                    !! to be subtracted from the direction where it acts
-      type(state_sums_type), allocatable :: state(:)   !! of each row of the present state, [ny]
+      type(state_sums_type), allocatable :: state(:)   !! of each row of the present state
    end type normal_work_type
 
    !> Values along x that the rows of a coarse block share.
@@ -67,8 +67,8 @@ contains
       if (allocated(error)) return
       associate (grid => self%grid)
          allocate (self%direction(grid%nx, grid%rows()), source=0.0_sp)
-         call new_active_blocks(self%active, grid%nx, grid%ny, grid%boundary == boundary_periodic, &
-            self%coarse%first_y, self%preconditioner%extends, self%threads)
+         call new_active_blocks(self%active, grid, self%coarse%first_y, self%coarse%strips, &
+            self%preconditioner%extends, self%threads)
          allocate (self%state(grid%rows()))
       end associate
    end subroutine new_normal_work
@@ -109,7 +109,7 @@ contains
       !$omp private(j, jb, strip) num_threads(self%threads)
       allocate (strip%correction(self%grid%nx), strip%column(self%grid%nx), strip%shares(self%grid%nx))
       !$omp do schedule(dynamic)
-      do jb = 1, self%coarse%ny
+      do jb = self%coarse%strips(1), self%coarse%strips(2)
          strip%correction(:) = 0.0_sp
          if (preconditioned) &
             strip%correction(:) = real(self%preconditioner%pending(self%coarse%block_x, jb), sp)
@@ -122,6 +122,8 @@ contains
          call self%coarse%sum_blocks(strip%shares, self%coarse%share(:, jb))
       end do
       !$omp end parallel
+      call self%coarse%share_blocks(self%coarse%mean)
+      call self%coarse%share_blocks(self%coarse%share)
       sums = total(rows)
       self%offset = 0.0_dp
       if (fixed_load) self%offset = sums%value/max(sums%cells, 1.0_dp)
@@ -247,7 +249,7 @@ contains
       !$omp private(j, k, jb, n, sums, column) num_threads(self%threads)
       allocate (column(self%grid%nx))
       !$omp do schedule(dynamic)
-      do jb = 1, self%coarse%ny
+      do jb = self%coarse%strips(1), self%coarse%strips(2)
          column(:) = 0.0_dp
          do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
             sums = step_sums_type()
@@ -269,6 +271,7 @@ contains
          self%coarse%mean(:, jb) = self%coarse%mean(:, jb)/self%coarse%cells
       end do
       !$omp end parallel
+      call self%coarse%share_blocks(self%coarse%mean)
       sums = total(rows)
    end subroutine clip_step
 

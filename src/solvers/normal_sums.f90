@@ -3,7 +3,7 @@
 !> A pass fills one record per row, whichever thread works on the row. `total` adds the records in
 !> the order of the rows, so that a result does not depend on the number of threads.
 module normal_sums
-   use field_sums, only : least_of_rows, row_total
+   use field_sums, only : least_of_rows, row_totals
    use asperity_precision, only : dp
    implicit none
    private
@@ -54,21 +54,29 @@ contains
    function total_direction(rows) result(sums)
       type(direction_sums_type), intent(in) :: rows(:)
       type(direction_sums_type) :: sums
+      real(dp), allocatable :: parts(:, :)
+      real(dp) :: totals(5)
 
-      sums%value = row_total(rows%value)
-      sums%cells = row_total(rows%cells)
-      sums%slope = row_total(rows%slope)
-      sums%residual = row_total(rows%residual)
-      sums%square = row_total(rows%square)
+      parts = reshape([rows%value, rows%cells, rows%slope, rows%residual, rows%square], [size(rows), 5])
+      totals = row_totals(transpose(parts))
+      sums%value = totals(1)
+      sums%cells = totals(2)
+      sums%slope = totals(3)
+      sums%residual = totals(4)
+      sums%square = totals(5)
    end function total_direction
 
    !> Sums of a trial pressure over the grid.
    function total_trial(rows) result(sums)
       type(trial_sums_type), intent(in) :: rows(:)
       type(trial_sums_type) :: sums
+      real(dp), allocatable :: parts(:, :)
+      real(dp) :: totals(2)
 
-      sums%above = row_total(rows%above)
-      sums%cells = row_total(rows%cells)
+      parts = reshape([rows%above, rows%cells], [size(rows), 2])
+      totals = row_totals(transpose(parts))
+      sums%above = totals(1)
+      sums%cells = totals(2)
       sums%least = least_of_rows(rows%least)
    end function total_trial
 
@@ -76,21 +84,29 @@ contains
    function total_step(rows) result(sums)
       type(step_sums_type), intent(in) :: rows(:)
       type(step_sums_type) :: sums
+      real(dp), allocatable :: parts(:, :)
+      real(dp) :: totals(2)
 
-      sums%slope = row_total(rows%slope)
-      sums%square = row_total(rows%square)
+      parts = reshape([rows%slope, rows%square], [size(rows), 2])
+      totals = row_totals(transpose(parts))
+      sums%slope = totals(1)
+      sums%square = totals(2)
    end function total_step
 
    !> Sums of a state over the grid.
    function total_state(rows) result(sums)
       type(state_sums_type), intent(in) :: rows(:)
       type(state_sums_type) :: sums
+      real(dp), allocatable :: parts(:, :)
+      real(dp) :: totals(5)
 
-      sums%load = row_total(rows%load)
-      sums%work = row_total(rows%work)
-      sums%touched = row_total(rows%touched)
-      sums%cells = row_total(rows%cells)
-      sums%distance = row_total(rows%distance)
+      parts = reshape([rows%load, rows%work, rows%touched, rows%cells, rows%distance], [size(rows), 5])
+      totals = row_totals(transpose(parts))
+      sums%load = totals(1)
+      sums%work = totals(2)
+      sums%touched = totals(3)
+      sums%cells = totals(4)
+      sums%distance = totals(5)
       sums%least = least_of_rows(rows%least)
    end function total_state
 

@@ -30,7 +30,8 @@ module schur_preconditioner
    use coarse_level, only : coarse_level_type, edge_rows, inner_rows
    use asperity_errors, only : error_type
    use normal_sweeps, only : residual_cells
-   use field_sums, only : row_total
+   use field_rim, only : close_rim
+   use field_sums, only : row_totals
    use asperity_precision, only : dp, sp
    use regular_grid, only : boundary_periodic, grid_type
    use schur_coarse, only : new_schur_coarse, om, schur_coarse_type, stencil_c1
@@ -105,15 +106,15 @@ contains
       wx = merge(0.0_dp, stencil_c1*(coarse%h/grid%dx)**2, grid%nx == 1)
       wy = merge(0.0_dp, stencil_c1*(coarse%h/grid%dy)**2, grid%ny == 1)
       self%weights = real([c0 + 2.0_dp*(wx + wy), wx, wy], sp)
-      allocate (self%residual(0:grid%nx + 1, 0:grid%ny + 1), source=0.0_sp)
-      allocate (self%search(0:grid%nx + 1, 0:grid%ny + 1), source=0.0_sp)
+      allocate (self%residual(0:grid%nx + 1, 0:grid%rows() + 1), source=0.0_sp)
+      allocate (self%search(0:grid%nx + 1, 0:grid%rows() + 1), source=0.0_sp)
       self%owns = .not. present(memory)
       if (present(memory)) then
-         call c_f_pointer(memory, pair, [grid%nx, grid%ny, 2])
+         call c_f_pointer(memory, pair, [grid%nx, grid%rows(), 2])
          self%image => pair(:, :, 1)
          self%response => pair(:, :, 2)
       else
-         allocate (self%image(grid%nx, grid%ny), self%response(grid%nx, grid%ny))
+         allocate (self%image(grid%nx, grid%rows()), self%response(grid%nx, grid%rows()))
       end if
       allocate (self%pending(coarse%nx, coarse%ny), source=0.0_dp)
       allocate (self%cells_off, self%image_off, self%response_off, self%search_off, source=self%pending)
@@ -127,17 +128,18 @@ contains
       type(active_blocks_type), intent(in) :: active
       real(dp), intent(in) :: scale                      !! a power of two
       real(dp), intent(in) :: level                      !! m
-      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%ny), gap(self%grid%nx, self%grid%ny)
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows()), gap(self%grid%nx, self%grid%rows())
       type(image_sums_type), allocatable :: rows(:)
       real(sp), allocatable :: column(:)
+      real(dp) :: totals(2)
       integer :: j, k, jb
 
-      allocate (rows(self%grid%ny))
+      allocate (rows(self%grid%rows()))
       !$omp parallel default(none) shared(self, coarse, active, scale, level, pressure, gap, rows) &
       !$omp private(j, k, jb, column) num_threads(self%threads)
       allocate (column(self%grid%nx))
       !$omp do schedule(dynamic)
-      do jb = 1, coarse%ny
+      do jb = coarse%strips(1), coarse%strips(2)
          column(:) = 0.0_sp
          do j = coarse%first_y(jb), coarse%first_y(jb + 1) - 1
             do k = 1, active%runs(j)
@@ -156,16 +158,19 @@ contains
       end do
       !$omp end do
       !$omp single
-      call close_field(self, self%residual)
+      call close_rim(self%grid, self%residual)
       !$omp end single
       ! The rows at the edges of blocks need rows that another thread may have formed.
       !$omp do schedule(dynamic)
-      do jb = 1, coarse%ny
+      do jb = coarse%strips(1), coarse%strips(2)
          call image_rows(self, coarse, active, jb, edge_rows(coarse, jb), rows)
       end do
       !$omp end parallel
-      self%sums%form = row_total(rows%form)
-      self%sums%square = row_total(rows%square)
+      call coarse%share_blocks(coarse%mean)
+      call coarse%share_blocks(self%image_off)
+      call coarse%share_blocks(self%cells_off)
+      totals = row_totals(transpose(reshape([rows%form, rows%square], [size(rows), 2])))
+      self%sums = image_sums_type(totals(1), totals(2))
    end subroutine set_residual
 
    !> K of the residual in some rows of a block.
@@ -256,13 +261,14 @@ contains
       type(step_type), intent(in) :: step
       type(response_sums_type), intent(out) :: sums
       type(response_sums_type), allocatable :: rows(:)
+      real(dp) :: totals(3)
       integer :: j, jb
 
-      allocate (rows(self%grid%ny))
+      allocate (rows(self%grid%rows()))
       !$omp parallel default(none) shared(self, coarse, active, step, rows) private(j, jb) &
       !$omp num_threads(self%threads)
       !$omp do schedule(dynamic)
-      do jb = 1, coarse%ny
+      do jb = coarse%strips(1), coarse%strips(2)
          self%response_off(:, jb) = 0.0_dp
          if (active%wide_runs(jb) == 0) cycle
          call search_rows(self, coarse, active, jb, step)
@@ -270,17 +276,17 @@ contains
       end do
       !$omp end do
       !$omp single
-      call close_field(self, self%search)
+      call close_rim(self%grid, self%search)
       !$omp end single
       !$omp do schedule(dynamic)
-      do jb = 1, coarse%ny
+      do jb = coarse%strips(1), coarse%strips(2)
          if (active%wide_runs(jb) == 0) cycle
          call response_rows(self, coarse, active, jb, edge_rows(coarse, jb), step%last, rows)
       end do
       !$omp end parallel
-      sums%form = row_total(rows%form)
-      sums%cross = row_total(rows%cross)
-      sums%square = row_total(rows%square)
+      call coarse%share_blocks(self%response_off)
+      totals = row_totals(transpose(reshape([rows%form, rows%cross, rows%square], [size(rows), 3])))
+      sums = response_sums_type(totals(1), totals(2), totals(3))
    end subroutine search_pass
 
    !> The image and the search direction in the rows of a block.
@@ -365,16 +371,6 @@ contains
       row(0) = row(self%grid%nx)
       row(self%grid%nx + 1) = row(1)
    end subroutine close_row
-
-   !> Repeat the first and the last row of a periodic field in its rim.
-   pure subroutine close_field(self, field)
-      type(schur_preconditioner_type), intent(in) :: self
-      real(sp), intent(inout) :: field(0:, 0:)
-
-      if (self%grid%boundary /= boundary_periodic) return
-      field(:, 0) = field(:, self%grid%ny)
-      field(:, self%grid%ny + 1) = field(:, 1)
-   end subroutine close_field
 
    !> Transforms done so far, counted as those of the whole grid.
    pure function transforms(self) result(count)
