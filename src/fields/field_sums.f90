@@ -15,7 +15,7 @@ module field_sums
    implicit none
    private
 
-   public :: cell_count, field_count, field_magnitude, field_maximum, field_mean, field_minimum, field_product, &
+   public :: added, cell_count, field_count, field_magnitude, field_maximum, field_mean, field_minimum, field_product, &
       field_rms, field_sum, largest_of_rows, least_of_rows, row_total, row_totals, threads_for
 
    integer, parameter :: small = 16384          !! cells below which one thread is faster

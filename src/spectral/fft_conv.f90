@@ -37,6 +37,11 @@ module fft_conv
 
    integer, parameter :: small = 16384                 !! cells below which one thread is faster
 
+   !> A periodic scalar operator from its symbol.
+   interface new_symbol_operator
+      module procedure :: new_whole_symbol_operator, new_shared_symbol_operator
+   end interface new_symbol_operator
+
    !> A convolution operator with its plans and its work space. Not to be copied.
    type :: convolution_type
       integer :: nx = 0                     !! cells along x
@@ -122,20 +127,32 @@ contains
       call finish_symbol(self)
    end subroutine new_inverse_convolution
 
-   !> A periodic scalar operator from its symbol, even in both wave numbers.
-   subroutine new_symbol_operator(self, nx, ny, symbol, error, single)
+   !> A periodic scalar operator from its symbol, even in both wave numbers, for fields that every process
+   !> holds whole.
+   subroutine new_whole_symbol_operator(self, nx, ny, symbol, error, single)
       type(convolution_type), intent(out) :: self
       integer, intent(in) :: nx, ny
       real(dp), intent(in) :: symbol(0:, 0:)      !! (0:nx/2, 0:ny/2)
       type(error_type), allocatable, intent(out) :: error
       logical, intent(in), optional :: single      !! work in single precision
 
-      call plan(self, whole_shape(nx, ny, 1), error, single)
+      call new_shared_symbol_operator(self, whole_shape(nx, ny, 1), symbol, error, single)
+   end subroutine new_whole_symbol_operator
+
+   !> The same for fields whose rows processes may share.
+   subroutine new_shared_symbol_operator(self, shape, symbol, error, single)
+      type(convolution_type), intent(out) :: self
+      type(transform_shape_type), intent(in) :: shape
+      real(dp), intent(in) :: symbol(0:, 0:)      !! (0:nx/2, 0:ny/2)
+      type(error_type), allocatable, intent(out) :: error
+      logical, intent(in), optional :: single      !! work in single precision
+
+      call plan(self, shape, error, single)
       if (allocated(error)) return
       call new_table(self)
-      self%symbol(0:nx/2, :, 1) = symbol
+      self%symbol(0:shape%nx/2, :, 1) = symbol
       call finish_symbol(self)
-   end subroutine new_symbol_operator
+   end subroutine new_shared_symbol_operator
 
    !> Put the factor of the inverse transform into the symbol; in single precision where that works.
    subroutine finish_symbol(self)

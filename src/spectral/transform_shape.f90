@@ -3,10 +3,11 @@ module transform_shape
    use asperity_parallel, only : process_count, process_number
    use influence, only : transform_length
    use regular_grid, only : grid_type
+   use row_sharing, only : new_row_sharing, owners_on_grid, row_sharing_type
    implicit none
    private
 
-   public :: shape_on_grid, transform_shape_type, whole_shape
+   public :: shape_of_rows, shape_on_grid, transform_shape_type, whole_shape
 
    !> Sizes of a transform.
    type :: transform_shape_type
@@ -16,6 +17,7 @@ module transform_shape
       integer :: inputs = 1                !! fields that go in
       logical :: shared = .false.          !! processes share the rows
       integer, allocatable :: rows_of(:)   !! rows of each process; of all where they are not shared
+      integer, allocatable :: order(:)     !! rows of the whole field, in the order of the processes
    contains
       procedure :: rows
    end type transform_shape_type
@@ -27,25 +29,32 @@ contains
       type(grid_type), intent(in) :: grid
       integer, intent(in) :: components
       type(transform_shape_type) :: self
-      integer :: p, range(2)
+      type(row_sharing_type) :: sharing
 
-      self = whole_shape(grid%nx, grid%ny, components)
+      call new_row_sharing(sharing, owners_on_grid(grid), grid%shared)
+      self = shape_of_rows(grid%nx, sharing, components)
       self%mx = transform_length(grid%nx, grid%boundary)
       self%my = transform_length(grid%ny, grid%boundary)
-      self%shared = grid%shared
-      if (.not. grid%shared) return
-      deallocate (self%rows_of)
-      allocate (self%rows_of(process_count()))
-      do p = 1, process_count()
-         range = grid%rows_of(p - 1)
-         self%rows_of(p) = range(2) - range(1) + 1
-      end do
    end function shape_on_grid
+
+   !> The shape for periodic fields whose rows are shared in any way.
+   pure function shape_of_rows(nx, sharing, components) result(self)
+      integer, intent(in) :: nx
+      type(row_sharing_type), intent(in) :: sharing
+      integer, intent(in) :: components
+      type(transform_shape_type) :: self
+
+      self = whole_shape(nx, size(sharing%owner), components)
+      self%shared = sharing%shared
+      self%rows_of = sharing%rows_of
+      self%order = sharing%order
+   end function shape_of_rows
 
    !> The shape for periodic fields that each process holds whole.
    pure function whole_shape(nx, ny, components) result(self)
       integer, intent(in) :: nx, ny, components
       type(transform_shape_type) :: self
+      integer :: j
 
       self%nx = nx
       self%ny = ny
@@ -54,6 +63,7 @@ contains
       self%components = components
       self%inputs = components
       self%rows_of = [ny]
+      self%order = [(j, j=1, ny)]
    end function whole_shape
 
    !> Number of rows that this process holds.
