@@ -15,8 +15,9 @@ module field_sums
    implicit none
    private
 
-   public :: added, cell_count, field_count, field_magnitude, field_maximum, field_mean, field_minimum, field_product, &
-      field_rms, field_sum, largest_of_rows, least_of_rows, row_total, row_totals, threads_for
+   public :: added, cell_count, field_count, field_magnitude, field_maximum, field_mean, field_minimum, &
+      field_product, field_rms, field_sum, largest_of_rows, least_of_rows, row_total, row_totals, sum_rows, &
+      threads_for, vector_sum
 
    integer, parameter :: small = 16384          !! cells below which one thread is faster
 
@@ -73,6 +74,30 @@ contains
          totals = added(rows)
       end if
    end function row_totals
+
+   !> Totals of several sums per row, and the largest of one more number per row, in one exchange.
+   subroutine sum_rows(rows, totals, largest)
+      real(dp), intent(in) :: rows(:, :)       !! [sums + 1, rows of this process]; the number comes last
+      real(dp), intent(out) :: totals(:)       !! [sums]
+      real(dp), intent(out) :: largest
+
+      if (process_count() > 1) then
+         call reduce(gather_rows(rows))
+      else
+         call reduce(rows)
+      end if
+
+   contains
+
+      !> The same where all rows are at hand.
+      subroutine reduce(all_rows)
+         real(dp), intent(in) :: all_rows(:, :)
+
+         totals = added(all_rows(:size(totals), :))
+         largest = maxval(all_rows(size(totals) + 1, :))
+      end subroutine reduce
+
+   end subroutine sum_rows
 
    !> Sums added one after the other.
    pure function added(rows) result(totals)
@@ -133,6 +158,23 @@ contains
       end do
       total = row_total(rows)
    end function field_sum
+
+   !> Sums of the components of a vector field.
+   function vector_sum(field) result(total)
+      real(dp), intent(in) :: field(:, :, :)   !! [nx, components, rows of this process]
+      real(dp) :: total(size(field, 2))
+      real(dp), allocatable :: rows(:, :)
+      integer :: c, j
+
+      allocate (rows(size(field, 2), size(field, 3)))
+      !$omp parallel do default(none) shared(field, rows) private(c, j) num_threads(threads_for(field(:, 1, :)))
+      do j = 1, size(field, 3)
+         do c = 1, size(field, 2)
+            rows(c, j) = sum(field(:, c, j))
+         end do
+      end do
+      total = row_totals(rows)
+   end function vector_sum
 
    !> Mean of a field over the cells of the grid.
    function field_mean(field) result(mean)

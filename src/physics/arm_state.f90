@@ -9,6 +9,7 @@
 !> Results do not depend on the number of threads or processes: sums are formed row by row.
 module arm_state
    use asperity_errors, only : error_memory, error_type, fail
+   use asperity_parallel, only : any_process
    use asperity_precision, only : dp
    use field_sums, only : row_totals
    use zener, only : is_elastic, scheme_exponential2, zener_type
@@ -62,7 +63,7 @@ contains
       if (status == 0) allocate (self%arm(i, arms, components), stat=status)
       if (material%scheme /= scheme_exponential2) i = 0
       if (status == 0) allocate (self%ds(i, components), stat=status)
-      if (status /= 0) then
+      if (any_process(status /= 0)) then
          call fail(error, error_memory, 'not enough memory for the state of the arms')
          return
       end if
@@ -151,7 +152,7 @@ contains
    subroutine commit_arms(self, material, p, u_old, u_new, products, carried)
       type(arm_state_type), intent(inout) :: self
       type(zener_type), intent(in) :: material        !! after start_step, _jump or _relaxed
-      !> P' at the end, Pa; [nx, ny] or [nx, components, ny]
+      !> P' at the end, Pa; [nx, rows] or [nx, components, rows]
       real(dp), intent(in) :: p(self%row, self%components, self%cells/self%row)
       real(dp), intent(in) :: u_old(self%row, self%components, self%cells/self%row)   !! at the start, m
       real(dp), intent(in) :: u_new(self%row, self%components, self%cells/self%row)   !! at the end, m

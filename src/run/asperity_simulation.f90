@@ -91,7 +91,7 @@ contains
       self%height = self%height(:, self%grid%first_row:self%grid%last_row)   ! TODO surfaces in slabs
       call new_contact(self, error)
       if (allocated(error)) return
-      if (self%frictional) call new_coupled_passes(self%passes, self%grid%nx, self%grid%ny)
+      if (self%frictional) call new_coupled_passes(self%passes, self%grid)
       self%has_steady = self%slides .and. any(case%phases%steady)
       if (.not. self%has_steady) return
       call new_steady_step(self%steady, case, self%rms_height, error)

@@ -96,9 +96,9 @@ contains
       if (allocated(error)) return
       self%frictional = self%slides .and. self%case%friction%law /= 'none'
       if (.not. self%frictional) return
-      call new_tangential_state(self%state%tangential, self%case, self%material, error)
+      call new_tangential_state(self%state%tangential, self%case, self%grid, self%material, error)
       if (allocated(error)) return
-      call new_tangential_step(self%tangential, self%case, error)
+      call new_tangential_step(self%tangential, self%case, self%grid, error)
    end subroutine new_contact
 
    !> Prepare a road that moves.

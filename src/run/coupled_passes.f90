@@ -44,7 +44,7 @@ module coupled_passes
    use field_sums, only : row_totals
    use pass_control, only : pass_control_type
    use asperity_precision, only : dp
-   use regular_grid, only : boundary_free
+   use regular_grid, only : boundary_free, grid_type
    use asperity_schedule, only : planned_row_type
    use solver_result, only : solver_result_type
    implicit none
@@ -64,7 +64,7 @@ module coupled_passes
    type :: coupled_passes_type
       integer :: passes = 0                             !! done in the last row
       real(dp) :: residual = 0.0_dp                     !! mismatch that the last row left
-      real(dp), allocatable, private :: place(:, :, :)      !! z, m [nx, 2, ny]
+      real(dp), allocatable, private :: place(:, :, :)      !! z, m [nx, 2, rows]
       real(dp), allocatable, private :: carried(:, :, :)    !! U_T of the row before, carried along, m
       real(dp), allocatable, private :: residuals(:, :, :)  !! U_T, carried, less z, m
       real(dp), allocatable, private :: best_place(:, :, :) !! z of the least mismatch, m
@@ -76,13 +76,13 @@ module coupled_passes
 contains
 
    !> Allocate the work space.
-   subroutine new_coupled_passes(self, nx, ny)
+   subroutine new_coupled_passes(self, grid)
       type(coupled_passes_type), intent(out) :: self
-      integer, intent(in) :: nx, ny
+      type(grid_type), intent(in) :: grid
 
-      allocate (self%place(nx, 2, ny), source=0.0_dp)
+      allocate (self%place(grid%nx, 2, grid%rows()), source=0.0_dp)
       allocate (self%carried, self%residuals, self%best_place, source=self%place)
-      call new_anderson(self%mixing, nx, 2, ny, pairs)
+      call new_anderson(self%mixing, grid%nx, 2, grid%rows(), pairs)
       self%mixing%largest = largest_factor
    end subroutine new_coupled_passes
 
@@ -196,7 +196,7 @@ contains
          return
       end if
       !$omp parallel do default(none) shared(self, contact) private(j)
-      do j = 1, contact%grid%ny
+      do j = 1, contact%grid%rows()
          self%residuals(:, :, j) = contact%tangential%trial(:, :, j) - self%place(:, :, j)
       end do
       motion = contact_mean(contact, self%residuals)
@@ -205,7 +205,7 @@ contains
             contact%grid%boundary /= boundary_free, self%residuals(:, c, :))
       end do
       !$omp parallel do default(none) shared(self, contact) private(j)
-      do j = 1, contact%grid%ny
+      do j = 1, contact%grid%rows()
          self%residuals(:, :, j) = self%residuals(:, :, j) - self%place(:, :, j)
       end do
       if (control%plain) then
@@ -234,9 +234,9 @@ contains
       call contact%work%lend('slope along y at U_T', slope_y)
       call displaced(contact%road, plan%road_x, plan%road_y, contact%tangential%trial(:, 1, :), &
          contact%tangential%trial(:, 2, :), height, slope_x, slope_y)
-      allocate (rows(4, contact%grid%ny))
+      allocate (rows(4, contact%grid%rows()))
       !$omp parallel do default(none) shared(contact, height, slope_x, slope_y, rows) private(j)
-      do j = 1, contact%grid%ny
+      do j = 1, contact%grid%rows()
          rows(1, j) = sum(abs(contact%state%pressure(:, j)))
          rows(2, j) = sum(abs(contact%state%pressure(:, j)*(height(:, j) - contact%height(:, j))))
          rows(3, j) = sum(abs(contact%state%pressure(:, j))*hypot(slope_x(:, j) - contact%slope_x(:, j), &

@@ -50,8 +50,8 @@ contains
       part = 0.0_dp
       mu = self%tangential%law%coefficient
       if (.not. self%tangential%law%slope) return
-      allocate (rows(2, self%grid%ny))
-      do j = 1, self%grid%ny
+      allocate (rows(2, self%grid%rows()))
+      do j = 1, self%grid%rows()
          rows(1, j) = sum(abs(self%state%pressure(:, j)))
          rows(2, j) = sum(abs(self%state%pressure(:, j)), &
             mu*hypot(self%slope_x(:, j), self%slope_y(:, j)) > 1.0_dp)

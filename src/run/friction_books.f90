@@ -24,9 +24,9 @@ contains
    subroutine book_friction(state, law, trial, slip, pressure, slope_x, slope_y, rubbed)
       type(tangential_state_type), intent(inout) :: state   !! displacement: at the start of the step
       type(friction_law_type), intent(in) :: law
-      real(dp), intent(in) :: trial(:, :, :)          !! [nx, 2, ny] displacement at the end, m
-      real(dp), intent(in) :: slip(:, :, :)           !! [nx, 2, ny] m
-      real(dp), intent(in) :: pressure(:, :)          !! [nx, ny] Pa
+      real(dp), intent(in) :: trial(:, :, :)          !! [nx, 2, rows] displacement at the end, m
+      real(dp), intent(in) :: slip(:, :, :)           !! [nx, 2, rows] m
+      real(dp), intent(in) :: pressure(:, :)          !! [nx, rows] Pa
       real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)
       type(rubbed_type), intent(out) :: rubbed
       real(dp), allocatable :: rows(:, :)

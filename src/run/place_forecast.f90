@@ -34,7 +34,7 @@ module place_forecast
       real(dp) :: dt = 0.0_dp                        !! length of the last step, s
       integer :: known = 0                           !! differences that are known: a, then b
       integer :: order = 1                           !! of the forecast of the next row
-      real(dp), allocatable :: change(:, :, :)       !! a of the last row, m [nx, 2, ny]
+      real(dp), allocatable :: change(:, :, :)       !! a of the last row, m [nx, 2, rows]
       real(dp), allocatable :: more(:, :, :)         !! b of the last row, m
    contains
       procedure :: add
@@ -46,11 +46,12 @@ module place_forecast
 contains
 
    !> Nothing is known yet.
-   subroutine new_place_forecast(self, nx, ny)
+   subroutine new_place_forecast(self, nx, rows)
       type(place_forecast_type), intent(out) :: self
-      integer, intent(in) :: nx, ny
+      integer, intent(in) :: nx
+      integer, intent(in) :: rows                    !! of this process
 
-      allocate (self%change(nx, 2, ny), source=0.0_dp)
+      allocate (self%change(nx, 2, rows), source=0.0_dp)
       allocate (self%more, source=self%change)
    end subroutine new_place_forecast
 
@@ -91,7 +92,7 @@ contains
    !> Add what this row is expected to change to the displacement carried along.
    subroutine add(self, place)
       class(place_forecast_type), intent(in) :: self
-      real(dp), intent(inout) :: place(:, :, :)      !! in: B; out: the forecast, m [nx, 2, ny]
+      real(dp), intent(inout) :: place(:, :, :)      !! in: B; out: the forecast, m [nx, 2, rows]
       integer :: j
 
       !$omp parallel do default(none) shared(self, place) private(j)
@@ -104,7 +105,7 @@ contains
    !> Learn from a row that is solved.
    subroutine learn(self, found, carried, pressure)
       class(place_forecast_type), intent(inout) :: self
-      real(dp), intent(in) :: found(:, :, :)         !! U_n, m [nx, 2, ny]
+      real(dp), intent(in) :: found(:, :, :)         !! U_n, m [nx, 2, rows]
       real(dp), intent(in) :: carried(:, :, :)       !! B_n, m
       real(dp), intent(in) :: pressure(:, :)         !! Pa
       real(dp), allocatable :: rows(:, :)

@@ -11,6 +11,7 @@
 !> no more than `most_more`. Otherwise such a row can be given up in its first part only.
 module row_stop
    use, intrinsic :: iso_c_binding, only : c_int
+   use asperity_parallel, only : global_max
    use asperity_precision, only : dp, int64
    use row_state, only : state_type
    implicit none
@@ -18,7 +19,7 @@ module row_stop
 
    public :: row_stop_type, stop_question
 
-   real(dp), parameter :: most_more = 64.0e6_dp    !! bytes that `keep_more` copies
+   real(dp), parameter :: most_more = 64.0e6_dp    !! bytes of a process that `keep_more` copies
 
    abstract interface
       !> Has a stop been asked for? C's convention, so that Python can answer.
@@ -72,7 +73,8 @@ contains
          numbers = real(size(state%arms%arm), dp) + real(size(t%arms%arm), dp) + size(state%arms%s) + &
             size(state%arms%ds) + size(t%arms%s) + size(t%arms%ds) + 3*size(t%displacement)
       end associate
-      self%complete = 8.0_dp*numbers <= most_more
+      ! The processes must agree: they have different numbers of rows.
+      self%complete = 8.0_dp*global_max(numbers) <= most_more
       if (.not. self%complete) return
       if (allocated(state%displacement)) self%kept%displacement = state%displacement
       self%kept%arms = state%arms

@@ -35,7 +35,7 @@ module starting_steps
       real(dp) :: lost_friction = 0.0_dp           !! time times power_friction, J
       real(dp) :: residual_normal = 0.0_dp         !! largest
       real(dp) :: residual_tangential = 0.0_dp     !! largest
-      real(dp), allocatable :: slip(:, :, :)       !! m [nx, 2, ny]
+      real(dp), allocatable :: slip(:, :, :)       !! m [nx, 2, rows]
    contains
       procedure :: add
       procedure :: hand_out

@@ -9,6 +9,7 @@ module tangential_state
    use asperity_precision, only : dp, int8
    use block_motion, only : block_motion_type
    use case_settings, only : case_type
+   use regular_grid, only : grid_type
    use place_forecast, only : new_place_forecast, place_forecast_type
    use viscoelastic_energy, only : energy_books_type, new_books
    use arm_state, only : arm_state_type, new_arm_state
@@ -22,7 +23,7 @@ module tangential_state
    type :: tangential_state_type
       logical :: moved = .false.                      !! the road has moved: friction acts
       type(block_motion_type) :: block                !! mean motion of the block
-      real(dp), allocatable :: traction(:, :, :)      !! T, Pa [nx, 2, ny]
+      real(dp), allocatable :: traction(:, :, :)      !! T, Pa [nx, 2, rows]
       real(dp), allocatable :: before(:, :, :)        !! T of the step before, seen from where T is, Pa
       real(dp) :: pace = 0.0_dp                       !! length of the step that led from it to T, s; 0: none
       real(dp), allocatable :: displacement(:, :, :)  !! U_T, m
@@ -39,23 +40,23 @@ module tangential_state
 contains
 
    !> A block at rest.
-   subroutine new_tangential_state(self, case, material, error)
+   subroutine new_tangential_state(self, case, grid, material, error)
       type(tangential_state_type), intent(out) :: self
       type(case_type), intent(in) :: case
+      type(grid_type), intent(in) :: grid             !! that of the case; its rows may be shared
       type(zener_type), intent(in) :: material
       type(error_type), allocatable, intent(out) :: error
 
       self%block%height = case%material%thickness
       self%block%mass = 0.5_dp*case%material%density*case%material%thickness
-      self%block%area = case%grid%area()
-      allocate (self%traction(case%grid%nx, 2, case%grid%ny), source=0.0_dp)
+      self%block%area = grid%area()
+      allocate (self%traction(grid%nx, 2, grid%rows()), source=0.0_dp)
       allocate (self%before, self%displacement, self%rubbing, source=self%traction)
-      allocate (self%contact(case%grid%nx, case%grid%ny), self%rubbed(case%grid%nx, case%grid%ny), &
-         source=0_int8)
-      call new_place_forecast(self%forecast, case%grid%nx, case%grid%ny)
-      call new_arm_state(self%arms, material, case%grid%nx, case%grid%ny, 2, error)
+      allocate (self%contact(grid%nx, grid%rows()), self%rubbed(grid%nx, grid%rows()), source=0_int8)
+      call new_place_forecast(self%forecast, grid%nx, grid%rows())
+      call new_arm_state(self%arms, material, grid%nx, grid%rows(), 2, error)
       if (allocated(error)) return
-      call new_books(self%books, material, case%grid%cell_area())
+      call new_books(self%books, material, grid%cell_area())
    end subroutine new_tangential_state
 
 end module tangential_state

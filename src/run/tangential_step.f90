@@ -16,7 +16,7 @@ module tangential_step
    use contact_rule, only : touches
    use asperity_errors, only : error_type
    use friction_books, only : book_friction, rubbed_type
-   use field_sums, only : field_count, field_mean, row_totals
+   use field_sums, only : field_count, row_totals, vector_sum
    use fft_conv, only : convolution_type, new_convolution
    use friction_cg, only : friction_fast, friction_fields_type, friction_solver_type, friction_thesis, &
       new_friction_solver
@@ -40,7 +40,7 @@ module tangential_step
       type(friction_law_type) :: law
       logical :: adhesive = .false.                   !! the contact has an adhesive potential
       real(dp) :: tolerance = 1e-6_dp                 !! of the next solve
-      real(dp), allocatable :: trial(:, :, :)         !! U_T at the end of the step, m [nx, 2, ny]
+      real(dp), allocatable :: trial(:, :, :)         !! U_T at the end of the step, m [nx, 2, rows]
       real(dp), allocatable :: slip(:, :, :)          !! of the step, m
       logical :: pulled(2) = .false.                  !! the road hangs on a force along x, y
       real(dp) :: pull(2) = 0.0_dp                    !! that force, over the cell, Pa
@@ -70,13 +70,14 @@ module tangential_step
 contains
 
    !> Prepare the operator and the solver.
-   subroutine new_tangential_step(self, case, error)
+   subroutine new_tangential_step(self, case, grid, error)
       type(tangential_step_type), intent(out) :: self
       type(case_type), intent(in) :: case
+      type(grid_type), intent(in) :: grid             !! that of the case; its rows may be shared
       type(error_type), allocatable, intent(out) :: error
       type(adhesion_potential_type) :: potential
 
-      self%grid = case%grid
+      self%grid = grid
       self%adhesive = case%adhesion%potential /= 'none'
       call new_adhesion_potential(potential, trim(case%adhesion%potential), case%adhesion%energy, &
          case%adhesion%range, error)
@@ -92,7 +93,7 @@ contains
       self%solver%max_iterations = case%solver%max_iterations
       ! The passes of a step measure by the displacements whether the step is solved.
       self%solver%settle = .false.
-      allocate (self%trial(self%grid%nx, 2, self%grid%ny), source=0.0_dp)
+      allocate (self%trial(self%grid%nx, 2, self%grid%rows()), source=0.0_dp)
       allocate (self%slip, self%drive, self%past, source=self%trial)
    end subroutine new_tangential_step
 
@@ -122,21 +123,21 @@ contains
       self%solver%least_scale = self%q*norm2(merge(0.0_dp, motion, pulled))
       if (.not. dt > 0.0_dp) state%pace = 0.0_dp
       call past_traction(state%arms, material, self%past)
-      self%past_mean = means(self%past)
+      self%past_mean = means(self, self%past)
       height = state%block%height
       shift = self%q*motion
       if (state%block%inert(dt)) then
          ! A mass makes the mean stiffer: like a lower block, moved by what is known of the mass.
          height = self%q*height/(self%q + state%block%resistance(dt))
-         shift = shift - height*state%block%known(means(state%displacement), motion, dt)
+         shift = shift - height*state%block%known(means(self, state%displacement), motion, dt)
       else if (state%block%mass > 0.0_dp) then
          ! A mass does not move in no time: the mean of the surface stays.
          height = 0.0_dp
-         shift = shift - self%q*means(state%displacement)
+         shift = shift - self%q*means(self, state%displacement)
       end if
       where (pulled) shift = 0.0_dp
       !$omp parallel do default(none) shared(self, state, shift) private(c, j)
-      do j = 1, self%grid%ny
+      do j = 1, self%grid%rows()
          do c = 1, 2
             self%drive(:, c, j) = self%q*state%displacement(:, c, j) + shift(c)
          end do
@@ -160,10 +161,10 @@ contains
       if (state%block%inert(self%dt)) then
          self%mass_yields = self%q*state%block%height/state%block%resistance(self%dt)
          self%mass_place = -self%mass_yields &
-            *state%block%known(means(state%displacement), [0.0_dp, 0.0_dp], self%dt)
+            *state%block%known(means(self, state%displacement), [0.0_dp, 0.0_dp], self%dt)
       else
          self%mass_yields = tiny(1.0_dp)
-         self%mass_place = -self%q*means(state%displacement)
+         self%mass_place = -self%q*means(self, state%displacement)
       end if
       do c = 1, 2
          if (self%pulled(c)) call self%operator%set_mean_mode(c, 0.0_dp)
@@ -203,7 +204,7 @@ contains
             state%block%height*(pull%traction + self%past_mean)
          self%found = merge(pull%offset/self%q, self%motion, self%pulled)
          self%slides_off = pull%slides_off
-         if (self%slides_off) self%held = merge(means(state%traction) + self%pull - pull%traction, 0.0_dp, &
+         if (self%slides_off) self%held = merge(means(self, state%traction) + self%pull - pull%traction, 0.0_dp, &
             self%pulled)
       end associate
    end subroutine find_motion
@@ -220,9 +221,9 @@ contains
 
       force = 0.0_dp
       if (self%law%slope .and. .not. self%adhesive) return
-      allocate (rows(2, self%grid%ny))
+      allocate (rows(2, self%grid%rows()))
       !$omp parallel do default(none) shared(self, state, pressure, slope_x, slope_y, rows) private(j, counts)
-      do j = 1, self%grid%ny
+      do j = 1, self%grid%rows()
          counts = state%contact(:, j) == 0_int8 .or. .not. self%law%slope
          rows(1, j) = sum(pressure(:, j)*slope_x(:, j), counts)
          rows(2, j) = sum(pressure(:, j)*slope_y(:, j), counts)
@@ -241,7 +242,7 @@ contains
       do c = 1, 2
          if (.not. self%pulled(c)) cycle
          !$omp parallel do default(none) shared(self, c) private(j)
-         do j = 1, self%grid%ny
+         do j = 1, self%grid%rows()
             self%trial(:, c, j) = self%trial(:, c, j) + (self%found(c) - self%motion(c))
          end do
       end do
@@ -260,7 +261,7 @@ contains
       factor = 0.0_dp
       if (steady .and. state%pace > 0.0_dp) factor = self%dt/state%pace
       !$omp parallel do default(none) shared(self, state, factor) private(i, j, t)
-      do j = 1, self%grid%ny
+      do j = 1, self%grid%rows()
          do i = 1, self%grid%nx
             t = state%traction(i, :, j)
             if (state%contact(i, j) == 1_int8) &
@@ -281,11 +282,12 @@ contains
    end subroutine set_thickness
 
    !> Means of a vector field over the grid.
-   function means(field) result(mean)
-      real(dp), intent(in) :: field(:, :, :)          !! [nx, 2, ny]
+   function means(self, field) result(mean)
+      type(tangential_step_type), intent(in) :: self
+      real(dp), intent(in) :: field(:, :, :)          !! [nx, 2, rows]
       real(dp) :: mean(2)
 
-      mean = [field_mean(field(:, 1, :)), field_mean(field(:, 2, :))]
+      mean = vector_sum(field)/self%grid%cells()
    end function means
 
    !> Solve for the traction under a pressure: T, the trial displacement, the slip. Where the road is
@@ -315,7 +317,7 @@ contains
       call self%solver%solve(self%operator, self%law, fields, outcome)
       call find_motion(self, state)
       !$omp parallel do default(none) shared(self, state) private(c, j)
-      do j = 1, self%grid%ny
+      do j = 1, self%grid%rows()
          do c = 1, 2
             self%slip(:, c, j) = self%slip(:, c, j)/self%q
             self%trial(:, c, j) = state%displacement(:, c, j) + self%motion(c) - self%slip(:, c, j)
@@ -331,7 +333,7 @@ contains
       integer :: i, j
 
       !$omp parallel do default(none) shared(self, state, pressure, gap) private(i, j)
-      do j = 1, self%grid%ny
+      do j = 1, self%grid%rows()
          do i = 1, self%grid%nx
             if (.not. touches(self%adhesive, pressure(i, j), gap(i, j))) then
                state%contact(i, j) = 0_int8
@@ -357,9 +359,9 @@ contains
       products = new_products(material)
       carried = 0.0_dp
       if (state%block%mass > 0.0_dp) then
-         before = means(state%displacement)
-         after = means(self%trial)
-         carried = means(state%traction) + self%past_mean - self%q*after/state%block%height
+         before = means(self, state%displacement)
+         after = means(self, self%trial)
+         carried = means(self, state%traction) + self%past_mean - self%q*after/state%block%height
          call state%block%finish(after - before - self%motion, carried, self%dt)
       end if
       call commit_arms(state%arms, material, state%traction, state%displacement, self%trial, &
@@ -379,8 +381,8 @@ contains
       real(dp), intent(out) :: stick
       real(dp), intent(out) :: slip(2)                !! m
 
-      traction = means(state%traction)
-      slip = means(self%slip)
+      traction = means(self, state%traction)
+      slip = means(self, self%slip)
       stick = field_count(state%contact == 1_int8)/self%grid%cells()
    end subroutine sums
 

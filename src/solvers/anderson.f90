@@ -29,7 +29,8 @@ module anderson
 
    !> The last differences. Plain data; may be kept from solve to solve.
    type :: anderson_type
-      integer :: nx = 0, components = 0, ny = 0
+      integer :: nx = 0, components = 0
+      integer :: rows = 0                            !! of this process
       integer :: pairs = 0                           !! that are kept at most
       integer :: used = 0                            !! pairs there are
       real(dp) :: largest = huge(1.0_dp)             !! where a gamma is as large, none is believed
@@ -37,7 +38,7 @@ module anderson
       integer, private :: threads = 1
       logical, private :: begun = .false.            !! there is a last iterate
       real(dp), allocatable, private :: gram(:, :)   !! df_i.df_j
-      real(sp), allocatable, private :: df(:, :, :, :)   !! [nx, components, ny, pairs]
+      real(sp), allocatable, private :: df(:, :, :, :)   !! [nx, components, rows, pairs]
       real(sp), allocatable, private :: dg(:, :, :, :)
       real(dp), allocatable, private :: last_f(:, :, :), last_g(:, :, :)
    contains
@@ -50,19 +51,20 @@ module anderson
 contains
 
    !> Make room for a number of pairs.
-   subroutine new_anderson(self, nx, components, ny, pairs)
+   subroutine new_anderson(self, nx, components, rows, pairs)
       type(anderson_type), intent(out) :: self
-      integer, intent(in) :: nx, components, ny
+      integer, intent(in) :: nx, components
+      integer, intent(in) :: rows                    !! of this process
       integer, intent(in) :: pairs
 
       self%nx = nx
       self%components = components
-      self%ny = ny
+      self%rows = rows
       self%pairs = pairs
-      self%threads = merge(1, thread_count(), nx*ny < 16384)
+      self%threads = merge(1, thread_count(), nx*rows < 16384)
       allocate (self%gram(pairs, pairs), source=0.0_dp)
-      allocate (self%df(nx, components, ny, pairs), self%dg(nx, components, ny, pairs))
-      allocate (self%last_f(nx, components, ny), self%last_g(nx, components, ny))
+      allocate (self%df(nx, components, rows, pairs), self%dg(nx, components, rows, pairs))
+      allocate (self%last_f(nx, components, rows), self%last_g(nx, components, rows))
    end subroutine new_anderson
 
    !> Start again: what was learnt does not apply any more.
@@ -78,8 +80,8 @@ contains
    subroutine step(self, weights, f, x, plain, damping)
       class(anderson_type), intent(inout) :: self
       real(dp), intent(in) :: weights(self%components)              !! of the components in the norm
-      real(dp), intent(in) :: f(self%nx, self%components, self%ny)  !! g(x) - x
-      real(dp), intent(inout) :: x(self%nx, self%components, self%ny)   !! in: x; out: the next
+      real(dp), intent(in) :: f(self%nx, self%components, self%rows)  !! g(x) - x
+      real(dp), intent(inout) :: x(self%nx, self%components, self%rows)   !! in: x; out: the next
       logical, intent(in) :: plain
       real(dp), intent(in), optional :: damping                     !! b, from 0 to 1 (default)
       real(dp), allocatable :: gamma(:)
@@ -93,7 +95,7 @@ contains
       if (present(damping)) left = 1.0_dp - damping
       !$omp parallel do default(none) shared(self, f, x, gamma, left) private(j) &
       !$omp num_threads(self%threads)
-      do j = 1, self%ny
+      do j = 1, self%rows
          call combine_row(self, gamma, left, j, f(:, :, j), x(:, :, j))
       end do
    end subroutine step
@@ -103,8 +105,8 @@ contains
    !> one iterate to the next is damped as by b alone. What has been learnt is forgotten.
    subroutine glide(self, f, x, damping, momentum)
       class(anderson_type), intent(inout) :: self
-      real(dp), intent(in) :: f(self%nx, self%components, self%ny)  !! g(x) - x
-      real(dp), intent(inout) :: x(self%nx, self%components, self%ny)   !! in: x; out: the next
+      real(dp), intent(in) :: f(self%nx, self%components, self%rows)  !! g(x) - x
+      real(dp), intent(inout) :: x(self%nx, self%components, self%rows)   !! in: x; out: the next
       real(dp), intent(in) :: damping                !! b, from 0 to 1
       real(dp), intent(in) :: momentum               !! m, from 0 to 1
       real(dp) :: m
@@ -114,7 +116,7 @@ contains
       call self%forget()
       self%begun = .true.
       !$omp parallel do default(none) shared(self, f, x, damping, m) private(j) num_threads(self%threads)
-      do j = 1, self%ny
+      do j = 1, self%rows
          call glide_row(self, damping, m, j, f(:, :, j), x(:, :, j))
       end do
    end subroutine glide
@@ -139,7 +141,7 @@ contains
    !> the step neither straight nor bent.
    function turn(self, f) result(cosine)
       class(anderson_type), intent(in) :: self
-      real(dp), intent(in) :: f(self%nx, self%components, self%ny)  !! g(x) - x
+      real(dp), intent(in) :: f(self%nx, self%components, self%rows)  !! g(x) - x
       real(dp) :: cosine
       real(dp), allocatable :: rows(:, :)
       real(dp) :: sums(3)
@@ -147,9 +149,9 @@ contains
 
       cosine = 0.5_dp
       if (.not. self%begun) return
-      allocate (rows(3, self%ny))
+      allocate (rows(3, self%rows))
       !$omp parallel do default(none) shared(self, f, rows) private(j) num_threads(self%threads)
-      do j = 1, self%ny
+      do j = 1, self%rows
          rows(1, j) = sum(f(:, :, j)*self%last_f(:, :, j))
          rows(2, j) = sum(f(:, :, j)**2)
          rows(3, j) = sum(self%last_f(:, :, j)**2)
@@ -183,8 +185,8 @@ contains
    subroutine learn(self, weights, f, x, gamma)
       class(anderson_type), intent(inout) :: self
       real(dp), intent(in) :: weights(self%components)
-      real(dp), intent(in) :: f(self%nx, self%components, self%ny)
-      real(dp), intent(in) :: x(self%nx, self%components, self%ny)
+      real(dp), intent(in) :: f(self%nx, self%components, self%rows)
+      real(dp), intent(in) :: x(self%nx, self%components, self%rows)
       real(dp), intent(inout) :: gamma(:)
       real(dp), allocatable :: rows(:, :), sums(:)
       integer :: j, k
@@ -195,10 +197,10 @@ contains
       end if
       self%newest = mod(self%newest, self%pairs) + 1
       self%used = min(self%used + 1, self%pairs)
-      allocate (rows(2*self%pairs, self%ny), sums(2*self%pairs))
+      allocate (rows(2*self%pairs, self%rows), sums(2*self%pairs))
       !$omp parallel do default(none) shared(self, weights, f, x, rows) private(j) &
       !$omp num_threads(self%threads)
-      do j = 1, self%ny
+      do j = 1, self%rows
          call learn_row(self, weights, j, f(:, :, j), x(:, :, j), rows(:, j))
       end do
       sums = row_totals(rows)

@@ -98,8 +98,8 @@ contains
       self%length = max(grid%lx, grid%ly)
       self%compliance = operator%self_compliance()
       if (self%compliance <= 0.0_dp) self%compliance = self%length     ! one cell has no modes
-      allocate (self%work%bound(grid%nx, 2, grid%ny), self%work%tangent(grid%nx, 3, grid%ny), &
-         self%work%old(grid%nx, 2, grid%ny), source=0.0_dp)
+      allocate (self%work%bound(grid%nx, 2, grid%rows()), self%work%tangent(grid%nx, 3, grid%rows()), &
+         self%work%old(grid%nx, 2, grid%rows()), source=0.0_dp)
       if (present(method)) then
          call choose_method(self, method, grid, operator%kernel, error)
       else
@@ -176,7 +176,7 @@ contains
       problem%work => self%work
       problem%law = law
       problem%nx = operator%nx
-      problem%ny = operator%ny
+      problem%rows = operator%rows
       problem%threads = operator%threads
       problem%compliance = self%compliance
       problem%settle = self%settle

@@ -82,8 +82,8 @@ module friction_cg_fast
       type(convolution_type), private :: preconditioner        !! M
       real(dp), private :: half_wave = 0.0_dp                  !! mean compliance where there is none, m
       logical, private :: periodic = .true.
-      real(dp), allocatable, private :: z(:, :, :)             !! [nx, 2, ny]
-      real(dp), allocatable, private :: d(:, :, :)             !! [nx, 2, ny]
+      real(dp), allocatable, private :: z(:, :, :)             !! [nx, 2, rows]
+      real(dp), allocatable, private :: d(:, :, :)             !! [nx, 2, rows]
    contains
       procedure :: iterate
       procedure :: destroy
@@ -123,7 +123,7 @@ contains
       block%mean_mode = self%half_wave
       call new_inverse_convolution(self%preconditioner, periodic, block, error)
       if (allocated(error)) return
-      allocate (self%z(grid%nx, 2, grid%ny), self%d(grid%nx, 2, grid%ny), source=0.0_dp)
+      allocate (self%z(grid%nx, 2, grid%rows()), self%d(grid%nx, 2, grid%rows()), source=0.0_dp)
    end subroutine new_friction_fast
 
    !> Iterate, as `friction_method_type` says; where the conjugate gradients stall, with the fallback in
@@ -270,28 +270,27 @@ contains
       type(uniform_type) :: uniform
       type(z_sums_type), allocatable :: rows(:)
       type(z_sums_type) :: sums
-      real(dp), allocatable :: crosses(:)
       real(dp) :: inverse(2, 2), coupling(2, 2), form
       integer :: j
 
-      allocate (rows(problem%ny), crosses(problem%ny))
+      allocate (rows(problem%rows))
       call mean_mode(problem, inverse, coupling)
       uniform%traction = matmul(inverse, problem%sums%residual)
       uniform%displacement = matmul(coupling, uniform%traction)
-      !$omp parallel do default(none) shared(self, problem, uniform, crosses) private(j) &
+      !$omp parallel do default(none) shared(self, problem, uniform, rows) private(j) &
       !$omp num_threads(problem%threads)
-      do j = 1, problem%ny
-         call scale_row(self, problem, uniform, j, crosses(j))
+      do j = 1, problem%rows
+         call scale_row(self, problem, uniform, j, rows(j)%cross)
       end do
-      now%cross = 0.0_dp
-      if (.not. now%restart) now%cross = row_total(crosses)
       call self%preconditioner%columns(columns_apply, form)
       !$omp parallel do default(none) shared(self, problem, uniform, rows) private(j) &
       !$omp num_threads(problem%threads)
-      do j = 1, problem%ny
+      do j = 1, problem%rows
          call unscale_row(self, problem, uniform, j, rows(j))
       end do
       sums = total_of(rows)
+      now%cross = 0.0_dp
+      if (.not. now%restart) now%cross = sums%cross
       now%shift = uniform%traction &
          - matmul(inverse, matmul(transpose(coupling), sums%total) + sums%bent)
       now%gz = sums%gz + dot_product(problem%sums%residual, now%shift)
@@ -343,7 +342,7 @@ contains
       type(friction_problem_type), intent(in) :: problem
       type(uniform_type), intent(in) :: uniform
       integer, intent(in) :: j
-      type(z_sums_type), intent(out) :: sums
+      type(z_sums_type), intent(inout) :: sums     !! in: with g.z_old
 
       call self%preconditioner%backward_row(1, j, self%z(:, 1, j))
       call self%preconditioner%backward_row(2, j, self%z(:, 2, j))
@@ -362,10 +361,10 @@ contains
       type(turn_sums_type) :: sums
       integer :: j
 
-      allocate (rows(problem%ny))
+      allocate (rows(problem%rows))
       !$omp parallel do default(none) shared(self, problem, operator, beta, now, rows) &
       !$omp private(j) num_threads(problem%threads)
-      do j = 1, problem%ny
+      do j = 1, problem%rows
          call turned_row(problem%compliance, beta, now%shift, problem%slip(:, :, j), &
             problem%work%tangent(:, :, j), self%z(:, :, j), self%d(:, :, j), rows(j))
          call operator%forward_row(1, j, self%d(:, 1, j))

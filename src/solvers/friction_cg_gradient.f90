@@ -10,7 +10,7 @@
 module friction_cg_gradient
    use asperity_precision, only : dp
    use fft_conv, only : convolution_type
-   use field_sums, only : row_total
+   use field_sums, only : row_totals
    use friction_law, only : contact_open, contact_stick
    use friction_method, only : friction_goal_type, friction_method_type
    use friction_moves, only : move
@@ -22,8 +22,8 @@ module friction_cg_gradient
 
    !> The method with its work fields, which are made when it is first used.
    type, extends(friction_method_type) :: friction_gradient_type
-      real(dp), allocatable, private :: slip(:, :, :)    !! [nx, 2, ny] r along the slope
-      real(dp), allocatable, private :: step(:, :, :)    !! [nx, 2, ny] s
+      real(dp), allocatable, private :: slip(:, :, :)    !! [nx, 2, rows] r along the slope
+      real(dp), allocatable, private :: step(:, :, :)    !! [nx, 2, rows] s
    contains
       procedure :: iterate
       procedure :: destroy
@@ -42,7 +42,8 @@ contains
       logical :: returned
 
       if (.not. allocated(self%step)) &
-         allocate (self%slip(problem%nx, 2, problem%ny), self%step(problem%nx, 2, problem%ny), source=0.0_dp)
+         allocate (self%slip(problem%nx, 2, problem%rows), &
+            self%step(problem%nx, 2, problem%rows), source=0.0_dp)
       first = problem%residual
       first_alpha = 1.0_dp/(problem%compliance*sqrt(real(max(problem%cells, 1), dp)))
       alpha = first_alpha
@@ -68,7 +69,7 @@ contains
 
       !$omp parallel do default(none) shared(self, problem, alpha) &
       !$omp private(i, j, slope, r, t, returned) num_threads(problem%threads)
-      do j = 1, problem%ny
+      do j = 1, problem%rows
          do i = 1, problem%nx
             if (problem%contact(i, j) == contact_open) cycle
             slope = problem%slope_at(i, j)
@@ -88,25 +89,25 @@ contains
       type(friction_problem_type), intent(in) :: problem
       real(dp), intent(in) :: first_alpha              !! where the step says nothing
       real(dp) :: alpha
-      real(dp), allocatable :: ss(:), sy(:), yy(:)
+      real(dp), allocatable :: rows(:, :)              !! s.s, s.y, y.y
       real(dp) :: s(2), y(2), products(3), shortest, longest
       integer :: i, j
 
-      allocate (ss(problem%ny), sy(problem%ny), yy(problem%ny), source=0.0_dp)
-      !$omp parallel do default(none) shared(self, problem, ss, sy, yy) private(i, j, s, y) &
+      allocate (rows(3, problem%rows), source=0.0_dp)
+      !$omp parallel do default(none) shared(self, problem, rows) private(i, j, s, y) &
       !$omp num_threads(problem%threads)
-      do j = 1, problem%ny
+      do j = 1, problem%rows
          do i = 1, problem%nx
             if (problem%contact(i, j) == contact_open) cycle
             y = self%slip(i, :, j) &
                - problem%law%slip_along_slope(problem%slope_at(i, j), problem%slip(i, :, j))
             s = self%step(i, :, j)
-            ss(j) = ss(j) + s(1)**2 + s(2)**2
-            sy(j) = sy(j) + s(1)*y(1) + s(2)*y(2)
-            yy(j) = yy(j) + y(1)**2 + y(2)**2
+            rows(1, j) = rows(1, j) + s(1)**2 + s(2)**2
+            rows(2, j) = rows(2, j) + s(1)*y(1) + s(2)*y(2)
+            rows(3, j) = rows(3, j) + y(1)**2 + y(2)**2
          end do
       end do
-      products = [row_total(ss), row_total(sy), row_total(yy)]
+      products = row_totals(rows)
       shortest = 0.0_dp
       longest = 0.0_dp
       if (products(3) > 0.0_dp) shortest = products(2)/products(3)

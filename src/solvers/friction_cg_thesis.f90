@@ -16,7 +16,7 @@
 module friction_cg_thesis
    use asperity_precision, only : dp
    use fft_conv, only : columns_form, convolution_type
-   use field_sums, only : row_total
+   use field_sums, only : row_totals
    use friction_law, only : contact_open, contact_slip
    use friction_method, only : friction_goal_type, friction_method_type
    use friction_moves, only : move
@@ -30,9 +30,9 @@ module friction_cg_thesis
 
    !> The method with its work fields, which are made when it is first used.
    type, extends(friction_method_type) :: friction_thesis_type
-      real(dp), allocatable, private :: gradient(:, :, :)    !! [nx, 2, ny] g
-      real(dp), allocatable, private :: direction(:, :, :)   !! [nx, 2, ny] d
-      real(dp), allocatable, private :: tangent(:, :, :)     !! [nx, 2, ny] t
+      real(dp), allocatable, private :: gradient(:, :, :)    !! [nx, 2, rows] g
+      real(dp), allocatable, private :: direction(:, :, :)   !! [nx, 2, rows] d
+      real(dp), allocatable, private :: tangent(:, :, :)     !! [nx, 2, rows] t
    contains
       procedure :: iterate
       procedure :: destroy
@@ -51,7 +51,7 @@ contains
       logical :: returned
 
       if (.not. allocated(self%gradient)) then
-         allocate (self%gradient(problem%nx, 2, problem%ny), source=0.0_dp)
+         allocate (self%gradient(problem%nx, 2, problem%rows), source=0.0_dp)
          allocate (self%direction, self%tangent, source=self%gradient)
       end if
       beta = 0.0_dp
@@ -79,14 +79,14 @@ contains
       real(dp), intent(in) :: beta
       real(dp), intent(out) :: ascent              !! t.g
       real(dp), intent(out) :: bend                !! K_2.r
-      real(dp), allocatable :: ascents(:), bends(:)
-      real(dp) :: d(2), r(2), g(2), v(2), t(2), first, second
+      real(dp), allocatable :: rows(:, :)          !! t.g, K_2.r
+      real(dp) :: d(2), r(2), g(2), v(2), t(2), first, second, totals(2)
       integer :: i, j
 
-      allocate (ascents(problem%ny), bends(problem%ny), source=0.0_dp)
-      !$omp parallel do default(none) shared(self, problem, operator, beta, ascents, bends) &
+      allocate (rows(2, problem%rows), source=0.0_dp)
+      !$omp parallel do default(none) shared(self, problem, operator, beta, rows) &
       !$omp private(i, j, d, r, g, v, t, first, second) num_threads(problem%threads)
-      do j = 1, problem%ny
+      do j = 1, problem%rows
          do i = 1, problem%nx
             g = 0.0_dp
             v = 0.0_dp
@@ -100,9 +100,9 @@ contains
                   call problem%law%bound_variation(problem%pressure(i, j), problem%slope_at(i, j), d, v, &
                      first, second)
                   t = v + first*d
-                  bends(j) = bends(j) + dot_product(second*d + 2.0_dp*first*v, r)
+                  rows(2, j) = rows(2, j) + dot_product(second*d + 2.0_dp*first*v, r)
                end if
-               ascents(j) = ascents(j) + dot_product(t, g)
+               rows(1, j) = rows(1, j) + dot_product(t, g)
             end if
             self%gradient(i, :, j) = g
             self%direction(i, :, j) = v
@@ -111,8 +111,9 @@ contains
          call operator%forward_row(1, j, self%tangent(:, 1, j))
          call operator%forward_row(2, j, self%tangent(:, 2, j))
       end do
-      ascent = row_total(ascents)
-      bend = row_total(bends)
+      totals = row_totals(rows)
+      ascent = totals(1)
+      bend = totals(2)
    end subroutine new_direction
 
    !> beta of eq. 3.14, with y = g' - g; the old g is in `gradient` still.
@@ -120,26 +121,26 @@ contains
       type(friction_thesis_type), intent(in) :: self
       type(friction_problem_type), intent(in) :: problem
       real(dp) :: beta
-      real(dp), allocatable :: ty(:), yg(:), tg(:), yy(:)
+      real(dp), allocatable :: rows(:, :)          !! t.y, y.g', t.g', y.y
       real(dp) :: d(2), r(2), g(2), y(2), t(2), products(4)
       integer :: i, j
 
-      allocate (ty(problem%ny), yg(problem%ny), tg(problem%ny), yy(problem%ny), source=0.0_dp)
-      !$omp parallel do default(none) shared(self, problem, ty, yg, tg, yy) private(i, j, d, r, g, y, t) &
+      allocate (rows(4, problem%rows), source=0.0_dp)
+      !$omp parallel do default(none) shared(self, problem, rows) private(i, j, d, r, g, y, t) &
       !$omp num_threads(problem%threads)
-      do j = 1, problem%ny
+      do j = 1, problem%rows
          do i = 1, problem%nx
             if (problem%contact(i, j) == contact_open) cycle
             call perpendicular(problem, i, j, d, r, g)
             y = g - self%gradient(i, :, j)
             t = self%tangent(i, :, j)
-            ty(j) = ty(j) + dot_product(t, y)
-            yg(j) = yg(j) + dot_product(y, g)
-            tg(j) = tg(j) + dot_product(t, g)
-            yy(j) = yy(j) + dot_product(y, y)
+            rows(1, j) = rows(1, j) + dot_product(t, y)
+            rows(2, j) = rows(2, j) + dot_product(y, g)
+            rows(3, j) = rows(3, j) + dot_product(t, g)
+            rows(4, j) = rows(4, j) + dot_product(y, y)
          end do
       end do
-      products = [row_total(ty), row_total(yg), row_total(tg), row_total(yy)]
+      products = row_totals(rows)
       beta = 0.0_dp
       if (abs(products(1)) > 0.0_dp) &
          beta = -products(2)/products(1) + theta*products(3)*products(4)/products(1)**2

@@ -17,9 +17,10 @@ module friction_directions
       real(dp) :: displacement(2) = 0.0_dp   !! m
    end type uniform_type
 
-   !> Sums of `unscaled_row`.
+   !> Sums of `unscaled_row` and `scaled_row`.
    type :: z_sums_type
       real(dp) :: gz = 0.0_dp                !! g.z
+      real(dp) :: cross = 0.0_dp             !! g.z_old, of `scaled_row`
       real(dp) :: total(2) = 0.0_dp          !! z
       real(dp) :: bent(2) = 0.0_dp           !! (curvature of the bound) w z
    end type z_sums_type
@@ -75,7 +76,7 @@ contains
       real(dp), intent(in), contiguous :: r(:, :)          !! [nx, 2] m
       real(dp), intent(in), contiguous :: tangent(:, :)    !! [nx, 3]
       real(dp), intent(inout), contiguous :: z(:, :)       !! [nx, 2] in: the preconditioned field
-      type(z_sums_type), intent(out) :: sums
+      type(z_sums_type), intent(inout) :: sums             !! in: with g.z_old
       real(dp) :: rv, rx_z, ry_z, gx, gy, bent, over, rz, sx, sy, bx, by, cx, cy, mean_x, mean_y
       integer :: i
 
@@ -109,7 +110,9 @@ contains
          bx = bx + bent*gx
          by = by + bent*gy
       end do
-      sums = z_sums_type(rz, [sx, sy], [bx, by])
+      sums%gz = rz
+      sums%total = [sx, sy]
+      sums%bent = [bx, by]
    end subroutine unscaled_row
 
    !> d = z + w Z c + beta Z d of a row, z' = z + w Z c; g.d and the curvature of the bounds along d.
@@ -153,15 +156,15 @@ contains
       type(z_sums_type), intent(in) :: rows(:)
       type(z_sums_type) :: total
       real(dp), allocatable :: packed(:, :)
-      real(dp) :: sums(5)
+      real(dp) :: sums(6)
       integer :: j
 
-      allocate (packed(5, size(rows)))
+      allocate (packed(6, size(rows)))
       do j = 1, size(rows)
-         packed(:, j) = [rows(j)%gz, rows(j)%total, rows(j)%bent]
+         packed(:, j) = [rows(j)%gz, rows(j)%cross, rows(j)%total, rows(j)%bent]
       end do
       sums = row_totals(packed)
-      total = z_sums_type(sums(1), sums(2:3), sums(4:5))
+      total = z_sums_type(sums(1), sums(2), sums(3:4), sums(5:6))
    end function total_of_z
 
    !> Sums of a direction.

@@ -1,6 +1,6 @@
 !> The fields of the tangential problem: the caller's, and those that the methods share.
 !>
-!> Vector fields have the shape [nx, 2, ny], so that a row of both components is one contiguous argument.
+!> Vector fields have the shape [nx, 2, rows], so that a row of both components is one contiguous argument.
 module friction_fields
    use asperity_precision, only : dp, int8
    implicit none
@@ -10,16 +10,16 @@ module friction_fields
 
    !> The caller's fields.
    type :: friction_fields_type
-      real(dp), pointer, contiguous :: pressure(:, :) => null()    !! [nx, ny] P, Pa
-      real(dp), pointer, contiguous :: slope_x(:, :) => null()     !! [nx, ny] H_x; any size without slope
-      real(dp), pointer, contiguous :: slope_y(:, :) => null()     !! [nx, ny] H_y
-      real(dp), pointer, contiguous :: drive(:, :, :) => null()    !! [nx, 2, ny] DX', m
-      !> [nx, 2, ny] T_h, a given traction, Pa: r = DX' - A (T + T_h) at no cost of a product. May be
+      real(dp), pointer, contiguous :: pressure(:, :) => null()    !! [nx, rows] P, Pa
+      real(dp), pointer, contiguous :: slope_x(:, :) => null()     !! [nx, rows] H_x; any size without slope
+      real(dp), pointer, contiguous :: slope_y(:, :) => null()     !! [nx, rows] H_y
+      real(dp), pointer, contiguous :: drive(:, :, :) => null()    !! [nx, 2, rows] DX', m
+      !> [nx, 2, rows] T_h, a given traction, Pa: r = DX' - A (T + T_h) at no cost of a product. May be
       !> missing.
       real(dp), pointer, contiguous :: past(:, :, :) => null()
-      real(dp), pointer, contiguous :: traction(:, :, :) => null() !! [nx, 2, ny] T, Pa; in: the start
-      real(dp), pointer, contiguous :: slip(:, :, :) => null()     !! [nx, 2, ny] out: r, everywhere, m
-      !> [nx, ny] In: 0 open, 1 in contact, 2 in contact and likely to slip, as it did in the step
+      real(dp), pointer, contiguous :: traction(:, :, :) => null() !! [nx, 2, rows] T, Pa; in: the start
+      real(dp), pointer, contiguous :: slip(:, :, :) => null()     !! [nx, 2, rows] out: r, everywhere, m
+      !> [nx, rows] In: 0 open, 1 in contact, 2 in contact and likely to slip, as it did in the step
       !> before: its traction starts on the bound. Without adhesion a point with P <= 0 is taken as
       !> open. Out: 0 open, 1 stick, 2 slip.
       integer(int8), pointer, contiguous :: contact(:, :) => null()
@@ -27,9 +27,9 @@ module friction_fields
 
    !> Fields of a solution beside the caller's; module `friction_rows` says what they hold.
    type :: friction_work_type
-      real(dp), allocatable :: bound(:, :, :)      !! [nx, 2, ny] F, Pa, and N_z of the road
-      real(dp), allocatable :: tangent(:, :, :)    !! [nx, 3, ny] direction of slip and weight
-      real(dp), allocatable :: old(:, :, :)        !! [nx, 2, ny] T before the last move, Pa
+      real(dp), allocatable :: bound(:, :, :)      !! [nx, 2, rows] F, Pa, and N_z of the road
+      real(dp), allocatable :: tangent(:, :, :)    !! [nx, 3, rows] direction of slip and weight
+      real(dp), allocatable :: old(:, :, :)        !! [nx, 2, rows] T before the last move, Pa
    end type friction_work_type
 
 end module friction_fields

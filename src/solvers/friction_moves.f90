@@ -21,7 +21,7 @@ contains
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
       real(dp), intent(in) :: step
-      real(dp), intent(in), contiguous :: direction(:, :, :)     !! [nx, 2, ny] d, Pa
+      real(dp), intent(in), contiguous :: direction(:, :, :)     !! [nx, 2, rows] d, Pa
       logical, intent(in) :: again                   !! from the T before the last move
       logical, intent(in) :: transform               !! transform the rows of T' on the way
       logical, intent(out) :: returned               !! points were put back
@@ -39,7 +39,7 @@ contains
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
       real(dp), intent(in) :: step
-      real(dp), intent(in), contiguous :: direction(:, :, :)     !! [nx, 2, ny] d, Pa
+      real(dp), intent(in), contiguous :: direction(:, :, :)     !! [nx, 2, rows] d, Pa
       logical, intent(in) :: again                   !! from the T before the last move
       logical, intent(out) :: returned               !! points were put back
       type(move_type) :: how
@@ -124,10 +124,10 @@ contains
       type(move_sums_type), allocatable :: rows(:)
       integer :: j
 
-      allocate (rows(problem%ny))
+      allocate (rows(problem%rows))
       !$omp parallel do default(none) shared(problem, operator, how, direction, transform, rows) &
       !$omp private(j) num_threads(problem%threads)
-      do j = 1, problem%ny
+      do j = 1, problem%rows
          call move_row(problem, how, direction(:, :, j), j, rows(j))
          if (transform) call problem%transform_row(operator, j)
       end do

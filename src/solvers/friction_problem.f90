@@ -25,13 +25,13 @@
 !> softer than the contact needs few such moves. A mass in the place of a spring needs none.
 !>
 !> Each pass over the fields is one loop over rows, fused with the transforms of its row. Sums are
-!> formed by row and added up in order: the results do not depend on the number of threads.
+!> formed by row and added up in order: the results do not depend on the number of threads or processes.
 module friction_problem
    use asperity_precision, only : dp, int8
    use fft_conv, only : columns_apply, convolution_type
    use friction_fields, only : friction_fields_type, friction_work_type
    use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type
-   use field_sums, only : field_sum, row_total
+   use field_sums, only : row_total, vector_sum
    use friction_rows, only : measure_sums_type, measured_row, row_constants_type, site_columns, &
       tangent_row, total_of
    implicit none
@@ -46,7 +46,8 @@ module friction_problem
    !> The problem, and the state of its solution.
    type, extends(friction_fields_type) :: friction_problem_type
       type(friction_law_type) :: law
-      integer :: nx = 0, ny = 0
+      integer :: nx = 0
+      integer :: rows = 0                    !! of this process
       integer :: threads = 1
       real(dp) :: compliance = 0.0_dp        !! a_0: displacement of a cell under its own unit traction
       !> Of the mean mode along x and y where it is soft, over the number of cells; else 0.
@@ -98,13 +99,13 @@ contains
       integer, allocatable :: cells(:)
       integer :: j
 
-      allocate (sizes(self%ny), cells(self%ny))
+      allocate (sizes(self%rows), cells(self%rows))
       self%constants = row_constants_type(coefficient=self%law%reach_coefficient(), &
          strength=self%law%strength_beside(), physical=self%law%slope .and. self%law%physical_slip, &
          compliance=self%compliance, stiffest=stiffest, on_bound=on_bound, outermost=outermost)
       !$omp parallel do default(none) shared(self, operator, sizes, cells) private(j) &
       !$omp num_threads(self%threads)
-      do j = 1, self%ny
+      do j = 1, self%rows
          call start_row(self, j, cells(j), sizes(j))
          call self%transform_row(operator, j)
       end do
@@ -208,7 +209,7 @@ contains
       integer :: j
 
       !$omp parallel do default(none) shared(self, operator) private(j) num_threads(self%threads)
-      do j = 1, self%ny
+      do j = 1, self%rows
          call self%transform_row(operator, j)
       end do
    end subroutine transform_tractions
@@ -253,10 +254,10 @@ contains
       type(measure_sums_type), allocatable :: rows(:)
       integer :: j
 
-      allocate (rows(self%ny))
+      allocate (rows(self%rows))
       !$omp parallel do default(none) shared(self, operator, factor, rows) private(j) &
       !$omp num_threads(self%threads)
-      do j = 1, self%ny
+      do j = 1, self%rows
          call take_slip_row(self, operator, factor, j)
          call measure_row(self, j, rows(j))
       end do
@@ -291,7 +292,7 @@ contains
       call follow_total(self)
       do c = 1, 2
          !$omp parallel do default(none) shared(self, c) private(j) num_threads(self%threads)
-         do j = 1, self%ny
+         do j = 1, self%rows
             self%slip(:, c, j) = self%drive(:, c, j)
          end do
       end do
@@ -315,9 +316,9 @@ contains
       type(measure_sums_type), allocatable :: rows(:)
       integer :: j
 
-      allocate (rows(self%ny))
+      allocate (rows(self%rows))
       !$omp parallel do default(none) shared(self, way, rows) private(j) num_threads(self%threads)
-      do j = 1, self%ny
+      do j = 1, self%rows
          self%slip(:, 1, j) = self%slip(:, 1, j) + way(1)
          self%slip(:, 2, j) = self%slip(:, 2, j) + way(2)
          call measure_row(self, j, rows(j))
@@ -332,7 +333,7 @@ contains
 
       if (.not. any(self%pulled)) return
       before = self%offset
-      self%total = [field_sum(self%traction(:, 1, :)), field_sum(self%traction(:, 2, :))]
+      self%total = vector_sum(self%traction)
       where (self%pulled) self%offset = self%spring_end - self%spring*(self%total - self%pull)
       self%offset_step = self%offset - before
    end subroutine follow_total
@@ -340,12 +341,12 @@ contains
    !> Add the part of the spring to the form d.A d of a direction.
    subroutine add_spring(self, direction, form)
       class(friction_problem_type), intent(inout) :: self
-      real(dp), intent(in), contiguous :: direction(:, :, :)   !! [nx, 2, ny]
+      real(dp), intent(in), contiguous :: direction(:, :, :)   !! [nx, 2, rows]
       real(dp), intent(inout) :: form
       real(dp) :: total(2)
 
       if (.not. any(self%pulled)) return
-      total = [field_sum(direction(:, 1, :)), field_sum(direction(:, 2, :))]
+      total = vector_sum(direction)
       form = form + sum(self%spring*total**2, self%pulled)
    end subroutine add_spring
 

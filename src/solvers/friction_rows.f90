@@ -18,7 +18,7 @@
 !> The sums of a row are small types with named components; `total_of` adds those of all rows in order.
 module friction_rows
    use asperity_precision, only : dp
-   use field_sums, only : largest_of_rows, row_totals
+   use field_sums, only : row_totals, sum_rows
    implicit none
    private
 
@@ -303,19 +303,19 @@ contains
       type(measure_sums_type), intent(in) :: rows(:)
       type(measure_sums_type) :: total
       real(dp), allocatable :: packed(:, :)
-      real(dp) :: sums(13)
+      real(dp) :: sums(13), largest
       integer :: j
 
-      allocate (packed(13, size(rows)))
+      allocate (packed(14, size(rows)))
       do j = 1, size(rows)
          associate (row => rows(j))
             packed(:, j) = [row%released, row%slipping, row%drive, row%displaced, row%residual, &
-               row%tangent, row%curved, row%gain]
+               row%tangent, row%curved, row%gain, row%largest]
          end associate
       end do
-      sums = row_totals(packed)
+      call sum_rows(packed, sums, largest)
       total = measure_sums_type(sums(1), sums(2), sums(3), sums(4), sums(5:6), sums(7:9), sums(10:12), &
-         sums(13), largest_of_rows(rows%largest))
+         sums(13), largest)
    end function total_of_measures
 
 end module friction_rows
