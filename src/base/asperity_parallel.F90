@@ -51,9 +51,9 @@ module asperity_parallel
       module procedure :: hand_reals, hand_bytes
    end interface hand_to_first
 
-   integer, save :: processes = 1              !! number of processes
-   integer, save :: number = 0                 !! of this process, from 0
-   integer, save :: neighbours = 1             !! processes on this machine
+   integer :: processes = 1              !! number of processes
+   integer :: number = 0                 !! of this process, from 0
+   integer :: neighbours = 1             !! processes on this machine
 
 contains
 

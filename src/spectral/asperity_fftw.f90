@@ -115,12 +115,11 @@ module asperity_fftw
          type(c_ptr), value :: plan, in, out
       end subroutine fftwf_execute_dft
 
-      type(c_ptr) function fftw_plan_r2r_2d(n0, n1, in, out, kind0, kind1, flags) &
-         bind(c, name='fftw_plan_r2r_2d')
+      type(c_ptr) function fftw_plan_r2r_1d(n, in, out, kind, flags) bind(c, name='fftw_plan_r2r_1d')
          import :: c_int, c_ptr
-         integer(c_int), value :: n0, n1, kind0, kind1, flags
+         integer(c_int), value :: n, kind, flags
          type(c_ptr), value :: in, out
-      end function fftw_plan_r2r_2d
+      end function fftw_plan_r2r_1d
 
       subroutine fftw_execute_r2r(plan, in, out) bind(c, name='fftw_execute_r2r')
          import :: c_ptr

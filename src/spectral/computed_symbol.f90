@@ -3,6 +3,7 @@
 !> For a scalar solid on a periodic grid. The numbers are those of the table of module `fft_conv`, to the
 !> last bit. A product takes longer, so that this is for operators that are seldom used.
 module computed_symbol
+   use asperity_parallel, only : global_sum
    use asperity_precision, only : dp, pi
    use kernels, only : kernel_type
    use regular_grid, only : grid_type
@@ -43,6 +44,7 @@ contains
       symbol%inverse = inverse
       symbol%sums => sums
       call transform%columns_through(symbol)
+      if (grid%shared) sums = reshape(global_sum(reshape(sums, [size(sums)])), shape(sums))
       form = 0.0_dp
       do b = 1, size(sums, 2)
          do i = 1, block

@@ -18,7 +18,7 @@ module fft_conv
    use asperity_errors, only : error_input, error_type, fail
    use computed_symbol, only : columns_computed
    use kernels, only : kernel_type
-   use asperity_parallel, only : thread_count
+   use asperity_parallel, only : global_max, global_sum, thread_count
    use asperity_precision, only : dp, int64, sp, power_of_two
    use regular_grid, only : boundary_periodic, grid_type
    use row_column_double, only : new_row_column_double => new_row_column, &
@@ -53,9 +53,12 @@ module fft_conv
       integer :: threads = 1                !! for parallel loops around forward_row, backward_row
       integer(int64) :: ffts = 0            !! real transforms done so far
       logical :: single = .false.           !! the transforms are in single precision
+      logical :: shared = .false.           !! processes share the rows
       type(grid_type) :: grid               !! of an operator of a solid
       type(kernel_type) :: kernel           !! what the solid is
-      !> Symbols over (mx my): (0:, 0:my/2, 1) or xx, yy, xy; zero beyond mx/2. Not there if single or lean.
+      integer, private :: own(2) = 0        !! first and last wave number along x of this process
+      !> Symbols over (mx my): (own(1):own(2), 0:my/2, 1) or xx, yy, xy; zero beyond mx/2. Not there if
+      !> single or lean.
       real(dp), allocatable, private :: symbol(:, :, :)
       type(row_column_double_type), private :: high        !! does the work if not single
       type(row_column_single_type), private :: low         !! does the work if single
@@ -107,7 +110,7 @@ contains
       if (grid%boundary /= boundary_periodic .or. kernel%components > 1 .or. self%single) tabulated = .true.
       if (.not. tabulated) return
       call new_table(self)
-      call kernel%symbols(grid, self%mx, self%my, self%symbol(0:self%mx/2, :, :))
+      call kernel%symbols(grid, self%mx, self%my, self%symbol(self%own(1):last_mode(self), :, :), self%own(1))
       call finish_symbol(self)
    end subroutine new_convolution
 
@@ -123,7 +126,7 @@ contains
       self%grid = grid
       self%kernel = kernel
       call new_table(self)
-      call kernel%inverse_symbols(grid, self%symbol(0:self%mx/2, :, :))
+      call kernel%inverse_symbols(grid, self%symbol(self%own(1):last_mode(self), :, :), self%own(1))
       call finish_symbol(self)
    end subroutine new_inverse_convolution
 
@@ -154,14 +157,23 @@ contains
       call finish_symbol(self)
    end subroutine new_shared_symbol_operator
 
+   !> Last wave number along x for which this process has a symbol.
+   pure integer function last_mode(self)
+      class(convolution_type), intent(in) :: self
+
+      last_mode = min(self%own(2), self%mx/2)
+   end function last_mode
+
    !> Put the factor of the inverse transform into the symbol; in single precision where that works.
    subroutine finish_symbol(self)
       type(convolution_type), intent(inout) :: self
 
       self%symbol = self%symbol/(real(self%mx, dp)*self%my)
       if (.not. self%single) return
-      self%symbol_unit = power_of_two(maxval(abs(self%symbol)))
-      allocate (self%low_symbol(0:ubound(self%symbol, 1), 0:self%my/2, size(self%symbol, 3)))
+      self%symbol_unit = maxval(abs(self%symbol))
+      if (self%shared) self%symbol_unit = global_max(self%symbol_unit)
+      self%symbol_unit = power_of_two(self%symbol_unit)
+      allocate (self%low_symbol(self%own(1):self%own(2), 0:self%my/2, size(self%symbol, 3)))
       self%low_symbol = real(self%symbol/self%symbol_unit, sp)
       deallocate (self%symbol)
    end subroutine finish_symbol
@@ -177,6 +189,7 @@ contains
       self%nx = shape%nx
       self%ny = shape%ny
       self%rows = shape%rows()
+      self%shared = shape%shared
       self%mx = shape%mx
       self%my = shape%my
       self%components = shape%components
@@ -184,8 +197,10 @@ contains
       if (present(single)) self%single = single
       if (self%single) then
          call new_row_column_single(self%low, shape, self%threads, error, memory)
+         self%own = self%low%own_columns()
       else
          call new_row_column_double(self%high, shape, self%threads, error, memory)
+         self%own = self%high%own_columns()
       end if
    end subroutine plan
 
@@ -193,8 +208,8 @@ contains
    subroutine new_table(self)
       type(convolution_type), intent(inout) :: self
 
-      allocate (self%symbol(0:max(self%low%longest, self%high%longest), 0:self%my/2, &
-         merge(1, 3, self%components == 1)), source=0.0_dp)
+      allocate (self%symbol(self%own(1):self%own(2), 0:self%my/2, merge(1, 3, self%components == 1)), &
+         source=0.0_dp)
    end subroutine new_table
 
    !> The memory of the spectrum, aligned for FFTW, of at least a field of doubles (half of that if
@@ -350,7 +365,7 @@ contains
    end subroutine set_unit
 
    !> One part of the symbol for a field and its transform without factors, in the first quarter of the
-   !> plane of wave numbers. Not for a single or lean operator.
+   !> plane of wave numbers. Not for a single or lean operator, nor where processes share the rows.
    pure function symbol_of(self, part) result(table)
       class(convolution_type), intent(in) :: self
       integer, intent(in) :: part                  !! 1; of a vector operator 1: xx, 2: yy, 3: xy
@@ -361,34 +376,48 @@ contains
 
    !> Displacement of a cell under a unit traction on that cell alone, the mean of both components: the
    !> mean of the symbols over the whole spectrum; without the mean mode where periodic. Not for a single
-   !> or lean operator.
-   pure function self_compliance(self) result(compliance)
+   !> or lean operator. Collective where processes share the rows.
+   function self_compliance(self) result(compliance)
       class(convolution_type), intent(in) :: self
       real(dp) :: compliance
-      real(dp) :: weight
+      real(dp) :: columns(0:self%mx/2), weight
       integer :: i, j
 
-      compliance = 0.0_dp
+      columns = 0.0_dp
       do j = 0, self%my/2
-         do i = 0, self%mx/2
+         do i = self%own(1), last_mode(self)
             if (self%grid%boundary == boundary_periodic .and. i == 0 .and. j == 0) cycle
             weight = merge(1.0_dp, 2.0_dp, i == 0 .or. 2*i == self%mx) &
                *merge(1.0_dp, 2.0_dp, j == 0 .or. 2*j == self%my)
-            compliance = compliance &
+            columns(i) = columns(i) &
                + 0.5_dp*weight*(self%symbol(i, j, 1) + self%symbol(i, j, self%components))
          end do
       end do
+      if (self%shared) columns = global_sum(columns)
+      compliance = sum(columns)
    end function self_compliance
 
    !> The mean mode: the uniform displacement that goes with tractions whose sum over the cells is 1 Pa.
-   !> Not for a single or lean operator, nor the procedures that set it.
-   pure function mean_mode(self, component) result(mode)
+   !> Not for a single or lean operator, nor the procedures that set it. Collective where processes share
+   !> the rows.
+   function mean_mode(self, component) result(mode)
       class(convolution_type), intent(in) :: self
       integer, intent(in) :: component             !! 1, or 2 of a vector operator
       real(dp) :: mode                             !! m/Pa
+      real(dp) :: modes(1)
 
-      mode = self%symbol(0, 0, component)
+      modes = 0.0_dp
+      if (has_mean_mode(self)) modes = self%symbol(0, 0, component)
+      if (self%shared) modes = global_sum(modes)
+      mode = modes(1)
    end function mean_mode
+
+   !> Does this process hold the symbol of the mean mode?
+   pure logical function has_mean_mode(self)
+      class(convolution_type), intent(in) :: self
+
+      has_mean_mode = self%own(1) == 0 .and. self%own(2) >= 0
+   end function has_mean_mode
 
    !> Set the mean mode of one component.
    subroutine set_mean_mode(self, component, mode)
@@ -396,7 +425,7 @@ contains
       integer, intent(in) :: component
       real(dp), intent(in) :: mode                 !! as `mean_mode` gives it, m/Pa
 
-      self%symbol(0, 0, component) = mode
+      if (has_mean_mode(self)) self%symbol(0, 0, component) = mode
    end subroutine set_mean_mode
 
    !> Set the mean mode of all components of a periodic operator by the compliance for a uniform traction:

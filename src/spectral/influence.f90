@@ -5,16 +5,27 @@
 !> holds a quarter of the plane: all coefficients are even in x and y, but that of the coupling xy, which
 !> is odd in both.
 module influence
-   use, intrinsic :: iso_c_binding, only : c_f_pointer, c_int, c_loc, c_ptr, c_size_t
+   use, intrinsic :: iso_c_binding, only : c_associated, c_f_pointer, c_int, c_null_ptr, c_ptr, c_size_t
    use asperity_fftw, only : fftw_alloc_real, fftw_destroy_plan, fftw_estimate, fftw_execute_r2r, &
-      fftw_free, fftw_plan_r2r_2d, fftw_redft00, fftw_rodft00
+      fftw_free, fftw_plan_r2r_1d, fftw_redft00, fftw_rodft00
    use asperity_precision, only : dp, pi
    use regular_grid, only : boundary_periodic
    use transform_lengths, only : good_length
    implicit none
    private
 
-   public :: love_normal, love_tangential, transform_even, transform_length, transform_odd
+   public :: line_transform_type, love_normal, love_tangential, new_line_transform, transform_length
+
+   !> Transforms of coefficients along a direction. Not to be copied.
+   type :: line_transform_type
+      integer, private :: m = 0            !! length of the circle
+      integer, private :: points = 0       !! coefficients that are transformed
+      logical, private :: odd = .false.    !! else even
+      type(c_ptr), private :: plan = c_null_ptr
+   contains
+      procedure :: transform_lines
+      procedure :: destroy => destroy_line_transform
+   end type line_transform_type
 
 contains
 
@@ -80,49 +91,59 @@ contains
       end if
    end function transform_length
 
-   !> Transform of coefficients that are even in both directions, in place; mx and my even.
-   subroutine transform_even(mx, my, table)
-      integer, intent(in) :: mx, my
-      real(dp), intent(inout) :: table(0:mx/2, 0:my/2)
+   !> Plan the transforms of lines of coefficients 0 to m/2 that are even, or odd, on a circle of m.
+   subroutine new_line_transform(self, m, odd)
+      type(line_transform_type), intent(out) :: self
+      integer, intent(in) :: m                     !! even
+      logical, intent(in) :: odd
+      type(c_ptr) :: memory
 
-      call transform_real(mx/2 + 1, my/2 + 1, fftw_redft00, table)
-   end subroutine transform_even
-
-   !> Transform of coefficients that are odd in both directions, in place; mx and my even.
-   !> Two sine transforms, each with the factor -i, make it real and negative.
-   subroutine transform_odd(mx, my, table)
-      integer, intent(in) :: mx, my
-      real(dp), intent(inout) :: table(0:mx/2, 0:my/2)
-      real(dp), allocatable :: inner(:, :)
-
-      inner = -table(1:mx/2 - 1, 1:my/2 - 1)
-      table = 0.0_dp
-      if (size(inner) == 0) return
-      call transform_real(mx/2 - 1, my/2 - 1, fftw_rodft00, inner)
-      table(1:mx/2 - 1, 1:my/2 - 1) = inner
-   end subroutine transform_odd
-
-   !> A real transform of one kind in both directions, in place.
-   subroutine transform_real(nx, ny, kind, table)
-      integer, intent(in) :: nx, ny
-      integer(c_int), intent(in) :: kind
-      real(dp), intent(inout) :: table(nx, ny)
-      type(c_ptr) :: memory, plan
-      real(dp), pointer :: work(:, :)
-
-      memory = fftw_alloc_real(int(nx, c_size_t)*ny)
-      call c_f_pointer(memory, work, [nx, ny])
+      self%m = m
+      self%odd = odd
+      self%points = merge(m/2 - 1, m/2 + 1, odd)
+      if (self%points == 0) return
+      memory = fftw_alloc_real(int(self%points, c_size_t))
       !$omp critical (fftw_planner)
-      plan = fftw_plan_r2r_2d(int(ny, c_int), int(nx, c_int), memory, memory, kind, kind, &
-         fftw_estimate)
-      !$omp end critical (fftw_planner)
-      work(:, :) = table
-      call fftw_execute_r2r(plan, memory, memory)
-      table(:, :) = work
-      !$omp critical (fftw_planner)
-      call fftw_destroy_plan(plan)
+      self%plan = fftw_plan_r2r_1d(int(self%points, c_int), memory, memory, &
+         merge(fftw_rodft00, fftw_redft00, odd), fftw_estimate)
       !$omp end critical (fftw_planner)
       call fftw_free(memory)
-   end subroutine transform_real
+   end subroutine new_line_transform
+
+   !> Transform lines in place; several threads may call this at once. The transform of an odd line has the
+   !> factor -i, which is left out: two of them, along x and y, are real and negative.
+   subroutine transform_lines(self, lines)
+      class(line_transform_type), intent(in) :: self
+      real(dp), intent(inout) :: lines(0:, :)      !! [0:m/2, lines]
+      type(c_ptr) :: memory
+      real(dp), pointer :: work(:)
+      integer :: first, k
+
+      first = merge(1, 0, self%odd)
+      if (self%points > 0) then
+         memory = fftw_alloc_real(int(self%points, c_size_t))
+         call c_f_pointer(memory, work, [self%points])
+         do k = 1, size(lines, 2)
+            work(:) = lines(first:first + self%points - 1, k)
+            call fftw_execute_r2r(self%plan, memory, memory)
+            lines(first:first + self%points - 1, k) = work
+         end do
+         call fftw_free(memory)
+      end if
+      if (.not. self%odd) return
+      lines(0, :) = 0.0_dp
+      lines(self%m/2, :) = 0.0_dp
+   end subroutine transform_lines
+
+   !> Free the plan.
+   subroutine destroy_line_transform(self)
+      class(line_transform_type), intent(inout) :: self
+
+      if (.not. c_associated(self%plan)) return
+      !$omp critical (fftw_planner)
+      call fftw_destroy_plan(self%plan)
+      !$omp end critical (fftw_planner)
+      self%plan = c_null_ptr
+   end subroutine destroy_line_transform
 
 end module influence

@@ -15,7 +15,7 @@
 !>     one cell      Love 1929; Kalker 1990 (module `influence`)
 module kernels
    use asperity_precision, only : dp, pi
-   use influence, only : love_normal, love_tangential, transform_even, transform_odd
+   use influence, only : line_transform_type, love_normal, love_tangential, new_line_transform
    use regular_grid, only : boundary_periodic, grid_type
    implicit none
    private
@@ -167,52 +167,98 @@ contains
       stiffness = 1.0_dp/self%compliance(pi/merge(grid%dx, sqrt(grid%dx*grid%dy), grid%ny == 1))
    end function largest_stiffness
 
-   !> A for all wave numbers of the transforms of a grid: the first quarter of the plane, since xx and yy
-   !> are even in both wave numbers and xy is odd in both.
-   subroutine symbols(self, grid, mx, my, table)
+   !> A for the wave numbers of the transforms of a grid: the first quarter of the plane, since xx and yy
+   !> are even in both wave numbers and xy is odd in both. The table may hold a part of the wave numbers
+   !> along x.
+   subroutine symbols(self, grid, mx, my, table, first)
       class(kernel_type), intent(in) :: self
       type(grid_type), intent(in) :: grid
       integer, intent(in) :: mx, my                    !! lengths of the transforms
-      real(dp), intent(out) :: table(0:, 0:, :)        !! [0:mx/2, 0:my/2, 1 or 3], m/Pa
+      real(dp), intent(out) :: table(0:, 0:, :)        !! [0:mx/2 or less, 0:my/2, 1 or 3], m/Pa
+      integer, intent(in), optional :: first           !! wave number along x of table(0, :, :), 0 if absent
       real(dp) :: a(3)
-      integer :: i, j
+      integer :: start, i, j
 
-      if (grid%boundary == boundary_periodic) then
-         !$omp parallel do default(none) shared(self, grid, mx, my, table) private(i, j, a)
-         do j = 0, my/2
-            do i = 0, mx/2
-               a = self%tensor(2.0_dp*pi*(i/grid%lx), 2.0_dp*pi*(j/grid%ly))
-               ! An odd symbol has no value on the Nyquist lines.
-               if (2*i == mx .or. 2*j == my) a(3) = 0.0_dp
-               table(i, j, :) = a(:size(table, 3))
-            end do
-         end do
-      else
-         !$omp parallel do default(none) shared(self, grid, mx, my, table) private(i, j, a)
-         do j = 0, my/2
-            do i = 0, mx/2
-               a = self%cell(i*grid%dx, j*grid%dy, grid%dx, grid%dy)
-               table(i, j, :) = a(:size(table, 3))
-            end do
-         end do
-         call transform_even(mx, my, table(0:mx/2, 0:my/2, 1))
-         if (size(table, 3) == 1) return
-         call transform_even(mx, my, table(0:mx/2, 0:my/2, 2))
-         call transform_odd(mx, my, table(0:mx/2, 0:my/2, 3))
+      start = 0
+      if (present(first)) start = first
+      if (grid%boundary /= boundary_periodic) then
+         call cell_symbols(self, grid, mx, my, start, table)
+         return
       end if
+      !$omp parallel do default(none) shared(self, grid, mx, my, start, table) private(i, j, a)
+      do j = 0, my/2
+         do i = start, start + size(table, 1) - 1
+            a = self%tensor(2.0_dp*pi*(i/grid%lx), 2.0_dp*pi*(j/grid%ly))
+            ! An odd symbol has no value on the Nyquist lines.
+            if (2*i == mx .or. 2*j == my) a(3) = 0.0_dp
+            table(i - start, j, :) = a(:size(table, 3))
+         end do
+      end do
    end subroutine symbols
 
-   !> The inverse of A on a periodic grid; 0 where A is 0.
-   subroutine inverse_symbols(self, grid, table)
+   !> The same on a free grid, from the responses to a traction on one cell. Rows are transformed as they are
+   !> formed, and only the part that is wanted is kept.
+   subroutine cell_symbols(self, grid, mx, my, start, table)
       class(kernel_type), intent(in) :: self
       type(grid_type), intent(in) :: grid
-      real(dp), intent(out) :: table(0:, 0:, :)        !! [0:nx/2, 0:ny/2, 1 or 3], Pa/m
+      integer, intent(in) :: mx, my
+      integer, intent(in) :: start
+      real(dp), intent(out) :: table(0:, 0:, :)
+      type(line_transform_type) :: along_x(3), along_y(3)
+      real(dp), allocatable :: line(:, :)
+      real(dp) :: a(3)
+      integer :: parts, c, i, j
+
+      parts = size(table, 3)
+      do c = 1, parts
+         call new_line_transform(along_x(c), mx, odd=c == 3)
+         call new_line_transform(along_y(c), my, odd=c == 3)
+      end do
+      !$omp parallel default(none) shared(self, grid, mx, my, start, table, parts, along_x, along_y) &
+      !$omp private(line, a, c, i, j)
+      allocate (line(0:mx/2, parts))
+      !$omp do
+      do j = 0, my/2
+         do i = 0, mx/2
+            a = self%cell(i*grid%dx, j*grid%dy, grid%dx, grid%dy)
+            line(i, :) = a(:parts)
+         end do
+         do c = 1, parts
+            call along_x(c)%transform_lines(line(:, c:c))
+         end do
+         table(:, j, :) = line(start:start + size(table, 1) - 1, :)
+      end do
+      !$omp end do
+      deallocate (line)
+      allocate (line(0:my/2, 1))
+      do c = 1, parts
+         !$omp do
+         do i = 0, size(table, 1) - 1
+            line(:, 1) = table(i, :, c)
+            call along_y(c)%transform_lines(line)
+            table(i, :, c) = merge(-line(:, 1), line(:, 1), c == 3)
+         end do
+         !$omp end do
+      end do
+      !$omp end parallel
+      do c = 1, parts
+         call along_x(c)%destroy()
+         call along_y(c)%destroy()
+      end do
+   end subroutine cell_symbols
+
+   !> The inverse of A on a periodic grid; 0 where A is 0.
+   subroutine inverse_symbols(self, grid, table, first)
+      class(kernel_type), intent(in) :: self
+      type(grid_type), intent(in) :: grid
+      real(dp), intent(out) :: table(0:, 0:, :)        !! [0:nx/2 or less, 0:ny/2, 1 or 3], Pa/m
+      integer, intent(in), optional :: first           !! wave number along x of table(0, :, :), 0 if absent
       real(dp) :: determinant, a(3)
       integer :: i, j
 
-      call self%symbols(grid, grid%nx, grid%ny, table)
+      call self%symbols(grid, grid%nx, grid%ny, table, first)
       do j = 0, grid%ny/2
-         do i = 0, grid%nx/2
+         do i = 0, size(table, 1) - 1
             if (self%components == 1) then
                if (table(i, j, 1) > 0.0_dp) table(i, j, 1) = 1.0_dp/table(i, j, 1)
             else

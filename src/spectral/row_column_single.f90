@@ -25,6 +25,6 @@ module row_column_single
 
    public :: new_row_column, row_column_type
 
-   include 'row_column.inc'      ! state 9f8d85b9, written by tools/check_sources.py --update
+   include 'row_column.inc'      ! state f41021a1, written by tools/check_sources.py --update
 
 end module row_column_single
