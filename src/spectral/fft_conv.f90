@@ -153,7 +153,7 @@ contains
       call plan(self, shape, error, single)
       if (allocated(error)) return
       call new_table(self)
-      self%symbol(0:shape%nx/2, :, 1) = symbol
+      self%symbol(self%own(1):last_mode(self), :, 1) = symbol(self%own(1):last_mode(self), :)
       call finish_symbol(self)
    end subroutine new_shared_symbol_operator
 
