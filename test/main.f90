@@ -1,6 +1,7 @@
 !> The one driver of the Fortran tests: all suites, or the suites and tests that the command line names.
 !> A new suite is one line of the table below.
 program main
+   use asperity_parallel, only : end_processes, start_processes
    use check, only : run_suites, suite_type
    use result_writer, only : run_writer
    use test_adhesion_cg, only : run_adhesion_cg
@@ -33,6 +34,7 @@ program main
    use test_result_file, only : run_result_file
    use test_roughness, only : run_roughness
    use test_schur, only : run_schur
+   use test_shared_rows, only : run_shared_rows
    use test_simulation, only : run_simulation
    use test_simulation_adhesion, only : run_simulation_adhesion
    use test_simulation_friction, only : run_simulation_friction
@@ -55,9 +57,11 @@ program main
       stop
    end if
 
+   call start_processes()
    call run_suites([ &
          suite_type('base', run_base), &
          suite_type('field_sums', run_field_sums), &
+         suite_type('shared_rows', run_shared_rows), &
          suite_type('fft_conv', run_fft_conv), &
          suite_type('kernels', run_kernels), &
          suite_type('hdf5_file', run_hdf5_file), &
@@ -97,5 +101,6 @@ program main
          suite_type('schur', run_schur), &
          suite_type('adhesion_free', run_adhesion_free), &
          suite_type('facade', run_facade)])
+   call end_processes()
 
 end program main

@@ -5,6 +5,7 @@ module test_coupled_passes
    use carried_field, only : carry
    use pass_control, only : pass_control_type
    use asperity_precision, only : dp
+   use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use place_forecast, only : new_place_forecast, place_forecast_type
    use simulation_runs, only : check_books, nl, record_type, run_case
    implicit none
@@ -32,21 +33,24 @@ contains
    subroutine carried_fields_move_with_the_contact()
       integer, parameter :: nx = 9, ny = 5
       real(dp), parameter :: cell(2) = [0.5_dp, 0.3_dp]
+      type(grid_type) :: periodic, free
       real(dp) :: field(nx, ny), moved(nx, ny), expected(nx, ny)
       integer :: i, j
 
+      periodic = new_grid(nx, ny, nx*cell(1), ny*cell(2), boundary_periodic)
+      free = new_grid(nx, ny, nx*cell(1), ny*cell(2), boundary_free)
       do j = 1, ny
          do i = 1, nx
             field(i, j) = sin(1.3_dp*i) + cos(2.1_dp*i*j)
          end do
       end do
-      call carry(field, [2, -1]*cell, cell, .true., moved)
+      call carry(periodic, field, [2, -1]*cell, moved)
       expected = cshift(cshift(field, 2, dim=1), -1, dim=2)
       call check_close(maxval(abs(moved - expected)), 0.0_dp, 1.0e-14_dp, 'whole cells, periodic')
-      call carry(field, [-0.25_dp, 0.0_dp]*cell, cell, .true., moved)
+      call carry(periodic, field, [-0.25_dp, 0.0_dp]*cell, moved)
       expected = 0.75_dp*field + 0.25_dp*cshift(field, -1, dim=1)
       call check_close(maxval(abs(moved - expected)), 0.0_dp, 1.0e-14_dp, 'a part of a cell')
-      call carry(field, [1.5_dp, 0.0_dp]*cell, cell, .false., moved)
+      call carry(free, field, [1.5_dp, 0.0_dp]*cell, moved)
       call check_close(moved(3, 2), 0.5_dp*(field(4, 2) + field(5, 2)), 1.0e-14_dp, 'free, inside')
       call check_close(moved(nx, 2), field(nx, 2), 1.0e-14_dp, 'free, at the rim')
    end subroutine carried_fields_move_with_the_contact
@@ -55,11 +59,13 @@ contains
    !> exactly after four steps; after a step of another length nothing is taken for granted.
    subroutine forecast_finds_quadratic_changes()
       integer, parameter :: nx = 12, ny = 5
-      real(dp), parameter :: cell(2) = [0.5_dp, 0.3_dp], motion(2) = [0.5_dp, 0.0_dp]
+      real(dp), parameter :: motion(2) = [0.5_dp, 0.0_dp]
       type(place_forecast_type) :: forecast
+      type(grid_type) :: grid
       real(dp) :: pattern(nx, 2, ny), found(nx, 2, ny), carried(nx, 2, ny), place(nx, 2, ny), pressure(nx, ny)
       integer :: n
 
+      grid = new_grid(nx, ny, 0.5_dp*nx, 0.3_dp*ny, boundary_periodic)
       call random_number(pattern)
       call random_number(pressure)
       call new_place_forecast(forecast, nx, ny)
@@ -67,7 +73,7 @@ contains
       do n = 1, 8
          carried = cshift(found, 1, dim=1)
          place = carried
-         call forecast%follow(merge(0.2_dp, 0.1_dp, n == 8), .true., motion, cell, .true.)
+         call forecast%follow(grid, merge(0.2_dp, 0.1_dp, n == 8), .true., motion)
          call forecast%add(place)
          found = cshift(pattern, n, dim=1)*(1.0_dp + 0.3_dp*n - 0.02_dp*n**2)
          if (n == 7) call check_close(maxval(abs(place - found)), 0.0_dp, 1.0e-14_dp, 'third order')
@@ -81,9 +87,11 @@ contains
    subroutine forecast_leaves_erratic_changes_alone()
       integer, parameter :: nx = 8, ny = 6
       type(place_forecast_type) :: forecast
+      type(grid_type) :: grid
       real(dp) :: pattern(nx, 2, ny), found(nx, 2, ny), carried(nx, 2, ny), place(nx, 2, ny), pressure(nx, ny)
       integer :: n
 
+      grid = new_grid(nx, ny, 0.5_dp*nx, 0.3_dp*ny, boundary_periodic)
       call random_number(pattern)
       pressure = 1.0_dp
       pressure(:, 4:) = 0.0_dp
@@ -92,7 +100,7 @@ contains
       do n = 1, 6
          carried = found
          place = carried
-         call forecast%follow(0.1_dp, .true., [0.0_dp, 0.0_dp], [0.5_dp, 0.5_dp], .true.)
+         call forecast%follow(grid, 0.1_dp, .true., [0.0_dp, 0.0_dp])
          call forecast%add(place)
          call check_close(maxval(abs(place - carried)), 0.0_dp, 0.0_dp, 'the row before')
          found(:, :, :3) = carried(:, :, :3) + (-1)**n*pattern(:, :, :3)

@@ -44,7 +44,7 @@ module coupled_passes
    use field_sums, only : row_totals
    use pass_control, only : pass_control_type
    use asperity_precision, only : dp
-   use regular_grid, only : boundary_free, grid_type
+   use regular_grid, only : grid_type
    use asperity_schedule, only : planned_row_type
    use solver_result, only : solver_result_type
    implicit none
@@ -163,20 +163,16 @@ contains
       real(dp), intent(in) :: dt                         !! s
       real(dp), intent(in) :: motion(2)                  !! of the road, m
       logical, intent(in) :: goes_on                     !! the row goes on as the last one did
-      real(dp) :: cell(2)
-      logical :: periodic
       integer :: c
 
-      cell = [contact%grid%dx, contact%grid%dy]
-      periodic = contact%grid%boundary /= boundary_free
       do c = 1, 2
-         call carry(contact%state%tangential%displacement(:, c, :), contact%drift - motion, cell, periodic, &
+         call carry(contact%grid, contact%state%tangential%displacement(:, c, :), contact%drift - motion, &
             self%carried(:, c, :))
          self%carried(:, c, :) = self%carried(:, c, :) + contact%drift(c)
       end do
       self%place(:, :, :) = self%carried
       associate (forecast => contact%state%tangential%forecast)
-         call forecast%follow(dt, goes_on, contact%drift - motion, cell, periodic)
+         call forecast%follow(contact%grid, dt, goes_on, contact%drift - motion)
          call forecast%add(self%place)
       end associate
    end subroutine predict
@@ -201,8 +197,7 @@ contains
       end do
       motion = contact_mean(contact, self%residuals)
       do c = 1, 2
-         call carry(contact%tangential%trial(:, c, :), motion, [contact%grid%dx, contact%grid%dy], &
-            contact%grid%boundary /= boundary_free, self%residuals(:, c, :))
+         call carry(contact%grid, contact%tangential%trial(:, c, :), motion, self%residuals(:, c, :))
       end do
       !$omp parallel do default(none) shared(self, contact) private(j)
       do j = 1, contact%grid%rows()

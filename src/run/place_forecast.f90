@@ -22,6 +22,7 @@ module place_forecast
    use asperity_precision, only : dp
    use carried_field, only : carry
    use field_sums, only : row_totals
+   use regular_grid, only : grid_type
    implicit none
    private
 
@@ -56,13 +57,12 @@ contains
    end subroutine new_place_forecast
 
    !> Begin a row: the contact moves along the rubber by -motion.
-   subroutine follow(self, dt, goes_on, motion, cell, periodic)
+   subroutine follow(self, grid, dt, goes_on, motion)
       class(place_forecast_type), intent(inout) :: self
+      type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: dt                     !! s
       logical, intent(in) :: goes_on                 !! the row goes on as the last one did
       real(dp), intent(in) :: motion(2)              !! of the rubber over the road, m
-      real(dp), intent(in) :: cell(2)                !! dx, dy, m
-      logical, intent(in) :: periodic
       real(dp), allocatable :: moved(:, :)
       integer :: c
 
@@ -71,11 +71,11 @@ contains
       allocate (moved(size(self%change, 1), size(self%change, 3)))
       do c = 1, 2
          if (self%known >= 1) then
-            call carry(self%change(:, c, :), motion, cell, periodic, moved)
+            call carry(grid, self%change(:, c, :), motion, moved)
             self%change(:, c, :) = moved
          end if
          if (self%known >= 2) then
-            call carry(self%more(:, c, :), motion, cell, periodic, moved)
+            call carry(grid, self%more(:, c, :), motion, moved)
             self%more(:, c, :) = moved
          end if
       end do

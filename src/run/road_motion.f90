@@ -5,9 +5,10 @@
 !> rubber's surface is expected to move on as in the step before.
 module road_motion
    use contact_model, only : contact_type, place_road
-   use asperity_precision, only : dp, int8
+   use asperity_precision, only : dp
+   use carried_field, only : shift_field, shift_states
    use pulled_road, only : drive_direction
-   use regular_grid, only : boundary_free
+   use regular_grid, only : boundary_periodic
    use asperity_schedule, only : planned_row_type
    implicit none
    private
@@ -50,62 +51,20 @@ contains
       class(contact_type), intent(inout) :: self
       integer, intent(in) :: cells(2)
       real(dp), pointer, contiguous :: moved(:, :)
-      logical :: free
       integer :: c
 
-      free = self%grid%boundary == boundary_free
       call self%work%lend('moved field', moved)
-      call shift_field(cells, free, self%state%pressure, moved)
-      if (self%side%adhesive .and. .not. free) call shift_field(cells, free, self%state%gap, moved)
+      call shift_field(self%grid, cells, self%state%pressure, moved)
+      if (self%side%adhesive .and. self%grid%boundary == boundary_periodic) &
+         call shift_field(self%grid, cells, self%state%gap, moved)
       if (self%rubs()) then
          do c = 1, 2
-            call shift_field(cells, free, self%state%tangential%traction(:, c, :), moved)
-            call shift_field(cells, free, self%state%tangential%before(:, c, :), moved)
+            call shift_field(self%grid, cells, self%state%tangential%traction(:, c, :), moved)
+            call shift_field(self%grid, cells, self%state%tangential%before(:, c, :), moved)
          end do
-         call shift_states(cells, free, self%state%tangential%contact)
+         call shift_states(self%grid, cells, self%state%tangential%contact)
       end if
       call self%work%take_back(moved)
    end subroutine shift_fields
-
-   !> Shift a field by whole cells; what enters a free map is zero.
-   subroutine shift_field(cells, free, field, moved)
-      integer, intent(in) :: cells(2)
-      logical, intent(in) :: free
-      real(dp), intent(inout) :: field(:, :)
-      real(dp), intent(inout) :: moved(:, :)           !! scratch
-      integer :: i, j, from_i, from_j, nx, ny
-
-      nx = size(field, 1)
-      ny = size(field, 2)
-      !$omp parallel do default(none) shared(field, moved, cells, free, nx, ny) &
-      !$omp private(i, j, from_i, from_j)
-      do j = 1, ny
-         from_j = j - cells(2)
-         do i = 1, nx
-            from_i = i - cells(1)
-            if (.not. free) then
-               moved(i, j) = field(modulo(from_i - 1, nx) + 1, modulo(from_j - 1, ny) + 1)
-            else if (from_i >= 1 .and. from_i <= nx .and. from_j >= 1 .and. from_j <= ny) then
-               moved(i, j) = field(from_i, from_j)
-            else
-               moved(i, j) = 0.0_dp
-            end if
-         end do
-      end do
-      field(:, :) = moved
-   end subroutine shift_field
-
-   !> The same for the states of contact.
-   subroutine shift_states(cells, free, states)
-      integer, intent(in) :: cells(2)
-      logical, intent(in) :: free
-      integer(int8), intent(inout) :: states(:, :)
-
-      if (free) then
-         states(:, :) = eoshift(eoshift(states, -cells(1), dim=1), -cells(2), dim=2)
-      else
-         states(:, :) = cshift(cshift(states, -cells(1), dim=1), -cells(2), dim=2)
-      end if
-   end subroutine shift_states
 
 end module road_motion

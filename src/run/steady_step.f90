@@ -141,7 +141,7 @@ contains
    subroutine solve(self, plan, road, outcome, rubbing)
       class(steady_step_type), intent(inout) :: self
       type(planned_row_type), intent(in) :: plan
-      type(interpolation_type), intent(in) :: road
+      type(interpolation_type), intent(inout) :: road
       type(solver_result_type), intent(out) :: outcome   !! of the pressure
       type(solver_result_type), intent(out) :: rubbing   !! of the traction
       type(steady_symbols_type) :: symbols

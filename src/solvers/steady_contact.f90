@@ -28,7 +28,7 @@ contains
    !> The road at x + u, u = A_T T less its mean over the contact; and r. In: slip holds d(A_T T)/ds.
    subroutine read_road(contact, road, base, direction)
       type(steady_contact_type), intent(inout) :: contact
-      type(interpolation_type), intent(in) :: road
+      type(interpolation_type), intent(inout) :: road
       real(dp), intent(in) :: base(2)                  !! displacement of the road, m
       real(dp), intent(in) :: direction(2)             !! e
       integer :: c

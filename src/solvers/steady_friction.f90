@@ -99,7 +99,7 @@ contains
       class(steady_friction_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator    !! with its symbols set
       type(normal_problem_type), intent(in) :: problem         !! warm: pressure, gap, traction are a start
-      type(interpolation_type), intent(in) :: road
+      type(interpolation_type), intent(inout) :: road
       type(steady_contact_type), intent(inout) :: contact
       type(solver_result_type), intent(out) :: normal          !! iterations, error of the pressure
       type(solver_result_type), intent(out) :: rubbing         !! rounds, error of the traction
@@ -145,7 +145,7 @@ contains
       class(steady_friction_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
       type(normal_problem_type), intent(in) :: task
-      type(interpolation_type), intent(in) :: road
+      type(interpolation_type), intent(inout) :: road
       type(steady_contact_type), intent(inout) :: contact
       type(solver_result_type), intent(out) :: normal
       type(normal_problem_type) :: rough
@@ -187,7 +187,7 @@ contains
       class(steady_friction_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
       type(normal_problem_type), intent(in) :: task
-      type(interpolation_type), intent(in) :: road
+      type(interpolation_type), intent(inout) :: road
       type(pace_type), intent(in) :: pace
       type(steady_contact_type), intent(inout) :: contact
       type(steady_measure_type), intent(out) :: measure    !! of the last normal step
@@ -230,7 +230,7 @@ contains
       class(steady_friction_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
       type(normal_problem_type), intent(in) :: task
-      type(interpolation_type), intent(in) :: road
+      type(interpolation_type), intent(inout) :: road
       type(pace_type), intent(inout) :: pace
       type(steady_contact_type), intent(inout) :: contact
       type(solver_result_type) :: normal, rubbing
@@ -250,7 +250,7 @@ contains
       class(steady_friction_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
       type(normal_problem_type), intent(in) :: task
-      type(interpolation_type), intent(in) :: road
+      type(interpolation_type), intent(inout) :: road
       type(pace_type), intent(in) :: pace
       type(steady_contact_type), intent(inout) :: contact
       type(solver_result_type), intent(inout) :: normal, rubbing
@@ -343,7 +343,7 @@ contains
       class(steady_friction_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
       type(normal_problem_type), intent(in) :: task
-      type(interpolation_type), intent(in) :: road
+      type(interpolation_type), intent(inout) :: road
       type(steady_contact_type), intent(inout) :: contact
       type(solver_result_type), intent(inout) :: normal, rubbing
 
@@ -360,7 +360,7 @@ contains
       class(steady_friction_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
       type(normal_problem_type), intent(in) :: task
-      type(interpolation_type), intent(in) :: road
+      type(interpolation_type), intent(inout) :: road
       type(steady_contact_type), intent(inout) :: contact
       type(solver_result_type), intent(inout) :: normal, rubbing
       type(gap_measure_type) :: found

@@ -1,0 +1,194 @@
+!> Tests of what crosses the rows that processes share: rows fetched from their owners, shifts, carried fields.
+!>
+!> The tests hold for any number of processes: built with MPI and started by mpirun, they share the rows.
+module test_shared_rows
+   use asperity_precision, only : dp, int8
+   use carried_field, only : carry, shift_field, shift_states
+   use check, only : begin_suite, check_close, selected
+   use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
+   use row_fetch, only : fetch_rows, foreign_rows
+   implicit none
+   private
+
+   public :: run_shared_rows
+
+   integer, parameter :: sizes(2, 4) = reshape([13, 37, 6, 1, 5, 3, 9, 200], [2, 4])   !! nx, ny
+
+contains
+
+   subroutine run_shared_rows()
+      call begin_suite('shared_rows')
+      if (selected('rows_come_from_their_owners')) call rows_come_from_their_owners()
+      if (selected('bytes_come_from_their_owners')) call bytes_come_from_their_owners()
+      if (selected('fields_shift_by_whole_cells')) call fields_shift_by_whole_cells()
+      if (selected('fields_are_carried')) call fields_are_carried()
+   end subroutine run_shared_rows
+
+   !> Any number, another one in each cell.
+   elemental function value(i, j)
+      integer, intent(in) :: i, j
+      real(dp) :: value
+
+      value = modulo(7919*i + 1049*j*j, 10007)/1024.0_dp - 4.0_dp
+   end function value
+
+   !> The value in a cell of an unbounded field: of its image, or 0 beyond a free grid.
+   elemental function image(grid, i, j)
+      type(grid_type), intent(in) :: grid
+      integer, intent(in) :: i, j
+      real(dp) :: image
+
+      image = 0.0_dp
+      if (grid%boundary == boundary_periodic) then
+         image = value(modulo(i - 1, grid%nx) + 1, modulo(j - 1, grid%ny) + 1)
+      else if (i >= 1 .and. i <= grid%nx .and. j >= 1 .and. j <= grid%ny) then
+         image = value(i, j)
+      end if
+   end function image
+
+   !> A grid whose rows are shared, and the rows of the field on this process.
+   subroutine new_field(k, boundary, grid, field)
+      integer, intent(in) :: k, boundary
+      type(grid_type), intent(out) :: grid
+      real(dp), allocatable, intent(out) :: field(:, :)
+      integer :: i, j
+
+      grid = new_grid(sizes(1, k), sizes(2, k), 0.5_dp*sizes(1, k), 0.3_dp*sizes(2, k), boundary)
+      call grid%share_rows()
+      allocate (field(grid%nx, grid%rows()))
+      do j = 1, grid%rows()
+         field(:, j) = value([(i, i=1, grid%nx)], grid%first_row + j - 1)
+      end do
+   end subroutine new_field
+
+   !> Largest difference of rows from those of a range of the unbounded field.
+   function difference(grid, rows, first, first_column) result(largest)
+      type(grid_type), intent(in) :: grid
+      real(dp), intent(in) :: rows(:, :)
+      integer, intent(in) :: first, first_column
+      real(dp) :: largest
+      integer :: i, j
+
+      largest = 0.0_dp
+      do j = 1, size(rows, 2)
+         do i = 1, size(rows, 1)
+            largest = max(largest, abs(rows(i, j) - image(grid, first_column - 1 + i, first - 1 + j)))
+         end do
+      end do
+   end function difference
+
+   !> A halo, a slab elsewhere, all rows and more, nothing: each process gets the rows that it asks for.
+   subroutine rows_come_from_their_owners()
+      integer, parameter :: boundaries(2) = [boundary_periodic, boundary_free]
+      type(grid_type) :: grid
+      real(dp), allocatable :: field(:, :), rows(:, :)
+      integer, allocatable :: list(:)
+      integer :: b, k, n, range(2)
+
+      do b = 1, 2
+         do k = 1, size(sizes, 2)
+            call new_field(k, boundaries(b), grid, field)
+            do n = 1, 6
+               select case (n)
+               case (1)
+                  range = [grid%first_row - 1, grid%last_row + 1]
+               case (2)
+                  range = [grid%first_row, grid%last_row] - 1000*grid%ny - 7
+               case (3)
+                  range = [1 - grid%ny, 2*grid%ny]
+               case (4)
+                  range = [5, 4]
+               case (5)
+                  range = [grid%last_row, grid%last_row + modulo(grid%first_row, 5)]
+               case default
+                  range = [1, merge(grid%ny, 0, modulo(grid%first_row, 2) == 1)]
+               end select
+               allocate (rows(grid%nx, max(0, range(2) - range(1) + 1)), source=-1.0_dp)
+               call fetch_rows(grid, field, range, rows)
+               call check_close(difference(grid, rows, range(1), 1), 0.0_dp, 0.0_dp, 'rows of the range')
+               list = foreign_rows(grid, range)
+               call fetch_rows(grid, field, range, rows, only_foreign=.true.)
+               if (size(list) > 0) call check_close(maxval(abs(rows(1, :size(list)) - value(1, list))), 0.0_dp, &
+                  0.0_dp, 'rows of other processes')
+               deallocate (rows)
+            end do
+         end do
+      end do
+   end subroutine rows_come_from_their_owners
+
+   !> Small integers travel as well.
+   subroutine bytes_come_from_their_owners()
+      type(grid_type) :: grid
+      real(dp), allocatable :: field(:, :)
+      integer(int8), allocatable :: states(:, :), rows(:, :)
+      integer :: i, j, worst
+
+      call new_field(1, boundary_periodic, grid, field)
+      allocate (states(grid%nx, grid%rows()), rows(grid%nx, grid%rows()))
+      do j = 1, grid%rows()
+         states(:, j) = int([(modulo(i*(grid%first_row + j - 1), 255) - 127, i=1, grid%nx)], int8)
+      end do
+      call fetch_rows(grid, states, [grid%first_row, grid%last_row] + 5, rows)
+      worst = 0
+      do j = 1, grid%rows()
+         do i = 1, grid%nx
+            worst = max(worst, abs(int(rows(i, j)) &
+               - (modulo(i*(modulo(grid%first_row + j + 3, grid%ny) + 1), 255) - 127)))
+         end do
+      end do
+      call check_close(real(worst, dp), 0.0_dp, 0.0_dp, 'bytes of the range')
+   end subroutine bytes_come_from_their_owners
+
+   !> Round a periodic grid, and out of a free one, of which zeros take the place.
+   subroutine fields_shift_by_whole_cells()
+      integer, parameter :: boundaries(2) = [boundary_periodic, boundary_free]
+      integer, parameter :: shifts(2, 4) = reshape([0, 0, 3, -4, -20, 11, 1, 1000003], [2, 4])
+      type(grid_type) :: grid
+      real(dp), allocatable :: field(:, :), moved(:, :)
+      integer(int8), allocatable :: states(:, :)
+      integer :: b, k, n
+
+      do b = 1, 2
+         do k = 1, size(sizes, 2)
+            do n = 1, size(shifts, 2)
+               call new_field(k, boundaries(b), grid, field)
+               allocate (moved, source=field)
+               states = int(field/3.0_dp, int8)
+               call shift_states(grid, shifts(:, n), states)
+               call shift_field(grid, shifts(:, n), field, moved)
+               call check_close(difference(grid, field, grid%first_row - shifts(2, n), 1 - shifts(1, n)), &
+                  0.0_dp, 0.0_dp, 'the field is that of a shifted place')
+               call check_close(real(sum(abs(int(states) - int(field/3.0_dp))), dp), 0.0_dp, 0.0_dp, &
+                  'the states shift with the field')
+               deallocate (moved)
+            end do
+         end do
+      end do
+   end subroutine fields_shift_by_whole_cells
+
+   !> By whole cells a field is carried to the last bit; on a free grid its rim goes on.
+   subroutine fields_are_carried()
+      type(grid_type) :: grid
+      real(dp), allocatable :: field(:, :), moved(:, :)
+      integer :: j, k
+
+      do k = 1, size(sizes, 2)
+         call new_field(k, boundary_periodic, grid, field)
+         allocate (moved, source=field)
+         call carry(grid, field, [-3*grid%dx, 50002*grid%dy], moved)
+         ! The motion in cells has round-off; so has the result.
+         call check_close(difference(grid, moved, grid%first_row + 50002, -2), 0.0_dp, 1.0e-6_dp*grid%ny, &
+            'carried round')
+         call carry(grid, field, [0.0_dp, 0.25_dp*grid%dy], moved)
+         deallocate (moved)
+         call new_field(k, boundary_free, grid, field)
+         allocate (moved, source=field)
+         call carry(grid, field, [0.0_dp, 4.0_dp*grid%dy], moved)
+         do j = 1, grid%rows()
+            call check_close(moved(2, j), value(2, min(grid%first_row + j + 3, grid%ny)), 1.0e-9_dp, 'the rim goes on')
+         end do
+         deallocate (moved)
+      end do
+   end subroutine fields_are_carried
+
+end module test_shared_rows
