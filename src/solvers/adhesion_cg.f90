@@ -68,7 +68,7 @@ contains
    subroutine solve(self, problem, height, gap, pressure, level, outcome, past)
       class(adhesion_solver_type), intent(inout) :: self
       type(adhesion_problem_type), intent(in) :: problem
-      real(dp), intent(in), contiguous, target :: height(:, :)       !! H, [nx, ny], m
+      real(dp), intent(in), contiguous, target :: height(:, :)       !! H, [nx, rows], m
       real(dp), intent(inout), contiguous, target :: gap(:, :)       !! g >= 0, 0 in contact, m
       real(dp), intent(inout), contiguous, target :: pressure(:, :)  !! P, attraction included, Pa
       real(dp), intent(inout) :: level                 !! U - H where the gap is zero, m

@@ -88,14 +88,14 @@ contains
       associate (work => self%work)
          call new_adhesion_patch(work%patch, grid, kernel, stiffness, compliance, error)
          if (allocated(error)) return
-         associate (mx => work%patch%mx, my => work%patch%my)
-            call new_adhesion_preconditioner(work%preconditioner, preconditioner, mx, my, compliance, &
-               stiffness, work%patch%nyquist, error)
+         associate (mx => work%patch%mx, rows => work%patch%all_rows)
+            call new_adhesion_preconditioner(work%preconditioner, preconditioner, mx, work%patch%sharing, &
+               compliance, stiffness, work%patch%nyquist, error)
             if (allocated(error)) return
-            allocate (work%exchange(mx, my), work%residual(mx, my), work%direction(mx, my), &
-               work%old(mx, my), source=0.0_dp)
+            allocate (work%exchange(mx, rows), work%residual(mx, rows), work%direction(mx, rows), &
+               work%old(mx, rows), source=0.0_dp)
             if (.not. work%patch%periodic) &
-               allocate (self%state(mx, my), self%traction(mx, my), source=0.0_dp)
+               allocate (self%state(mx, rows), self%traction(mx, rows), source=0.0_dp)
          end associate
       end associate
    end subroutine new_adhesion_fast
@@ -225,8 +225,8 @@ contains
 
       if (.not. now%slope > 0.0_dp) return
       estimate = now%problem%modulus*now%kappa*self%work%preconditioner%estimate(now%squares)
-      associate (nx => self%work%patch%nx, ny => self%work%patch%ny, threads => self%work%patch%threads)
-         associate (gap => now%state(1:nx, 1:ny), direction => self%work%direction(1:nx, 1:ny))
+      associate (nx => self%work%patch%nx, rows => self%work%patch%rows, threads => self%work%patch%threads)
+         associate (gap => now%state(1:nx, 1:rows), direction => self%work%direction(1:nx, 1:rows))
             step%alpha = clipped_step(now%problem, gap, direction, -now%slope, estimate, threads)
             do trial = 1, 40
                if (self%work%patch%periodic .and. now%problem%control == control_approach) &
@@ -255,12 +255,12 @@ contains
       real(dp), allocatable :: change(:)
       integer :: j, n
 
-      allocate (rows(self%work%patch%my))
+      allocate (rows(self%work%patch%all_rows))
       !$omp parallel default(none) shared(self, now, step, rows) private(j, n, change) &
       !$omp num_threads(self%work%patch%threads)
       allocate (change(self%work%patch%mx))
       !$omp do
-      do j = 1, self%work%patch%my
+      do j = 1, self%work%patch%all_rows
          n = self%work%patch%inner(j)
          call form_step_row(now%problem, now%state(1:n, j), self%work%direction(1:n, j), &
             self%work%residual(1:n, j), step%alpha, step%shift, change(1:n), rows(j))
@@ -273,7 +273,7 @@ contains
       end do
       !$omp end do
       !$omp end parallel
-      known = known_of_step(rows)
+      known = known_of_step(rows, self%work%patch%sharing)
       known%slope = known%slope - now%missing*step%alpha*now%lift
    end subroutine form_step
 
@@ -293,7 +293,7 @@ contains
       end if
       !$omp parallel do default(none) shared(self, now, step) private(i, j, n, next) &
       !$omp num_threads(self%work%patch%threads)
-      do j = 1, self%work%patch%my
+      do j = 1, self%work%patch%all_rows
          call self%work%patch%stiffness%add_backward_row(1, j, step%part*now%problem%modulus, &
             now%traction(:, j))
          n = self%work%patch%inner(j)

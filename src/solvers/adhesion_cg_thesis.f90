@@ -19,7 +19,7 @@ module adhesion_cg_thesis
       reason_closed, reason_converged, reason_detached, reason_limit, reason_stalled
    use adhesion_steps, only : stepped_gap, sum_shift
    use asperity_errors, only : error_input, error_type, fail
-   use field_sums, only : largest_of_rows, least_of_rows, row_total
+   use field_sums, only : largest_of_rows, least_of_rows, row_total, row_totals
    use kernels, only : kernel_type
    use asperity_precision, only : dp, int64
    use omp_lib, only : omp_get_wtime
@@ -63,9 +63,10 @@ contains
       end if
       call new_adhesion_patch(self%patch, grid, kernel, stiffness, compliance, error)
       if (allocated(error)) return
-      allocate (self%residual(grid%nx, grid%ny), self%direction(grid%nx, grid%ny), &
-         self%product(grid%nx, grid%ny), self%trial_gap(grid%nx, grid%ny), &
-         self%trial_traction(grid%nx, grid%ny), source=0.0_dp)
+      associate (nx => grid%nx, rows => self%patch%rows)
+         allocate (self%residual(nx, rows), self%direction(nx, rows), self%product(nx, rows), &
+            self%trial_gap(nx, rows), self%trial_traction(nx, rows), source=0.0_dp)
+      end associate
    end subroutine new_adhesion_thesis
 
    !> Solve an adhesive contact problem, as `adhesion_method_type` says.
@@ -178,7 +179,7 @@ contains
       lowest = huge(1.0_dp)
       !$omp parallel do default(none) shared(self, now) private(i, j, g) &
       !$omp reduction(max: worst) reduction(min: lowest) num_threads(self%patch%threads)
-      do j = 1, self%patch%ny
+      do j = 1, self%patch%rows
          do i = 1, self%patch%nx
             g = self%residual(i, j) + now%load
             worst = max(worst, natural_residual(now%units, now%state(i, j), g))
@@ -199,10 +200,10 @@ contains
       real(dp) :: s1, e, e1, e2
       integer :: i, j
 
-      allocate (rows(self%patch%ny))
+      allocate (rows(self%patch%rows))
       !$omp parallel do default(none) shared(self, now, rows) private(i, j, s1, e, e1, e2) &
       !$omp num_threads(self%patch%threads)
-      do j = 1, self%patch%ny
+      do j = 1, self%patch%rows
          s1 = 0.0_dp
          do i = 1, self%patch%nx
             call adhesive_terms(now%problem%potential, now%state(i, j), e, e1, e2)
@@ -222,10 +223,10 @@ contains
       real(dp) :: s1, e, e1, e2
       integer :: i, j
 
-      allocate (rows(self%patch%ny))
+      allocate (rows(self%patch%rows))
       !$omp parallel do default(none) shared(self, now, rows) private(i, j, s1, e, e1, e2) &
       !$omp num_threads(self%patch%threads)
-      do j = 1, self%patch%ny
+      do j = 1, self%patch%rows
          s1 = 0.0_dp
          do i = 1, self%patch%nx
             call adhesive_terms(now%problem%potential, now%state(i, j), e, e1, e2)
@@ -242,28 +243,30 @@ contains
       type(adhesion_contact_type), intent(in) :: now
       real(dp), intent(in) :: beta
       real(dp), intent(out) :: rd
-      real(dp), allocatable :: sums(:), counts(:), products(:)
-      real(dp) :: mean
+      real(dp), allocatable :: rows(:, :), products(:)
+      real(dp) :: mean, sums(2)
       logical :: free
       integer :: i, j
 
-      allocate (sums(self%patch%ny), counts(self%patch%ny), products(self%patch%ny), source=0.0_dp)
-      !$omp parallel do default(none) shared(self, now, beta, sums, counts) private(i, j, free) &
+      allocate (rows(2, self%patch%rows), products(self%patch%rows), source=0.0_dp)
+      !$omp parallel do default(none) shared(self, now, beta, rows) private(i, j, free) &
       !$omp num_threads(self%patch%threads)
-      do j = 1, self%patch%ny
+      do j = 1, self%patch%rows
          do i = 1, self%patch%nx
             free = now%state(i, j) > 0.0_dp .or. self%residual(i, j) > 0.0_dp
             self%direction(i, j) = merge(self%residual(i, j) + beta*self%direction(i, j), 0.0_dp, free)
-            sums(j) = sums(j) + self%direction(i, j)
-            if (free) counts(j) = counts(j) + 1.0_dp
+            rows(1, j) = rows(1, j) + self%direction(i, j)
+            if (free) rows(2, j) = rows(2, j) + 1.0_dp
          end do
       end do
       mean = 0.0_dp
-      if (now%problem%control == control_approach) &
-         mean = row_total(sums)/max(row_total(counts), 1.0_dp)
+      if (now%problem%control == control_approach) then
+         sums = row_totals(rows)
+         mean = sums(1)/max(sums(2), 1.0_dp)
+      end if
       !$omp parallel do default(none) shared(self, now, mean, products) private(i, j) &
       !$omp num_threads(self%patch%threads)
-      do j = 1, self%patch%ny
+      do j = 1, self%patch%rows
          do i = 1, self%patch%nx
             if (now%state(i, j) > 0.0_dp) then
                self%direction(i, j) = self%direction(i, j) - mean
@@ -287,7 +290,7 @@ contains
       form = now%problem%modulus*form
       !$omp parallel do default(none) shared(self, now) private(j) &
       !$omp num_threads(self%patch%threads)
-      do j = 1, self%patch%ny
+      do j = 1, self%patch%rows
          self%product(:, j) = now%problem%modulus*self%product(:, j)
       end do
    end subroutine multiply
@@ -306,7 +309,7 @@ contains
          shift = sum_shift(now%state, self%direction, alpha, now%gap_sum, self%patch%threads)
       !$omp parallel do default(none) shared(self, now, trial, alpha, shift) private(j) &
       !$omp num_threads(self%patch%threads)
-      do j = 1, self%patch%ny
+      do j = 1, self%patch%rows
          trial%state(:, j) = stepped_gap(now%state(:, j), self%direction(:, j), alpha, shift)
       end do
    end subroutine try_step
@@ -316,23 +319,24 @@ contains
       type(adhesion_thesis_type), intent(in) :: self
       type(adhesion_contact_type), intent(in) :: now, trial
       logical :: yes
-      real(dp), allocatable :: changes(:), sizes(:)
-      real(dp) :: s, before
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: s, before, sums(2)
       integer :: i, j
 
-      allocate (changes(self%patch%ny), sizes(self%patch%ny), source=0.0_dp)
-      !$omp parallel do default(none) shared(self, now, trial, changes, sizes) private(i, j, s, before) &
+      allocate (rows(2, self%patch%rows), source=0.0_dp)
+      !$omp parallel do default(none) shared(self, now, trial, rows) private(i, j, s, before) &
       !$omp num_threads(self%patch%threads)
-      do j = 1, self%patch%ny
+      do j = 1, self%patch%rows
          do i = 1, self%patch%nx
             s = trial%state(i, j) - now%state(i, j)
             before = adhesive_energy(now%problem%potential, now%state(i, j))
-            changes(j) = changes(j) + s*(0.5_dp*(now%traction(i, j) + trial%traction(i, j)) + now%load) &
+            rows(1, j) = rows(1, j) + s*(0.5_dp*(now%traction(i, j) + trial%traction(i, j)) + now%load) &
                + adhesive_energy(now%problem%potential, trial%state(i, j)) - before
-            sizes(j) = sizes(j) + abs(before)
+            rows(2, j) = rows(2, j) + abs(before)
          end do
       end do
-      yes = row_total(changes) <= 4.0_dp*epsilon(1.0_dp)*row_total(sizes)
+      sums = row_totals(rows)
+      yes = sums(1) <= 4.0_dp*epsilon(1.0_dp)*sums(2)
    end function falls
 
    !> Make the trial contact the contact.
@@ -343,7 +347,7 @@ contains
       integer :: j
 
       !$omp parallel do default(none) shared(self, now, trial) private(j) num_threads(self%patch%threads)
-      do j = 1, self%patch%ny
+      do j = 1, self%patch%rows
          now%state(:, j) = trial%state(:, j)
          now%traction(:, j) = trial%traction(:, j)
       end do

@@ -8,8 +8,9 @@ module adhesion_directions
       natural_residual
    use adhesion_preconditioner, only : adhesion_preconditioner_type
    use adhesion_state, only : control_approach, control_pressure, diagonal_scaling
-   use field_sums, only : largest_of_rows, least_of_rows, row_total
    use asperity_precision, only : dp
+   use field_sums, only : largest_of_rows, least_of_rows
+   use row_sharing, only : row_sharing_type
    implicit none
    private
 
@@ -67,28 +68,29 @@ contains
    subroutine measure(self, now)
       type(adhesion_work_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(inout) :: now
-      real(dp), allocatable :: loads(:), paddings(:)
-      real(dp) :: worst, least
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: worst, least, padding, sums(2)
       integer :: j
 
       call evaluate_gradient(self%patch, now, self%exchange)
-      allocate (loads(self%patch%my), paddings(self%patch%my))
+      allocate (rows(2, self%patch%all_rows))
       worst = 0.0_dp
       least = huge(1.0_dp)
-      !$omp parallel do default(none) shared(self, now, loads, paddings) private(j) &
+      !$omp parallel do default(none) shared(self, now, rows) private(j, padding) &
       !$omp reduction(max: worst) reduction(min: least) num_threads(self%patch%threads)
-      do j = 1, self%patch%my
-         call measure_row(self, now, j, worst, least, paddings(j))
-         loads(j) = sum(now%traction(1:self%patch%inner(j), j))
+      do j = 1, self%patch%all_rows
+         call measure_row(self, now, j, worst, least, padding)
+         rows(:, j) = [padding, sum(now%traction(1:self%patch%inner(j), j))]
          call self%preconditioner%put_row(j, self%exchange(:, j))
       end do
       now%residual = largest_of_rows([worst])
       now%least = least_of_rows([least])
       if (self%patch%periodic) return
-      now%psi_r = row_total(paddings)
+      sums = self%patch%sharing%totals(rows)
+      now%psi_r = sums(1)
       if (now%problem%control /= control_pressure) return
       now%old_missing = now%missing
-      now%missing = now%force - row_total(loads)
+      now%missing = now%force - sums(2)
       now%residual = max(now%residual, abs(now%missing)/max(abs(now%force), now%units%traction))
    end subroutine measure
 
@@ -162,28 +164,28 @@ contains
 
       first = last_pass
       if (self%patch%periodic .and. now%problem%control == control_approach) first = sum_pass
-      allocate (rows(self%patch%my))
+      allocate (rows(self%patch%all_rows))
       !$omp parallel default(none) shared(self, now, level_z, rows, first) private(j, z) &
       !$omp num_threads(self%patch%threads)
       allocate (z(self%patch%mx))
       !$omp do
-      do j = 1, self%patch%my
+      do j = 1, self%patch%all_rows
          call self%preconditioner%get_row(j, self%exchange(:, j), z)
          call take_z_row(self, now, level_z, j, z)
          call center_row(self, now, first, 0.0_dp, j, rows(j))
       end do
       !$omp end do
       !$omp end parallel
-      sums = sum_of(rows)
+      sums = sum_of(rows, self%patch%sharing)
       ! Cells in contact that the mean would close drop out, which changes the mean: once more.
       do pass = first + 1, last_pass
          mean = sums%total/max(sums%moving, 1.0_dp)
          !$omp parallel do default(none) shared(self, now, pass, mean, rows) private(j) &
          !$omp num_threads(self%patch%threads)
-         do j = 1, self%patch%my
+         do j = 1, self%patch%all_rows
             call center_row(self, now, pass, mean, j, rows(j))
          end do
-         sums = sum_of(rows)
+         sums = sum_of(rows, self%patch%sharing)
       end do
    end subroutine precondition
 
@@ -239,14 +241,20 @@ contains
    end subroutine center_row
 
    !> Sums of all rows, in order.
-   function sum_of(rows) result(sums)
+   function sum_of(rows, sharing) result(sums)
       type(z_sums_type), intent(in) :: rows(:)
+      type(row_sharing_type), intent(in) :: sharing    !! of the rows
       type(z_sums_type) :: sums
+      real(dp), allocatable :: parts(:, :)
+      real(dp) :: totals(4)
+      integer :: j
 
-      sums%rz = row_total(rows%rz)
-      sums%old_rz = row_total(rows%old_rz)
-      sums%total = row_total(rows%total)
-      sums%moving = row_total(rows%moving)
+      allocate (parts(4, size(rows)))
+      do j = 1, size(rows)
+         parts(:, j) = [rows(j)%rz, rows(j)%old_rz, rows(j)%total, rows(j)%moving]
+      end do
+      totals = sharing%totals(parts)
+      sums = z_sums_type(totals(1), totals(2), totals(3), totals(4))
    end function sum_of
 
    !> d = z + beta d on the free cells and in the padding, 0 elsewhere; the level's alike. The change of
@@ -256,35 +264,36 @@ contains
       real(dp), intent(in) :: beta
       real(dp), intent(in) :: level_z                  !! z of the level, m
       type(adhesion_iteration_type), intent(inout) :: now
-      real(dp), allocatable :: change(:), slopes(:), squares(:)
-      real(dp) :: d
+      real(dp), allocatable :: change(:), rows(:, :)
+      real(dp) :: d, slope, sums(2)
       integer :: i, j, n
 
       now%lift = level_z + beta*now%lift
-      allocate (slopes(self%patch%my), squares(self%patch%my))
-      !$omp parallel default(none) shared(self, now, beta, slopes, squares) &
-      !$omp private(i, j, n, d, change) num_threads(self%patch%threads)
+      allocate (rows(2, self%patch%all_rows))
+      !$omp parallel default(none) shared(self, now, beta, rows) &
+      !$omp private(i, j, n, d, slope, change) num_threads(self%patch%threads)
       allocate (change(self%patch%mx))
       !$omp do
-      do j = 1, self%patch%my
+      do j = 1, self%patch%all_rows
          n = self%patch%inner(j)
-         slopes(j) = 0.0_dp
+         slope = 0.0_dp
          do i = 1, self%patch%mx
             d = self%exchange(i, j) + beta*self%direction(i, j)
             if (i <= n) then
                if (.not. (now%state(i, j) > 0.0_dp .or. self%exchange(i, j) > 0.0_dp)) d = 0.0_dp
             end if
-            slopes(j) = slopes(j) + self%residual(i, j)*d
+            slope = slope + self%residual(i, j)*d
             self%direction(i, j) = d
             change(i) = merge(d + now%lift, d, i <= n)
          end do
-         squares(j) = sum(change**2)
+         rows(:, j) = [slope, sum(change**2)]
          call self%preconditioner%put_estimate_row(j, change)
       end do
       !$omp end do
       !$omp end parallel
-      now%slope = row_total(slopes) + now%missing*now%lift
-      now%squares = row_total(squares)
+      sums = self%patch%sharing%totals(rows)
+      now%slope = sums(1) + now%missing*now%lift
+      now%squares = sums(2)
    end subroutine turn
 
 end module adhesion_directions

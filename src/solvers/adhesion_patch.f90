@@ -16,15 +16,21 @@
 !> Where the load is prescribed the level is one more unknown. It moves with the mode psi, which is 1 on
 !> the patch and falls in the padding as the displacement of a uniform pressure does. A solution is
 !> checked with the displacement of its pressure by the true free operator: there the padding drops out.
+!>
+!> Processes share the rows of the road's grid. A process that has row j of the patch also has row ny + j of
+!> the padding, so that all have as much of the patch, which takes more work, and no field moves between the
+!> road's grid and that of the unknowns. Fields of the unknowns have the rows of the patch first.
 module adhesion_patch
    use adhesion_potential, only : adhesive_slope
    use adhesion_state, only : adhesion_problem_type, close_gaps, control_approach, control_pressure
    use asperity_errors, only : error_input, error_type, fail
    use asperity_precision, only : dp, int64
    use fft_conv, only : columns_apply, convolution_type, new_convolution, new_symbol_operator
-   use field_sums, only : field_magnitude, field_mean, field_minimum, field_sum, largest_of_rows, row_total
+   use field_sums, only : field_magnitude, field_mean, field_minimum, field_sum, largest_of_rows, row_totals
    use kernels, only : kernel_type
    use regular_grid, only : boundary_periodic, grid_type
+   use row_sharing, only : new_row_sharing, owners_on_grid, row_sharing_type
+   use transform_shape, only : shape_of_rows
    implicit none
    private
 
@@ -56,8 +62,11 @@ module adhesion_patch
    !> A patch with its operators. Not to be copied.
    type :: adhesion_patch_type
       logical :: periodic = .true.
-      integer :: nx = 0, ny = 0                            !! cells of the patch
+      integer :: nx = 0                                    !! cells of the patch along x
+      integer :: rows = 0                                  !! rows of the patch that this process holds
       integer :: mx = 0, my = 0                            !! cells of the grid of the unknowns
+      integer :: all_rows = 0                              !! rows of that grid that this process holds
+      type(row_sharing_type) :: sharing                    !! who holds the rows of the unknowns
       integer :: threads = 1
       real(dp) :: cells = 1.0_dp                           !! number of the patch's
       type(convolution_type) :: stiffness                  !! B for G = 1
@@ -90,12 +99,13 @@ contains
 
       self%periodic = grid%boundary == boundary_periodic
       self%nx = grid%nx
-      self%ny = grid%ny
+      self%rows = grid%rows()
       self%cells = grid%cells()
       self%nyquist = kernel%largest_stiffness(grid)
       self%longest = kernel%least_stiffness(grid)
       self%mx = merge(1, 2, self%periodic)*grid%nx
       self%my = merge(1, 2, self%periodic)*grid%ny
+      call share_unknowns(self, grid)
       allocate (stiffness(0:self%mx/2, 0:self%my/2), compliance(0:self%mx/2, 0:self%my/2), &
          symbol(0:self%mx/2, 0:self%my/2, 1))
       if (self%periodic) then
@@ -116,11 +126,23 @@ contains
          call new_convolution(self%operator, grid, kernel, error)
          if (allocated(error)) return
       end if
-      call new_symbol_operator(self%stiffness, self%mx, self%my, stiffness, error)
+      call new_symbol_operator(self%stiffness, shape_of_rows(self%mx, self%sharing, 1), stiffness, error)
       if (allocated(error)) return
       self%threads = self%stiffness%threads
       if (.not. self%periodic) call make_psi(self)
    end subroutine new_adhesion_patch
+
+   !> Who holds the rows of the unknowns: those of the patch as on its grid, and the padding alike.
+   pure subroutine share_unknowns(self, grid)
+      type(adhesion_patch_type), intent(inout) :: self
+      type(grid_type), intent(in) :: grid
+      integer, allocatable :: owner(:)
+
+      owner = owners_on_grid(grid)
+      if (.not. self%periodic) owner = [owner, owner]
+      call new_row_sharing(self%sharing, owner, grid%shared)
+      self%all_rows = size(self%sharing%own)
+   end subroutine share_unknowns
 
    !> psi: the displacement of a uniform pressure on the patch over its least value there, at most 1.
    subroutine make_psi(self)
@@ -129,11 +151,11 @@ contains
       real(dp) :: least
       integer :: j
 
-      allocate (pressure(self%mx, self%my), self%psi(self%mx, self%my), source=0.0_dp)
-      pressure(1:self%nx, 1:self%ny) = 1.0_dp
+      allocate (pressure(self%mx, self%all_rows), self%psi(self%mx, self%all_rows), source=0.0_dp)
+      pressure(1:self%nx, 1:self%rows) = 1.0_dp
       call self%stiffness%apply_inverse(pressure, self%psi)
-      least = field_minimum(self%psi(1:self%nx, 1:self%ny))
-      do j = 1, self%my
+      least = field_minimum(self%psi(1:self%nx, 1:self%rows))
+      do j = 1, self%all_rows
          self%psi(:, j) = min(self%psi(:, j)/least, 1.0_dp)
       end do
       call self%stiffness%quadratic_form(self%psi, self%psi_form)
@@ -145,7 +167,7 @@ contains
       integer, intent(in) :: j
       integer :: n
 
-      n = merge(self%nx, 0, j <= self%ny)
+      n = merge(self%nx, 0, j <= self%rows)
    end function inner
 
    !> Does a prescribed level leave no gap at all? In free mode the solid can always bulge outside.
@@ -172,9 +194,9 @@ contains
          !$omp parallel default(none) shared(self, contact) private(j, row) num_threads(self%threads)
          allocate (row(self%mx))
          !$omp do
-         do j = 1, self%my
+         do j = 1, self%all_rows
             row(:) = contact%state(:, j)
-            if (j <= self%ny) row(1:nx) = row(1:nx) + (contact%height(:, j) - contact%problem%datum) &
+            if (j <= self%rows) row(1:nx) = row(1:nx) + (contact%height(:, j) - contact%problem%datum) &
                + contact%level
             call self%stiffness%forward_row(1, j, row)
          end do
@@ -182,10 +204,10 @@ contains
          !$omp end parallel
          call self%stiffness%columns(columns_apply, form)
          !$omp parallel do default(none) shared(self, contact) private(j) num_threads(self%threads)
-         do j = 1, self%my
+         do j = 1, self%all_rows
             call self%stiffness%backward_row(1, j, contact%traction(:, j))
             contact%traction(:, j) = contact%problem%modulus*contact%traction(:, j)
-            if (j <= self%ny .and. associated(contact%past)) contact%traction(1:nx, j) = &
+            if (j <= self%rows .and. associated(contact%past)) contact%traction(1:nx, j) = &
                contact%traction(1:nx, j) - (contact%past(:, j) - contact%past_mean)
          end do
       end associate
@@ -197,23 +219,24 @@ contains
       type(adhesion_patch_type), intent(in) :: self
       class(adhesion_contact_type), intent(inout) :: contact
       real(dp), intent(inout) :: gradient(:, :)        !! out: P + e'(g) on the patch, Pa
-      real(dp), allocatable :: sums(:)
-      integer, allocatable :: counts(:)
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: sums(2)
       integer :: j
 
-      allocate (sums(self%ny), counts(self%ny))
+      allocate (rows(2, self%rows))
       associate (nx => self%nx)
-         !$omp parallel do default(none) shared(self, contact, gradient, sums, counts) private(j) &
+         !$omp parallel do default(none) shared(self, contact, gradient, rows) private(j) &
          !$omp num_threads(self%threads)
-         do j = 1, self%ny
+         do j = 1, self%rows
             gradient(1:nx, j) = contact%traction(1:nx, j) &
                + adhesive_slope(contact%problem%potential, contact%state(1:nx, j))
-            sums(j) = sum(gradient(1:nx, j), contact%state(1:nx, j) > 0.0_dp)
-            counts(j) = count(contact%state(1:nx, j) > 0.0_dp)
+            rows(1, j) = sum(gradient(1:nx, j), contact%state(1:nx, j) > 0.0_dp)
+            rows(2, j) = count(contact%state(1:nx, j) > 0.0_dp)
          end do
       end associate
-      if (self%periodic .and. contact%problem%control == control_approach) &
-         contact%load = -row_total(sums)/row_total(counts)
+      if (.not. (self%periodic .and. contact%problem%control == control_approach)) return
+      sums = row_totals(rows)
+      contact%load = -sums(1)/sums(2)
    end subroutine evaluate_gradient
 
    !> Is the solid pulled, and are all gaps so wide that no cell attracts as much as the mean pull?
@@ -253,7 +276,7 @@ contains
       !$omp parallel default(none) shared(self, contact) private(j, row) num_threads(self%operator%threads)
       allocate (row(self%nx))
       !$omp do
-      do j = 1, self%ny
+      do j = 1, self%rows
          row(:) = contact%traction(1:self%nx, j)
          if (associated(contact%past)) row(:) = row + contact%past(:, j)
          call self%operator%forward_row(1, j, row)
@@ -261,12 +284,12 @@ contains
       !$omp end do
       !$omp end parallel
       call self%operator%columns(columns_apply, form)
-      allocate (worst(self%ny))
+      allocate (worst(self%rows))
       !$omp parallel default(none) shared(self, contact, worst) private(j, row) &
       !$omp num_threads(self%operator%threads)
       allocate (row(self%nx))
       !$omp do
-      do j = 1, self%ny
+      do j = 1, self%rows
          call self%operator%backward_row(1, j, row)
          row(:) = row/contact%problem%modulus - (contact%height(:, j) - contact%problem%datum) - contact%level
          worst(j) = maxval(natural_residual(contact%units, row, contact%traction(1:self%nx, j) &
@@ -276,7 +299,7 @@ contains
       !$omp end parallel
       natural = largest_of_rows(worst)
       if (contact%problem%control /= control_pressure) return
-      load = field_sum(contact%traction(1:self%nx, 1:self%ny))
+      load = field_sum(contact%traction(1:self%nx, 1:self%rows))
       natural = max(natural, abs(load - contact%force)/max(abs(contact%force), contact%units%traction))
    end function true_residual
 
@@ -294,7 +317,7 @@ contains
 
       !$omp parallel do default(none) shared(self, contact, gap, pressure) private(j) &
       !$omp num_threads(self%threads)
-      do j = 1, self%ny
+      do j = 1, self%rows
          gap(:, j) = contact%state(1:self%nx, j)
          pressure(:, j) = contact%traction(1:self%nx, j) + contact%load
       end do

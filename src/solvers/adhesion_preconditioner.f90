@@ -13,11 +13,17 @@
 !> the division by what passes 139 to 199; with theta 2 instead of 1.4 over B at the Nyquist wave
 !> number 170 to 285; on a grid of half the cells each way 144 to 177).
 !>
+!> Processes share the rows of the coarse grid, too: each has those whose centres lie on its rows of the
+!> grid. What one of them needs of its neighbours are restricted rows and coarse rows at the rims.
+!>
 !> Memory: a spectrum and a symbol for 'full'; 1/4 of a field for 'coarse' and for the estimate.
 module adhesion_preconditioner
    use asperity_errors, only : error_input, error_type, fail
    use fft_conv, only : columns_apply, convolution_type, new_symbol_operator
    use asperity_precision, only : dp, pi
+   use row_halo, only : new_row_halo, row_halo_type
+   use row_sharing, only : new_row_sharing, row_sharing_type
+   use transform_shape, only : shape_of_rows
    implicit none
    private
 
@@ -31,13 +37,17 @@ module adhesion_preconditioner
       logical :: full = .false.                   !! which of the two forms
       integer :: nx = 0, ny = 0                   !! the grid
       integer :: mx = 0, my = 0                   !! the coarse grid
+      type(row_sharing_type) :: sharing           !! who holds the rows of the coarse grid
+      integer, allocatable :: own(:)              !! rows of the grid that this process holds
+      type(row_halo_type) :: fine_halo            !! restricted rows that coarse rows need
+      type(row_halo_type) :: coarse_halo          !! coarse rows that rows of the grid need
       real(dp) :: theta = 0.0_dp                  !! M at high wave numbers
       real(dp) :: fine_symbol = 0.0_dp            !! B of what the coarse grid does not see
       real(dp) :: cells = 1.0_dp                  !! cells to one coarse cell
-      integer, allocatable :: left(:), below(:)   !! lower coarse neighbour of a cell
+      integer, allocatable :: left(:), below(:)   !! lower coarse neighbour of a cell, of the whole grid
       real(dp), allocatable :: wx(:), wy(:)       !! weight of the upper one
-      real(dp), allocatable :: rows(:, :)         !! restricted along x, [mx, ny]
-      real(dp), allocatable :: field(:, :)        !! on the coarse grid, [mx, my]
+      real(dp), allocatable :: rows(:, :)         !! restricted along x, [mx, rows and foreign ones]
+      real(dp), allocatable :: field(:, :)        !! on the coarse grid, [mx, rows and foreign ones]
       type(convolution_type) :: fine              !! M, 'full'
       type(convolution_type) :: coarse            !! M_c, 'coarse'
       type(convolution_type) :: stiffness         !! low symbols of B
@@ -54,19 +64,22 @@ module adhesion_preconditioner
 contains
 
    !> Make one from the symbols of M and B on the grid.
-   subroutine new_adhesion_preconditioner(self, kind, nx, ny, m_symbol, b_symbol, nyquist, error)
+   subroutine new_adhesion_preconditioner(self, kind, nx, fine, m_symbol, b_symbol, nyquist, error)
       type(adhesion_preconditioner_type), intent(out) :: self
       character(*), intent(in) :: kind              !! 'full' or 'coarse'
-      integer, intent(in) :: nx, ny
+      integer, intent(in) :: nx                     !! cells of the grid along x
+      type(row_sharing_type), intent(in) :: fine    !! who holds its rows
       real(dp), intent(in) :: m_symbol(0:, 0:)      !! M, (0:nx/2, 0:ny/2), > 0
       real(dp), intent(in) :: b_symbol(0:, 0:)      !! B, the same
       real(dp), intent(in) :: nyquist               !! B at the Nyquist wave number, > 0
       type(error_type), allocatable, intent(out) :: error
       real(dp), allocatable :: low(:, :)
-      integer :: i, j
+      integer :: i, j, ny
 
+      ny = size(fine%owner)
       self%nx = nx
       self%ny = ny
+      self%own = fine%own
       self%theta = 1.4_dp/nyquist
       self%fine_symbol = 0.5_dp*nyquist
       self%mx = max(1, nint(nx/ratio))
@@ -75,14 +88,16 @@ contains
       allocate (self%left(nx), self%wx(nx), self%below(ny), self%wy(ny))
       call neighbours(nx, self%mx, self%left, self%wx)
       call neighbours(ny, self%my, self%below, self%wy)
-      allocate (self%rows(self%mx, ny), self%field(self%mx, self%my))
-      call new_symbol_operator(self%stiffness, self%mx, self%my, &
+      call share_coarse_rows(self, fine)
+      allocate (self%rows(self%mx, self%fine_halo%own + self%fine_halo%foreign), &
+         self%field(self%mx, self%coarse_halo%own + self%coarse_halo%foreign))
+      call new_symbol_operator(self%stiffness, shape_of_rows(self%mx, self%sharing, 1), &
          b_symbol(0:self%mx/2, 0:self%my/2), error)
       if (allocated(error)) return
       select case (kind)
       case ('full')
          self%full = .true.
-         call new_symbol_operator(self%fine, nx, ny, m_symbol, error)
+         call new_symbol_operator(self%fine, shape_of_rows(nx, fine, 1), m_symbol, error)
       case ('coarse')
          allocate (low(0:self%mx/2, 0:self%my/2))
          do j = 0, self%my/2
@@ -90,11 +105,37 @@ contains
                low(i, j) = m_symbol(i, j)/max(passed(i, self%mx)*passed(j, self%my), least_passed)
             end do
          end do
-         call new_symbol_operator(self%coarse, self%mx, self%my, low, error)
+         call new_symbol_operator(self%coarse, shape_of_rows(self%mx, self%sharing, 1), low, error)
       case default
          call fail(error, error_input, "preconditioner = '"//kind//"': must be 'full' or 'coarse'")
       end select
    end subroutine new_adhesion_preconditioner
+
+   !> Who holds which coarse rows, and what each process needs of others.
+   pure subroutine share_coarse_rows(self, fine)
+      type(adhesion_preconditioner_type), intent(inout) :: self
+      type(row_sharing_type), intent(in) :: fine
+      integer :: owner(self%my), above(self%ny), rows(self%ny)
+      integer :: j, k
+
+      do k = 1, self%my
+         owner(k) = fine%owner(min(int((k - 0.5_dp)*self%ny/self%my) + 1, self%ny))
+      end do
+      call new_row_sharing(self%sharing, owner, fine%shared)
+      above = upper(self%below, self%my)
+      rows = [(j, j=1, self%ny)]
+      call new_row_halo(self%fine_halo, fine, [rows, rows], [owner(self%below), owner(above)])
+      call new_row_halo(self%coarse_halo, self%sharing, [self%below, above], [fine%owner, fine%owner])
+   end subroutine share_coarse_rows
+
+   !> The coarse cell after one, on a periodic grid.
+   elemental function upper(lower, m) result(cell)
+      integer, intent(in) :: lower
+      integer, intent(in) :: m                      !! coarse cells
+      integer :: cell
+
+      cell = merge(1, lower + 1, lower == m)
+   end function upper
 
    !> What linear interpolation and its adjoint leave of a wave: sinc^4.
    pure function passed(k, m) result(share)
@@ -121,7 +162,7 @@ contains
       end do
    end subroutine neighbours
 
-   !> Hand in row j of r.
+   !> Hand in row j of r, of those of this process.
    subroutine put_row(self, j, row)
       class(adhesion_preconditioner_type), intent(inout) :: self
       integer, intent(in) :: j
@@ -159,18 +200,31 @@ contains
       end do
    end subroutine restrict_row
 
-   !> Finish the restriction: weighted means on the coarse grid.
+   !> Finish the restriction: weighted means on the coarse grid. Each is summed in the order of the rows.
    subroutine restrict_columns(self)
       class(adhesion_preconditioner_type), intent(inout) :: self
-      integer :: j, k, l
+      integer :: j, from
 
+      call self%fine_halo%fetch(self%rows)
       self%field = 0.0_dp
       do j = 1, self%ny
-         k = self%below(j)
-         l = merge(1, k + 1, k == self%my)
-         self%field(:, k) = self%field(:, k) + (1.0_dp - self%wy(j))/self%cells*self%rows(:, j)
-         self%field(:, l) = self%field(:, l) + self%wy(j)/self%cells*self%rows(:, j)
+         from = self%fine_halo%place(j)
+         if (from == 0) cycle
+         call add(self%coarse_halo%place(self%below(j)), 1.0_dp - self%wy(j))
+         call add(self%coarse_halo%place(upper(self%below(j), self%my)), self%wy(j))
       end do
+
+   contains
+
+      !> Add a row to a coarse row, if that is one of this process.
+      subroutine add(k, weight)
+         integer, intent(in) :: k
+         real(dp), intent(in) :: weight
+
+         if (k < 1 .or. k > self%coarse_halo%own) return
+         self%field(:, k) = self%field(:, k) + weight/self%cells*self%rows(:, from)
+      end subroutine add
+
    end subroutine restrict_columns
 
    !> Between putting and getting rows.
@@ -183,9 +237,12 @@ contains
          call self%fine%columns(columns_apply, form)
       else
          call restrict_columns(self)
-         allocate (product(self%mx, self%my))
-         call self%coarse%apply(self%field, product)
+         allocate (product, mold=self%field)
+         associate (own => self%coarse_halo%own)
+            call self%coarse%apply(self%field(:, :own), product(:, :own))
+         end associate
          call move_alloc(product, self%field)
+         call self%coarse_halo%fetch(self%field)
       end if
    end subroutine transform
 
@@ -195,21 +252,23 @@ contains
       integer, intent(in) :: j
       real(dp), intent(in) :: r(:)                !! row j of r
       real(dp), intent(out) :: z(:)
-      real(dp) :: upper, a, b
+      real(dp) :: share, a, b
       integer :: i, k, l, below, above
 
       if (self%full) then
          call self%fine%backward_row(1, j, z)
          return
       end if
-      below = self%below(j)
-      above = merge(1, below + 1, below == self%my)
-      upper = self%wy(j)
+      associate (row => self%own(j))
+         below = self%coarse_halo%place(self%below(row))
+         above = self%coarse_halo%place(upper(self%below(row), self%my))
+         share = self%wy(row)
+      end associate
       do i = 1, self%nx
          k = self%left(i)
          l = merge(1, k + 1, k == self%mx)
-         a = self%field(k, below) + upper*(self%field(k, above) - self%field(k, below))
-         b = self%field(l, below) + upper*(self%field(l, above) - self%field(l, below))
+         a = self%field(k, below) + share*(self%field(k, above) - self%field(k, below))
+         b = self%field(l, below) + share*(self%field(l, above) - self%field(l, below))
          z(i) = self%theta*r(i) + a + self%wx(i)*(b - a)
       end do
    end subroutine get_row
@@ -219,11 +278,19 @@ contains
       class(adhesion_preconditioner_type), intent(inout) :: self
       real(dp), intent(in) :: squares             !! d.d over the cells
       real(dp) :: form
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: coarse_squares(1)
+      integer :: j
 
       call restrict_columns(self)
-      call self%stiffness%quadratic_form(self%field, form)
+      allocate (rows(1, self%coarse_halo%own))
+      do j = 1, self%coarse_halo%own
+         rows(1, j) = sum(self%field(:, j)**2)
+      end do
+      coarse_squares = self%sharing%totals(rows)
+      call self%stiffness%quadratic_form(self%field(:, :self%coarse_halo%own), form)
       form = self%cells*form &
-         + max(squares - self%cells*sum(self%field**2), 0.0_dp)*self%fine_symbol
+         + max(squares - self%cells*coarse_squares(1), 0.0_dp)*self%fine_symbol
    end function estimate
 
    !> Transforms done so far, counted in those of the grid.

@@ -51,7 +51,7 @@ contains
          contact%past_mean = field_mean(contact%past)
       if (contact%problem%control == control_pressure) contact%load = contact%problem%target
       !$omp parallel do default(none) shared(contact) private(j) num_threads(self%threads)
-      do j = 1, self%ny
+      do j = 1, self%rows
          contact%state(:, j) = max(contact%state(:, j), 0.0_dp)
          if (contact%problem%full_contact) contact%state(:, j) = 0.0_dp
       end do
@@ -60,7 +60,7 @@ contains
       if (field_sum(contact%state) > 0.0_dp) then
          shift = sum_shift(contact%state, contact%state, 0.0_dp, contact%gap_sum, self%threads)
          !$omp parallel do default(none) shared(contact, shift) private(j) num_threads(self%threads)
-         do j = 1, self%ny
+         do j = 1, self%rows
             contact%state(:, j) = stepped_gap(contact%state(:, j), 0.0_dp, 0.0_dp, shift)
          end do
       else
@@ -80,21 +80,21 @@ contains
       if (contact%problem%control == control_pressure) contact%force = contact%problem%target*self%cells
       if (contact%problem%full_contact) then
          if (contact%problem%control /= control_approach) contact%level = -contact%mean_height
-         do j = 1, self%my
+         do j = 1, self%all_rows
             contact%state(:, j) = (contact%level + contact%mean_height)*self%psi(:, j)
-            if (j <= self%ny) contact%state(1:self%nx, j) = max(gap(:, j), 0.0_dp)
+            if (j <= self%rows) contact%state(1:self%nx, j) = max(gap(:, j), 0.0_dp)
          end do
          return
       end if
-      do j = 1, self%my
+      do j = 1, self%all_rows
          contact%traction(:, j) = 0.0_dp
-         if (j > self%ny) cycle
+         if (j > self%rows) cycle
          contact%traction(1:self%nx, j) = pressure(:, j)
          if (associated(contact%past)) contact%traction(1:self%nx, j) = pressure(:, j) &
             + contact%past(:, j)
       end do
       call self%stiffness%apply_inverse(contact%traction, contact%state)
-      do j = 1, self%my
+      do j = 1, self%all_rows
          contact%state(:, j) = contact%state(:, j)/contact%problem%modulus
          do i = 1, self%inner(j)
             g = contact%state(i, j) - (contact%height(i, j) - contact%problem%datum) - contact%level

@@ -61,7 +61,7 @@ module adhesion_state
          implicit none
          class(adhesion_method_type), intent(inout), target :: self
          type(adhesion_problem_type), intent(in) :: problem
-         real(dp), intent(in), contiguous, target :: height(:, :)      !! H, [nx, ny], m
+         real(dp), intent(in), contiguous, target :: height(:, :)      !! H, [nx, rows], m
          real(dp), intent(inout), contiguous, target :: gap(:, :)      !! g, m: a start in periodic mode
          real(dp), intent(inout), contiguous, target :: pressure(:, :) !! P, Pa: a start in free mode
          real(dp), intent(inout) :: level                              !! m: a start in free mode

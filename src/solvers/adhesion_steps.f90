@@ -8,8 +8,10 @@
 module adhesion_steps
    use adhesion_potential, only : adhesive_terms, has_smooth_potential
    use adhesion_state, only : adhesion_problem_type
-   use field_sums, only : largest_of_rows, least_of_rows, row_total
+   use asperity_parallel, only : any_process
    use asperity_precision, only : dp
+   use field_sums, only : least_of_rows, row_totals
+   use row_sharing, only : row_sharing_type
    implicit none
    private
 
@@ -96,30 +98,30 @@ contains
       real(dp), intent(in) :: total                !! m, > 0
       integer, intent(in) :: threads
       real(dp) :: shift
-      real(dp), allocatable :: sums(:)
-      real(dp) :: next, x
-      integer, allocatable :: counts(:)
-      integer :: i, j, open
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: next, open, height, sums(2), x
+      integer :: i, j
 
-      allocate (sums(size(gap, 2)), counts(size(gap, 2)))
+      allocate (rows(2, size(gap, 2)))
       shift = 0.0_dp
       do
-         !$omp parallel do default(none) shared(gap, direction, alpha, shift, sums, counts) &
-         !$omp private(i, j, x) num_threads(threads)
+         !$omp parallel do default(none) shared(gap, direction, alpha, shift, rows) &
+         !$omp private(i, j, open, height, x) num_threads(threads)
          do j = 1, size(gap, 2)
-            sums(j) = 0.0_dp
-            counts(j) = 0
+            height = 0.0_dp
+            open = 0.0_dp
             do i = 1, size(gap, 1)
                x = gap(i, j) + alpha*direction(i, j)
                if (x > max(shift, 0.0_dp)) then
-                  sums(j) = sums(j) + x
-                  counts(j) = counts(j) + 1
+                  height = height + x
+                  open = open + 1.0_dp
                end if
             end do
+            rows(:, j) = [height, open]
          end do
-         open = row_total(counts)
-         if (open == 0) exit
-         next = (row_total(sums) - total)/open
+         sums = row_totals(rows)
+         if (.not. sums(2) > 0.0_dp) exit
+         next = (sums(1) - total)/sums(2)
          if (next <= shift) then
             ! The sum is too small: all that is open is lifted.
             if (shift == 0.0_dp) shift = next
@@ -169,12 +171,12 @@ contains
       subroutine adhesive_part(a, first, second)
          real(dp), intent(in) :: a
          real(dp), intent(out) :: first, second
-         real(dp), allocatable :: slopes(:), curvatures(:)
-         real(dp) :: x, e, e1, e2, s1, s2
+         real(dp), allocatable :: rows(:, :)
+         real(dp) :: sums(2), x, e, e1, e2, s1, s2
          integer :: i, j
 
-         allocate (slopes(size(gap, 2)), curvatures(size(gap, 2)))
-         !$omp parallel do default(none) shared(problem, gap, direction, slopes, curvatures, a) &
+         allocate (rows(2, size(gap, 2)))
+         !$omp parallel do default(none) shared(problem, gap, direction, rows, a) &
          !$omp private(i, j, x, e, e1, e2, s1, s2) num_threads(threads)
          do j = 1, size(gap, 2)
             s1 = 0.0_dp
@@ -186,11 +188,11 @@ contains
                s1 = s1 + direction(i, j)*e1
                if (x > 0.0_dp) s2 = s2 + direction(i, j)**2*e2
             end do
-            slopes(j) = s1
-            curvatures(j) = s2
+            rows(:, j) = [s1, s2]
          end do
-         first = row_total(slopes)
-         second = row_total(curvatures)
+         sums = row_totals(rows)
+         first = sums(1)
+         second = sums(2)
       end subroutine adhesive_part
 
    end function clipped_step
@@ -232,17 +234,27 @@ contains
    end subroutine form_step_row
 
    !> What is known of a step from its rows.
-   function known_of_step(rows) result(known)
+   function known_of_step(rows, sharing) result(known)
       type(step_sums_type), intent(in) :: rows(:)
+      type(row_sharing_type), intent(in) :: sharing    !! of the rows
       type(step_sums_type) :: known
+      real(dp), allocatable :: parts(:, :)
+      real(dp) :: sums(5)
+      integer :: j
 
-      known%slope = row_total(rows%slope)
-      known%adhesive_slope = row_total(rows%adhesive_slope)
-      known%curvature = row_total(rows%curvature)
-      known%energy = row_total(rows%energy)
-      known%squares = row_total(rows%squares)
+      allocate (parts(5, size(rows)))
+      do j = 1, size(rows)
+         parts(:, j) = [rows(j)%slope, rows(j)%adhesive_slope, rows(j)%curvature, rows(j)%energy, &
+            rows(j)%squares]
+      end do
+      sums = sharing%totals(parts)
+      known%slope = sums(1)
+      known%adhesive_slope = sums(2)
+      known%curvature = sums(3)
+      known%energy = sums(4)
+      known%squares = sums(5)
       known%longest = least_of_rows(rows%longest)
-      known%clipped = largest_of_rows(merge(1.0_dp, 0.0_dp, rows%clipped)) > 0.0_dp
+      known%clipped = any_process(any(rows%clipped))
    end function known_of_step
 
    !> How far to go along the segment s: t near the first minimum of the energy, never where the
@@ -307,13 +319,13 @@ contains
       subroutine adhesive_part(at, slope_sum, energy_sum)
          real(dp), intent(in) :: at
          real(dp), intent(out) :: slope_sum, energy_sum
-         real(dp), allocatable :: slopes(:), energies(:)
-         real(dp) :: s, e, e1, e2, s1, s2
+         real(dp), allocatable :: rows(:, :)
+         real(dp) :: sums(2), s, e, e1, e2, s1, s2
          integer :: i, j
 
-         allocate (slopes(size(gap, 2)), energies(size(gap, 2)))
+         allocate (rows(2, size(gap, 2)))
          !$omp parallel do default(none) &
-         !$omp shared(problem, gap, direction, alpha, shift, slopes, energies, at) &
+         !$omp shared(problem, gap, direction, alpha, shift, rows, at) &
          !$omp private(i, j, s, e, e1, e2, s1, s2) num_threads(threads)
          do j = 1, size(gap, 2)
             s1 = 0.0_dp
@@ -324,11 +336,11 @@ contains
                s1 = s1 + s*e1
                s2 = s2 + e
             end do
-            slopes(j) = s1
-            energies(j) = s2
+            rows(:, j) = [s1, s2]
          end do
-         slope_sum = row_total(slopes)
-         energy_sum = row_total(energies)
+         sums = row_totals(rows)
+         slope_sum = sums(1)
+         energy_sum = sums(2)
       end subroutine adhesive_part
 
    end function choose_step
