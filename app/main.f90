@@ -10,10 +10,13 @@ program main
       template_text
    use copies_guard, only : refuse_copies
    use command_line, only : command_type, help_text, read_command_line
-   use asperity_parallel, only : end_processes, is_first_process, process_count, start_processes
+   use asperity_parallel, only : any_process, end_processes, global_max, is_first_process, process_count, share, &
+      start_processes
    use asperity_errors, only : error_file, error_input, error_memory, error_type, fail
    use hand_over, only : become_python
+   use process_agreement, only : agree
    use reference_page, only : reference_markdown
+   use asperity_precision, only : dp
    use asperity_progress, only : progress_type
    use result_summary, only : summarise_result
    use asperity_signals, only : catch_signals, checkpoint_asked, forget_checkpoint, stop_signal, &
@@ -38,29 +41,19 @@ program main
    call read_command_line(command, error)
    if (.not. allocated(error)) then
       select case (command%verb)
-      case ('help')
-         call say(help_text(command%help_of), error)
-      case ('version')
-         call say('asperity '//version_number//new_line('a')//linked_versions(), error)
-      case ('template')
-         call template(error)
+      case ('run')
+         call run(error)
       case ('check')
          call check(error)
-      case ('info')
-         call info(error)
-      case ('python')
-         if (command%help_of == '') then
-            call become_python(error)
-         else
-            call become_python(error, command%handed_over, '--help')
-         end if
       case default
-         call run(error)
+         ! The program may become another one, which knows nothing of the other processes.
+         call end_processes()
+         if (is_first_process()) call tell(error)
       end select
    end if
    status = 0
    if (allocated(error)) then
-      call say_error(error%message)
+      if (is_first_process()) call say_error(error%message)
       status = error%status
       if (status == error_memory) status = error_file
    end if
@@ -68,6 +61,28 @@ program main
    stop status, quiet=.true.
 
 contains
+
+   !> Commands that do not read a case: only one process carries them out.
+   subroutine tell(error)
+      type(error_type), allocatable, intent(out) :: error
+
+      select case (command%verb)
+      case ('help')
+         call say(help_text(command%help_of), error)
+      case ('version')
+         call say('asperity '//version_number//new_line('a')//linked_versions(), error)
+      case ('template')
+         call template(error)
+      case ('info')
+         call info(error)
+      case default                                   ! python
+         if (command%help_of == '') then
+            call become_python(error)
+         else
+            call become_python(error, command%handed_over, '--help')
+         end if
+      end select
+   end subroutine tell
 
    !> asperity template [NAME]
    subroutine template(error)
@@ -96,9 +111,11 @@ contains
       type(case_type) :: case
 
       call read_case(command%path, case, error)
-      if (.not. allocated(error)) call check_files(case%grid, case%surfaces, error)
-      if (allocated(error)) return
-      call say(resolved_input(case)//case_summary(case), error)
+      if (.not. allocated(error) .and. is_first_process()) then
+         call check_files(case%grid, case%surfaces, error)
+         if (.not. allocated(error)) call say(resolved_input(case)//case_summary(case), error)
+      end if
+      call agree(error)
    end subroutine check
 
    !> asperity info RESULT.h5
@@ -121,27 +138,33 @@ contains
       if (allocated(error)) return
       call read_case(command%path, case, error)
       if (allocated(error)) return
-      if (allocated(command%output)) then
-         if (len(command%output) > path_length) then
-            call fail(error, error_input, 'asperity: --output: the path has '//to_text(len(command%output))// &
-               ' characters: at most '//to_text(path_length)//' are allowed')
-            return
-         end if
-         case%output%file = command%output
-         if (overwritten_file(case) /= '') then
-            call fail(error, error_input, 'asperity: --output '//command%output// &
-               ': would overwrite '//overwritten_file(case))
-            return
-         end if
-      end if
+      if (allocated(command%output)) call choose_output(case, error)
+      call agree(error)
+      if (allocated(error)) return
       if (command%threads > 0) case%solver%threads = command%threads
-      if (case%warnings /= '') call say_error(case%warnings)
+      if (case%warnings /= '' .and. is_first_process()) call say_error(case%warnings)
       call catch_signals()
       call run_steps(case, error)
    end subroutine run
 
+   !> --output in place of the file that the case names.
+   subroutine choose_output(case, error)
+      type(case_type), intent(inout) :: case
+      type(error_type), allocatable, intent(out) :: error
+
+      if (len(command%output) > path_length) then
+         call fail(error, error_input, 'asperity: --output: the path has '//to_text(len(command%output))// &
+            ' characters: at most '//to_text(path_length)//' are allowed')
+         return
+      end if
+      case%output%file = command%output
+      if (overwritten_file(case) /= '') call fail(error, error_input, 'asperity: --output '// &
+         command%output//': would overwrite '//overwritten_file(case))
+   end subroutine choose_output
+
    !> The steps of a run. A signal or the time limit stops it after the present step, with a
-   !> checkpoint; a signal also ends a step with friction that takes long.
+   !> checkpoint; a signal also ends a step with friction that takes long. A signal to any process counts
+   !> for all of them, and the first process looks at the clock.
    subroutine run_steps(case, error)
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
@@ -149,22 +172,28 @@ contains
       type(progress_type) :: progress
       type(time_limit_type) :: limit
       type(error_type), allocatable :: closing
+      logical :: near
+      integer :: signal
 
       call limit%start(command%time_limit)
       call run%open(case, command%restart, command%overwrite, error)
       if (.not. allocated(error)) then
          run%sim%stop%asked => stop_was_asked
-         call progress%start(run%rows, max(run%sim%state%schedule%row + 1, 0), command%quiet)
+         call progress%start(run%rows, max(run%sim%state%schedule%row + 1, 0), &
+            command%quiet .or. .not. is_first_process())
          do while (.not. run%finished)
             call tell_warnings(run, progress)
-            if (stop_signal() /= 0) then
-               call stop_run(run, 128 + stop_signal(), 'stopped by '//stop_signal_name(), error)
+            signal = nint(global_max(real(stop_signal(), dp)))
+            near = limit%is_near()
+            call share(near)
+            if (signal /= 0) then
+               call stop_run(run, 128 + signal, 'stopped by '//stop_signal_name(signal), error)
                exit
-            else if (limit%is_near()) then
+            else if (near) then
                call stop_run(run, stopped_by_limit, 'the time limit is near: stopped', error)
                exit
             end if
-            if (checkpoint_asked()) then
+            if (any_process(checkpoint_asked())) then
                call forget_checkpoint()
                call limit%step_begins()
                call run%save(error)
@@ -214,7 +243,7 @@ contains
 
       if (len(run%warnings) == 0) return
       call progress%finish()
-      call say_error(run%warnings)
+      if (is_first_process()) call say_error(run%warnings)
       run%warnings = ''
    end subroutine tell_warnings
 

@@ -173,11 +173,13 @@ contains
       plan%rows = 1
       plan%snapshots = 1
       grid = new_grid(nx, ny, 1.0_dp, 1.0_dp, boundary_free)
-      call output%create('no_such_folder/x.h5', grid, pressure_of(0), plan, error)
+      call output%create('no_such_folder/x.h5', grid, plan, error)
       call check_error(error, 'there is no folder "no_such_folder"', 'no folder')
-      call output%create('.', grid, pressure_of(0), plan, error)
+      call output%create('.', grid, plan, error)
       call check_error(error, 'is a folder', 'folder')
-      call output%create(path, grid, pressure_of(0), plan, error)
+      call output%create(path, grid, plan, error)
+      call output%write_height_rows(1, pressure_of(0))
+      call output%publish(error)
       call check_no_error(error, 'a free grid')
       call check_that(.not. file_exists(checkpoint_path(path)), 'old checkpoint removed')
       call output%begin_snapshot(0, 0.0_dp, 1)
@@ -189,7 +191,7 @@ contains
       call output%close(error)
       call check_no_error(error, 'closed')
 
-      call output%create(other_path, grid, pressure_of(0), plan, error)
+      call output%create(other_path, grid, plan, error)
       call output%begin_snapshot(0, 0.0_dp, 1, error)
       call output%begin_snapshot(1, 0.0_dp, 1, error)
       call check_error(error, '/snapshots/000000 is not finished yet', 'two at once')

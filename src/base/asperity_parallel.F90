@@ -51,6 +51,7 @@ module asperity_parallel
       module procedure :: hand_reals, hand_bytes
    end interface hand_to_first
 
+   logical :: joined = .false.           !! between the start and the end of the processes
    integer :: processes = 1              !! number of processes
    integer :: number = 0                 !! of this process, from 0
    integer :: neighbours = 1             !! processes on this machine
@@ -71,13 +72,16 @@ contains
       call mpi_comm_split_type(mpi_comm_world, mpi_comm_type_shared, 0, mpi_info_null, machine)
       call mpi_comm_size(machine, neighbours)
       call mpi_comm_free(machine)
+      joined = .true.
 #endif
    end subroutine start_processes
 
-   !> Leave the other processes. To be called once, last of all, by every process.
+   !> Leave the other processes. To be called by every process; what is called after it exchanges nothing.
    subroutine end_processes()
 #ifdef ASPERITY_MPI
-      call mpi_finalize()
+      if (joined) call mpi_finalize()
+      joined = .false.
+      processes = 1
 #endif
    end subroutine end_processes
 

@@ -110,11 +110,12 @@ contains
       yes = merge(1_c_int, 0_c_int, caught /= 0)
    end function stop_was_asked
 
-   !> The name of that signal.
-   function stop_signal_name() result(name)
+   !> The name of a signal that stops a run.
+   pure function stop_signal_name(number) result(name)
+      integer, intent(in) :: number
       character(:), allocatable :: name
 
-      select case (caught)
+      select case (number)
       case (signal_hang_up)
          name = 'SIGHUP'
       case (signal_interrupt)

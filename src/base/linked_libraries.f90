@@ -3,6 +3,7 @@
 module linked_libraries
    use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_f_pointer, c_int, c_ptr
    use, intrinsic :: iso_fortran_env, only : compiler_version
+   use asperity_parallel, only : parallel_library
    implicit none
    private
 
@@ -34,6 +35,7 @@ contains
    !> Compiler, FFTW, HDF5 and MPI, one per line.
    function linked_versions() result(text)
       character(:), allocatable :: text
+      character(:), allocatable :: parallel
       character(40) :: hdf5
       integer(c_int) :: major, minor, release
 
@@ -42,10 +44,13 @@ contains
          write (hdf5, '(i0, 2(".", i0))') major, minor, release
       end if
 
+      parallel = parallel_library()
+      if (parallel == '') parallel = 'none'
+
       text = 'compiler: '//compiler_version()//new_line('a')// &
          'FFTW: '//fftw_version()//new_line('a')// &
          'HDF5: '//trim(hdf5)//new_line('a')// &
-         'MPI: none'//new_line('a')
+         'MPI: '//parallel//new_line('a')
    end function linked_versions
 
    !> The version of FFTW, from the first word of its wisdom.

@@ -7,11 +7,13 @@ module case_input
    use case_settings, only : case_type, output_settings_type, path_length, word_length
    use case_surfaces, only : resolve_path, resolve_surfaces
    use asperity_errors, only : error_type
+   use asperity_parallel, only : is_first_process, share
    use input_faults, only : faults_type
    use input_group, only : group_values_type
    use input_reference, only : group_entries, group_entry_type
    use input_values, only : default_group, read_groups
    use asperity_precision, only : dp
+   use process_agreement, only : agree
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use surface_warnings, only : find_warnings, warning_length
    use asperity_text_file, only : read_text_file
@@ -24,16 +26,22 @@ module case_input
 
 contains
 
-   !> Read a case from a file.
+   !> Read a case from a file. Of several processes the first one reads the file, and all of them the text.
+   !> Collective.
    subroutine read_case(path, case, error)
       character(*), intent(in) :: path
       type(case_type), intent(out) :: case
       type(error_type), allocatable, intent(out) :: error      !! all faults, one a line
       character(:), allocatable :: text
 
-      call read_text_file(path, text, error)
+      if (is_first_process()) call read_text_file(path, text, error)
+      call agree(error)
       if (allocated(error)) return
+      call share(text)
       call parse_case(text, path, case, error)
+      call agree(error)
+      ! The first process has looked into the files of height maps, too.
+      if (.not. allocated(error)) call share(case%warnings)
    end subroutine read_case
 
    !> Read a case from a text.

@@ -16,7 +16,7 @@ module result_file
    use history_row, only : history_row_type, row_values
    use random_id, only : new_id
    use regular_grid, only : grid_type
-   use result_frame, only : read_grid, result_plan_type, write_axes, write_frame
+   use result_frame, only : height_path, read_grid, result_plan_type, write_axes, write_frame
    use result_losses, only : drop_losses, put_losses
    use result_history, only : append_values, count_history_rows, create_history_columns, &
       shorten_history
@@ -46,6 +46,8 @@ module result_file
       integer, public :: rows = 0                    !! rows of the history
    contains
       procedure :: create => create_result
+      procedure :: write_height_rows
+      procedure :: publish => publish_result
       procedure :: reopen => reopen_result
       procedure :: write_text
       procedure :: read_text
@@ -71,15 +73,14 @@ module result_file
 
 contains
 
-   !> Start a result. One of the same name is replaced, and its checkpoint is removed.
-   subroutine create_result(self, path, grid, height, plan, error)
+   !> Start a result as FILE.new. The heights of the road follow (`write_height_rows`), and then
+   !> `publish` lets it take its place.
+   subroutine create_result(self, path, grid, plan, error)
       class(result_file_type), intent(inout) :: self
       character(*), intent(in) :: path               !! name of the file
       type(grid_type), intent(in) :: grid
-      real(dp), intent(in), contiguous :: height(:, :) !! height map before any sliding, m [nx, ny]
       type(result_plan_type), intent(in) :: plan
       type(error_type), allocatable, intent(out) :: error
-      character(:), allocatable :: temporary
 
       self%grid = grid
       self%expected_rows = plan%rows
@@ -93,26 +94,63 @@ contains
 
       call check_place(self%path, error)
       if (allocated(error)) return
-      temporary = self%path//'.new'
-      call write_frame(self%file, temporary, self%id, grid, height, plan)
+      call write_frame(self%file, new_path(self), self%id, grid, plan)
       ! The link is made and removed, so that the root group keeps the room for its name.
       call self%link_checkpoint()
       call self%unlink_checkpoint()
       call self%file%report(error)
+      if (allocated(error)) call give_up(self, error)
+   end subroutine create_result
+
+   !> Write a slab of the height map before any sliding. The slabs have `height_rows` rows, the last one
+   !> may have fewer.
+   subroutine write_height_rows(self, first, height, error)
+      class(result_file_type), intent(inout) :: self
+      integer, intent(in) :: first                     !! first row, from 1
+      real(dp), intent(in), contiguous :: height(:, :) !! m [nx, rows]
+      type(error_type), allocatable, intent(out), optional :: error
+
+      call write_slab(self%file, height_path, first, height, error)
+   end subroutine write_height_rows
+
+   !> Let the new result take its place. One of the same name is replaced, and its checkpoint is removed.
+   subroutine publish_result(self, error)
+      class(result_file_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%file%flush()
+      call self%file%report(error)
       if (allocated(error)) then
-         ! The user knows the file by its own name.
+         call give_up(self, error)
+         return
+      end if
+      call remove_file(sibling_path(self%path, '.checkpoint.h5'))
+      call remove_file(self%xdmf_path)
+      call rename_file(new_path(self), self%path, error)
+      if (allocated(error)) return
+      self%file%path = self%path
+   end subroutine publish_result
+
+   !> Remove a new result that cannot be written. The user knows the file by its own name.
+   subroutine give_up(self, error)
+      class(result_file_type), intent(inout) :: self
+      type(error_type), allocatable, intent(inout) :: error
+
+      associate (temporary => new_path(self))
          if (index(error%message, temporary//':') == 1) &
             error%message = self%path//error%message(len(temporary) + 1:)
          call self%file%close()
          call remove_file(temporary)
-         return
-      end if
-      call remove_file(sibling_path(path, '.checkpoint.h5'))
-      call remove_file(self%xdmf_path)
-      call rename_file(temporary, self%path, error)
-      if (allocated(error)) return
-      self%file%path = self%path
-   end subroutine create_result
+      end associate
+   end subroutine give_up
+
+   !> Name of a result that has not taken its place yet.
+   pure function new_path(self) result(path)
+      class(result_file_type), intent(in) :: self
+      character(:), allocatable :: path
+
+      path = self%path//'.new'
+   end function new_path
 
    !> Write a text as an attribute of the file, such as the name of a case.
    subroutine write_text(self, name, value, error)

@@ -6,6 +6,7 @@ module result_frame
    use asperity_precision, only : dp
    use asperity_version, only : version_number
    use hdf5_file, only : hdf5_file_type
+   use hdf5_slabs, only : create_field
    use history_row, only : history_columns
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use result_history, only : create_history_columns
@@ -15,6 +16,7 @@ module result_frame
 
    public :: read_grid, result_plan_type, write_axes, write_frame
 
+   character(*), parameter, public :: height_path = '/surface/height'   !! of the height of the road
    character(*), parameter, public :: axes(2) = ['x', 'y']    !! of every field, in the same group
 
    !> What a result is about, and what it will contain when it is complete.
@@ -31,12 +33,12 @@ module result_frame
 contains
 
    !> Write everything that is known before the first row, except for the numbers of the material.
-   subroutine write_frame(file, path, id, grid, height, plan)
+   !> The height of the road gets no values yet: they follow in slabs of rows.
+   subroutine write_frame(file, path, id, grid, plan)
       type(hdf5_file_type), intent(inout) :: file
       character(*), intent(in) :: path                 !! name of the file
       character(*), intent(in) :: id                   !! identity of the result
       type(grid_type), intent(in) :: grid
-      real(dp), intent(in), contiguous :: height(:, :) !! height map before any sliding, m [nx, ny]
       type(result_plan_type), intent(in) :: plan
 
       ! The groups that grow are made first, in pages of their own.
@@ -50,8 +52,8 @@ contains
 
       call write_origin(file, id, plan)
       call write_grid(file, grid, plan%compression)
-      call file%write('/surface/height', height, 'm', 'height of the road', &
-         compression=plan%compression)
+      call create_field(file, height_path, [grid%nx, grid%ny], .false., 'm', 'height of the road', &
+         plan%compression)
       call write_axes(file, '/surface', grid, ['height'], plan%compression)
       call file%create_group('/material')
       call file%create_group('/history', expected=size(history_columns()) + 1)

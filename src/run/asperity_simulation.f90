@@ -321,7 +321,7 @@ contains
       self%reason = reason_overflow
    end subroutine look_for_overflow
 
-   !> Rows of a field of the state by its name in the result.
+   !> Rows of a field of the state by its name in the result. They are counted on this process.
    subroutine field_rows(self, name, first, values)
       class(simulation_type), intent(in) :: self
       character(*), intent(in) :: name              !! as in /snapshots, but for 'contact'
@@ -357,7 +357,7 @@ contains
    end subroutine field_rows
 
    !> The states of the cells of some rows: 0 open, 1 stick, 2 slip. Without friction all contact slips;
-   !> with it all sticks until the road moves.
+   !> with it all sticks until the road moves. The rows are counted on this process.
    subroutine contact_rows(self, first, states)
       class(simulation_type), intent(in) :: self
       integer, intent(in) :: first                  !! the first row

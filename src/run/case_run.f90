@@ -2,6 +2,9 @@
 !>
 !> The program and the Python package drive it alike: `open`, `step` until `finished`, `close`. A stop
 !> between two steps writes a checkpoint; a failing solver keeps all there is in the result.
+!>
+!> Several processes do the same, each on its rows of the fields. The first one has the files; what
+!> fails on one process fails on all of them, with the same message (module `process_agreement`).
 module case_run
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use case_identity, only : identity_of
@@ -15,9 +18,9 @@ module case_run
    use file_lock, only : file_lock_type
    use history_row, only : row_values
    use memory_limits, only : need_memory
-   use asperity_parallel, only : is_first_process, process_count, process_number, set_threads
-   use asperity_surface, only : new_height
+   use asperity_parallel, only : is_first_process, set_threads, share
    use path_identity, only : real_path
+   use process_agreement, only : agree
    use asperity_precision, only : dp, int64
    use result_file, only : result_file_type, result_plan_type
    use result_names, only : sibling_path
@@ -26,7 +29,7 @@ module case_run
    use steady_losses, only : longest_wave
    use asperity_simulation, only : new_simulation, simulation_type
    use simulation_state, only : load_state, save_state
-   use snapshot_writer, only : write_snapshot
+   use snapshot_writer, only : write_height, write_snapshot
    use text_tools, only : to_text
    implicit none
    private
@@ -68,7 +71,6 @@ contains
 
       call set_threads(case%solver%threads)
       self%path = trim(case%output%file)
-      if (.not. is_first_process()) self%path = trim(case%output%file)//'.'//to_text(process_number())   ! TODO files
       self%warnings = ''
       self%all_warnings = ''
       self%rows = count_rows(case%phases)
@@ -76,11 +78,14 @@ contains
       self%next_time = 1
       self%last_snapshot = -1
       call system_clock(self%saved_at)
-      call take_place(self, restart, overwrite, error)
+      if (is_first_process()) call take_place(self, restart, overwrite, error)
+      call agree(error)
       if (allocated(error)) return
       call need_memory(memory_needed(case), 'the run', error)
+      call agree(error)
       if (allocated(error)) return
       call new_simulation(self%sim, case, error)
+      call agree(error)
       if (allocated(error)) return
       self%settings = resolved_input(self%sim%case)
       self%identity = identity_of(self%settings)//map_lines(self%sim)
@@ -118,7 +123,6 @@ contains
       type(run_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
       type(result_plan_type) :: plan
-      real(dp), allocatable :: whole(:, :)
 
       associate (case => self%sim%case)
          plan%title = trim(case%title)
@@ -130,15 +134,22 @@ contains
             plan%snapshots = plan%snapshots + self%rows/case%output%snapshot_every
          if (self%sim%has_steady) plan%losses = count(case%phases%steady)
          plan%compression = case%output%compression
-         call new_height(case%grid, case%surfaces, whole, error)   ! TODO files
-         call self%result%create(self%path, case%grid, whole, plan, error)
+         if (is_first_process()) call self%result%create(self%path, self%sim%grid, plan, error)
+         call agree(error)
          if (allocated(error)) return
-         call write_material(self%result, case%material)
-         call self%result%write_text('height_maps', checksums_of_maps(self%sim))
-         call self%result%write_text('warnings', case%warnings)
-         call self%result%write_text('outcome', 'running')
+         call write_height(self%result, self%sim)
+         if (is_first_process()) then
+            call self%result%publish(error)
+            if (.not. allocated(error)) then
+               call write_material(self%result, case%material)
+               call self%result%write_text('height_maps', checksums_of_maps(self%sim))
+               call self%result%write_text('warnings', case%warnings)
+               call self%result%write_text('outcome', 'running')
+               call self%result%report(error)
+            end if
+         end if
       end associate
-      call self%result%report(error)
+      call agree(error)
    end subroutine create_result
 
    !> Go on from the checkpoint: the state, and a result without what came later.
@@ -214,14 +225,18 @@ contains
       end do
    end subroutine take_up_warnings
 
-   !> Leave in the result how the run ended, and what it warned of.
+   !> Leave in the result how the run ended, and what it warned of. Collective.
    subroutine leave_word(self, outcome, error)
       type(run_type), intent(inout) :: self
       character(*), intent(in) :: outcome
       type(error_type), allocatable, intent(out) :: error
 
-      if (len(self%all_warnings) > 0) call self%result%write_text('run_warnings', self%all_warnings, error)
-      if (.not. allocated(error)) call self%result%write_text('outcome', outcome, error)
+      if (is_first_process()) then
+         if (len(self%all_warnings) > 0) &
+            call self%result%write_text('run_warnings', self%all_warnings, error)
+         if (.not. allocated(error)) call self%result%write_text('outcome', outcome, error)
+      end if
+      call agree(error)
    end subroutine leave_word
 
    !> Do a row, and write what is due. With status error_convergence the row is kept all the same. A row
@@ -232,6 +247,7 @@ contains
       character(:), allocatable :: outcome
 
       call self%sim%advance(error)
+      call agree(error)
       if (allocated(error) .or. self%sim%stop%given_up) return
       if (.not. all(ieee_is_finite(row_values(self%sim%state%row)))) then
          self%sim%converged = .false.
@@ -239,9 +255,8 @@ contains
       end if
       self%finished = self%sim%finished
       call collect_warnings(self)
-      call self%result%append_row(self%sim%state%row, error)
-      if (allocated(error)) return
-      if (self%sim%state%steady%now) call write_losses(self, error)
+      if (is_first_process()) call write_row(self, error)
+      call agree(error)
       if (allocated(error)) return
       if (snapshot_due(self)) call snapshot(self, error)
       if (allocated(error)) return
@@ -257,29 +272,44 @@ contains
          return
       end if
       if (self%finished) then
-         call self%result%unlink_checkpoint(error)
-         if (allocated(error)) return
-         call remove_checkpoint(self%path)
-         call leave_word(self, 'finished', error)
-         if (allocated(error)) return
-         call self%result%finish(.true., error)
+         call finish_run(self, error)
       else if (checkpoint_due(self)) then
          call self%save(error)
       end if
    end subroutine step_run
 
-   !> Where the last row, one of steady sliding, loses its energy.
-   subroutine write_losses(self, error)
+   !> The run is complete: there is nothing to go on with. Collective.
+   subroutine finish_run(self, error)
+      type(run_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+
+      if (is_first_process()) then
+         call self%result%unlink_checkpoint(error)
+         if (.not. allocated(error)) call remove_checkpoint(self%path)
+      end if
+      call agree(error)
+      if (allocated(error)) return
+      call leave_word(self, 'finished', error)
+      if (allocated(error)) return
+      if (is_first_process()) call self%result%finish(.true., error)
+      call agree(error)
+   end subroutine finish_run
+
+   !> Write the last row of the history and, if it is one of steady sliding, where it loses its energy. On
+   !> the first process.
+   subroutine write_row(self, error)
       type(run_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
       integer :: k
 
+      call self%result%append_row(self%sim%state%row, error)
+      if (allocated(error) .or. .not. self%sim%state%steady%now) return
       associate (losses => self%sim%steady%losses)
          call self%result%write_losses(self%sim%state%row%step, &
             [(longest_wave(self%sim%grid)/2.0_dp**(k - 1), k = 1, size(losses%octave))], losses%octave, &
             self%sim%case%material%prony_tau, losses%arm, error)
       end associate
-   end subroutine write_losses
+   end subroutine write_row
 
    !> Is a snapshot of the last row due?
    function snapshot_due(self) result(due)
@@ -307,11 +337,11 @@ contains
       type(error_type), allocatable, intent(out) :: error
       logical, intent(in), optional :: at_stop     !! written for a stop only: a restart drops it
 
-      if (process_count() == 1) call write_snapshot(self%result, self%sim, error, at_stop)   ! TODO files
+      call write_snapshot(self%result, self%sim, error, at_stop)
       self%last_snapshot = self%sim%state%row%step
    end subroutine snapshot
 
-   !> Is a checkpoint due after the last row?
+   !> Is a checkpoint due after the last row? The clock of the first process says so to all. Collective.
    function checkpoint_due(self) result(due)
       type(run_type), intent(in) :: self
       logical :: due
@@ -324,6 +354,7 @@ contains
          if (output%checkpoint_minutes > 0.0_dp) then
             call system_clock(now, rate)
             due = due .or. real(now - self%saved_at, dp) > 60.0_dp*output%checkpoint_minutes*rate
+            call share(due)
          end if
       end associate
    end function checkpoint_due
@@ -367,9 +398,10 @@ contains
       class(run_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
 
-      call self%result%close(error)
+      if (is_first_process()) call self%result%close(error)
       call self%sim%destroy()
-      call self%lock%release()
+      if (is_first_process()) call self%lock%release()
+      call agree(error)
    end subroutine close_run
 
    !> New warnings of the simulation, for the caller.

@@ -3,6 +3,7 @@
 !> too few cells, and height maps whose files state another size, unit or boundary than the input.
 module surface_warnings
    use asperity_errors, only : error_type
+   use asperity_parallel, only : is_first_process
    use hdf5_file, only : hdf5_file_type
    use asperity_precision, only : dp
    use regular_grid, only : boundary_periodic, grid_type
@@ -60,7 +61,7 @@ contains
 
    !> The lengths, the unit and the boundary that the file of a map states must agree with the
    !> input. No warning is given about a file that states none of them, or that cannot be read:
-   !> reading the map itself reports that as an error.
+   !> reading the map itself reports that as an error. Only the first process opens files.
    subroutine check_map(grid, term, warnings)
       type(grid_type), intent(in) :: grid
       type(surface_settings_type), intent(in) :: term
@@ -71,6 +72,7 @@ contains
       character(warning_length) :: text
       real(dp) :: lx, ly
 
+      if (.not. is_first_process()) return
       call file%open(trim(term%file), 'read', error)
       if (allocated(error)) return
       map = trim(term%dataset)
