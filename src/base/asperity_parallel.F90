@@ -26,7 +26,7 @@ module asperity_parallel
    implicit none
    private
 
-   public :: any_process, end_processes, exchange, gather_rows, global_max, global_min, global_sum, &
+   public :: any_process, end_processes, exchange, exchanged_bytes, gather_rows, global_max, global_min, global_sum, &
       hand_to_first, is_first_process, on_any_process, parallel_library, process_count, process_number, processor_count, &
       release_threads, rows_before, set_threads, share, start_processes, take_from_first, thread_count
 
@@ -55,6 +55,7 @@ module asperity_parallel
    integer :: processes = 1              !! number of processes
    integer :: number = 0                 !! of this process, from 0
    integer :: neighbours = 1             !! processes on this machine
+   real(dp) :: sent = 0.0_dp             !! bytes that this process has sent to others
 
 contains
 
@@ -115,6 +116,18 @@ contains
       text = ''
 #endif
    end function parallel_library
+
+   !> What all processes have sent to each other so far, bytes: parts of fields and numbers of rows.
+   !> Collective.
+   function exchanged_bytes() result(bytes)
+      real(dp) :: bytes
+
+      bytes = sent
+#ifdef ASPERITY_MPI
+      if (processes > 1) call mpi_allreduce(mpi_in_place, bytes, 1, mpi_double_precision, mpi_sum, &
+         mpi_comm_world)
+#endif
+   end function exchanged_bytes
 
    ! Numbers that all processes need. Collective.
 
@@ -202,6 +215,7 @@ contains
             starts(p) = starts(p - 1) + counts(p - 1)
          end do
          allocate (whole(size(local, 1), sum(counts)/size(local, 1)))
+         sent = sent + 8.0_dp*size(local)*(processes - 1)
          call mpi_allgatherv(local, size(local), mpi_double_precision, whole, counts, starts, &
             mpi_double_precision, mpi_comm_world)
          return
@@ -293,6 +307,7 @@ contains
       complex(dp), intent(inout), contiguous :: receive(:)
       integer, intent(in) :: receive_counts(:)     !! from each process
 #ifdef ASPERITY_MPI
+      call count_sent(send_counts, 16)
       call mpi_alltoallv(send, send_counts, starts_of(send_counts), mpi_double_complex, &
          receive, receive_counts, starts_of(receive_counts), mpi_double_complex, mpi_comm_world)
 #else
@@ -307,6 +322,7 @@ contains
       complex(sp), intent(inout), contiguous :: receive(:)
       integer, intent(in) :: receive_counts(:)
 #ifdef ASPERITY_MPI
+      call count_sent(send_counts, 8)
       call mpi_alltoallv(send, send_counts, starts_of(send_counts), mpi_complex, &
          receive, receive_counts, starts_of(receive_counts), mpi_complex, mpi_comm_world)
 #else
@@ -321,6 +337,7 @@ contains
       real(dp), intent(inout), contiguous :: receive(:)
       integer, intent(in) :: receive_counts(:)
 #ifdef ASPERITY_MPI
+      call count_sent(send_counts, 8)
       call mpi_alltoallv(send, send_counts, starts_of(send_counts), mpi_double_precision, &
          receive, receive_counts, starts_of(receive_counts), mpi_double_precision, mpi_comm_world)
 #else
@@ -335,6 +352,7 @@ contains
       real(sp), intent(inout), contiguous :: receive(:)
       integer, intent(in) :: receive_counts(:)
 #ifdef ASPERITY_MPI
+      call count_sent(send_counts, 4)
       call mpi_alltoallv(send, send_counts, starts_of(send_counts), mpi_real, &
          receive, receive_counts, starts_of(receive_counts), mpi_real, mpi_comm_world)
 #else
@@ -342,6 +360,7 @@ contains
 #endif
    end subroutine exchange_real_single
 
+#ifdef ASPERITY_MPI
    !> Where parts that lie one after the other begin.
    pure function starts_of(counts) result(starts)
       integer, intent(in) :: counts(:)
@@ -353,6 +372,15 @@ contains
          starts(p) = starts(p - 1) + counts(p - 1)
       end do
    end function starts_of
+
+   !> Count values that this process sends to the others.
+   subroutine count_sent(values, bytes)
+      integer, intent(in) :: values(:)             !! for each process, those for itself included
+      integer, intent(in) :: bytes                 !! of a value
+
+      sent = sent + (sum(real(values, dp)) - values(number + 1))*bytes
+   end subroutine count_sent
+#endif
 
    !> Bring numbers from a process to the first one: only these two take part, and any other returns at once.
    subroutine hand_reals(from, values)

@@ -9,8 +9,9 @@ module row_column_double
       fft_plan_many_dft => fftw_plan_many_dft, &
       fft_plan_many_dft_c2r => fftw_plan_many_dft_c2r, &
       fft_plan_many_dft_r2c => fftw_plan_many_dft_r2c
-   use asperity_parallel, only : any_process, exchange, global_sum, is_first_process, process_number
+   use asperity_parallel, only : any_process, global_sum, is_first_process
    use asperity_errors, only : error_input, error_memory, error_type, fail
+   use column_parcels_double, only : block, column_parcels_type, new_column_parcels
    use omp_lib, only : omp_get_thread_num
    use asperity_precision, only : dp, wp => dp
    use transform_shape, only : transform_shape_type
@@ -18,8 +19,8 @@ module row_column_double
    implicit none
    private
 
-   public :: new_row_column, row_column_type
+   public :: block, new_row_column, row_column_type
 
-   include 'row_column.inc'      ! state f41021a1, written by tools/check_sources.py --update
+   include 'row_column.inc'      ! state 55cf651b, written by tools/check_sources.py --update
 
 end module row_column_double

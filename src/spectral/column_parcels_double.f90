@@ -1,0 +1,13 @@
+!> Blocks of columns that processes exchange, in double precision, for module `row_column_double`.
+module column_parcels_double
+   use asperity_parallel, only : exchange, process_number
+   use asperity_precision, only : dp, wp => dp
+   use transform_shape, only : transform_shape_type
+   implicit none
+   private
+
+   public :: column_parcels_type, new_column_parcels
+
+   include 'column_parcels.inc'      ! state b0545c62, written by tools/check_sources.py --update
+
+end module column_parcels_double
