@@ -37,6 +37,7 @@ module adhesion_cg_fast
    use adhesion_potential, only : stiffens
    use adhesion_preconditioner, only : new_adhesion_preconditioner
    use adhesion_start, only : begin_contact
+   use adhesion_symbols, only : adhesion_symbols_type
    use adhesion_state, only : adhesion_method_type, adhesion_problem_type, control_approach, &
       reason_closed, reason_converged, reason_detached, reason_limit, reason_stalled
    use adhesion_steps, only : choose_step, clipped_step, form_step_row, known_of_step, step_sums_type, &
@@ -83,14 +84,14 @@ contains
       type(kernel_type), intent(in) :: kernel          !! what the solid is, normal
       character(*), intent(in) :: preconditioner           !! 'coarse' or 'full'
       type(error_type), allocatable, intent(out) :: error
-      real(dp), allocatable :: stiffness(:, :), compliance(:, :)
+      type(adhesion_symbols_type) :: symbols
 
       associate (work => self%work)
-         call new_adhesion_patch(work%patch, grid, kernel, stiffness, compliance, error)
+         call new_adhesion_patch(work%patch, grid, kernel, symbols, error)
          if (allocated(error)) return
          associate (mx => work%patch%mx, rows => work%patch%all_rows)
             call new_adhesion_preconditioner(work%preconditioner, preconditioner, mx, work%patch%sharing, &
-               compliance, stiffness, work%patch%nyquist, error)
+               symbols, work%patch%nyquist, error)
             if (allocated(error)) return
             allocate (work%exchange(mx, rows), work%residual(mx, rows), work%direction(mx, rows), &
                work%old(mx, rows), source=0.0_dp)

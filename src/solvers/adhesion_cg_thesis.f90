@@ -15,6 +15,7 @@ module adhesion_cg_thesis
       natural_residual, new_adhesion_patch
    use adhesion_potential, only : adhesive_energy, adhesive_terms
    use adhesion_start, only : begin_contact
+   use adhesion_symbols, only : adhesion_symbols_type
    use adhesion_state, only : adhesion_method_type, adhesion_problem_type, control_approach, &
       reason_closed, reason_converged, reason_detached, reason_limit, reason_stalled
    use adhesion_steps, only : stepped_gap, sum_shift
@@ -54,14 +55,14 @@ contains
       type(grid_type), intent(in) :: grid                  !! periodic
       type(kernel_type), intent(in) :: kernel          !! what the solid is, normal
       type(error_type), allocatable, intent(out) :: error
-      real(dp), allocatable :: stiffness(:, :), compliance(:, :)
+      type(adhesion_symbols_type) :: symbols
 
       if (grid%boundary /= boundary_periodic) then
          call fail(error, error_input, &
             "method = 'thesis': adhesion on a free grid: must be 'fast' there")
          return
       end if
-      call new_adhesion_patch(self%patch, grid, kernel, stiffness, compliance, error)
+      call new_adhesion_patch(self%patch, grid, kernel, symbols, error)
       if (allocated(error)) return
       associate (nx => grid%nx, rows => self%patch%rows)
          allocate (self%residual(nx, rows), self%direction(nx, rows), self%product(nx, rows), &

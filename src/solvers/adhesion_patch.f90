@@ -22,6 +22,7 @@
 !> road's grid and that of the unknowns. Fields of the unknowns have the rows of the patch first.
 module adhesion_patch
    use adhesion_potential, only : adhesive_slope
+   use adhesion_symbols, only : adhesion_symbols_type, new_adhesion_symbols
    use adhesion_state, only : adhesion_problem_type, close_gaps, control_approach, control_pressure
    use asperity_errors, only : error_input, error_type, fail
    use asperity_precision, only : dp, int64
@@ -88,16 +89,18 @@ module adhesion_patch
 contains
 
    !> Make the patch of a grid, and its symbols for a preconditioner.
-   subroutine new_adhesion_patch(self, grid, kernel, stiffness, compliance, error)
+   subroutine new_adhesion_patch(self, grid, kernel, symbols, error)
       type(adhesion_patch_type), intent(out) :: self
       type(grid_type), intent(in) :: grid                      !! free grids: ny > 1
       type(kernel_type), intent(in) :: kernel          !! what the solid is, normal
-      real(dp), allocatable, intent(out) :: stiffness(:, :)    !! B for G = 1, (0:mx/2, 0:my/2)
-      real(dp), allocatable, intent(out) :: compliance(:, :)   !! about its inverse, > 0
+      type(adhesion_symbols_type), intent(out) :: symbols
       type(error_type), allocatable, intent(out) :: error
-      real(dp), allocatable :: symbol(:, :, :)
 
       self%periodic = grid%boundary == boundary_periodic
+      if (grid%ny < 2 .and. .not. self%periodic) then
+         call fail(error, error_input, 'adhesion_patch: a free grid must have ny > 1')
+         return
+      end if
       self%nx = grid%nx
       self%rows = grid%rows()
       self%cells = grid%cells()
@@ -106,28 +109,14 @@ contains
       self%mx = merge(1, 2, self%periodic)*grid%nx
       self%my = merge(1, 2, self%periodic)*grid%ny
       call share_unknowns(self, grid)
-      allocate (stiffness(0:self%mx/2, 0:self%my/2), compliance(0:self%mx/2, 0:self%my/2), &
-         symbol(0:self%mx/2, 0:self%my/2, 1))
-      if (self%periodic) then
-         call kernel%inverse_symbols(grid, symbol)
-         stiffness(:, :) = symbol(:, :, 1)
-         compliance(:, :) = 1.0_dp/(stiffness + self%longest)      ! finite at wave number zero
-      else if (grid%ny < 2) then
-         call fail(error, error_input, 'adhesion_patch: a free grid must have ny > 1')
-         return
-      else
-         call kernel%symbols(grid, self%mx, self%my, symbol)
-         compliance(:, :) = symbol(:, :, 1)
-         if (minval(compliance) <= 0.0_dp) then
-            call fail(error, error_input, 'adhesion_patch: the symbol of this grid is not positive')
-            return
-         end if
-         stiffness = 1.0_dp/compliance
-         call new_convolution(self%operator, grid, kernel, error)
-         if (allocated(error)) return
-      end if
-      call new_symbol_operator(self%stiffness, shape_of_rows(self%mx, self%sharing, 1), stiffness, error)
+      if (.not. self%periodic) call new_convolution(self%operator, grid, kernel, error)
       if (allocated(error)) return
+      call new_symbol_operator(self%stiffness, shape_of_rows(self%mx, self%sharing, 1), error)
+      if (allocated(error)) return
+      call new_adhesion_symbols(symbols, grid, kernel, self%mx, self%my)
+      call symbols%form(self%stiffness%modes(), error)
+      if (allocated(error)) return
+      call self%stiffness%set_symbol(symbols%stiffness)
       self%threads = self%stiffness%threads
       if (.not. self%periodic) call make_psi(self)
    end subroutine new_adhesion_patch

@@ -18,6 +18,7 @@
 !>
 !> Memory: a spectrum and a symbol for 'full'; 1/4 of a field for 'coarse' and for the estimate.
 module adhesion_preconditioner
+   use adhesion_symbols, only : adhesion_symbols_type
    use asperity_errors, only : error_input, error_type, fail
    use fft_conv, only : columns_apply, convolution_type, new_symbol_operator
    use asperity_precision, only : dp, pi
@@ -63,18 +64,16 @@ module adhesion_preconditioner
 
 contains
 
-   !> Make one from the symbols of M and B on the grid.
-   subroutine new_adhesion_preconditioner(self, kind, nx, fine, m_symbol, b_symbol, nyquist, error)
+   !> Make one from the symbols of M and B.
+   subroutine new_adhesion_preconditioner(self, kind, nx, fine, symbols, nyquist, error)
       type(adhesion_preconditioner_type), intent(out) :: self
       character(*), intent(in) :: kind              !! 'full' or 'coarse'
       integer, intent(in) :: nx                     !! cells of the grid along x
       type(row_sharing_type), intent(in) :: fine    !! who holds its rows
-      real(dp), intent(in) :: m_symbol(0:, 0:)      !! M, (0:nx/2, 0:ny/2), > 0
-      real(dp), intent(in) :: b_symbol(0:, 0:)      !! B, the same
+      type(adhesion_symbols_type), intent(inout) :: symbols   !! of B and M
       real(dp), intent(in) :: nyquist               !! B at the Nyquist wave number, > 0
       type(error_type), allocatable, intent(out) :: error
-      real(dp), allocatable :: low(:, :)
-      integer :: i, j, ny
+      integer :: ny
 
       ny = size(fine%owner)
       self%nx = nx
@@ -91,25 +90,51 @@ contains
       call share_coarse_rows(self, fine)
       allocate (self%rows(self%mx, self%fine_halo%own + self%fine_halo%foreign), &
          self%field(self%mx, self%coarse_halo%own + self%coarse_halo%foreign))
-      call new_symbol_operator(self%stiffness, shape_of_rows(self%mx, self%sharing, 1), &
-         b_symbol(0:self%mx/2, 0:self%my/2), error)
-      if (allocated(error)) return
       select case (kind)
       case ('full')
          self%full = .true.
-         call new_symbol_operator(self%fine, shape_of_rows(nx, fine, 1), m_symbol, error)
+         call new_symbol_operator(self%fine, shape_of_rows(nx, fine, 1), error)
+         if (allocated(error)) return
+         call symbols%form(self%fine%modes(), error)
+         if (allocated(error)) return
+         call self%fine%set_symbol(symbols%compliance)
       case ('coarse')
-         allocate (low(0:self%mx/2, 0:self%my/2))
-         do j = 0, self%my/2
-            do i = 0, self%mx/2
-               low(i, j) = m_symbol(i, j)/max(passed(i, self%mx)*passed(j, self%my), least_passed)
-            end do
-         end do
-         call new_symbol_operator(self%coarse, shape_of_rows(self%mx, self%sharing, 1), low, error)
+         call new_symbol_operator(self%coarse, shape_of_rows(self%mx, self%sharing, 1), error)
       case default
          call fail(error, error_input, "preconditioner = '"//kind//"': must be 'full' or 'coarse'")
       end select
+      if (allocated(error)) return
+      call new_symbol_operator(self%stiffness, shape_of_rows(self%mx, self%sharing, 1), error)
+      if (allocated(error)) return
+      call set_low_symbols(self, symbols, error)
    end subroutine new_adhesion_preconditioner
+
+   !> Give the operators of the coarse grid the low symbols.
+   subroutine set_low_symbols(self, symbols, error)
+      type(adhesion_preconditioner_type), intent(inout) :: self
+      type(adhesion_symbols_type), intent(inout) :: symbols
+      type(error_type), allocatable, intent(out) :: error
+      real(dp), allocatable :: low(:, :)
+      real(dp) :: along_x(0:self%mx/2), along_y(0:self%my/2)
+      integer :: modes(2), i, j
+
+      modes = self%stiffness%modes()
+      call symbols%form(modes, error)
+      if (allocated(error)) return
+      allocate (low(modes(1):modes(2), 0:self%my/2))
+      low(:, :) = symbols%stiffness(modes(1):modes(2), 0:self%my/2)
+      call self%stiffness%set_symbol(low)
+      if (self%full) return
+      ! Of all wave numbers, since a vectorised sine may depend in its last bit on where a loop begins.
+      along_x = passed([(i, i=0, self%mx/2)], self%mx)
+      along_y = passed([(j, j=0, self%my/2)], self%my)
+      do j = 0, self%my/2
+         do i = modes(1), modes(2)
+            low(i, j) = symbols%compliance(i, j)/max(along_x(i)*along_y(j), least_passed)
+         end do
+      end do
+      call self%coarse%set_symbol(low)
+   end subroutine set_low_symbols
 
    !> Who holds which coarse rows, and what each process needs of others.
    pure subroutine share_coarse_rows(self, fine)
@@ -138,7 +163,7 @@ contains
    end function upper
 
    !> What linear interpolation and its adjoint leave of a wave: sinc^4.
-   pure function passed(k, m) result(share)
+   elemental function passed(k, m) result(share)
       integer, intent(in) :: k                      !! wave number
       integer, intent(in) :: m                      !! coarse cells
       real(dp) :: share

@@ -78,6 +78,8 @@ module fft_conv
       procedure :: spectrum_memory
       procedure :: symbol_of
       procedure :: self_compliance
+      procedure :: modes
+      procedure :: set_symbol
       procedure :: mean_mode
       procedure :: set_mean_mode
       procedure :: set_mean_compliance
@@ -139,23 +141,37 @@ contains
       type(error_type), allocatable, intent(out) :: error
       logical, intent(in), optional :: single      !! work in single precision
 
-      call new_shared_symbol_operator(self, whole_shape(nx, ny, 1), symbol, error, single)
+      call new_shared_symbol_operator(self, whole_shape(nx, ny, 1), error, single)
+      if (.not. allocated(error)) call self%set_symbol(symbol)
    end subroutine new_whole_symbol_operator
 
-   !> The same for fields whose rows processes may share.
-   subroutine new_shared_symbol_operator(self, shape, symbol, error, single)
+   !> The same for fields whose rows processes may share. The caller sets the symbols of its `modes`.
+   subroutine new_shared_symbol_operator(self, shape, error, single)
       type(convolution_type), intent(out) :: self
       type(transform_shape_type), intent(in) :: shape
-      real(dp), intent(in) :: symbol(0:, 0:)      !! (0:nx/2, 0:ny/2)
       type(error_type), allocatable, intent(out) :: error
       logical, intent(in), optional :: single      !! work in single precision
 
       call plan(self, shape, error, single)
-      if (allocated(error)) return
-      call new_table(self)
-      self%symbol(self%own(1):last_mode(self), :, 1) = symbol(self%own(1):last_mode(self), :)
-      call finish_symbol(self)
    end subroutine new_shared_symbol_operator
+
+   !> First and last wave number along x for which this process has a symbol; none if the last is less.
+   pure function modes(self)
+      class(convolution_type), intent(in) :: self
+      integer :: modes(2)
+
+      modes = [self%own(1), last_mode(self)]
+   end function modes
+
+   !> Set the symbol of an operator that was made without one. Collective.
+   subroutine set_symbol(self, symbol)
+      class(convolution_type), intent(inout) :: self
+      real(dp), intent(in) :: symbol(:, :)         !! [modes of this process, 0:my/2]
+
+      call new_table(self)
+      self%symbol(self%own(1):last_mode(self), :, 1) = symbol
+      call finish_symbol(self)
+   end subroutine set_symbol
 
    !> Last wave number along x for which this process has a symbol.
    pure integer function last_mode(self)

@@ -1,0 +1,70 @@
+!> The symbols of the stiffness B of an adhesive contact and of about its inverse, by wave numbers along x.
+!>
+!> A process needs those of the columns that it transforms, and no others: `form` makes them.
+module adhesion_symbols
+   use asperity_errors, only : error_input, error_type, fail
+   use asperity_parallel, only : any_process
+   use asperity_precision, only : dp
+   use kernels, only : kernel_type
+   use regular_grid, only : boundary_periodic, grid_type
+   implicit none
+   private
+
+   public :: adhesion_symbols_type, new_adhesion_symbols
+
+   !> The symbols that are at hand.
+   type :: adhesion_symbols_type
+      type(grid_type), private :: grid
+      type(kernel_type), private :: kernel             !! what the solid is, normal
+      integer, private :: mx = 0, my = 0               !! cells of the grid of the unknowns
+      integer, private :: modes(2) = [0, -1]           !! first and last wave number at hand
+      real(dp), allocatable :: stiffness(:, :)         !! B for G = 1, (first:last, 0:my/2)
+      real(dp), allocatable :: compliance(:, :)        !! about its inverse, > 0
+   contains
+      procedure :: form
+   end type adhesion_symbols_type
+
+contains
+
+   !> Symbols of a solid, none at hand yet.
+   subroutine new_adhesion_symbols(self, grid, kernel, mx, my)
+      type(adhesion_symbols_type), intent(out) :: self
+      type(grid_type), intent(in) :: grid
+      type(kernel_type), intent(in) :: kernel
+      integer, intent(in) :: mx, my                    !! cells of the grid of the unknowns
+
+      self%grid = grid
+      self%kernel = kernel
+      self%mx = mx
+      self%my = my
+   end subroutine new_adhesion_symbols
+
+   !> Have the symbols of some wave numbers along x at hand; more may be. Collective.
+   subroutine form(self, modes, error)
+      class(adhesion_symbols_type), intent(inout) :: self
+      integer, intent(in) :: modes(2)                  !! first and last, none if the last is less
+      type(error_type), allocatable, intent(out) :: error
+      real(dp), allocatable :: table(:, :, :)
+
+      if (.not. any_process(modes(1) < self%modes(1) .or. modes(2) > self%modes(2))) return
+      self%modes = modes
+      if (allocated(self%stiffness)) deallocate (self%stiffness, self%compliance)
+      allocate (self%stiffness(modes(1):modes(2), 0:self%my/2), &
+         self%compliance(modes(1):modes(2), 0:self%my/2), table(modes(1):modes(2), 0:self%my/2, 1))
+      if (self%grid%boundary == boundary_periodic) then
+         call self%kernel%inverse_symbols(self%grid, table, modes(1))
+         self%stiffness(:, :) = table(:, :, 1)
+         ! This is finite at wave number zero, too.
+         self%compliance(:, :) = 1.0_dp/(self%stiffness + self%kernel%least_stiffness(self%grid))
+      else
+         call self%kernel%symbols(self%grid, self%mx, self%my, table, modes(1))
+         self%compliance(:, :) = table(:, :, 1)
+         if (any_process(any(self%compliance <= 0.0_dp))) then
+            call fail(error, error_input, 'adhesion_symbols: the symbol of this grid is not positive')
+            return
+         end if
+         self%stiffness(:, :) = 1.0_dp/self%compliance
+      end if
+   end subroutine form
+
+end module adhesion_symbols
