@@ -5,8 +5,8 @@
 module hdf5_slabs
    use, intrinsic :: iso_c_binding, only : c_loc, c_null_ptr, c_ptr
    use asperity_errors, only : error_type
-   use asperity_precision, only : dp, int8
-   use hdf5_c_values, only : h5dclose, h5dget_space, h5dopen2, h5dwrite, h5sclose, h5sselect_hyperslab
+   use asperity_precision, only : dp, int64, int8
+   use hdf5_c_values, only : h5dclose, h5dget_space, h5dopen2, h5dread, h5dwrite, h5sclose, h5sselect_hyperslab
    use hdf5_file, only : hdf5_file_type
    use hdf5_kinds, only : hid_t, hsize_t
    use hdf5_library, only : c_text, h5p_default, h5s_select_set, h5t_native_double, h5t_native_int8, &
@@ -15,7 +15,7 @@ module hdf5_slabs
    implicit none
    private
 
-   public :: create_field, slab_rows, write_slab
+   public :: create_field, read_part, slab_rows, write_part, write_slab
 
    !> Write a slab of reals or of bytes.
    interface write_slab
@@ -32,25 +32,28 @@ contains
       rows = max(1, chunk_values/nx)
    end function slab_rows
 
-   !> Create a field without values; in the file its shape is (ny, nx).
+   !> Create a field without values; in the file its shape is (ny, nx). Without `compression` it is stored in
+   !> one piece without checksums.
    subroutine create_field(file, path, extent, bytes, units, long_name, compression, error)
       class(hdf5_file_type), intent(inout) :: file
       character(*), intent(in) :: path
-      integer, intent(in) :: extent(2)      !! nx, ny
+      integer, intent(in) :: extent(:)      !! such as nx, ny
       logical, intent(in) :: bytes          !! of bytes, else of reals
       character(*), intent(in) :: units
       character(*), intent(in) :: long_name
-      integer, intent(in) :: compression    !! 0 none, 9 as small as possible
+      integer, intent(in), optional :: compression   !! 0 none, 9 as small as possible
       type(error_type), allocatable, intent(out), optional :: error
       type(error_type), allocatable :: fault
       character(:), allocatable :: name
       integer(hid_t) :: location
-      integer :: status
+      integer :: level, status
 
       if (file%has_failed(error)) return
+      level = -1
+      if (present(compression)) level = max(0, min(compression, 9))
       call file%resolve(path, location, name)
       call new_dataset(location, name, extent, merge(kind_int8, kind_real, bytes), c_null_ptr, &
-         max(0, min(compression, 9)), status)
+         level, status)
       call file%checked(status, 'the dataset cannot be written', path, fault)
       if (.not. allocated(fault)) call file%write_attribute(path, 'units', units, fault)
       if (.not. allocated(fault)) call file%write_attribute(path, 'long_name', long_name, fault)
@@ -65,7 +68,8 @@ contains
       real(dp), intent(in), contiguous, target :: values(:, :)   !! [nx, rows]
       type(error_type), allocatable, intent(out), optional :: error
 
-      call store(file, path, first, shape(values), h5t_native_double, c_loc(values), error)
+      call move(file, path, [0_int64, int(first - 1, int64)], shape(values), h5t_native_double, &
+         c_loc(values), .false., error)
    end subroutine write_reals
 
    !> Write a slab of bytes.
@@ -76,41 +80,73 @@ contains
       integer(int8), intent(in), contiguous, target :: values(:, :)
       type(error_type), allocatable, intent(out), optional :: error
 
-      call store(file, path, first, shape(values), h5t_native_int8, c_loc(values), error)
+      call move(file, path, [0_int64, int(first - 1, int64)], shape(values), h5t_native_int8, &
+         c_loc(values), .false., error)
    end subroutine write_bytes
 
-   !> Write a slab of a field.
-   subroutine store(file, path, first, extent, type, address, error)
+   !> Write a part of a dataset of reals or of bytes.
+   subroutine write_part(file, path, start, extent, values, error)
       class(hdf5_file_type), intent(inout) :: file
       character(*), intent(in) :: path
-      integer, intent(in) :: first
-      integer, intent(in) :: extent(2)      !! nx, rows
-      integer(hid_t), intent(in) :: type    !! of the values in memory
+      integer(int64), intent(in) :: start(:)     !! from 0, in Fortran's order of the dimensions
+      integer, intent(in) :: extent(:)           !! of the part, in the same order
+      real(dp), intent(in), contiguous, target :: values(:, :)   !! as many
+      type(error_type), allocatable, intent(out), optional :: error
+
+      call move(file, path, start, extent, h5t_native_double, c_loc(values), .false., error)
+   end subroutine write_part
+
+   !> Read a part of a dataset of numbers.
+   subroutine read_part(file, path, start, extent, values, error)
+      class(hdf5_file_type), intent(inout) :: file
+      character(*), intent(in) :: path
+      integer(int64), intent(in) :: start(:)     !! from 0, in Fortran's order of the dimensions
+      integer, intent(in) :: extent(:)           !! of the part, in the same order
+      real(dp), intent(inout), contiguous, target :: values(:, :)   !! as many
+      type(error_type), allocatable, intent(out), optional :: error
+
+      call move(file, path, start, extent, h5t_native_double, c_loc(values), .true., error)
+   end subroutine read_part
+
+   !> Write or read a part of a dataset.
+   subroutine move(file, path, start, extent, type, address, reads, error)
+      class(hdf5_file_type), intent(inout) :: file
+      character(*), intent(in) :: path
+      integer(int64), intent(in) :: start(:)     !! from 0, in Fortran's order of the dimensions
+      integer, intent(in) :: extent(:)
+      integer(hid_t), intent(in) :: type         !! of the values in memory
       type(c_ptr), intent(in) :: address
+      logical, intent(in) :: reads
       type(error_type), allocatable, intent(out), optional :: error
       type(error_type), allocatable :: fault
       character(:), allocatable :: name
       integer(hid_t) :: location, dataset, memory, space
-      integer :: status, ignored
+      integer :: status, ignored, n
 
       if (file%has_failed(error)) return
+      n = size(extent)
       call file%resolve(path, location, name)
       dataset = h5dopen2(location, c_text(name), h5p_default)
       status = status_of(dataset)
       if (status >= 0) then
          space = h5dget_space(dataset)
          memory = simple_space(int(extent, hsize_t))
-         status = h5sselect_hyperslab(space, h5s_select_set, [int(first - 1, hsize_t), 0_hsize_t], &
-            c_null_ptr, int(extent(2:1:-1), hsize_t), c_null_ptr)
-         if (status >= 0) status = h5dwrite(dataset, type, memory, space, h5p_default, address)
+         status = h5sselect_hyperslab(space, h5s_select_set, int(start(n:1:-1), hsize_t), &
+            c_null_ptr, int(extent(n:1:-1), hsize_t), c_null_ptr)
+         if (status >= 0 .and. reads) status = h5dread(dataset, type, memory, space, h5p_default, address)
+         if (status >= 0 .and. .not. reads) status = h5dwrite(dataset, type, memory, space, h5p_default, address)
          ignored = h5sclose(memory)
          ignored = h5sclose(space)
          ! Compressed data leave the cache here, so that a full disk is noticed here.
          ignored = h5dclose(dataset)
          if (status >= 0) status = ignored
       end if
-      call file%checked(status, 'the dataset cannot be written', path, fault)
+      if (reads) then
+         call file%checked(status, 'the dataset cannot be read', path, fault)
+      else
+         call file%checked(status, 'the dataset cannot be written', path, fault)
+      end if
       call file%settle(fault, error)
-   end subroutine store
+   end subroutine move
 
 end module hdf5_slabs

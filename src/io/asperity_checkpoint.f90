@@ -7,11 +7,13 @@
 !> user block shows whether the file is whole (`checkpoint_block`).
 module asperity_checkpoint
    use asperity_errors, only : add_fault, error_convergence, error_file, error_input, error_type, fail
+   use asperity_parallel, only : any_process, is_first_process, share
    use asperity_precision, only : dp
    use checkpoint_block, only : block_length, check_block, write_block
    use checkpoint_pieces, only : get_piece, put_piece
    use file_system, only : file_exists, remove_file, rename_file, sync_file
    use hdf5_file, only : hdf5_file_type
+   use process_agreement, only : agree
    use result_names, only : sibling_path
    use state_table, only : state_table_type
    use text_tools, only : to_text
@@ -97,18 +99,19 @@ contains
       if (present(error)) call report(self, error)
    end subroutine put_number
 
-   !> Add the state.
+   !> Add the state. Collective, and the only one of these procedures that is: the first process has the
+   !> file, and the others have their rows of the fields.
    subroutine put_state(self, table, error)
       class(checkpoint_writer_type), intent(inout) :: self
       type(state_table_type), intent(in) :: table
       type(error_type), allocatable, intent(out), optional :: error
       integer :: i
 
-      call self%file%write_attribute('/state', 'pieces', table%count)
+      if (is_first_process()) call self%file%write_attribute('/state', 'pieces', table%count)
       do i = 1, table%count
-         call put_piece(self%file, table%pieces(i))
+         call put_piece(self%file, table%pieces(i), table%grid)
       end do
-      if (present(error)) call report(self, error)
+      if (present(error) .and. is_first_process()) call report(self, error)
    end subroutine put_state
 
    !> Let the checkpoint replace the old one.
@@ -251,27 +254,43 @@ contains
    end subroutine get_number
 
    !> Get the state into the memory that the table points to. Arrays must have the same extents.
+   !> Collective: the first process has the file.
    subroutine get_state(self, table, error)
       class(checkpoint_reader_type), intent(inout) :: self
       type(state_table_type), intent(inout) :: table
       type(error_type), allocatable, intent(out) :: error
-      integer :: count, i
+      character(:), allocatable :: path
+      integer :: i
 
       do i = 1, table%count
-         call get_piece(self%file, table%pieces(i), error)
+         call get_piece(self%file, table%pieces(i), table%grid, error)
          if (allocated(error)) return
-         if (.not. table%pieces(i)%is_finite()) then
-            call fail(error, error_convergence, self%file%path//': /state/'//table%pieces(i)%name// &
+         if (any_process(.not. table%pieces(i)%is_finite())) then
+            path = ''
+            if (is_first_process()) path = self%file%path
+            call share(path)
+            call fail(error, error_convergence, path//': /state/'//table%pieces(i)%name// &
                ' holds a value that is not a finite number: the run cannot go on')
             return
          end if
       end do
+      if (is_first_process()) call check_count(self, table, error)
+      call agree(error)
+   end subroutine get_state
+
+   !> Check that the state has as many pieces as the case needs.
+   subroutine check_count(self, table, error)
+      class(checkpoint_reader_type), intent(inout) :: self
+      type(state_table_type), intent(in) :: table
+      type(error_type), allocatable, intent(out) :: error
+      integer :: count
+
       call self%file%read_attribute('/state', 'pieces', count, error)
       if (allocated(error)) return
       if (count /= table%count) call fail(error, error_input, self%file%path//': the state has '// &
          to_text(count)//' pieces, the case needs '//to_text(table%count)// &
          ': it was written by another version of Asperity')
-   end subroutine get_state
+   end subroutine check_count
 
    !> Close the checkpoint.
    subroutine close_checkpoint(self)

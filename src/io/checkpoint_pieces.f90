@@ -1,9 +1,13 @@
 !> The pieces of a state in the file of a checkpoint: one dataset per piece of a `state_table` in
 !> the group /state, under the name of the piece.
 module checkpoint_pieces
-   use asperity_errors, only : error_input, error_type, fail
+   use asperity_errors, only : error_type
+   use asperity_parallel, only : is_first_process, process_count, share
    use asperity_precision, only : dp, int8
+   use checkpoint_rows, only : check_extent, get_rows, put_rows
    use hdf5_file, only : hdf5_file_type
+   use process_agreement, only : agree
+   use regular_grid, only : grid_type
    use state_table, only : state_piece_type
    implicit none
    private
@@ -12,8 +16,21 @@ module checkpoint_pieces
 
 contains
 
-   !> Write one piece of a state. The file remembers a fault.
-   subroutine put_piece(file, piece)
+   !> Write one piece of a state. The file, which the first process has, remembers a fault. Collective.
+   subroutine put_piece(file, piece, grid)
+      type(hdf5_file_type), intent(inout) :: file
+      type(state_piece_type), intent(in) :: piece
+      type(grid_type), intent(in) :: grid
+
+      if (piece%row > 0 .and. process_count() > 1) then
+         call put_rows(file, '/state/'//piece%name, piece, grid)
+      else if (is_first_process()) then
+         call put_whole(file, piece)
+      end if
+   end subroutine put_piece
+
+   !> Write a piece that this process has as a whole.
+   subroutine put_whole(file, piece)
       type(hdf5_file_type), intent(inout) :: file
       type(state_piece_type), intent(in) :: piece
       character(:), allocatable :: path
@@ -41,10 +58,54 @@ contains
             call file%write_attribute(path, 'text', trim(piece%text))
          end if
       end associate
-   end subroutine put_piece
+   end subroutine put_whole
 
-   !> Read one piece of a state into the memory that the table points to.
-   subroutine get_piece(file, piece, error)
+   !> Read one piece of a state into the memory that the table points to. Collective.
+   subroutine get_piece(file, piece, grid, error)
+      type(hdf5_file_type), intent(inout) :: file
+      type(state_piece_type), intent(inout) :: piece
+      type(grid_type), intent(in) :: grid
+      type(error_type), allocatable, intent(out) :: error
+
+      if (piece%row > 0 .and. process_count() > 1) then
+         call get_rows(file, '/state/'//piece%name, piece, grid, error)
+      else
+         if (is_first_process()) call get_whole(file, piece, error)
+         call agree(error)
+         if (.not. allocated(error)) call share_piece(piece)
+      end if
+   end subroutine get_piece
+
+   !> Give all processes a piece that is not shared by rows.
+   subroutine share_piece(piece)
+      type(state_piece_type), intent(inout) :: piece
+      character(:), allocatable :: text
+      integer :: k
+
+      if (process_count() == 1) return
+      if (associated(piece%truth)) then
+         call share(piece%truth)
+      else if (associated(piece%whole)) then
+         call share(piece%whole)
+      else if (associated(piece%real_0)) then
+         call share(piece%real_0)
+      else if (associated(piece%real_1)) then
+         do k = 1, size(piece%real_1)
+            call share(piece%real_1(k))
+         end do
+      else if (associated(piece%whole_1)) then
+         do k = 1, size(piece%whole_1)
+            call share(piece%whole_1(k))
+         end do
+      else if (associated(piece%text)) then
+         text = piece%text
+         call share(text)
+         piece%text = text
+      end if
+   end subroutine share_piece
+
+   !> Read a piece of which this process has all rows.
+   subroutine get_whole(file, piece, error)
       type(hdf5_file_type), intent(inout) :: file
       type(state_piece_type), intent(inout) :: piece
       type(error_type), allocatable, intent(out) :: error
@@ -77,7 +138,7 @@ contains
          if (associated(piece%whole)) piece%whole = nint(number)
          if (associated(piece%truth)) piece%truth = number > 0.5_dp
       end if
-   end subroutine get_piece
+   end subroutine get_whole
 
    !> Read a vector.
    subroutine get_real_1(file, path, values, error)
@@ -127,21 +188,5 @@ contains
          end do
       end do
    end subroutine get_real_3
-
-   !> Check that an array in the checkpoint has the same extents as the one in the run.
-   subroutine check_extent(file, path, stored, wanted, error)
-      type(hdf5_file_type), intent(in) :: file
-      character(*), intent(in) :: path
-      integer, intent(in) :: stored(:)
-      integer, intent(in) :: wanted(:)
-      type(error_type), allocatable, intent(out) :: error
-      character(120) :: text
-
-      if (all(stored == wanted)) return
-      write (text, '(*(i0, :, " "))') stored
-      text = ': the extents are '//trim(text)//', the case needs'
-      write (text(len_trim(text) + 2:), '(*(i0, :, " "))') wanted
-      call fail(error, error_input, file%path//': '//path//trim(text))
-   end subroutine check_extent
 
 end module checkpoint_pieces

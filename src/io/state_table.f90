@@ -7,9 +7,15 @@
 !>
 !> The table points into the state, which therefore must be a target and stay where it is while the
 !> table is in use. Pieces that are not allocated or empty in a case are left out of the table.
+!>
+!> Where several processes share the rows of the grid, `add_field` and `add_cells` add what they share: each
+!> has its rows. All other pieces are the same on every process. The table has the same pieces on all of them,
+!> also where one has no rows; therefore adding fields is collective.
 module state_table
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
+   use asperity_parallel, only : any_process
    use asperity_precision, only : dp, int8
+   use regular_grid, only : grid_type
    implicit none
    private
 
@@ -29,20 +35,29 @@ module state_table
       real(dp), pointer :: real_2(:, :) => null()
       real(dp), pointer :: real_3(:, :, :) => null()
       character(:), pointer :: text => null()
+      integer :: row = 0                    !! values of a row of the grid; 0: not shared by rows
+      logical :: by_cells = .false.         !! the first dimension counts all cells, else the last one rows
    contains
       procedure :: is_finite
+      procedure :: extent
+      procedure :: layers
    end type state_piece_type
 
    !> The table.
    type :: state_table_type
       integer :: count = 0
       type(state_piece_type), allocatable :: pieces(:)   !! the first `count` are in use
+      type(grid_type) :: grid                            !! whose rows are shared
    contains
       procedure, private :: add_truth, add_whole, add_whole_1, add_byte_2, add_real_0, add_real_1, &
-         add_real_2, add_real_3, add_text
+         add_real_2, add_real_3, add_text, add_field_byte, add_field_2, add_field_3, add_cells_2, add_cells_3
       !> Add a piece. Arrays of two and three dimensions are allocatable in the state.
       generic :: add => add_truth, add_whole, add_whole_1, add_byte_2, add_real_0, add_real_1, &
          add_real_2, add_real_3, add_text
+      !> Add a field whose last dimension is the rows of the grid.
+      generic :: add_field => add_field_byte, add_field_2, add_field_3
+      !> Add fields whose first dimension is the cells of the grid, row after row.
+      generic :: add_cells => add_cells_2, add_cells_3
    end type state_table_type
 
 contains
@@ -162,6 +177,102 @@ contains
       call start_piece(self, name, '1', meaning)
       self%pieces(self%count)%text => value
    end subroutine add_text
+
+   subroutine add_field_byte(self, name, values, meaning)
+      class(state_table_type), intent(inout) :: self
+      character(*), intent(in) :: name
+      integer(int8), allocatable, intent(in), target :: values(:, :)
+      character(*), intent(in) :: meaning
+
+      if (.not. allocated(values)) return
+      if (.not. any_process(size(values) > 0)) return
+      call start_piece(self, name, '1', meaning)
+      self%pieces(self%count)%byte_2 => values
+      self%pieces(self%count)%row = size(values, 1)
+   end subroutine add_field_byte
+
+   subroutine add_field_2(self, name, values, units, meaning)
+      class(state_table_type), intent(inout) :: self
+      character(*), intent(in) :: name
+      real(dp), allocatable, intent(in), target :: values(:, :)
+      character(*), intent(in) :: units, meaning
+
+      if (.not. allocated(values)) return
+      if (.not. any_process(size(values) > 0)) return
+      call start_piece(self, name, units, meaning)
+      self%pieces(self%count)%real_2 => values
+      self%pieces(self%count)%row = size(values, 1)
+   end subroutine add_field_2
+
+   subroutine add_field_3(self, name, values, units, meaning)
+      class(state_table_type), intent(inout) :: self
+      character(*), intent(in) :: name
+      real(dp), allocatable, intent(in), target :: values(:, :, :)
+      character(*), intent(in) :: units, meaning
+
+      if (.not. allocated(values)) return
+      if (.not. any_process(size(values) > 0)) return
+      call start_piece(self, name, units, meaning)
+      self%pieces(self%count)%real_3 => values
+      self%pieces(self%count)%row = size(values, 1)*size(values, 2)
+   end subroutine add_field_3
+
+   subroutine add_cells_2(self, name, values, row, units, meaning)
+      class(state_table_type), intent(inout) :: self
+      character(*), intent(in) :: name
+      real(dp), allocatable, intent(in), target :: values(:, :)
+      integer, intent(in) :: row            !! cells of a row
+      character(*), intent(in) :: units, meaning
+
+      if (.not. allocated(values)) return
+      if (.not. any_process(size(values) > 0)) return
+      call start_piece(self, name, units, meaning)
+      self%pieces(self%count)%real_2 => values
+      self%pieces(self%count)%row = row
+      self%pieces(self%count)%by_cells = .true.
+   end subroutine add_cells_2
+
+   subroutine add_cells_3(self, name, values, row, units, meaning)
+      class(state_table_type), intent(inout) :: self
+      character(*), intent(in) :: name
+      real(dp), allocatable, intent(in), target :: values(:, :, :)
+      integer, intent(in) :: row            !! cells of a row
+      character(*), intent(in) :: units, meaning
+
+      if (.not. allocated(values)) return
+      if (.not. any_process(size(values) > 0)) return
+      call start_piece(self, name, units, meaning)
+      self%pieces(self%count)%real_3 => values
+      self%pieces(self%count)%row = row
+      self%pieces(self%count)%by_cells = .true.
+   end subroutine add_cells_3
+
+   !> Shape of a field of two or three dimensions on this process.
+   pure function extent(self)
+      class(state_piece_type), intent(in) :: self
+      integer, allocatable :: extent(:)
+
+      if (associated(self%byte_2)) then
+         extent = shape(self%byte_2)
+      else if (associated(self%real_2)) then
+         extent = shape(self%real_2)
+      else
+         extent = shape(self%real_3)
+      end if
+   end function extent
+
+   !> Number of fields that lie one after the other in a piece.
+   pure function layers(self)
+      class(state_piece_type), intent(in) :: self
+      integer :: layers
+
+      integer, allocatable :: extent(:)
+
+      layers = 1
+      if (.not. self%by_cells) return
+      extent = self%extent()
+      layers = product(extent(2:))
+   end function layers
 
    !> Are all real numbers of a piece finite?
    function is_finite(self) result(yes)

@@ -158,22 +158,18 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(checkpoint_reader_type) :: reader
 
-      call reader%open(self%path, error)
+      if (is_first_process()) call open_checkpoint(self, reader, error)
+      call agree(error)
       if (allocated(error)) return
-      call reader%compare(self%identity, error)
-      if (.not. allocated(error)) call compare_map(self, reader, error)
-      if (.not. allocated(error)) call load_state(self%sim, reader, error)
-      call reader%close()
-      if (allocated(error)) return
-      call self%result%reopen(self%path, reader%result_id, self%sim%state%row%step, &
-         self%sim%case%output%compression, error)
-      if (allocated(error)) return
-      call self%result%write_text('outcome', 'running', error)
-      if (allocated(error)) return
-      call take_up_warnings(self, error)
+      call load_state(self%sim, reader, error)
+      if (is_first_process()) then
+         call reader%close()
+         if (.not. allocated(error)) call take_up_result(self, reader%result_id, error)
+      end if
+      call agree(error)
       if (allocated(error)) return
       self%finished = self%sim%finished
-      self%last_snapshot = self%result%last_snapshot()
+      call share(self%last_snapshot)
       associate (times => self%sim%case%output%snapshot_times)
          do while (self%next_time <= size(times))
             if (times(self%next_time) > self%sim%state%row%time) exit
@@ -181,6 +177,33 @@ contains
          end do
       end associate
    end subroutine take_up
+
+   !> Open the checkpoint, and see that it is that of the case. On the first process.
+   subroutine open_checkpoint(self, reader, error)
+      type(run_type), intent(in) :: self
+      type(checkpoint_reader_type), intent(inout) :: reader
+      type(error_type), allocatable, intent(out) :: error
+
+      call reader%open(self%path, error)
+      if (allocated(error)) return
+      call reader%compare(self%identity, error)
+      if (.not. allocated(error)) call compare_map(self, reader, error)
+      if (allocated(error)) call reader%close()
+   end subroutine open_checkpoint
+
+   !> Open the result to go on after the last row of the checkpoint. On the first process.
+   subroutine take_up_result(self, id, error)
+      type(run_type), intent(inout) :: self
+      character(*), intent(in) :: id               !! of the result that the checkpoint belongs to
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%result%reopen(self%path, id, self%sim%state%row%step, &
+         self%sim%case%output%compression, error)
+      if (allocated(error)) return
+      self%last_snapshot = self%result%last_snapshot()
+      call self%result%write_text('outcome', 'running', error)
+      if (.not. allocated(error)) call take_up_warnings(self, error)
+   end subroutine take_up_result
 
    !> See that the height map is that of the checkpoint. Maps from files are bound by their checksums
    !> in the identity; a map that is computed may differ by rounding on another machine.
@@ -365,13 +388,17 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(checkpoint_writer_type) :: writer
 
-      call writer%start(self%path, self%result%id, self%identity)
-      call writer%put_number('rms_height', self%sim%rms_height)
-      call writer%put_number('summit', self%sim%summit)
+      if (is_first_process()) then
+         call writer%start(self%path, self%result%id, self%identity)
+         call writer%put_number('rms_height', self%sim%rms_height)
+         call writer%put_number('summit', self%sim%summit)
+      end if
       call save_state(self%sim, writer)
-      call writer%commit(error)                 ! reports the first fault of all these calls
-      if (allocated(error)) return
-      call self%result%link_checkpoint(error)
+      if (is_first_process()) then
+         call writer%commit(error)                 ! reports the first fault of all these calls
+         if (.not. allocated(error)) call self%result%link_checkpoint(error)
+      end if
+      call agree(error)
       call system_clock(self%saved_at)
    end subroutine save_run
 

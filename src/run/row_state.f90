@@ -62,7 +62,7 @@ module row_state
 
 contains
 
-   !> The table of the state: everything that one row leaves to the next.
+   !> The table of the state: everything that one row leaves to the next. Collective.
    subroutine list_state(state, table)
       type(state_type), intent(in), target :: state
       type(state_table_type), intent(out) :: table
@@ -88,10 +88,9 @@ contains
       call table%add('passes/first_mismatch', state%first_mismatch, '1', &
          'mismatch that the first pass of the last step left')
 
-      call table%add('pressure', state%pressure, 'Pa', 'normal traction on the rubber')
-      call table%add('gap', state%gap, 'm', 'gap between rubber and road')
-      if (allocated(state%displacement)) &
-         call table%add('displacement', state%displacement, 'm', 'displacement of the rubber along z')
+      call table%add_field('pressure', state%pressure, 'Pa', 'normal traction on the rubber')
+      call table%add_field('gap', state%gap, 'm', 'gap between rubber and road')
+      call table%add_field('displacement', state%displacement, 'm', 'displacement of the rubber along z')
       call table%add('dt_old', state%dt_old, 's', 'length of the last step, 0 after a jump')
       call list_books('books', state%books, table)
       call list_arms('arms', state%arms, table)
@@ -159,9 +158,9 @@ contains
       type(arm_state_type), intent(in), target :: arms
       type(state_table_type), intent(inout) :: table
 
-      call table%add(prefix//'/s', arms%s, '1', 'S = P over a modulus')
-      call table%add(prefix//'/ds', arms%ds, '1', 'S less that of the step before')
-      call table%add(prefix//'/arm', arms%arm, 'Pa', 'tractions of the arms')
+      call table%add_cells(prefix//'/s', arms%s, arms%row, '1', 'S = P over a modulus')
+      call table%add_cells(prefix//'/ds', arms%ds, arms%row, '1', 'S less that of the step before')
+      call table%add_cells(prefix//'/arm', arms%arm, arms%row, 'Pa', 'tractions of the arms')
    end subroutine list_arms
 
    !> A state of steady sliding from which the next row may start.
@@ -173,10 +172,9 @@ contains
       call table%add(prefix//'/known', start%known, 'there is such a state')
       call table%add(prefix//'/pressure_mean', start%pressure_mean, 'Pa', 'load')
       call table%add(prefix//'/velocity', start%velocity, 'm/s', 'velocity of the road')
-      call table%add(prefix//'/pressure', start%pressure, 'Pa', 'normal traction on the rubber')
-      call table%add(prefix//'/gap', start%gap, 'm', 'gap between rubber and road')
-      if (size(start%traction) > 0) &
-         call table%add(prefix//'/traction', start%traction, 'Pa', 'tangential traction')
+      call table%add_field(prefix//'/pressure', start%pressure, 'Pa', 'normal traction on the rubber')
+      call table%add_field(prefix//'/gap', start%gap, 'm', 'gap between rubber and road')
+      call table%add_field(prefix//'/traction', start%traction, 'Pa', 'tangential traction')
    end subroutine list_start
 
    !> The tangential part of the state.
@@ -193,18 +191,18 @@ contains
       call table%add('tangential/block/work', t%block%work, 'J', 'work done on the mass')
       call table%add('tangential/block/lost', t%block%lost, 'J', 'energy that the rule of its motion lost')
       call table%add('tangential/lost_friction', t%lost_friction, 'J', 'energy lost by friction')
-      call table%add('tangential/traction', t%traction, 'Pa', 'tangential traction')
-      call table%add('tangential/before', t%before, 'Pa', 'tangential traction of the step before')
-      call table%add('tangential/displacement', t%displacement, 'm', 'tangential displacement')
-      call table%add('tangential/rubbing', t%rubbing, 'Pa', 'frictional traction T - T* of the last step')
-      call table%add('tangential/contact', t%contact, '0 open, 1 stick, 2 slip')
-      call table%add('tangential/rubbed', t%rubbed, 'contact of the last step at the rubber''s own points')
+      call table%add_field('tangential/traction', t%traction, 'Pa', 'tangential traction')
+      call table%add_field('tangential/before', t%before, 'Pa', 'tangential traction of the step before')
+      call table%add_field('tangential/displacement', t%displacement, 'm', 'tangential displacement')
+      call table%add_field('tangential/rubbing', t%rubbing, 'Pa', 'frictional traction T - T* of the last step')
+      call table%add_field('tangential/contact', t%contact, '0 open, 1 stick, 2 slip')
+      call table%add_field('tangential/rubbed', t%rubbed, 'contact of the last step at the rubber''s own points')
       call table%add('tangential/forecast/dt', t%forecast%dt, 's', 'length of the last step of the forecast')
       call table%add('tangential/forecast/known', t%forecast%known, 'differences that the forecast knows')
       call table%add('tangential/forecast/order', t%forecast%order, 'order of the forecast')
-      call table%add('tangential/forecast/change', t%forecast%change, 'm', &
+      call table%add_field('tangential/forecast/change', t%forecast%change, 'm', &
          'change of the displacement around the contact in the last step')
-      call table%add('tangential/forecast/more', t%forecast%more, 'm', &
+      call table%add_field('tangential/forecast/more', t%forecast%more, 'm', &
          'by how much this was more than in the step before')
       call list_books('tangential/books', t%books, table)
       call list_arms('tangential/arms', t%arms, table)

@@ -1,4 +1,5 @@
-!> The state of a run in a checkpoint: all that the next row needs to go on to the same numbers.
+!> The state of a run in a checkpoint: all that the next row needs to go on to the same numbers. Collective;
+!> the first process has the checkpoint open.
 module simulation_state
    use asperity_checkpoint, only : checkpoint_reader_type, checkpoint_writer_type
    use asperity_errors, only : error_type
@@ -20,6 +21,7 @@ contains
       type(state_table_type) :: table
 
       call list_state(sim%state, table)
+      table%grid = sim%grid
       call writer%put_state(table, error)
    end subroutine save_state
 
@@ -31,6 +33,7 @@ contains
       type(state_table_type) :: table
 
       call list_state(sim%state, table)
+      table%grid = sim%grid
       call reader%get_state(table, error)
       if (allocated(error)) return
       call sim%take_up()
