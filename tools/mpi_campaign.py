@@ -126,7 +126,7 @@ class Draw:
         viscoelastic = physics in ("viscoelastic", "steady") or r.random() < 0.4
         if physics == "elastic":
             viscoelastic = False
-        text += self.material(viscoelastic)
+        text += self.material(viscoelastic, free)
         modulus = 1e6
         if physics == "adhesion" or (physics == "sliding" and r.random() < 0.15):
             text += self.adhesion(lx / nx)
@@ -167,13 +167,13 @@ class Draw:
             ) + self.group("surface", shape="paraboloid", radius=lx / slope)
         return self.group("surface", shape=shape, radius=lx / slope)
 
-    def material(self, viscoelastic):
+    def material(self, viscoelastic, free):
         """Return a material."""
         r = self.random
         values = {"shear_modulus": 1e6, "poisson": r.choice([0.5, 0.5, 0.3, 0.0])}
-        if self.physics in ("friction", "steady"):
+        if self.physics in ("friction", "steady") and not free:
             values["thickness"] = r.choice([0.0, 1e-3, 5e-3])
-            if values["thickness"] > 0.0 and r.random() < 0.5 and self.physics == "friction":
+            if values.get("thickness", 0.0) > 0.0 and r.random() < 0.5 and self.physics == "friction":
                 values["density"] = 1000.0
         if viscoelastic:
             arms = r.choice([1, 2, 3])
@@ -239,7 +239,7 @@ class Draw:
                     values["velocity_x"] = way / values["duration"]
                     if not line and r.random() < 0.5:
                         values["velocity_y"] = values["velocity_x"] * r.uniform(-1, 1)
-            if i == 0 and r.random() < 0.3:
+            if i == 0 and "ramp" not in values and r.random() < 0.3:
                 values["relaxed"] = True
             text += self.group("phase", **values)
         return text
