@@ -113,7 +113,7 @@ class Draw:
         self.moving = physics in ("sliding", "friction", "steady")
         most = 40 if self.moving or physics == "adhesion" else 80
         nx = r.randint(6, most)
-        line = r.random() < 0.1
+        line = not free and r.random() < 0.15
         ny = 1 if line else r.choice([r.randint(2, 12), r.randint(6, most), r.randint(6, most), nx])
         if not free and r.random() < 0.3:
             nx, ny = r.choice([16, 32, 48]), 1 if line else r.choice([16, 32, 48, 64])
@@ -173,7 +173,11 @@ class Draw:
         values = {"shear_modulus": 1e6, "poisson": r.choice([0.5, 0.5, 0.3, 0.0])}
         if self.physics in ("friction", "steady") and not free:
             values["thickness"] = r.choice([0.0, 1e-3, 5e-3])
-            if values.get("thickness", 0.0) > 0.0 and r.random() < 0.5 and self.physics == "friction":
+            if (
+                values.get("thickness", 0.0) > 0.0
+                and r.random() < 0.5
+                and self.physics == "friction"
+            ):
                 values["density"] = 1000.0
         if viscoelastic:
             arms = r.choice([1, 2, 3])
