@@ -9,71 +9,93 @@
 !> system; the second derivatives at its two ends are one-sided differences, so that the spline
 !> reproduces cubic polynomials up to the rim.
 !>
-!> Cells are numbered from 0 in this module, and coefficients from -1 to n + 1.
+!> Cells are numbered from 0 in this module, and coefficients from -1 to n + 1. The processes share the rows of
+!> coefficients like those of the map. The rows -1 and ny of a bounded map, its rim, are on all of them.
 module cubic_spline
+   use asperity_parallel, only : global_sum
    use asperity_precision, only : dp
+   use field_columns, only : block, column_work_type, work_on_columns
+   use regular_grid, only : boundary_periodic, grid_type
    implicit none
    private
 
    public :: spline_coefficients, spline_height, spline_map
 
-   integer, parameter :: block = 16             !! lines that are filtered at the same time
    integer, parameter :: terms = 60             !! of a geometric series in z; |z|^60 < 1e-34
+
+   !> The filter along y.
+   type, extends(column_work_type) :: column_filter_type
+      logical :: periodic = .true.
+      integer :: n = 0                                     !! rows of the map
+      real(dp), pointer, contiguous :: ends(:, :) => null()   !! coefficients -1 and n of each column
+   contains
+      procedure :: work => filter_columns
+   end type column_filter_type
 
 contains
 
-   !> Coefficients of the spline through a map.
-   subroutine spline_coefficients(height, periodic, c)
-      real(dp), intent(in) :: height(0:, 0:)               !! m, shape [nx, ny]
-      logical, intent(in) :: periodic                      !! otherwise the map ends at its rim
-      real(dp), allocatable, intent(out) :: c(:, :)        !! m, bounds [-1:nx+1, -1:ny+1]
+   !> Coefficients of the spline through a map. Collective.
+   subroutine spline_coefficients(grid, height, c, rim)
+      type(grid_type), intent(in) :: grid
+      real(dp), intent(in) :: height(:, :)                 !! m, [nx, rows of this process]
+      real(dp), intent(inout) :: c(:, :)                   !! out: m, [-1..nx+1, rows of this process]
+      real(dp), intent(out) :: rim(:, :)                   !! rows -1 and ny, m, [-1..nx+1, 2]
+      type(column_filter_type) :: filter
+      real(dp), allocatable, target :: ends(:, :)
       real(dp), allocatable :: lines(:, :)
-      integer :: first, i, j, last, nx, ny
+      integer :: first, i, j, last, nx, rows
 
-      nx = size(height, 1)
-      ny = size(height, 2)
-      allocate (c(-1:nx + 1, -1:ny + 1))
-      !$omp parallel default(none) shared(c, height, nx, ny, periodic) &
+      nx = grid%nx
+      rows = grid%rows()
+      filter%periodic = grid%boundary == boundary_periodic
+      !$omp parallel default(none) shared(c, height, nx, rows, filter) &
       !$omp private(first, i, j, last, lines)
       allocate (lines(block, -1:nx + 1))
       lines = 0.0_dp
       !$omp do
-      do first = 0, ny - 1, block
-         last = min(first + block, ny) - 1
+      do first = 1, rows, block
+         last = min(first + block - 1, rows)
          do j = first, last
             do i = 0, nx - 1
-               lines(j - first + 1, i) = height(i, j)
+               lines(j - first + 1, i) = height(i + 1, j)
             end do
          end do
-         call filter_lines(periodic, nx, lines)
+         call filter_lines(filter%periodic, nx, lines)
          do j = first, last
             do i = -1, nx + 1
-               c(i, j) = lines(j - first + 1, i)
-            end do
-         end do
-      end do
-      deallocate (lines)
-
-      allocate (lines(block, -1:ny + 1))
-      lines = 0.0_dp
-      !$omp do
-      do first = -1, nx + 1, block
-         last = min(first + block, nx + 2) - 1
-         do j = 0, ny - 1
-            do i = first, last
-               lines(i - first + 1, j) = c(i, j)
-            end do
-         end do
-         call filter_lines(periodic, ny, lines)
-         do j = -1, ny + 1
-            do i = first, last
-               c(i, j) = lines(i - first + 1, j)
+               c(i + 2, j) = lines(j - first + 1, i)
             end do
          end do
       end do
       deallocate (lines)
       !$omp end parallel
+
+      ! Each process sets the ends of the columns that it filters; the others are 0 there.
+      allocate (ends(size(rim, 1), 2), source=0.0_dp)
+      filter%n = grid%ny
+      filter%before = 1
+      filter%behind = 2
+      filter%ends => ends
+      call work_on_columns(grid, c, filter)
+      rim(:, 1) = ends(:, 1)
+      rim(:, 2) = ends(:, 2)
+      if (.not. grid%shared) return
+      rim(:, 1) = global_sum(ends(:, 1))
+      rim(:, 2) = global_sum(ends(:, 2))
    end subroutine spline_coefficients
+
+   !> Filter a block of columns, and keep the coefficients beyond their ends.
+   subroutine filter_columns(self, first, columns)
+      class(column_filter_type), intent(in) :: self
+      integer, intent(in) :: first                         !! number of the first column, from 1
+      real(dp), intent(inout) :: columns(:, :)             !! [block, -1..n+1]
+      integer :: last
+
+      call filter_lines(self%periodic, self%n, columns)
+      last = min(first + block - 1, size(self%ends, 1))
+      self%ends(first:last, 1) = columns(:last - first + 1, 1)
+      self%ends(first:last, 2) = columns(:last - first + 1, self%n + 2)
+   end subroutine filter_columns
 
    !> Replace heights at 0..n-1 by coefficients at -1..n+1.
    pure subroutine filter_lines(periodic, n, lines)
@@ -158,9 +180,10 @@ contains
    end subroutine filter_bounded
 
    !> Height at (i + u, j + v).
-   pure function spline_height(c, i, j, u, v) result(h)
-      real(dp), intent(in) :: c(-1:, -1:)       !! coefficients
-      integer, intent(in) :: i, j               !! cell, from 0
+   pure function spline_height(c, i, rows, u, v) result(h)
+      real(dp), intent(in) :: c(-1:, :)         !! coefficients, in any rows
+      integer, intent(in) :: i                  !! cell along x, from 0
+      integer, intent(in) :: rows(4)            !! of the coefficients j - 1 to j + 2
       real(dp), intent(in) :: u, v              !! 0 to 1
       real(dp) :: h
       real(dp) :: a(4), b(4)
@@ -170,15 +193,16 @@ contains
       b = weights(v)
       h = 0.0_dp
       do m = 1, 4
-         h = h + b(m)*(a(1)*c(i - 1, j + m - 2) + a(2)*c(i, j + m - 2) &
-            + a(3)*c(i + 1, j + m - 2) + a(4)*c(i + 2, j + m - 2))
+         h = h + b(m)*(a(1)*c(i - 1, rows(m)) + a(2)*c(i, rows(m)) &
+            + a(3)*c(i + 1, rows(m)) + a(4)*c(i + 2, rows(m)))
       end do
    end function spline_height
 
    !> Height at (i + u, j + v), and its slopes per cell (not per metre).
-   pure subroutine spline_map(c, i, j, u, v, h, h_u, h_v)
-      real(dp), intent(in) :: c(-1:, -1:)       !! coefficients
-      integer, intent(in) :: i, j               !! cell, from 0
+   pure subroutine spline_map(c, i, rows, u, v, h, h_u, h_v)
+      real(dp), intent(in) :: c(-1:, :)         !! coefficients, in any rows
+      integer, intent(in) :: i                  !! cell along x, from 0
+      integer, intent(in) :: rows(4)            !! of the coefficients j - 1 to j + 2
       real(dp), intent(in) :: u, v              !! 0 to 1
       real(dp), intent(out) :: h                !! m
       real(dp), intent(out) :: h_u, h_v         !! m per cell
@@ -193,10 +217,10 @@ contains
       h_u = 0.0_dp
       h_v = 0.0_dp
       do m = 1, 4
-         row = a(1)*c(i - 1, j + m - 2) + a(2)*c(i, j + m - 2) &
-            + a(3)*c(i + 1, j + m - 2) + a(4)*c(i + 2, j + m - 2)
-         row_u = a_u(1)*c(i - 1, j + m - 2) + a_u(2)*c(i, j + m - 2) &
-            + a_u(3)*c(i + 1, j + m - 2) + a_u(4)*c(i + 2, j + m - 2)
+         row = a(1)*c(i - 1, rows(m)) + a(2)*c(i, rows(m)) &
+            + a(3)*c(i + 1, rows(m)) + a(4)*c(i + 2, rows(m))
+         row_u = a_u(1)*c(i - 1, rows(m)) + a_u(2)*c(i, rows(m)) &
+            + a_u(3)*c(i + 1, rows(m)) + a_u(4)*c(i + 2, rows(m))
          h = h + b(m)*row
          h_u = h_u + b(m)*row_u
          h_v = h_v + b_v(m)*row
