@@ -12,6 +12,7 @@ module contact_size
    use asperity_precision, only : dp, pi
    use field_sums, only : row_totals
    use regular_grid, only : boundary_periodic, grid_type
+   use row_fetch, only : fetch_rows, row_in_grid
    use text_tools, only : to_text
    implicit none
    private
@@ -41,21 +42,27 @@ contains
    end subroutine watch_contact_size
 
    !> Mean number of cells across a patch of contact, in the direction where they are fewer; 0 where
-   !> nothing touches, a huge number where all does.
+   !> nothing touches, a huge number where all does. Collective.
    function cells_across(grid, adhesive, pressure, gap) result(across)
       type(grid_type), intent(in) :: grid
       logical, intent(in) :: adhesive
       real(dp), intent(in) :: pressure(:, :), gap(:, :)
       real(dp) :: across
       logical, allocatable :: row(:), below(:)
-      real(dp), allocatable :: rows(:, :)
+      real(dp), allocatable :: rows(:, :), pressure_below(:, :), gap_below(:, :)
       real(dp) :: sums(3)
-      integer :: j
+      integer :: j, range(2)
 
-      allocate (row(grid%nx), rows(3, grid%ny))
-      below = touches(adhesive, pressure(:, grid%ny), gap(:, grid%ny))
-      if (grid%boundary /= boundary_periodic) below = .false.
-      do j = 1, grid%ny
+      allocate (row(grid%nx), rows(3, grid%rows()), below(grid%nx))
+      ! The row below the first one belongs to another process. A process without rows needs none.
+      range = grid%first_row - 1
+      if (grid%rows() == 0) range = [1, 0]
+      allocate (pressure_below(grid%nx, 1), gap_below(grid%nx, 1), source=0.0_dp)
+      call fetch_rows(grid, pressure, range, pressure_below)
+      call fetch_rows(grid, gap, range, gap_below)
+      below(:) = touches(adhesive, pressure_below(:, 1), gap_below(:, 1))
+      if (row_in_grid(grid, range(1)) == 0) below(:) = .false.
+      do j = 1, grid%rows()
          row(:) = touches(adhesive, pressure(:, j), gap(:, j))
          rows(:, j) = [count(row), count(row(2:) .and. .not. row(:grid%nx - 1)), &
             count(row .and. .not. below)]
