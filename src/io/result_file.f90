@@ -50,6 +50,7 @@ module result_file
       procedure :: publish => publish_result
       procedure :: reopen => reopen_result
       procedure :: write_text
+      procedure :: write_number
       procedure :: read_text
       procedure :: pair_arms
       procedure :: append_row
@@ -151,6 +152,16 @@ contains
 
       path = self%path//'.new'
    end function new_path
+
+   !> Write a number as an attribute of the file.
+   subroutine write_number(self, name, value, error)
+      class(result_file_type), intent(inout) :: self
+      character(*), intent(in) :: name
+      real(dp), intent(in) :: value
+      type(error_type), allocatable, intent(out), optional :: error
+
+      call self%file%write_attribute('/', name, value, error)
+   end subroutine write_number
 
    !> Write a text as an attribute of the file, such as the name of a case.
    subroutine write_text(self, name, value, error)

@@ -18,7 +18,7 @@ module case_run
    use file_lock, only : file_lock_type
    use history_row, only : row_values
    use memory_limits, only : need_memory
-   use asperity_parallel, only : is_first_process, set_threads, share
+   use asperity_parallel, only : exchanged_bytes, is_first_process, process_count, set_threads, share
    use path_identity, only : real_path
    use process_agreement, only : agree
    use asperity_precision, only : dp, int64
@@ -305,8 +305,12 @@ contains
    subroutine finish_run(self, error)
       type(run_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
+      real(dp) :: exchanged
 
+      exchanged = exchanged_bytes()
       if (is_first_process()) then
+         call self%result%write_number('processes', real(process_count(), dp))
+         call self%result%write_number('exchanged_bytes', exchanged)
          call self%result%unlink_checkpoint(error)
          if (.not. allocated(error)) call remove_checkpoint(self%path)
       end if

@@ -1,0 +1,80 @@
+#!/usr/bin/env python3
+"""Compare processes with threads on one machine, and count what processes send to each other.
+
+    tools/build_mpi.sh
+    python tools/bench/processes.py [--cells 2048 4096 8192] [--processes 2] [--repeats 3]
+
+An elastic contact of a rough road (the case of 16384 x 16384 cells in docs/benchmarks.md, with fewer cells) is solved
+by N processes of one thread each and by one process of N threads, in turn. The table holds the least
+seconds of the solver, their ratio (above 1: the processes are faster), and the bytes that the processes
+sent to each other for each transform and cell. The last column is what the transforms alone send:
+8 bytes each for half of the spectrum's 16, less the part that stays.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import tempfile
+from pathlib import Path
+
+import h5py
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+CASE = """
+&grid nx = {n}, ny = {n}, lx = 1e-3 /
+&surface shape = 'self_affine', hurst = 0.8, rms_slope = 0.2, wavelength_long = 2.5e-4,
+   wavelength_short = {short} /
+&material shear_modulus = 1e6 /
+&phase pressure = 4e3 /
+&output snapshot_fields = 'contact' /
+"""
+MPIRUN = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-q"]
+
+
+def solve(folder: Path, launcher: list[str], program: str, threads: int) -> dict[str, float]:
+    """Run the case once and return what its result says."""
+    result = folder / "case.h5"
+    command = [*launcher, str(ROOT / ".venv/bin" / program), "run", str(folder / "case.nml")]
+    command += ["--output", str(result), "--threads", str(threads), "--quiet", "--overwrite"]
+    subprocess.run(command, check=True)
+    with h5py.File(result) as file:
+        return {
+            "seconds": float(file["history/seconds"][0]),
+            "ffts": float(file["history/ffts"][0]),
+            "bytes": float(file.attrs["exchanged_bytes"]),
+        }
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--cells", type=int, nargs="+", default=[2048, 4096, 8192])
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--repeats", type=int, default=3)
+    options = parser.parse_args()
+    n_processes = options.processes
+    launcher = [*MPIRUN, "-n", str(n_processes)]
+    columns = ("cells", "threads, s", "processes, s", "ratio", "bytes/transform/cell", "transforms alone")
+    print("| " + " | ".join(columns) + " |")
+    print("|" + " ---: |" * len(columns))
+    for cells in options.cells:
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            (folder / "case.nml").write_text(CASE.format(n=cells, short=16e-3 / cells))
+            threaded, shared = [], []
+            for _ in range(options.repeats):
+                threaded.append(solve(folder, [], "asperity", n_processes))
+                shared.append(solve(folder, launcher, "asperity-mpi", 1))
+        one = min(run["seconds"] for run in threaded)
+        other = min(run["seconds"] for run in shared)
+        volume = shared[0]["bytes"] / shared[0]["ffts"] / cells**2
+        alone = 8.0 * (1.0 - 1.0 / n_processes)
+        print(
+            f"| {cells}² | {one:.2f} | {other:.2f} | {one / other:.2f} | {volume:.1f} | {alone:.1f} |",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()
