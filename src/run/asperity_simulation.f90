@@ -86,9 +86,8 @@ contains
       allocate (self%state)
       self%slides = road_moves(case%phases)
       if (present(movable)) self%slides = self%slides .or. movable
-      call new_height(case%grid, case%surfaces, self%height, error, self%map_checksums)
+      call new_height(self%grid, case%surfaces, self%height, error, self%map_checksums)
       if (allocated(error)) return
-      self%height = self%height(:, self%grid%first_row:self%grid%last_row)   ! TODO surfaces in slabs
       call new_contact(self, error)
       if (allocated(error)) return
       if (self%frictional) call new_coupled_passes(self%passes, self%grid)

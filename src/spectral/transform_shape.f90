@@ -14,7 +14,7 @@ module transform_shape
       integer :: nx = 0, ny = 0            !! cells of the whole field
       integer :: mx = 0, my = 0            !! lengths of the transforms, more than the cells where padded
       integer :: components = 1            !! fields that come out: 1 scalar, 2 vector
-      integer :: inputs = 1                !! fields that go in
+      integer :: inputs = 1                !! fields that go in; 0: the modes come from a multiplier
       logical :: shared = .false.          !! processes share the rows
       integer, allocatable :: rows_of(:)   !! rows of each process; of all where they are not shared
       integer, allocatable :: order(:)     !! rows of the whole field, in the order of the processes

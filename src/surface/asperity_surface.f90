@@ -25,7 +25,7 @@ contains
    subroutine new_height(grid, terms, height, error, map_checksums)
       type(grid_type), intent(in) :: grid
       type(surface_settings_type), intent(in) :: terms(:)          !! none: flat
-      real(dp), allocatable, intent(out) :: height(:, :)           !! m, shape [nx, ny]
+      real(dp), allocatable, intent(out) :: height(:, :)           !! m, shape [nx, rows]
       type(error_type), allocatable, intent(out) :: error
       !> Checksums of the maps that are read from files, by the number of the term; 0 for other
       !> terms
@@ -36,9 +36,9 @@ contains
       if (present(map_checksums)) allocate (map_checksums(size(terms)), source=0_int64)
       call check_terms(terms, error)
       if (allocated(error)) return
-      allocate (height(grid%nx, grid%ny))
+      allocate (height(grid%nx, grid%rows()))
       !$omp parallel do default(none) shared(grid, height) private(i)
-      do j = 1, grid%ny
+      do j = 1, grid%rows()
          do i = 1, grid%nx
             height(i, j) = 0.0_dp
          end do
@@ -271,9 +271,9 @@ contains
       if (.not. associated(shape%formula)) return
       formula => shape%formula
       !$omp parallel do default(none) shared(grid, term, height, formula) private(i)
-      do j = 1, grid%ny
+      do j = 1, grid%rows()
          do i = 1, grid%nx
-            height(i, j) = height(i, j) + formula(place_at(grid, term, i, j), term)
+            height(i, j) = height(i, j) + formula(place_at(grid, term, i, grid%first_row + j - 1), term)
          end do
       end do
    end subroutine add_analytic

@@ -15,17 +15,19 @@
 !> Finally the surface is scaled to exactly the requested rms height over the cells, or to the
 !> requested rms slope. The square of the rms slope is the sum of |k|^2 |c_k|^2 over the modes c_k,
 !> which is the mean of |grad h|^2 of the surface that they describe. The surface is the same to the
-!> last bit for any number of threads.
+!> last bit for any number of threads and processes: the sums are added up by columns of the spectrum.
 !>
 !> Memory: one field in addition to the height.
 module surface_self_affine
    use counter_random, only : normal_number, row_key, uniform_number
    use asperity_errors, only : error_input, error_type, fail
    use asperity_precision, only : dp, int64, pi
-   use real_transform, only : destroy_real_transform, new_real_transform, real_transform_type, &
-      to_space, to_spectrum
+   use asperity_parallel, only : global_sum
+   use field_sums, only : threads_for
    use regular_grid, only : grid_type
+   use row_column_double, only : block, multiplier_type, new_row_column, row_column_type
    use surface_settings, only : surface_settings_type
+   use transform_shape, only : shape_on_grid, transform_shape_type
    use wave_vectors, only : is_nyquist, mode_number, wave_number
    implicit none
    private
@@ -36,41 +38,49 @@ module surface_self_affine
    !> belongs to the band.
    real(dp), parameter :: edge = 1.0e-9_dp
 
+   !> The amplitudes and phases of the modes.
+   type, extends(multiplier_type) :: rough_modes_type
+      type(grid_type) :: grid
+      type(surface_settings_type) :: term
+      !> Sums of |c|^2, or of |k|^2 |c|^2, by wave number along x, from 0. One thread has a whole column, so that
+      !> they do not depend on the number of threads.
+      real(dp), pointer, contiguous :: sums(:) => null()
+   contains
+      procedure :: multiply => give_amplitudes
+   end type rough_modes_type
+
 contains
 
-   !> Add a self-affine surface to a height map.
+   !> Add a self-affine surface to a height map. Collective where processes share the rows.
    subroutine add_self_affine(grid, term, height, error)
       type(grid_type), intent(in) :: grid
       type(surface_settings_type), intent(in) :: term         !! checked
-      real(dp), intent(inout) :: height(:, :)                 !! m, shape [nx, ny]
+      real(dp), intent(inout) :: height(:, :)                 !! m, shape [nx, rows]
       type(error_type), allocatable, intent(out) :: error
-      type(real_transform_type) :: transform
-      real(dp) :: total
-      integer :: i, j
+      type(row_column_type) :: transform
+      type(transform_shape_type) :: shape
+      real(dp) :: total, factor
+      integer :: threads, j
 
-      call new_real_transform(transform, grid%nx, grid%ny, error)
+      shape = shape_on_grid(grid, 1)
+      shape%mx = grid%nx                     ! without padding: the surface is periodic on any grid
+      shape%my = grid%ny
+      if (term%generator == 'random_phase') shape%inputs = 0
+      threads = threads_for(height)
+      call new_row_column(transform, shape, threads, error)
       if (allocated(error)) return
-      if (term%generator == 'filtered_noise') then
-         call white_noise(grid, term%seed, transform%space)
-         call to_spectrum(transform)
-         call filter(grid, term, transform%spectrum)
-      else
-         call random_phases(grid, term, transform%spectrum)
-      end if
-      total = weighted_sum(grid, transform%spectrum, term%rms_slope > 0.0_dp)
+      if (term%generator == 'filtered_noise') call add_noise(grid, term%seed, threads, transform)
+      call shape_modes(grid, term, transform, total)
       if (total > 0.0_dp) then
-         call scale(transform%spectrum, max(term%rms_height, term%rms_slope)/sqrt(total))
-         call to_space(transform)
-         !$omp parallel do default(none) shared(grid, height, transform) private(i)
-         do j = 1, grid%ny
-            do i = 1, grid%nx
-               height(i, j) = height(i, j) + transform%space(i, j)
-            end do
+         factor = max(term%rms_height, term%rms_slope)/sqrt(total)
+         !$omp parallel do default(none) shared(grid, height, transform, factor) num_threads(threads)
+         do j = 1, grid%rows()
+            call transform%add_backward_row(1, j, factor, height(:, j))
          end do
       else
          call fail(error, error_input, no_modes(term))
       end if
-      call destroy_real_transform(transform)
+      call transform%destroy()
    end subroutine add_self_affine
 
    !> The power spectral density relative to its value between k_l and k_r.
@@ -109,106 +119,103 @@ contains
          wave_number(j, grid%ny, grid%ly)), grid%ny == 1))
    end function amplitude
 
-   !> Fill the spectrum with the amplitudes of the modes and with random phases.
-   subroutine random_phases(grid, term, spectrum)
-      type(grid_type), intent(in) :: grid
-      type(surface_settings_type), intent(in) :: term
-      complex(dp), intent(out) :: spectrum(:, :)
-      integer :: i, j, row, sign_y
-      integer(int64) :: key, mirror_key
-      real(dp) :: a, phase
-
-      !$omp parallel do default(none) shared(grid, term, spectrum) &
-      !$omp private(i, row, sign_y, key, mirror_key, a, phase)
-      do j = 1, grid%ny
-         row = mode_number(j, grid%ny)
-         sign_y = merge(-1, 1, row < 0)
-         key = row_key(term%seed, row)
-         mirror_key = row_key(term%seed, abs(row))
-         do i = 1, size(spectrum, 1)
-            a = amplitude(grid, term, i, j)
-            if (.not. a > 0.0_dp) then
-               spectrum(i, j) = (0.0_dp, 0.0_dp)
-            else if (i == 1) then       ! k_x = 0: (0, -k_y) is the conjugate of (0, k_y)
-               phase = 2.0_dp*pi*uniform_number(mirror_key, 0)
-               spectrum(i, j) = cmplx(a*cos(phase), sign_y*a*sin(phase), dp)
-            else
-               phase = 2.0_dp*pi*uniform_number(key, i - 1)
-               spectrum(i, j) = cmplx(a*cos(phase), a*sin(phase), dp)
-            end if
-         end do
-      end do
-   end subroutine random_phases
-
-   !> Standard normal numbers on all cells.
-   subroutine white_noise(grid, seed, field)
+   !> White noise: standard normal numbers on all cells, transformed row by row.
+   subroutine add_noise(grid, seed, threads, transform)
       type(grid_type), intent(in) :: grid
       integer, intent(in) :: seed
-      real(dp), intent(inout) :: field(:, :)
-      integer :: i, j
+      integer, intent(in) :: threads
+      type(row_column_type), intent(inout) :: transform
+      real(dp), allocatable :: row(:)
       integer(int64) :: key
+      integer :: i, j
 
-      !$omp parallel do default(none) shared(grid, seed, field) private(i, key)
-      do j = 1, grid%ny
-         key = row_key(seed, j)
+      allocate (row(grid%nx))
+      !$omp parallel do default(none) shared(grid, seed, transform) private(i, key) firstprivate(row) &
+      !$omp num_threads(threads)
+      do j = 1, grid%rows()
+         key = row_key(seed, grid%first_row + j - 1)
          do i = 1, grid%nx
-            field(i, j) = normal_number(key, i)
+            row(i) = normal_number(key, i)
          end do
+         call transform%forward_row(1, j, row)
       end do
-   end subroutine white_noise
+   end subroutine add_noise
 
-   !> Multiply the spectrum by the amplitudes.
-   subroutine filter(grid, term, spectrum)
+   !> Give the modes their amplitudes, and transform them along y.
+   subroutine shape_modes(grid, term, transform, total)
       type(grid_type), intent(in) :: grid
       type(surface_settings_type), intent(in) :: term
-      complex(dp), intent(inout) :: spectrum(:, :)
-      integer :: i, j
+      type(row_column_type), intent(inout) :: transform
+      real(dp), intent(out) :: total               !! sum of |c|^2, or of |k|^2 |c|^2, over all modes
+      type(rough_modes_type) :: rough_modes
+      real(dp), allocatable, target :: sums(:)
+      integer :: i
 
-      !$omp parallel do default(none) shared(grid, term, spectrum) private(i)
-      do j = 1, grid%ny
-         do i = 1, size(spectrum, 1)
-            spectrum(i, j) = amplitude(grid, term, i, j)*spectrum(i, j)
-         end do
+      allocate (sums(0:transform%longest), source=0.0_dp)
+      rough_modes%grid = grid
+      rough_modes%term = term
+      rough_modes%sums(0:) => sums
+      call transform%columns_through(rough_modes)
+      if (grid%shared) sums = global_sum(sums)
+      total = 0.0_dp
+      do i = 0, grid%nx/2
+         total = total + merge(1.0_dp, 2.0_dp, i == 0)*sums(i)
       end do
-   end subroutine filter
+   end subroutine shape_modes
 
-   !> Sum of |c|^2, or of |k|^2 |c|^2, over all modes. Rows are summed first and then added in
-   !> order, so that the result does not depend on the number of threads.
-   function weighted_sum(grid, spectrum, slope) result(total)
+   !> Give a row of a block of columns its amplitudes, and random phases unless it holds noise.
+   subroutine give_amplitudes(self, first, j, modes)
+      class(rough_modes_type), intent(in) :: self
+      integer, intent(in) :: first                 !! wave number along x of modes(1, :)
+      integer, intent(in) :: j                     !! position along y
+      complex(dp), intent(inout) :: modes(:, :)    !! [block, 1]
+      real(dp) :: a(block), power, k_y
+      integer :: i, last
+
+      last = min(block, self%grid%nx/2 - first + 1)
+      a = 0.0_dp
+      a(:last) = amplitude(self%grid, self%term, [(first + i, i=1, last)], j + 1)
+      if (.not. any(a > 0.0_dp)) then
+         modes = (0.0_dp, 0.0_dp)
+         return
+      end if
+      if (self%term%generator == 'random_phase') then
+         modes(:, 1) = random_phases(self%grid, self%term%seed, first, j)
+      end if
+      modes(:, 1) = a*modes(:, 1)
+
+      k_y = wave_number(j + 1, self%grid%ny, self%grid%ly)
+      do i = 1, last
+         power = real(modes(i, 1))**2 + aimag(modes(i, 1))**2
+         if (self%term%rms_slope > 0.0_dp) &
+            power = power*(wave_number(first + i, self%grid%nx, self%grid%lx)**2 + k_y**2)
+         self%sums(first + i - 1) = self%sums(first + i - 1) + power
+      end do
+   end subroutine give_amplitudes
+
+   !> Random phases of a row of a block of columns: exp(i phase).
+   pure function random_phases(grid, seed, first, j) result(phases)
       type(grid_type), intent(in) :: grid
-      complex(dp), intent(in) :: spectrum(:, :)
-      logical, intent(in) :: slope
-      real(dp) :: total
-      real(dp), allocatable :: row_sum(:)
-      real(dp) :: k_y, power
-      integer :: i, j
+      integer, intent(in) :: seed
+      integer, intent(in) :: first                 !! wave number along x of the first one
+      integer, intent(in) :: j                     !! position along y, from 0
+      complex(dp) :: phases(block)
+      integer(int64) :: key
+      real(dp) :: phase
+      integer :: i, row, k_x
 
-      allocate (row_sum(grid%ny))
-      !$omp parallel do default(none) shared(grid, spectrum, slope, row_sum) private(i, k_y, power)
-      do j = 1, grid%ny
-         k_y = wave_number(j, grid%ny, grid%ly)
-         row_sum(j) = 0.0_dp
-         do i = 1, size(spectrum, 1)
-            power = real(spectrum(i, j), dp)**2 + aimag(spectrum(i, j))**2
-            if (slope) power = power*(wave_number(i, grid%nx, grid%lx)**2 + k_y**2)
-            if (i > 1) power = 2.0_dp*power
-            row_sum(j) = row_sum(j) + power
-         end do
+      row = mode_number(j + 1, grid%ny)
+      key = row_key(seed, row)
+      do i = 1, block
+         k_x = first + i - 1
+         phase = 2.0_dp*pi*uniform_number(key, k_x)
+         if (k_x == 0) then            ! (0, -k_y) is the conjugate of (0, k_y)
+            phase = 2.0_dp*pi*uniform_number(row_key(seed, abs(row)), 0)
+            if (row < 0) phase = -phase
+         end if
+         phases(i) = cmplx(cos(phase), sin(phase), dp)
       end do
-      total = sum(row_sum)
-   end function weighted_sum
-
-   !> Multiply the spectrum by a factor.
-   subroutine scale(spectrum, factor)
-      complex(dp), intent(inout) :: spectrum(:, :)
-      real(dp), intent(in) :: factor
-      integer :: j
-
-      !$omp parallel do default(none) shared(spectrum, factor)
-      do j = 1, size(spectrum, 2)
-         spectrum(:, j) = factor*spectrum(:, j)
-      end do
-   end subroutine scale
+   end function random_phases
 
    !> The message for a band in which no mode of the grid lies.
    pure function no_modes(term) result(message)
