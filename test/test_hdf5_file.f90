@@ -3,7 +3,7 @@ module test_hdf5_file
    use check, only : begin_suite, check_close, check_error, check_no_error, check_that, selected
    use asperity_errors, only : error_file, error_input, error_type
    use file_system, only : remove_file
-   use hdf5_field, only : read_field
+   use hdf5_field, only : field_reader_type
    use hdf5_file, only : hdf5_file_type
    use asperity_precision, only : dp, int8
    implicit none
@@ -112,36 +112,41 @@ contains
    subroutine fields_are_read()
       type(hdf5_file_type) :: file
       type(error_type), allocatable :: error
-      real(dp), allocatable :: field(:, :)
-      real(dp) :: height(4, 2)
-      integer :: extent(2), i
+      type(field_reader_type) :: reader
+      real(dp) :: height(4, 2), field(4, 2)
+      integer :: i
 
       height = reshape([(real(i, dp), i=1, 8)], [4, 2])
       call file%open(path, 'create', error)
       call file%write('/surface', height, 'm', 'height', error)
       call file%write('/line', [1.0_dp], 'm', 'a line', error)
       call file%close(error)
-      extent = [4, 2]
-      call read_field(path, '', extent, field, error)
+      call reader%open(path, '', [4, 2], error)
       call check_no_error(error, 'usual name')
-      call check_that(all(shape(field) == [4, 2]) .and. all(same(field, height)), 'surface')
-      call read_field(path, 'heights', extent, field, error)
+      call check_that(all(reader%extent == [4, 2]), 'shape of the surface')
+      call reader%read(2, field(:, 2:), error)
+      call reader%read(1, field(:, :1), error)
+      call check_no_error(error, 'rows one by one')
+      call check_that(all(same(field, height)), 'surface')
+      call reader%close()
+      call reader%open(path, 'heights', [4, 2], error)
       call check_error(error, 'there is no dataset "heights"; there are: line, surface', 'missing')
       call check_that(error%status == error_file, 'status of a missing dataset')
-      call read_field(path, 'line', extent, field, error)
+      call reader%open(path, 'line', [4, 2], error)
       call check_error(error, 'has 1 dimensions, not 2', 'shape')
       call check_that(error%status == error_input, 'status of a wrong shape')
 
       call file%open(path, 'create', error)
       call file%write('/surface/height', 2*height, 'm', 'height', error)
       call file%close(error)
-      extent = [4, 2]
-      call read_field(path, '', extent, field, error)
+      call reader%open(path, '', [4, 2], error)
+      call reader%read(1, field, error)
       call check_that(all(same(field, 2*height)), 'surface/height')
-      extent = [2, 4]
-      call read_field(path, '', extent, field, error)
+      call reader%close()
+      call reader%open(path, '', [2, 4], error)
       call check_no_error(error, 'another shape')
-      call check_that(.not. allocated(field) .and. all(extent == [4, 2]), 'is told and not read')
+      call check_that(all(reader%extent == [4, 2]), 'the caller finds the other shape')
+      call reader%close()
    end subroutine fields_are_read
 
    !> Columns grow over their first chunk, and after the file was closed.

@@ -3,15 +3,17 @@ module test_surface
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite, ieee_quiet_nan, ieee_value
    use check, only : begin_suite, check_close, check_error, check_no_error, check_order, &
       check_that, selected
+   use asperity_checksum, only : checksum_of_field
    use counter_random, only : mix, normal_number, row_key, uniform_number
    use asperity_errors, only : error_file, error_input, error_type
    use hdf5_file, only : hdf5_file_type
+   use hdf5_slabs, only : slab_rows
    use input_reference, only : kind_real, variable_entries, variable_entry_type
    use omp_lib, only : omp_get_max_threads, omp_set_num_threads
    use asperity_precision, only : dp, int64, pi
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use roughness, only : height_psd, height_statistics, roughness_type
-   use asperity_surface, only : check_terms, new_height, rim_height
+   use asperity_surface, only : check_terms, new_height
    use surface_warnings, only : find_warnings, warning_length
    use surface_settings, only : default_surface, real_variable, surface_settings_type
    use surface_shapes, only : all_shapes, shape_type
@@ -37,6 +39,7 @@ contains
       if (selected('every_shape_can_be_checked_and_listed')) &
          call every_shape_can_be_checked_and_listed()
       if (selected('height_maps_from_files')) call height_maps_from_files()
+      if (selected('long_maps_are_read_in_slabs')) call long_maps_are_read_in_slabs()
       if (selected('warnings_name_what_is_doubtful')) call warnings_name_what_is_doubtful()
       if (selected('map_that_contradicts_the_case')) call map_that_contradicts_the_case()
    end subroutine run_surface
@@ -89,7 +92,6 @@ contains
       term%shape = 'paraboloid'
       call new_height(grid, [term], h, error)
       call check_close(h(9, 1), -(16.0_dp + 2.25_dp)/4.0_dp, 1.0e-15_dp, 'paraboloid')
-      call check_close(rim_height(h), -1.0_dp/4.0_dp, 1.0e-15_dp, 'highest on the rim: (0, 1)')
       ! a shallow cap keeps its digits
       term%shape = 'sphere'
       term%radius = 1.0e9_dp
@@ -491,6 +493,42 @@ contains
       open (newunit=unit, file=path, status='old')
       close (unit, status='delete')
    end subroutine height_maps_from_files
+
+   !> A map that is read in several slabs, the last one smaller: the values, and the checksum of the whole.
+   subroutine long_maps_are_read_in_slabs()
+      character(*), parameter :: path = 'build/test_surface.h5'
+      integer, parameter :: nx = 30000, ny = 11
+      type(grid_type) :: grid
+      type(surface_settings_type) :: term
+      type(hdf5_file_type) :: file
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: h(:, :), map(:, :)
+      integer(int64), allocatable :: checksums(:)
+      integer :: i, j, unit
+
+      grid = new_grid(nx, ny, 1.0_dp, 1.0_dp, boundary_periodic)
+      call check_that(slab_rows(nx) == 4, 'three slabs')
+      allocate (map(nx, ny))
+      do j = 1, ny
+         do i = 1, nx
+            map(i, j) = sin(0.1_dp*i)*j
+         end do
+      end do
+      call file%open(path, 'create', error)
+      call file%write('surface', map, 'm', 'height', error, compression=1)
+      call file%close(error)
+      call check_no_error(error, 'a long map')
+      term = default_surface(grid)
+      term%shape = 'file'
+      term%file = path
+      call new_height(grid, [term, default_surface(grid)], h, error, checksums)
+      call check_no_error(error, 'reading a long map')
+      call check_that(all(abs(h - map) <= 0.0_dp), 'values of a long map')
+      call check_that(checksums(1) == checksum_of_field(map), 'checksum of a long map')
+      call check_that(checksums(2) == 0, 'a flat term has no checksum')
+      open (newunit=unit, file=path, status='old')
+      close (unit, status='delete')
+   end subroutine long_maps_are_read_in_slabs
 
    !> Warnings name what is doubtful, and are silent otherwise.
    subroutine warnings_name_what_is_doubtful()

@@ -47,10 +47,10 @@ contains
 
    !> Checksum of a height map, as a result names it in its attribute `height_maps`.
    subroutine map_checksum(path, dataset, nx, ny, checksum_text, status, message)
-      use asperity_checksum, only : checksum_of_field, hexadecimal
-      use asperity_errors, only : error_input, error_type, fail
-      use hdf5_field, only : read_field
-      use asperity_precision, only : dp
+      use asperity_checksum, only : hexadecimal
+      use asperity_errors, only : error_type
+      use asperity_precision, only : int64
+      use height_map, only : checksum_of_map
       character(len=*), intent(in) :: path
       character(len=*), intent(in) :: dataset              !! blank: the usual names
       integer(c_int), intent(in) :: nx, ny                 !! of the grid that the map is for
@@ -58,19 +58,11 @@ contains
       integer(c_int), intent(out) :: status
       character(len=2000), intent(out) :: message
       type(error_type), allocatable :: error
-      real(dp), allocatable :: map(:, :)
-      integer :: extent(2)
+      integer(int64) :: checksum
 
       checksum_text = ''
-      extent = [int(nx), int(ny)]
-      call read_field(trim(path), trim(dataset), extent, map, error)
-      if (.not. allocated(error)) then
-         if (allocated(map)) then
-            checksum_text = hexadecimal(checksum_of_field(map))
-         else
-            call fail(error, error_input, trim(path)//': has another shape')
-         end if
-      end if
+      call checksum_of_map(trim(path), trim(dataset), [int(nx), int(ny)], checksum, error)
+      if (.not. allocated(error)) checksum_text = hexadecimal(checksum)
       call report(error, status, message)
    end subroutine map_checksum
 

@@ -12,7 +12,8 @@ module asperity_checksum
    implicit none
    private
 
-   public :: checksum_of_field, checksum_of_file, checksum_of_text, crc32_of_values, hexadecimal
+   public :: checksum_of_checksums, checksum_of_field, checksum_of_file, checksum_of_text, checksums_of_rows, &
+      crc32_of_values, hexadecimal
 
    integer(int64), parameter :: polynomial = &
       ior(shiftl(int(z'C96C5795', int64), 32), int(z'D7870F42', int64))
@@ -66,6 +67,13 @@ contains
    function checksum_of_field(field) result(sum)
       real(dp), intent(in) :: field(:, :)           !! [nx, ny]
       integer(int64) :: sum
+
+      sum = checksum_of_checksums(size(field, 1), checksums_of_rows(field))
+   end function checksum_of_field
+
+   !> Checksums of the rows of a field, or of a part of it.
+   function checksums_of_rows(field) result(rows)
+      real(dp), intent(in) :: field(:, :)           !! [nx, rows]
       integer(int64), allocatable :: rows(:)
       integer :: j
 
@@ -76,11 +84,20 @@ contains
          rows(j) = not(0_int64)
          call add_words(rows(j), transfer(field(:, j), rows(:0), size(field, 1)))
       end do
+   end function checksums_of_rows
+
+   !> Checksum of a field from those of all its rows.
+   function checksum_of_checksums(nx, rows) result(sum)
+      integer, intent(in) :: nx                     !! values of a row
+      integer(int64), intent(in) :: rows(:)
+      integer(int64) :: sum
+
+      call fill_table()
       sum = not(0_int64)
-      call add_words(sum, [int(size(field, 1), int64), int(size(field, 2), int64)])
+      call add_words(sum, [int(nx, int64), int(size(rows), int64)])
       call add_words(sum, rows)
       sum = not(sum)
-   end function checksum_of_field
+   end function checksum_of_checksums
 
    !> Checksum of the characters of a text.
    function checksum_of_text(text) result(sum)

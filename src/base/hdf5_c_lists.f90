@@ -12,7 +12,7 @@ module hdf5_c_lists
 
    public :: h5p_cls_dataset_access_id_g, h5p_cls_dataset_create_id_g, h5p_cls_file_access_id_g, &
       h5p_cls_file_create_id_g, h5p_cls_group_create_id_g, h5p_cls_link_create_id_g, h5pclose, &
-      h5pcreate, h5pset_alignment, h5pset_attr_phase_change, h5pset_chunk, h5pset_chunk_cache, &
+      h5pcreate, h5pget_chunk, h5pget_layout, h5pset_alignment, h5pset_attr_phase_change, h5pset_chunk, h5pset_chunk_cache, &
       h5pset_create_intermediate_group, h5pset_deflate, h5pset_est_link_info, &
       h5pset_fclose_degree, h5pset_fill_time, h5pset_fletcher32, &
       h5pset_libver_bounds, h5pset_link_phase_change, &
@@ -155,6 +155,20 @@ module hdf5_c_lists
          integer(c_int), value :: level
          integer(c_int) :: status
       end function h5pset_deflate
+
+      function h5pget_layout(list) bind(c, name='H5Pget_layout') result(layout)
+         import :: c_int, hid_t
+         integer(hid_t), value :: list
+         integer(c_int) :: layout
+      end function h5pget_layout
+
+      function h5pget_chunk(list, most, extent) bind(c, name='H5Pget_chunk') result(rank)
+         import :: c_int, hid_t, hsize_t
+         integer(hid_t), value :: list
+         integer(c_int), value :: most
+         integer(hsize_t), intent(out) :: extent(*)
+         integer(c_int) :: rank
+      end function h5pget_chunk
 
       subroutine h5t_native_double_g() bind(c, name='H5T_NATIVE_DOUBLE_g')
       end subroutine h5t_native_double_g

@@ -7,7 +7,7 @@ module hdf5_c_values
    private
 
    public :: h5aclose, h5acreate2, h5aexists, h5aget_space, h5aget_type, h5aopen, h5aread, &
-      h5awrite, h5dclose, h5dcreate2, h5dget_space, h5dopen2, h5dread, h5dset_extent, &
+      h5awrite, h5dclose, h5dcreate2, h5dget_create_plist, h5dget_space, h5dopen2, h5dread, h5dset_extent, &
       h5dvlen_reclaim, h5dwrite, h5sclose, h5screate, h5screate_simple, h5sget_simple_extent_dims, &
       h5sget_simple_extent_ndims, h5sselect_hyperslab, h5tclose, h5tcopy, h5tget_size, &
       h5tis_variable_str, h5tset_cset, h5tset_size, h5tset_strpad
@@ -92,6 +92,12 @@ module hdf5_c_values
          integer(hid_t), value :: dataset
          integer(hid_t) :: found
       end function h5dget_space
+
+      function h5dget_create_plist(dataset) bind(c, name='H5Dget_create_plist') result(list)
+         import :: hid_t
+         integer(hid_t), value :: dataset
+         integer(hid_t) :: list
+      end function h5dget_create_plist
 
       function h5dset_extent(dataset, extent) bind(c, name='H5Dset_extent') result(status)
          import :: c_int, hid_t, hsize_t

@@ -1,66 +1,117 @@
-!> One field of an HDF5 file that anyone may have written, such as a height map.
+!> Fields of HDF5 files that anyone may have written, such as height maps. They are read in slabs of rows.
 module hdf5_field
    use asperity_errors, only : error_type
    use asperity_precision, only : dp
    use hdf5_file, only : hdf5_file_type
+   use hdf5_slab_reader, only : slab_reader_type
+   use hdf5_slabs, only : slab_rows
    use trial_process, only : trial_type
    implicit none
    private
 
-   public :: read_field
+   public :: field_reader_type
+
+   !> A field in a file that is open.
+   type :: field_reader_type
+      integer :: extent(2) = 0               !! nx, ny of the dataset, whose shape is (ny, nx)
+      type(hdf5_file_type), private :: file
+      type(slab_reader_type), private :: slabs
+   contains
+      procedure :: open => open_field
+      procedure :: read => read_rows
+      procedure :: close => close_field
+   end type field_reader_type
 
 contains
 
-   !> Read a field. HDF5 may crash or hang on a damaged file, so that a separate process tries
-   !> first.
-   subroutine read_field(path, dataset, extent, field, error)
-      character(*), intent(in) :: path      !! name of the file
-      character(*), intent(in) :: dataset   !! '': 'surface/height', or otherwise 'surface'
-      !> On entry the shape that is wanted, on return that of the dataset. The field is read only if
-      !> they agree.
-      integer, intent(inout) :: extent(2)
-      real(dp), allocatable, intent(out) :: field(:, :)  !! [nx, ny] from a dataset (ny, nx)
+   !> Open a field. HDF5 may crash or hang on a damaged file, so that a separate process first tries to
+   !> read all of it, if it has the shape that is wanted.
+   subroutine open_field(self, path, dataset, wanted, error)
+      class(field_reader_type), intent(inout) :: self
+      character(*), intent(in) :: path       !! name of the file
+      character(*), intent(in) :: dataset    !! '': 'surface/height', or otherwise 'surface'
+      integer, intent(in) :: wanted(2)       !! nx, ny; the caller compares them with `extent`
       type(error_type), allocatable, intent(out) :: error
       real(dp), parameter :: slowest = 2.0e6_dp          !! bytes/s from the slowest disk
       type(trial_type) :: trial
 
-      call trial%start(60 + int(min(8.0_dp*product(real(extent, dp))/slowest, 1.0e6_dp)))
+      call trial%start(60 + int(min(8.0_dp*product(real(wanted, dp))/slowest, 1.0e6_dp)))
       if (trial%is_copy) then
-         call load_field(path, dataset, extent, field, error)
+         call try_field(self, path, dataset, wanted)
          call trial%leave()
       end if
       call trial%verdict(path, error)
-      if (.not. allocated(error)) call load_field(path, dataset, extent, field, error)
-   end subroutine read_field
+      if (.not. allocated(error)) call open_dataset(self, path, dataset, error)
+   end subroutine open_field
 
-   !> The same without a trial.
-   subroutine load_field(path, dataset, extent, field, error)
+   !> Open a field, and read all of it if it has the shape that is wanted.
+   subroutine try_field(self, path, dataset, wanted)
+      class(field_reader_type), intent(inout) :: self
       character(*), intent(in) :: path
       character(*), intent(in) :: dataset
-      integer, intent(inout) :: extent(2)
-      real(dp), allocatable, intent(out) :: field(:, :)
+      integer, intent(in) :: wanted(2)
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: slab(:, :)
+      integer :: first, rows
+
+      call open_dataset(self, path, dataset, error)
+      if (allocated(error)) return
+      if (any(self%extent /= wanted)) return
+      allocate (slab(wanted(1), min(slab_rows(wanted(1)), wanted(2))))
+      do first = 1, wanted(2), size(slab, 2)
+         rows = min(size(slab, 2), wanted(2) - first + 1)
+         call self%read(first, slab(:, :rows), error)
+         if (allocated(error)) return
+      end do
+   end subroutine try_field
+
+   !> Open a field without a trial.
+   subroutine open_dataset(self, path, dataset, error)
+      class(field_reader_type), intent(inout) :: self
+      character(*), intent(in) :: path
+      character(*), intent(in) :: dataset
       type(error_type), allocatable, intent(out) :: error
-      type(hdf5_file_type) :: file
       character(:), allocatable :: name
+      real(dp), allocatable :: field(:, :)
       integer, allocatable :: found(:)
 
-      call file%open(path, 'read')
+      self%extent = 0
+      call self%file%open(path, 'read')
       name = trim(dataset)
       if (name == '') then
          name = 'surface/height'
-         if (.not. file%has_dataset(name)) then
-            if (file%has_dataset('surface')) name = 'surface'
+         if (.not. self%file%has_dataset(name)) then
+            if (self%file%has_dataset('surface')) name = 'surface'
          end if
       end if
-      call file%dataset_shape(name, found)
-      if (size(found) /= 2) then
-         call file%read(name, field)        ! this reports that the number of dimensions is wrong
-         extent = 0
+      call self%file%dataset_shape(name, found)
+      if (size(found) == 2) then
+         self%extent = found
+         call self%slabs%open(self%file, name)
       else
-         if (all(found == extent)) call file%read(name, field)
-         extent = found
+         call self%file%read(name, field)    ! this reports that the number of dimensions is wrong
       end if
-      call file%close(error)
-   end subroutine load_field
+      call self%file%report(error)
+      if (allocated(error)) call self%close()
+   end subroutine open_dataset
+
+   !> Read some rows.
+   subroutine read_rows(self, first, values, error)
+      class(field_reader_type), intent(inout) :: self
+      integer, intent(in) :: first           !! the first of them, from 1
+      real(dp), intent(out), contiguous :: values(:, :)  !! [nx, rows]
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%slabs%read(self%file, first, values, error)
+   end subroutine read_rows
+
+   !> Close the file.
+   subroutine close_field(self)
+      class(field_reader_type), intent(inout) :: self
+      type(error_type), allocatable :: error
+
+      call self%slabs%close()
+      call self%file%close(error)            ! everything has been read: a fault means nothing any more
+   end subroutine close_field
 
 end module hdf5_field

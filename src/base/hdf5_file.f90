@@ -31,6 +31,7 @@ module hdf5_file
    type, extends(hdf5_attributes_type) :: hdf5_file_type
    contains
       procedure :: dataset_shape
+      procedure :: open_values
       procedure :: create_column
       procedure :: append
       procedure :: name_axes
@@ -288,26 +289,37 @@ contains
       end if
    end subroutine get_shape
 
+   !> Open a dataset whose values are to be read: none may be missing.
+   subroutine open_values(self, path, dataset, fault)
+      class(hdf5_file_type), intent(inout) :: self
+      character(*), intent(in) :: path
+      integer(hid_t), intent(out) :: dataset      !! to be closed where there is no fault
+      type(error_type), allocatable, intent(out) :: fault
+      character(:), allocatable :: reason
+      integer :: ignored
+
+      call self%open_object(path, dataset, fault)
+      if (allocated(fault)) return
+      call check_sources(self%path, dataset, reason)
+      if (reason == '') return
+      call fail(fault, error_file, self%path//': '//trim(path)// &
+         ': is a virtual dataset, and '//reason//': copy the values into a dataset of their own')
+      ignored = h5oclose(dataset)
+   end subroutine open_values
+
    !> Read a whole dataset into memory.
    subroutine load(self, path, buffer, fault)
       class(hdf5_file_type), intent(inout) :: self
       character(*), intent(in) :: path
       type(c_ptr), intent(in) :: buffer
       type(error_type), allocatable, intent(out) :: fault
-      character(:), allocatable :: reason
       integer(hid_t) :: dataset
       integer :: status, ignored
 
-      call self%open_object(path, dataset, fault)
+      call self%open_values(path, dataset, fault)
       if (allocated(fault)) return
-      call check_sources(self%path, dataset, reason)
-      if (reason == '') then
-         call get_reals(dataset, buffer, status)
-         call self%checked(status, 'the dataset cannot be read', path, fault)
-      else
-         call fail(fault, error_file, self%path//': '//trim(path)// &
-            ': is a virtual dataset, and '//reason//': copy the values into a dataset of their own')
-      end if
+      call get_reals(dataset, buffer, status)
+      call self%checked(status, 'the dataset cannot be read', path, fault)
       ignored = h5oclose(dataset)
    end subroutine load
 

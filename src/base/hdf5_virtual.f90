@@ -6,8 +6,8 @@ module hdf5_virtual
    use, intrinsic :: iso_c_binding, only : c_char, c_int, c_long, c_null_char, c_size_t
    use asperity_errors, only : error_type
    use file_system, only : file_exists, folder_of
-   use hdf5_c_lists, only : h5pclose
-   use hdf5_c_values, only : h5dget_space, h5sclose
+   use hdf5_c_lists, only : h5pclose, h5pget_layout
+   use hdf5_c_values, only : h5dget_create_plist, h5dget_space, h5sclose
    use hdf5_kinds, only : hid_t, hsize_t
    use hdf5_tree, only : hdf5_tree_type
    implicit none
@@ -25,18 +25,6 @@ module hdf5_virtual
    end type source_type
 
    interface
-      function h5dget_create_plist(dataset) bind(c, name='H5Dget_create_plist') result(list)
-         import :: hid_t
-         integer(hid_t), value :: dataset
-         integer(hid_t) :: list
-      end function h5dget_create_plist
-
-      function h5pget_layout(list) bind(c, name='H5Pget_layout') result(layout)
-         import :: c_int, hid_t
-         integer(hid_t), value :: list
-         integer(c_int) :: layout
-      end function h5pget_layout
-
       function h5pget_virtual_count(list, count) bind(c, name='H5Pget_virtual_count') result(status)
          import :: c_int, c_size_t, hid_t
          integer(hid_t), value :: list

@@ -3,12 +3,13 @@
 !> z points up into the rubber, so that summits are the largest values; lengths are in m. The table
 !> in `surface_shapes` names the shapes and holds the formulas of the analytic ones.
 !>
-!> Memory: the height, and one field more while a file is read or a random surface is made.
+!> Where processes share the rows of the grid, each makes its own rows, and none has a whole map.
+!>
+!> Memory: the height, and one field more while a random surface is made.
 module asperity_surface
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
-   use asperity_checksum, only : checksum_of_field
-   use asperity_errors, only : add_fault, error_input, error_type, fail
-   use hdf5_field, only : read_field
+   use asperity_errors, only : add_fault, error_input, error_type
+   use height_map, only : add_map, check_map
    use asperity_precision, only : dp, int64
    use regular_grid, only : grid_type
    use surface_self_affine, only : add_self_affine
@@ -17,11 +18,12 @@ module asperity_surface
    implicit none
    private
 
-   public :: check_files, check_terms, new_height, rim_height
+   public :: check_files, check_terms, new_height
 
 contains
 
-   !> The height of the road on every cell: the sum of all terms.
+   !> The height of the road on every cell of this process: the sum of all terms. Collective where processes
+   !> share the rows.
    subroutine new_height(grid, terms, height, error, map_checksums)
       type(grid_type), intent(in) :: grid
       type(surface_settings_type), intent(in) :: terms(:)          !! none: flat
@@ -48,7 +50,7 @@ contains
          case ('self_affine')
             call add_self_affine(grid, terms(n), height, error)
          case ('file')
-            call add_file(grid, terms(n), height, map_checksum, error)
+            call add_map(grid, terms(n), height, map_checksum, error)
             if (present(map_checksums)) map_checksums(n) = map_checksum
          case default
             call add_analytic(grid, terms(n), height)
@@ -56,18 +58,6 @@ contains
          if (allocated(error)) return
       end do
    end subroutine new_height
-
-   !> Highest value on the outermost cells, which leave or enter a free map when the road slides.
-   pure function rim_height(height) result(rim)
-      real(dp), intent(in) :: height(:, :)      !! m, shape [nx, ny]
-      real(dp) :: rim
-      integer :: nx, ny
-
-      nx = size(height, 1)
-      ny = size(height, 2)
-      rim = max(maxval(height(1, :)), maxval(height(nx, :)), maxval(height(:, 1)), &
-         maxval(height(:, ny)))
-   end function rim_height
 
    !> Check that every term has what its shape needs; all faults are reported at once.
    subroutine check_terms(terms, error)
@@ -167,28 +157,6 @@ contains
       word = trim(adjustl(text))
    end function number
 
-   !> Add a height map from a file, times its scale.
-   subroutine add_file(grid, term, height, map_checksum, error)
-      type(grid_type), intent(in) :: grid
-      type(surface_settings_type), intent(in) :: term         !! checked
-      real(dp), intent(inout) :: height(:, :)
-      integer(int64), intent(out) :: map_checksum             !! of the map as it is in the file
-      type(error_type), allocatable, intent(out) :: error
-      real(dp), allocatable :: map(:, :)
-      integer :: i, j
-
-      map_checksum = 0_int64
-      call read_map(grid, term, map, error)
-      if (allocated(error)) return
-      map_checksum = checksum_of_field(map)
-      !$omp parallel do default(none) shared(grid, height, map, term) private(i)
-      do j = 1, grid%ny
-         do i = 1, grid%nx
-            height(i, j) = height(i, j) + term%scale*map(i, j)
-         end do
-      end do
-   end subroutine add_file
-
    !> Check that the maps of all terms that are files can be used, by reading them; all faults are
    !> reported at once.
    subroutine check_files(grid, terms, error)
@@ -196,67 +164,14 @@ contains
       type(surface_settings_type), intent(in) :: terms(:)
       type(error_type), allocatable, intent(out) :: error
       type(error_type), allocatable :: fault
-      real(dp), allocatable :: map(:, :)
       integer :: n
 
       do n = 1, size(terms)
          if (terms(n)%shape /= 'file') cycle
-         call read_map(grid, terms(n), map, fault)
+         call check_map(grid, terms(n), fault)
          if (allocated(fault)) call add_fault(error, fault%status, fault%message)
       end do
    end subroutine check_files
-
-   !> Read the map of a term, and check that it has the shape of the grid and only finite values.
-   subroutine read_map(grid, term, map, error)
-      type(grid_type), intent(in) :: grid
-      type(surface_settings_type), intent(in) :: term         !! checked
-      real(dp), allocatable, intent(out) :: map(:, :)         !! as in the file, not scaled
-      type(error_type), allocatable, intent(out) :: error
-      character(160) :: text
-      integer :: extent(2), faulty, i, j
-
-      extent = [grid%nx, grid%ny]
-      call read_field(trim(term%file), trim(term%dataset), extent, map, error)
-      if (allocated(error)) then
-         error%message = map_fault(term, error%message)
-         return
-      end if
-      if (any(extent /= [grid%nx, grid%ny])) then
-         write (text, '(4(a, i0), a)') 'the height map has the shape (', extent(2), ', ', &
-            extent(1), '): must be (ny, nx) = (', grid%ny, ', ', grid%nx, ')'
-         call fail(error, error_input, map_fault(term, trim(text)))
-         return
-      end if
-      faulty = 0
-      !$omp parallel do default(none) shared(grid, map, term) private(i) reduction(+:faulty)
-      do j = 1, grid%ny
-         do i = 1, grid%nx
-            if (.not. ieee_is_finite(term%scale*map(i, j))) faulty = faulty + 1
-         end do
-      end do
-      if (faulty > 0) then
-         write (text, '(a, i0, a)') 'the height map has ', faulty, &
-            ' values that are not finite (NaN or infinite): all must be numbers, in m'
-         call fail(error, error_input, map_fault(term, trim(text)))
-      end if
-   end subroutine read_map
-
-   !> The message about a map: first the place in the input that names its file, then what is wrong.
-   pure function map_fault(term, message) result(fault)
-      type(surface_settings_type), intent(in) :: term
-      character(*), intent(in) :: message                     !! may start with the file's name
-      character(:), allocatable :: fault
-      character(16) :: line
-      integer :: first
-
-      first = 1
-      if (index(message, trim(term%file)//': ') == 1) first = len_trim(term%file) + 3
-      fault = trim(term%place)//': file = '''//trim(term%file)//''': '//message(first:)
-      if (term%line > 0) then
-         write (line, '(a, i0, a)') ' (line ', term%line, ')'
-         fault = fault//trim(line)
-      end if
-   end function map_fault
 
    !> Add an analytic shape; a plane has no formula and adds nothing.
    subroutine add_analytic(grid, term, height)
