@@ -11,7 +11,8 @@
 !>     call trial%verdict(path, error)
 !>
 !> Ordinary errors in the copy are ignored, because this process will find and report them. The copy
-!> must neither print nor use OpenMP. If no copy can be made, there is no trial.
+!> must neither print nor use OpenMP nor MPI, and it ends without the exit handlers of the program. If no
+!> copy can be made, there is no trial.
 module trial_process
    use, intrinsic :: iso_c_binding, only : c_int, c_intptr_t
    use asperity_errors, only : error_file, error_type, fail
