@@ -4,7 +4,7 @@ module test_field_sums
    use asperity_precision, only : dp
    use check, only : begin_suite, check_close, check_that, selected
    use field_sums, only : cell_count, field_count, field_magnitude, field_maximum, field_mean, field_minimum, &
-      field_product, field_rms, field_sum, largest_of_rows, least_of_rows, row_total, row_totals
+      field_product, field_rms, field_sum, largest_of_rows, least_of_rows, row_total, row_totals, sum_rows, vector_sum
    use projection, only : project_simplex
    use regular_grid, only : boundary_free, grid_type, new_grid
    use workspace, only : new_workspace, workspace_type
@@ -78,7 +78,7 @@ contains
    !> Row sums are added one after the other: with 1, 2^60 and -2^60 in this order nothing is left.
    subroutine totals_of_rows()
       real(dp), parameter :: large = 2.0_dp**60
-      real(dp) :: rows(2, 3), totals(2)
+      real(dp) :: rows(2, 3), totals(2), largest
 
       rows(1, :) = [1.0_dp, large, -large]
       rows(2, :) = [large, -large, 1.0_dp]
@@ -89,12 +89,15 @@ contains
       call check_close(row_total(rows(2, :)), 1.0_dp, 0.0_dp, 'one sum per row')
       call check_close(largest_of_rows(rows(1, :)), large, 0.0_dp, 'largest of the rows')
       call check_close(least_of_rows(rows(1, :)), -large, 0.0_dp, 'least of the rows')
+      call sum_rows(rows, totals(:1), largest)
+      call check_close(totals(1), 0.0_dp, 0.0_dp, 'a sum beside a largest number')
+      call check_close(largest, large, 0.0_dp, 'the largest number beside a sum')
    end subroutine totals_of_rows
 
    !> The field i + 10 j on an oblong grid, whose sums are integers.
    subroutine known_fields()
       integer, parameter :: nx = 5, ny = 3
-      real(dp) :: field(nx, ny), ones(nx, ny)
+      real(dp) :: field(nx, ny), ones(nx, ny), sums(2)
       integer :: i, j
 
       field = reshape([((real(i + 10*j, dp), i = 1, nx), j = 1, ny)], [nx, ny])
@@ -102,6 +105,9 @@ contains
       call check_close(cell_count(field), 15.0_dp, 0.0_dp, 'number of cells')
       call check_close(field_sum(field), 345.0_dp, 0.0_dp, 'sum')
       call check_close(field_mean(field), 23.0_dp, 0.0_dp, 'mean')
+      sums = vector_sum(reshape([field, 2.0_dp*field], [nx, 2, ny], order=[1, 3, 2]))
+      call check_close(sums(1), 345.0_dp, 0.0_dp, 'sum of the first component')
+      call check_close(sums(2), 690.0_dp, 0.0_dp, 'sum of the second component')
       call check_close(field_product(field, ones), 345.0_dp, 0.0_dp, 'product with ones')
       call check_close(field_product(field, field), 8965.0_dp, 0.0_dp, 'sum of squares')
       call check_close(field_rms(field, 23.0_dp), sqrt(1030.0_dp/15.0_dp), 1e-14_dp, 'rms about the mean')

@@ -396,21 +396,24 @@ contains
    function self_compliance(self) result(compliance)
       class(convolution_type), intent(in) :: self
       real(dp) :: compliance
-      real(dp) :: columns(0:self%mx/2), weight
+      real(dp) :: symbols(0:self%mx/2), weight
       integer :: i, j
 
-      columns = 0.0_dp
+      compliance = 0.0_dp
       do j = 0, self%my/2
+         symbols = 0.0_dp
          do i = self%own(1), last_mode(self)
+            symbols(i) = self%symbol(i, j, 1) + self%symbol(i, j, self%components)
+         end do
+         ! All columns of a row at once: the sum is in the same order for any number of processes.
+         if (self%shared) symbols = global_sum(symbols)
+         do i = 0, self%mx/2
             if (self%grid%boundary == boundary_periodic .and. i == 0 .and. j == 0) cycle
             weight = merge(1.0_dp, 2.0_dp, i == 0 .or. 2*i == self%mx) &
                *merge(1.0_dp, 2.0_dp, j == 0 .or. 2*j == self%my)
-            columns(i) = columns(i) &
-               + 0.5_dp*weight*(self%symbol(i, j, 1) + self%symbol(i, j, self%components))
+            compliance = compliance + 0.5_dp*weight*symbols(i)
          end do
       end do
-      if (self%shared) columns = global_sum(columns)
-      compliance = sum(columns)
    end function self_compliance
 
    !> The mean mode: the uniform displacement that goes with tractions whose sum over the cells is 1 Pa.
