@@ -27,7 +27,8 @@ module asperity_parallel
    private
 
    public :: any_process, end_processes, exchange, exchanged_bytes, gather_rows, global_max, global_min, global_sum, &
-      hand_to_first, is_first_process, on_any_process, parallel_library, process_count, process_number, processor_count, &
+      hand_to_first, is_first_process, on_any_process, parallel_library, process_count, process_number, &
+      processes_of_machine, processor_count, &
       release_threads, rows_before, set_threads, share, start_processes, take_from_first, thread_count
 
    !> Elementwise sum over the processes, of counts or of numbers of which all but one are 0: both are exact.
@@ -90,6 +91,11 @@ contains
    pure integer function process_count()
       process_count = processes
    end function process_count
+
+   !> Number of processes of this run on this machine.
+   pure integer function processes_of_machine()
+      processes_of_machine = neighbours
+   end function processes_of_machine
 
    !> Number of this process, from 0.
    pure integer function process_number()

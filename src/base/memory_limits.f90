@@ -31,17 +31,20 @@ contains
    end subroutine check_allocation
 
    !> An error if a task needs more memory than this process can get.
-   subroutine need_memory(bytes, task, error)
+   subroutine need_memory(bytes, task, error, processes)
       real(dp), intent(in) :: bytes
       character(*), intent(in) :: task              !! such as 'the run'
       type(error_type), allocatable, intent(out) :: error
+      integer, intent(in), optional :: processes    !! of this machine that need as much each; default 1
       character(:), allocatable :: what
-      real(dp) :: limit
+      real(dp) :: limit, needed
 
       limit = memory_limit(what)
-      if (bytes > limit) then
+      needed = bytes
+      if (present(processes)) needed = bytes*processes
+      if (needed > limit) then
          call fail(error, error_memory, 'not enough memory: '//task//' needs about '// &
-            memory_text(bytes)//', which is more than '//what//': '//memory_text(limit))
+            memory_text(needed)//', which is more than '//what//': '//memory_text(limit))
          return
       end if
       limit = address_space()

@@ -21,9 +21,10 @@ module case_memory
 
 contains
 
-   !> Memory of a run, bytes.
-   pure function memory_needed(case) result(bytes)
+   !> Memory of a run, or of one of the processes that share the rows of its fields, bytes.
+   pure function memory_needed(case, rows) result(bytes)
       type(case_type), intent(in) :: case
+      integer, intent(in), optional :: rows        !! of the process; default all
       real(dp) :: bytes
       real(dp) :: cells, fields
       logical :: slides
@@ -43,6 +44,7 @@ contains
       if (any(case%phases%steady)) &
          fields = fields + merge(130.0_dp, 32.0_dp, slides .and. case%friction%law /= 'none')
       cells = real(case%grid%nx, dp)*real(case%grid%ny, dp)
+      if (present(rows)) cells = real(case%grid%nx, dp)*real(rows, dp)
       bytes = 8.0_dp*(fields*cells + chunks*min(cells, chunk)) + program_itself
    end function memory_needed
 

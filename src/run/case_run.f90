@@ -18,9 +18,11 @@ module case_run
    use file_lock, only : file_lock_type
    use history_row, only : row_values
    use memory_limits, only : need_memory
-   use asperity_parallel, only : exchanged_bytes, is_first_process, process_count, set_threads, share
+   use asperity_parallel, only : exchanged_bytes, global_max, is_first_process, process_count, &
+      processes_of_machine, set_threads, share
    use path_identity, only : real_path
    use process_agreement, only : agree
+   use regular_grid, only : grid_type
    use asperity_precision, only : dp, int64
    use result_file, only : result_file_type, result_plan_type
    use result_names, only : sibling_path
@@ -81,8 +83,7 @@ contains
       if (is_first_process()) call take_place(self, restart, overwrite, error)
       call agree(error)
       if (allocated(error)) return
-      call need_memory(memory_needed(case), 'the run', error)
-      call agree(error)
+      call look_at_memory(case, error)
       if (allocated(error)) return
       call new_simulation(self%sim, case, error)
       call agree(error)
@@ -96,6 +97,19 @@ contains
       end if
       call collect_warnings(self)
    end subroutine open_run
+
+   !> See that every machine has the memory that its processes need. Collective.
+   subroutine look_at_memory(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      type(grid_type) :: grid
+
+      grid = case%grid
+      call grid%share_rows()
+      call need_memory(memory_needed(case, nint(global_max(real(grid%rows(), dp)))), 'the run', error, &
+         processes_of_machine())
+      call agree(error)
+   end subroutine look_at_memory
 
    !> See that the result can be written where the case wants it, that no other run writes it, and
    !> that nothing is lost by it.

@@ -9,9 +9,12 @@
 !> that only the end of a step changes are not copied, because the arms may have many. A row whose step
 !> is solved in parts needs them, too, once a part is committed: `keep_more` copies them if they take
 !> no more than `most_more`. Otherwise such a row can be given up in its first part only.
+!>
+!> Several processes give up a row together: a stop that any of them was asked for counts for all, and the
+!> row is given up as soon as the patience of one has ended.
 module row_stop
    use, intrinsic :: iso_c_binding, only : c_int
-   use asperity_parallel, only : global_max
+   use asperity_parallel, only : any_process, global_max
    use asperity_precision, only : dp, int64
    use row_state, only : state_type
    implicit none
@@ -91,7 +94,7 @@ contains
       if (allocated(self%kept) .and. .not. self%complete) deallocate (self%kept)
    end subroutine part_ends
 
-   !> Is the row in hand to be given up?
+   !> Is the row in hand to be given up? Collective.
    function is_due(self) result(due)
       class(row_stop_type), intent(inout) :: self
       logical :: due
@@ -99,10 +102,10 @@ contains
 
       due = .false.
       if (.not. allocated(self%kept)) return
-      if (self%asked() == 0_c_int) return
+      if (.not. any_process(self%asked() /= 0_c_int)) return
       call system_clock(now, rate)
       if (self%since < 0) self%since = now
-      due = real(now - self%since, dp) >= self%patience*real(rate, dp)
+      due = any_process(real(now - self%since, dp) >= self%patience*real(rate, dp))
    end function is_due
 
    !> Go back to the state at the start of the row.
