@@ -5,6 +5,7 @@
 !> step dt earlier a field was the same, moved back by V dt: S_old = rho S with rho = exp(i q.V dt), so
 !> that the first step in time has a step before it.
 module steady_memory
+   use asperity_parallel, only : global_sum
    use asperity_precision, only : dp
    use field_sums, only : row_totals
    use steady_losses, only : elastic_forms
@@ -55,10 +56,10 @@ contains
          complex(dp), allocatable :: table(:, :)
          integer :: i, j
 
-         allocate (table(0:operator%last, 0:operator%ny - 1), source=(0.0_dp, 0.0_dp))
+         allocate (table(operator%first:operator%last, 0:operator%ny - 1), source=(0.0_dp, 0.0_dp))
          !$omp parallel do default(none) shared(table, medium, dt, which, operator) private(i, j)
          do j = 0, operator%ny - 1
-            do i = 0, operator%nx/2
+            do i = operator%first, min(operator%last, operator%nx/2)
                table(i, j) = response(medium, dt, which, i, j)
             end do
          end do
@@ -105,22 +106,26 @@ contains
    subroutine book_memory(medium, dt, p, t, books)
       type(medium_type), intent(in) :: medium
       real(dp), intent(in) :: dt
-      complex(dp), intent(in) :: p(0:, 0:)             !! transform of the pressure, or of no extent
-      complex(dp), intent(in) :: t(0:, 0:, :)          !! of the traction, or of no extent
+      complex(dp), intent(in) :: p(0:, medium%grid%first_row - 1:)      !! transform of the pressure, or of no extent
+      complex(dp), intent(in) :: t(0:, medium%grid%first_row - 1:, :)   !! of the traction, or of no extent
       type(energy_books_type), intent(inout) :: books
       real(dp), allocatable :: rows(:, :), total(:)
-      real(dp) :: area
+      real(dp) :: area, mean(1)
       integer :: arms, j
 
       arms = size(medium%g)
-      allocate (rows(2 + 2*arms, 0:medium%grid%ny - 1))
+      allocate (rows(2 + 2*arms, medium%grid%first_row - 1:medium%grid%last_row - 1))
       !$omp parallel do default(none) shared(medium, dt, p, t, rows) private(j)
-      do j = 0, medium%grid%ny - 1
+      do j = medium%grid%first_row - 1, medium%grid%last_row - 1
          if (size(p) > 0) call row_products(medium, dt, j, rows(:, j), p=p(:, j))
          if (size(t) > 0) call row_products(medium, dt, j, rows(:, j), t=t(:, j, :))
       end do
       total = row_totals(rows)
-      if (size(t) > 0) total(1) = total(1) + medium%tangential%mean_mode*sum(abs(t(0, 0, :))**2) &
+      ! The mean mode is in the first row.
+      mean = 0.0_dp
+      if (size(t) > 0 .and. medium%grid%first_row == 1) mean = sum(abs(t(0, 0, :))**2)
+      mean = global_sum(mean)
+      if (mean(1) > 0.0_dp) total(1) = total(1) + medium%tangential%mean_mode*mean(1) &
          /medium%grid%cells()**2/medium%modulus**2
       area = medium%grid%area()
       call book_state(books, medium%modulus, medium%g, area*total(1), area*total(2), &

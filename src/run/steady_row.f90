@@ -95,7 +95,7 @@ contains
       state%block%fresh = .true.
       state%block%work = state%block%work + state%block%kinetic() - before
       !$omp parallel do default(none) shared(tangential, state, found) private(i, j, slope, star)
-      do j = 1, tangential%grid%ny
+      do j = 1, tangential%grid%rows()
          do i = 1, tangential%grid%nx
             state%traction(i, :, j) = found%traction(i, :, j)
             state%displacement(i, :, j) = found%displacement(i, :, j)

@@ -48,7 +48,7 @@ module steady_step
       real(dp) :: velocity(2) = 0.0_dp                 !! m/s
       real(dp), allocatable :: pressure(:, :)          !! Pa
       real(dp), allocatable :: gap(:, :)               !! m
-      real(dp), allocatable :: traction(:, :, :)       !! Pa [nx, 2, ny]; no extent without friction
+      real(dp), allocatable :: traction(:, :, :)       !! Pa [nx, 2, rows]; no extent without friction
    end type steady_start_type
 
    !> Solvers and the last states. Not to be copied.
@@ -71,6 +71,7 @@ module steady_step
       type(steady_operator_type), private :: operator
       type(steady_normal_type), private :: normal
       type(steady_friction_type), private :: coupled
+      !> Transforms of P and T; of each row of the grid the wave number along y of that number, less 1.
       complex(dp), allocatable, private :: p_modes(:, :), t_modes(:, :, :)
    contains
       procedure :: solve
@@ -88,16 +89,17 @@ contains
       type(case_type), intent(in) :: case
       real(dp), intent(in) :: rms_height               !! of the road about its mean, m
       type(error_type), allocatable, intent(out) :: error
-      integer :: nx, ny
+      integer :: nx, rows
 
       self%grid = case%grid
+      call self%grid%share_rows()
       nx = self%grid%nx
-      ny = self%grid%ny
+      rows = self%grid%rows()
       self%frictional = case%friction%law /= 'none'
       self%tolerance = case%solver%tolerance
       self%max_iterations = case%solver%max_iterations
       self%rms_height = rms_height
-      self%medium%grid = case%grid
+      self%medium%grid = self%grid
       self%medium%normal = normal_kernel(case%material)
       self%medium%tangential = tangential_kernel(case%material)
       self%medium%modulus = case%material%shear_modulus
@@ -106,10 +108,10 @@ contains
       call new_steady_operator(self%operator, self%grid, self%frictional, error)
       if (allocated(error)) return
       associate (c => self%contact)
-         allocate (c%pressure(nx, ny), c%gap(nx, ny), c%height(nx, ny), c%slope_x(nx, ny), &
-            c%slope_y(nx, ny), source=0.0_dp)
+         allocate (c%pressure(nx, rows), c%gap(nx, rows), c%height(nx, rows), c%slope_x(nx, rows), &
+            c%slope_y(nx, rows), source=0.0_dp)
          if (self%frictional) then
-            allocate (c%traction(nx, 2, ny), c%displacement(nx, 2, ny), c%slip(nx, 2, ny), source=0.0_dp)
+            allocate (c%traction(nx, 2, rows), c%displacement(nx, 2, rows), c%slip(nx, 2, rows), source=0.0_dp)
          else
             allocate (c%traction(nx, 2, 0), c%displacement(nx, 2, 0), c%slip(nx, 2, 0))
          end if
@@ -149,7 +151,7 @@ contains
 
       self%medium%velocity = [plan%velocity_x, plan%velocity_y]
       self%medium%dt = self%scheme_dt
-      call new_steady_symbols(symbols, self%medium, self%operator%last, self%frictional)
+      call new_steady_symbols(symbols, self%medium, self%operator%first, self%operator%last, self%frictional)
       call self%operator%set_symbols(symbols)
       problem%modulus = self%medium%modulus
       problem%target = plan%load
@@ -201,7 +203,7 @@ contains
       part = onward(self, problem%target)
       associate (c => self%contact, a => self%last, b => self%before)
          scale = field_sum(a%pressure)/max(field_sum(a%gap), tiny(1.0_dp))
-         do j = 1, self%grid%ny
+         do j = 1, self%grid%rows()
             ! Pressure and gap are one quantity on both sides of zero.
             c%pressure(:, j) = a%pressure(:, j) - scale*a%gap(:, j)
             if (part > 0.0_dp .or. part < 0.0_dp) c%pressure(:, j) = c%pressure(:, j) &
@@ -259,12 +261,11 @@ contains
       type(steady_step_type), intent(inout) :: self
       real(dp), allocatable :: rows(:, :)
       real(dp) :: direction(2), speed, area, sums(4)
-      integer :: j, last
+      integer :: j
 
-      last = self%operator%last
       if (.not. allocated(self%p_modes)) then
-         allocate (self%p_modes(0:last, 0:self%grid%ny - 1))
-         allocate (self%t_modes(0:last, 0:self%grid%ny - 1, merge(2, 0, self%frictional)))
+         allocate (self%p_modes(0:self%grid%nx/2, self%grid%rows()))
+         allocate (self%t_modes(0:self%grid%nx/2, self%grid%rows(), merge(2, 0, self%frictional)))
       end if
       call self%operator%spectrum(self%contact%pressure, self%p_modes)
       do j = 1, size(self%t_modes, 3)
@@ -272,9 +273,9 @@ contains
       end do
       call sum_losses(self%medium, self%p_modes, self%t_modes, self%losses)
 
-      allocate (rows(4, self%grid%ny))
+      allocate (rows(4, self%grid%rows()))
       !$omp parallel do default(none) shared(self, rows) private(j)
-      do j = 1, self%grid%ny
+      do j = 1, self%grid%rows()
          call row_forces(self, j, rows(:, j))
       end do
       sums = row_totals(rows)/self%grid%cells()

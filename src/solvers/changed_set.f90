@@ -9,10 +9,16 @@
 !> p0 = 0 on L, K p = h + level on J and the load are a small system for r, p_j and the level. Its
 !> columns K^-1 e_b and K^-1 k_j are kept, so a cell costs one pair of triangular solves.
 !>
+!> Where processes share the rows, each has its rows of the fields, and all solve the same systems: cells
+!> are known by their place in the whole grid and are listed in the order of its rows, and what the systems
+!> need of the displacement is added up from the processes that have it.
+!>
 !> Memory: the matrix, and a column for each cell that has changed.
 module changed_set
-   use dense_factors, only : factor, solve_factors
+   use asperity_parallel, only : gather_rows, global_sum
    use asperity_precision, only : dp
+   use dense_factors, only : factor, solve_factors
+   use regular_grid, only : grid_type
    use steady_operator, only : steady_operator_type
    implicit none
    private
@@ -23,13 +29,19 @@ module changed_set
    type :: changed_set_type
       integer :: factors = 0                           !! factorings so far
       integer, private :: threads = 1
+      type(grid_type), private :: grid
       real(dp), private :: load = 0.0_dp               !! sum of P over the cells, Pa
+      ! Fields of the rows of this process:
       real(dp), allocatable, private :: kernel(:, :)   !! displacement by the first cell's unit pressure
       real(dp), allocatable, private :: height(:, :)   !! m
       logical, allocatable, private :: inside(:, :)    !! the set C
       integer, allocatable, private :: number(:, :)    !! of a cell in C0; minus that of a joined one
-      integer, allocatable, private :: cells(:, :)     !! C0, [2, n]
+      ! Lists and systems, the same on all processes:
+      integer, allocatable, private :: cells(:, :)     !! C0, column and row of the grid [2, n]
       integer, allocatable, private :: changed(:, :)   !! cells of L and J, [2, k]; some may be neither now
+      integer, allocatable, private :: origin(:)       !! their number in C0; 0 where they were not in it
+      logical, allocatable, private :: held(:)         !! they are in C now
+      real(dp), allocatable, private :: right(:)       !! their height, m
       real(dp), allocatable, private :: matrix(:, :)   !! factors
       real(dp), allocatable, private :: base(:, :)     !! K^-1 h, K^-1 1
       real(dp), allocatable, private :: columns(:, :)  !! of the changed cells
@@ -56,11 +68,12 @@ contains
       allocate (self%kernel, mold=height)
       allocate (self%height, source=height)
       allocate (self%inside, source=inside)
-      allocate (self%number(size(height, 1), size(height, 2)))
+      allocate (self%number(size(height, 1), size(height, 2)), source=0)
+      self%grid = operator%grid
       self%load = load
       self%threads = operator%threads
       work = 0.0_dp
-      work(1, 1) = 1.0_dp
+      if (has_row(self, 1)) work(1, 1) = 1.0_dp
       call operator%displace(work, self%kernel)
       call self%refresh()
    end subroutine new_changed_set
@@ -68,50 +81,95 @@ contains
    !> Factor the matrix of the set as it is.
    subroutine refresh(self)
       class(changed_set_type), intent(inout) :: self
-      integer :: a, b, i, j, n, room
+      real(dp), allocatable :: listed(:, :)
+      integer :: a, b, n, room
 
-      n = count(self%inside)
-      if (allocated(self%cells)) deallocate (self%cells, self%matrix, self%base, self%changed, self%columns)
+      call list_cells(self, self%inside, listed)
+      n = size(listed, 2)
+      if (allocated(self%cells)) deallocate (self%cells, self%matrix, self%base, self%changed, self%columns, &
+         self%origin, self%held, self%right)
       room = max(48, n/4)
       allocate (self%cells(2, n), self%matrix(n, n), self%base(n, 2), self%changed(2, room), &
-         self%columns(n, room))
+         self%columns(n, room), self%origin(room), self%held(room), self%right(room))
       self%used = 0
       self%factors = self%factors + 1
       self%number = 0
-      n = 0
-      do j = 1, size(self%inside, 2)
-         do i = 1, size(self%inside, 1)
-            if (.not. self%inside(i, j)) cycle
-            n = n + 1
-            self%cells(:, n) = [i, j]
-            self%number(i, j) = n
-         end do
+      self%cells(:, :) = nint(listed(1:2, :))
+      do a = 1, n
+         call set_number(self, self%cells(:, a), a)
       end do
       !$omp parallel do default(none) shared(self, n) private(a, b) num_threads(self%threads)
       do b = 1, n
          do a = 1, n
-            self%matrix(a, b) = entry_of(self, self%cells(:, a), self%cells(:, b))
+            self%matrix(a, b) = entry_here(self, self%cells(:, a), self%cells(:, b))
          end do
       end do
+      if (self%grid%shared) then
+         do b = 1, n
+            self%matrix(:, b) = global_sum(self%matrix(:, b))
+         end do
+      end if
       call factor(self%matrix, self%threads)
-      do a = 1, n
-         self%base(a, 1) = self%height(self%cells(1, a), self%cells(2, a))
-      end do
+      self%base(:, 1) = listed(4, :)
       self%base(:, 2) = 1.0_dp
       call solve_factors(self%matrix, self%base(:, 1))
       call solve_factors(self%matrix, self%base(:, 2))
    end subroutine refresh
 
-   !> Displacement at one cell by the pressure of another.
-   pure function entry_of(self, at, by) result(displacement)
+   !> The cells for which a condition holds, of all processes in the order of the rows of the grid.
+   subroutine list_cells(self, condition, listed)
+      type(changed_set_type), intent(in) :: self
+      logical, intent(in) :: condition(:, :)           !! [nx, rows]
+      real(dp), allocatable, intent(out) :: listed(:, :)   !! column, row of the grid, number, height [4, n]
+      real(dp), allocatable :: here(:, :)
+      integer :: i, j, n
+
+      allocate (here(4, count(condition)))
+      n = 0
+      do j = 1, size(condition, 2)
+         do i = 1, size(condition, 1)
+            if (.not. condition(i, j)) cycle
+            n = n + 1
+            here(:, n) = [real(i, dp), real(self%grid%first_row - 1 + j, dp), real(self%number(i, j), dp), &
+               self%height(i, j)]
+         end do
+      end do
+      if (self%grid%shared) then
+         listed = gather_rows(here)
+      else
+         call move_alloc(here, listed)
+      end if
+   end subroutine list_cells
+
+   !> Does this process have a row of the grid?
+   pure function has_row(self, row) result(yes)
+      type(changed_set_type), intent(in) :: self
+      integer, intent(in) :: row
+      logical :: yes
+
+      yes = row >= self%grid%first_row .and. row <= self%grid%last_row
+   end function has_row
+
+   !> Note the number of a cell on the process that has it.
+   pure subroutine set_number(self, cell, number)
+      type(changed_set_type), intent(inout) :: self
+      integer, intent(in) :: cell(2)
+      integer, intent(in) :: number
+
+      if (has_row(self, cell(2))) self%number(cell(1), cell(2) - self%grid%first_row + 1) = number
+   end subroutine set_number
+
+   !> Displacement at one cell by the pressure of another: only one process knows it, all others get zero.
+   pure function entry_here(self, at, by) result(displacement)
       type(changed_set_type), intent(in) :: self
       integer, intent(in) :: at(2), by(2)
       real(dp) :: displacement
       integer :: d(2)
 
-      d = modulo(at - by, shape(self%kernel))
-      displacement = self%kernel(d(1) + 1, d(2) + 1)
-   end function entry_of
+      d = modulo(at - by, [self%grid%nx, self%grid%ny]) + 1
+      displacement = 0.0_dp
+      if (has_row(self, d(2))) displacement = self%kernel(d(1), d(2) - self%grid%first_row + 1)
+   end function entry_here
 
    !> Have more cells changed than there are columns for?
    pure function crowded(self) result(full)
@@ -126,17 +184,8 @@ contains
       class(changed_set_type), intent(inout) :: self
       logical, intent(in) :: leaving(:, :)
       integer, intent(out) :: cells                    !! how many there were
-      integer :: i, j
 
-      cells = 0
-      do j = 1, size(leaving, 2)
-         do i = 1, size(leaving, 1)
-            if (.not. (leaving(i, j) .and. self%inside(i, j))) cycle
-            cells = cells + 1
-            self%inside(i, j) = .false.
-            if (self%number(i, j) > 0) call add_column(self, i, j)
-         end do
-      end do
+      call change_cells(self, leaving .and. self%inside, .false., cells)
    end subroutine leave
 
    !> Take cells into the set.
@@ -144,40 +193,59 @@ contains
       class(changed_set_type), intent(inout) :: self
       logical, intent(in) :: joining(:, :)
       integer, intent(out) :: cells                    !! how many there were
-      integer :: i, j
 
-      cells = 0
-      do j = 1, size(joining, 2)
-         do i = 1, size(joining, 1)
-            if (.not. joining(i, j) .or. self%inside(i, j)) cycle
-            cells = cells + 1
-            self%inside(i, j) = .true.
-            if (self%number(i, j) <= 0) call add_column(self, i, j)
-         end do
-      end do
+      call change_cells(self, joining .and. .not. self%inside, .true., cells)
    end subroutine join
 
-   !> The column of a cell that changes for the first time; without room the next `refresh` sees it.
-   subroutine add_column(self, i, j)
+   !> Take cells into the set, or out of it. Those that differ from C0 for the first time get a column.
+   subroutine change_cells(self, condition, joins, cells)
       type(changed_set_type), intent(inout) :: self
-      integer, intent(in) :: i, j
+      logical, intent(in) :: condition(:, :)
+      logical, intent(in) :: joins
+      integer, intent(out) :: cells
+      real(dp), allocatable :: listed(:, :)
+      integer :: cell(2), k, m, origin
+
+      call list_cells(self, condition, listed)
+      cells = size(listed, 2)
+      do m = 1, cells
+         cell = nint(listed(1:2, m))
+         origin = max(nint(listed(3, m)), 0)
+         if (has_row(self, cell(2))) self%inside(cell(1), cell(2) - self%grid%first_row + 1) = joins
+         do k = self%used, 1, -1
+            if (all(self%changed(:, k) == cell)) exit
+         end do
+         if (k == 0 .and. (origin > 0 .neqv. joins) .and. .not. self%crowded()) then
+            call add_column(self, cell, origin, listed(4, m))
+            k = self%used
+         end if
+         if (k > 0) self%held(k) = joins
+      end do
+   end subroutine change_cells
+
+   !> The column of a cell that changes for the first time. Where there is no room the caller does without,
+   !> and the next `refresh` sees the cell.
+   subroutine add_column(self, cell, origin, height)
+      type(changed_set_type), intent(inout) :: self
+      integer, intent(in) :: cell(2)
+      integer, intent(in) :: origin                    !! its number in C0, or 0
+      real(dp), intent(in) :: height                   !! m
       integer :: a, n
 
-      do a = 1, self%used
-         if (all(self%changed(:, a) == [i, j])) return
-      end do
-      if (self%crowded()) return
       self%used = self%used + 1
       n = self%used
-      self%changed(:, n) = [i, j]
-      if (self%number(i, j) > 0) then
+      self%changed(:, n) = cell
+      self%origin(n) = origin
+      self%right(n) = height
+      if (origin > 0) then
          self%columns(:, n) = 0.0_dp
-         self%columns(self%number(i, j), n) = 1.0_dp
+         self%columns(origin, n) = 1.0_dp
       else
-         self%number(i, j) = -n
+         call set_number(self, cell, -n)
          do a = 1, size(self%cells, 2)
-            self%columns(a, n) = -entry_of(self, self%cells(:, a), [i, j])
+            self%columns(a, n) = -entry_here(self, self%cells(:, a), cell)
          end do
+         if (self%grid%shared) self%columns(:, n) = global_sum(self%columns(:, n))
       end if
       call solve_factors(self%matrix, self%columns(:, n))
    end subroutine add_column
@@ -203,7 +271,7 @@ contains
          call row_of(self, active, a, system(a, :), x(a))
       end do
       do a = 1, k
-         system(k + 1, a) = sum(self%columns(:, active(a))) + merge(0.0_dp, 1.0_dp, in_base(self, active(a)))
+         system(k + 1, a) = sum(self%columns(:, active(a))) + merge(0.0_dp, 1.0_dp, self%origin(active(a)) > 0)
       end do
       system(k + 1, k + 1) = sum(self%base(:, 2))
       x(k + 1) = self%load - sum(self%base(:, 1))
@@ -218,16 +286,25 @@ contains
       solved = all(abs(p) < huge(1.0_dp))
       pressure = 0.0_dp
       do a = 1, n
-         associate (i => self%cells(1, a), j => self%cells(2, a))
-            if (self%inside(i, j)) pressure(i, j) = p(a)
-         end associate
+         call set_pressure(self, self%cells(:, a), p(a), pressure)
       end do
       do a = 1, k
-         associate (cell => self%changed(:, active(a)))
-            if (self%inside(cell(1), cell(2))) pressure(cell(1), cell(2)) = x(a)
-         end associate
+         call set_pressure(self, self%changed(:, active(a)), x(a), pressure)
       end do
    end subroutine solve
+
+   !> The pressure of a cell that is in the set, on the process that has it.
+   pure subroutine set_pressure(self, cell, value, pressure)
+      type(changed_set_type), intent(in) :: self
+      integer, intent(in) :: cell(2)
+      real(dp), intent(in) :: value
+      real(dp), intent(inout) :: pressure(:, :)
+
+      if (.not. has_row(self, cell(2))) return
+      associate (i => cell(1), j => cell(2) - self%grid%first_row + 1)
+         if (self%inside(i, j)) pressure(i, j) = value
+      end associate
+   end subroutine set_pressure
 
    !> Does a changed cell differ from the set at the start?
    pure function is_active(self, k) result(active)
@@ -235,45 +312,41 @@ contains
       integer, intent(in) :: k
       logical :: active
 
-      active = self%inside(self%changed(1, k), self%changed(2, k)) .neqv. in_base(self, k)
+      active = self%held(k) .neqv. self%origin(k) > 0
    end function is_active
 
-   !> Is a changed cell one of the set at the start?
-   pure function in_base(self, k) result(is)
-      type(changed_set_type), intent(in) :: self
-      integer, intent(in) :: k
-      logical :: is
-
-      is = self%number(self%changed(1, k), self%changed(2, k)) > 0
-   end function in_base
-
    !> The condition of a changed cell: no pressure where it has left, no gap where it has joined.
-   pure subroutine row_of(self, active, a, row, right)
+   subroutine row_of(self, active, a, row, right)
       type(changed_set_type), intent(in) :: self
       integer, intent(in) :: active(:)
       integer, intent(in) :: a
       real(dp), intent(out) :: row(:)                  !! for r or p of the changed cells, and the level
       real(dp), intent(out) :: right
-      real(dp) :: reach(size(self%cells, 2))
-      integer :: b, n
+      real(dp), allocatable :: reach(:)                !! displacement by the cells of C0, then by the active ones
+      integer :: b, n, origin
 
+      n = size(self%cells, 2)
       associate (cell => self%changed(:, active(a)))
-         if (in_base(self, active(a))) then
-            n = self%number(cell(1), cell(2))
-            row = [self%columns(n, active), self%base(n, 2)]
-            right = -self%base(n, 1)
+         origin = self%origin(active(a))
+         if (origin > 0) then
+            row = [self%columns(origin, active), self%base(origin, 2)]
+            right = -self%base(origin, 1)
             return
          end if
-         do b = 1, size(self%cells, 2)
-            reach(b) = entry_of(self, cell, self%cells(:, b))
+         allocate (reach(n + size(active)))
+         do b = 1, n
+            reach(b) = entry_here(self, cell, self%cells(:, b))
          end do
          do b = 1, size(active)
-            row(b) = dot_product(reach, self%columns(:, active(b)))
-            if (.not. in_base(self, active(b))) &
-               row(b) = row(b) + entry_of(self, cell, self%changed(:, active(b)))
+            reach(n + b) = entry_here(self, cell, self%changed(:, active(b)))
          end do
-         row(size(row)) = dot_product(reach, self%base(:, 2)) - 1.0_dp
-         right = self%height(cell(1), cell(2)) - dot_product(reach, self%base(:, 1))
+         if (self%grid%shared) reach = global_sum(reach)
+         do b = 1, size(active)
+            row(b) = dot_product(reach(:n), self%columns(:, active(b)))
+            if (self%origin(active(b)) == 0) row(b) = row(b) + reach(n + b)
+         end do
+         row(size(row)) = dot_product(reach(:n), self%base(:, 2)) - 1.0_dp
+         right = self%right(active(a)) - dot_product(reach(:n), self%base(:, 1))
       end associate
    end subroutine row_of
 

@@ -29,12 +29,12 @@ contains
    subroutine bound_tractions(law, c, pressure, slope_x, slope_y, start, slip, traction)
       type(friction_law_type), intent(in) :: law
       real(dp), intent(in) :: c                        !! c_t, Pa
-      real(dp), intent(in) :: pressure(:, :)           !! [nx, ny], Pa
+      real(dp), intent(in) :: pressure(:, :)           !! [nx, rows], Pa
       real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)
-      !> [nx, 2, ny] traction over the pressure; over the strength where the law is a constant shear
+      !> [nx, 2, rows] traction over the pressure; over the strength where the law is a constant shear
       real(dp), intent(in) :: start(:, :, :)
-      real(dp), intent(in) :: slip(:, :, :)            !! r, [nx, 2, ny]
-      real(dp), intent(inout) :: traction(:, :, :)     !! [nx, 2, ny], Pa
+      real(dp), intent(in) :: slip(:, :, :)            !! r, [nx, 2, rows]
+      real(dp), intent(inout) :: traction(:, :, :)     !! [nx, 2, rows], Pa
       real(dp) :: slope(2), scale
       integer :: i, j
 

@@ -16,8 +16,8 @@ module steady_contact
       real(dp), allocatable :: gap(:, :)               !! m
       real(dp), allocatable :: height(:, :)            !! H of the road at x + u, m
       real(dp), allocatable :: slope_x(:, :), slope_y(:, :)   !! grad H there
-      real(dp), allocatable :: traction(:, :, :)       !! T, Pa [nx, 2, ny]
-      real(dp), allocatable :: displacement(:, :, :)   !! A_T T without its mean mode, m [nx, 2, ny]
+      real(dp), allocatable :: traction(:, :, :)       !! T, Pa [nx, 2, rows]
+      real(dp), allocatable :: displacement(:, :, :)   !! A_T T without its mean mode, m [nx, 2, rows]
       real(dp), allocatable :: slip(:, :, :)           !! r, the slip speed over the road's speed
       real(dp) :: level = 0.0_dp                       !! U - H where the gap is zero, m
       real(dp) :: offset(2) = 0.0_dp                   !! mean displacement of the contact, m

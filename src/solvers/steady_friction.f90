@@ -67,11 +67,11 @@ module steady_friction
       real(dp) :: direction(2) = 0.0_dp                !! e
       real(dp) :: base(2) = 0.0_dp                     !! displacement of the road, m
       real(dp) :: c = 0.0_dp                           !! c_t, Pa
-      real(dp), allocatable, private :: state(:, :, :)     !! z, u, r [nx, 5, ny]
+      real(dp), allocatable, private :: state(:, :, :)     !! z, u, r [nx, 5, rows]
       real(dp), allocatable, private :: residual(:, :, :)
-      real(dp), allocatable, private :: best(:, :, :)      !! P and T of the least error, Pa [nx, 3, ny]
-      real(dp), allocatable, private :: ratio(:, :, :)     !! T/P [nx, 2, ny]
-      real(dp), allocatable, private :: place(:, :, :)     !! u+, m [nx, 2, ny]
+      real(dp), allocatable, private :: best(:, :, :)      !! P and T of the least error, Pa [nx, 3, rows]
+      real(dp), allocatable, private :: ratio(:, :, :)     !! T/P [nx, 2, rows]
+      real(dp), allocatable, private :: place(:, :, :)     !! u+, m [nx, 2, rows]
       type(anderson_type), private :: memory
    contains
       procedure :: solve
@@ -84,14 +84,15 @@ contains
       type(steady_friction_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
       type(friction_law_type), intent(in) :: law
+      integer :: rows
 
       self%grid = grid
       self%law = law
       call new_steady_normal(self%normal, grid)
-      allocate (self%state(grid%nx, components, grid%ny), self%residual(grid%nx, components, grid%ny), &
-         self%best(grid%nx, 3, grid%ny), self%ratio(grid%nx, 2, grid%ny), &
-         self%place(grid%nx, 2, grid%ny), source=0.0_dp)
-      call new_anderson(self%memory, grid%nx, components, grid%ny, pairs)
+      rows = grid%rows()
+      allocate (self%state(grid%nx, components, rows), self%residual(grid%nx, components, rows), &
+         self%best(grid%nx, 3, rows), self%ratio(grid%nx, 2, rows), self%place(grid%nx, 2, rows), source=0.0_dp)
+      call new_anderson(self%memory, grid%nx, components, rows, pairs)
    end subroutine new_steady_friction
 
    !> Solve for the steady state over a road. Not converging is an outcome.
@@ -204,7 +205,7 @@ contains
       contact%offset = contact_mean(contact)
       do c = 1, 2
          !$omp parallel do default(none) shared(self, contact, pace, c) private(j)
-         do j = 1, self%grid%ny
+         do j = 1, self%grid%rows()
             self%residual(:, 1 + c, j) = pace%beta*(contact%displacement(:, c, j) - contact%offset(c) &
                - self%state(:, 1 + c, j))
             self%residual(:, 3 + c, j) = pace%beta*(self%direction(c) + contact%slip(:, c, j) &
@@ -270,8 +271,8 @@ contains
       real(dp) :: sums(2)
       integer :: j
 
-      allocate (rows(2, self%grid%ny))
-      do j = 1, self%grid%ny
+      allocate (rows(2, self%grid%rows()))
+      do j = 1, self%grid%rows()
          rows(1, j) = sum(self%residual(:, 2:3, j)**2)
          rows(2, j) = sum((self%state(:, 2:3, j) + self%residual(:, 2:3, j)/beta)**2)
       end do
@@ -331,8 +332,8 @@ contains
       real(dp), allocatable :: rows(:)
       integer :: j
 
-      allocate (rows(self%grid%ny))
-      do j = 1, self%grid%ny
+      allocate (rows(self%grid%rows()))
+      do j = 1, self%grid%rows()
          rows(j) = sum(self%state(:, 2:3, j)**2)
       end do
       length = sqrt(row_total(rows))
@@ -384,8 +385,8 @@ contains
       allocate (again, mold=contact%traction)
       call bound_tractions(self%law, self%c, contact%pressure, contact%slope_x, contact%slope_y, &
          self%ratio, contact%slip, again)
-      allocate (rows(2, self%grid%ny))
-      do j = 1, self%grid%ny
+      allocate (rows(2, self%grid%rows()))
+      do j = 1, self%grid%rows()
          rows(1, j) = sum((again(:, :, j) - contact%traction(:, :, j))**2)
          rows(2, j) = sum(contact%traction(:, :, j)**2)
       end do

@@ -85,20 +85,21 @@ contains
       forms = forms*mode_weight(medium%grid, i)/medium%grid%cells()**2
    end function elastic_forms
 
-   !> The losses of a state from the transforms of its pressure and traction.
+   !> The losses of a state from the transforms of its pressure and traction. Processes share the wave
+   !> numbers along y like the rows of the grid.
    subroutine sum_losses(medium, p, t, losses)
       type(medium_type), intent(in) :: medium
-      complex(dp), intent(in) :: p(0:, 0:)             !! (0:last, 0:ny-1)
-      complex(dp), intent(in) :: t(0:, 0:, :)          !! (0:last, 0:ny-1, 2), or of no extent
+      complex(dp), intent(in) :: p(0:, medium%grid%first_row - 1:)      !! (0:nx/2, 0:ny-1)
+      complex(dp), intent(in) :: t(0:, medium%grid%first_row - 1:, :)   !! (0:nx/2, 0:ny-1, 2), or of no extent
       type(steady_losses_type), intent(out) :: losses
       real(dp), allocatable :: rows(:, :), total(:)
       integer :: arms, j, octaves
 
       arms = size(medium%g)
       octaves = count_octaves(medium%grid)
-      allocate (rows(2 + octaves + arms, 0:medium%grid%ny - 1))
+      allocate (rows(2 + octaves + arms, medium%grid%first_row - 1:medium%grid%last_row - 1))
       !$omp parallel do default(none) shared(medium, p, t, rows, octaves) private(j)
-      do j = 0, medium%grid%ny - 1
+      do j = medium%grid%first_row - 1, medium%grid%last_row - 1
          if (size(t) > 0) then
             call row_losses(medium, j, octaves, p(:, j), rows(:, j), t(:, j, :))
          else

@@ -79,11 +79,13 @@ contains
    subroutine new_steady_normal(self, grid)
       type(steady_normal_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
+      integer :: rows
 
       self%grid = grid
-      allocate (self%z(grid%nx, grid%ny), self%pressure(grid%nx, grid%ny), &
-         self%residual(grid%nx, grid%ny), self%best(grid%nx, grid%ny), source=0.0_dp)
-      call new_anderson(self%memory, grid%nx, 1, grid%ny, pairs)
+      rows = grid%rows()
+      allocate (self%z(grid%nx, rows), self%pressure(grid%nx, rows), self%residual(grid%nx, rows), &
+         self%best(grid%nx, rows), source=0.0_dp)
+      call new_anderson(self%memory, grid%nx, 1, rows, pairs)
    end subroutine new_steady_normal
 
    !> Solve under a road. Not converging is an outcome: the best state is handed out.
@@ -267,13 +269,13 @@ contains
       call project_simplex(self%pressure, task%target*self%grid%cells())
       !$omp parallel do default(none) shared(self, height, mean, z) private(j) &
       !$omp num_threads(operator%threads)
-      do j = 1, self%grid%ny
+      do j = 1, self%grid%rows()
          self%residual(:, j) = 2.0_dp*self%pressure(:, j) - z(:, j) + self%c*(height(:, j) - mean)
       end do
       call operator%resolve(self%residual, self%residual)
-      allocate (rows(sums_count + 1, self%grid%ny))
+      allocate (rows(sums_count + 1, self%grid%rows()))
       !$omp parallel do default(none) shared(self, z, rows) private(j) num_threads(operator%threads)
-      do j = 1, self%grid%ny
+      do j = 1, self%grid%rows()
          call measure_row(self%c, self%pressure(:, j), z(:, j), self%residual(:, j), rows(:, j))
       end do
       sums = row_totals(rows(:sums_count, :))

@@ -6,6 +6,8 @@
 !> * `shear`: U_T and dU_T/ds from T, six transforms.
 !> * `spectrum`: the transform of a field, for losses; `apply_table`: any other symbol.
 !>
+!> Where processes share the rows, each has the symbols only of the columns that it transforms.
+!>
 !> Memory: one field for the spectrum of the normal side and four for that of the tangential one; the
 !> symbols take one field, and six more with friction; the resolvent one.
 module steady_operator
@@ -37,17 +39,13 @@ module steady_operator
       procedure :: multiply => multiply_pair
    end type pair_type
 
-   !> Keeps the modes as they are.
-   type, extends(multiplier_type) :: keeper_type
-      complex(dp), pointer, contiguous :: table(:, :) => null()
-   contains
-      procedure :: multiply => keep_modes
-   end type keeper_type
-
    !> The operators of one grid; the symbols change with the velocity. Not to be copied.
    type :: steady_operator_type
-      integer :: nx = 0, ny = 0
-      integer :: last = 0                              !! last wave number along x of the tables
+      type(grid_type) :: grid
+      integer :: nx = 0, ny = 0                        !! cells of the whole grid
+      integer :: rows = 0                              !! rows of this process
+      integer :: first = 0                             !! first and ...
+      integer :: last = 0                              !! ... last wave number along x of the tables
       integer :: threads = 1
       logical :: frictional = .false.
       real(dp) :: longest = 0.0_dp                     !! largest |K|, m/Pa
@@ -79,14 +77,19 @@ contains
       logical, intent(in) :: frictional
       type(error_type), allocatable, intent(out) :: error
       type(transform_shape_type) :: vector
+      integer :: columns(2)
 
+      self%grid = grid
       self%nx = grid%nx
       self%ny = grid%ny
+      self%rows = grid%rows()
       self%frictional = frictional
       self%threads = merge(1, thread_count(), grid%nx*grid%ny < small)
       call new_row_column(self%scalar, shape_on_grid(grid, 1), self%threads, error)
       if (allocated(error)) return
-      self%last = self%scalar%longest
+      columns = self%scalar%own_columns()
+      self%first = columns(1)
+      self%last = columns(2)
       if (.not. frictional) return
       vector = shape_on_grid(grid, 4)
       vector%inputs = 2
@@ -101,11 +104,13 @@ contains
 
       factor = 1.0_dp/(real(self%nx, dp)*self%ny)
       if (.not. allocated(self%symbol)) then
-         allocate (self%symbol(0:self%last, 0:self%ny - 1))
-         allocate (self%normal%table, self%inverse%table, self%resolvent%table, mold=self%symbol)
+         allocate (self%symbol(self%first:self%last, 0:self%ny - 1))
+         allocate (self%normal%table(self%first:self%last, 0:self%ny - 1))
+         allocate (self%inverse%table(self%first:self%last, 0:self%ny - 1))
+         allocate (self%resolvent%table(self%first:self%last, 0:self%ny - 1))
          if (self%frictional) then
-            allocate (self%tangential%first(3, 0:self%last, 0:self%ny - 1))
-            allocate (self%tangential%second, mold=self%tangential%first)
+            allocate (self%tangential%first(3, self%first:self%last, 0:self%ny - 1))
+            allocate (self%tangential%second(3, self%first:self%last, 0:self%ny - 1))
          end if
       end if
       self%longest = symbols%longest
@@ -134,7 +139,7 @@ contains
       factor = 1.0_dp/(real(self%nx, dp)*self%ny)
       !$omp parallel do default(none) shared(self, c, factor) private(i, j) num_threads(self%threads)
       do j = 0, self%ny - 1
-         do i = 0, self%last
+         do i = self%first, self%last
             self%resolvent%table(i, j) = factor/(1.0_dp + c*self%symbol(i, j))
          end do
       end do
@@ -143,7 +148,7 @@ contains
    !> U_z = K P.
    subroutine displace(self, pressure, displacement)
       class(steady_operator_type), intent(inout) :: self
-      real(dp), intent(in) :: pressure(:, :)           !! [nx, ny], Pa
+      real(dp), intent(in) :: pressure(:, :)           !! [nx, rows], Pa
       real(dp), intent(inout) :: displacement(:, :)    !! m; may not be the pressure
 
       call pass_through(self, self%normal, pressure, displacement)
@@ -170,27 +175,34 @@ contains
    !> y of x by any symbol, given without the factor of the transform.
    subroutine apply_table(self, table, x, y)
       class(steady_operator_type), intent(inout) :: self
-      complex(dp), intent(in) :: table(0:, 0:)         !! (0:last, 0:ny-1)
+      complex(dp), intent(in) :: table(self%first:, 0:)   !! (first:last, 0:ny-1)
       real(dp), intent(in) :: x(:, :)
       real(dp), intent(inout) :: y(:, :)               !! may be x
       type(scalar_type) :: multiplier
 
-      allocate (multiplier%table(0:self%last, 0:self%ny - 1))
+      allocate (multiplier%table(self%first:self%last, 0:self%ny - 1))
       multiplier%table(:, :) = table/(real(self%nx, dp)*self%ny)
       call pass_through(self, multiplier, x, y)
    end subroutine apply_table
 
-   !> The modes of a field, sum f exp(-i q.x) over the cells.
+   !> The modes of a field, sum f exp(-i q.x) over the cells. Processes share the wave numbers along y like
+   !> the rows of the grid, so that sums over modes are formed like sums over cells.
    subroutine spectrum(self, field, modes)
       class(steady_operator_type), intent(inout) :: self
-      real(dp), intent(in) :: field(:, :)
-      complex(dp), intent(inout), target, contiguous :: modes(0:, 0:)   !! (0:last, 0:ny-1)
-      type(keeper_type) :: keeper
-      real(dp), allocatable :: unused(:, :)
+      real(dp), intent(in) :: field(:, :)              !! [nx, rows]
+      complex(dp), intent(inout) :: modes(0:, :)       !! (0:nx/2, rows): the wave numbers along x and y
+      integer :: j
 
-      keeper%table(0:, 0:) => modes
-      allocate (unused(self%nx, self%ny))
-      call pass_through(self, keeper, field, unused)
+      !$omp parallel do default(none) shared(self, field) private(j) num_threads(self%threads)
+      do j = 1, self%rows
+         call self%scalar%forward_row(1, j, field(:, j))
+      end do
+      call self%scalar%columns_forward()
+      !$omp parallel do default(none) shared(self, modes) private(j) num_threads(self%threads)
+      do j = 1, self%rows
+         call self%scalar%row_modes(1, j, modes(:, j))
+      end do
+      self%ffts = self%ffts + 1
    end subroutine spectrum
 
    !> One field through a multiplier.
@@ -202,12 +214,12 @@ contains
       integer :: j
 
       !$omp parallel do default(none) shared(self, x) private(j) num_threads(self%threads)
-      do j = 1, self%ny
+      do j = 1, self%rows
          call self%scalar%forward_row(1, j, x(:, j))
       end do
       call self%scalar%columns_through(multiplier)
       !$omp parallel do default(none) shared(self, y) private(j) num_threads(self%threads)
-      do j = 1, self%ny
+      do j = 1, self%rows
          call self%scalar%backward_row(1, j, y(:, j))
       end do
       self%ffts = self%ffts + 2
@@ -216,20 +228,20 @@ contains
    !> U_T = A_T T and its derivative along the motion.
    subroutine shear(self, traction, displacement, stretch)
       class(steady_operator_type), intent(inout) :: self
-      real(dp), intent(in) :: traction(:, :, :)            !! [nx, 2, ny], Pa
-      real(dp), intent(inout) :: displacement(:, :, :)     !! [nx, 2, ny], m
-      real(dp), intent(inout) :: stretch(:, :, :)          !! dU_T/ds, [nx, 2, ny]
+      real(dp), intent(in) :: traction(:, :, :)            !! [nx, 2, rows], Pa
+      real(dp), intent(inout) :: displacement(:, :, :)     !! [nx, 2, rows], m
+      real(dp), intent(inout) :: stretch(:, :, :)          !! dU_T/ds, [nx, 2, rows]
       integer :: j
 
       !$omp parallel do default(none) shared(self, traction) private(j) num_threads(self%threads)
-      do j = 1, self%ny
+      do j = 1, self%rows
          call self%vector%forward_row(1, j, traction(:, 1, j))
          call self%vector%forward_row(2, j, traction(:, 2, j))
       end do
       call self%vector%columns_through(self%tangential)
       !$omp parallel do default(none) shared(self, displacement, stretch) private(j) &
       !$omp num_threads(self%threads)
-      do j = 1, self%ny
+      do j = 1, self%rows
          call self%vector%backward_row(1, j, displacement(:, 1, j))
          call self%vector%backward_row(2, j, displacement(:, 2, j))
          call self%vector%backward_row(3, j, stretch(:, 1, j))
@@ -247,16 +259,6 @@ contains
 
       modes(:, 1) = self%table(first:first + size(modes, 1) - 1, j)*modes(:, 1)
    end subroutine multiply_scalar
-
-   !> Keep the modes.
-   subroutine keep_modes(self, first, j, modes)
-      class(keeper_type), intent(in) :: self
-      integer, intent(in) :: first
-      integer, intent(in) :: j
-      complex(dp), intent(inout) :: modes(:, :)
-
-      self%table(first:first + size(modes, 1) - 1, j) = modes(:, 1)
-   end subroutine keep_modes
 
    !> Multiply two inputs by two symmetric tensors.
    subroutine multiply_pair(self, first, j, modes)

@@ -18,9 +18,10 @@
 !>     G = G_e + sum g [(phi + chi)(1 - rho) - chi (rho - rho^2)]/(1 - exp(-x) rho),   x = dt/tau
 !>     d/ds = (rho - 1)/(|V| dt)
 !>
-!> Tables run over (0:last, 0:ny-1), negative wave numbers along y behind the positive ones, and are
-!> zero beyond nx/2.
+!> Tables run over (first:last, 0:ny-1), negative wave numbers along y behind the positive ones, and are
+!> zero beyond nx/2. One process has all columns, from 0 on; of several each has those that it transforms.
 module steady_symbols
+   use asperity_parallel, only : global_max, global_min
    use asperity_precision, only : dp, pi
    use kernels, only : kernel_type
    use prony, only : complex_modulus
@@ -44,9 +45,8 @@ module steady_symbols
 
    !> The symbols of one velocity.
    type :: steady_symbols_type
-      integer :: last = 0                              !! of the tables' index along x
-      complex(dp), allocatable :: normal(:, :)         !! K, m/Pa (0:last, 0:ny-1)
-      complex(dp), allocatable :: tangential(:, :, :)  !! A_T: xx, yy, xy, m/Pa (3, 0:last, 0:ny-1)
+      complex(dp), allocatable :: normal(:, :)         !! K, m/Pa (first:last, 0:ny-1)
+      complex(dp), allocatable :: tangential(:, :, :)  !! A_T: xx, yy, xy, m/Pa (3, first:last, 0:ny-1)
       complex(dp), allocatable :: stretch(:, :, :)     !! d/ds A_T alike, 1/Pa
       real(dp) :: longest = 0.0_dp                     !! largest |K|, m/Pa
       real(dp) :: shortest = 0.0_dp                    !! smallest |K|, m/Pa
@@ -54,30 +54,35 @@ module steady_symbols
 
 contains
 
-   !> The symbols of a medium.
-   subroutine new_steady_symbols(self, medium, last, frictional)
+   !> The symbols of a medium. Collective where processes share the columns.
+   subroutine new_steady_symbols(self, medium, first, last, frictional)
       type(steady_symbols_type), intent(out) :: self
       type(medium_type), intent(in) :: medium
-      integer, intent(in) :: last                      !! last wave number along x of the tables
+      integer, intent(in) :: first, last               !! wave numbers along x of the tables
       logical, intent(in) :: frictional                !! the tangential symbols are needed
+      real(dp), allocatable :: extremes(:, :)          !! of |K| over the columns
       integer :: i, j, nx, ny
 
       nx = medium%grid%nx
       ny = medium%grid%ny
-      self%last = last
-      allocate (self%normal(0:last, 0:ny - 1), source=(0.0_dp, 0.0_dp))
+      allocate (self%normal(first:last, 0:ny - 1), source=(0.0_dp, 0.0_dp))
       if (frictional) then
-         allocate (self%tangential(3, 0:last, 0:ny - 1), source=(0.0_dp, 0.0_dp))
-         allocate (self%stretch, source=self%tangential)
+         allocate (self%tangential(3, first:last, 0:ny - 1), source=(0.0_dp, 0.0_dp))
+         allocate (self%stretch(3, first:last, 0:ny - 1), source=(0.0_dp, 0.0_dp))
       end if
-      !$omp parallel do default(none) shared(self, medium, frictional, nx, ny) private(i, j)
+      allocate (extremes(2, 0:ny - 1))
+      !$omp parallel do default(none) shared(self, medium, frictional, first, last, nx, ny, extremes) &
+      !$omp private(i, j)
       do j = 0, ny - 1
-         do i = 0, nx/2
+         do i = first, min(last, nx/2)
             if (i + j > 0) call mode_symbols(self, medium, frictional, i, j)
          end do
+         associate (compliance => abs(self%normal(first:min(last, nx/2), j)))
+            extremes(:, j) = [maxval(compliance), minval(compliance, mask=compliance > 0.0_dp)]
+         end associate
       end do
-      self%longest = maxval(abs(self%normal(0:nx/2, :)))
-      self%shortest = minval(abs(self%normal(0:nx/2, :)), mask=abs(self%normal(0:nx/2, :)) > 0.0_dp)
+      self%longest = global_max(maxval(extremes(1, :)))
+      self%shortest = global_min(minval(extremes(2, :)))
    end subroutine new_steady_symbols
 
    !> The symbols of one mode: the mean over the wave vectors that it stands for.
