@@ -5,7 +5,7 @@
 !> step dt earlier a field was the same, moved back by V dt: S_old = rho S with rho = exp(i q.V dt), so
 !> that the first step in time has a step before it.
 module steady_memory
-   use asperity_parallel, only : global_sum
+   use asperity_parallel, only : any_process, global_sum
    use asperity_precision, only : dp
    use field_sums, only : row_totals
    use steady_losses, only : elastic_forms
@@ -39,7 +39,8 @@ contains
       shape_1d = size(field)
       call respond(whole)
       arms%s(:, component) = reshape(result, shape_1d)
-      if (size(arms%ds) > 0) then
+      ! A process without rows must take part.
+      if (any_process(size(arms%ds) > 0)) then
          call respond(increment)
          arms%ds(:, component) = reshape(result, shape_1d)
       end if

@@ -1,5 +1,6 @@
 !> A row of steady sliding within a run: its state, and what the arms remember of it where time goes on.
 module steady_row
+   use asperity_parallel, only : any_process
    use asperity_precision, only : dp, int8
    use asperity_schedule, only : planned_row_type
    use contact_model, only : contact_type
@@ -124,7 +125,7 @@ contains
       real(dp) :: next_dt
 
       next_dt = 0.0_dp
-      if (size(contact%state%arms%ds) > 0) next_dt = plan%next_dt
+      if (any_process(size(contact%state%arms%ds) > 0)) next_dt = plan%next_dt
       call steady%remember_normal(next_dt, contact%state%arms, contact%state%books)
       if (contact%frictional) then
          associate (tangential => contact%state%tangential)
