@@ -209,7 +209,7 @@ contains
       self%mx = shape%mx
       self%my = shape%my
       self%components = shape%components
-      self%threads = merge(1, thread_count(), shape%nx*shape%ny < small)
+      self%threads = merge(1, thread_count(), real(shape%nx, dp)*shape%ny < small)
       if (present(single)) self%single = single
       if (self%single) then
          call new_row_column_single(self%low, shape, self%threads, error, memory)

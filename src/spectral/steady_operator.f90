@@ -84,7 +84,7 @@ contains
       self%ny = grid%ny
       self%rows = grid%rows()
       self%frictional = frictional
-      self%threads = merge(1, thread_count(), grid%nx*grid%ny < small)
+      self%threads = merge(1, thread_count(), grid%cells() < small)
       call new_row_column(self%scalar, shape_on_grid(grid, 1), self%threads, error)
       if (allocated(error)) return
       columns = self%scalar%own_columns()
