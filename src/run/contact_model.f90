@@ -11,6 +11,7 @@ module contact_model
    use adhesion_advice, only : adhesion_edge
    use asperity_errors, only : error_type
    use asperity_interpolation, only : interpolation_type, new_interpolation, shifted
+   use process_agreement, only : agree
    use asperity_precision, only : dp
    use asperity_schedule, only : count_rows, planned_row_type
    use case_settings, only : case_type
@@ -62,7 +63,8 @@ module contact_model
 
 contains
 
-   !> Prepare the solvers, and a state at rest. `self%case`, `grid`, `height` and `slides` are set.
+   !> Prepare the solvers, and a state at rest. `self%case`, `grid`, `height` and `slides` are set. Collective:
+   !> where memory is short on one process, all of them return.
    subroutine new_contact(self, error)
       class(contact_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
@@ -77,6 +79,7 @@ contains
          if (case%adhesion%potential /= 'none') edge = adhesion_edge(case)
          call new_normal_step(self%side, self%grid, normal_kernel(case%material), case%solver, &
             case%adhesion, edge, self%height, error)
+         call agree(error)
          if (allocated(error)) return
          call new_zener(self%material, case%material%shear_modulus, case%material%prony_g, &
             case%material%prony_tau, trim(case%solver%time_scheme), error)
@@ -85,6 +88,7 @@ contains
       self%summit = self%side%summit
       self%rms_height = self%side%rms_height
       call new_arm_state(self%state%arms, self%material, nx, ny, 1, error)
+      call agree(error)
       if (allocated(error)) return
       call new_books(self%state%books, self%material, self%grid%cell_area())
       allocate (self%state%pressure(nx, ny), self%state%gap(nx, ny), source=0.0_dp)
@@ -93,12 +97,15 @@ contains
          allocate (self%state%displacement(nx, ny), source=0.0_dp)
       if (.not. is_elastic(self%material)) allocate (self%past(nx, ny), source=0.0_dp)
       if (self%slides) call new_road(self, error)
+      call agree(error)
       if (allocated(error)) return
       self%frictional = self%slides .and. self%case%friction%law /= 'none'
       if (.not. self%frictional) return
       call new_tangential_state(self%state%tangential, self%case, self%grid, self%material, error)
+      call agree(error)
       if (allocated(error)) return
       call new_tangential_step(self%tangential, self%case, self%grid, error)
+      call agree(error)
    end subroutine new_contact
 
    !> Prepare a road that moves.
@@ -108,6 +115,7 @@ contains
 
       call new_interpolation(self%road, self%grid, self%height, trim(self%case%solver%interpolation), &
          error)
+      call agree(error)
       if (allocated(error)) return
       allocate (self%slope_x(self%grid%nx, self%grid%rows()), self%slope_y(self%grid%nx, self%grid%rows()))
       call place_road(self, 0.0_dp, 0.0_dp)
