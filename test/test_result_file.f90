@@ -192,6 +192,8 @@ contains
       call check_no_error(error, 'closed')
 
       call output%create(other_path, grid, plan, error)
+      call output%write_height_rows(1, pressure_of(0))
+      call output%publish(error)
       call output%begin_snapshot(0, 0.0_dp, 1, error)
       call output%begin_snapshot(1, 0.0_dp, 1, error)
       call check_error(error, '/snapshots/000000 is not finished yet', 'two at once')
