@@ -2,11 +2,14 @@
 !>
 !> The tests hold for any number of processes: built with MPI and started by mpirun, they share the rows.
 module test_shared_rows
+   use asperity_errors, only : error_type
+   use asperity_interpolation, only : displaced, interpolation_type, new_interpolation, shifted
    use asperity_precision, only : dp, int8
    use carried_field, only : carry, shift_field, shift_states
-   use check, only : begin_suite, check_close, selected
+   use check, only : begin_suite, check_close, check_no_error, selected
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use row_fetch, only : fetch_rows, foreign_rows
+   use surface_slopes, only : spectral_slopes
    implicit none
    private
 
@@ -22,6 +25,8 @@ contains
       if (selected('bytes_come_from_their_owners')) call bytes_come_from_their_owners()
       if (selected('fields_shift_by_whole_cells')) call fields_shift_by_whole_cells()
       if (selected('fields_are_carried')) call fields_are_carried()
+      if (selected('roads_are_read_across_rows')) call roads_are_read_across_rows()
+      if (selected('spectral_slopes_cross_rows')) call spectral_slopes_cross_rows()
    end subroutine run_shared_rows
 
    !> Any number, another one in each cell.
@@ -108,8 +113,8 @@ contains
                call check_close(difference(grid, rows, range(1), 1), 0.0_dp, 0.0_dp, 'rows of the range')
                list = foreign_rows(grid, range)
                call fetch_rows(grid, field, range, rows, only_foreign=.true.)
-               if (size(list) > 0) call check_close(maxval(abs(rows(1, :size(list)) - value(1, list))), 0.0_dp, &
-                  0.0_dp, 'rows of other processes')
+               call check_close(sum(abs(rows(1, :size(list)) - value(1, list))), 0.0_dp, 0.0_dp, &
+                  'rows of other processes')
                deallocate (rows)
             end do
          end do
@@ -185,10 +190,86 @@ contains
          allocate (moved, source=field)
          call carry(grid, field, [0.0_dp, 4.0_dp*grid%dy], moved)
          do j = 1, grid%rows()
-            call check_close(moved(2, j), value(2, min(grid%first_row + j + 3, grid%ny)), 1.0e-9_dp, 'the rim goes on')
+            call check_close(moved(2, j), value(2, min(grid%first_row + j + 3, grid%ny)), 1.0e-9_dp, &
+               'the rim goes on')
          end do
          deallocate (moved)
       end do
    end subroutine fields_are_carried
+
+   !> The road read on shared rows is that of a grid that every process holds whole, to the last bit: near and
+   !> far away, at rest and displaced, step after step.
+   subroutine roads_are_read_across_rows()
+      character(6), parameter :: methods(2) = ['linear', 'cubic ']
+      integer, parameter :: boundaries(2) = [boundary_periodic, boundary_free]
+      type(error_type), allocatable :: error
+      type(grid_type) :: grid, whole
+      type(interpolation_type) :: road, whole_road
+      real(dp), allocatable :: field(:, :), all(:, :), h(:, :, :), g(:, :, :), s(:, :, :)
+      integer :: b, i, j, k, m, n
+
+      do b = 1, 2
+         do k = 1, size(sizes, 2)
+            call new_field(k, boundaries(b), grid, field)
+            whole = new_grid(grid%nx, grid%ny, grid%lx, grid%ly, grid%boundary)
+            allocate (all(grid%nx, grid%ny), s(grid%nx, grid%ny, 2), h(grid%nx, grid%rows(), 3), g(grid%nx, grid%ny, 3))
+            do j = 1, grid%ny
+               all(:, j) = value([(i, i=1, grid%nx)], j)
+               s(:, j, 1) = 0.3_dp*value(j, [(i, i=1, grid%nx)])
+               s(:, j, 2) = 0.1_dp*value([(i + j, i=1, grid%nx)], j)
+            end do
+            do m = 1, 2
+               call new_interpolation(road, grid, field, trim(methods(m)), error)
+               call check_no_error(error, 'shared')
+               call new_interpolation(whole_road, whole, all, trim(methods(m)), error)
+               call check_no_error(error, 'whole')
+               do n = 0, 12
+                  call shifted(road, 0.2_dp*n, -0.35_dp*n**2, h(:, :, 1), h(:, :, 2), h(:, :, 3))
+                  call shifted(whole_road, 0.2_dp*n, -0.35_dp*n**2, g(:, :, 1), g(:, :, 2), g(:, :, 3))
+                  call check_same('shifted')
+                  call displaced(road, 0.2_dp*n, 0.7_dp*n, s(:, grid%first_row:grid%last_row, 1), &
+                     n*s(:, grid%first_row:grid%last_row, 2), h(:, :, 1), h(:, :, 2), h(:, :, 3))
+                  call displaced(whole_road, 0.2_dp*n, 0.7_dp*n, s(:, :, 1), n*s(:, :, 2), &
+                     g(:, :, 1), g(:, :, 2), g(:, :, 3))
+                  call check_same('displaced')
+               end do
+            end do
+            deallocate (all, s, h, g)
+         end do
+      end do
+
+   contains
+
+      !> Compare the rows of this process.
+      subroutine check_same(what)
+         character(*), intent(in) :: what
+
+         call check_close(sum(abs(h - g(:, grid%first_row:grid%last_row, :))), 0.0_dp, 0.0_dp, what)
+      end subroutine check_same
+
+   end subroutine roads_are_read_across_rows
+
+   !> The same for slopes from the spectrum.
+   subroutine spectral_slopes_cross_rows()
+      type(error_type), allocatable :: error
+      type(grid_type) :: grid, whole
+      real(dp), allocatable :: field(:, :), all(:, :), h(:, :, :), g(:, :, :)
+      integer :: i, j, k
+
+      do k = 1, size(sizes, 2)
+         call new_field(k, boundary_periodic, grid, field)
+         whole = new_grid(grid%nx, grid%ny, grid%lx, grid%ly, grid%boundary)
+         allocate (all(grid%nx, grid%ny), h(grid%nx, grid%rows(), 2), g(grid%nx, grid%ny, 2))
+         do j = 1, grid%ny
+            all(:, j) = value([(i, i=1, grid%nx)], j)
+         end do
+         call spectral_slopes(grid, field, h(:, :, 1), h(:, :, 2), error)
+         call check_no_error(error, 'shared')
+         call spectral_slopes(whole, all, g(:, :, 1), g(:, :, 2), error)
+         call check_no_error(error, 'whole')
+         call check_close(sum(abs(h - g(:, grid%first_row:grid%last_row, :))), 0.0_dp, 0.0_dp, 'slopes')
+         deallocate (all, h, g)
+      end do
+   end subroutine spectral_slopes_cross_rows
 
 end module test_shared_rows
