@@ -101,7 +101,7 @@ contains
       self%grid = grid
       self%periodic = grid%boundary == boundary_periodic
       self%cubic = method == 'cubic'
-      allocate (self%height(grid%nx, grid%rows()))
+      allocate (self%height(grid%nx, grid%rows() + merge(0, foreign_room(grid), self%cubic)))
       !$omp parallel do default(none) shared(grid, height, self)
       do j = 1, grid%rows()
          self%height(:, j) = height(:, j)
@@ -120,11 +120,20 @@ contains
       associate (grid => self%grid)
          ! A bounded map has a rim. A periodic one has none.
          if (.not. self%periodic) self%lasting = grid%rows() + 2
-         allocate (self%coefficients(-1:grid%nx + 1, self%lasting), rim(grid%nx + 3, 2))
+         allocate (self%coefficients(-1:grid%nx + 1, self%lasting + foreign_room(grid)), rim(grid%nx + 3, 2))
          call spline_coefficients(grid, self%height, self%coefficients(:, :grid%rows()), rim)
-         if (.not. self%periodic) self%coefficients(:, grid%rows() + 1:) = rim
+         if (.not. self%periodic) self%coefficients(:, grid%rows() + 1:self%lasting) = rim
       end associate
    end subroutine new_coefficients
+
+   !> Room for rows of other processes, so that the road needs no larger copy when it moves on. It takes
+   !> no memory before rows are put there.
+   pure integer function foreign_room(grid)
+      type(grid_type), intent(in) :: grid
+
+      foreign_room = 0
+      if (grid%shared) foreign_room = min(grid%rows() + reach(2) - reach(1) + 2*spare, grid%ny)
+   end function foreign_room
 
    !> The places of the rows that are always there.
    subroutine place_lasting_rows(self)
