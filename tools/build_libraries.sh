@@ -5,7 +5,7 @@
 #
 # HDF5 is the C library alone, with zlib: without the drivers for the network (curl, Kerberos, LDAP), the
 # high-level library, szip, and the interfaces for other languages. FFTW is built for double and single
-# precision with OpenMP. The source archives are taken from the folder $ASPERITY_SOURCES, where they are
+# precision. The source archives are taken from the folder $ASPERITY_SOURCES, where they are
 # there (hdf5*.tar.gz, fftw*.tar.gz), and else from their projects' sites. Licences are left in
 # PREFIX/share/licenses. The build of Asperity finds the libraries by
 #
@@ -68,7 +68,7 @@ build_fftw() {
     mkdir -p "$work/fftw-$kind"
     cd "$work/fftw-$kind"
     ../fftw/configure --prefix="$prefix" --libdir="$prefix/lib" --enable-shared --disable-static \
-      --enable-openmp --disable-fortran --disable-doc --enable-sse2 --enable-avx --enable-avx2 \
+      --disable-fortran --disable-doc --enable-sse2 --enable-avx --enable-avx2 \
       $single >configure.log
     make -s -j "$jobs" >make.log 2>&1 || { tail -20 make.log; exit 1; }
     make -s install >>make.log 2>&1 || { tail -20 make.log; exit 1; }

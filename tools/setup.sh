@@ -24,7 +24,7 @@ else
   fi
   if [ -n "$missing" ]; then
     echo "asperity: not found:$missing" >&2
-    echo "asperity: install gcc, gfortran, pkg-config, FFTW 3 (double and single, with OpenMP)," >&2
+    echo "asperity: install gcc, gfortran, pkg-config, FFTW 3 (double and single)," >&2
     echo "asperity: HDF5, and Python 3.10 or newer; docs/install.md" >&2
     echo "asperity: lists the packages of conda-forge and Homebrew." >&2
     exit 1
