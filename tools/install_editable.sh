@@ -11,3 +11,5 @@ else
     --config-settings=build-dir=.venv/python -e .
   touch .venv/installed
 fi
+# The program on PATH; meson-python leaves it in the build folder.
+ln -sf ../python/asperity .venv/bin/asperity
