@@ -187,3 +187,17 @@ def test_full_disk(tmp_path: Path, writer: str, compression: str) -> None:
             result.unlink()
     assert seen == sorted(seen)
     assert seen[-1] > 5
+
+
+def test_a_result_that_cannot_be_begun(tmp_path: Path, program: str) -> None:
+    """Not even the first pages fit: one message, status 3, and nothing is left behind."""
+    case = tmp_path / "case.nml"
+    case.write_text("&grid nx = 64, ny = 64, lx = 1. /\n&surface shape = 'sphere', radius = 2. /\n"
+                    "&material shear_modulus = 1. /\n&phase pressure = 1e-3 /\n")
+    for limit in (0, 1000, 20000, 40000):
+        run = subprocess.run(
+            [program, "run", str(case), "--quiet"], capture_output=True, text=True, check=False,
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))  # noqa: B023
+        assert run.returncode == 3, run.stderr
+        assert run.stderr.startswith(f"{case.with_suffix('.h5')}: ")
+        assert sorted(path.name for path in tmp_path.iterdir()) == ["case.nml"]

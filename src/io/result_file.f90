@@ -136,13 +136,13 @@ contains
    subroutine give_up(self, error)
       class(result_file_type), intent(inout) :: self
       type(error_type), allocatable, intent(inout) :: error
+      character(:), allocatable :: temporary
 
-      associate (temporary => new_path(self))
-         if (index(error%message, temporary//':') == 1) &
-            error%message = self%path//error%message(len(temporary) + 1:)
-         call self%file%close()
-         call remove_file(temporary)
-      end associate
+      temporary = new_path(self)
+      if (index(error%message, temporary//':') == 1) &
+         error%message = self%path//error%message(len(temporary) + 1:)
+      call self%file%close()
+      call remove_file(temporary)
    end subroutine give_up
 
    !> Name of a result that has not taken its place yet.
