@@ -230,7 +230,8 @@ contains
          level = measure%weighted_level - task%datum
          if (problem%control /= control_pressure) level = problem%target
          call reject_overflow(outcome, pressure, gap, self%operator%threads)
-         outcome%ffts = nint(transforms(self) - before, int64)
+         ! A little more, so that a half is not rounded by the round-off of what was counted before.
+         outcome%ffts = nint(transforms(self) - before + 1e-6_dp, int64)
          outcome%seconds = omp_get_wtime() - began
       end subroutine finish_solve
 
