@@ -8,6 +8,6 @@ module column_parcels_double
 
    public :: column_parcels_type, new_column_parcels
 
-   include 'column_parcels.inc'      ! state 315b9741, written by tools/check_sources.py --update
+   include 'column_parcels.inc'      ! state d150b519, written by tools/check_sources.py --update
 
 end module column_parcels_double
