@@ -76,7 +76,7 @@ contains
       real(dp), intent(in), contiguous :: r(:, :)          !! [nx, 2] m
       real(dp), intent(in), contiguous :: tangent(:, :)    !! [nx, 3]
       real(dp), intent(inout), contiguous :: z(:, :)       !! [nx, 2] in: the preconditioned field
-      type(z_sums_type), intent(inout) :: sums             !! in: with g.z_old
+      type(z_sums_type), intent(inout) :: sums             !! comes with g.z_old
       real(dp) :: rv, rx_z, ry_z, gx, gy, bent, over, rz, sx, sy, bx, by, cx, cy, mean_x, mean_y
       integer :: i
 
