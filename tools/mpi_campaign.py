@@ -11,7 +11,9 @@ and all fields must agree in every bit, and so must the exit status and the mess
 also continues each run from one of its checkpoints with another number of processes.
 
 Where something differs, the seed, the command and what differs are printed, and the files are kept.
-The exit status is 1 if any trial failed. `--mpi` and `--serial` name other programs.
+The exit status is 1 if any trial failed. The programs are those in `.venv/bin`, which must be of
+the same sources: `. tools/install_editable.sh` brings the one without MPI up to date. `--mpi` and
+`--serial` name other ones.
 """
 
 import argparse
@@ -111,12 +113,19 @@ class Draw:
         physics = self.physics
         free = physics != "steady" and r.random() < 0.5
         self.moving = physics in ("sliding", "friction", "steady")
+        self.large = physics == "large"
+        if self.large:
+            self.moving = r.random() < 0.3
         most = 40 if self.moving or physics == "adhesion" else 80
         nx = r.randint(6, most)
         line = not free and r.random() < 0.15
         ny = 1 if line else r.choice([r.randint(2, 12), r.randint(6, most), r.randint(6, most), nx])
         if not free and r.random() < 0.3:
             nx, ny = r.choice([16, 32, 48]), 1 if line else r.choice([16, 32, 48, 64])
+        if self.large:
+            # Several threads are at work, and the preconditioner extends the residual.
+            nx, ny, line = r.randint(363, 620), r.randint(363, 620), False
+            free = r.random() < 0.2
         lx = 1e-3
         ly = lx * ny / nx * r.choice([1.0, 1.0, 0.7, 1.5]) if not line else lx
         text = self.group(
@@ -128,7 +137,8 @@ class Draw:
             viscoelastic = False
         text += self.material(viscoelastic, free)
         modulus = 1e6
-        if physics == "adhesion" or (physics == "sliding" and r.random() < 0.15):
+        share = {"adhesion": 1.0, "sliding": 0.15, "friction": 0.2, "large": 0.2}.get(physics, 0.0)
+        if r.random() < share:
             text += self.adhesion(lx / nx)
         if physics == "friction" or (physics == "steady" and r.random() < 0.5):
             text += self.friction()
@@ -227,18 +237,21 @@ class Draw:
                 text += self.group("phase", velocity_x=0.01, duration=2 * cell / 0.01)
             return text
         text = ""
-        for i in range(r.randint(1, 3)):
+        pulled = self.physics == "friction" and r.random() < 0.2
+        for i in range(r.randint(1, 2 if self.large else 3)):
             values = {"pressure": pressure * r.uniform(0.5, 2.0)}
             if r.random() < 0.25:
                 values = {"displacement": cell * r.uniform(0.05, 0.5)}
             moving = self.moving and (i > 0 or r.random() < 0.5)
             if r.random() < 0.7 or moving:
-                steps = r.randint(1, 4)
+                steps = r.randint(1, 2 if self.large else 4)
                 values["steps"] = steps
                 values["duration"] = 10.0 ** r.uniform(-4, -1)
                 if r.random() < 0.4:
                     values["ramp"] = "linear"
-                if moving:
+                if moving and pulled:
+                    values["traction_x"] = pressure * r.uniform(0.01, 0.6)
+                elif moving:
                     way = cell * steps * r.uniform(0.2, 1.3)
                     values["velocity_x"] = way / values["duration"]
                     if not line and r.random() < 0.5:
@@ -374,19 +387,7 @@ class Trial:
         return kept
 
 
-def serial_program():
-    """Return the newest program without MPI that fpm has built."""
-    found = sorted(ROOT.glob("build/gfortran_*/app/asperity"), key=lambda p: p.stat().st_mtime)
-    return found[-1] if found else ROOT / ".venv/bin/asperity"
-
-
-def mpi_program():
-    """Return the newest program with MPI."""
-    found = [*ROOT.glob("build/mpifort_*/app/asperity"), *ROOT.glob(".venv/bin/asperity-mpi")]
-    return max(found, key=lambda p: p.stat().st_mtime) if found else ROOT / ".venv/bin/asperity-mpi"
-
-
-PHYSICS = ["elastic", "viscoelastic", "sliding", "adhesion", "friction", "steady"]
+PHYSICS = ["elastic", "viscoelastic", "sliding", "adhesion", "friction", "steady", "large"]
 
 
 def read_options():
@@ -398,8 +399,8 @@ def read_options():
     parser.add_argument("--physics", default=",".join(PHYSICS))
     parser.add_argument("--numbers", type=int, default=3, help="numbers of processes per trial")
     parser.add_argument("--restarts", action="store_true")
-    parser.add_argument("--mpi", type=Path, default=mpi_program())
-    parser.add_argument("--serial", type=Path, default=serial_program())
+    parser.add_argument("--mpi", type=Path, default=ROOT / ".venv/bin/asperity-mpi")
+    parser.add_argument("--serial", type=Path, default=ROOT / ".venv/bin/asperity")
     parser.add_argument("--keep", type=Path, default=Path(tempfile.gettempdir()) / "mpi_campaign")
     options = parser.parse_args()
     options.physics = options.physics.split(",")
