@@ -16,14 +16,14 @@ program main
    use hand_over, only : become_python
    use process_agreement, only : agree
    use reference_page, only : reference_markdown
+   use row_interrupts, only : limit, must_stop
    use asperity_precision, only : dp
    use asperity_progress, only : progress_type
    use result_summary, only : summarise_result
    use asperity_signals, only : catch_signals, checkpoint_asked, forget_checkpoint, stop_signal, &
-      stop_signal_name, stop_was_asked
+      stop_signal_name
    use standard_streams, only : say, say_error
    use asperity_surface, only : check_files
-   use time_limit, only : time_limit_type
    use linked_libraries, only : linked_versions
    use text_tools, only : nearest_name, ordinary, to_text
    use asperity_version, only : version_number
@@ -163,14 +163,13 @@ contains
    end subroutine choose_output
 
    !> The steps of a run. A signal or the time limit stops it after the present step, with a
-   !> checkpoint; a signal also ends a step with friction that takes long. A signal to any process counts
+   !> checkpoint; both also end a step that takes long. A signal to any process counts
    !> for all of them, and the first process looks at the clock.
    subroutine run_steps(case, error)
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
       type(run_type) :: run
       type(progress_type) :: progress
-      type(time_limit_type) :: limit
       type(error_type), allocatable :: closing
       logical :: near
       integer :: signal
@@ -178,7 +177,7 @@ contains
       call limit%start(command%time_limit)
       call run%open(case, command%restart, command%overwrite, error)
       if (.not. allocated(error)) then
-         run%sim%stop%asked => stop_was_asked
+         run%sim%stop%asked => must_stop
          call progress%start(run%rows, max(run%sim%state%schedule%row + 1, 0), &
             command%quiet .or. .not. is_first_process())
          do while (.not. run%finished)

@@ -33,7 +33,7 @@ module asperity
    use normal_cg, only : new_normal_solver, normal_solver_type
    use normal_solvers, only : new_contact_solver
    use normal_state, only : control_approach, control_pressure, normal_problem_type
-   use asperity_parallel, only : set_threads, thread_count
+   use asperity_threads, only : set_threads, thread_count
    use asperity_precision, only : dp, sp
    use prony, only : complex_modulus, creep_compliance, relaxation_modulus, wlf_shift, zener_to_prony
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid

@@ -11,6 +11,7 @@ program main
    use test_block_motion, only : run_block_motion
    use test_case_input, only : run_case_input
    use test_checkpoint, only : run_checkpoint
+   use test_chunk_writer, only : run_chunk_writer
    use test_coupled_passes, only : run_coupled_passes
    use test_coupled_runs, only : run_coupled_runs
    use test_facade, only : run_facade
@@ -65,6 +66,7 @@ program main
          suite_type('fft_conv', run_fft_conv), &
          suite_type('kernels', run_kernels), &
          suite_type('hdf5_file', run_hdf5_file), &
+         suite_type('chunk_writer', run_chunk_writer), &
          suite_type('prony', run_prony), &
          suite_type('surface', run_surface), &
          suite_type('roughness', run_roughness), &

@@ -6,9 +6,9 @@ module normal_fixture
    use contact_solver, only : contact_solver_type
    use normal_solvers, only : new_contact_solver
    use normal_state, only : control_pressure, normal_problem_type
-   use asperity_parallel, only : set_threads, thread_count
+   use asperity_threads, only : set_threads, thread_count
    use kernels, only : normal_half_space
-   use asperity_precision, only : dp, pi
+   use asperity_precision, only : dp
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
    use asperity_surface, only : new_height

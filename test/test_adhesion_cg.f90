@@ -1,15 +1,18 @@
 !> Tests of adhesive contact in periodic mode.
 module test_adhesion_cg
    use adhesion_cg, only : adhesion_solver_type, new_adhesion_solver
+   use adhesion_model, only : adhesion_model_type, new_adhesion_model
+   use adhesion_patch, only : adhesion_patch_type, new_adhesion_patch
    use adhesion_potential, only : adhesion_potential_type, adhesive_energy, adhesive_slope, &
       new_adhesion_potential
    use adhesion_state, only : adhesion_problem_type, control_approach, control_pressure, &
       reason_closed, reason_detached
+   use adhesion_symbols, only : adhesion_symbols_type
    use check, only : begin_suite, check_close, check_error, check_no_error, check_order, &
       check_that, selected
    use asperity_errors, only : error_type
    use fft_conv, only : convolution_type, new_symbol_operator
-   use asperity_parallel, only : set_threads
+   use asperity_threads, only : set_threads
    use kernels, only : normal_half_space
    use asperity_precision, only : dp, pi
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
@@ -34,19 +37,24 @@ contains
          if (selected('pressure_is_gradient_of_energy')) &
             call pressure_is_gradient_of_energy(trim(potentials(k)))
          if (selected('solution_meets_its_conditions')) &
-            call solution_meets_its_conditions(36, 25, 1.0_dp, 0.6_dp, trim(potentials(k)), 'coarse')
+            call solution_meets_its_conditions(36, 25, 1.0_dp, 0.6_dp, trim(potentials(k)))
          if (selected('solution_meets_its_conditions')) &
-            call solution_meets_its_conditions(31, 48, 0.5_dp, 1.0_dp, trim(potentials(k)), 'full')
+            call solution_meets_its_conditions(31, 48, 0.5_dp, 1.0_dp, trim(potentials(k)))
          if (selected('energy_falls_with_the_iterations')) &
             call energy_falls_with_the_iterations(trim(potentials(k)), 'fast')
          if (selected('energy_falls_with_the_iterations')) &
             call energy_falls_with_the_iterations(trim(potentials(k)), 'thesis')
          if (selected('thesis_method_agrees')) call thesis_method_agrees(trim(potentials(k)))
       end do
+      if (selected('model_is_near_the_operator')) then
+         call model_is_near_the_operator(1.0_dp, 0.8_dp, 1.3_dp)
+         call model_is_near_the_operator(2.0_dp, 0.75_dp, 1.6_dp)
+      end if
       if (selected('force_is_derivative_of_energy')) call force_is_derivative_of_energy()
       if (selected('westergaard_wave_without_adhesion')) call westergaard_wave_without_adhesion()
       if (selected('johnson_adhesive_wave')) call johnson_adhesive_wave()
       if (selected('strong_attraction_on_rough_surface')) call strong_attraction_on_rough_surface()
+      if (selected('attraction_closes_as_in_a_slow_motion')) call attraction_closes_as_in_a_slow_motion()
       if (selected('pull_off_takes_more_work_than_approach')) &
          call pull_off_takes_more_work_than_approach()
       if (selected('detached_closed_and_refused')) call detached_closed_and_refused()
@@ -185,10 +193,10 @@ contains
    end subroutine pressure_is_gradient_of_energy
 
    !> Conditions of a solution, recomputed; both controls, both starts of the control, a history.
-   subroutine solution_meets_its_conditions(nx, ny, lx, ly, name, preconditioner)
+   subroutine solution_meets_its_conditions(nx, ny, lx, ly, name)
       integer, intent(in) :: nx, ny
       real(dp), intent(in) :: lx, ly
-      character(*), intent(in) :: name, preconditioner
+      character(*), intent(in) :: name
       type(grid_type) :: grid
       type(adhesion_solver_type) :: solver
       type(adhesion_problem_type) :: problem
@@ -203,7 +211,7 @@ contains
 
       range = 0.02_dp
       grid = new_grid(nx, ny, lx, ly, boundary_periodic)
-      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error, preconditioner=preconditioner)
+      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
       call check_no_error(error, 'solver')
       height = waves(grid, 0.01_dp)
       past = 0.05_dp*waves(grid, 1.0_dp)
@@ -466,7 +474,7 @@ contains
 
    end subroutine johnson_adhesive_wave
 
-   !> Strong attraction of short range on a rough surface: the solver gets there, by both forms.
+   !> Strong attraction of short range on a rough surface: the solver gets there.
    subroutine strong_attraction_on_rough_surface()
       type(grid_type) :: grid
       type(adhesion_solver_type) :: solver
@@ -474,29 +482,71 @@ contains
       type(solver_result_type) :: outcome
       type(error_type), allocatable :: error
       real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :)
-      character(6), parameter :: forms(2) = ['coarse', 'full  ']
       real(dp) :: level
-      integer :: k, l
+      integer :: l
 
       grid = new_grid(80, 66, 1.0_dp, 0.9_dp, boundary_periodic)
       height = waves(grid, 0.02_dp) + 0.002_dp*noise(80, 66)
       do l = 1, size(potentials)
-         do k = 1, 2
-            call new_adhesion_solver(solver, grid, normal_half_space(poisson), error, preconditioner=trim(forms(k)))
-            problem%modulus = modulus
-            problem%target = 0.01_dp
-            problem%potential = potential_of(trim(potentials(l)), 2e-3_dp, 1e-3_dp)
-            gap = maxval(height) - height
-            pressure = 0.0_dp*gap
-            call solver%solve(problem, height, gap, pressure, level, outcome)
-            call check_that(outcome%converged .and. outcome%residual <= 1e-6_dp, &
-               'strong '//trim(potentials(l))//' '//trim(forms(k))//': '//trim(outcome%reason))
-            call check_that(all(abs(pressure) < 1e3_dp) .and. all(gap >= 0.0_dp), 'no NaN', &
-               [maxval(abs(pressure)), minval(gap)])
-            call solver%destroy()
-         end do
+         call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
+         problem%modulus = modulus
+         problem%target = 0.01_dp
+         problem%potential = potential_of(trim(potentials(l)), 2e-3_dp, 1e-3_dp)
+         gap = maxval(height) - height
+         pressure = 0.0_dp*gap
+         call solver%solve(problem, height, gap, pressure, level, outcome)
+         call check_that(outcome%converged .and. outcome%residual <= 1e-6_dp, &
+            'strong '//trim(potentials(l))//': '//trim(outcome%reason))
+         call check_that(all(abs(pressure) < 1e3_dp) .and. all(gap >= 0.0_dp), 'no NaN', &
+            [maxval(abs(pressure)), minval(gap)])
+         call solver%destroy()
       end do
    end subroutine strong_attraction_on_rough_surface
+
+   !> From a gap that is too wide everywhere the solution is the first that a slow closing motion meets, though the
+   !> energy has others with more contact. A motion so slow that it cannot miss it: the attraction of the
+   !> gap before, which is less than that of any solution below, against the wall, again and again. And
+   !> the transforms are few.
+   subroutine attraction_closes_as_in_a_slow_motion()
+      type(grid_type) :: grid
+      type(adhesion_solver_type) :: solver
+      type(adhesion_problem_type) :: problem
+      type(solver_result_type) :: outcome
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: height(:, :), gap(:, :), slow(:, :), pressure(:, :), past(:, :)
+      real(dp), parameter :: energy = 2.5e-4_dp, range = 4e-3_dp
+      real(dp) :: level, change
+      integer :: k
+
+      grid = new_grid(64, 60, 1.0_dp, 0.9_dp, boundary_periodic)
+      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
+      height = waves(grid, 0.015_dp) + 0.001_dp*noise(64, 60)
+      problem%modulus = modulus
+      problem%target = 0.01_dp
+      problem%tolerance = 1e-7_dp
+      slow = maxval(height) - height
+      pressure = 0.0_dp*slow
+      call solver%solve(problem, height, slow, pressure, level, outcome)
+      gap = slow
+      do k = 1, 400
+         past = -energy/range*exp(-slow/range)
+         ! A traction of the past moves the mean, too, which does not matter there.
+         problem%target = 0.01_dp - sum(past)/size(past)
+         change = sum(slow)
+         call solver%solve(problem, height, slow, pressure, level, outcome, past)
+         call check_that(outcome%converged, 'slow: '//trim(outcome%reason))
+         if (abs(change - sum(slow)) < 1e-9_dp) exit
+      end do
+      problem%target = 0.01_dp
+      problem%tolerance = 1e-6_dp
+      problem%potential = potential_of('exponential', energy, range)
+      call solver%solve(problem, height, gap, pressure, level, outcome)
+      call check_that(outcome%converged, trim(outcome%reason))
+      call check_close(maxval(abs(gap - slow)), 0.0_dp, 1e-2_dp*range, 'the first solution on the way')
+      call check_that(count(gap == 0.0_dp) > 200, 'a contact', [real(count(gap == 0.0_dp), dp)])
+      call check_order(real(outcome%ffts, dp), '<=', 80.0_dp, 'transforms')
+      call solver%destroy()
+   end subroutine attraction_closes_as_in_a_slow_motion
 
    !> In and out at prescribed level, each from the state before: attraction before contact, pull-off,
    !> and the way out needs more work than the way in gives.
@@ -533,7 +583,50 @@ contains
       call solver%destroy()
    end subroutine pull_off_takes_more_work_than_approach
 
-   !> Detachment, a closed gap, a wrong preconditioner.
+   !> The form s.B_h s of the local model over s.B s, for single waves of all lengths and directions: the bounds
+   !> that the theory states.
+   subroutine model_is_near_the_operator(ratio, least, most)
+      real(dp), intent(in) :: ratio                !! length of a cell over its width
+      real(dp), intent(in) :: least, most
+      integer, parameter :: nx = 144, ny = 120
+      type(grid_type) :: grid
+      type(adhesion_patch_type) :: patch
+      type(adhesion_symbols_type) :: symbols
+      type(adhesion_model_type) :: model
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: wave(:, :), product(:, :)
+      character(20) :: which
+      real(dp) :: form
+      integer :: i, j, k, l
+
+      grid = new_grid(nx, ny, nx*ratio, real(ny, dp), boundary_periodic)
+      call new_adhesion_patch(patch, grid, normal_half_space(poisson), symbols, error)
+      call check_no_error(error, 'patch')
+      call new_adhesion_model(model, nx, patch%sharing, symbols, patch%stiffness%modes(), patch%nyquist, error)
+      call check_no_error(error, 'model')
+      allocate (wave(nx, ny), product(nx, ny))
+      do k = 0, nx/2, 3
+         do l = 0, ny/2, 3
+            if (k + l == 0) cycle
+            do j = 1, ny
+               wave(:, j) = [(cos(2.0_dp*pi*(k*i/real(nx, dp) + l*j/real(ny, dp))), i=1, nx)]
+               call model%put_row(j, wave(:, j))
+            end do
+            call model%transform_product()
+            do j = 1, ny
+               call model%product_row(j, wave, product(:, j))
+            end do
+            form = sum(wave*product)/(sum(wave**2)*symbols%stiffness(k, l))
+            write (which, '(a, i0, a, i0)') 'wave ', k, ', ', l
+            call check_order(form, '<=', most, 'not much stiffer: '//which)
+            call check_order(least, '<=', form, 'not much softer: '//which)
+         end do
+      end do
+      call model%destroy()
+      call patch%destroy()
+   end subroutine model_is_near_the_operator
+
+   !> Detachment, a closed gap, an unknown method.
    subroutine detached_closed_and_refused()
       type(grid_type) :: grid
       type(adhesion_solver_type) :: solver
@@ -569,9 +662,6 @@ contains
       problem%target = -sum(height)/size(height) + 1e-3_dp
       call solver%solve(problem, height, gap, pressure, level, outcome)
       call check_that(outcome%reason == reason_closed, 'no gap left')
-      call solver%destroy()
-      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error, preconditioner='fine')
-      call check_error(error, 'coarse', 'unknown preconditioner')
       call solver%destroy()
       call new_adhesion_solver(solver, grid, normal_half_space(poisson), error, method='slow')
       call check_error(error, 'thesis', 'unknown method')

@@ -4,15 +4,13 @@
 !> (pi gamma_0 R^2/K)^(1/3), loads in pi gamma_0 R, and Maugis's lambda = 2 gamma_0/z_0.
 module test_adhesion_free
    use adhesion_cg, only : adhesion_solver_type, new_adhesion_solver
-   use adhesion_potential, only : adhesion_potential_type, adhesive_energy, adhesive_slope, &
-      new_adhesion_potential
-   use adhesion_state, only : adhesion_problem_type, control_approach, control_pressure, &
-      reason_detached
+   use adhesion_potential, only : adhesive_energy, adhesive_slope, new_adhesion_potential
+   use adhesion_state, only : adhesion_problem_type, control_approach, reason_detached
    use check, only : begin_suite, check_close, check_error, check_no_error, check_order, &
       check_that, selected
    use asperity_errors, only : error_type
    use influence, only : love_normal
-   use asperity_parallel, only : set_threads
+   use asperity_threads, only : set_threads
    use kernels, only : normal_half_space
    use asperity_precision, only : dp, pi
    use regular_grid, only : boundary_free, grid_type, new_grid
@@ -29,12 +27,11 @@ contains
 
    subroutine run_adhesion_free()
       call begin_suite('adhesion_free')
-      if (selected('solution_meets_its_conditions')) &
-         call solution_meets_its_conditions('exponential', 'coarse')
-      if (selected('solution_meets_its_conditions')) &
-         call solution_meets_its_conditions('gauss', 'full')
-      if (selected('solution_meets_its_conditions')) &
-         call solution_meets_its_conditions('maugis_dugdale', 'coarse')
+      if (selected('solution_meets_its_conditions')) then
+         call solution_meets_its_conditions('exponential')
+         call solution_meets_its_conditions('gauss')
+         call solution_meets_its_conditions('maugis_dugdale')
+      end if
       if (selected('hertz_jkr_and_dmt_limits')) call hertz_jkr_and_dmt_limits()
       if (selected('sphere_converges_with_the_mesh')) call sphere_converges_with_the_mesh()
       ! Long range: a sharp minimum at first touch, where half a step of 0.02 costs 0.003; and a disc of
@@ -94,8 +91,8 @@ contains
    end function displacement_sum
 
    !> Conditions of a solution by that sum; both controls; a history; from full contact.
-   subroutine solution_meets_its_conditions(name, preconditioner)
-      character(*), intent(in) :: name, preconditioner
+   subroutine solution_meets_its_conditions(name)
+      character(*), intent(in) :: name
       type(grid_type) :: grid
       type(adhesion_solver_type) :: solver
       type(adhesion_problem_type) :: problem
@@ -107,7 +104,7 @@ contains
       integer :: i, j
 
       grid = new_grid(27, 22, 5.0_dp, 6.0_dp, boundary_free)
-      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error, preconditioner=preconditioner)
+      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
       call check_no_error(error, 'solver')
       height = paraboloid(grid)
       do j = 1, grid%ny

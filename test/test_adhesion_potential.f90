@@ -17,16 +17,13 @@ contains
 
    subroutine run_adhesion_potential()
       call begin_suite('adhesion_potential')
-      if (selected('derivatives_match_differences')) &
+      if (selected('derivatives_match_differences')) then
          call derivatives_match_differences('exponential', -energy/range)
-      if (selected('derivatives_match_differences')) &
          call derivatives_match_differences('gauss', 0.0_dp)
-      if (selected('derivatives_match_differences')) &
          call derivatives_match_differences('maugis_dugdale', -energy/range)
-      if (selected('derivatives_match_differences')) &
          call derivatives_match_differences('maugis_dugdale', -energy/range, edge=0.4_dp*range)
-      if (selected('derivatives_match_differences')) &
          call derivatives_match_differences('maugis_dugdale', -energy/range, edge=range)
+      end if
       if (selected('bounds_of_the_range')) call bounds_of_the_range()
       if (selected('table')) call table()
       if (selected('table_of_a_line')) call table_of_a_line()

@@ -3,7 +3,7 @@
 module test_coupled_runs
    use asperity_checkpoint, only : checkpoint_reader_type, checkpoint_writer_type, remove_checkpoint
    use asperity_errors, only : error_type
-   use asperity_parallel, only : set_threads
+   use asperity_threads, only : set_threads
    use asperity_precision, only : dp
    use asperity_simulation, only : new_simulation, simulation_type
    use case_input, only : parse_case

@@ -19,34 +19,24 @@ contains
       call begin_suite('fft_conv')
       if (selected('good_lengths')) call good_lengths()
       if (selected('coefficients_match_quadrature')) call coefficients_match_quadrature()
-      if (selected('oblique_waves_are_eigenfunctions')) &
+      if (selected('oblique_waves_are_eigenfunctions')) then
          call oblique_waves_are_eigenfunctions(8, 6, 3.0_dp, 2.0_dp, .false.)
-      if (selected('oblique_waves_are_eigenfunctions')) &
          call oblique_waves_are_eigenfunctions(8, 6, 3.0_dp, 2.0_dp, .true.)
-      if (selected('oblique_waves_are_eigenfunctions')) &
          call oblique_waves_are_eigenfunctions(9, 5, 1.0_dp, 2.0_dp, .false.)
-      if (selected('oblique_waves_are_eigenfunctions')) &
          call oblique_waves_are_eigenfunctions(9, 5, 1.0_dp, 2.0_dp, .true.)
-      if (selected('oblique_waves_are_eigenfunctions')) &
          call oblique_waves_are_eigenfunctions(16, 1, 1.0_dp, 2.0_dp, .false.)
-      if (selected('oblique_waves_are_eigenfunctions')) &
          call oblique_waves_are_eigenfunctions(16, 1, 1.0_dp, 2.0_dp, .true.)
-      if (selected('oblique_waves_are_eigenfunctions')) &
          call oblique_waves_are_eigenfunctions(160, 131, 1.0_dp, 0.7_dp, .false.)
-      if (selected('oblique_waves_are_eigenfunctions')) &
          call oblique_waves_are_eigenfunctions(160, 131, 1.0_dp, 0.7_dp, .true.)
-      if (selected('free_operator_is_the_double_sum')) &
+      end if
+      if (selected('free_operator_is_the_double_sum')) then
          call free_operator_is_the_double_sum(7, 5, .false.)
-      if (selected('free_operator_is_the_double_sum')) &
          call free_operator_is_the_double_sum(7, 5, .true.)
-      if (selected('free_operator_is_the_double_sum')) &
          call free_operator_is_the_double_sum(6, 8, .false.)
-      if (selected('free_operator_is_the_double_sum')) &
          call free_operator_is_the_double_sum(6, 8, .true.)
-      if (selected('free_operator_is_the_double_sum')) &
          call free_operator_is_the_double_sum(1, 3, .false.)
-      if (selected('free_operator_is_the_double_sum')) &
          call free_operator_is_the_double_sum(1, 3, .true.)
+      end if
       if (selected('inverse_undoes_the_operator')) call inverse_undoes_the_operator(.false.)
       if (selected('inverse_undoes_the_operator')) call inverse_undoes_the_operator(.true.)
       if (selected('units_beyond_single_precision')) call units_beyond_single_precision()

@@ -1,6 +1,6 @@
 !> Tests of the field algebra and of the projection.
 module test_field_sums
-   use asperity_parallel, only : set_threads
+   use asperity_threads, only : set_threads
    use asperity_precision, only : dp
    use check, only : begin_suite, check_close, check_that, selected
    use field_sums, only : cell_count, field_count, field_magnitude, field_maximum, field_mean, field_minimum, &

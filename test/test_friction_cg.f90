@@ -7,7 +7,7 @@ module test_friction_cg
       friction_solver_type, friction_thesis, new_friction_solver
    use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type, &
       new_friction_law
-   use asperity_parallel, only : set_threads, thread_count
+   use asperity_threads, only : set_threads, thread_count
    use friction_bounds, only : largest_excess, return_tractions
    use kernels, only : tangential_half_space
    use asperity_precision, only : dp, int8, pi

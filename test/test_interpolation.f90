@@ -8,7 +8,7 @@ module test_interpolation
    use omp_lib, only : omp_get_max_threads, omp_set_num_threads
    use asperity_precision, only : dp, pi
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
-   use surface_slopes, only : central_slopes, spectral_slopes
+   use surface_slopes, only : central_slopes
    implicit none
    private
 
@@ -355,10 +355,9 @@ contains
       end do
    end subroutine maps_of_few_cells
 
-   !> Spectral slopes of waves, Nyquist modes; central slopes and their order.
+   !> Central slopes of a wave, and of a plane up to the rim of a free map.
    subroutine slopes_of_waves()
       type(grid_type) :: grid
-      type(error_type), allocatable :: error
       real(dp), allocatable :: h(:, :), h_x(:, :), h_y(:, :), phase(:, :)
       real(dp) :: k_x, k_y
       integer :: i, j
@@ -374,26 +373,16 @@ contains
          end do
       end do
       h = 0.2_dp + sin(phase)
-      call spectral_slopes(grid, h, h_x, h_y, error)
-      call check_no_error(error, 'spectral slopes')
-      call check_close(maxval(abs(h_x - k_x*cos(phase))), 0.0_dp, 1.0e-12_dp, 'spectral slope, x')
-      call check_close(maxval(abs(h_y - k_y*cos(phase))), 0.0_dp, 1.0e-12_dp, 'spectral slope, y')
       call central_slopes(grid, h, h_x, h_y)
       call check_close(maxval(abs(h_x - sin(k_x*grid%dx)/grid%dx*cos(phase))), 0.0_dp, 1.0e-13_dp, &
          'central slope, x')
       call check_close(maxval(abs(h_y - sin(k_y*grid%dy)/grid%dy*cos(phase))), 0.0_dp, 1.0e-13_dp, &
          'central slope, y')
-      h = spread([(real(2*modulo(i, 2) - 1, dp), i = 1, 20)], 2, 15)
-      call spectral_slopes(grid, h, h_x, h_y, error)
-      call check_close(maxval(abs(h_x)) + maxval(abs(h_y)), 0.0_dp, 1.0e-13_dp, &
-         'the Nyquist mode has no slope at the cells')
       grid%boundary = boundary_free
       h = 0.3_dp*spread([(i*grid%dx, i = 1, 20)], 2, 15) - 0.1_dp*spread([(j*grid%dy, j = 1, 15)], 1, 20)
       call central_slopes(grid, h, h_x, h_y)
       call check_close(maxval(abs(h_x - 0.3_dp)) + maxval(abs(h_y + 0.1_dp)), 0.0_dp, 1.0e-14_dp, &
          'a free plane has its slope up to the rim')
-      call spectral_slopes(grid, h, h_x, h_y, error)
-      call check_error(error, 'periodic', 'spectral slopes of a free map')
    end subroutine slopes_of_waves
 
    !> The slope at the cells of a wave with 8 cells is too low by a factor that is known for both

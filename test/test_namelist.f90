@@ -3,8 +3,8 @@ module test_namelist
    use check, only : begin_suite, check_close, check_error, check_order, check_that, selected
    use input_faults, only : faults_type
    use input_group, only : group_values_type
-   use input_ranges, only : allowed_phrase, value_range
-   use input_reference, only : group_entries, variable_entries, variable_entry_type
+   use input_ranges, only : allowed_phrase
+   use input_reference, only : variable_entries, variable_entry_type
    use input_values, only : default_group
    use namelist_file, only : namelists_type, scan_namelists, shown_tokens
    use asperity_precision, only : dp

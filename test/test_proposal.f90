@@ -50,17 +50,40 @@ contains
          '&phase pressure = 2e4, velocity_x = 0.3, duration = 4e-3, steps = 2 /', 'adhesion')
    end subroutine propose_reject_advance
 
-   !> A row that is given up after any of its passes, in any part of its step, leaves the state of the row
-   !> before, and the run goes on to the same numbers.
+   !> Rows are given up whatever acts, those with friction between passes and within them.
    subroutine give_up_advance()
+      call give_up_case(slides, 3, 'friction')
+      call give_up_case(grid//rubber//' /'//nl//'&phase pressure = 1e5 /'//nl// &
+         '&phase pressure = 2e5, ramp = ''linear'', duration = 4e-3, steps = 2 /', 1, 'load')
+      call give_up_case(grid//rubber//' /'//nl//'&phase pressure = 1e5, velocity_x = 0.5, steady = .true., '// &
+         'duration = 2e-3, steps = 2 /'//nl//'&phase pressure = 1e5, velocity_x = 0.7, steady = .true. /', 2, &
+         'steady sliding and the way on in time')
+      call give_up_case(slides//'&phase pressure = 1e5, velocity_x = 0.5, steady = .true. /', 7, &
+         'steady sliding with friction')
+      call give_up_case(grid//rubber//' /'//nl//'&adhesion potential = ''exponential'', '// &
+         'energy = 0.05, range = 5e-5 /'//nl//'&phase pressure = 1e5 /'//nl// &
+         '&phase pressure = 2e4, velocity_x = 0.3, duration = 4e-3, steps = 2 /', 5, 'adhesion')
+      call give_up_case(grid//rubber//' /'//nl//'&solver method = ''thesis'' /'//nl//'&phase pressure = 1e5 /'//nl// &
+         '&phase pressure = 2e5 /', 4, 'the method of the thesis')
+      call give_up_case(grid//rubber//' /'//nl//'&solver method = ''thesis'' /'//nl// &
+         '&adhesion potential = ''exponential'', energy = 0.05, range = 5e-5 /'//nl// &
+         '&phase pressure = 1e5 /'//nl//'&phase pressure = 2e4 /', 9, 'adhesion by the method of the thesis')
+   end subroutine give_up_advance
+
+   !> A row that is given up at any iteration or pass, in any part of its step, leaves the state of the row
+   !> before, and the run goes on to the same numbers.
+   subroutine give_up_case(text, every, what)
+      character(*), intent(in) :: text, what
+      integer, intent(in) :: every                  !! of the places to give up that are tried
       type(simulation_type) :: plain, hesitant
       type(state_type) :: before
       type(case_type) :: case
       type(error_type), allocatable :: error
-      integer :: k, passes, given_up
+      integer :: first, given_up, k, places
 
-      call parse_case(slides, 'given_up.nml', case, error)
-      call check_no_error(error, 'given up: input')
+      call parse_case(text, 'given_up.nml', case, error)
+      call check_no_error(error, what//': input')
+      if (allocated(error)) return
       call new_simulation(plain, case, error)
       call new_simulation(hesitant, case, error)
       hesitant%stop%asked => asked
@@ -69,22 +92,23 @@ contains
       do k = 1, count_rows(case%phases)
          call plain%advance(error)
          before = hesitant%state
-         do passes = 0, plain%state%row%passes, 3
-            questions = passes
+         first = given_up
+         do places = 0, 10000, every
+            questions = places
             call hesitant%advance(error)
             if (.not. hesitant%stop%given_up) exit
             given_up = given_up + 1
-            call check_that(same(hesitant%state, before), 'given up: the state of the row before')
+            call check_that(same(hesitant%state, before), what//', given up: the state of the row before')
          end do
+         call check_that(given_up > first, what//': every row can be given up')
          questions = huge(1)
          if (hesitant%stop%given_up) call hesitant%advance(error)
-         call check_that(same(hesitant%state, plain%state), 'given up: the same numbers afterwards')
+         call check_that(same(hesitant%state, plain%state), what//', given up: the same numbers afterwards')
       end do
-      call check_that(given_up > 10, 'given up: many times')
-      call check_that(hesitant%finished, 'given up: finished')
+      call check_that(hesitant%finished, what//', given up: finished')
       call plain%destroy()
       call hesitant%destroy()
-   end subroutine give_up_advance
+   end subroutine give_up_case
 
    !> Is a stop asked for? No, as often as `questions` says, then yes.
    function asked() bind(c) result(yes)

@@ -27,12 +27,11 @@ contains
 
    subroutine run_schur()
       call begin_suite('schur')
-      if (selected('preconditioner_is_the_schur_complement')) &
+      if (selected('preconditioner_is_the_schur_complement')) then
          call preconditioner_is_the_schur_complement(boundary_periodic, 24, 16, 1.0_dp)
-      if (selected('preconditioner_is_the_schur_complement')) &
          call preconditioner_is_the_schur_complement(boundary_periodic, 23, 17, 1.5_dp)
-      if (selected('preconditioner_is_the_schur_complement')) &
          call preconditioner_is_the_schur_complement(boundary_free, 19, 21, 1.0_dp)
+      end if
       if (selected('iterations_stay_few_at_every_load')) call iterations_stay_few_at_every_load()
    end subroutine run_schur
 
@@ -114,7 +113,7 @@ contains
       do jb = 1, s%coarse%ny
          do j = s%coarse%first_y(jb), s%coarse%first_y(jb + 1) - 1
             do i = 1, s%grid%nx
-               out(i, j) = s%preconditioner%image(i, j) + s%preconditioner%pending(s%coarse%block_x(i), jb)
+               out(i, j) = s%preconditioner%image(i, j) + s%preconditioner%blocks%pending(s%coarse%block_x(i), jb)
                if (s%preconditioner%length > 0.0_sp) &
                   out(i, j) = out(i, j) + s%preconditioner%length*s%preconditioner%response(i, j)
             end do

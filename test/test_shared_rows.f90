@@ -6,10 +6,9 @@ module test_shared_rows
    use asperity_interpolation, only : displaced, interpolation_type, new_interpolation, shifted
    use asperity_precision, only : dp, int8
    use carried_field, only : carry, shift_field, shift_states
-   use check, only : begin_suite, check_close, check_no_error, selected
+   use check, only : begin_suite, check_close, check_no_error, check_that, selected
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
-   use row_fetch, only : fetch_rows, foreign_rows
-   use surface_slopes, only : spectral_slopes
+   use row_halo, only : fetch_rows, new_range_halo, row_halo_type
    implicit none
    private
 
@@ -26,7 +25,6 @@ contains
       if (selected('fields_shift_by_whole_cells')) call fields_shift_by_whole_cells()
       if (selected('fields_are_carried')) call fields_are_carried()
       if (selected('roads_are_read_across_rows')) call roads_are_read_across_rows()
-      if (selected('spectral_slopes_cross_rows')) call spectral_slopes_cross_rows()
    end subroutine run_shared_rows
 
    !> Any number, another one in each cell.
@@ -86,9 +84,9 @@ contains
    subroutine rows_come_from_their_owners()
       integer, parameter :: boundaries(2) = [boundary_periodic, boundary_free]
       type(grid_type) :: grid
-      real(dp), allocatable :: field(:, :), rows(:, :)
-      integer, allocatable :: list(:)
-      integer :: b, k, n, range(2)
+      type(row_halo_type) :: halo
+      real(dp), allocatable :: beside(:, :), field(:, :), rows(:, :)
+      integer :: b, i, k, n, range(2)
 
       do b = 1, 2
          do k = 1, size(sizes, 2)
@@ -111,10 +109,12 @@ contains
                allocate (rows(grid%nx, max(0, range(2) - range(1) + 1)), source=-1.0_dp)
                call fetch_rows(grid, field, range, rows)
                call check_close(difference(grid, rows, range(1), 1), 0.0_dp, 0.0_dp, 'rows of the range')
-               list = foreign_rows(grid, range)
-               call fetch_rows(grid, field, range, rows, only_foreign=.true.)
-               call check_close(sum(abs(rows(1, :size(list)) - value(1, list))), 0.0_dp, 0.0_dp, &
+               call new_range_halo(halo, grid, range)
+               beside = reshape([field, [(-1.0_dp, i=1, grid%nx*halo%foreign)]], [grid%nx, halo%own + halo%foreign])
+               call halo%fetch(beside)
+               call check_close(sum(abs(beside(1, halo%own + 1:) - value(1, halo%row))), 0.0_dp, 0.0_dp, &
                   'rows of other processes')
+               call check_that(all(halo%place(halo%row) == halo%own + [(i, i=1, halo%foreign)]), 'their places')
                deallocate (rows)
             end do
          end do
@@ -248,28 +248,5 @@ contains
       end subroutine check_same
 
    end subroutine roads_are_read_across_rows
-
-   !> The same for slopes from the spectrum.
-   subroutine spectral_slopes_cross_rows()
-      type(error_type), allocatable :: error
-      type(grid_type) :: grid, whole
-      real(dp), allocatable :: field(:, :), all(:, :), h(:, :, :), g(:, :, :)
-      integer :: i, j, k
-
-      do k = 1, size(sizes, 2)
-         call new_field(k, boundary_periodic, grid, field)
-         whole = new_grid(grid%nx, grid%ny, grid%lx, grid%ly, grid%boundary)
-         allocate (all(grid%nx, grid%ny), h(grid%nx, grid%rows(), 2), g(grid%nx, grid%ny, 2))
-         do j = 1, grid%ny
-            all(:, j) = value([(i, i=1, grid%nx)], j)
-         end do
-         call spectral_slopes(grid, field, h(:, :, 1), h(:, :, 2), error)
-         call check_no_error(error, 'shared')
-         call spectral_slopes(whole, all, g(:, :, 1), g(:, :, 2), error)
-         call check_no_error(error, 'whole')
-         call check_close(sum(abs(h - g(:, grid%first_row:grid%last_row, :))), 0.0_dp, 0.0_dp, 'slopes')
-         deallocate (all, h, g)
-      end do
-   end subroutine spectral_slopes_cross_rows
 
 end module test_shared_rows

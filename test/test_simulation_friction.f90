@@ -4,9 +4,9 @@ module test_simulation_friction
    use case_settings, only : case_type
    use check, only : begin_suite, check_close, check_no_error, check_order, check_that, selected
    use asperity_errors, only : error_type
-   use asperity_parallel, only : set_threads
+   use asperity_threads, only : set_threads
    use friction_bounds, only : largest_excess
-   use asperity_precision, only : dp, int8, pi
+   use asperity_precision, only : dp, int8
    use asperity_simulation, only : new_simulation, simulation_type
    use simulation_runs, only : check_books, check_same_rows, last, nl, record_type, run_case
    use text_tools, only : exact_text, to_text
@@ -38,7 +38,6 @@ contains
       if (selected('all_sticks_or_all_slips')) call all_sticks_or_all_slips()
       if (selected('same_result_on_two_threads')) call same_result_on_two_threads()
       if (selected('numerical_stick_slip_is_reported')) call numerical_stick_slip_is_reported()
-      if (selected('stick_slip_is_reported_once')) call stick_slip_is_reported_once()
       if (selected('contact_sticks_until_the_road_moves')) &
          call contact_sticks_until_the_road_moves()
       if (selected('cylinder_of_the_thesis')) call cylinder_of_the_thesis()
@@ -233,7 +232,8 @@ contains
 
    !> A thick elastic block on a short wave in one pass a step, with the ripples that linear interpolation
    !> leaves on the friction from cell to cell: the scheme sticks and slips in turn,
-   !> which is reported once. A mass ends it; a smooth case is silent.
+   !> which is reported once, also by a run after a restart (python/tests/test_stops.py). A mass ends it; a smooth
+   !> case is silent.
    subroutine numerical_stick_slip_is_reported()
       character(*), parameter :: report = 'numerical stick-slip'
       type(record_type) :: record
@@ -287,21 +287,6 @@ contains
       end subroutine slide
 
    end subroutine numerical_stick_slip_is_reported
-
-   !> The watch warns once. (That the warning comes at the same step after a restart is tested with
-   !> whole runs, in python/tests/test_stops.py.)
-   subroutine stick_slip_is_reported_once()
-      type(stick_slip_watch_type) :: watch
-      character(:), allocatable :: message
-      integer :: k, warnings
-
-      warnings = 0
-      do k = 1, 20
-         call watch_slip(watch, merge(1.2_dp, 0.8_dp, mod(k, 2) == 0), 1.0_dp, 2, 0.0_dp, message)
-         if (len(message) > 0) warnings = warnings + 1
-      end do
-      call check_that(warnings == 1, 'the watch warns once')
-   end subroutine stick_slip_is_reported_once
 
    !> Where friction is on, what touches sticks until the road moves; without friction it slips.
    subroutine contact_sticks_until_the_road_moves()

@@ -5,7 +5,7 @@ module test_simulation_pull
    use check, only : begin_suite, check_close, check_error, check_no_error, check_order, &
       check_that, selected
    use asperity_errors, only : error_type
-   use asperity_precision, only : dp, pi
+   use asperity_precision, only : dp
    use asperity_simulation, only : new_simulation, simulation_type
    use simulation_runs, only : check_books, last, nl, record_type, run_case
    use text_tools, only : exact_text
@@ -20,14 +20,12 @@ contains
       call begin_suite('simulation_pull')
       if (selected('mindlin_cycle_under_a_force')) call mindlin_cycle_under_a_force()
       if (selected('sticking_block_creeps')) call sticking_block_creeps()
-      if (selected('pulled_road_goes_as_a_driven_one')) &
+      if (selected('pulled_road_goes_as_a_driven_one')) then
          call pulled_road_goes_as_a_driven_one('.true.', 'fast')
-      if (selected('pulled_road_goes_as_a_driven_one')) &
          call pulled_road_goes_as_a_driven_one('.false.', 'fast')
-      if (selected('pulled_road_goes_as_a_driven_one')) &
          call pulled_road_goes_as_a_driven_one('.true.', 'thesis')
-      if (selected('pulled_road_goes_as_a_driven_one')) &
          call pulled_road_goes_as_a_driven_one('.false.', 'thesis')
+      end if
       if (selected('far_way_is_reported_once')) call far_way_is_reported_once()
       if (selected('pull_beyond_friction_is_reported')) call pull_beyond_friction_is_reported()
       if (selected('pulled_mass_accelerates')) call pulled_mass_accelerates()

@@ -2,7 +2,7 @@
 module test_simulation_sliding
    use check, only : begin_suite, check_close, check_order, check_that, selected
    use asperity_errors, only : error_type
-   use asperity_parallel, only : set_threads
+   use asperity_threads, only : set_threads
    use asperity_precision, only : dp, pi
    use real_transform, only : destroy_real_transform, new_real_transform, real_transform_type, &
       to_spectrum

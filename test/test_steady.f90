@@ -5,7 +5,7 @@ module test_steady
    use check, only : begin_suite, check_close, check_no_error, check_order, check_that, selected
    use asperity_errors, only : error_type
    use asperity_interpolation, only : interpolation_type, new_interpolation
-   use asperity_parallel, only : set_threads, thread_count
+   use asperity_threads, only : set_threads, thread_count
    use asperity_precision, only : dp, pi
    use prony, only : complex_modulus
    use asperity_schedule, only : planned_row_type

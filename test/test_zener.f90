@@ -3,7 +3,7 @@ module test_zener
    use check, only : begin_suite, check_close, check_error, check_no_error, check_order, &
       check_that, selected
    use asperity_errors, only : error_type
-   use asperity_parallel, only : set_threads, thread_count
+   use asperity_threads, only : set_threads, thread_count
    use asperity_precision, only : dp
    use prony, only : creep_compliance, relaxation_modulus, retardation_spectrum, zener_to_prony
    use relaxation_functions, only : mean_decay, mean_rise, parabola_work, slope_response, &

@@ -1,9 +1,11 @@
-"""Write python/asperity/runs/group_types.py: what type checkers and editors know of the input.
+"""Write what type checkers, editors and a page know of the input and of the history.
 
-    python tools/make_types.py            writes the module
-    python tools/make_types.py --check    ends with status 1 if it is not what it should be
+    python tools/make_types.py            writes the files
+    python tools/make_types.py --check    ends with status 1 if they are not what they should be
 
-The names, types and words come from the table of the input in the Fortran library.
+`python/asperity/runs/group_types.py` holds the groups of an input, from the table of the input in
+the Fortran library; `python/asperity/results/column_types.py` and the table of the history in
+`docs/result_file.md` hold the columns of the history, from the table in `src/io/history_row.f90`.
 """
 
 from __future__ import annotations
@@ -11,11 +13,16 @@ from __future__ import annotations
 import argparse
 import re
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from asperity.runs import namelists
+from asperity.runs.row import Column, columns
 
-TARGET = Path(__file__).resolve().parent.parent / "python/asperity/runs/group_types.py"
+ROOT = Path(__file__).resolve().parent.parent
+GROUPS = ROOT / "python/asperity/runs/group_types.py"
+COLUMNS = ROOT / "python/asperity/results/column_types.py"
+PAGE = ROOT / "docs/result_file.md"
 
 HEAD = '''"""The groups of an input and their variables, for type checkers and editors.
 
@@ -137,21 +144,66 @@ def write_case(entries: list[namelists.GroupEntry]) -> str:
     return "\n".join([*text, "", "    if TYPE_CHECKING:", signature])
 
 
-def main() -> int:
-    """Write the module, or compare it."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--check", action="store_true")
-    wanted = parser.parse_args()
-    entries = list(namelists.table().values())
+def write_groups(entries: list[namelists.GroupEntry]) -> str:
+    """Return the module of the groups."""
     topography = ('class HasHeights(Protocol):\n'
                   '    """A topography of SurfaceTopography."""\n\n'
                   "    def heights(self) -> Any: ...")
     head = HEAD.replace("Literal, TypedDict", "Literal, Protocol, TypedDict")
     body = "\n\n\n".join([topography, *map(write_group, entries), write_case(entries)])
-    text = f"{head}\n\n{body}\n"
-    if not wanted.check:
-        TARGET.write_text(text)
-    return int(TARGET.read_text() != text)
+    return f"{head}\n\n{body}\n"
+
+
+COLUMNS_HEAD = '''"""The columns of the history, for type checkers and editors.
+
+Written by `tools/make_types.py` from the program's table of the columns.
+"""
+
+# ruff: noqa: E501
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+'''
+
+
+def write_columns(found: Sequence[Column]) -> str:
+    """Return the module of the columns: one value of each in a row, arrays in a history."""
+    text = [COLUMNS_HEAD]
+    for name, what, whole, real in [
+            ("RowColumns", "One row of the history.", "int", "float"),
+            ("HistoryColumns", "The history: one value per row.", "NDArray[np.int32]",
+             "NDArray[np.float64]")]:
+        text += ["", f"class {name}:", f'    """{what}"""', ""]
+        text += [f"    {column.name}: {whole if column.is_whole else real}  # {column.long_name}"
+                 + ("" if column.units == "1" or column.is_whole else f", {column.units}")
+                 for column in found]
+        text += [""]
+    return "\n".join(text)
+
+
+def write_page(found: Sequence[Column]) -> str:
+    """Return the page on the result file with the table of the columns."""
+    rows = [f"| `{column.name}` | {'-' if column.units == '1' else column.units} | "
+            f"{column.long_name} |" for column in found]
+    before, history = PAGE.read_text().split("## `/history`", 1)
+    table = re.compile(r"(?<=\n\| --- \| --- \| --- \|\n)(\| .*\n)*?(?=\| `checksum` )")
+    lines = "".join(f"{row}\n" for row in rows)
+    return f"{before}## `/history`{table.sub(lambda _: lines, history, count=1)}"
+
+
+def main() -> int:
+    """Write the files, or compare them."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--check", action="store_true")
+    wanted = parser.parse_args()
+    texts = {GROUPS: write_groups(list(namelists.table().values())),
+             COLUMNS: write_columns(columns()), PAGE: write_page(columns())}
+    for path, text in texts.items():
+        if not wanted.check:
+            path.write_text(text)
+    return int(any(path.read_text() != text for path, text in texts.items()))
 
 
 if __name__ == "__main__":

@@ -4,11 +4,13 @@
     python tools/mpi_campaign.py --minutes 10 [--seed 1] [--physics elastic,friction]
     python tools/mpi_campaign.py --seed 17 --trials 1 --physics friction
 
-Every trial draws a case of one physics from its own seed: the grid, the boundary, the law, the
-scheme and the phases. The program without MPI runs it with one thread, the program with MPI with
-some numbers of processes from 1 to 8 and of threads. All columns of the history but the wall time
-and all fields must agree in every bit, and so must the exit status and the message. `--restarts`
-also continues each run from one of its checkpoints with another number of processes.
+Every trial draws a case of one physics from its own seed: the grid, the boundary, the road, which
+may be a height map in a file, the law, the scheme and the phases. 'huge' has so many cells that the
+processes divide the coarse level of the preconditioner. The program without MPI runs it with one
+thread, the program with MPI with some numbers of processes from 1 to 8 and of threads. All columns
+of the history but the wall time and all fields must agree in every bit, and so must the exit status
+and the message. `--restarts` also continues each run from one of its checkpoints with another
+number of processes.
 
 Where something differs, the seed, the command and what differs are printed, and the files are kept.
 The exit status is 1 if any trial failed. The programs are those in `.venv/bin`, which must be of
@@ -90,7 +92,9 @@ class Draw:
     def __init__(self, seed, physics):
         """Start from a seed."""
         self.random = random.Random(f"{physics}{seed}")
+        self.maps = random.Random(f"maps{physics}{seed}")
         self.physics = physics
+        self.height = None  # of the map in the file map.h5, if the case has one
 
     def group(self, name, **values):
         """Return a namelist group."""
@@ -113,7 +117,7 @@ class Draw:
         physics = self.physics
         free = physics != "steady" and r.random() < 0.5
         self.moving = physics in ("sliding", "friction", "steady")
-        self.large = physics == "large"
+        self.large = physics in ("large", "huge")
         if self.large:
             self.moving = r.random() < 0.3
         most = 40 if self.moving or physics == "adhesion" else 80
@@ -126,6 +130,9 @@ class Draw:
             # Several threads are at work, and the preconditioner extends the residual.
             nx, ny, line = r.randint(363, 620), r.randint(363, 620), False
             free = r.random() < 0.2
+        if physics == "huge":
+            nx, ny = r.choice([(1024, 1024), (1100, 990), (1031, 1033)])
+            self.moving = False
         lx = 1e-3
         ly = lx * ny / nx * r.choice([1.0, 1.0, 0.7, 1.5]) if not line else lx
         text = self.group(
@@ -154,6 +161,8 @@ class Draw:
     def surface(self, nx, ny, lx, ly):
         """Return one or two terms of a surface."""
         r = self.random
+        if not self.large and self.maps.random() < 0.15:
+            return self.height_map(nx, ny, lx)
         shape = r.choice(["self_affine", "self_affine", "paraboloid", "sine", "cylinder", "sphere"])
         slope = r.uniform(0.03, 0.25)
         if shape == "self_affine" and min(nx, ny if ny > 1 else nx) < 8:
@@ -176,6 +185,17 @@ class Draw:
                 "surface", shape=shape, amplitude=slope * lx / 6.3, wavelength=lx
             ) + self.group("surface", shape="paraboloid", radius=lx / slope)
         return self.group("surface", shape=shape, radius=lx / slope)
+
+    def height_map(self, nx, ny, lx):
+        """Draw a rough map for a file and return the surface that reads it."""
+        noise = np.random.default_rng(self.maps.randrange(10**6)).standard_normal((ny, nx))
+        spectrum = np.fft.rfft2(noise)
+        waves = np.hypot(np.fft.fftfreq(ny)[:, None] * ny, np.fft.rfftfreq(nx) * nx)
+        spectrum[waves > max(nx, ny) / 8] = 0.0
+        height = np.fft.irfft2(spectrum / np.maximum(waves, 1.0), (ny, nx))
+        self.height = height / max(np.ptp(height), 1e-300) * self.maps.uniform(0.01, 0.06) * lx
+        scale = self.maps.choice([1.0, 1.0, 0.5])
+        return self.group("surface", shape="file", file="map.h5", scale=scale)
 
     def material(self, viscoelastic, free):
         """Return a material."""
@@ -289,9 +309,14 @@ class Trial:
         """Draw the case."""
         self.options = options
         self.folder = folder
+        self.patience = PATIENCE * (5.0 if physics == "huge" else 1.0)
         self.random = random.Random(f"numbers{seed}")
         self.case = folder / "case.nml"
-        self.case.write_text(Draw(seed, physics).case())
+        draw = Draw(seed, physics)
+        self.case.write_text(draw.case())
+        if draw.height is not None:
+            with h5py.File(folder / "map.h5", "w") as file:
+                file.create_dataset("surface/height", data=draw.height)
         self.faults = []
 
     def call(self, command, name, *more):
@@ -304,7 +329,7 @@ class Trial:
                 cwd=self.folder,
                 capture_output=True,
                 text=True,
-                timeout=PATIENCE,
+                timeout=self.patience,
                 env=environment,
                 check=False,
             )
@@ -371,7 +396,7 @@ class Trial:
         run = subprocess.Popen(
             words, cwd=self.folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
-        end = time.monotonic() + PATIENCE
+        end = time.monotonic() + self.patience
         while run.poll() is None and time.monotonic() < end:
             try:
                 if kept and kept[-1].samefile(checkpoint):
@@ -387,7 +412,7 @@ class Trial:
         return kept
 
 
-PHYSICS = ["elastic", "viscoelastic", "sliding", "adhesion", "friction", "steady", "large"]
+PHYSICS = ["elastic", "viscoelastic", "sliding", "adhesion", "friction", "steady", "large", "huge"]
 
 
 def read_options():

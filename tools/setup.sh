@@ -2,7 +2,7 @@
 # fpm, python and the other tools on PATH. Afterwards it does nothing.
 set -eu
 
-packages="gcc gfortran libc6-dev pkg-config libfftw3-dev libhdf5-dev python3 python3-dev python3-venv"
+packages="gcc gfortran libc6-dev pkg-config libfftw3-dev libhdf5-dev zlib1g-dev python3 python3-dev python3-venv"
 if command -v apt-get >/dev/null 2>&1; then
   if ! dpkg -s $packages >/dev/null 2>&1; then
     sudo=
@@ -18,14 +18,14 @@ else
     command -v $tool >/dev/null 2>&1 || missing="$missing $tool"
   done
   if command -v pkg-config >/dev/null 2>&1; then
-    for library in fftw3 fftw3f hdf5; do
+    for library in fftw3 fftw3f hdf5 zlib; do
       pkg-config --exists $library || missing="$missing $library"
     done
   fi
   if [ -n "$missing" ]; then
     echo "asperity: not found:$missing" >&2
     echo "asperity: install gcc, gfortran, pkg-config, FFTW 3 (double and single)," >&2
-    echo "asperity: HDF5, and Python 3.10 or newer; docs/install.md" >&2
+    echo "asperity: HDF5, zlib, and Python 3.10 or newer; docs/install.md" >&2
     echo "asperity: lists the packages of conda-forge and Homebrew." >&2
     exit 1
   fi

@@ -1,11 +1,12 @@
 !> Operators in hand, known to Python by a number. Not seen by f2py, which has no derived types.
 module operator_handles
+   use asperity_errors, only : error_input, error_type, fail
    use fft_conv, only : convolution_type
    use asperity_precision, only : dp
    implicit none
    private
 
-   public :: free_operator, new_operator, operator_of, operator_type
+   public :: find_operator, free_operator, new_operator, operator_type
 
    integer, parameter :: most = 256     !! operators at a time
 
@@ -26,34 +27,40 @@ module operator_handles
 
 contains
 
-   !> Make an operator; the handle is 0 if there are too many.
-   subroutine new_operator(handle)
-      integer, intent(out) :: handle
+   !> Make an operator.
+   subroutine new_operator(handle, operator, error)
+      integer, intent(out) :: handle               !! 0 after an error
+      type(operator_type), pointer, intent(out) :: operator
+      type(error_type), allocatable, intent(out) :: error
       integer :: i
 
       handle = 0
+      operator => null()
       do i = 1, most
          if (slots(i)%handle /= 0) cycle
          last_handle = last_handle + 1
          slots(i)%handle = last_handle
          handle = last_handle
          allocate (slots(i)%operator)
+         operator => slots(i)%operator
          return
       end do
+      call fail(error, error_input, 'too many operators are open')
    end subroutine new_operator
 
-   !> The operator of a handle, null for a handle that is not in use.
-   function operator_of(handle) result(operator)
+   !> The operator of a handle that must be in use.
+   subroutine find_operator(handle, operator, error)
       integer, intent(in) :: handle
-      type(operator_type), pointer :: operator
+      type(operator_type), pointer, intent(out) :: operator
+      type(error_type), allocatable, intent(out) :: error
       integer :: i
 
       operator => null()
-      if (handle <= 0) return
       do i = 1, most
-         if (slots(i)%handle == handle) operator => slots(i)%operator
+         if (handle > 0 .and. slots(i)%handle == handle) operator => slots(i)%operator
       end do
-   end function operator_of
+      if (.not. associated(operator)) call fail(error, error_input, 'the operator is closed')
+   end subroutine find_operator
 
    !> Free an operator and its plans.
    subroutine free_operator(handle)

@@ -2,14 +2,16 @@
 !> types. A run writes files; a driven simulation is advanced row by row and writes none.
 module run_handles
    use case_run, only : run_type
+   use asperity_errors, only : error_input, error_type, fail
    use asperity_precision, only : dp
    use asperity_simulation, only : simulation_type
    implicit none
    private
 
-   public :: driven_of, driven_type, free_driven, free_run, new_driven, new_run, run_of, sim_of
+   public :: driven_of, driven_type, find_driven, find_run, find_sim, free_handle, new_driven, new_run, run_of
 
    integer, parameter :: most = 64      !! runs at a time, and simulations
+   character(*), parameter :: closed_simulation = 'the simulation is closed'
 
    !> A simulation, with what it was before anyone steered it.
    type :: driven_type
@@ -43,27 +45,51 @@ contains
       end do
    end function slot_of
 
-   !> Give a free slot a new handle; null if there are too many.
-   function new_slot() result(slot)
-      type(slot_type), pointer :: slot
-
-      slot => slot_of(0)
-      if (.not. associated(slot)) return
-      last_handle = last_handle + 1
-      slot%handle = last_handle
-   end function new_slot
-
-   !> Make a run; the handle is 0 if there are too many.
-   subroutine new_run(handle)
+   !> Give a free slot a new handle; 0 and null if there are too many.
+   subroutine new_slot(what, handle, slot, error)
+      character(*), intent(in) :: what             !! it is for
       integer, intent(out) :: handle
-      type(slot_type), pointer :: slot
+      type(slot_type), pointer, intent(out) :: slot
+      type(error_type), allocatable, intent(out) :: error
 
       handle = 0
-      slot => new_slot()
-      if (.not. associated(slot)) return
+      slot => slot_of(0)
+      if (.not. associated(slot)) then
+         call fail(error, error_input, 'too many '//what//' are open: close some')
+         return
+      end if
+      last_handle = last_handle + 1
+      slot%handle = last_handle
+      handle = last_handle
+   end subroutine new_slot
+
+   !> Make a run.
+   subroutine new_run(handle, run, error)
+      integer, intent(out) :: handle               !! 0 after an error
+      type(run_type), pointer, intent(out) :: run
+      type(error_type), allocatable, intent(out) :: error
+      type(slot_type), pointer :: slot
+
+      run => null()
+      call new_slot('runs', handle, slot, error)
+      if (allocated(error)) return
       allocate (slot%run)
-      handle = slot%handle
+      run => slot%run
    end subroutine new_run
+
+   !> Make a simulation.
+   subroutine new_driven(handle, driven, error)
+      integer, intent(out) :: handle               !! 0 after an error
+      type(driven_type), pointer, intent(out) :: driven
+      type(error_type), allocatable, intent(out) :: error
+      type(slot_type), pointer :: slot
+
+      driven => null()
+      call new_slot('simulations', handle, slot, error)
+      if (allocated(error)) return
+      allocate (slot%driven)
+      driven => slot%driven
+   end subroutine new_driven
 
    !> The run of a handle, null for a handle that is none of a run.
    function run_of(handle) result(run)
@@ -77,30 +103,6 @@ contains
       if (associated(slot)) run => slot%run
    end function run_of
 
-   !> Forget a run that is closed.
-   subroutine free_run(handle)
-      integer, intent(in) :: handle
-      type(slot_type), pointer :: slot
-
-      if (.not. associated(run_of(handle))) return
-      slot => slot_of(handle)
-      deallocate (slot%run)
-      slot%run => null()
-      slot%handle = 0
-   end subroutine free_run
-
-   !> Make a simulation; the handle is 0 if there are too many.
-   subroutine new_driven(handle)
-      integer, intent(out) :: handle
-      type(slot_type), pointer :: slot
-
-      handle = 0
-      slot => new_slot()
-      if (.not. associated(slot)) return
-      allocate (slot%driven)
-      handle = slot%handle
-   end subroutine new_driven
-
    !> The simulation of a handle, null for a handle that is none of a simulation.
    function driven_of(handle) result(driven)
       integer, intent(in) :: handle
@@ -113,22 +115,31 @@ contains
       if (associated(slot)) driven => slot%driven
    end function driven_of
 
-   !> Forget a simulation that is destroyed.
-   subroutine free_driven(handle)
+   !> The run of a handle that must be in use.
+   subroutine find_run(handle, run, error)
       integer, intent(in) :: handle
-      type(slot_type), pointer :: slot
+      type(run_type), pointer, intent(out) :: run
+      type(error_type), allocatable, intent(out) :: error
 
-      if (.not. associated(driven_of(handle))) return
-      slot => slot_of(handle)
-      deallocate (slot%driven)
-      slot%driven => null()
-      slot%handle = 0
-   end subroutine free_driven
+      run => run_of(handle)
+      if (.not. associated(run)) call fail(error, error_input, 'the run is closed')
+   end subroutine find_run
 
-   !> The state behind a handle of either kind, null for a handle that is not in use.
-   function sim_of(handle) result(sim)
+   !> The simulation of a handle that must be in use.
+   subroutine find_driven(handle, driven, error)
       integer, intent(in) :: handle
-      type(simulation_type), pointer :: sim
+      type(driven_type), pointer, intent(out) :: driven
+      type(error_type), allocatable, intent(out) :: error
+
+      driven => driven_of(handle)
+      if (.not. associated(driven)) call fail(error, error_input, closed_simulation)
+   end subroutine find_driven
+
+   !> The state behind a handle of either kind, which must be in use.
+   subroutine find_sim(handle, sim, error)
+      integer, intent(in) :: handle
+      type(simulation_type), pointer, intent(out) :: sim
+      type(error_type), allocatable, intent(out) :: error
       type(driven_type), pointer :: driven
       type(run_type), pointer :: run
 
@@ -137,6 +148,20 @@ contains
       run => run_of(handle)
       if (associated(driven)) sim => driven%sim
       if (associated(run)) sim => run%sim
-   end function sim_of
+      if (.not. associated(sim)) call fail(error, error_input, closed_simulation)
+   end subroutine find_sim
+
+   !> Forget a run that is closed, or a simulation that is destroyed; a handle that is not in use is no error.
+   subroutine free_handle(handle)
+      integer, intent(in) :: handle
+      type(slot_type), pointer :: slot
+
+      if (handle <= 0) return
+      slot => slot_of(handle)
+      if (.not. associated(slot)) return
+      if (associated(slot%run)) deallocate (slot%run)
+      if (associated(slot%driven)) deallocate (slot%driven)
+      slot%handle = 0
+   end subroutine free_handle
 
 end module run_handles

@@ -137,3 +137,29 @@ def test_mass_moves_on_through_a_jump(tmp_path):
     speed = np.sqrt(2 * history["energy_kinetic"][11] / (0.5 * 1e4 * 1e-3 * 0.7e-6))
     assert history["sliding_speed"][11] == pytest.approx(speed, rel=1e-6)
     assert (np.diff(history["dissipated_friction"]) >= 0).all()
+
+
+def test_slow_sliding_under_a_pull(tmp_path):
+    """A wavy road on lossy rubber, pulled by its friction at a speed, slides at that speed."""
+    speed = 2e-3
+    start = ("&grid nx = 32, ny = 1, lx = 1e-3 /\n"
+             "&surface shape = 'sine', amplitude = 8e-6, wavelength = 1e-3 /\n"
+             "&material shear_modulus = 1e6, prony_g = 3e6, prony_tau = 1e-2, thickness = 1e-3, "
+             "density = {density} /\n&friction law = 'coulomb', coefficient = 0.05 /\n"
+             "&phase pressure = 3e4, duration = 0.1, steps = 10 /\n{phases}"
+             "&solver threads = 1 /\n&output file = '{file}' /\n")
+    (tmp_path / "driven.nml").write_text(start.format(
+        density=0, file=tmp_path / "driven.h5",
+        phases=f"&phase velocity_x = {speed}, duration = 1, steps = 128 /\n"))
+    driven = asperity.run(tmp_path / "driven.nml", quiet=True).history
+    late = driven["road_x"] > 1.001e-3
+    pull = float(driven["traction_x"][late].mean())
+    assert driven["friction_viscous"][late].mean() > 0.01, "the rubber holds a part of the pull"
+    (tmp_path / "pulled.nml").write_text(start.format(
+        density=1e5, file=tmp_path / "pulled.h5",
+        phases=f"&phase traction_x = {pull!r}, ramp = 'linear', duration = 0.6, steps = 150 /\n"
+        f"&phase traction_x = {pull!r}, duration = 0.9, steps = 225 /\n"))
+    pulled = asperity.run(tmp_path / "pulled.nml", quiet=True).history
+    late = pulled["time"] > 1.1
+    found = np.polyfit(pulled["time"][late], pulled["road_x"][late], 1)[0]
+    assert found == pytest.approx(speed, rel=2e-3)

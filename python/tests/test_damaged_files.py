@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import subprocess
+import zlib
 from pathlib import Path
 
 import h5py
@@ -235,3 +236,46 @@ def test_damaged_field_in_python(program: str, tmp_path: Path) -> None:
     assert snapshot.pressure.max() > 0.0
     with pytest.raises(OSError, match=r"y\.h5: cannot be read: "):
         _ = snapshot.gap
+
+
+@pytest.mark.parametrize("compression", [0, 1, 9])
+def test_chunks_are_as_the_filters_of_the_file_say(program: str, tmp_path: Path, compression: int
+                                                   ) -> None:
+    """Programs other than HDF5 undo the filters of a chunk; threads do not change a byte."""
+    chunks = {}
+    for threads in (1, 3):
+        case = tmp_path / f"case{threads}.nml"
+        case.write_text("&grid nx = 600, ny = 500, lx = 1e-3 /\n"
+                        "&surface shape = 'self_affine', rms_slope = 0.2, hurst = 0.8,"
+                        " wavelength_long = 2e-4, wavelength_short = 1e-5 /\n"
+                        "&material shear_modulus = 1e6 /\n&phase pressure = 1e5 /\n"
+                        f"&output compression = {compression} /\n&solver threads = {threads} /\n")
+        subprocess.run([program, "run", case, "--quiet"], check=True)
+        with h5py.File(case.with_suffix(".h5")) as file:
+            snapshot = file["snapshots/000000"]
+            for name in ("pressure", "gap", "displacement_z", "road_height", "contact"):
+                field = snapshot[name]
+                assert field.chunks == (218, 600) and field.id.get_num_chunks() == 3
+                assert field.fletcher32 and field.shuffle == (compression > 0)
+                rows = []
+                for first in range(0, 500, 218):
+                    mask, stored = field.id.read_direct_chunk((first, 0))
+                    assert mask == 0
+                    chunks.setdefault((name, first), stored)
+                    assert chunks[name, first] == stored
+                    rows.append(undone(stored, field.dtype, compression))
+                assert not rows[-1][500 % 218 * 600:].any()      # what is beyond the field
+                assert np.array_equal(np.concatenate(rows)[:field.size].reshape(field.shape),
+                                      field[...])
+                if compression and name == "displacement_z":     # six of eight bytes are random
+                    assert 0.7 < sum(map(len, (chunks[name, k] for k in (0, 218)))) / (
+                        2 * 218 * 600 * 8) < 0.9
+
+
+def undone(stored: bytes, dtype: np.dtype, compression: int) -> np.ndarray:
+    """Return the values of a chunk from what is stored, without HDF5."""
+    body = stored[:-4]
+    if not compression:
+        return np.frombuffer(body, dtype)
+    planes = np.frombuffer(zlib.decompress(body), np.uint8).reshape(dtype.itemsize, -1)
+    return np.ascontiguousarray(planes.T).view(dtype).ravel()

@@ -113,7 +113,7 @@ def run_fortran(path, build):
     if not library.is_file() or compiler is None:
         pytest.skip("needs the library of an installation in place, and a compiler")
     subprocess.run([compiler, "-Wall", "-Werror", "-fopenmp", f"-I{modules}", str(path),
-                    str(library), "-lhdf5_serial", "-lfftw3_omp", "-lfftw3", "-lfftw3f_omp",
+                    str(library), "-lhdf5_serial", "-lz", "-lfftw3_omp", "-lfftw3", "-lfftw3f_omp",
                     "-lfftw3f", "-o", "program"], check=True)
     done = subprocess.run(["./program"], check=True, capture_output=True, text=True)
     print(done.stdout)

@@ -13,6 +13,10 @@ import h5py
 import numpy as np
 import pytest
 from conftest import PATIENCE, ROOT
+from slurm import HAS_SLURM, Slurm
+
+from asperity import surface, theory
+from asperity.material import Prony
 
 PROGRAM = Path(os.environ.get("ASPERITY_MPI_PROGRAM", ROOT / ".venv/bin/asperity-mpi"))
 
@@ -112,6 +116,75 @@ def test_results_do_not_depend_on_the_number_of_processes(tmp_path: Path, name: 
     )
 
 
+def test_large_grids_share_the_coarse_level(tmp_path: Path) -> None:
+    """From 16 384 blocks on each process has a part of the preconditioner's coarse level."""
+    case = write(tmp_path, CASES["elastic"].replace("nx = 40, ny = 37", "nx = 1100, ny = 957")
+                 + "&solver tolerance = 1e-4 /\n&output snapshot_fields = 'pressure' /\n")
+    sent = []
+    for processes in (1, 3):
+        result = tmp_path / f"{processes}.h5"
+        done = run(processes, case, "--output", str(result))
+        assert done.returncode == 0, done.stderr
+        with h5py.File(result) as file:
+            sent.append(file.attrs["exchanged_bytes"])
+    assert_same(tmp_path / "3.h5", tmp_path / "1.h5")
+    assert sent[0] == 0.0 < sent[1]
+
+
+def wave_along_y(folder: Path, rows: int, amplitude: float) -> str:
+    """Write a height map whose wave crosses the rows, and return the namelists that use it."""
+    height = amplitude * np.cos(2 * np.pi * np.arange(rows) / rows)
+    length = 1e-3
+    surface.save(folder / "wave.h5", np.repeat(height[:, None], 8, axis=1), 8 * length / rows,
+                 length)
+    return (f"&grid nx = 8, ny = {rows}, lx = {8 * length / rows}, ly = {length} /\n"
+            "&surface shape = 'file', file = 'wave.h5' /\n")
+
+
+def test_westergaard_on_three_processes(tmp_path: Path) -> None:
+    rows, amplitude, area = 256, 1e-6, 0.4
+    full = np.pi * 4e6 * amplitude / 1e-3
+    exact = theory.westergaard(amplitude, 1e-3, 4e6, full * np.sin(np.pi * area / 2) ** 2)
+    case = write(tmp_path, wave_along_y(tmp_path, rows, amplitude)
+                 + "&material shear_modulus = 1e6 /\n"
+                 + f"&phase pressure = {exact.mean_pressure} /\n&solver tolerance = 1e-8 /\n")
+    done = run(3, case)
+    assert done.returncode == 0, done.stderr
+    with h5py.File(case.with_suffix(".h5")) as file:
+        assert file["history/contact_area"][-1] == pytest.approx(area, abs=2 / rows)
+        found = file["snapshots"][max(file["snapshots"])]["pressure"][:]
+    y = np.arange(rows) * 1e-3 / rows
+    assert np.all(np.ptp(found, axis=1) <= 1e-6 * found.max())
+    assert np.max(np.abs(found[:, 0] - exact.pressure(y))) < 0.02 * found.max()
+    inside = exact.pressure(y) > 0.3 * found.max()
+    np.testing.assert_allclose(found[inside, 0], exact.pressure(y)[inside], rtol=5e-3)
+
+
+def test_a_sliding_viscoelastic_wave_on_three_processes(tmp_path: Path) -> None:
+    """Full contact from rest: the road crosses the rows of all processes, a cell in each step."""
+    rows, steps, speed, amplitude = 128, 64, 0.05, 1e-6
+    rubber = Prony(1e6, [2e6, 4e6], [1e-3, 1e-2])
+    duration = steps * 1e-3 / rows / speed
+    exact = theory.full_contact_waves(amplitude, (0.0, 2e3 * np.pi), (0.0, speed), rubber,
+                                      times=duration)
+    pressure = 1.2 * float(exact.full_pressure_bound.max())
+    case = write(tmp_path, wave_along_y(tmp_path, rows, amplitude)
+                 + "&material shear_modulus = 1e6, prony_g = 2e6, 4e6, prony_tau = 1e-3, 1e-2 /\n"
+                 + f"&phase pressure = {pressure}, relaxed = .true. /\n"
+                 + f"&phase velocity_y = {speed}, steps = {steps}, duration = {duration} /\n"
+                 + "&solver tolerance = 1e-8 /\n")
+    done = run(3, case)
+    assert done.returncode == 0, done.stderr
+    with h5py.File(case.with_suffix(".h5")) as file:
+        found = file["snapshots"][max(file["snapshots"])]["pressure"][:, 0]
+        friction = file["history/friction_viscous"][-1] * file["history/pressure"][-1]
+        assert file["history/contact_area"][-1] == 1.0
+    y = np.arange(rows) * 1e-3 / rows
+    wave = exact.pressure(np.zeros(rows), y)
+    assert np.max(np.abs(found - pressure - wave)) < 1e-3 * np.ptp(wave)
+    assert friction == pytest.approx(float(exact.friction_stress[1]), rel=2e-3)
+
+
 def test_version() -> None:
     done = subprocess.run([PROGRAM, "--version"], capture_output=True, text=True, check=True)
     line = done.stdout.splitlines()[4]
@@ -153,6 +226,19 @@ def test_errors_end_all_processes_with_one_message(tmp_path: Path) -> None:
         assert "did not converge" in file.attrs["outcome"]
 
 
+def test_too_little_memory_for_one_process_ends_all(tmp_path: Path) -> None:
+    """One of them has a limit on its address space, which it finds out before the run begins."""
+    limited = write(tmp_path, "#!/bin/sh\n[ \"$OMPI_COMM_WORLD_RANK\" = 1 ] && ulimit -v 400000\n"
+                    f"exec {PROGRAM} \"$@\"\n", "limited.sh")
+    limited.chmod(0o700)
+    case = write(tmp_path, CASES["elastic"].replace("nx = 40, ny = 37", "nx = 1024, ny = 1024"))
+    command = [str(limited) if word == str(PROGRAM) else word for word in words(3, case)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    assert done.returncode == 3, done.stderr
+    assert done.stderr.count("not enough memory: the run needs about") == 1
+    assert "limit on the address space" in done.stderr
+
+
 LONG = ROUGH.format(boundary="periodic") + VISCOELASTIC + (
     "&phase pressure = 3e4, steps = {steps}, duration = 1e-1 /\n"
     "&output checkpoint_every = 5, compression = 0 /\n"
@@ -178,10 +264,15 @@ def start(processes: int, case: Path, rows: int) -> tuple[subprocess.Popen, Path
 
 
 def children(process: subprocess.Popen) -> list[int]:
-    """Return the processes that mpirun has started."""
+    """Return the processes that mpirun has started; the run must still be going on."""
+    assert process.poll() is None, "the run has ended"
     done = subprocess.run(["ps", "-o", "pid=,args=", "--ppid", str(process.pid)],
                           capture_output=True, text=True, check=False)
-    return [int(line.split()[0]) for line in done.stdout.splitlines() if str(PROGRAM) in line]
+    pids = [int(line.split()[0]) for line in done.stdout.splitlines() if str(PROGRAM) in line]
+    if not pids:
+        process.kill()
+        pytest.skip("the processes of mpirun cannot be found")
+    return pids
 
 
 def test_a_stopped_run_goes_on_with_another_number_of_processes(tmp_path: Path) -> None:
@@ -206,6 +297,38 @@ def test_the_time_limit_stops_all(tmp_path: Path) -> None:
     assert case.with_suffix(".checkpoint.h5").exists()
 
 
+# With a constant shear stress a step may have no solution: its passes go on for hours.
+STUCK = """&grid nx = 48, ny = 41, lx = 1e-3, ly = 0.9e-3 /
+&surface shape = 'self_affine', hurst = 0.8, wavelength_long = 0.5e-3,
+   wavelength_short = 0.15e-3, rms_slope = 0.5, seed = 3 /
+&material shear_modulus = 0.5e6, prony_g = 1e6, prony_tau = 1e-2, thickness = 1e-3 /
+&friction law = 'constant_shear', shear_strength = 3e5 /
+&phase pressure = 5e4, duration = 0.01, steps = 2 /
+&phase velocity_x = 10e-3, duration = 0.01, steps = 20 /
+&solver passes = 100000000, coupling_tolerance = 1e-8 /
+&output checkpoint_minutes = 0 /
+"""
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
+def test_a_row_is_given_up_together_though_clocks_differ(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The patience with a row in hand ends on one process long before it ends on the others."""
+    library = tmp_path / "other_clock.so"
+    subprocess.run(["gcc", "-O1", "-shared", "-fPIC", "-o", library,
+                    Path(__file__).with_name("other_clock.c")], check=True)
+    case = write(tmp_path, STUCK)
+    monkeypatch.setenv("LD_PRELOAD", str(library))
+    process, result = start(3, case, 2)
+    time.sleep(1.0)
+    process.send_signal(signal.SIGXCPU)
+    _, message = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 128 + signal.SIGXCPU, message
+    assert message.count("after step 2, within the next one, which is lost") == 1
+    with h5py.File(result) as file:
+        assert len(file["history/step"]) == 3
+
+
 def test_sigterm_to_mpirun_leaves_a_checkpoint(tmp_path: Path) -> None:
     case = write(tmp_path, LONG.format(steps=20000))
     process, result = start(2, case, 3)
@@ -216,14 +339,30 @@ def test_sigterm_to_mpirun_leaves_a_checkpoint(tmp_path: Path) -> None:
     assert result.with_suffix(".checkpoint.h5").exists()
 
 
+def test_sigterm_within_a_solve_stops_all(tmp_path: Path) -> None:
+    """Processes give up a solve together that would go on for ever."""
+    case = write(tmp_path, """
+        &grid nx = 2048, ny = 2048, lx = 1e-3 /
+        &surface shape = 'self_affine', rms_slope = 0.2, hurst = 0.8, wavelength_long = 5e-4,
+           wavelength_short = 5e-6 /
+        &material shear_modulus = 1e6 /
+        &phase pressure = 1e4 /
+        &solver method = 'thesis', tolerance = 1e-13, max_iterations = 1000000000 /""")
+    process = subprocess.Popen(words(2, case, "--threads", "1"), stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + PATIENCE
+    while not case.with_suffix(".h5").exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    time.sleep(2.0)
+    os.kill(children(process)[-1], signal.SIGTERM)
+    _, message = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 143, message
+    assert message.count("stopped by SIGTERM before the first row") == 1
+
+
 def test_sigterm_to_one_process_stops_all(tmp_path: Path) -> None:
     case = write(tmp_path, LONG.format(steps=20000))
     process, result = start(3, case, 3)
-    pids = children(process)
-    if not pids:
-        process.kill()
-        pytest.skip("the processes of mpirun cannot be found")
-    os.kill(pids[-1], signal.SIGTERM)
+    os.kill(children(process)[-1], signal.SIGTERM)
     _, message = process.communicate(timeout=PATIENCE)
     assert process.returncode == 143, message
     assert message.count("stopped by SIGTERM after step") == 1
@@ -233,11 +372,7 @@ def test_sigterm_to_one_process_stops_all(tmp_path: Path) -> None:
 def test_a_process_that_dies_takes_the_others_with_it(tmp_path: Path) -> None:
     case = write(tmp_path, LONG.format(steps=20000))
     process, result = start(3, case, 8)
-    pids = children(process)
-    if not pids:
-        process.kill()
-        pytest.skip("the processes of mpirun cannot be found")
-    os.kill(pids[-1], signal.SIGKILL)
+    os.kill(children(process)[-1], signal.SIGKILL)
     process.communicate(timeout=60)
     assert process.returncode == 137
     with h5py.File(result) as file:
@@ -252,3 +387,22 @@ def test_the_program_without_mpi_is_refused_under_mpirun(tmp_path: Path, program
     assert done.returncode == 2
     assert "was built without MPI" in done.stderr
     assert not list(tmp_path.glob("*.h5"))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not HAS_SLURM, reason="no Slurm that this user may start")
+@pytest.mark.parametrize("launcher", ["mpirun --allow-run-as-root", "srun --mpi=pmix"])
+def test_two_processes_in_a_job_of_slurm(tmp_path: Path, launcher: str) -> None:
+    """A real Slurm, of this machine, starts both processes of a job."""
+    case = write(tmp_path, CASES["sliding"] + OUTPUT)
+    assert run(1, case, "--output", str(tmp_path / "one.h5")).returncode == 0
+    script = write(tmp_path, "#!/bin/sh\n#SBATCH --ntasks=2 --time=5 --output=job.log\n"
+                   f"{launcher} {PROGRAM} run case.nml --quiet\n", "job.sh")
+    with Slurm() as slurm:
+        slurm.call("sbatch", f"--chdir={tmp_path}", str(script))
+        slurm.drain()
+    result = case.with_suffix(".h5")
+    assert result.exists(), (tmp_path / "job.log").read_text()
+    assert_same(result, tmp_path / "one.h5")
+    with h5py.File(result) as file:
+        assert file.attrs["processes"] == 2

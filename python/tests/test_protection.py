@@ -379,7 +379,7 @@ def test_no_limit_of_memory_ends_the_interpreter(tmp_path: Path, what: str) -> N
 &solver tolerance = 1e-2 /
 """)
     outcomes = []
-    for room in (1e6, 30e6, 100e6, 250e6, 300e6, 350e6, 400e6, 500e6, 650e6, 800e6, 1000e6):
+    for room in (1e6, 30e6, 100e6, 250e6, 300e6, 350e6, 400e6, 500e6, 650e6, 800e6, 1000e6, 1300e6):
         done = subprocess.run(
             [os.sys.executable, "-c", LIMITS.replace("CASE", repr(str(case))), what, str(room)],
             capture_output=True, text=True, timeout=PATIENCE, check=False)

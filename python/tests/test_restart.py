@@ -68,6 +68,21 @@ def test_a_finished_run_leaves_no_checkpoint(program: str, reference: Path) -> N
     assert done.returncode == 3 and "case.h5: the run is complete" in done.stderr
 
 
+def test_killed_before_the_root_group_was_written(program: str, tmp_path: Path) -> None:
+    """HDF5 writes the superblock first: what a kill then leaves is replaced like any beginning."""
+    case = tmp_path / "case.nml"
+    case.write_text(vc.text())
+    # Version 2, base 0, no extension, end of file 0x13ec, root group at 0x1000, checksum.
+    superblock = ("894844460d0a1a0a 02080801 0000000000000000 ffffffffffffffff ec13000000000000"
+                  "0010000000000000 b398dd51")
+    beginning = tmp_path / "case.h5.new"
+    beginning.write_bytes(bytes.fromhex(superblock).ljust(8475, b"\0"))
+    process = vc.start(program, case)
+    _, message = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, message
+    assert not beginning.exists()
+
+
 def test_killed_at_any_moment(program: str, tmp_path: Path, reference: Path) -> None:
     """kill -9 again and again: the result opens each time, and going on gives the same numbers."""
     case = tmp_path / "case.nml"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import subprocess
@@ -16,6 +17,7 @@ import viscoelastic_case as vc
 from conftest import PATIENCE
 
 import asperity
+from asperity.views.watch import watch
 
 
 @pytest.fixture
@@ -113,6 +115,88 @@ def test_stop_within_a_row_of_python(stuck: Path, number: signal.Signals) -> Non
         assert process.returncode == -signal.SIGTERM, message
     assert asperity.open(stuck.with_suffix(".h5")).outcome == "stopped after step 2"
     assert stuck.with_suffix(".checkpoint.h5").exists()
+
+
+def test_whether_a_run_goes_on_is_seen_from_its_lock(program: str, stuck: Path,
+                                                     monkeypatch: pytest.MonkeyPatch) -> None:
+    """A slow row is not taken for a dead run, and a killed run is known at once."""
+    result = stuck.with_suffix(".h5")
+    process = vc.start(program, stuck)
+    vc.wait_for_rows(process, result, 3)
+    with monkeypatch.context() as patch:
+        patch.setattr("asperity.results.standing.silence", lambda run: 1e6)
+        assert "no longer running" not in asperity.open(result).state
+    process.kill()
+    process.communicate(timeout=PATIENCE)
+    assert asperity.open(result).state.endswith("its process has ended")
+    lines = io.StringIO()
+    watch(result, once=True, stream=lines)
+    assert "its process has ended (--restart goes on" in lines.getvalue()
+
+
+# A solve that takes some minutes.
+ENDLESS = """
+&grid nx = 2048, ny = 2048, lx = 1e-3 /
+&surface shape = 'self_affine', hurst = 0.8, wavelength_long = 0.5e-3,
+   wavelength_short = 5e-6, rms_slope = 0.2 /
+&material shear_modulus = 1e6 /
+&phase pressure = 1e4 /
+&solver method = 'thesis', tolerance = 1e-13, max_iterations = 1000000000 /
+"""
+
+
+def wait_for_work(process: subprocess.Popen, seconds: float = 1.0) -> None:
+    """Wait until a process has used so much processor time, in which it has surely begun."""
+    clock = os.sysconf("SC_CLK_TCK")
+    while process.poll() is None:
+        words = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
+        if (int(words[11]) + int(words[12])) / clock > seconds:
+            return
+        time.sleep(0.05)
+
+
+@pytest.mark.parametrize("more, status, reason", [
+    ((), 143, "stopped by SIGTERM before the first row"),
+    (("--time-limit", "0:03"), 124, "the time limit is near: stopped before the first row")])
+def test_stop_within_a_solve(program: str, tmp_path: Path, more: tuple[str, ...], status: int,
+                             reason: str) -> None:
+    """A row without friction is given up as well, for a signal and for the limit of time."""
+    case = tmp_path / "endless.nml"
+    case.write_text(ENDLESS)
+    process = vc.start(program, case, *more)
+    if not more:
+        wait_for_work(process)
+        process.terminate()
+    start = time.monotonic()
+    _, message = process.communicate(timeout=PATIENCE)
+    assert time.monotonic() - start < 30.0  # 2 s, or 5 s, if nothing else runs
+    assert process.returncode == status, message
+    assert reason in message
+
+
+@pytest.mark.parametrize("what", ["solve", "simulation"])
+def test_interrupt_within_a_solve_of_python(tmp_path: Path, what: str) -> None:
+    """Ctrl-C ends a call that would go on for ever; a simulation is where it was."""
+    case = tmp_path / "endless.nml"
+    case.write_text(ENDLESS)
+    script = ("import signal, asperity\n"
+              "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+              f"sim = asperity.Simulation({str(case)!r})\n"
+              "height = sim.fields['height']\n"
+              "try:\n"
+              + ("    sim.advance()\n" if what == "simulation" else
+                 "    asperity.solve_normal(height, 1e-3, None, 1e6, pressure=1e4,\n"
+                 "        method='thesis', tolerance=1e-30, max_iterations=10**9)\n") +
+              "except KeyboardInterrupt:\n"
+              "    print('interrupted', sim.row, sim.fields['pressure'].max())\n"
+              "contact = asperity.solve_normal(height, 1e-3, None, 1e6, pressure=1e4)\n"
+              "print(contact.converged)\n")
+    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, text=True)
+    wait_for_work(process, 4.0)
+    process.send_signal(signal.SIGINT)
+    told, message = process.communicate(timeout=PATIENCE)
+    assert (process.returncode, told) == (0, "interrupted None 0.0\nTrue\n"), message
 
 
 def test_stop_before_the_first_row(program: str, case: Path) -> None:

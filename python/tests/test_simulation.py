@@ -258,10 +258,3 @@ def test_a_callback_sees_each_row_and_may_end_the_run(tmp_path):
 
     with pytest.raises(AttributeError, match=r"Use asperity\.Simulation"):
         asperity.run(text, output=tmp_path / "steered.h5", callback=steer)
-
-
-def test_a_row_has_its_columns_as_typed_attributes():
-    from asperity.runs.row import Row, columns
-
-    kinds = {column.name: "int" if column.is_whole else "float" for column in columns()}
-    assert {name: str(kind) for name, kind in Row.__annotations__.items()} == kinds

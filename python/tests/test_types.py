@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import difflib
+import importlib
 import re
 import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from conftest import ROOT
 
-import asperity
-from asperity.results.history import History
-from asperity.runs.row import Row, columns
+from asperity.runs.row import Column, columns
 
 # A comment `E: text` is an error that mypy must report in that line, `N: text` a type it reveals;
 # there must be no others.
@@ -93,16 +94,28 @@ def test_mypy_knows_names_and_types(tmp_path: Path) -> None:
             assert not messages, f"{line}\n{messages}"
 
 
-def test_groups_are_those_of_the_program() -> None:
-    """The module for type checkers is what the program's table of the input gives."""
+def test_types_are_those_of_the_program() -> None:
+    """The modules for type checkers and the page's table are what the program's tables give."""
     done = subprocess.run([sys.executable, ROOT / "tools" / "make_types.py", "--check"],
                           check=False)
-    assert done.returncode == 0, "python tools/make_types.py writes it anew"
+    assert done.returncode == 0, "python tools/make_types.py writes them again"
 
 
-def test_columns_are_those_of_the_program() -> None:
-    """History and row declare the columns that the library writes."""
-    names = [column.name for column in columns()]
-    assert list(Row.__annotations__) == names
-    assert [name for name in History.__annotations__ if not name.startswith("_")] == names
-    assert asperity.Run.__annotations__["snapshots"]
+def test_a_new_column_is_stated_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A line of the program's table becomes types of a row and a history, and a row of the page."""
+    monkeypatch.syspath_prepend(ROOT / "tools")
+    make_types = importlib.import_module("make_types")
+    known = columns()
+    more = (*known, Column("slip_distance", "m", False, "distance that the surface has slipped"),
+            Column("jumps", "1", True, "jumps of the contact"))
+    assert make_types.write_page(known) == (ROOT / "docs/result_file.md").read_text()
+    added = [difflib.ndiff(write(known).splitlines(), write(more).splitlines())
+             for write in (make_types.write_columns, make_types.write_page)]
+    types, table = ([line[2:] for line in lines if line.startswith(("+", "-"))] for lines in added)
+    assert types == [
+        "    slip_distance: float  # distance that the surface has slipped, m",
+        "    jumps: int  # jumps of the contact",
+        "    slip_distance: NDArray[np.float64]  # distance that the surface has slipped, m",
+        "    jumps: NDArray[np.int32]  # jumps of the contact"]
+    assert table == ["| `slip_distance` | m | distance that the surface has slipped |",
+                     "| `jumps` | - | jumps of the contact |"]

@@ -1,4 +1,4 @@
-!> Threads and processes. This is the only module that calls MPI.
+!> Processes. This is the only module that calls MPI.
 !>
 !> Built with the macro ASPERITY_MPI, the program runs as several processes, started by mpirun or srun,
 !> that share the rows of the grid (module `regular_grid`). Without the macro, and in a program that does not
@@ -15,21 +15,18 @@ module asperity_parallel
 #ifdef ASPERITY_MPI
    use mpi_f08, only : mpi_allgather, mpi_allgatherv, mpi_allreduce, mpi_alltoallv, mpi_bcast, &
       mpi_character, mpi_comm, mpi_comm_free, mpi_comm_rank, mpi_comm_size, mpi_comm_split_type, &
-      mpi_comm_type_shared, mpi_comm_world, mpi_double_complex, mpi_double_precision, mpi_finalize, &
-      mpi_complex, mpi_get_library_version, mpi_in_place, mpi_info_null, mpi_init_thread, mpi_integer, mpi_integer1, &
+      mpi_comm_type_shared, mpi_comm_world, mpi_datatype, mpi_double_complex, mpi_double_precision, mpi_finalize, &
+      mpi_get_library_version, mpi_in_place, mpi_info_null, mpi_init_thread, mpi_integer, mpi_integer1, &
       mpi_integer8, mpi_logical, mpi_lor, mpi_max, mpi_max_library_version_string, mpi_min, mpi_real, mpi_recv, &
       mpi_send, mpi_status_ignore, mpi_sum, mpi_thread_serialized
 #endif
-   use omp_lib, only : omp_get_max_threads, omp_get_num_procs, omp_pause_hard, &
-      omp_pause_resource_all, omp_set_num_threads
    use asperity_precision, only : dp, int64, int8, sp
    implicit none
    private
 
    public :: any_process, end_processes, exchange, exchanged_bytes, gather_rows, global_max, global_min, global_sum, &
       hand_to_first, is_first_process, on_any_process, parallel_library, process_count, process_number, &
-      processes_of_machine, processor_count, &
-      release_threads, rows_before, set_threads, share, start_processes, take_from_first, thread_count
+      processes_of_machine, rows_before, share, start_processes, take_from_first
 
    !> Elementwise sum over the processes, of counts or of numbers of which all but one are 0: both are exact.
    interface global_sum
@@ -312,59 +309,58 @@ contains
       integer, intent(in) :: send_counts(:)        !! for each process
       complex(dp), intent(inout), contiguous :: receive(:)
       integer, intent(in) :: receive_counts(:)     !! from each process
-#ifdef ASPERITY_MPI
-      call count_sent(send_counts, 16)
-      call mpi_alltoallv(send, send_counts, starts_of(send_counts), mpi_double_complex, &
-         receive, receive_counts, starts_of(receive_counts), mpi_double_complex, mpi_comm_world)
-#else
-      receive(:sum(receive_counts)) = send(:sum(send_counts))
-#endif
+
+      call exchange_values(send, send_counts, receive, receive_counts, 16)
    end subroutine exchange_complex
 
    !> Exchange complex numbers in single precision.
    subroutine exchange_complex_single(send, send_counts, receive, receive_counts)
       complex(sp), intent(in), contiguous :: send(:)
-      integer, intent(in) :: send_counts(:)
+      integer, intent(in) :: send_counts(:)        !! for each process
       complex(sp), intent(inout), contiguous :: receive(:)
-      integer, intent(in) :: receive_counts(:)
-#ifdef ASPERITY_MPI
-      call count_sent(send_counts, 8)
-      call mpi_alltoallv(send, send_counts, starts_of(send_counts), mpi_complex, &
-         receive, receive_counts, starts_of(receive_counts), mpi_complex, mpi_comm_world)
-#else
-      receive(:sum(receive_counts)) = send(:sum(send_counts))
-#endif
+      integer, intent(in) :: receive_counts(:)     !! from each process
+
+      call exchange_values(send, send_counts, receive, receive_counts, 8)
    end subroutine exchange_complex_single
 
    !> Exchange real numbers.
    subroutine exchange_real(send, send_counts, receive, receive_counts)
       real(dp), intent(in), contiguous :: send(:)
-      integer, intent(in) :: send_counts(:)
+      integer, intent(in) :: send_counts(:)        !! for each process
       real(dp), intent(inout), contiguous :: receive(:)
-      integer, intent(in) :: receive_counts(:)
-#ifdef ASPERITY_MPI
-      call count_sent(send_counts, 8)
-      call mpi_alltoallv(send, send_counts, starts_of(send_counts), mpi_double_precision, &
-         receive, receive_counts, starts_of(receive_counts), mpi_double_precision, mpi_comm_world)
-#else
-      receive(:sum(receive_counts)) = send(:sum(send_counts))
-#endif
+      integer, intent(in) :: receive_counts(:)     !! from each process
+
+      call exchange_values(send, send_counts, receive, receive_counts, 8)
    end subroutine exchange_real
 
    !> Exchange real numbers in single precision.
    subroutine exchange_real_single(send, send_counts, receive, receive_counts)
       real(sp), intent(in), contiguous :: send(:)
-      integer, intent(in) :: send_counts(:)
+      integer, intent(in) :: send_counts(:)        !! for each process
       real(sp), intent(inout), contiguous :: receive(:)
-      integer, intent(in) :: receive_counts(:)
-#ifdef ASPERITY_MPI
-      call count_sent(send_counts, 4)
-      call mpi_alltoallv(send, send_counts, starts_of(send_counts), mpi_real, &
-         receive, receive_counts, starts_of(receive_counts), mpi_real, mpi_comm_world)
-#else
-      receive(:sum(receive_counts)) = send(:sum(send_counts))
-#endif
+      integer, intent(in) :: receive_counts(:)     !! from each process
+
+      call exchange_values(send, send_counts, receive, receive_counts, 4)
    end subroutine exchange_real_single
+
+   !> Exchange values of any type; one process alone has nothing to exchange.
+   subroutine exchange_values(send, send_counts, receive, receive_counts, bytes)
+      type(*), intent(in) :: send(*)
+      integer, intent(in) :: send_counts(:)        !! for each process
+      type(*), intent(inout) :: receive(*)
+      integer, intent(in) :: receive_counts(:)     !! from each process
+      integer, intent(in) :: bytes                 !! of a value: 4, 8 or 16
+#ifdef ASPERITY_MPI
+      type(mpi_datatype) :: kind
+
+      kind = mpi_double_precision
+      if (bytes == 4) kind = mpi_real
+      if (bytes == 16) kind = mpi_double_complex
+      sent = sent + (sum(real(send_counts, dp)) - send_counts(number + 1))*bytes
+      call mpi_alltoallv(send, send_counts, starts_of(send_counts), kind, &
+         receive, receive_counts, starts_of(receive_counts), kind, mpi_comm_world)
+#endif
+   end subroutine exchange_values
 
 #ifdef ASPERITY_MPI
    !> Where parts that lie one after the other begin.
@@ -378,14 +374,6 @@ contains
          starts(p) = starts(p - 1) + counts(p - 1)
       end do
    end function starts_of
-
-   !> Count values that this process sends to the others.
-   subroutine count_sent(values, bytes)
-      integer, intent(in) :: values(:)             !! for each process, those for itself included
-      integer, intent(in) :: bytes                 !! of a value
-
-      sent = sent + (sum(real(values, dp)) - values(number + 1))*bytes
-   end subroutine count_sent
 #endif
 
    !> Bring numbers from a process to the first one: only these two take part, and any other returns at once.
@@ -423,70 +411,5 @@ contains
          mpi_status_ignore)
 #endif
    end subroutine take_from_first
-
-   ! Threads.
-
-   !> Use `n` threads from here on. 0 takes what the environment asks for: OMP_NUM_THREADS, or what
-   !> Slurm grants a task, SLURM_CPUS_PER_TASK; without them all processors, shared with the other processes
-   !> of this machine.
-   subroutine set_threads(n)
-      integer, intent(in) :: n
-
-      if (n > 0) then
-         call omp_set_num_threads(n)
-      else
-         call omp_set_num_threads(threads_of_environment())
-      end if
-   end subroutine set_threads
-
-   !> Number of threads that the environment asks for. A launcher may bind each process to processors of
-   !> its own; then it has fewer than the machine.
-   function threads_of_environment() result(n)
-      integer :: n
-
-      n = number_in_environment('OMP_NUM_THREADS')
-      if (n == 0) n = number_in_environment('SLURM_CPUS_PER_TASK')
-      if (n == 0) n = max(1, omp_get_num_procs()/neighbours)
-   end function threads_of_environment
-
-   !> The number that a variable of the environment starts with (a list of OpenMP has one for each
-   !> level); 0 where it has none.
-   function number_in_environment(name) result(n)
-      character(*), intent(in) :: name
-      integer :: n
-      character(80) :: text
-      integer :: length, status
-
-      n = 0
-      call get_environment_variable(name, text, status=status)
-      if (status /= 0) return
-      text = adjustl(text)
-      length = verify(text, '0123456789') - 1
-      if (length < 1 .or. length > 6) return
-      read (text(:length), *, iostat=status) n
-      if (status /= 0) n = 0
-   end function number_in_environment
-
-   !> End the idle threads; the next parallel region starts new ones. A copy of a process (fork) has
-   !> only the thread that made it: with the others it would wait for ever.
-   subroutine release_threads()
-      integer :: status
-
-      status = omp_pause_resource_all(omp_pause_hard)
-   end subroutine release_threads
-
-   !> Number of threads in use.
-   function thread_count() result(n)
-      integer :: n
-
-      n = omp_get_max_threads()
-   end function thread_count
-
-   !> Number of processors of this machine.
-   function processor_count() result(n)
-      integer :: n
-
-      n = omp_get_num_procs()
-   end function processor_count
 
 end module asperity_parallel

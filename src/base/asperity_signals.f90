@@ -103,7 +103,7 @@ contains
       number = caught
    end function stop_signal
 
-   !> Has a signal asked the run to stop? 1 or 0, for module `row_stop`.
+   !> Has a signal asked the run to stop? 1 or 0, for module `stop_watch`.
    function stop_was_asked() bind(c) result(yes)
       integer(c_int) :: yes
 

@@ -1,14 +1,14 @@
 !> C functions of HDF5 for attributes, datasets, dataspaces and types, under their own names.
 !> Their results and arguments are explained in `hdf5_c_objects`.
 module hdf5_c_values
-   use, intrinsic :: iso_c_binding, only : c_char, c_int, c_ptr
+   use, intrinsic :: iso_c_binding, only : c_char, c_int, c_int8_t, c_ptr
    use hdf5_kinds, only : hid_t, hsize_t, size_t
    implicit none
    private
 
    public :: h5aclose, h5acreate2, h5aexists, h5aget_space, h5aget_type, h5aopen, h5aread, &
       h5awrite, h5dclose, h5dcreate2, h5dget_create_plist, h5dget_space, h5dopen2, h5dread, h5dset_extent, &
-      h5dvlen_reclaim, h5dwrite, h5sclose, h5screate, h5screate_simple, h5sget_simple_extent_dims, &
+      h5dvlen_reclaim, h5dwrite, h5dwrite_chunk, h5sclose, h5screate, h5screate_simple, h5sget_simple_extent_dims, &
       h5sget_simple_extent_ndims, h5sselect_hyperslab, h5tclose, h5tcopy, h5tget_size, &
       h5tis_variable_str, h5tset_cset, h5tset_size, h5tset_strpad
 
@@ -121,6 +121,17 @@ module hdf5_c_values
          type(c_ptr), value :: buffer
          integer(c_int) :: status
       end function h5dwrite
+
+      function h5dwrite_chunk(dataset, transfer, filters, start, length, buffer) &
+         bind(c, name='H5Dwrite_chunk') result(status)
+         import :: c_int, c_int8_t, hid_t, hsize_t, size_t
+         integer(hid_t), value :: dataset, transfer
+         integer(c_int), value :: filters        !! a bit for each filter that was left out
+         integer(hsize_t), intent(in) :: start(*)
+         integer(size_t), value :: length        !! bytes
+         integer(c_int8_t), intent(in) :: buffer(*)
+         integer(c_int) :: status
+      end function h5dwrite_chunk
 
       function h5dvlen_reclaim(type, space, transfer, buffer) &
          bind(c, name='H5Dvlen_reclaim') result(status)

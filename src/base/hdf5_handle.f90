@@ -35,7 +35,7 @@ module hdf5_handle
    use hdf5_kinds, only : hid_t, hsize_t
    use hdf5_errors, only : last_reason, start_hdf5
    use hdf5_library, only : c_text, h5f_acc_rdonly, h5f_acc_rdwr, h5f_acc_trunc, h5f_close_strong, &
-      h5f_libver_v18, h5f_scope_local, h5p_default, h5p_file_access, h5p_file_create
+      h5f_libver_v18, h5f_scope_local, h5p_file_access, h5p_file_create
    implicit none
    private
 

@@ -1,26 +1,20 @@
 !> Fields that are written in slabs of rows, so that nobody needs a copy of a whole field.
 !>
 !> A slab holds the rows of one chunk of the dataset (`slab_rows`); the last one of a field may have fewer.
-!> HDF5 compresses a chunk when it is complete and keeps none of them.
+!> `hdf5_chunk_writer` writes fields that are compressed.
 module hdf5_slabs
    use, intrinsic :: iso_c_binding, only : c_loc, c_null_ptr, c_ptr
    use asperity_errors, only : error_type
-   use asperity_precision, only : dp, int64, int8
+   use asperity_precision, only : dp, int64
    use hdf5_c_values, only : h5dclose, h5dget_space, h5dopen2, h5dread, h5dwrite, h5sclose, h5sselect_hyperslab
    use hdf5_file, only : hdf5_file_type
    use hdf5_kinds, only : hid_t, hsize_t
-   use hdf5_library, only : c_text, h5p_default, h5s_select_set, h5t_native_double, h5t_native_int8, &
-      simple_space, status_of
+   use hdf5_library, only : c_text, h5p_default, h5s_select_set, h5t_native_double, simple_space, status_of
    use hdf5_values, only : chunk_values, kind_int8, kind_real, new_dataset
    implicit none
    private
 
-   public :: create_field, read_part, slab_rows, write_part, write_slab
-
-   !> Write a slab of reals or of bytes.
-   interface write_slab
-      module procedure :: write_reals, write_bytes
-   end interface write_slab
+   public :: create_field, read_part, slab_rows, write_part
 
 contains
 
@@ -59,30 +53,6 @@ contains
       if (.not. allocated(fault)) call file%write_attribute(path, 'long_name', long_name, fault)
       call file%settle(fault, error)
    end subroutine create_field
-
-   !> Write a slab of reals.
-   subroutine write_reals(file, path, first, values, error)
-      class(hdf5_file_type), intent(inout) :: file
-      character(*), intent(in) :: path
-      integer, intent(in) :: first          !! first row of the slab, from 1
-      real(dp), intent(in), contiguous, target :: values(:, :)   !! [nx, rows]
-      type(error_type), allocatable, intent(out), optional :: error
-
-      call move(file, path, [0_int64, int(first - 1, int64)], shape(values), h5t_native_double, &
-         c_loc(values), .false., error)
-   end subroutine write_reals
-
-   !> Write a slab of bytes.
-   subroutine write_bytes(file, path, first, values, error)
-      class(hdf5_file_type), intent(inout) :: file
-      character(*), intent(in) :: path
-      integer, intent(in) :: first
-      integer(int8), intent(in), contiguous, target :: values(:, :)
-      type(error_type), allocatable, intent(out), optional :: error
-
-      call move(file, path, [0_int64, int(first - 1, int64)], shape(values), h5t_native_int8, &
-         c_loc(values), .false., error)
-   end subroutine write_bytes
 
    !> Write a part of a dataset of reals or of bytes.
    subroutine write_part(file, path, start, extent, values, error)
@@ -137,7 +107,6 @@ contains
          if (status >= 0 .and. .not. reads) status = h5dwrite(dataset, type, memory, space, h5p_default, address)
          ignored = h5sclose(memory)
          ignored = h5sclose(space)
-         ! Compressed data leave the cache here, so that a full disk is noticed here.
          ignored = h5dclose(dataset)
          if (status >= 0) status = ignored
       end if

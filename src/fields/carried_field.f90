@@ -2,7 +2,7 @@
 module carried_field
    use asperity_precision, only : dp, int8
    use regular_grid, only : boundary_periodic, grid_type
-   use row_fetch, only : fetch_rows
+   use row_halo, only : fetch_rows, new_range_halo, row_halo_type
    implicit none
    private
 
@@ -14,43 +14,43 @@ contains
    !> free grid the rim goes on outside. Collective.
    subroutine carry(grid, field, motion, moved)
       type(grid_type), intent(in) :: grid
-      real(dp), intent(in) :: field(:, :)        !! [nx, rows of this process]
+      real(dp), intent(in), target :: field(:, :)   !! [nx, rows of this process]
       real(dp), intent(in) :: motion(2)          !! of the rubber over the road, m
       real(dp), intent(out) :: moved(:, :)       !! [nx, rows of this process]
-      real(dp), allocatable :: rows(:, :)
+      type(row_halo_type) :: halo
+      real(dp), allocatable, target :: foreign(:, :)
       real(dp) :: part(2)
-      integer :: cells(2), range(2), j, j0, j1
+      integer :: cells(2), range(2), j, row
 
       associate (cell => [grid%dx, grid%dy])
          cells = floor(motion/cell)
          part = motion/cell - cells
       end associate
-      if (.not. grid%shared) then
-         !$omp parallel do default(none) shared(grid, field, moved, cells, part) private(j, j0, j1)
-         do j = 1, grid%ny
-            j0 = within(grid, j + cells(2), grid%ny)
-            j1 = within(grid, j + cells(2) + 1, grid%ny)
-            call blend_rows(grid, cells(1), part, field(:, j0), field(:, j1), moved(:, j))
-         end do
-         return
-      end if
       range = [grid%first_row, grid%last_row + 1] + cells(2)
+      if (grid%boundary /= boundary_periodic) range = within(grid, range, grid%ny)
       if (grid%rows() == 0) range = [1, 0]
-      if (grid%boundary /= boundary_periodic .and. grid%rows() > 0) &
-         range = within(grid, range, grid%ny)
-      allocate (rows(grid%nx, range(2) - range(1) + 1))
-      call fetch_rows(grid, field, range, rows)
-      !$omp parallel do default(none) shared(grid, rows, moved, cells, part, range) private(j, j0, j1)
+      call new_range_halo(halo, grid, range)
+      allocate (foreign(grid%nx, halo%foreign))
+      call halo%fetch(field, foreign)
+      !$omp parallel do default(none) shared(grid, field, foreign, halo, moved, cells, part) private(j, row)
       do j = 1, grid%rows()
-         j0 = grid%first_row + j - 1 + cells(2)
-         j1 = j0 + 1
-         if (grid%boundary /= boundary_periodic) then
-            j0 = within(grid, j0, grid%ny)
-            j1 = within(grid, j1, grid%ny)
-         end if
-         call blend_rows(grid, cells(1), part, rows(:, j0 - range(1) + 1), rows(:, j1 - range(1) + 1), &
-            moved(:, j))
+         row = grid%first_row - 1 + j + cells(2)
+         call blend_rows(grid, cells(1), part, row_at(row), row_at(row + 1), moved(:, j))
       end do
+
+   contains
+
+      !> The row at a place that may lie beyond the grid.
+      function row_at(place) result(values)
+         integer, intent(in) :: place
+         real(dp), pointer :: values(:)
+
+         associate (k => halo%place(within(grid, place, grid%ny)))
+            if (k <= halo%own) values => field(:, k)
+            if (k > halo%own) values => foreign(:, k - halo%own)
+         end associate
+      end function row_at
+
    end subroutine carry
 
    !> A row of a field that is carried, from the two rows between which it lies.
@@ -100,7 +100,7 @@ contains
       !$omp parallel do default(none) shared(grid, field, moved, cells) private(i, j, from)
       do j = 1, grid%rows()
          do i = 1, grid%nx
-            from = source_cell(grid, i - cells(1))
+            from = grid%column_at(i - cells(1))
             if (from == 0) then
                field(i, j) = 0.0_dp
             else
@@ -122,23 +122,11 @@ contains
       call fetch_rows(grid, states, [grid%first_row, grid%last_row] - cells(2), moved)
       do j = 1, grid%rows()
          do i = 1, grid%nx
-            from = source_cell(grid, i - cells(1))
+            from = grid%column_at(i - cells(1))
             states(i, j) = 0_int8
             if (from > 0) states(i, j) = moved(from, j)
          end do
       end do
    end subroutine shift_states
-
-   !> The cell along x from which a value comes, 0 if it comes from beyond a free grid.
-   elemental function source_cell(grid, i) result(k)
-      type(grid_type), intent(in) :: grid
-      integer, intent(in) :: i
-      integer :: k
-
-      k = i
-      if (k >= 1 .and. k <= grid%nx) return
-      k = 0
-      if (grid%boundary == boundary_periodic) k = modulo(i - 1, grid%nx) + 1
-   end function source_cell
 
 end module carried_field

@@ -10,7 +10,8 @@
 !> A process holds only its own rows of a field, so that `size(field)` is not the number of cells:
 !> `cell_count` and the means of this module are over the whole grid.
 module field_sums
-   use asperity_parallel, only : gather_rows, global_max, global_min, global_sum, process_count, thread_count
+   use asperity_parallel, only : gather_rows, global_max, global_min, global_sum, process_count
+   use asperity_threads, only : thread_count
    use asperity_precision, only : dp
    implicit none
    private
@@ -220,46 +221,44 @@ contains
    function field_maximum(field) result(largest)
       real(dp), intent(in) :: field(:, :)
       real(dp) :: largest
-      real(dp), allocatable :: rows(:)
-      integer :: j
+      real(dp), allocatable :: rows(:, :)
 
-      allocate (rows(size(field, 2)))
-      !$omp parallel do default(none) shared(field, rows) private(j) num_threads(threads_for(field))
-      do j = 1, size(field, 2)
-         rows(j) = maxval(field(:, j))
-      end do
-      largest = largest_of_rows(rows)
+      rows = row_extremes(field)
+      largest = largest_of_rows(rows(2, :))
    end function field_maximum
 
    !> Largest magnitude of a field; not quite zero where the field is zero.
    function field_magnitude(field) result(largest)
       real(dp), intent(in) :: field(:, :)
       real(dp) :: largest
-      real(dp), allocatable :: rows(:)
-      integer :: j
+      real(dp), allocatable :: rows(:, :)
 
-      allocate (rows(size(field, 2)))
-      !$omp parallel do default(none) shared(field, rows) private(j) num_threads(threads_for(field))
-      do j = 1, size(field, 2)
-         rows(j) = maxval(abs(field(:, j)))
-      end do
-      largest = max(largest_of_rows(rows), tiny(1.0_dp))
+      rows = row_extremes(field)
+      largest = max(largest_of_rows(max(-rows(1, :), rows(2, :))), tiny(1.0_dp))
    end function field_magnitude
 
    !> Least value of a field.
    function field_minimum(field) result(least)
       real(dp), intent(in) :: field(:, :)
       real(dp) :: least
-      real(dp), allocatable :: rows(:)
+      real(dp), allocatable :: rows(:, :)
+
+      rows = row_extremes(field)
+      least = least_of_rows(rows(1, :))
+   end function field_minimum
+
+   !> Least and largest value of each row.
+   function row_extremes(field) result(rows)
+      real(dp), intent(in) :: field(:, :)
+      real(dp), allocatable :: rows(:, :)      !! [2, rows of this process]
       integer :: j
 
-      allocate (rows(size(field, 2)))
+      allocate (rows(2, size(field, 2)))
       !$omp parallel do default(none) shared(field, rows) private(j) num_threads(threads_for(field))
       do j = 1, size(field, 2)
-         rows(j) = minval(field(:, j))
+         rows(:, j) = [minval(field(:, j)), maxval(field(:, j))]
       end do
-      least = least_of_rows(rows)
-   end function field_minimum
+   end function row_extremes
 
    !> Number of cells of the whole grid for which a condition holds, as a real number.
    function field_count(condition) result(cells)

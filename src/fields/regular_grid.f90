@@ -41,6 +41,8 @@ module regular_grid
       procedure :: strip_start
       procedure :: share_rows
       procedure :: rows_of
+      procedure :: column_at
+      procedure :: row_at
    end type grid_type
 
 contains
@@ -88,6 +90,35 @@ contains
       strips = int([process, process + 1]*int(blocks(2), int64)/process_count())
       range = [self%strip_start(strips(1) + 1), self%strip_start(strips(2) + 1) - 1]
    end function rows_of
+
+   !> The column of cells at a place that may lie beyond the grid: its image on a periodic grid, 0 beyond a free one.
+   elemental function column_at(self, place) result(column)
+      class(grid_type), intent(in) :: self
+      integer, intent(in) :: place                 !! from 1
+      integer :: column
+
+      column = image(self%boundary, self%nx, place)
+   end function column_at
+
+   !> The same for the rows.
+   elemental function row_at(self, place) result(row)
+      class(grid_type), intent(in) :: self
+      integer, intent(in) :: place                 !! from 1
+      integer :: row
+
+      row = image(self%boundary, self%ny, place)
+   end function row_at
+
+   !> The one of n cells that a place is or repeats; 0: none.
+   elemental function image(boundary, n, place) result(cell)
+      integer, intent(in) :: boundary, n, place
+      integer :: cell
+
+      cell = place
+      if (place >= 1 .and. place <= n) return
+      cell = 0
+      if (boundary == boundary_periodic) cell = modulo(place - 1, n) + 1
+   end function image
 
    !> Number of blocks of the coarse level along x and y: about as long as wide, in metres, of whole cells.
    pure function blocks(self)

@@ -12,7 +12,7 @@ module row_sharing
    implicit none
    private
 
-   public :: new_row_sharing, owners_on_grid, row_sharing_type
+   public :: new_row_sharing, owners_on_grid, row_sharing_type, sharing_on_grid
 
    !> The rows of all processes.
    type :: row_sharing_type
@@ -32,7 +32,7 @@ contains
       type(row_sharing_type), intent(out) :: self
       integer, intent(in) :: owner(:)      !! process of each row, from 0
       logical, intent(in) :: shared        !! .false.: every process holds all rows
-      integer :: j, p, last
+      integer :: j, p, next(0:process_count())     ! where the next row of each process goes
 
       self%shared = shared
       self%owner = owner
@@ -41,15 +41,25 @@ contains
       self%rows_of = [size(owner)]
       if (.not. shared) return
       deallocate (self%rows_of)
-      allocate (self%rows_of(process_count()))
-      last = 0
-      do p = 1, process_count()
-         self%rows_of(p) = count(owner == p - 1)
-         self%order(last + 1:last + self%rows_of(p)) = pack(self%own, owner == p - 1)
-         last = last + self%rows_of(p)
+      allocate (self%rows_of(process_count()), source=0)
+      do j = 1, size(owner)
+         self%rows_of(owner(j) + 1) = self%rows_of(owner(j) + 1) + 1
+      end do
+      next = [1, (1 + sum(self%rows_of(:p)), p=1, process_count())]
+      do j = 1, size(owner)
+         self%order(next(owner(j))) = j
+         next(owner(j)) = next(owner(j)) + 1
       end do
       self%own = pack(self%own, owner == process_number())
    end subroutine new_row_sharing
+
+   !> How the rows of a grid are shared.
+   pure function sharing_on_grid(grid) result(sharing)
+      type(grid_type), intent(in) :: grid
+      type(row_sharing_type) :: sharing
+
+      call new_row_sharing(sharing, owners_on_grid(grid), grid%shared)
+   end function sharing_on_grid
 
    !> The process of each row of a grid, from 0.
    pure function owners_on_grid(grid) result(owner)

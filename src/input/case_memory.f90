@@ -17,7 +17,7 @@ module case_memory
 
    real(dp), parameter :: program_itself = 26.0e6_dp  !! with its libraries, bytes
    real(dp), parameter :: chunk = 131072.0_dp         !! most values of a chunk of the result
-   real(dp), parameter :: chunks = 4.0_dp             !! in work at a time
+   real(dp), parameter :: chunks = 4.0_dp             !! gathered at a time, with two threads
 
 contains
 
@@ -37,6 +37,8 @@ contains
       if (arms > 0) fields = fields + 3.0_dp + arms
       ! The displacement serves the next row.
       if (slides .or. count_rows(case%phases) > 1) fields = fields + 1.0_dp
+      ! Pressure and gap before a row that may be given up (module row_stop); friction counts its own.
+      if (count_rows(case%phases) > 1 .and. .not. (slides .and. case%friction%law /= 'none')) fields = fields + 2.0_dp
       ! The original map and its spline, the slopes, and a field that is being shifted.
       if (slides) fields = fields + merge(5.0_dp, 4.0_dp, case%solver%interpolation == 'cubic')
       if (case%adhesion%potential /= 'none') fields = fields + adhesion_fields(case)
@@ -45,7 +47,9 @@ contains
          fields = fields + merge(130.0_dp, 32.0_dp, slides .and. case%friction%law /= 'none')
       cells = real(case%grid%nx, dp)*real(case%grid%ny, dp)
       if (present(rows)) cells = real(case%grid%nx, dp)*real(rows, dp)
-      bytes = 8.0_dp*(fields*cells + chunks*min(cells, chunk)) + program_itself
+      ! Chunks that are gathered, twice as many that are stored, and one in work for each thread (module
+      ! hdf5_chunk_writer).
+      bytes = 8.0_dp*(fields*cells + 3.0_dp*min(cells, chunks*chunk) + 2.0_dp*min(cells, chunk)) + program_itself
    end function memory_needed
 
    !> Fields of the normal solver and of the state it works on (module normal_cg).
@@ -67,8 +71,8 @@ contains
       type(case_type), intent(in) :: case
       real(dp) :: fields
 
-      fields = 5.8_dp
-      if (case%grid%boundary == boundary_free) fields = 37.0_dp
+      fields = 10.7_dp
+      if (case%grid%boundary == boundary_free) fields = 54.0_dp
       if (case%solver%method == 'thesis') fields = 3.4_dp
    end function adhesion_fields
 

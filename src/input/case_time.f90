@@ -9,7 +9,7 @@
 module case_time
    use case_settings, only : case_type, road_moves
    use asperity_errors, only : error_type
-   use asperity_parallel, only : processor_count
+   use asperity_threads, only : processor_count
    use asperity_precision, only : dp
    use real_transform, only : destroy_real_transform, new_real_transform, real_transform_type, to_space, &
       to_spectrum

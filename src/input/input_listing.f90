@@ -7,7 +7,6 @@ module input_listing
    use input_reference, only : group_entries, group_entry_type, kind_integer, kind_logical, kind_real, &
       kind_reals, variable_entries, variable_entry_type
    use input_values, only : read_groups
-   use asperity_precision, only : dp
    use text_tools, only : to_text
    implicit none
    private

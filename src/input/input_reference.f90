@@ -290,7 +290,8 @@ contains
          row('output', 'checkpoint_minutes', kind_real, '10', 'min', 'not negative', &
             'Time between checkpoints; 0 means that none are written by time.'), &
          row('output', 'compression', kind_integer, '1', '', '[0, 9]', &
-            'Compression level (deflate) of the fields; 0 means no compression.')]
+            'Compression level (deflate) of the fields; 0 means no compression. Higher levels than 1 save '// &
+            'hardly any space and take longer.')]
    end function solver_and_output
 
    !> Must the user give it wherever it applies?

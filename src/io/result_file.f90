@@ -11,8 +11,9 @@ module result_file
    use asperity_errors, only : error_file, error_input, error_type, fail
    use asperity_precision, only : dp, int8
    use file_system, only : name_of, remove_file, rename_file
+   use hdf5_chunk_writer, only : chunk_writer_type
    use hdf5_file, only : hdf5_file_type
-   use hdf5_slabs, only : create_field, slab_rows, write_slab
+   use hdf5_slabs, only : create_field, slab_rows
    use history_row, only : history_row_type, row_values
    use random_id, only : new_id
    use regular_grid, only : grid_type
@@ -34,6 +35,7 @@ module result_file
    type :: result_file_type
       private
       type(hdf5_file_type) :: file
+      type(chunk_writer_type) :: writer              !! of the field in hand
       type(grid_type) :: grid
       integer :: expected_rows = 0
       integer :: compression = 0
@@ -99,6 +101,7 @@ contains
       ! The link is made and removed, so that the root group keeps the room for its name.
       call self%link_checkpoint()
       call self%unlink_checkpoint()
+      call self%writer%start(self%file, height_path, [grid%nx, grid%ny], .false., self%compression)
       call self%file%report(error)
       if (allocated(error)) call give_up(self, error)
    end subroutine create_result
@@ -111,7 +114,8 @@ contains
       real(dp), intent(in), contiguous :: height(:, :) !! m [nx, rows]
       type(error_type), allocatable, intent(out), optional :: error
 
-      call write_slab(self%file, height_path, first, height, error)
+      call self%writer%add(self%file, first, height)
+      call self%file%report(error)
    end subroutine write_height_rows
 
    !> Let the new result take its place. One of the same name is replaced, and its checkpoint is removed.
@@ -119,6 +123,7 @@ contains
       class(result_file_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
 
+      call self%writer%finish(self%file)
       call self%file%flush()
       call self%file%report(error)
       if (allocated(error)) then
@@ -138,6 +143,7 @@ contains
       type(error_type), allocatable, intent(inout) :: error
       character(:), allocatable :: temporary
 
+      call self%writer%finish(self%file)
       temporary = new_path(self)
       if (index(error%message, temporary//':') == 1) &
          error%message = self%path//error%message(len(temporary) + 1:)
@@ -273,6 +279,8 @@ contains
       type(error_type), allocatable, intent(out), optional :: error
       type(error_type), allocatable :: fault
       type(field_type) :: field
+      character(:), allocatable :: path
+      integer :: extent(2)
 
       rows = slab_rows(self%grid%nx)
       field = find_field(name)
@@ -282,8 +290,13 @@ contains
          return
       end if
       self%current%fields = [character(24) :: self%current%fields, name]
-      call create_field(self%file, self%current_path//'/'//trim(name), [self%grid%nx, self%grid%ny], &
-         name == 'contact', trim(field%units), trim(field%long_name), self%compression, error)
+      call self%writer%finish(self%file)
+      path = self%current_path//'/'//trim(name)
+      extent = [self%grid%nx, self%grid%ny]
+      call create_field(self%file, path, extent, name == 'contact', trim(field%units), trim(field%long_name), &
+         self%compression)
+      call self%writer%start(self%file, path, extent, name == 'contact', self%compression)
+      call self%file%report(error)
    end subroutine start_field
 
    !> Write a slab of the field that was started last.
@@ -293,7 +306,8 @@ contains
       real(dp), intent(in), contiguous :: values(:, :) !! [nx, rows]
       type(error_type), allocatable, intent(out), optional :: error
 
-      call write_slab(self%file, field_path(self), first, values, error)
+      call self%writer%add(self%file, first, values)
+      call self%file%report(error)
    end subroutine write_real_rows
 
    !> The same for a field of states.
@@ -303,25 +317,16 @@ contains
       integer(int8), intent(in), contiguous :: values(:, :)
       type(error_type), allocatable, intent(out), optional :: error
 
-      call write_slab(self%file, field_path(self), first, values, error)
+      call self%writer%add(self%file, first, values)
+      call self%file%report(error)
    end subroutine write_state_rows
-
-   !> Path of the field that was started last.
-   pure function field_path(self) result(path)
-      class(result_file_type), intent(in) :: self
-      character(:), allocatable :: path
-
-      associate (fields => self%current%fields)
-         path = self%current_path
-         if (size(fields) > 0) path = path//'/'//trim(fields(size(fields)))
-      end associate
-   end function field_path
 
    !> Let the snapshot appear, in the result and in the XDMF file.
    subroutine end_snapshot(self, error)
       class(result_file_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
 
+      call self%writer%finish(self%file)
       call write_axes(self%file, self%current_path, self%grid, self%current%fields, &
          self%compression)
       call self%file%publish_group()
@@ -400,6 +405,7 @@ contains
       class(result_file_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
 
+      call self%writer%finish(self%file)
       call self%file%close(error)
    end subroutine close_result
 

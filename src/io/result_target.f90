@@ -110,7 +110,7 @@ contains
    end subroutine check_replaced
 
    !> Does this HDF5 file contain only what a result contains before its first attribute is written,
-   !> or can it not even be opened?
+   !> or can it or its root group not even be read?
    function is_beginning(path) result(yes)
       character(*), intent(in) :: path
       logical :: yes
@@ -122,7 +122,8 @@ contains
       yes = allocated(error)
       if (yes) return
       call file%members('/', names, error)
-      if (.not. allocated(error)) yes = all(names == 'snapshots')
+      yes = allocated(error)
+      if (.not. yes) yes = all(names == 'snapshots')
       call file%close(error)
    end function is_beginning
 

@@ -28,7 +28,7 @@ module adhesion_potential
    implicit none
    private
 
-   public :: adhesion_potential_type, adhesive_curvature, adhesive_energy, adhesive_slope, &
+   public :: adhesion_potential_type, adhesive_curvature, adhesive_energy, adhesive_slope, adhesive_slopes, &
       adhesive_terms, has_smooth_potential, edge_of_cells, new_adhesion_potential, &
       new_tabulated_potential, stiffens
 
@@ -244,6 +244,30 @@ contains
          call table_terms(self, gap, energy, slope, curvature)
       end select
    end subroutine adhesive_terms
+
+   !> e' and e'' of a row of cells at once.
+   pure subroutine adhesive_slopes(self, gap, slope, curvature)
+      type(adhesion_potential_type), intent(in) :: self
+      real(dp), intent(in), contiguous :: gap(:)         !! m, >= 0
+      real(dp), intent(out), contiguous :: slope(:)      !! e', Pa
+      real(dp), intent(out), contiguous :: curvature(:)  !! e'', Pa/m
+      real(dp) :: energy, scale, stiffness
+      integer :: i
+
+      if (self%kind /= potential_exponential) then
+         do i = 1, size(gap)
+            call adhesive_terms(self, gap(i), energy, slope(i), curvature(i))
+         end do
+         return
+      end if
+      scale = self%energy/self%range
+      stiffness = -1.0_dp/self%range
+      do i = 1, size(gap)
+         slope(i) = 0.0_dp
+         if (gap(i) < far*self%range) slope(i) = scale*exp(-gap(i)/self%range)
+         curvature(i) = stiffness*slope(i)
+      end do
+   end subroutine adhesive_slopes
 
    !> Is there no attraction at a gap?
    pure function is_far(self, gap)

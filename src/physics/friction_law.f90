@@ -59,7 +59,6 @@ module friction_law
       procedure :: strength_beside
       procedure :: return_to_bound
       procedure :: place_on_bound
-      procedure :: slip_direction
       procedure :: slip_along_slope
    end type friction_law_type
 
@@ -267,19 +266,6 @@ contains
          end if
       end if
    end subroutine place_on_bound
-
-   !> The direction of slip on the bound: D - n (n.D), or D itself in the thesis.
-   pure function slip_direction(self, slope, d) result(direction)
-      class(friction_law_type), intent(in) :: self
-      real(dp), intent(in) :: slope(2)
-      real(dp), intent(in) :: d(2)          !! D, Pa
-      real(dp) :: direction(2)              !! Pa
-
-      direction = d
-      if (self%slope .and. self%physical_slip) then
-         direction = d - slope*((slope(1)*d(1) + slope(2)*d(2))/(1.0_dp + slope(1)**2 + slope(2)**2))
-      end if
-   end function slip_direction
 
    !> The slip that must be parallel to D: r + grad H (grad H . r), or r itself in the thesis.
    pure function slip_along_slope(self, slope, r) result(slip)

@@ -95,8 +95,8 @@ contains
       if (.not. self%has_steady) return
       call new_steady_step(self%steady, case, self%rms_height, error)
       if (allocated(error)) return
-      self%state%steady%last = self%steady%last
-      self%state%steady%before = self%steady%before
+      call self%state%steady%last%take(self%steady%last)
+      call self%state%steady%before%take(self%steady%before)
    end subroutine new_simulation
 
    !> Find the state after the next row; the present one stays as it is. Where the solvers did not
@@ -146,16 +146,25 @@ contains
    subroutine advance(self, error)
       class(simulation_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
+
+      if (allocated(self%proposed)) deallocate (self%proposed)
+      call self%stop%keep(self%state)
+      call do_row(self, error)
+      call self%stop%release()
+   end subroutine advance
+
+   !> A row, in one part or in several.
+   subroutine do_row(self, error)
+      class(simulation_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
       type(planned_row_type) :: plan
       type(planned_row_type), allocatable :: parts(:)
       type(part_sums_type) :: sums
       integer :: k
 
-      if (allocated(self%proposed)) deallocate (self%proposed)
-      if (self%frictional) call self%stop%keep(self%state)
       call plan_row(self, plan, parts)
       if (self%finished) return
-      if (self%frictional .and. size(parts) > 1) call self%stop%keep_more(self%state)
+      if (size(parts) > 1) call self%stop%keep_more(self%state)
       do k = 1, size(parts)
          call take_step(self, parts(k), error)
          if (allocated(error)) return
@@ -172,7 +181,7 @@ contains
       call watch_cells(self, plan, self%warnings)
       call look_for_overflow(self)
       self%finished = self%state%schedule%phase > size(self%case%phases)
-   end subroutine advance
+   end subroutine do_row
 
    !> The next row of the schedule, and the parts in which its step is taken.
    subroutine plan_row(self, plan, parts)
@@ -241,6 +250,7 @@ contains
       found%rubbing%converged = .true.
       if (plan%steady) then
          call slide_for_ever(self, self%steady, plan, found)
+         self%stop%given_up = found%normal%stopped
          return
       end if
       associate (state => self%state)
@@ -258,6 +268,8 @@ contains
             found%mismatch = self%passes%residual
          else
             call solve_normal(self, plan, self%case%solver%tolerance, found%normal)
+            self%stop%given_up = found%normal%stopped
+            if (self%stop%given_up) return
          end if
          if (self%frictional) then
             call take_road(plan, state%schedule, self%tangential, self%rubs(), road, state%velocity)

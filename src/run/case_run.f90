@@ -19,7 +19,8 @@ module case_run
    use history_row, only : row_values
    use memory_limits, only : need_memory
    use asperity_parallel, only : exchanged_bytes, global_max, is_first_process, process_count, &
-      processes_of_machine, set_threads, share
+      processes_of_machine, share
+   use asperity_threads, only : set_threads
    use path_identity, only : real_path
    use process_agreement, only : agree
    use regular_grid, only : grid_type

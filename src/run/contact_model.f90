@@ -45,7 +45,7 @@ module contact_model
       type(zener_type) :: material                  !! with the coefficients of the step in hand
       type(interpolation_type) :: road              !! the original map
       type(workspace_type) :: work                  !! scratch fields of the stages of a step
-      type(row_stop_type) :: stop                   !! gives up a row with friction if a stop is asked for
+      type(row_stop_type) :: stop                   !! gives up a row if a stop is asked for
       real(dp), allocatable :: height(:, :)         !! H under the rubber in the step in hand, m
       real(dp), allocatable :: slope_x(:, :)        !! of the road under the rubber, -
       real(dp), allocatable :: slope_y(:, :)

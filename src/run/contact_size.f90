@@ -12,7 +12,7 @@ module contact_size
    use asperity_precision, only : dp, pi
    use field_sums, only : row_totals
    use regular_grid, only : boundary_periodic, grid_type
-   use row_fetch, only : fetch_rows, row_in_grid
+   use row_halo, only : fetch_beside
    use text_tools, only : to_text
    implicit none
    private
@@ -49,19 +49,16 @@ contains
       real(dp), intent(in) :: pressure(:, :), gap(:, :)
       real(dp) :: across
       logical, allocatable :: row(:), below(:)
-      real(dp), allocatable :: rows(:, :), pressure_below(:, :), gap_below(:, :)
+      real(dp), allocatable :: rows(:, :), pressure_beside(:, :), gap_beside(:, :)
       real(dp) :: sums(3)
-      integer :: j, range(2)
+      integer :: j
 
       allocate (row(grid%nx), rows(3, grid%rows()), below(grid%nx))
-      ! The row below the first one belongs to another process. A process without rows needs none.
-      range = grid%first_row - 1
-      if (grid%rows() == 0) range = [1, 0]
-      allocate (pressure_below(grid%nx, 1), gap_below(grid%nx, 1), source=0.0_dp)
-      call fetch_rows(grid, pressure, range, pressure_below)
-      call fetch_rows(grid, gap, range, gap_below)
-      below(:) = touches(adhesive, pressure_below(:, 1), gap_below(:, 1))
-      if (row_in_grid(grid, range(1)) == 0) below(:) = .false.
+      allocate (pressure_beside(grid%nx, 2), gap_beside(grid%nx, 2))
+      call fetch_beside(grid, pressure, pressure_beside)
+      call fetch_beside(grid, gap, gap_beside)
+      below(:) = grid%row_at(grid%first_row - 1) > 0 &
+         .and. touches(adhesive, pressure_beside(:, 1), gap_beside(:, 1))
       do j = 1, grid%rows()
          row(:) = touches(adhesive, pressure(:, j), gap(:, j))
          rows(:, j) = [count(row), count(row(2:) .and. .not. row(:grid%nx - 1)), &

@@ -47,6 +47,7 @@ module coupled_passes
    use regular_grid, only : grid_type
    use asperity_schedule, only : planned_row_type
    use solver_result, only : solver_result_type
+   use stop_watch, only : stop_is_due
    implicit none
    private
 
@@ -115,10 +116,12 @@ contains
          ! Early passes are solved coarsely; what the row keeps is solved to the tolerance.
          if (self%passes == most) control%accuracy = min(control%accuracy, tolerance)
          call do_pass(self, contact, plan, control%accuracy, normal, rubbing)
+         contact%stop%given_up = normal%stopped
+         if (contact%stop%given_up) return
          if (self%passes == 1 .and. .not. plan%instantaneous) contact%state%first_mismatch = self%residual
          if (self%passes == most .or. .not. normal%converged) exit
          if (control%accuracy <= tolerance .and. self%residual <= tolerance) exit
-         contact%stop%given_up = contact%stop%is_due()
+         contact%stop%given_up = stop_is_due()
          if (contact%stop%given_up) return
          call control%judge(self%residual)
          call choose_place(self, contact, control)
@@ -146,6 +149,8 @@ contains
       call displaced(contact%road, plan%road_x, plan%road_y, self%place(:, 1, :), self%place(:, 2, :), &
          contact%height, contact%slope_x, contact%slope_y)
       call solve_normal(contact, plan, accuracy, part)
+      normal%stopped = part%stopped
+      if (normal%stopped) return
       call add_result(normal, part)
       contact%tangential%tolerance = accuracy
       call contact%tangential%solve(contact%state%tangential, contact%state%pressure, contact%state%gap, &

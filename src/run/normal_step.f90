@@ -22,6 +22,9 @@ module normal_step
 
    public :: new_normal_step, normal_step_type, normal_task_type
 
+   !> The contact without adhesion is only where the one with adhesion begins: a share of its duality gap.
+   real(dp), parameter :: start_tolerance = 1e-2_dp
+
    !> What a row asks of the normal side.
    type :: normal_task_type
       character(12) :: control = 'pressure'        !! 'pressure' | 'force' | 'displacement'
@@ -108,6 +111,10 @@ contains
          end do
       else if (task%first) then
          call start(self, task, height, pressure, gap, level, before, past)
+         if (before%stopped) then
+            outcome = before
+            return
+         end if
       end if
       problem%potential = self%potential
       problem%modulus = task%modulus
@@ -136,7 +143,7 @@ contains
       end if
    end subroutine load_of
 
-   !> The first state with adhesion: the solution without, or mere touch where the load does not press.
+   !> The first state with adhesion: about the solution without, or mere touch where the load does not press.
    subroutine start(self, task, height, pressure, gap, level, outcome, past)
       type(normal_step_type), intent(inout) :: self
       type(normal_task_type), intent(in) :: task
@@ -146,21 +153,32 @@ contains
       type(solver_result_type), intent(out) :: outcome
       real(dp), intent(in), optional :: past(:, :)
       type(normal_task_type) :: touch
+      logical :: presses
       integer :: j
 
       touch = task
-      if (task%control /= 'displacement' .and. task%load <= 0.0_dp) then
+      presses = task%control == 'displacement' .or. task%load > 0.0_dp
+      if (.not. presses) then
          touch%control = 'displacement'
          touch%load = 0.0_dp
       end if
-      call solve_bare(self, touch, height, pressure, gap, level, outcome, past)
-      !$omp parallel do default(none) shared(self, gap) private(j)
+      if (presses .or. present(past)) then
+         call solve_bare(self, touch, height, pressure, gap, level, outcome, past)
+         if (outcome%stopped) return
+      else
+         level = -self%summit
+      end if
+      !$omp parallel do default(none) shared(self, presses, height, past, pressure, gap, level) private(j)
       do j = 1, self%grid%rows()
+         if (.not. (presses .or. present(past))) then
+            pressure(:, j) = 0.0_dp
+            gap(:, j) = -level - height(:, j)
+         end if
          gap(:, j) = max(gap(:, j), 0.0_dp)
       end do
    end subroutine start
 
-   !> The contact without adhesion.
+   !> The contact without adhesion; where adhesion follows, only about.
    subroutine solve_bare(self, task, height, pressure, gap, level, outcome, past)
       type(normal_step_type), intent(inout) :: self
       type(normal_task_type), intent(in) :: task
@@ -173,6 +191,7 @@ contains
 
       problem%modulus = task%modulus
       problem%tolerance = self%tolerance
+      if (self%adhesive) problem%tolerance = max(self%tolerance, start_tolerance)
       problem%max_iterations = self%max_iterations
       problem%rms_height = self%rms_height
       problem%warm = .not. task%first

@@ -79,43 +79,46 @@ contains
       character(:), allocatable, intent(inout) :: text
       type(error_type), allocatable, intent(out) :: error
       integer, allocatable :: extent(:)
-      character(:), allocatable :: words
+      character(:), allocatable :: boundary
       real(dp) :: lx, ly
       real(dp), allocatable :: height(:, :)
 
-      call file%dataset_shape('/surface/height', extent, error)
+      call file%dataset_shape('/surface/height', extent)
+      call file%report(error)
+      if (.not. allocated(error) .and. size(extent) /= 2) call fail(error, error_file, path// &
+         ': /surface/height: is no map: it has '//to_text(size(extent))//' dimensions')
       if (allocated(error)) return
-      if (size(extent) /= 2) then
-         call fail(error, error_file, path//': /surface/height: is no map: it has '// &
-            to_text(size(extent))//' dimensions')
-         return
-      end if
       allocate (height(extent(1), extent(2)))
-      call file%read('/surface/height', height, error)
-      if (allocated(error)) return
-      text = 'file        '//path//nl//'holds       a height map'//nl
-      if (file%has_attribute('/', 'title')) then
-         call file%read_attribute('/', 'title', words, error)
-         if (allocated(error)) return
-         if (words /= '') text = text//'title       '//ordinary(words, 200)//nl
-      end if
-      text = text//'grid        '//to_text(extent(1))//' x '//to_text(extent(2))//' cells'
+      call file%read('/surface/height', height)
+      text = 'file        '//path//nl//'holds       a height map'//nl//attribute_line(file, 'title', 'title       ', 200) &
+         //'grid        '//to_text(extent(1))//' x '//to_text(extent(2))//' cells'
       if (file%has_attribute('/grid', 'lx') .and. file%has_attribute('/grid', 'ly')) then
-         call file%read_attribute('/grid', 'lx', lx, error)
-         if (.not. allocated(error)) call file%read_attribute('/grid', 'ly', ly, error)
-         if (.not. allocated(error)) call file%read_attribute('/grid', 'boundary', words, error)
-         if (allocated(error)) return
-         text = text//', '//to_text(lx)//' m x '//to_text(ly)//' m, '//ordinary(words, 40)
+         call file%read_attribute('/grid', 'lx', lx)
+         call file%read_attribute('/grid', 'ly', ly)
+         call file%read_attribute('/grid', 'boundary', boundary)
+         text = text//', '//to_text(lx)//' m x '//to_text(ly)//' m, '//ordinary(boundary, 40)
       end if
       text = text//nl//'heights     '//to_text(minval(height))//' m to '//to_text(maxval(height))// &
          ' m, rms '//to_text(sqrt(sum((height - sum(height)/size(height))**2)/size(height)))//' m'//nl
-      if (file%has_attribute('/', 'steps_text')) then
-         call file%read_attribute('/', 'steps_text', words, error)
-         if (allocated(error)) return
-         if (words /= '') text = text//'done to it  '//ordinary(words, 400)//nl
-      end if
+      text = text//attribute_line(file, 'steps_text', 'done to it  ', 400)
+      call file%report(error)
       text = text//'to use it   &surface shape = ''file'', file = '''//path//''' /'//nl
    end subroutine describe_map
+
+   !> The line of an attribute of the whole file; '' where it has none, or an empty one.
+   function attribute_line(file, name, head, most) result(line)
+      type(hdf5_file_type), intent(inout) :: file
+      character(*), intent(in) :: name
+      character(*), intent(in) :: head               !! the words before it
+      integer, intent(in) :: most                    !! characters of it
+      character(:), allocatable :: line
+      character(:), allocatable :: words
+
+      line = ''
+      if (.not. file%has_attribute('/', name)) return
+      call file%read_attribute('/', name, words)
+      if (words /= '') line = head//ordinary(words, most)//nl
+   end function attribute_line
 
    !> The summary of an open file.
    subroutine describe(file, path, text, error)
@@ -154,13 +157,13 @@ contains
          text = text//'finished    no'//nl
       end if
       if (finished == 0 .and. file%has_attribute('/', 'outcome')) then
-         call file%read_attribute('/', 'outcome', outcome, error)
-         if (allocated(error)) return
+         call file%read_attribute('/', 'outcome', outcome)
          if (outcome == 'running') outcome = 'going on, or killed'//row_note(file)
          text = text//'outcome     '//ordinary(outcome, 400)//nl
       end if
-      call add_warnings(file, 'warnings', text, error)
-      if (.not. allocated(error)) call add_warnings(file, 'run_warnings', text, error)
+      call add_warnings(file, 'warnings', text)
+      call add_warnings(file, 'run_warnings', text)
+      call file%report(error)
    end subroutine describe
 
    !> How long the last row took, for a look at whether rows are added; '' where it is not known.
@@ -179,17 +182,15 @@ contains
    end function row_note
 
    !> The lines of an attribute with warnings, where there is one.
-   subroutine add_warnings(file, name, text, error)
+   subroutine add_warnings(file, name, text)
       type(hdf5_file_type), intent(inout) :: file
       character(*), intent(in) :: name
       character(:), allocatable, intent(inout) :: text
-      type(error_type), allocatable, intent(out) :: error
       character(:), allocatable :: lines
       integer :: at, next
 
       if (.not. file%has_attribute('/', name)) return
-      call file%read_attribute('/', name, lines, error)
-      if (allocated(error)) return
+      call file%read_attribute('/', name, lines)
       at = 1
       do while (at <= len(lines))
          next = index(lines(at:), nl)
@@ -260,8 +261,7 @@ contains
       end if
       text = text//'rows        '//to_text(rows)
       if (file%has_attribute('/', 'expected_rows')) then
-         call file%read_attribute('/', 'expected_rows', expected, error)
-         if (allocated(error)) return
+         call file%read_attribute('/', 'expected_rows', expected)
          if (expected /= rows) text = text//' of '//to_text(expected)
       end if
       text = text//nl//'last row'//nl

@@ -1,36 +1,30 @@
 !> Giving up a row that is in hand when a stop is asked for.
 !>
-!> A row may take minutes, such as one whose passes do not settle. A run that is asked to stop lets the row
-!> end if that takes no longer than `patience`; otherwise the row is given up, and the state is that of the
-!> row before.
+!> A row may take minutes: a large contact, or passes that do not settle. A run that is asked to stop lets
+!> the row end if that takes no longer than `patience`; otherwise the row is given up, and the state is that
+!> of the row before. Solvers ask for it at each iteration (module `stop_watch`), rows with friction also
+!> between two passes.
 !>
 !> For this `keep` copies, at the start of a row, what the row changes before it commits a step: P, the
-!> gap, T and T of the step before, the forecast, the states of contact, and all scalars. The fields
-!> that only the end of a step changes are not copied, because the arms may have many. A row whose step
-!> is solved in parts needs them, too, once a part is committed: `keep_more` copies them if they take
-!> no more than `most_more`. Otherwise such a row can be given up in its first part only.
+!> gap, T and T of the step before, the forecast, the states of contact, and all scalars. Before the first
+!> row P and the gap are zero and need no copy. The fields that only the end of a step changes are not
+!> copied, because the arms may have many. A row whose step is solved in parts needs them, too, once a part
+!> is committed: `keep_more` copies them if they take no more than `most_more`. Otherwise such a row can be
+!> given up in its first part only.
 !>
-!> Several processes give up a row together: a stop that any of them was asked for counts for all, and the
-!> row is given up as soon as the patience of one has ended.
+!> Several processes give up a row together.
 module row_stop
-   use, intrinsic :: iso_c_binding, only : c_int
+   use arm_state, only : arm_state_type
    use asperity_parallel, only : any_process, global_max
-   use asperity_precision, only : dp, int64
+   use asperity_precision, only : dp
    use row_state, only : state_type
+   use stop_watch, only : begin_watch, end_watch, stop_question
    implicit none
    private
 
-   public :: row_stop_type, stop_question
+   public :: row_stop_type
 
    real(dp), parameter :: most_more = 64.0e6_dp    !! bytes of a process that `keep_more` copies
-
-   abstract interface
-      !> Has a stop been asked for? C's convention, so that Python can answer.
-      function stop_question() bind(c) result(yes)
-         import :: c_int
-         integer(c_int) :: yes                 !! not 0: yes
-      end function stop_question
-   end interface
 
    !> Whom to ask, and the state to go back to.
    type :: row_stop_type
@@ -39,13 +33,12 @@ module row_stop
       logical :: given_up = .false.            !! the row in hand was given up
       type(state_type), allocatable, private :: kept
       logical, private :: complete = .false.   !! `kept` has all fields
-      integer(int64), private :: since = -1    !! clock at which the answer was first yes
    contains
       procedure :: keep
       procedure :: keep_more
       procedure :: part_ends
-      procedure :: is_due
       procedure :: put_back
+      procedure :: release
    end type row_stop_type
 
 contains
@@ -55,14 +48,30 @@ contains
       class(row_stop_type), intent(inout) :: self
       type(state_type), intent(inout) :: state       !! unchanged on return
       type(state_type) :: aside
+      integer :: status
 
       self%given_up = .false.
       self%complete = .false.
       if (allocated(self%kept)) deallocate (self%kept)
       if (.not. associated(self%asked)) return
       call hand_over(state, aside)
+      call hand_over_steady(state, aside)
+      call hand_over_contact(state, aside)
       allocate (self%kept, source=state)
+      call hand_over_contact(aside, state)
+      call hand_over_steady(aside, state)
       call hand_over(aside, state)
+      status = 0
+      if (.not. state%first) then
+         allocate (self%kept%pressure, source=state%pressure, stat=status)
+         if (status == 0) allocate (self%kept%gap, source=state%gap, stat=status)
+      end if
+      ! Where memory is too short for the copies, the row always ends.
+      if (any_process(status /= 0)) then
+         deallocate (self%kept)
+      else
+         call begin_watch(self%asked, self%patience)
+      end if
    end subroutine keep
 
    !> The row has several parts: keep what the first of them will commit.
@@ -72,41 +81,35 @@ contains
       real(dp) :: numbers
 
       if (.not. allocated(self%kept)) return
-      associate (t => state%tangential)
-         numbers = real(size(state%arms%arm), dp) + real(size(t%arms%arm), dp) + size(state%arms%s) + &
-            size(state%arms%ds) + size(t%arms%s) + size(t%arms%ds) + 3*size(t%displacement)
-      end associate
+      numbers = numbers_of(state%arms) + numbers_of(state%tangential%arms)
+      if (allocated(state%tangential%displacement)) numbers = numbers + 3.0_dp*size(state%tangential%displacement)
       ! The processes must agree: they have different numbers of rows.
       self%complete = 8.0_dp*global_max(numbers) <= most_more
       if (.not. self%complete) return
       if (allocated(state%displacement)) self%kept%displacement = state%displacement
       self%kept%arms = state%arms
+      self%kept%tangential%arms = state%tangential%arms
+      if (.not. allocated(state%tangential%displacement)) return
       self%kept%tangential%displacement = state%tangential%displacement
       self%kept%tangential%rubbing = state%tangential%rubbing
       self%kept%tangential%rubbed = state%tangential%rubbed
-      self%kept%tangential%arms = state%tangential%arms
    end subroutine keep_more
+
+   !> The numbers that arms have on this process.
+   pure function numbers_of(arms) result(numbers)
+      type(arm_state_type), intent(in) :: arms
+      real(dp) :: numbers
+
+      numbers = 0.0_dp
+      if (allocated(arms%arm)) numbers = real(size(arms%arm), dp) + size(arms%s) + size(arms%ds)
+   end function numbers_of
 
    !> A part of the row has been committed.
    subroutine part_ends(self)
       class(row_stop_type), intent(inout) :: self
 
-      if (allocated(self%kept) .and. .not. self%complete) deallocate (self%kept)
+      if (.not. self%complete) call self%release()
    end subroutine part_ends
-
-   !> Is the row in hand to be given up? Collective.
-   function is_due(self) result(due)
-      class(row_stop_type), intent(inout) :: self
-      logical :: due
-      integer(int64) :: now, rate
-
-      due = .false.
-      if (.not. allocated(self%kept)) return
-      if (.not. any_process(self%asked() /= 0_c_int)) return
-      call system_clock(now, rate)
-      if (self%since < 0) self%since = now
-      due = any_process(real(now - self%since, dp) >= self%patience*real(rate, dp))
-   end function is_due
 
    !> Go back to the state at the start of the row.
    subroutine put_back(self, state)
@@ -114,8 +117,30 @@ contains
       type(state_type), allocatable, intent(inout) :: state
 
       if (.not. self%complete) call hand_over(state, self%kept)
+      call hand_over_steady(state, self%kept)
+      if (self%kept%first) then
+         call hand_over_contact(state, self%kept)
+         self%kept%pressure = 0.0_dp
+         self%kept%gap = 0.0_dp
+      end if
       call move_alloc(self%kept, state)
    end subroutine put_back
+
+   !> The row has ended, or can no longer be given up.
+   subroutine release(self)
+      class(row_stop_type), intent(inout) :: self
+
+      if (allocated(self%kept)) deallocate (self%kept)
+      call end_watch()
+   end subroutine release
+
+   !> Move the fields of the contact from one state to another.
+   subroutine hand_over_contact(from, to)
+      type(state_type), intent(inout) :: from, to
+
+      call move_alloc(from%pressure, to%pressure)
+      call move_alloc(from%gap, to%gap)
+   end subroutine hand_over_contact
 
    !> Move the fields that only the end of a step changes from one state to another.
    subroutine hand_over(from, to)
@@ -132,5 +157,18 @@ contains
       call move_alloc(from%tangential%arms%ds, to%tangential%arms%ds)
       call move_alloc(from%tangential%arms%arm, to%tangential%arms%arm)
    end subroutine hand_over
+
+   !> Move the states of the last steady rows. A row that is solved in parts is none of these and leaves them as
+   !> they are.
+   subroutine hand_over_steady(from, to)
+      type(state_type), intent(inout) :: from, to
+
+      call move_alloc(from%steady%last%pressure, to%steady%last%pressure)
+      call move_alloc(from%steady%last%gap, to%steady%last%gap)
+      call move_alloc(from%steady%last%traction, to%steady%last%traction)
+      call move_alloc(from%steady%before%pressure, to%steady%before%pressure)
+      call move_alloc(from%steady%before%gap, to%steady%before%gap)
+      call move_alloc(from%steady%before%traction, to%steady%before%traction)
+   end subroutine hand_over_steady
 
 end module row_stop

@@ -17,7 +17,8 @@ module steady_row
 
 contains
 
-   !> Find the row's state, and put it in the place of the last one.
+   !> Find the row's state, and put it in the place of the last one. A solve that was stopped changes nothing
+   !> that the state has.
    subroutine slide_for_ever(contact, steady, plan, found)
       class(contact_type), intent(inout) :: contact
       type(steady_step_type), intent(inout) :: steady
@@ -26,14 +27,15 @@ contains
 
       associate (state => contact%state)
          steady%base = state%steady%base
-         steady%last = state%steady%last
-         steady%before = state%steady%before
+         call steady%last%take(state%steady%last)
+         call steady%before%take(state%steady%before)
          if (.not. state%steady%now) call steady%begin_curve([state%row%road_x, state%row%road_y])
          call steady%solve(plan, contact%road, found%normal, found%rubbing)
+         if (found%normal%stopped) return
          state%steady%now = .true.
          state%steady%base = steady%base
-         state%steady%last = steady%last
-         state%steady%before = steady%before
+         call state%steady%last%take(steady%last)
+         call state%steady%before%take(steady%before)
       end associate
       found%viscous_force = steady%viscous_force
       found%power_viscous = steady%losses%normal + steady%losses%tangential

@@ -22,7 +22,7 @@ module steady_step
    use friction_law, only : friction_law_type, new_friction_law
    use asperity_interpolation, only : interpolation_type, shifted
    use normal_state, only : normal_problem_type
-   use asperity_precision, only : dp, int8
+   use asperity_precision, only : dp
    use regular_grid, only : grid_type
    use asperity_schedule, only : planned_row_type
    use solver_result, only : solver_result_type
@@ -49,6 +49,8 @@ module steady_step
       real(dp), allocatable :: pressure(:, :)          !! Pa
       real(dp), allocatable :: gap(:, :)               !! m
       real(dp), allocatable :: traction(:, :, :)       !! Pa [nx, 2, rows]; no extent without friction
+   contains
+      procedure :: take
    end type steady_start_type
 
    !> Solvers and the last states. Not to be copied.
@@ -117,7 +119,7 @@ contains
          end if
          allocate (self%last%pressure, self%last%gap, source=c%pressure)
          allocate (self%last%traction, source=c%traction)
-         self%before = self%last
+         call self%before%take(self%last)
       end associate
       if (self%frictional) then
          self%law = new_friction_law(trim(case%friction%law), case%friction%coefficient, &
@@ -128,6 +130,24 @@ contains
          call new_steady_normal(self%normal, self%grid)
       end if
    end subroutine new_steady_step
+
+   !> Become a copy of another start. An assignment would allocate the fields each time, and gfortran does not
+   !> notice where that fails.
+   subroutine take(self, other)
+      class(steady_start_type), intent(inout) :: self
+      type(steady_start_type), intent(in) :: other
+
+      self%known = other%known
+      self%pressure_mean = other%pressure_mean
+      self%velocity = other%velocity
+      if (.not. allocated(self%pressure)) then
+         allocate (self%pressure, self%gap, mold=other%pressure)
+         allocate (self%traction, mold=other%traction)
+      end if
+      self%pressure(:, :) = other%pressure
+      self%gap(:, :) = other%gap
+      self%traction(:, :, :) = other%traction
+   end subroutine take
 
    !> Forget the states of earlier rows; the next steady row finds the road here.
    subroutine begin_curve(self, place)
@@ -168,11 +188,12 @@ contains
          self%coupled%direction = self%medium%velocity/norm2(self%medium%velocity)
          self%coupled%base = self%base
          call self%coupled%solve(self%operator, problem, road, self%contact, outcome, rubbing)
-         call add_mean_shear(self)
+         if (.not. outcome%stopped) call add_mean_shear(self)
       else
          call self%normal%solve(self%operator, problem, self%contact%height, self%contact%pressure, &
             self%contact%gap, self%contact%level, outcome)
       end if
+      if (outcome%stopped) return
       self%place = self%base + self%contact%offset
       call find_losses(self)
       call keep_state(self, problem%target)
@@ -247,7 +268,7 @@ contains
       type(steady_step_type), intent(inout) :: self
       real(dp), intent(in) :: target
 
-      if (self%last%known) self%before = self%last
+      if (self%last%known) call self%before%take(self%last)
       self%last%known = .true.
       self%last%pressure_mean = target
       self%last%velocity = self%medium%velocity

@@ -25,6 +25,7 @@ module time_limit
       procedure :: step_begins
       procedure :: step_ends
       procedure :: is_near
+      procedure :: has_come
    end type time_limit_type
 
    interface
@@ -88,6 +89,15 @@ contains
       if (self%limited) near = seconds_now() + self%margin + 2.0_dp*(self%longest_step + &
          self%longest_save) > self%finish
    end function is_near
+
+   !> Is there just time left for a checkpoint?
+   function has_come(self) result(come)
+      class(time_limit_type), intent(in) :: self
+      logical :: come
+
+      come = .false.
+      if (self%limited) come = seconds_now() + self%margin + 2.0_dp*self%longest_save > self%finish
+   end function has_come
 
    !> A clock that only rises, s.
    function seconds_now() result(seconds)

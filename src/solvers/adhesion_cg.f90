@@ -8,7 +8,7 @@ module adhesion_cg
    use adhesion_state, only : adhesion_method_type, adhesion_problem_type, control_approach
    use finite_fields, only : reject_overflow
    use asperity_errors, only : error_input, error_type, fail
-   use asperity_parallel, only : thread_count
+   use asperity_threads, only : thread_count
    use field_sums, only : field_maximum
    use kernels, only : kernel_type
    use asperity_precision, only : dp
@@ -30,19 +30,16 @@ module adhesion_cg
 contains
 
    !> Make a solver for a grid; in free mode ny > 1.
-   subroutine new_adhesion_solver(self, grid, kernel, error, method, preconditioner)
+   subroutine new_adhesion_solver(self, grid, kernel, error, method)
       type(adhesion_solver_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
       type(kernel_type), intent(in) :: kernel          !! what the solid is, normal
       type(error_type), allocatable, intent(out) :: error
       character(*), intent(in), optional :: method          !! 'fast' (default) or 'thesis' (periodic)
-      character(*), intent(in), optional :: preconditioner  !! 'coarse' (default) or 'full', of 'fast'
-      character(16) :: name, form
+      character(16) :: name
 
       name = 'fast'
       if (present(method)) name = method
-      form = 'coarse'
-      if (present(preconditioner)) form = preconditioner
       select case (name)
       case ('fast')
          allocate (adhesion_fast_type :: self%method)
@@ -54,7 +51,7 @@ contains
       end select
       select type (chosen => self%method)
       type is (adhesion_fast_type)
-         call new_adhesion_fast(chosen, grid, kernel, trim(form), error)
+         call new_adhesion_fast(chosen, grid, kernel, error)
       type is (adhesion_thesis_type)
          call new_adhesion_thesis(chosen, grid, kernel, error)
       end select
@@ -81,6 +78,7 @@ contains
       if (problem%control == control_approach) task%target = problem%target + task%datum
       level = level + task%datum
       call self%method%solve(task, height, gap, pressure, level, outcome, past)
+      if (outcome%stopped) return
       call reject_overflow(outcome, gap, pressure, thread_count())
       level = level - task%datum
       if (problem%control == control_approach) level = problem%target

@@ -26,6 +26,7 @@ module adhesion_cg_thesis
    use omp_lib, only : omp_get_wtime
    use regular_grid, only : boundary_periodic, grid_type
    use solver_result, only : solver_result_type
+   use stop_watch, only : stop_is_due
    implicit none
    private
 
@@ -99,6 +100,7 @@ contains
          trial%state => self%trial_gap
          trial%traction => self%trial_traction
          call iterate(self, now, trial, outcome)
+         if (outcome%stopped) return
          call self%patch%hand_out(now, gap, pressure, level, outcome%load_error)
       end if
       outcome%ffts = self%patch%transforms() - before
@@ -126,6 +128,8 @@ contains
          if (failures > most_failures) outcome%reason = reason_stalled
          if (outcome%residual <= now%problem%tolerance) outcome%reason = reason_converged
          if (outcome%reason /= reason_limit .or. outcome%iterations >= now%problem%max_iterations) exit
+         outcome%stopped = stop_is_due()
+         if (outcome%stopped) return
          outcome%iterations = outcome%iterations + 1
 
          beta = 0.0_dp

@@ -4,9 +4,9 @@
 !> `measure` finds r and the error from the traction at hand, `find_direction` the direction d = z + beta d
 !> with z = M r.
 module adhesion_directions
-   use adhesion_patch, only : adhesion_contact_type, adhesion_patch_type, evaluate_gradient, &
-      natural_residual
-   use adhesion_preconditioner, only : adhesion_preconditioner_type
+   use adhesion_patch, only : adhesion_contact_type, adhesion_patch_type, evaluate_gradient
+   use adhesion_potential, only : adhesive_slopes
+   use adhesion_model, only : adhesion_model_type
    use adhesion_state, only : control_approach, control_pressure, diagonal_scaling
    use asperity_precision, only : dp
    use field_sums, only : largest_of_rows, least_of_rows
@@ -20,6 +20,9 @@ module adhesion_directions
    integer, parameter :: sum_pass = 0           !! add up
    integer, parameter :: last_pass = 2          !! z is what it will be
 
+   !> Errors in the padding count more: they are smooth and of one sign, and add up in energies.
+   real(dp), parameter :: strictness = 10.0_dp
+
    ! Where the traction comes from. Only a fresh one proves a solution.
    integer, parameter, public :: updated = 1    !! it was updated with the steps: it has gathered round-off
    integer, parameter, public :: fresh = 2      !! it is a product with B
@@ -27,12 +30,18 @@ module adhesion_directions
    !> The operators and work fields of the method.
    type :: adhesion_work_type
       type(adhesion_patch_type) :: patch
-      type(adhesion_preconditioner_type) :: preconditioner
-      !> What is exchanged with the preconditioner: G, of which `measure` makes the input of M, and then z = M r.
+      type(adhesion_model_type) :: model
+      !> What is exchanged with M: G, of which `measure` makes the input of M, and then z = M r.
       real(dp), allocatable :: exchange(:, :)
       real(dp), allocatable :: residual(:, :)        !! r
+      real(dp), allocatable :: curvature(:, :)       !! e'' at the gap that was measured last, on the patch
       real(dp), allocatable :: old(:, :)             !! r of the iteration before
       real(dp), allocatable :: direction(:, :)       !! d
+      ! The contact in the local model of its energy:
+      real(dp), pointer, contiguous :: model_state(:, :) => null()
+      real(dp), pointer, contiguous :: model_traction(:, :) => null()
+      real(dp), allocatable :: change(:, :)          !! of the displacement, with the foreign rows of the model
+      real(dp), allocatable :: image(:, :)           !! its product
       real(dp) :: scaling = 0.0_dp                   !! k of the Gauss potential, Pa/m; 0: none
    end type adhesion_work_type
 
@@ -48,10 +57,8 @@ module adhesion_directions
       real(dp) :: old_missing = 0.0_dp           !! in the iteration before
       real(dp) :: psi_r = 0.0_dp                 !! psi.r of the padding, Pa
       real(dp) :: old_rz = 0.0_dp                !! r.z of the iteration before; 0: directions start anew
-      real(dp) :: kappa = 1.0_dp                 !! last form of a step over its estimate
       real(dp) :: lift = 0.0_dp                  !! d of the level
       real(dp) :: slope = 0.0_dp                 !! r.d
-      real(dp) :: squares = 0.0_dp               !! of the change of the displacement along d
    end type adhesion_iteration_type
 
    !> Sums of a row of z.
@@ -72,7 +79,8 @@ contains
       real(dp) :: worst, least, padding, sums(2)
       integer :: j
 
-      call evaluate_gradient(self%patch, now, self%exchange)
+      if (self%patch%periodic .and. now%problem%control == control_approach) &
+         call evaluate_gradient(self%patch, now, self%exchange)
       allocate (rows(2, self%patch%all_rows))
       worst = 0.0_dp
       least = huge(1.0_dp)
@@ -81,7 +89,7 @@ contains
       do j = 1, self%patch%all_rows
          call measure_row(self, now, j, worst, least, padding)
          rows(:, j) = [padding, sum(now%traction(1:self%patch%inner(j), j))]
-         call self%preconditioner%put_row(j, self%exchange(:, j))
+         call self%model%put_row(j, self%exchange(:, j))
       end do
       now%residual = largest_of_rows([worst])
       now%least = least_of_rows([least])
@@ -106,22 +114,25 @@ contains
       integer :: i, n
 
       n = self%patch%inner(j)
+      call adhesive_slopes(now%problem%potential, now%state(1:n, j), self%exchange(1:n, j), &
+         self%curvature(1:n, j))
       do i = 1, n
          gap = now%state(i, j)
-         g = self%exchange(i, j) + now%load
-         worst = max(worst, natural_residual(now%units, gap, g))
+         g = now%traction(i, j) + self%exchange(i, j) + now%load
+         worst = max(worst, abs(min(gap/now%units%length, g/now%units%traction)))
          least = min(least, gap)
          r = 0.0_dp
          if (gap > 0.0_dp .or. g < 0.0_dp) r = -g
          self%old(i, j) = self%residual(i, j)
          self%residual(i, j) = r
-         if (self%scaling > 0.0_dp) r = r*diagonal_scaling(now%problem, gap, self%scaling)
          self%exchange(i, j) = r
       end do
+      if (self%scaling > 0.0_dp) self%exchange(1:n, j) = self%exchange(1:n, j)*diagonal_scaling(now%problem, &
+         now%state(1:n, j), self%scaling)
       padding = 0.0_dp
       do i = n + 1, self%patch%mx
          r = -now%traction(i, j)
-         worst = max(worst, abs(r)/now%units%traction)
+         worst = max(worst, strictness*abs(r)/now%units%traction)
          padding = padding + self%patch%psi(i, j)*r
          self%old(i, j) = self%residual(i, j)
          self%residual(i, j) = r
@@ -136,7 +147,7 @@ contains
       type(z_sums_type) :: sums
       real(dp) :: level_z, beta
 
-      call self%preconditioner%transform()
+      call self%model%transform_inverse()
       level_z = 0.0_dp
       if (.not. self%patch%periodic .and. now%problem%control == control_pressure) &
          level_z = (now%missing + now%psi_r)/(now%problem%modulus*self%patch%psi_form)
@@ -170,7 +181,7 @@ contains
       allocate (z(self%patch%mx))
       !$omp do
       do j = 1, self%patch%all_rows
-         call self%preconditioner%get_row(j, self%exchange(:, j), z)
+         call self%model%inverse_row(j, self%exchange(:, j), z)
          call take_z_row(self, now, level_z, j, z)
          call center_row(self, now, first, 0.0_dp, j, rows(j))
       end do
@@ -199,11 +210,12 @@ contains
       integer :: i, n
 
       n = self%patch%inner(j)
-      z(:) = z/now%problem%modulus
+      z(:) = z*(1.0_dp/now%problem%modulus)
       do i = 1, n
-         if (.not. (now%state(i, j) > 0.0_dp .or. self%residual(i, j) > 0.0_dp)) z(i) = 0.0_dp
-         if (self%scaling > 0.0_dp) z(i) = z(i)*diagonal_scaling(now%problem, now%state(i, j), self%scaling)
+         z(i) = merge(z(i), 0.0_dp, now%state(i, j) > 0.0_dp .or. self%residual(i, j) > 0.0_dp)
       end do
+      if (self%scaling > 0.0_dp) &
+         z(1:n) = z(1:n)*diagonal_scaling(now%problem, now%state(1:n, j), self%scaling)
       if (n < self%patch%mx) z(n + 1:) = z(n + 1:) + level_z*self%patch%psi(n + 1:, j)
       self%exchange(:, j) = z
    end subroutine take_z_row
@@ -218,25 +230,26 @@ contains
       type(z_sums_type), intent(out) :: sums
       real(dp) :: z
       logical :: open, opening
-      integer :: i
+      integer :: i, n
 
-      do i = 1, self%patch%mx
+      n = self%patch%inner(j)
+      do i = 1, n
          z = self%exchange(i, j)
-         if (i <= self%patch%inner(j)) then
-            open = now%state(i, j) > 0.0_dp
-            opening = self%residual(i, j) > 0.0_dp
-            if (pass == last_pass) opening = z > 0.0_dp
-            if (open .or. opening) z = z - mean
-            if (pass /= sum_pass .and. .not. open) then
-               z = merge(max(z, 0.0_dp), 0.0_dp, opening)
-               opening = z > 0.0_dp
-            end if
-            if (open .or. opening) sums%moving = sums%moving + 1.0_dp
-            self%exchange(i, j) = z
-            sums%total = sums%total + z
+         open = now%state(i, j) > 0.0_dp
+         opening = self%residual(i, j) > 0.0_dp
+         if (pass == last_pass) opening = z > 0.0_dp
+         if (open .or. opening) z = z - mean
+         if (pass /= sum_pass .and. .not. open) then
+            z = merge(max(z, 0.0_dp), 0.0_dp, opening)
+            opening = z > 0.0_dp
          end if
-         sums%rz = sums%rz + z*self%residual(i, j)
-         sums%old_rz = sums%old_rz + z*self%old(i, j)
+         if (open .or. opening) sums%moving = sums%moving + 1.0_dp
+         self%exchange(i, j) = z
+         sums%total = sums%total + z
+      end do
+      do i = 1, self%patch%mx
+         sums%rz = sums%rz + self%exchange(i, j)*self%residual(i, j)
+         sums%old_rz = sums%old_rz + self%exchange(i, j)*self%old(i, j)
       end do
    end subroutine center_row
 
@@ -257,23 +270,20 @@ contains
       sums = z_sums_type(totals(1), totals(2), totals(3), totals(4))
    end function sum_of
 
-   !> d = z + beta d on the free cells and in the padding, 0 elsewhere; the level's alike. The change of
-   !> the displacement along d is handed to the estimate.
+   !> d = z + beta d on the free cells and in the padding, 0 elsewhere; the level's alike.
    subroutine turn(self, beta, level_z, now)
       type(adhesion_work_type), intent(inout) :: self
       real(dp), intent(in) :: beta
       real(dp), intent(in) :: level_z                  !! z of the level, m
       type(adhesion_iteration_type), intent(inout) :: now
-      real(dp), allocatable :: change(:), rows(:, :)
-      real(dp) :: d, slope, sums(2)
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: d, slope, sums(1)
       integer :: i, j, n
 
       now%lift = level_z + beta*now%lift
-      allocate (rows(2, self%patch%all_rows))
-      !$omp parallel default(none) shared(self, now, beta, rows) &
-      !$omp private(i, j, n, d, slope, change) num_threads(self%patch%threads)
-      allocate (change(self%patch%mx))
-      !$omp do
+      allocate (rows(1, self%patch%all_rows))
+      !$omp parallel do default(none) shared(self, now, beta, rows) private(i, j, n, d, slope) &
+      !$omp num_threads(self%patch%threads)
       do j = 1, self%patch%all_rows
          n = self%patch%inner(j)
          slope = 0.0_dp
@@ -284,16 +294,11 @@ contains
             end if
             slope = slope + self%residual(i, j)*d
             self%direction(i, j) = d
-            change(i) = merge(d + now%lift, d, i <= n)
          end do
-         rows(:, j) = [slope, sum(change**2)]
-         call self%preconditioner%put_estimate_row(j, change)
+         rows(1, j) = slope
       end do
-      !$omp end do
-      !$omp end parallel
       sums = self%patch%sharing%totals(rows)
       now%slope = sums(1) + now%missing*now%lift
-      now%squares = sums(2)
    end subroutine turn
 
 end module adhesion_directions

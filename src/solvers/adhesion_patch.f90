@@ -176,7 +176,6 @@ contains
       class(adhesion_patch_type), intent(inout) :: self
       class(adhesion_contact_type), intent(inout) :: contact
       real(dp), allocatable :: row(:)
-      real(dp) :: form
       integer :: j
 
       associate (nx => self%nx)
@@ -191,7 +190,7 @@ contains
          end do
          !$omp end do
          !$omp end parallel
-         call self%stiffness%columns(columns_apply, form)
+         call self%stiffness%columns(columns_apply)
          !$omp parallel do default(none) shared(self, contact) private(j) num_threads(self%threads)
          do j = 1, self%all_rows
             call self%stiffness%backward_row(1, j, contact%traction(:, j))
@@ -259,7 +258,7 @@ contains
       class(adhesion_contact_type), intent(in) :: contact
       real(dp) :: natural
       real(dp), allocatable :: row(:), worst(:)
-      real(dp) :: form, load
+      real(dp) :: load
       integer :: j
 
       !$omp parallel default(none) shared(self, contact) private(j, row) num_threads(self%operator%threads)
@@ -272,7 +271,7 @@ contains
       end do
       !$omp end do
       !$omp end parallel
-      call self%operator%columns(columns_apply, form)
+      call self%operator%columns(columns_apply)
       allocate (worst(self%rows))
       !$omp parallel default(none) shared(self, contact, worst) private(j, row) &
       !$omp num_threads(self%operator%threads)

@@ -82,7 +82,7 @@ module adhesion_state
 contains
 
    !> Scaling of the preconditioner at a cell, from both sides: (1 + max(e'', 0)/k)^(-1/2).
-   pure function diagonal_scaling(problem, gap, stiffness) result(scaling)
+   elemental function diagonal_scaling(problem, gap, stiffness) result(scaling)
       type(adhesion_problem_type), intent(in) :: problem
       real(dp), intent(in) :: gap                  !! m
       real(dp), intent(in) :: stiffness            !! k, Pa/m

@@ -17,7 +17,7 @@
 !> Memory: for each pair two fields of single precision per component, which is enough because the
 !> residual itself is never taken from them; and two fields of doubles per component.
 module anderson
-   use asperity_parallel, only : thread_count
+   use asperity_threads, only : thread_count
    use field_sums, only : row_totals
    use asperity_precision, only : dp, sp
    implicit none

@@ -4,8 +4,11 @@
 !> * the low wave numbers of the preconditioner (module schur_preconditioner);
 !> * a prediction of p.A p, with which a step length is chosen before any transform of full size.
 !>
-!> Every process holds the whole coarse level, which is small. It sums over its own rows of blocks, and all
-!> then share the sums (`share_blocks`).
+!> Where processes share the rows of the grid, each sums over its own rows of blocks. A level of many blocks
+!> is divided among the processes in the same way. A level of few blocks is copied: every process gets the sums
+!> of all (`share_blocks`) and does the same work on them, since that takes less time than the exchanges of a
+!> divided one. Sums over the blocks are added in the order of the rows of blocks, so that both have the
+!> same results.
 !>
 !> Restriction (block sums over the mean block size) and prolongation (piecewise constant) are adjoint
 !> up to a factor, so that the preconditioner stays symmetric for any numbers of cells.
@@ -13,13 +16,17 @@ module coarse_level
    use asperity_parallel, only : gather_rows
    use asperity_errors, only : error_type
    use fft_conv, only : convolution_type, new_convolution
+   use field_sums, only : added, row_totals
    use kernels, only : kernel_type
    use asperity_precision, only : dp, pi, sp
    use regular_grid, only : block_cells, grid_type, new_grid
+   use row_sharing, only : new_row_sharing, owners_on_grid, row_sharing_type
    implicit none
    private
 
    public :: coarse_level_type, edge_rows, inner_rows, new_coarse_level
+
+   real(dp), parameter :: many_blocks = 16384.0_dp   !! from which the level is divided
 
    !> Not to be copied.
    type :: coarse_level_type
@@ -28,17 +35,20 @@ module coarse_level
       real(dp) :: h = 0.0_dp                       !! side of a square cell of the same area, m
       integer, allocatable :: block_x(:)           !! block of a cell along x, [nx of the grid]
       integer, allocatable :: last_x(:)            !! last cell of a block along x, [nx]
-      integer :: strips(2) = 0                     !! first and last row of blocks of this process
+      integer :: strips(2) = 0                     !! first and last row of blocks of this process ...
+      integer :: held(2) = 0                       !! ... and of those whose numbers it has: its own or all
+      type(row_sharing_type) :: sharing            !! of the rows of blocks where the level is divided
       integer, allocatable :: first_y(:)           !! first row of a block among those of this process, [ny + 1]
-      real(dp), allocatable :: mean(:, :)          !! block means, [nx, ny]
-      real(dp), allocatable :: share(:, :)         !! part of a block that takes part, [nx, ny]
-      logical, private :: shared = .false.         !! other processes hold the other rows of blocks
+      real(dp), allocatable :: mean(:, :)          !! block means, (nx, held(1):held(2))
+      real(dp), allocatable :: share(:, :)         !! part of a block that takes part, likewise
+      logical, private :: copied = .false.         !! all processes hold the sums of all blocks
       real(dp), private :: fine_symbol = 0.0_dp    !! of A at the size of a block
       type(convolution_type), private :: normal
    contains
       generic :: sum_blocks => sum_blocks_single, sum_blocks_double
       procedure, private :: sum_blocks_single, sum_blocks_double
       procedure :: share_blocks
+      procedure :: block_totals
       procedure :: predict_form
       procedure :: transforms
       procedure :: destroy
@@ -46,7 +56,7 @@ module coarse_level
 
 contains
 
-   !> Make the coarse level of a grid.
+   !> Make the coarse level of a grid. Collective where processes share the rows.
    subroutine new_coarse_level(self, grid, kernel, error)
       type(coarse_level_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
@@ -54,6 +64,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(grid_type) :: blocks
       real(dp) :: h
+      integer, allocatable :: owner(:)
+      logical :: divided
       integer :: counts(2), i, j
 
       h = grid%cell_side()
@@ -74,11 +86,16 @@ contains
       end do
       ! Blocks whose first row is among the rows of this process.
       self%strips = [count(self%first_y(:self%ny) < 1) + 1, count(self%first_y(:self%ny) <= grid%rows())]
-      self%shared = grid%shared
-      allocate (self%mean(self%nx, self%ny), self%share(self%nx, self%ny))
+      divided = grid%shared .and. real(self%nx, dp)*self%ny >= many_blocks
+      self%copied = grid%shared .and. .not. divided
+      self%held = merge(self%strips, [1, self%ny], divided)
+      allocate (self%mean(self%nx, self%held(1):self%held(2)), self%share(self%nx, self%held(1):self%held(2)))
 
+      owner = owners_on_grid(grid)
+      owner = owner([(grid%strip_start(j), j=1, self%ny)])
+      call new_row_sharing(self%sharing, owner, divided)
       blocks = new_grid(self%nx, self%ny, grid%lx, grid%ly, grid%boundary)
-      call new_convolution(self%normal, blocks, kernel, error)
+      call new_convolution(self%normal, blocks, kernel, error, sharing=self%sharing)
    end subroutine new_coarse_level
 
    !> Sums over the blocks along x of values in single precision.
@@ -114,23 +131,42 @@ contains
       end do
    end subroutine sum_blocks_double
 
-   !> Bring numbers for each block, which this process has for its rows of blocks, to all processes.
+   !> Bring numbers for each block, which this process has for its rows of blocks, to all processes that hold
+   !> them. Collective.
    subroutine share_blocks(self, values)
       class(coarse_level_type), intent(in) :: self
-      real(dp), intent(inout) :: values(:, :)          !! [nx, ny]
+      real(dp), intent(inout) :: values(:, :)          !! [nx, held rows]
 
-      if (self%shared) values(:, :) = gather_rows(values(:, self%strips(1):self%strips(2)))
+      if (self%copied) values(:, :) = gather_rows(values(:, self%strips(1):self%strips(2)))
    end subroutine share_blocks
 
-   !> Estimate of d.A d over the cells, G = 1, from the block means of d.
+   !> Totals over the rows of blocks, added in their order. Collective.
+   function block_totals(self, rows) result(totals)
+      class(coarse_level_type), intent(in) :: self
+      real(dp), intent(in) :: rows(:, :)               !! [sums, held rows]
+      real(dp) :: totals(size(rows, 1))
+
+      if (self%sharing%shared) then
+         totals = row_totals(rows)
+      else
+         totals = added(rows)
+      end if
+   end function block_totals
+
+   !> Estimate of d.A d over the cells, G = 1, from the block means of d. Collective.
    function predict_form(self, squares) result(form)
       class(coarse_level_type), intent(inout) :: self
       real(dp), intent(in) :: squares                  !! d.d over the cells
       real(dp) :: form
+      real(dp) :: rows(1, self%held(1):self%held(2)), total(1)
+      integer :: j
 
       call self%normal%quadratic_form(self%mean, form)
-      form = self%cells*form &
-         + max(squares - self%cells*sum(self%mean**2), 0.0_dp)*self%fine_symbol
+      do j = self%held(1), self%held(2)
+         rows(1, j) = sum(self%mean(:, j)**2)
+      end do
+      total = self%block_totals(rows)
+      form = self%cells*form + max(squares - self%cells*total(1), 0.0_dp)*self%fine_symbol
    end function predict_form
 
    !> Transforms done on this level, counted as those of the full grid.

@@ -54,7 +54,6 @@ module friction_cg_fast
    use kernels, only : kernel_type
    use asperity_precision, only : dp, pi
    use fft_conv, only : columns_apply, columns_form, convolution_type, new_inverse_convolution
-   use field_sums, only : row_total
    use friction_cg_gradient, only : friction_gradient_type
    use friction_directions, only : scaled_row, total_of, turn_sums_type, turned_row, uniform_type, &
       unscaled_row, z_sums_type
@@ -270,7 +269,7 @@ contains
       type(uniform_type) :: uniform
       type(z_sums_type), allocatable :: rows(:)
       type(z_sums_type) :: sums
-      real(dp) :: inverse(2, 2), coupling(2, 2), form
+      real(dp) :: inverse(2, 2), coupling(2, 2)
       integer :: j
 
       allocate (rows(problem%rows))
@@ -282,7 +281,7 @@ contains
       do j = 1, problem%rows
          call scale_row(self, problem, uniform, j, rows(j)%cross)
       end do
-      call self%preconditioner%columns(columns_apply, form)
+      call self%preconditioner%columns(columns_apply)
       !$omp parallel do default(none) shared(self, problem, uniform, rows) private(j) &
       !$omp num_threads(problem%threads)
       do j = 1, problem%rows

@@ -227,11 +227,10 @@ contains
    subroutine update_slip(self, operator)
       class(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
-      real(dp) :: form
 
       self%fresh = .true.
       call follow_total(self)
-      call operator%columns(columns_apply, form)
+      call operator%columns(columns_apply)
       call take_slip(self, operator, 1.0_dp)
    end subroutine update_slip
 

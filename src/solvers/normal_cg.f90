@@ -55,6 +55,7 @@ module normal_cg
    use projection, only : project_simplex
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
+   use stop_watch, only : stop_is_due
    implicit none
    private
 
@@ -142,6 +143,8 @@ contains
       do
          call measure_state()
          if (now%phase == phase_ended) exit
+         outcome%stopped = stop_is_due()
+         if (outcome%stopped) return
          outcome%iterations = outcome%iterations + 1
          call choose_direction(self%work, task, measure, pressure, gap, now)
          call choose_step(self, product, task, measure%level, pressure, gap, now)

@@ -18,6 +18,7 @@ module normal_cg_thesis
    use asperity_precision, only : dp, int64
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
+   use stop_watch, only : stop_is_due
    implicit none
    private
 
@@ -78,6 +79,8 @@ contains
             call narrow_scale(task, height, pressure, self%operator%threads, measure)
          if (.not. determined .or. measure%strict <= task%tolerance) exit
          if (outcome%iterations == task%max_iterations) exit
+         outcome%stopped = stop_is_due()
+         if (outcome%stopped) return
          outcome%iterations = outcome%iterations + 1
          call choose_direction()
          if (outcome%reason /= reason_iterations) exit

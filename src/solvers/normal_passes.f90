@@ -112,7 +112,7 @@ contains
       do jb = self%coarse%strips(1), self%coarse%strips(2)
          strip%correction(:) = 0.0_sp
          if (preconditioned) &
-            strip%correction(:) = real(self%preconditioner%pending(self%coarse%block_x, jb), sp)
+            strip%correction(:) = real(self%preconditioner%blocks%pending(self%coarse%block_x, jb), sp)
          strip%column(:) = 0.0_sp
          strip%shares(:) = 0.0_sp
          do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1

@@ -5,7 +5,6 @@ module normal_solvers
    use normal_cg, only : new_normal_solver, normal_solver_type
    use normal_cg_thesis, only : new_thesis_solver, thesis_solver_type
    use kernels, only : kernel_type
-   use asperity_precision, only : dp
    use regular_grid, only : grid_type
    implicit none
    private

@@ -230,7 +230,6 @@ contains
       real(dp), intent(in) :: height(:, :), pressure(:, :)
       real(dp), intent(inout) :: gap(:, :)
       real(dp), intent(in), optional :: past(:, :)
-      real(dp) :: form
       logical :: remembers
       integer :: j
 
@@ -244,7 +243,7 @@ contains
             call operator%forward_row(1, j, pressure(:, j))
          end if
       end do
-      call operator%columns(columns_apply, form)
+      call operator%columns(columns_apply)
       !$omp parallel do default(none) shared(operator, height, gap, problem) private(j) &
       !$omp num_threads(operator%threads)
       do j = 1, operator%rows

@@ -54,60 +54,50 @@ contains
    function total_direction(rows) result(sums)
       type(direction_sums_type), intent(in) :: rows(:)
       type(direction_sums_type) :: sums
-      real(dp), allocatable :: parts(:, :)
-      real(dp) :: totals(5)
+      real(dp) :: t(5)
 
-      parts = reshape([rows%value, rows%cells, rows%slope, rows%residual, rows%square], [size(rows), 5])
-      totals = row_totals(transpose(parts))
-      sums%value = totals(1)
-      sums%cells = totals(2)
-      sums%slope = totals(3)
-      sums%residual = totals(4)
-      sums%square = totals(5)
+      t = totals_of([rows%value, rows%cells, rows%slope, rows%residual, rows%square], 5)
+      sums = direction_sums_type(value=t(1), cells=t(2), slope=t(3), residual=t(4), square=t(5))
    end function total_direction
 
    !> Sums of a trial pressure over the grid.
    function total_trial(rows) result(sums)
       type(trial_sums_type), intent(in) :: rows(:)
       type(trial_sums_type) :: sums
-      real(dp), allocatable :: parts(:, :)
-      real(dp) :: totals(2)
+      real(dp) :: t(2)
 
-      parts = reshape([rows%above, rows%cells], [size(rows), 2])
-      totals = row_totals(transpose(parts))
-      sums%above = totals(1)
-      sums%cells = totals(2)
-      sums%least = least_of_rows(rows%least)
+      t = totals_of([rows%above, rows%cells], 2)
+      sums = trial_sums_type(above=t(1), cells=t(2), least=least_of_rows(rows%least))
    end function total_trial
 
    !> Sums of a step over the grid.
    function total_step(rows) result(sums)
       type(step_sums_type), intent(in) :: rows(:)
       type(step_sums_type) :: sums
-      real(dp), allocatable :: parts(:, :)
-      real(dp) :: totals(2)
+      real(dp) :: t(2)
 
-      parts = reshape([rows%slope, rows%square], [size(rows), 2])
-      totals = row_totals(transpose(parts))
-      sums%slope = totals(1)
-      sums%square = totals(2)
+      t = totals_of([rows%slope, rows%square], 2)
+      sums = step_sums_type(slope=t(1), square=t(2))
    end function total_step
 
    !> Sums of a state over the grid.
    function total_state(rows) result(sums)
       type(state_sums_type), intent(in) :: rows(:)
       type(state_sums_type) :: sums
-      real(dp), allocatable :: parts(:, :)
-      real(dp) :: totals(5)
+      real(dp) :: t(5)
 
-      parts = reshape([rows%load, rows%work, rows%touched, rows%cells, rows%distance], [size(rows), 5])
-      totals = row_totals(transpose(parts))
-      sums%load = totals(1)
-      sums%work = totals(2)
-      sums%touched = totals(3)
-      sums%cells = totals(4)
-      sums%distance = totals(5)
-      sums%least = least_of_rows(rows%least)
+      t = totals_of([rows%load, rows%work, rows%touched, rows%cells, rows%distance], 5)
+      sums = state_sums_type(load=t(1), work=t(2), touched=t(3), cells=t(4), distance=t(5), &
+         least=least_of_rows(rows%least))
    end function total_state
+
+   !> Totals of several sums per row, which lie one after the other.
+   function totals_of(rows, n) result(totals)
+      real(dp), intent(in) :: rows(:)
+      integer, intent(in) :: n              !! sums
+      real(dp) :: totals(n)
+
+      totals = row_totals(transpose(reshape(rows, [size(rows)/n, n])))
+   end function totals_of
 
 end module normal_sums

@@ -12,14 +12,19 @@
 !> The shift grows with the part of the grid that is not in N: the coarse functions are cut off there,
 !> which would make their eigenvalues too large without it.
 !>
+!> Processes may share the rows of blocks. Each then holds the numbers of its own rows, and the symbols of the
+!> wave numbers that it transforms.
+!>
 !> All numbers were chosen by trials on rough contacts; none of them is critical.
 module schur_coarse
    use asperity_errors, only : error_type
-   use fft_conv, only : convolution_type, new_symbol_operator
+   use fft_conv, only : columns_apply, convolution_type, new_symbol_operator
+   use asperity_parallel, only : global_sum
    use asperity_precision, only : dp, pi, sp
    use regular_grid, only : grid_type
    use row_column_single, only : new_row_column, row_column_type
-   use transform_shape, only : whole_shape
+   use row_sharing, only : row_sharing_type
+   use transform_shape, only : shape_of_rows, transform_shape_type
    implicit none
    private
 
@@ -34,11 +39,13 @@ module schur_coarse
    !> The coarse part. Not to be copied.
    type :: schur_coarse_type
       real(dp), private :: cells = 1.0_dp                !! cells of a block
+      real(dp), private :: blocks = 1.0_dp               !! number of blocks
+      logical, private :: shared = .false.               !! other processes hold the other rows of blocks
       integer, private :: threads = 1
-      real(dp), allocatable, private :: weight(:, :)     !! w of each block
+      real(dp), allocatable, private :: weight(:, :)     !! w of each block, [blocks along x, rows]
       type(convolution_type), private :: missing         !! what the stencil lacks
       type(row_column_type), private :: transform        !! for W
-      real(dp), allocatable, private :: model(:, :)      !! symbol of B
+      real(dp), allocatable, private :: model(:, :)      !! symbol of B, for the modes of this process
       real(sp), allocatable, private :: symbol(:, :, :)  !! of W, with the factor of the transforms
       real(dp), private :: taken = -1.0_dp               !! part of the grid for which it was made
       integer, private :: products = 0                   !! products with W so far
@@ -52,41 +59,51 @@ module schur_coarse
 
 contains
 
-   !> Make the coarse part for a grid of blocks.
-   subroutine new_schur_coarse(self, grid, c0, h, blocks, threads, error)
+   !> Make the coarse part for a grid of blocks. Collective where processes share the rows.
+   subroutine new_schur_coarse(self, grid, c0, h, blocks_x, sharing, threads, error)
       type(schur_coarse_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: c0                       !! of the stencil
       real(dp), intent(in) :: h                        !! side of a square cell of the same area, m
-      integer, intent(in) :: blocks(2)                 !! along x and y
+      integer, intent(in) :: blocks_x                  !! blocks along x
+      type(row_sharing_type), intent(in) :: sharing    !! of the rows of blocks
       integer, intent(in) :: threads
       type(error_type), allocatable, intent(out) :: error
+      type(transform_shape_type) :: shape
       real(dp), allocatable :: symbol(:, :)
+      integer :: own(2), modes(2)
 
-      self%cells = grid%cells()/(real(blocks(1), dp)*blocks(2))
-      self%threads = merge(1, threads, blocks(1)*blocks(2) < 16384)
-      allocate (self%weight(blocks(1), blocks(2)), source=0.0_dp)
-      allocate (symbol(0:blocks(1)/2, 0:blocks(2)/2), self%model(0:blocks(1)/2, 0:blocks(2)/2))
-      call model_symbols(grid, c0, h, symbol, self%model)
-      call new_symbol_operator(self%missing, blocks(1), blocks(2), symbol, error, single=.true.)
+      shape = shape_of_rows(blocks_x, sharing, 1)
+      self%shared = shape%shared
+      self%blocks = real(shape%nx, dp)*shape%ny
+      self%cells = grid%cells()/self%blocks
+      self%threads = merge(1, threads, self%blocks < 16384.0_dp)
+      allocate (self%weight(shape%nx, shape%rows()), source=0.0_dp)
+      call new_symbol_operator(self%missing, shape, error, single=.true.)
       if (allocated(error)) return
-      call new_row_column(self%transform, whole_shape(blocks(1), blocks(2), 1), self%threads, error)
+      modes = self%missing%modes()
+      allocate (symbol(modes(1):modes(2), 0:shape%ny/2), self%model(modes(1):modes(2), 0:shape%ny/2))
+      call model_symbols(grid, c0, h, modes(1), symbol, self%model)
+      call self%missing%set_symbol(symbol)
+      call new_row_column(self%transform, shape, self%threads, error)
       if (allocated(error)) return
-      allocate (self%symbol(0:self%transform%longest, 0:blocks(2)/2, 1), source=0.0_sp)
+      own = self%transform%own_columns()
+      allocate (self%symbol(own(1):own(2), 0:shape%ny/2, 1), source=0.0_sp)
    end subroutine new_schur_coarse
 
    !> What the coarse level adds to the stencil, and the sum of both, at its wave vectors.
-   pure subroutine model_symbols(grid, c0, h, missing, model)
+   pure subroutine model_symbols(grid, c0, h, first, missing, model)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: c0
       real(dp), intent(in) :: h                        !! side of a cell, m
-      real(dp), intent(out) :: missing(0:, 0:), model(0:, 0:)
+      integer, intent(in) :: first                     !! wave number along x of the first column
+      real(dp), intent(out) :: missing(first:, 0:), model(first:, 0:)
       real(dp) :: qx, qy, q, q_least
       integer :: i, j
 
       q_least = pi*h/max(merge(0.0_dp, grid%lx, grid%nx == 1), merge(0.0_dp, grid%ly, grid%ny == 1), h)
       do j = 0, ubound(missing, 2)
-         do i = 0, ubound(missing, 1)
+         do i = first, ubound(missing, 1)
             qx = 2.0_dp*pi*i*h/grid%lx
             qy = 2.0_dp*pi*j*h/grid%ly
             q = max(hypot(qx, qy), q_least)
@@ -108,49 +125,63 @@ contains
 
    end subroutine model_symbols
 
-   !> What the coarse level adds to the stencil, from the sums of a field over the blocks.
-   subroutine add_missing(self, sums, addition)
+   !> What the coarse level adds to the stencil, from the sums of a field over the blocks. Collective.
+   subroutine add_missing(self, factor, sums, addition)
       class(schur_coarse_type), intent(inout) :: self
-      real(dp), intent(in) :: sums(:, :)
+      real(dp), intent(in) :: factor
+      real(dp), intent(in) :: sums(:, :)               !! over this factor
       real(dp), intent(inout) :: addition(:, :)        !! the same for all cells of a block
+      integer :: j
 
-      call self%missing%apply(sums/self%cells, addition)
+      !$omp parallel do default(none) shared(self, factor, sums) private(j) num_threads(self%threads)
+      do j = 1, size(sums, 2)
+         call self%missing%forward_row(1, j, factor*sums(:, j)/self%cells)
+      end do
+      call self%missing%columns(columns_apply)
+      !$omp parallel do default(none) shared(self, addition) private(j) num_threads(self%threads)
+      do j = 1, size(addition, 2)
+         call self%missing%backward_row(1, j, addition(:, j))
+      end do
    end subroutine add_missing
 
-   !> Prepare W for a set N.
+   !> Prepare W for a set N. Collective.
    subroutine set_weights(self, cells_off)
       class(schur_coarse_type), intent(inout) :: self
       real(dp), intent(in) :: cells_off(:, :)          !! numbers of cells of N in the blocks
-      real(dp) :: taken, shift
+      real(dp) :: taken, shift, all_off(1)
       integer :: i, j
 
-      self%weight(:, :) = (cells_off/self%cells)**power
-      ! The shift is rounded, so that the symbol is seldom made again.
-      taken = nint(32.0_dp*(1.0_dp - sum(cells_off)/(self%cells*size(cells_off))))/32.0_dp
+      !$omp parallel do default(none) shared(self, cells_off) private(j) num_threads(self%threads)
+      do j = 1, size(cells_off, 2)
+         self%weight(:, j) = (cells_off(:, j)/self%cells)**power
+      end do
+      ! The shift is rounded, so that the symbol is seldom made again. Numbers of cells are added without error.
+      all_off = sum(cells_off)
+      if (self%shared) all_off = global_sum(all_off)
+      taken = nint(32.0_dp*(1.0_dp - all_off(1)/(self%cells*self%blocks)))/32.0_dp
       if (abs(taken - self%taken) <= 0.0_dp) return
       self%taken = taken
       shift = least_shift + contact_shift*taken
       do j = 0, ubound(self%model, 2)
-         do i = 0, ubound(self%model, 1)
-            self%symbol(i, j, 1) = real(max(1.0_dp/(self%model(i, j) + shift) - om, 0.0_dp) &
-               /size(cells_off), sp)
+         do i = lbound(self%model, 1), ubound(self%model, 1)
+            self%symbol(i, j, 1) = real(max(1.0_dp/(self%model(i, j) + shift) - om, 0.0_dp)/self%blocks, sp)
          end do
       end do
    end subroutine set_weights
 
-   !> The coarse part of W p, from the sums of p over the cells of N in the blocks.
-   subroutine weigh(self, sums, correction)
+   !> The coarse part of W p, from the sums of p over the cells of N in the blocks. Collective.
+   subroutine weigh(self, factor, sums, correction)
       class(schur_coarse_type), intent(inout) :: self
-      real(dp), intent(in) :: sums(:, :)
+      real(dp), intent(in) :: factor
+      real(dp), intent(in) :: sums(:, :)               !! over this factor
       real(dp), intent(inout) :: correction(:, :)      !! the same for all cells of N in a block
-      real(dp) :: form
       integer :: j
 
-      !$omp parallel do default(none) shared(self, sums) private(j) num_threads(self%threads)
+      !$omp parallel do default(none) shared(self, factor, sums) private(j) num_threads(self%threads)
       do j = 1, size(sums, 2)
-         call self%transform%forward_row(1, j, self%weight(:, j)*sums(:, j)/self%cells)
+         call self%transform%forward_row(1, j, self%weight(:, j)*(factor*sums(:, j))/self%cells)
       end do
-      call self%transform%columns(self%symbol, 1.0_dp, .false., .true., form)
+      call self%transform%columns(self%symbol, 1.0_dp, .false., .true.)
       !$omp parallel do default(none) shared(self, sums, correction) private(j) num_threads(self%threads)
       do j = 1, size(sums, 2)
          call self%transform%backward_row(1, j, correction(:, j))

@@ -15,7 +15,7 @@
 !> and a coarse part, W p = om p + coarse part. A step needs one pass over the cells. The pass adds the
 !> step before to the image b = B v, forms the search direction d, and its response e = K d. The other
 !> sums that conjugate gradients need follow from block sums, because coarse parts are constant in a
-!> block. What the last step adds to b is left to the caller:
+!> block (module schur_blocks). What the last step adds to b is left to the caller:
 !>     M r = image + length response + pending.
 !>
 !> On small grids the extension saves no time, and on flat cells the stencil is too poor a model for it:
@@ -30,11 +30,12 @@ module schur_preconditioner
    use coarse_level, only : coarse_level_type, edge_rows, inner_rows
    use asperity_errors, only : error_type
    use normal_sweeps, only : residual_cells
-   use field_rim, only : close_rim
    use field_sums, only : row_totals
    use asperity_precision, only : dp, sp
    use regular_grid, only : boundary_periodic, grid_type
-   use schur_coarse, only : new_schur_coarse, om, schur_coarse_type, stencil_c1
+   use row_halo, only : new_rim_halo, row_halo_type
+   use schur_blocks, only : new_schur_blocks, schur_blocks_type
+   use schur_coarse, only : om, stencil_c1
    use schur_sweeps, only : image_cells, image_sums_type, last_response_cells, response_cells, &
       response_sums_type, search_cells, start_search_cells
    implicit none
@@ -51,9 +52,10 @@ module schur_preconditioner
    !> The preconditioner with its fields. Not to be copied.
    type :: schur_preconditioner_type
       type(grid_type), private :: grid
+      type(row_halo_type), private :: rim                !! rows of other processes that the stencil reads
       integer, private :: threads = 1
       logical :: extends = .false.                       !! the residual is extended at all
-      type(schur_coarse_type), private :: model
+      type(schur_blocks_type) :: blocks                  !! coarse parts and sums of each block
       real(sp), private :: weights(3) = 0.0_sp           !! of the stencil: centre, along x, along y
       real(sp), allocatable :: residual(:, :)            !! (0:nx+1, 0:ny+1), v on S, 0 on N
       real(sp), allocatable :: search(:, :)              !! (0:nx+1, 0:ny+1), d, 0 on S
@@ -61,13 +63,7 @@ module schur_preconditioner
       real(sp), pointer, contiguous :: response(:, :) => null()   !! [nx, ny], e of the last step
       logical, private :: owns = .false.                 !! and frees these two
       real(sp) :: length = 0.0_sp                        !! multiple of e that is still to be added to b
-      real(dp), allocatable :: pending(:, :)             !! coarse part to be added to b, of each block
       type(image_sums_type), private :: sums
-      ! Sums over the cells of N in each block:
-      real(dp), allocatable, private :: cells_off(:, :)      !! 1
-      real(dp), allocatable, private :: image_off(:, :)      !! b
-      real(dp), allocatable, private :: response_off(:, :)   !! e
-      real(dp), allocatable, private :: search_off(:, :)     !! d
    contains
       procedure :: set_residual
       procedure :: extend
@@ -79,7 +75,6 @@ module schur_preconditioner
    type :: step_type
       logical :: first = .false., last = .false.
       real(sp) :: beta = 0.0_sp                          !! multiple of the old direction
-      real(dp), allocatable :: correction(:, :)          !! coarse part of W, of each block
    end type step_type
 
 contains
@@ -98,6 +93,7 @@ contains
       real(dp) :: wx, wy, c0
 
       self%grid = grid
+      call new_rim_halo(self%rim, grid)
       self%threads = threads
       self%extends = min(grid%nx, grid%ny) > 1 .and. grid%cells() >= least_cells &
          .and. max(grid%dx/grid%dy, grid%dy/grid%dx) <= largest_aspect
@@ -116,9 +112,7 @@ contains
       else
          allocate (self%image(grid%nx, grid%rows()), self%response(grid%nx, grid%rows()))
       end if
-      allocate (self%pending(coarse%nx, coarse%ny), source=0.0_dp)
-      allocate (self%cells_off, self%image_off, self%response_off, self%search_off, source=self%pending)
-      call new_schur_coarse(self%model, grid, c0, coarse%h, [coarse%nx, coarse%ny], threads, error)
+      call new_schur_blocks(self%blocks, grid, coarse, c0, threads, error)
    end subroutine new_schur_preconditioner
 
    !> The residual scale (level - gap) on S = {P > 0 or gap < level}, its block means, and K of it.
@@ -152,13 +146,13 @@ contains
          end do
          call coarse%sum_blocks(column, coarse%mean(:, jb))
          coarse%mean(:, jb) = coarse%mean(:, jb)/coarse%cells
-         self%image_off(:, jb) = 0.0_dp
-         self%cells_off(:, jb) = 0.0_dp
+         self%blocks%image_off(:, jb) = 0.0_dp
+         self%blocks%cells_off(:, jb) = 0.0_dp
          call image_rows(self, coarse, active, jb, inner_rows(coarse, jb), rows)
       end do
       !$omp end do
       !$omp single
-      call close_rim(self%grid, self%residual)
+      call self%rim%close_rim(self%residual)
       !$omp end single
       ! The rows at the edges of blocks need rows that another thread may have formed.
       !$omp do schedule(dynamic)
@@ -167,8 +161,8 @@ contains
       end do
       !$omp end parallel
       call coarse%share_blocks(coarse%mean)
-      call coarse%share_blocks(self%image_off)
-      call coarse%share_blocks(self%cells_off)
+      call coarse%share_blocks(self%blocks%image_off)
+      call coarse%share_blocks(self%blocks%cells_off)
       totals = row_totals(transpose(reshape([rows%form, rows%square], [size(rows), 2])))
       self%sums = image_sums_type(totals(1), totals(2))
    end subroutine set_residual
@@ -195,11 +189,11 @@ contains
             end associate
          end do
       end do
-      call add_blocks(coarse, column, self%image_off(:, jb))
-      call add_blocks(coarse, count, self%cells_off(:, jb))
+      call add_blocks(coarse, column, self%blocks%image_off(:, jb))
+      call add_blocks(coarse, count, self%blocks%cells_off(:, jb))
    end subroutine image_rows
 
-   !> Extend the residual to N by some steps of conjugate gradients.
+   !> Extend the residual to N by some steps of conjugate gradients. Collective.
    subroutine extend(self, coarse, active, steps, form)
       class(schur_preconditioner_type), intent(inout) :: self
       type(coarse_level_type), intent(in) :: coarse
@@ -207,47 +201,39 @@ contains
       integer, intent(in) :: steps
       real(dp), intent(out) :: form                      !! r.M r = v.B v
       type(step_type) :: step
-      type(response_sums_type) :: sums
-      real(dp), allocatable :: addition(:, :)            !! coarse part of B d, of each block
+      type(response_sums_type) :: sums, parts
       real(dp) :: square                                 !! of the residual on N, which is -b
       real(dp) :: product, before, first, length
       integer :: k
 
-      call self%model%add_missing(coarse%cells*coarse%mean, self%pending)
+      call self%blocks%image_parts(coarse, form, square)
       self%length = 0.0_sp
-      form = self%sums%form + coarse%cells*sum(coarse%mean*self%pending)
+      form = self%sums%form + form
       if (steps == 0 .or. .not. self%extends) return
-      square = self%sums%square + sum(self%pending*(2.0_dp*self%image_off + self%pending*self%cells_off))
-      self%image_off(:, :) = self%image_off + self%pending*self%cells_off
-      self%search_off(:, :) = 0.0_dp
-      call self%model%set_weights(self%cells_off)
-      allocate (step%correction, addition, source=self%pending)
+      square = self%sums%square + square
+      call self%blocks%start(coarse)
       before = 0.0_dp
       first = 0.0_dp
       do k = 1, steps
-         call self%model%weigh(-self%image_off, step%correction)
-         product = om*square - sum(self%image_off*step%correction)
+         call self%blocks%weigh(coarse, product)
+         product = om*square + product
          if (k == 1) first = product
          if (product <= solved*first .or. product <= tiny(1.0_dp)) exit
          step%first = k == 1
          step%last = k == steps
          if (k > 1) step%beta = real(product/before, sp)
          before = product
-         self%search_off(:, :) = step%correction*self%cells_off - om*self%image_off &
-            + step%beta*self%search_off
-         call self%model%add_missing(self%search_off, addition)
+         call self%blocks%turn(coarse, real(step%beta, dp))
          call search_pass(self, coarse, active, step, sums)
          self%length = 0.0_sp
-         self%pending(:, :) = 0.0_dp
-         length = sums%form + sum(self%search_off*addition)
+         call self%blocks%response_parts(coarse, parts%form, parts%cross, parts%square)
+         length = sums%form + parts%form
          if (length <= 0.0_dp) exit
          length = product/length
          form = form - length*product
-         square = square + 2.0_dp*length*(sums%cross + sum(addition*self%image_off)) + length**2 &
-            *(sums%square + sum(addition*(2.0_dp*self%response_off + addition*self%cells_off)))
-         self%image_off(:, :) = self%image_off + length*(self%response_off + addition*self%cells_off)
+         square = square + 2.0_dp*length*(sums%cross + parts%cross) + length**2*(sums%square + parts%square)
+         call self%blocks%advance(coarse, length)
          self%length = real(length, sp)
-         self%pending(:, :) = length*addition
          ! Single precision cannot resolve smaller gains: further directions would be round-off.
          if (length*product <= epsilon(1.0_sp)*form) exit
       end do
@@ -269,14 +255,14 @@ contains
       !$omp num_threads(self%threads)
       !$omp do schedule(dynamic)
       do jb = coarse%strips(1), coarse%strips(2)
-         self%response_off(:, jb) = 0.0_dp
+         self%blocks%response_off(:, jb) = 0.0_dp
          if (active%wide_runs(jb) == 0) cycle
          call search_rows(self, coarse, active, jb, step)
          call response_rows(self, coarse, active, jb, inner_rows(coarse, jb), step%last, rows)
       end do
       !$omp end do
       !$omp single
-      call close_rim(self%grid, self%search)
+      call self%rim%close_rim(self%search)
       !$omp end single
       !$omp do schedule(dynamic)
       do jb = coarse%strips(1), coarse%strips(2)
@@ -284,7 +270,7 @@ contains
          call response_rows(self, coarse, active, jb, edge_rows(coarse, jb), step%last, rows)
       end do
       !$omp end parallel
-      call coarse%share_blocks(self%response_off)
+      call coarse%share_blocks(self%blocks%response_off)
       totals = row_totals(transpose(reshape([rows%form, rows%cross, rows%square], [size(rows), 3])))
       sums = response_sums_type(totals(1), totals(2), totals(3))
    end subroutine search_pass
@@ -300,8 +286,8 @@ contains
       integer :: j, k, n
 
       allocate (added(self%grid%nx), corrected(self%grid%nx))
-      added(:) = real(self%pending(coarse%block_x, jb), sp)
-      corrected(:) = real(step%correction(coarse%block_x, jb), sp)
+      added(:) = real(self%blocks%pending(coarse%block_x, jb), sp)
+      corrected(:) = real(self%blocks%correction(coarse%block_x, jb), sp)
       do j = coarse%first_y(jb), coarse%first_y(jb + 1) - 1
          do k = 1, active%wide_runs(jb)
             associate (first => active%wide_first(k, jb))
@@ -348,7 +334,7 @@ contains
             end associate
          end do
       end do
-      if (.not. last) call add_blocks(coarse, column, self%response_off(:, jb))
+      if (.not. last) call add_blocks(coarse, column, self%blocks%response_off(:, jb))
    end subroutine response_rows
 
    !> Add sums over the blocks along x.
@@ -377,14 +363,14 @@ contains
       class(schur_preconditioner_type), intent(in) :: self
       real(dp) :: count
 
-      count = self%model%transforms()
+      count = self%blocks%transforms()
    end function transforms
 
    !> Free plans and memory.
    subroutine destroy(self)
       class(schur_preconditioner_type), intent(inout) :: self
 
-      call self%model%destroy()
+      call self%blocks%destroy()
       if (self%owns) deallocate (self%image, self%response)
       self%owns = .false.
       nullify (self%image, self%response)

@@ -13,6 +13,7 @@ module solver_result
       real(dp) :: residual = 0.0_dp             !! relative residual, recomputed at the end
       real(dp) :: load_error = 0.0_dp           !! relative error of the prescribed load
       logical :: converged = .false.            !! the residual met the tolerance
+      logical :: stopped = .false.              !! given up (module stop_watch): the fields have no meaning
       character(64) :: reason = ''              !! why the solver came back
       real(dp) :: seconds = 0.0_dp              !! wall time of the solve
    end type solver_result_type

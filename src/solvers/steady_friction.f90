@@ -31,6 +31,7 @@ module steady_friction
    use projection, only : project_simplex
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
+   use stop_watch, only : stop_is_due
    use steady_bound, only : bound_tractions, compare_tractions, largest_force
    use steady_contact, only : contact_mean, explain, read_road, steady_contact_type
    use steady_normal, only : new_steady_normal, steady_measure_type, steady_normal_type
@@ -114,6 +115,7 @@ contains
       before = operator%ffts
       call prepare_problem(problem, self%grid, operator%threads, contact%height, task, determined)
       call begin(self, operator, task, road, contact, normal)
+      if (normal%stopped) return
       pace%accepted = task%tolerance
       normal%reason = reason_iterations
       rubbing%reason = reason_iterations
@@ -121,6 +123,8 @@ contains
          call round(self, operator, task, road, pace, contact, measure, change)
          rubbing%iterations = rubbing%iterations + 1
          normal%iterations = normal%iterations + pace%inner
+         normal%stopped = stop_is_due()
+         if (normal%stopped) return
          if (max(change, measure%change/measure%size) <= pace%accepted .and. &
             measure%error <= task%tolerance) then
             call finish(self, operator, task, road, contact, normal, rubbing)
@@ -170,6 +174,7 @@ contains
          rough%tolerance = max(task%tolerance, 1e-2_dp)
          call self%normal%solve(operator, rough, contact%height, contact%pressure, contact%gap, &
             contact%level, normal)
+         if (normal%stopped) return
          contact%displacement = 0.0_dp
          contact%slip = 0.0_dp
          contact%offset = 0.0_dp

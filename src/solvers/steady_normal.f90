@@ -26,6 +26,7 @@ module steady_normal
    use projection, only : project_simplex
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
+   use stop_watch, only : stop_is_due
    use steady_active, only : finish_on_contact, worthwhile
    use steady_operator, only : steady_operator_type
    implicit none
@@ -114,6 +115,8 @@ contains
          outcome%iterations = outcome%iterations + 1
          call judge(self, operator, task, height, progress, gap, found, outcome)
          if (outcome%converged .or. outcome%iterations >= task%max_iterations) exit
+         outcome%stopped = stop_is_due()
+         if (outcome%stopped) return
 
          call advance(self, operator, task, outcome%iterations, progress)
       end do

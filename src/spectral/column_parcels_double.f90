@@ -1,6 +1,6 @@
 !> Blocks of columns that processes exchange, in double precision, for module `row_column_double`.
 module column_parcels_double
-   use asperity_parallel, only : exchange, process_number
+   use asperity_parallel, only : exchange, global_max, process_number
    use asperity_precision, only : dp, wp => dp
    use transform_shape, only : transform_shape_type
    implicit none
@@ -8,6 +8,6 @@ module column_parcels_double
 
    public :: column_parcels_type, new_column_parcels
 
-   include 'column_parcels.inc'      ! state d150b519, written by tools/check_sources.py --update
+   include 'column_parcels.inc'      ! state c55a781b, written by tools/check_sources.py --update
 
 end module column_parcels_double

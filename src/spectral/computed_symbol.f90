@@ -32,7 +32,7 @@ contains
       type(grid_type), intent(in) :: grid            !! periodic
       type(kernel_type), intent(in) :: kernel        !! of one component
       logical, intent(in) :: inverse                 !! by 1/symbol
-      real(dp), intent(out) :: form                  !! p.(symbol p) over the cells
+      real(dp), intent(out), optional :: form        !! p.(symbol p) over the cells
       type(computed_symbol_type) :: symbol
       real(dp), allocatable, target :: sums(:, :)
       real(dp) :: weight(block)
@@ -44,6 +44,7 @@ contains
       symbol%inverse = inverse
       symbol%sums => sums
       call transform%columns_through(symbol)
+      if (.not. present(form)) return
       if (grid%shared) sums = reshape(global_sum(reshape(sums, [size(sums)])), shape(sums))
       form = 0.0_dp
       do b = 1, size(sums, 2)

@@ -18,13 +18,15 @@ module fft_conv
    use asperity_errors, only : error_input, error_type, fail
    use computed_symbol, only : columns_computed
    use kernels, only : kernel_type
-   use asperity_parallel, only : global_max, global_sum, thread_count
+   use asperity_parallel, only : global_max, global_sum
+   use asperity_threads, only : thread_count
    use asperity_precision, only : dp, int64, sp, power_of_two
    use regular_grid, only : boundary_periodic, grid_type
    use row_column_double, only : new_row_column_double => new_row_column, &
       row_column_double_type => row_column_type
    use row_column_single, only : new_row_column_single => new_row_column, &
       row_column_single_type => row_column_type
+   use row_sharing, only : row_sharing_type
    use transform_shape, only : shape_on_grid, transform_shape_type, whole_shape
    implicit none
    private
@@ -89,7 +91,7 @@ module fft_conv
 contains
 
    !> The operator of a solid of unit shear modulus, m/Pa.
-   subroutine new_convolution(self, grid, kernel, error, single, memory, lean)
+   subroutine new_convolution(self, grid, kernel, error, single, memory, lean, sharing)
       type(convolution_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
       type(kernel_type), intent(in) :: kernel      !! what the solid is
@@ -97,13 +99,14 @@ contains
       logical, intent(in), optional :: single      !! work in single precision
       type(c_ptr), intent(in), optional :: memory  !! of an operator that is never in use meanwhile
       logical, intent(in), optional :: lean        !! no table of the symbol, where that is possible
+      type(row_sharing_type), intent(in), optional :: sharing   !! of the rows; absent: that of the grid
       logical :: tabulated
 
       if (grid%boundary /= boundary_periodic .and. .not. associated(kernel%cell)) then
          call fail(error, error_input, 'this solid is for periodic boundaries only')
          return
       end if
-      call plan(self, shape_on_grid(grid, kernel%components), error, single, memory)
+      call plan(self, shape_on_grid(grid, kernel%components, sharing), error, single, memory)
       if (allocated(error)) return
       self%grid = grid
       self%kernel = kernel
@@ -244,15 +247,13 @@ contains
       real(dp), intent(in) :: p(:, :)                 !! [nx, rows], Pa
       real(dp), intent(inout) :: u(:, :)              !! [nx, rows], m; may not be p
       real(dp), intent(out), optional :: form         !! p.A p over the cells
-      real(dp) :: sum
       integer :: j
 
       !$omp parallel do default(none) shared(self, p) private(j) num_threads(self%threads)
       do j = 1, self%rows
          call self%forward_row(1, j, p(:, j))
       end do
-      call self%columns(columns_apply, sum)
-      if (present(form)) form = sum
+      call self%columns(columns_apply, form)
       !$omp parallel do default(none) shared(self, u) private(j) num_threads(self%threads)
       do j = 1, self%rows
          call self%backward_row(1, j, u(:, j))
@@ -264,14 +265,13 @@ contains
       class(convolution_type), intent(inout) :: self
       real(dp), intent(in) :: u(:, :)                 !! [nx, rows], m
       real(dp), intent(inout) :: p(:, :)              !! [nx, rows], Pa
-      real(dp) :: sum
       integer :: j
 
       !$omp parallel do default(none) shared(self, u) private(j) num_threads(self%threads)
       do j = 1, self%rows
          call self%forward_row(1, j, u(:, j))
       end do
-      call self%columns(columns_inverse, sum)
+      call self%columns(columns_inverse)
       !$omp parallel do default(none) shared(self, p) private(j) num_threads(self%threads)
       do j = 1, self%rows
          call self%backward_row(1, j, p(:, j))
@@ -284,7 +284,6 @@ contains
       real(dp), intent(in) :: px(:, :), py(:, :)          !! [nx, rows], Pa
       real(dp), intent(inout) :: ux(:, :), uy(:, :)       !! [nx, rows], m
       real(dp), intent(out), optional :: form             !! p.A p over the cells
-      real(dp) :: sum
       integer :: j
 
       !$omp parallel do default(none) shared(self, px, py) private(j) num_threads(self%threads)
@@ -292,8 +291,7 @@ contains
          call self%forward_row(1, j, px(:, j))
          call self%forward_row(2, j, py(:, j))
       end do
-      call self%columns(columns_apply, sum)
-      if (present(form)) form = sum
+      call self%columns(columns_apply, form)
       !$omp parallel do default(none) shared(self, ux, uy) private(j) num_threads(self%threads)
       do j = 1, self%rows
          call self%backward_row(1, j, ux(:, j))
@@ -463,7 +461,7 @@ contains
    subroutine columns(self, action, form)
       class(convolution_type), intent(inout) :: self
       integer, intent(in) :: action                !! columns_apply, columns_inverse or columns_form
-      real(dp), intent(out) :: form                !! p.(symbol p) over the cells
+      real(dp), intent(out), optional :: form      !! p.(symbol p) over the cells
       logical :: inverse, back
 
       inverse = action == columns_inverse

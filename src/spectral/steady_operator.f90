@@ -12,7 +12,7 @@
 !> symbols take one field, and six more with friction; the resolvent one.
 module steady_operator
    use asperity_errors, only : error_type
-   use asperity_parallel, only : thread_count
+   use asperity_threads, only : thread_count
    use asperity_precision, only : dp, int64
    use regular_grid, only : grid_type
    use row_column_double, only : multiplier_type, new_row_column, row_column_type

@@ -1,9 +1,9 @@
 !> What a transform needs to know of the grid that it is for.
 module transform_shape
-   use asperity_parallel, only : process_count, process_number
+   use asperity_parallel, only : process_number
    use influence, only : transform_length
    use regular_grid, only : grid_type
-   use row_sharing, only : new_row_sharing, owners_on_grid, row_sharing_type
+   use row_sharing, only : row_sharing_type, sharing_on_grid
    implicit none
    private
 
@@ -25,14 +25,17 @@ module transform_shape
 contains
 
    !> The shape for fields on a grid, of which each process may hold a part.
-   pure function shape_on_grid(grid, components) result(self)
+   pure function shape_on_grid(grid, components, sharing) result(self)
       type(grid_type), intent(in) :: grid
       integer, intent(in) :: components
+      type(row_sharing_type), intent(in), optional :: sharing   !! of the rows; absent: that of the grid
       type(transform_shape_type) :: self
-      type(row_sharing_type) :: sharing
 
-      call new_row_sharing(sharing, owners_on_grid(grid), grid%shared)
-      self = shape_of_rows(grid%nx, sharing, components)
+      if (present(sharing)) then
+         self = shape_of_rows(grid%nx, sharing, components)
+      else
+         self = shape_of_rows(grid%nx, sharing_on_grid(grid), components)
+      end if
       self%mx = transform_length(grid%nx, grid%boundary)
       self%my = transform_length(grid%ny, grid%boundary)
    end function shape_on_grid

@@ -65,7 +65,6 @@ contains
    integer(c_int) function planning_flag(attempt) result(flag)
       integer, intent(in) :: attempt           !! `from_memory` first, `from_measuring` where that fails
       integer(c_int), parameter :: writable = 2
-      integer(c_int) :: status
 
       if (.not. started .and. is_first_process()) then
          started = .true.

@@ -87,7 +87,6 @@ def rough(n: int = 256) -> dict:
 
 def measure(case: dict) -> dict:
     """Solve a case from its non-adhesive start, thrice; the least time counts."""
-    load = max(case["pressure"], 1e-3)
     best = None
     for _ in range(3):
         begin = time.process_time()
@@ -97,13 +96,16 @@ def measure(case: dict) -> dict:
         seconds = time.process_time() - begin
         if best is None or seconds < best[0]:
             best = seconds, found
-    given = {"pressure": load} if case["pressure"] > 0 else {"displacement": 1e-13}
-    start = asperity.solve_normal(case["height"], case["side"], None, case["modulus"],
-                                  boundary=case["boundary"], **given)
+    # A load that presses starts from about the contact without adhesion, others from mere touch.
+    start = 0
+    if case["pressure"] > 0:
+        start = asperity.solve_normal(case["height"], case["side"], None, case["modulus"],
+                                      boundary=case["boundary"], pressure=case["pressure"],
+                                      tolerance=1e-2).ffts
     seconds, found = best
     # A transform of the grid on which this case's transforms are.
     size = case["height"].shape[0] * (2 if case["boundary"] == "free" else 1)
-    return {"iterations": found.iterations, "ffts": found.ffts, "start": start.ffts,
+    return {"iterations": found.iterations, "ffts": found.ffts, "start": start,
             "size": size, "seconds": seconds, "residual": found.residual,
             "area": found.contact_area}
 
@@ -131,11 +133,11 @@ def main() -> None:
              for tabor in (0.3, 1.0, 3.0)] + [rough(256), rough(512)]
     lines = [START, "", "## Adhesion, one thread", "",
              "Measured by `python tools/bench/adhesion.py`. All cases have the exponential",
-             "potential and start from the contact without adhesion; they end at a natural",
+             "potential and start from about the contact without adhesion; they end at a natural",
              "residual max|min(g/z0, G z0/w)| of 1e-6. The spheres have n = 128 and no load. The",
              "rough surfaces have a Hurst exponent of 0.8, waves from L/4 to 13 cells, rms slope",
              "h' = 1, E\\* = 25 MPa, w = 50 mJ/m2, z0 = 2.071 nm, cells of 1.5 nm and p = 0.05",
-             "E\\* h'. The transforms are real FFTs; those of the coarse preconditioner count in",
+             "E\\* h'. The transforms are real FFTs; those of the coarse grid count in",
              "proportion to their size. In free mode they are those of the doubled grid.", "",
              "| case | iterations | FFTs, total | FFTs, start | residual | contact | seconds |",
              "| --- | --- | --- | --- | --- | --- | --- |"]

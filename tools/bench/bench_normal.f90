@@ -16,7 +16,7 @@ program bench_normal
    use normal_cg, only : new_normal_solver, normal_solver_type
    use normal_state, only : normal_problem_type
    use omp_lib, only : omp_get_wtime
-   use asperity_parallel, only : set_threads
+   use asperity_threads, only : set_threads
    use asperity_precision, only : dp, int64
    use regular_grid, only : boundary_periodic, grid_type, new_grid
    use solver_result, only : solver_result_type

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
+import signal
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -15,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 # this when its library is loaded, so it comes first.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
-from asperity._core import asperity_flat
+from asperity import _core
 
 from .check import choice, no_masked, positive
 from .errors import raise_for_status
@@ -24,6 +25,13 @@ __all__ = ["bare", "call", "check_depth", "contact_map", "flag_of_boundary", "he
            "lengths", "set_threads", "version"]
 
 _lock = threading.Lock()
+_modules = (_core.flat_contact, _core.flat_library, _core.flat_roads, _core.flat_runs,
+            _core.flat_simulations)
+
+
+def _routine(name: str) -> Any:
+    """Return a routine of the library, whichever module holds it."""
+    return next(getattr(module, name) for module in _modules if hasattr(module, name))
 
 
 def _before_fork() -> None:
@@ -33,7 +41,7 @@ def _before_fork() -> None:
     other threads of OpenMP, or for a lock that another thread held.
     """
     _lock.acquire()
-    asperity_flat.release_idle_threads()
+    _core.flat_library.release_idle_threads()
 
 
 if hasattr(os, "register_at_fork"):
@@ -41,26 +49,42 @@ if hasattr(os, "register_at_fork"):
                         after_in_child=_lock.release)
 
 
-def call(name: str) -> Callable[..., tuple[Any, ...]]:
+def call(name: str, *, interruptible: bool = False) -> Callable[..., tuple[Any, ...]]:
     """Return a routine of the library that raises instead of returning a status.
 
-    The routine's last two outputs are its status and message; the others are returned.
+    The routine's last two outputs are its status and message; the others are returned. Ctrl-C
+    ends an interruptible routine at its next iteration, with KeyboardInterrupt.
     """
-    routine = getattr(asperity_flat, name)
+    routine = _routine(name)
 
     @functools.wraps(routine)
     def checked(*arguments: Any) -> tuple[Any, ...]:
         with _lock:
-            *outputs, status, message = routine(*arguments)
+            signals = _interrupts() if interruptible else None
+            if signals is not None:
+                _core.flat_library.await_interrupts(signals)
+            try:
+                *outputs, status, message = routine(*arguments)
+            finally:
+                if signals is not None:
+                    _core.flat_library.end_interrupts(signals)
         raise_for_status(int(status), message)
         return tuple(outputs)
 
     return checked
 
 
+def _interrupts() -> NDArray[np.int32] | None:
+    """Return the signal of Ctrl-C, if it raises KeyboardInterrupt in this thread."""
+    if (threading.current_thread() is threading.main_thread()
+            and signal.getsignal(signal.SIGINT) is signal.default_int_handler):
+        return np.array([signal.SIGINT], dtype=np.int32)
+    return None
+
+
 def bare(name: str) -> Callable[..., Any]:
     """Return a routine of the library that has no status."""
-    routine = getattr(asperity_flat, name)
+    routine = _routine(name)
 
     @functools.wraps(routine)
     def locked(*arguments: Any) -> Any:
@@ -72,7 +96,7 @@ def bare(name: str) -> Callable[..., Any]:
 
 def version() -> str:
     """Return the version of the library."""
-    return asperity_flat.library_version().decode().strip()
+    return _core.flat_library.library_version().decode().strip()
 
 
 def set_threads(number: int = 0) -> int:
@@ -103,7 +127,7 @@ def set_threads(number: int = 0) -> int:
     if number < 0:
         raise ValueError(f"number = {number}: must be 0 or more")
     with _lock:
-        return int(asperity_flat.set_thread_count(number))
+        return int(_core.flat_library.set_thread_count(number))
 
 
 def height_map(height: ArrayLike, name: str = "height") -> NDArray[np.float64]:

@@ -6,7 +6,9 @@ import difflib
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-__all__ = ["NamedValues", "OpenValues", "UnknownNameError", "unknown_name"]
+from numpy.typing import NDArray
+
+__all__ = ["NamedFields", "NamedValues", "OpenValues", "UnknownNameError", "unknown_name"]
 
 
 class UnknownNameError(KeyError):
@@ -88,6 +90,30 @@ class NamedValues(Mapping[str, Any]):
 
     def __repr__(self) -> str:
         return "\n".join(f"{name}: {value}" for name, value in self._values.items()) or "(empty)"
+
+
+class NamedFields:
+    """Fields by name, which are made when they are asked for: items are attributes, too."""
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        raise NotImplementedError
+
+    def __iter__(self) -> Iterator[str]:
+        raise NotImplementedError
+
+    def __getattr__(self, name: str) -> NDArray[Any]:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        try:
+            return self[name]
+        except UnknownNameError as error:
+            raise AttributeError(str(error)) from None
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *self})
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self)
 
 
 class OpenValues(NamedValues):

@@ -20,7 +20,7 @@ POTENTIALS = ("exponential", "gauss", "maugis_dugdale")
 STARTS = ("non_adhesive", "full_contact")
 INTERVALS = 4096  # of the table of an attraction that is a function
 
-_solve = library.call("contact_adhesive")
+_solve = library.call("contact_adhesive", interruptible=True)
 
 
 @dataclass(frozen=True)

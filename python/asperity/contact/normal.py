@@ -16,7 +16,7 @@ __all__ = ["NormalContact", "solve_normal"]
 
 FloatArray = NDArray[np.float64]
 
-_solve = library.call("contact_normal")
+_solve = library.call("contact_normal", interruptible=True)
 
 
 @dataclass(frozen=True)

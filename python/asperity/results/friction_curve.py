@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.optional import needed
 from ..base.presenters import present
 
 if TYPE_CHECKING:
@@ -195,10 +196,7 @@ class FrictionCurve:
         ImportError
             If xarray is not installed.
         """
-        try:
-            import xarray
-        except ImportError as error:
-            raise ImportError("to_xarray needs xarray: python -m pip install xarray") from error
+        xarray = needed("xarray", "to_xarray")
         axes = ("pressure", "temperature", "speed")
 
         def told(name: str, more: str = "") -> dict[str, str]:

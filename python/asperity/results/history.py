@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.names import NamedValues
+from ..base.optional import needed
 from ..base.presenters import present
+from .column_types import HistoryColumns
 
 if TYPE_CHECKING:
     import pandas
@@ -17,7 +19,6 @@ if TYPE_CHECKING:
 __all__ = ["Grid", "History"]
 
 FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 
 @dataclass(frozen=True)
@@ -55,52 +56,13 @@ class Grid:
         return self.ly / self.ny
 
 
-class History(NamedValues):
+class History(NamedValues, HistoryColumns):
     """The history of a run: a mapping from names to numpy arrays, one value a row.
 
     The row 0 is the initial state; a step adds a row. Of a run that is being written, the rows
-    that every column has are shown. The columns named below are those that this version writes;
-    older files may lack some.
+    that every column has are shown. This version writes the columns of `HistoryColumns`; older
+    files may lack some.
     """
-
-    step: IntArray
-    phase: IntArray
-    time: FloatArray
-    pressure: FloatArray
-    force: FloatArray
-    displacement: FloatArray
-    contact_area: FloatArray
-    mean_gap: FloatArray
-    road_x: FloatArray
-    road_y: FloatArray
-    traction_x: FloatArray
-    traction_y: FloatArray
-    stick_area: FloatArray
-    sliding_speed: FloatArray
-    friction_viscous: FloatArray
-    friction: FloatArray
-    work_normal: FloatArray
-    work_tangential: FloatArray
-    work_load: FloatArray
-    work_drive: FloatArray
-    work_missing: FloatArray
-    energy_elastic: FloatArray
-    energy_adhesive: FloatArray
-    energy_kinetic: FloatArray
-    energy_radiated: FloatArray
-    dissipated_viscous: FloatArray
-    dissipated_numerical: FloatArray
-    dissipated_friction: FloatArray
-    power_viscous: FloatArray
-    power_friction: FloatArray
-    iterations_normal: IntArray
-    iterations_tangential: IntArray
-    residual_normal: FloatArray
-    residual_tangential: FloatArray
-    passes: IntArray
-    residual_coupling: FloatArray
-    ffts: FloatArray
-    seconds: FloatArray
 
     def __init__(self, columns: dict[str, NDArray[Any]], units: dict[str, str],
                  long_names: dict[str, str]) -> None:
@@ -138,10 +100,7 @@ class History(NamedValues):
         ImportError
             If pandas is not installed.
         """
-        try:
-            import pandas
-        except ImportError as error:
-            raise ImportError("to_pandas needs pandas: python -m pip install pandas") from error
+        pandas = needed("pandas", "to_pandas")
         return pandas.DataFrame(self._values)
 
     def _repr_html_(self) -> str:

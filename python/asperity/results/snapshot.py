@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, overload
 import h5py
 from numpy.typing import NDArray
 
-from ..base.names import UnknownNameError, unknown_name
+from ..base.names import NamedFields, UnknownNameError, unknown_name
 from ..base.presenters import present
 from .reading import read_file, scalar_of, text_of
 from .result_file import ResultFile
@@ -25,7 +25,7 @@ _NORMAL = ("pressure", "gap", "displacement_z", "contact", "road_height")
 _TANGENTIAL = ("traction_x", "traction_y", "displacement_x", "displacement_y", "slip_x", "slip_y")
 
 
-class Snapshot:
+class Snapshot(NamedFields):
     """The fields of one row of the history, read from the file when they are asked for.
 
     ``snapshot.pressure`` and ``snapshot["pressure"]`` are the same array of shape (ny, nx).
@@ -72,14 +72,6 @@ class Snapshot:
         self._check(name)
         return read_file(self._run.path, lambda file: file["snapshots"][self._key][name][()])
 
-    def __getattr__(self, name: str) -> NDArray[Any]:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        try:
-            return self[name]
-        except UnknownNameError as error:
-            raise AttributeError(str(error)) from None
-
     def _check(self, name: str) -> None:
         """Raise a message that helps on if there is no such field."""
         if name in self._meanings:
@@ -99,12 +91,6 @@ class Snapshot:
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._meanings)
-
-    def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *self._meanings})
-
-    def _ipython_key_completions_(self) -> list[str]:
-        return list(self._meanings)
 
     def units(self, name: str) -> str:
         """Return the units of a field, '1' for a pure number."""

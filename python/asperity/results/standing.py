@@ -1,12 +1,17 @@
 """How a run stands: finished, stopped, going on, or perhaps killed.
 
-A killed run leaves its file as one that goes on does. What tells them apart is how long nothing
-has been written, against the time that a row takes.
+A killed run leaves its file as one that goes on does. What tells them apart is the lock beside the
+result: the system releases it when the process that holds it dies. Where the lock cannot be seen,
+as for a run on another machine, it is how long nothing has been written, against the time that a
+row takes.
 """
 
 from __future__ import annotations
 
+import os
+import platform
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,8 +19,8 @@ import numpy as np
 if TYPE_CHECKING:
     from .result_file import ResultFile
 
-__all__ = ["duration", "note_of", "rows_of", "seems_dead", "short_time", "silence", "standing",
-           "time_of_row"]
+__all__ = ["duration", "held", "note_of", "rows_of", "seems_dead", "short_time", "silence",
+           "standing", "time_of_row"]
 
 LAST = 20  # rows that tell how long the next one may take
 PATIENCE = 20.0  # times the longest of them
@@ -79,10 +84,33 @@ def time_of_row(run: ResultFile) -> float | None:
     return float(last.max()) if len(last) else None
 
 
+def held(run: ResultFile) -> bool | None:
+    """Whether a process holds the lock of a result; None where that cannot be seen.
+
+    Trying to take the lock would keep a run that starts now from it. The list of all locks, which
+    Linux has, disturbs nobody.
+    """
+    path = Path(os.path.realpath(run.path))
+    lock = path.with_suffix(".lock") if path.suffix == ".h5" else Path(f"{path}.lock")
+    try:
+        words = lock.read_text(errors="replace").split()
+        if words[3:5] != ["on", platform.node()]:  # asperity process NUMBER on HOST since ...
+            return None
+        there = lock.stat()
+        wanted = f"{os.major(there.st_dev):02x}:{os.minor(there.st_dev):02x}:{there.st_ino}"
+        return any(wanted in line.split() and "FLOCK" in line.split()
+                   for line in Path("/proc/locks").read_text().splitlines())
+    except OSError:
+        return None
+
+
 def seems_dead(run: ResultFile) -> bool:
-    """Whether a run that has told no end has been silent for much longer than a row takes."""
+    """Whether a run that has told no end goes on no longer, as far as can be seen."""
     if run.finished or run.outcome != "running":
         return False
+    alive = held(run)
+    if alive is not None:
+        return not alive
     quiet, row = silence(run), time_of_row(run)
     return quiet is not None and row is not None and quiet > max(LEAST, PATIENCE * row)
 
@@ -97,7 +125,9 @@ def note_of(run: ResultFile) -> str:
     if quiet is None:
         return ""
     text = f"last written {short_time(quiet)} ago"
-    if seems_dead(run):
+    if held(run) is False:
+        text += ", and its process has ended"
+    elif seems_dead(run):
         text += f", and a row takes up to {short_time(row or 0.0)}: perhaps no longer running"
     return text
 

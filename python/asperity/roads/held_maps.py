@@ -10,17 +10,16 @@ from __future__ import annotations
 import hashlib
 import shutil
 import tempfile
-from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import library
 from ..base.check import positive
 from .instrument_files import to_metres
+from .map_writer import new_map_file, write_grid, write_height
 
 __all__ = ["HeldMap", "held_map", "is_map", "keep_beside", "map_of_file", "save"]
 
@@ -151,34 +150,13 @@ def save(path: str | Path, height: ArrayLike, lx: float | None = None, ly: float
 
 def _write(path: Path, held: HeldMap, title: str) -> Path:
     """Write the file, which appears when it is complete."""
-    from .measured import is_result
-
-    if not path.parent.is_dir():
-        raise OSError(f"{path}: cannot be written: there is no folder {str(path.parent)!r}")
-    if path.is_dir():
-        raise OSError(f"{path}: is a folder, not a file")
-    if is_result(path):
-        raise ValueError(f"{path}: is the result of a run: name another file")
-    ny, nx = held.height.shape
-    new = path.with_name(path.name + ".new")
-    try:
-        with h5py.File(new, "w") as file:
-            file.attrs.update(title=title, program="asperity", version=library.version(),
-                              created=f"{datetime.now(timezone.utc):%Y-%m-%dT%H:%M:%SZ}")
-            data = file.create_dataset("surface/height", data=held.height)
-            data.attrs.update(units="m", long_name="height of the road")
-            if held.lx is not None:
-                lx = positive("lx", held.lx)
-                ly = lx * ny / nx if held.ly is None else positive("ly", held.ly)
-                grid = file.create_group("grid")
-                grid.attrs.update(nx=np.int32(nx), ny=np.int32(ny), lx=lx, ly=ly,
-                                  boundary="periodic" if held.periodic else "free")
-                for name, count, length in (("x", nx, lx), ("y", ny, ly)):
-                    axis = grid.create_dataset(name, data=np.arange(count) * length / count)
-                    axis.attrs.update(units="m", long_name=f"centres of the cells along {name}")
-                data.attrs.update(lx=lx, ly=ly)
-        new.replace(path)
-    except OSError as error:
-        new.unlink(missing_ok=True)
-        raise OSError(f"{path}: cannot be written: {error}") from None
+    with new_map_file(path, title, "asperity") as file:
+        lengths = {}
+        if held.lx is not None:
+            ny, nx = held.height.shape
+            lx = positive("lx", held.lx)
+            ly = lx * ny / nx if held.ly is None else positive("ly", held.ly)
+            write_grid(file, held.height.shape, lx, ly, held.periodic)
+            lengths = {"lx": lx, "ly": ly}
+        write_height(file, held.height, **lengths)
     return path

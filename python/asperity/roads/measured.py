@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.check import choice, number
-from ..base.library import version
 from ..base.presenters import present
 from .instrument_files import UNITS, channels, read_map, to_metres
 from .map_work import MapWork, fit_terms, polynomial
+from .map_writer import new_map_file, write_grid, write_height
 from .statistics import statistics
 
 __all__ = ["MeasuredSurface", "channels", "import_topography", "load"]
@@ -140,57 +139,22 @@ class MeasuredSurface:
         import h5py
 
         path = Path(path)
-        if not path.parent.is_dir():
-            raise OSError(f"{path}: cannot be written: there is no folder {str(path.parent)!r}")
-        if path.is_dir():
-            raise OSError(f"{path}: is a folder, not a file")
-        if is_result(path):
-            raise ValueError(f"{path}: is the result of a run: name another file")
-        ny, nx = self.height.shape
-        temporary = path.with_name(path.name + ".new")
-        try:
-            with h5py.File(temporary, "w") as file:
-                file.attrs["title"] = self.source["name"]
-                file.attrs["program"] = "asperity import"
-                file.attrs["version"] = version()
-                file.attrs["created"] = f"{datetime.now(timezone.utc):%Y-%m-%dT%H:%M:%SZ}"
-                for name, value in self.source.items():
-                    if name != "metadata":
-                        file.attrs[f"source_{name}"] = value
-                # a dataset, for attributes hold 64 kB only
-                told = json.dumps(self.source["metadata"], default=str)
-                metadata = file.create_dataset("source/metadata", data=told,
-                                               dtype=h5py.string_dtype())
-                metadata.attrs.update(units="1", long_name="what the file says of the measurement"
-                                                           " (JSON)")
-                file.attrs["source_unit"] = self.unit
-                file.attrs["steps"] = json.dumps(self.steps)
-                file.attrs["steps_text"] = "\n".join(map(_told, self.steps))
-                grid = file.create_group("grid")
-                grid.attrs.update(nx=np.int32(nx), ny=np.int32(ny), lx=self.lx, ly=self.ly,
-                                  boundary="periodic" if self.periodic else "free")
-                for name, count, length in (("x", nx, self.lx), ("y", ny, self.ly)):
-                    axis = grid.create_dataset(name, data=np.arange(count) * length / count)
-                    axis.attrs.update(units="m", long_name=f"centres of the cells along {name}")
-                data = file.create_dataset("surface/height", data=self.height)
-                data.attrs.update(units="m", long_name="height of the road", lx=self.lx,
-                                  ly=self.ly, rms_height=self.rms_height,
-                                  rms_slope=self.rms_slope)
-            temporary.replace(path)
-        except OSError as error:
-            temporary.unlink(missing_ok=True)
-            raise OSError(f"{path}: cannot be written: {error}") from None
+        with new_map_file(path, self.source["name"], "asperity import") as file:
+            file.attrs.update({f"source_{name}": value for name, value in self.source.items()
+                               if name != "metadata"})
+            # a dataset, for attributes hold 64 kB only
+            told = json.dumps(self.source["metadata"], default=str)
+            metadata = file.create_dataset("source/metadata", data=told,
+                                           dtype=h5py.string_dtype())
+            metadata.attrs.update(units="1", long_name="what the file says of the measurement"
+                                                       " (JSON)")
+            file.attrs["source_unit"] = self.unit
+            file.attrs["steps"] = json.dumps(self.steps)
+            file.attrs["steps_text"] = "\n".join(map(_told, self.steps))
+            write_grid(file, self.height.shape, self.lx, self.ly, self.periodic)
+            write_height(file, self.height, lx=self.lx, ly=self.ly, rms_height=self.rms_height,
+                         rms_slope=self.rms_slope)
         return path
-
-
-def is_result(path: Path) -> bool:
-    """Whether a file is the result of a run, which is not to be replaced by a map."""
-    import h5py
-
-    if not path.is_file() or path.stat().st_size < 8 or not h5py.is_hdf5(path):
-        return False
-    with h5py.File(path, "r", locking=False) as file:
-        return "history" in file
 
 
 def load(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..base import library
 from ..base.names import NamedValues
+from ..results.column_types import RowColumns
 
 __all__ = ["Column", "Row", "columns"]
 
@@ -37,7 +38,7 @@ def columns() -> tuple[Column, ...]:
     return tuple(found)
 
 
-class Row(NamedValues):
+class Row(NamedValues, RowColumns):
     """A row of the history: its columns are items and attributes, in SI units.
 
     Examples
@@ -46,45 +47,6 @@ class Row(NamedValues):
     >>> row.step, row["time"]
     (0, 2.0)
     """
-
-    step: int
-    phase: int
-    time: float
-    pressure: float
-    force: float
-    displacement: float
-    contact_area: float
-    mean_gap: float
-    road_x: float
-    road_y: float
-    traction_x: float
-    traction_y: float
-    stick_area: float
-    sliding_speed: float
-    friction_viscous: float
-    friction: float
-    work_normal: float
-    work_tangential: float
-    work_load: float
-    work_drive: float
-    work_missing: float
-    energy_elastic: float
-    energy_adhesive: float
-    energy_kinetic: float
-    energy_radiated: float
-    dissipated_viscous: float
-    dissipated_numerical: float
-    dissipated_friction: float
-    power_viscous: float
-    power_friction: float
-    iterations_normal: int
-    iterations_tangential: int
-    residual_normal: float
-    residual_tangential: float
-    passes: int
-    residual_coupling: float
-    ffts: float
-    seconds: float
 
     def __init__(self, values: NDArray[Any] | range) -> None:
         super().__init__({column.name: int(value) if column.is_whole else float(value)

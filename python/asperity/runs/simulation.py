@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 from ..base import library
 from ..base.check import whole
 from ..base.errors import NotConverged
-from ..base.names import UnknownNameError, unknown_name
+from ..base.names import NamedFields, UnknownNameError, unknown_name
 from . import namelists
 from .row import Row, columns
 
 __all__ = ["FIELDS", "RunView", "Simulation"]
 
 _open = library.call("simulation_open")
-_step = library.call("simulation_step")
+_step = library.call("simulation_step", interruptible=True)
 _steer = library.call("simulation_steer")
 _save = library.call("simulation_save")
 _load = library.call("simulation_load")
@@ -46,7 +46,7 @@ class _CaseLike(Protocol):
     path: Path | None
 
 
-class _Fields(Mapping[str, NDArray[Any]]):
+class _Fields(NamedFields, Mapping[str, NDArray[Any]]):
     """The fields as they are now: arrays of shape (ny, nx) of their own."""
 
     def __init__(self, handle: int, shape: tuple[int, int]) -> None:
@@ -60,25 +60,11 @@ class _Fields(Mapping[str, NDArray[Any]]):
         _field(self._handle, name, values.T)
         return values.astype(np.int8) if name == "contact" else values
 
-    def __getattr__(self, name: str) -> NDArray[Any]:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        try:
-            return self[name]
-        except UnknownNameError as error:
-            raise AttributeError(str(error)) from None
-
     def __iter__(self) -> Iterator[str]:
         return iter(FIELDS)
 
     def __len__(self) -> int:
         return len(FIELDS)
-
-    def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *FIELDS})
-
-    def _ipython_key_completions_(self) -> list[str]:
-        return list(FIELDS)
 
     def __repr__(self) -> str:
         return f"fields of {self._shape[0]} x {self._shape[1]} cells: {', '.join(FIELDS)}"
@@ -208,6 +194,8 @@ class Simulation:
             If the simulation is finished or closed.
         NotConverged
             If a solver fails; its ``result`` is this simulation, with the state reached.
+        KeyboardInterrupt
+            At Ctrl-C. The row is given up; the simulation is where it was before.
         """
         if self.finished:
             raise ValueError("the simulation is finished: no row is left")

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.names import UnknownNameError, unknown_name
+from ..base.optional import needed
 from ..base.presenters import present
 from ..results import Run, open_result
 
@@ -120,10 +121,7 @@ class Sweep(Mapping[str, NDArray[Any]]):
         ImportError
             If pandas is not installed.
         """
-        try:
-            import pandas
-        except ImportError as error:
-            raise ImportError("to_pandas needs pandas: python -m pip install pandas") from error
+        pandas = needed("pandas", "to_pandas")
         return pandas.DataFrame({name: list(column) if column.ndim > 1 else column
                                  for name, column in self._columns.items()})
 

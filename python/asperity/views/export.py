@@ -12,6 +12,8 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.optional import needed
+
 if TYPE_CHECKING:
     import xarray
 
@@ -42,10 +44,7 @@ def to_xarray(snapshot: Snapshot) -> xarray.Dataset:
     ImportError
         If xarray is not installed.
     """
-    try:
-        import xarray
-    except ImportError as error:
-        raise ImportError("to_xarray needs xarray: python -m pip install xarray") from error
+    xarray = needed("xarray", "to_xarray")
     run, grid = snapshot.run, snapshot.run.grid
 
     def along(name: str, values: NDArray[np.float64]) -> Any:
@@ -85,10 +84,7 @@ def run_to_xarray(run: Run) -> xarray.Dataset:
     ImportError
         If xarray is not installed.
     """
-    try:
-        import xarray
-    except ImportError as error:
-        raise ImportError("to_xarray needs xarray: python -m pip install xarray") from error
+    xarray = needed("xarray", "to_xarray")
     grid, history = run.grid, run.history
     stored = list(run.snapshots)
     names = [name for name in (stored[0].fields if stored else ())

@@ -15,7 +15,15 @@ import numpy as np
 
 from ..base.library import version
 from ..results.derived import closure, energy_terms, has_friction, missing_work, solver_setting
-from ..results.standing import duration, rows_of, seems_dead, short_time, silence, time_of_row
+from ..results.standing import (
+    duration,
+    held,
+    rows_of,
+    seems_dead,
+    short_time,
+    silence,
+    time_of_row,
+)
 from ..results.steady import steady_mean
 from .page_parts import PAGE, colour_scales, fill_page, page_file, page_json
 from .report_data import faulty, now, page_data, phase_names
@@ -136,6 +144,8 @@ def _unfinished(run: Run) -> str:
         return f"It ended so: {escape(run.outcome)}; {again}"
     quiet = silence(run)
     last = "" if quiet is None else f"The file was last written {short_time(quiet)} before"
+    if held(run) is False:
+        return f"Its process has ended before the run did: {again}"
     if seems_dead(run):
         return (f"{last}, where a row takes up to {short_time(time_of_row(run) or 0.0)}: the run"
                 f" was perhaps killed. If so, {again}")

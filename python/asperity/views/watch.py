@@ -16,7 +16,15 @@ from typing import TYPE_CHECKING, Any, TextIO
 import numpy as np
 
 from ..results import Run
-from ..results.standing import duration, rows_of, seems_dead, short_time, silence, time_of_row
+from ..results.standing import (
+    duration,
+    held,
+    rows_of,
+    seems_dead,
+    short_time,
+    silence,
+    time_of_row,
+)
 from .style import si_scale
 
 if TYPE_CHECKING:
@@ -121,7 +129,9 @@ def state_of(run: Run, pace: Pace) -> str:
     quiet = max(pace.still, silence(run) or 0.0)
     if quiet >= 10.0:
         told.append(f"no new row for {duration(quiet)}")
-    if seems_dead(run):
+    if held(run) is False:
+        told.append("its process has ended (--restart goes on from the last checkpoint)")
+    elif seems_dead(run):
         told[-1] += (f" where a row takes up to {short_time(time_of_row(run) or 0.0)}: perhaps no"
                      " longer running (--restart goes on from the last checkpoint)")
     return ", ".join(told)

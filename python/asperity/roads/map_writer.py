@@ -1,0 +1,78 @@
+"""The HDF5 file of a height map, which ``&surface shape = 'file'`` takes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.library import version
+
+if TYPE_CHECKING:
+    import h5py
+
+__all__ = ["new_map_file", "write_grid", "write_height"]
+
+
+def _is_result(path: Path) -> bool:
+    """Whether a file is the result of a run, which is not to be replaced by a map."""
+    import h5py
+
+    if not path.is_file() or path.stat().st_size < 8 or not h5py.is_hdf5(path):
+        return False
+    with h5py.File(path, "r", locking=False) as file:
+        return "history" in file
+
+
+@contextmanager
+def new_map_file(path: Path, title: str, program: str) -> Iterator[h5py.File]:
+    """Open a new file, which takes its place when it is complete.
+
+    Raises
+    ------
+    ValueError
+        If the path is that of the result of a run.
+    OSError
+        If it cannot be written.
+    """
+    import h5py
+
+    if not path.parent.is_dir():
+        raise OSError(f"{path}: cannot be written: there is no folder {str(path.parent)!r}")
+    if path.is_dir():
+        raise OSError(f"{path}: is a folder, not a file")
+    if _is_result(path):
+        raise ValueError(f"{path}: is the result of a run: name another file")
+    new = path.with_name(path.name + ".new")
+    try:
+        with h5py.File(new, "w") as file:
+            file.attrs.update(title=title, program=program, version=version(),
+                              created=f"{datetime.now(timezone.utc):%Y-%m-%dT%H:%M:%SZ}")
+            yield file
+        new.replace(path)
+    except OSError as error:
+        new.unlink(missing_ok=True)
+        raise OSError(f"{path}: cannot be written: {error}") from None
+
+
+def write_height(file: h5py.File, height: NDArray[np.float64], **attributes: Any) -> None:
+    """Write the heights, m."""
+    data = file.create_dataset("surface/height", data=height)
+    data.attrs.update(units="m", long_name="height of the road", **attributes)
+
+
+def write_grid(file: h5py.File, shape: tuple[int, ...], lx: float, ly: float,
+               periodic: bool) -> None:
+    """Write the grid of the heights: its lengths in m, and the centres of its cells."""
+    ny, nx = shape
+    grid = file.create_group("grid")
+    grid.attrs.update(nx=np.int32(nx), ny=np.int32(ny), lx=lx, ly=ly,
+                      boundary="periodic" if periodic else "free")
+    for name, count, length in (("x", nx, lx), ("y", ny, ly)):
+        axis = grid.create_dataset(name, data=np.arange(count) * length / count)
+        axis.attrs.update(units="m", long_name=f"centres of the cells along {name}")

@@ -1,0 +1,59 @@
+"""The dense steps of the tools against the program, and a step that has no solution."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+from conftest import ROOT
+
+sys.path.insert(0, str(ROOT / "tools"))
+
+from constant_shear import examine, look_for_plain, replay, run_case, run_starts
+
+
+# A half-space with two arms (its first step is taken in parts), a free patch with an arm, and a
+# block with mass and an arm; the load jumps in all of them.
+@pytest.mark.parametrize(("seed", "allowed"), [
+    (774100078, 1e-4), (774100254, 1e-4), (774100248, 1e-4)])
+def test_settled_rows(program, tmp_path, seed, allowed):
+    """Every row of a run that settles is the solution of the dense step, without partial cells."""
+    text, status = run_case(seed, tmp_path, program)
+    assert status == 0
+    if "prony" in text:
+        run_starts(text, tmp_path, program)
+    end = replay(tmp_path, text)
+    assert end["row"] == 15, "the last row of three phases"
+    assert end["before"] < allowed
+    step, known = end["step"], end["guesses"][0]
+    found, left = step.solve(end["guesses"])
+    assert left < 1e-8
+    for values, exact in zip(known[:2], step.fields(found)[:2], strict=True):
+        assert np.abs(values - exact).sum() < allowed * known[0].sum()
+    assert step.partial(found).size == 0
+    assert look_for_plain(step, found, cut=False)["plain"]
+
+
+def test_step_without_solution(program, tmp_path):
+    """Two cells are partly sheared; whatever is forced on them breaks the law somewhere."""
+    text, status = run_case(774100058, tmp_path, program)
+    assert status == 4
+    end = replay(tmp_path, text)
+    step = end["step"]
+    found, left = step.solve(end["guesses"])
+    assert left < 1e-8
+    partial = step.partial(found)
+    np.testing.assert_allclose(step.shares(found)[partial], [0.680, 0.944], atol=1e-3)
+    pressure, traction, gap = step.fields(found)
+    assert np.abs(pressure[partial]).max() < 1e-9 * pressure.max()
+    assert np.abs(gap[partial]).max() < 1e-9 * np.ptp(gap)
+    # The limit that the law of the other cells approaches: the same traction, cell by cell.
+    size = np.linalg.norm(traction, axis=0) / step.case.strength
+    assert (size[pressure > 0] > 0.9).any()
+    assert (size[pressure == 0] < 1).all()
+    tree = look_for_plain(step, found, cut=False)
+    assert tree["complete"]
+    assert not tree["plain"]
+    assert tree["states"] == tree["broken"] >= 4
+    assert "| none |" in examine(774100058, program)

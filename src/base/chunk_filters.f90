@@ -1,0 +1,240 @@
+!> The filters of HDF5 on the bytes of a chunk: shuffle, deflate, and the checksum of Fletcher.
+!>
+!> HDF5 applies its filters one chunk after the other. These procedures make the same format, so that
+!> threads can work on different chunks, and every reader of HDF5 reads what they made.
+!>
+!> * Shuffle: the first bytes of all values come first, then all second bytes, and so on. The bytes at one
+!>   place in all values of a chunk are called a plane here.
+!> * Deflate: a stream of zlib. The lower planes of a field of reals are as good as random: deflate would
+!>   work on them for most of its time and gain nothing. Planes that promise less than `worthwhile` are
+!>   therefore stored in the stream as they are (level 0 of zlib), which is 10 times as fast.
+!> * Fletcher: a checksum of 32 bits behind the bytes, as the manual of HDF5 defines it: two sums modulo
+!>   65535 over words of 16 bits with the high byte first.
+!>
+!> The bytes depend on the values and the level alone.
+module chunk_filters
+   use, intrinsic :: iso_c_binding, only : c_int, c_loc
+   use asperity_precision, only : dp, int64, int8
+   use zlib_library, only : deflate, deflate_end, deflate_params, start_deflate, stream_type, z_default_strategy, &
+      z_finish, z_no_flush, z_ok, z_stream_end
+   implicit none
+   private
+
+   public :: expected_gain, filter_chunk, fletcher32
+
+   real(dp), parameter :: worthwhile = 1.0_dp/16.0_dp  !! part of a plane that deflate should save
+   integer, parameter :: samples = 16384               !! bytes of a plane that are looked at
+   integer, parameter :: window = 32768                !! bytes back to which deflate can refer
+   integer, parameter :: slots = 4096                  !! of the table of places
+
+contains
+
+   !> Bytes of a chunk as they are stored.
+   subroutine filter_chunk(values, level, stored, length, success)
+      integer(int8), intent(in), contiguous :: values(:, :)   !! [bytes of a value, values]
+      integer, intent(in) :: level                 !! of deflate, 1 to 9; 0: no shuffle and no deflate
+      integer(int8), allocatable, intent(inout) :: stored(:)
+      integer, intent(out) :: length               !! of what is stored, bytes
+      logical, intent(out) :: success              !! no: memory is short
+      integer(int8), allocatable :: planes(:, :)
+      integer :: status
+
+      length = 0
+      call make_room(stored, size(values), success)
+      if (.not. success) return
+      if (level == 0) then
+         length = size(values)
+         stored(:length) = reshape(values, [length])
+      else
+         allocate (planes(size(values, 2), size(values, 1)), stat=status)
+         success = status == 0
+         if (.not. success) return
+         call shuffle(values, planes)
+         call deflate_planes(planes, level, stored, length, success)
+         if (.not. success) return
+      end if
+      call append_sum(stored, length)
+   end subroutine filter_chunk
+
+   !> Let an array take what any chunk of a number of bytes may become.
+   subroutine make_room(stored, bytes, success)
+      integer(int8), allocatable, intent(inout) :: stored(:)
+      integer, intent(in) :: bytes
+      logical, intent(out) :: success
+      integer :: needed, status
+
+      ! Deflate adds 5 bytes to each block that it stores, and some at the ends of planes.
+      needed = bytes + bytes/100 + 1024
+      success = .true.
+      if (allocated(stored)) then
+         if (size(stored) >= needed) return
+         deallocate (stored)
+      end if
+      allocate (stored(needed), stat=status)
+      success = status == 0
+   end subroutine make_room
+
+   !> Collect the bytes of the values by their place in the value.
+   pure subroutine shuffle(values, planes)
+      integer(int8), intent(in), contiguous :: values(:, :)     !! [bytes of a value, values]
+      integer(int8), intent(out), contiguous :: planes(:, :)    !! [values, bytes of a value]
+      integer, parameter :: some = 512                 !! values whose bytes stay in the cache meanwhile
+      integer :: b, i, start
+
+      do start = 1, size(values, 2), some
+         do b = 1, size(values, 1)
+            do i = start, min(start + some - 1, size(values, 2))
+               planes(i, b) = values(b, i)
+            end do
+         end do
+      end do
+   end subroutine shuffle
+
+   !> Compress planes into one stream.
+   subroutine deflate_planes(planes, level, stored, length, success)
+      integer(int8), intent(in), contiguous, target :: planes(:, :)    !! [values, bytes of a value]
+      integer, intent(in) :: level
+      integer(int8), intent(inout), contiguous, target :: stored(:)
+      integer, intent(out) :: length               !! of the stream, bytes
+      logical, intent(out) :: success
+      type(stream_type), target :: stream
+      integer(c_int) :: status, ignored, wanted
+      integer :: b, last
+
+      length = 0
+      success = start_deflate(stream, level) == z_ok
+      if (.not. success) return
+      stream%next_out = c_loc(stored)
+      stream%avail_out = int(size(stored), c_int)
+      last = size(planes, 2)
+      do b = 1, last
+         wanted = 0
+         if (expected_gain(planes(:, b)) >= worthwhile) wanted = int(level, c_int)
+         ! This first completes what is in the stream at the level before.
+         status = deflate_params(stream, wanted, z_default_strategy)
+         stream%next_in = c_loc(planes(1, b))
+         stream%avail_in = int(size(planes, 1), c_int)
+         if (status == z_ok) status = deflate(stream, merge(z_finish, z_no_flush, b == last))
+         success = status == merge(z_stream_end, z_ok, b == last) .and. stream%avail_in == 0
+         if (.not. success) exit
+      end do
+      length = int(stream%total_out)
+      ignored = deflate_end(stream)
+   end subroutine deflate_planes
+
+   !> The part of a plane that deflate is likely to save, from a sample: by shorter codes for frequent
+   !> bytes (entropy), by runs of one byte, or by references to what has occurred before.
+   pure function expected_gain(plane) result(gain)
+      integer(int8), intent(in), contiguous :: plane(:)
+      real(dp) :: gain
+      integer :: counts(-128:127), i, n, rarest, runs, step
+      real(dp) :: entropy
+
+      ! An odd step, because even ones would meet the same bytes of small patterns again and again.
+      step = max(1, size(plane)/samples)
+      if (mod(step, 2) == 0) step = step + 1
+      counts = 0
+      runs = 0
+      n = 0
+      do i = 1, size(plane) - 1, step
+         n = n + 1
+         counts(plane(i)) = counts(plane(i)) + 1
+         if (plane(i) == plane(i + 1)) runs = runs + 1
+      end do
+      gain = 1.0_dp
+      if (n == 0) return
+
+      entropy = 0.0_dp
+      do i = -128, 127
+         if (counts(i) > 0) entropy = entropy + counts(i)*log(real(n, dp)/counts(i))
+      end do
+      gain = max(1.0_dp - entropy/(n*log(256.0_dp)), real(runs, dp)/n)
+      if (gain >= worthwhile) return
+      rarest = minloc(counts, 1, counts > 0) - 129
+      gain = max(gain, repeated_part(plane, int(rarest, int8)))
+   end function expected_gain
+
+   !> The part of a plane that has occurred before within the window, from the places where a given byte
+   !> is: those are the same in whatever is repeated.
+   pure function repeated_part(plane, mark) result(part)
+      integer(int8), intent(in), contiguous :: plane(:)
+      integer(int8), intent(in) :: mark
+      real(dp) :: part
+      integer :: before, i, marks, places(0:slots - 1), repeated, slot
+
+      places = -window
+      marks = 0
+      repeated = 0
+      do i = 1, size(plane) - 7
+         if (plane(i) /= mark) cycle
+         marks = marks + 1
+         slot = iand(ieor(int(plane(i + 1)), shiftl(int(plane(i + 2)), 4)), slots - 1)
+         before = places(slot)
+         places(slot) = i
+         if (i - before >= window) cycle
+         if (all(plane(before:before + 7) == plane(i:i + 7))) repeated = repeated + 1
+      end do
+      part = 0.0_dp
+      if (marks > 0) part = real(repeated, dp)/marks
+   end function repeated_part
+
+   !> Add the checksum of what is stored behind it, the lowest byte first.
+   subroutine append_sum(stored, length)
+      integer(int8), intent(inout), contiguous :: stored(:)
+      integer, intent(inout) :: length
+      integer(int64) :: sum
+      integer :: i
+
+      sum = fletcher32(stored(:length))
+      do i = 1, 4
+         stored(length + i) = as_byte(iand(shiftr(sum, 8*(i - 1)), 255_int64))
+      end do
+      length = length + 4
+   end subroutine append_sum
+
+   !> A number from 0 to 255 as a byte with these bits.
+   pure function as_byte(number) result(byte)
+      integer(int64), intent(in) :: number
+      integer(int8) :: byte
+
+      byte = int(number - merge(256, 0, number > 127), int8)
+   end function as_byte
+
+   !> The checksum of HDF5's filter, a number below 2^32.
+   pure function fletcher32(bytes) result(sum)
+      integer(int8), intent(in), contiguous :: bytes(:)
+      integer(int64) :: sum
+      integer, parameter :: some = 65536              !! words after which the sums are reduced
+      integer(int64) :: first, second, word
+      integer :: i, start, words
+
+      first = 0
+      second = 0
+      words = size(bytes)/2
+      do start = 1, words, some
+         do i = start, min(start + some - 1, words)
+            word = ior(shiftl(iand(int(bytes(2*i - 1), int64), 255_int64), 8), &
+               iand(int(bytes(2*i), int64), 255_int64))
+            first = first + word
+            second = second + first
+         end do
+         first = reduced(first)
+         second = reduced(second)
+      end do
+      if (mod(size(bytes), 2) == 1) then
+         first = reduced(first + shiftl(iand(int(bytes(size(bytes)), int64), 255_int64), 8))
+         second = reduced(second + first)
+      end if
+      sum = ior(shiftl(second, 16), first)
+   end function fletcher32
+
+   !> A sum modulo 65535, with 65535 for 0 unless all that was added is 0.
+   pure function reduced(sum) result(rest)
+      integer(int64), intent(in) :: sum
+      integer(int64) :: rest
+
+      rest = mod(sum, 65535_int64)
+      if (rest == 0 .and. sum > 0) rest = 65535
+   end function reduced
+
+end module chunk_filters

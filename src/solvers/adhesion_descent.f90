@@ -1,0 +1,197 @@
+!> A step of the fast method for adhesive contact: towards the minimum of a local model of the energy.
+!>
+!> The model of the energy about the gap g has B_h (module adhesion_model) in place of B, and all else as it
+!> is: the attraction, not linearised, and g >= 0. It is minimised by the iteration of module
+!> adhesion_directions (preconditioned conjugate gradients on the free cells) without any transform of full
+!> size, so that the long way of an edge that advances cell by cell takes few of those. A step ends after
+!> `most_iterations`: more would make it exact for B_h, which is not B.
+!>
+!> Where the attraction is strong the energy has many minima, and a long step can leap over the one that
+!> a slow motion would stop at. Therefore no iteration changes g + z_0 of a cell by more than a share of it:
+!> the attraction changes little, and the cells that have come into contact resist before their neighbours
+!> follow. Without this limit rough surfaces end with 5 to 10 % more contact.
+module adhesion_descent
+   use adhesion_directions, only : adhesion_iteration_type, adhesion_work_type, find_direction, measure
+   use adhesion_potential, only : has_smooth_potential
+   use adhesion_state, only : control_approach
+   use adhesion_steps, only : sum_shift
+   use asperity_parallel, only : any_process
+   use asperity_precision, only : dp
+   use field_sums, only : least_of_rows
+   implicit none
+   private
+
+   public :: approach_minimum
+
+   integer, parameter :: most_iterations = 8          !! in the model, for a step
+   real(dp), parameter :: goal = 0.1_dp               !! share of the residual that may be left
+   real(dp), parameter :: longest = 0.7_dp            !! change of g + z_0 over g + z_0 in an iteration
+   real(dp), parameter :: boldest = 100.0_dp          !! the same where the attraction jumps
+   real(dp), parameter :: least_stiffness = 0.25_dp   !! of the form s.B_h s, that is left by the attraction
+
+contains
+
+   !> The step from the gap that is at hand, measured, towards a minimum of the model: in work%direction and
+   !> now%lift. After steps that failed it is shorter.
+   subroutine approach_minimum(work, now)
+      type(adhesion_work_type), intent(inout) :: work
+      type(adhesion_iteration_type), intent(inout) :: now
+      type(adhesion_iteration_type) :: inner
+      real(dp) :: share
+      integer :: j, k, most
+
+      inner = now
+      inner%state => work%model_state
+      inner%traction => work%model_traction
+      !$omp parallel do default(none) shared(work, now, inner) private(j) num_threads(work%patch%threads)
+      do j = 1, work%patch%all_rows
+         inner%state(:, j) = now%state(:, j)
+         inner%traction(:, j) = now%traction(:, j)
+         work%direction(:, j) = 0.0_dp
+      end do
+      inner%old_rz = 0.0_dp
+      inner%lift = 0.0_dp
+      most = max(1, most_iterations/4**now%failures)
+      share = longest/4**now%failures
+      ! A jump of the attraction would hold every cell that comes to it in a small step.
+      if (.not. has_smooth_potential(now%problem%potential)) share = boldest/4**now%failures
+      do k = 1, most
+         if (k > 1) call measure(work, inner)
+         if (k > 1 .and. inner%residual <= goal*now%residual) exit
+         call find_direction(work, inner)
+         if (.not. inner%slope > 0.0_dp) exit
+         call descend(work, inner, share)
+      end do
+      !$omp parallel do default(none) shared(work, now, inner) private(j) num_threads(work%patch%threads)
+      do j = 1, work%patch%all_rows
+         work%direction(:, j) = inner%state(:, j) - now%state(:, j)
+      end do
+      now%lift = inner%level - now%level
+   end subroutine approach_minimum
+
+   !> An iteration in the model: along the direction by the length that its curvature predicts.
+   subroutine descend(work, inner, share)
+      type(adhesion_work_type), intent(inout) :: work
+      type(adhesion_iteration_type), intent(inout) :: inner
+      real(dp), intent(in) :: share                    !! by which g + z_0 may change
+      real(dp) :: alpha, curvature, form, farthest, shift, stiffness
+      logical :: clipped
+
+      call form_change(work, inner, curvature, farthest)
+      call form_product(work, form)
+      form = inner%problem%modulus*form
+      stiffness = max(form + curvature, least_stiffness*form)
+      alpha = share*farthest
+      if (stiffness*alpha > inner%slope) alpha = inner%slope/stiffness
+      shift = 0.0_dp
+      associate (patch => work%patch)
+         if (patch%periodic .and. inner%problem%control == control_approach) shift = sum_shift( &
+            inner%state, work%direction, alpha, inner%gap_sum, patch%threads)
+      end associate
+      call move(work, inner, alpha, shift, clipped)
+      inner%level = inner%level + alpha*inner%lift
+      ! Gaps that closed on the way: the traction needs a product of the step that was really made.
+      if (clipped) call form_product(work, form)
+      call add_product(work, inner, merge(1.0_dp, alpha, clipped))
+   end subroutine descend
+
+   !> The change of the displacement along d; d.e'' d, and the length at which a gap plus z_0 would be gone.
+   subroutine form_change(work, inner, curvature, farthest)
+      type(adhesion_work_type), intent(inout) :: work
+      type(adhesion_iteration_type), intent(in) :: inner
+      real(dp), intent(out) :: curvature, farthest
+      real(dp), allocatable :: rows(:, :), least(:)
+      real(dp) :: d, sums(1), slowest, total
+      integer :: i, j, n
+
+      allocate (rows(1, work%patch%all_rows), least(work%patch%all_rows))
+      !$omp parallel do default(none) shared(work, inner, rows, least) private(d, i, j, n, slowest, total) &
+      !$omp num_threads(work%patch%threads)
+      do j = 1, work%patch%all_rows
+         n = work%patch%inner(j)
+         total = 0.0_dp
+         slowest = huge(1.0_dp)
+         do i = 1, n
+            d = work%direction(i, j)
+            work%change(i, j) = d + inner%lift
+            if (.not. abs(d) > 0.0_dp) cycle
+            total = total + d**2*work%curvature(i, j)
+            slowest = min(slowest, (inner%state(i, j) + inner%units%length)/abs(d))
+         end do
+         rows(1, j) = total
+         least(j) = slowest
+         work%change(n + 1:work%patch%mx, j) = work%direction(n + 1:, j)
+         call work%model%put_row(j, work%change(:, j))
+      end do
+      sums = work%patch%sharing%totals(rows)
+      curvature = sums(1)
+      farthest = least_of_rows(least)
+   end subroutine form_change
+
+   !> B_h of the change of the displacement, whose rows have been put, and the form.
+   subroutine form_product(work, form)
+      type(adhesion_work_type), intent(inout) :: work
+      real(dp), intent(out) :: form
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: sums(1)
+      integer :: j
+
+      call work%model%halo%fetch(work%change)
+      call work%model%transform_product()
+      allocate (rows(1, work%patch%all_rows))
+      !$omp parallel do default(none) shared(work, rows) private(j) num_threads(work%patch%threads)
+      do j = 1, work%patch%all_rows
+         call work%model%product_row(j, work%change, work%image(:, j))
+         rows(1, j) = sum(work%change(:, j)*work%image(:, j))
+      end do
+      sums = work%patch%sharing%totals(rows)
+      form = sums(1)
+   end subroutine form_product
+
+   !> g = g + alpha d, closed where it would be negative; and the change of the displacement.
+   subroutine move(work, inner, alpha, shift, clipped)
+      type(adhesion_work_type), intent(inout) :: work
+      type(adhesion_iteration_type), intent(inout) :: inner
+      real(dp), intent(in) :: alpha, shift
+      logical, intent(out) :: clipped                  !! the change is not alpha times that of before
+      real(dp) :: next, old, trial
+      integer :: i, j, n
+      logical :: any_clipped
+
+      any_clipped = .false.
+      !$omp parallel do default(none) shared(work, inner, alpha, shift) private(i, j, n, next, old, trial) &
+      !$omp reduction(.or.: any_clipped) num_threads(work%patch%threads)
+      do j = 1, work%patch%all_rows
+         n = work%patch%inner(j)
+         do i = 1, n
+            old = inner%state(i, j)
+            trial = old + alpha*work%direction(i, j)
+            next = max(trial - shift, 0.0_dp)
+            if (.not. trial > 0.0_dp) next = 0.0_dp
+            any_clipped = any_clipped .or. next > trial - shift
+            work%change(i, j) = next - old + alpha*inner%lift
+            inner%state(i, j) = next
+         end do
+         do i = n + 1, work%patch%mx
+            work%change(i, j) = alpha*work%direction(i, j)
+            inner%state(i, j) = inner%state(i, j) + work%change(i, j)
+         end do
+         call work%model%put_row(j, work%change(:, j))
+      end do
+      clipped = any_process(any_clipped)
+   end subroutine move
+
+   !> Add a multiple of the product to the traction of the model.
+   subroutine add_product(work, inner, part)
+      type(adhesion_work_type), intent(in) :: work
+      type(adhesion_iteration_type), intent(inout) :: inner
+      real(dp), intent(in) :: part
+      integer :: j
+
+      !$omp parallel do default(none) shared(work, inner, part) private(j) num_threads(work%patch%threads)
+      do j = 1, work%patch%all_rows
+         inner%traction(:, j) = inner%traction(:, j) + part*inner%problem%modulus*work%image(:, j)
+      end do
+   end subroutine add_product
+
+end module adhesion_descent

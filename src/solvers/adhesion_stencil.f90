@@ -1,0 +1,124 @@
+!> A stencil of 5 x 5 cells that fits the stiffness B of an adhesive contact at short waves.
+!>
+!> Its symbol is sum_ab weight(a, b) cos(a kx) cos(b ky) with a, b = 0 to 2 and wave numbers per cell. The
+!> weights make the sum of (symbol/B - 1)^2/k least over the wave vectors that are longer than `band`: any
+!> solid and any shape of cells gets a stencil of its own. For a half-space with square cells the symbol is
+!> between 0.8 and 1.3 times B (0.75 and 1.6 where cells are twice as long as wide).
+module adhesion_stencil
+   use adhesion_symbols, only : adhesion_symbols_type
+   use asperity_parallel, only : global_sum
+   use asperity_precision, only : dp, pi
+   use dense_factors, only : factor, solve_factors
+   implicit none
+   private
+
+   public :: add_stencil, band, fit_stencil, reach, stencil_symbol
+
+   integer, parameter :: reach = 2                      !! cells on each side
+   integer, parameter :: terms = (reach + 1)**2
+   integer, parameter :: samples = 128                  !! wave numbers that are looked at, in each direction
+   real(dp), parameter :: band = pi/16.0_dp             !! least wave number per cell that is fitted
+   real(dp), parameter :: ridge = 1e-10_dp              !! for grids with fewer waves than weights
+
+contains
+
+   !> The weights of the stencil for a grid of mx by my cells, from the symbols at hand. Collective.
+   subroutine fit_stencil(symbols, modes, mx, my, weights)
+      type(adhesion_symbols_type), intent(in) :: symbols
+      integer, intent(in) :: modes(2)                   !! wave numbers along x of this process: first, last
+      integer, intent(in) :: mx, my
+      real(dp), intent(out) :: weights(0:reach, 0:reach)
+      real(dp), allocatable :: sums(:)
+      real(dp) :: matrix(terms, terms), right(terms), column(terms*(terms + 1)), term(terms), kx, ky
+      integer :: i, j, k, size_of_sums
+
+      ! Sums of each wave number along x by one process, which all then add up in the same order.
+      size_of_sums = size(column)*(mx/2 + 1)
+      allocate (sums(size_of_sums), source=0.0_dp)
+      do i = modes(1), modes(2)
+         if (modulo(i, max(1, mx/samples)) /= 0) cycle
+         column(:) = 0.0_dp
+         do j = 0, my/2, max(1, my/samples)
+            kx = 2.0_dp*pi*i/mx
+            ky = 2.0_dp*pi*j/my
+            if (hypot(kx, ky) < band) cycle
+            term(:) = reshape(waves(kx, ky, mx, my), [terms])/symbols%stiffness(i, j)
+            do k = 1, terms
+               column(terms*(k - 1) + 1:terms*k) = column(terms*(k - 1) + 1:terms*k) &
+                  + term*term(k)/hypot(kx, ky)
+            end do
+            column(terms**2 + 1:) = column(terms**2 + 1:) + term/hypot(kx, ky)
+         end do
+         sums(size(column)*i + 1:size(column)*(i + 1)) = column
+      end do
+      sums(:) = global_sum(sums)
+      column(:) = sum(reshape(sums, [size(column), mx/2 + 1]), dim=2)
+      matrix(:, :) = reshape(column(:terms**2), [terms, terms])
+      right(:) = column(terms**2 + 1:)
+      do k = 1, terms
+         matrix(k, k) = matrix(k, k) + ridge*matrix(1, 1) + tiny(1.0_dp)
+      end do
+      call factor(matrix, 1)
+      call solve_factors(matrix, right)
+      weights(:, :) = reshape(right, [reach + 1, reach + 1])
+   end subroutine fit_stencil
+
+   !> cos(a kx) cos(b ky); 0 along a side of a single cell, for a > 0 or b > 0.
+   pure function waves(kx, ky, mx, my) result(values)
+      real(dp), intent(in) :: kx, ky
+      integer, intent(in) :: mx, my
+      real(dp) :: values(0:reach, 0:reach)
+      integer :: a, b
+
+      do b = 0, reach
+         do a = 0, reach
+            values(a, b) = cos(a*kx)*cos(b*ky)
+            if ((mx == 1 .and. a > 0) .or. (my == 1 .and. b > 0)) values(a, b) = 0.0_dp
+         end do
+      end do
+   end function waves
+
+   !> Symbol of a stencil at wave numbers per cell.
+   pure function stencil_symbol(weights, kx, ky) result(value)
+      real(dp), intent(in) :: weights(0:reach, 0:reach)
+      real(dp), intent(in) :: kx, ky
+      real(dp) :: value
+      integer :: a, b
+
+      value = 0.0_dp
+      do b = 0, reach
+         do a = 0, reach
+            value = value + weights(a, b)*cos(a*kx)*cos(b*ky)
+         end do
+      end do
+   end function stencil_symbol
+
+   !> Add to a row the stencil's product, from the rows around it on a periodic grid.
+   pure subroutine add_stencil(weights, below2, below1, row, above1, above2, product)
+      real(dp), intent(in) :: weights(0:reach, 0:reach)
+      real(dp), intent(in), contiguous :: below2(:), below1(:), row(:), above1(:), above2(:)
+      real(dp), intent(inout), contiguous :: product(:)
+      real(dp) :: near(-1:size(row) + 2, 0:reach), w(0:reach, 0:reach)
+      integer :: i, n
+
+      n = size(row)
+      near(1:n, 0) = row
+      near(1:n, 1) = below1 + above1
+      near(1:n, 2) = below2 + above2
+      do i = 1, reach
+         near(1 - i, :) = near(modulo(-i, n) + 1, :)
+         near(n + i, :) = near(modulo(i - 1, n) + 1, :)
+      end do
+      ! A pair of cells at a distance shares the weight of its wave.
+      w(:, :) = weights
+      w(1:, :) = 0.5_dp*w(1:, :)
+      w(:, 1:) = 0.5_dp*w(:, 1:)
+      do i = 1, n
+         product(i) = product(i) + w(0, 0)*near(i, 0) + w(0, 1)*near(i, 1) + w(0, 2)*near(i, 2) &
+            + w(1, 0)*(near(i - 1, 0) + near(i + 1, 0)) + w(1, 1)*(near(i - 1, 1) + near(i + 1, 1)) &
+            + w(1, 2)*(near(i - 1, 2) + near(i + 1, 2)) + w(2, 0)*(near(i - 2, 0) + near(i + 2, 0)) &
+            + w(2, 1)*(near(i - 2, 1) + near(i + 2, 1)) + w(2, 2)*(near(i - 2, 2) + near(i + 2, 2))
+      end do
+   end subroutine add_stencil
+
+end module adhesion_stencil

@@ -1,0 +1,189 @@
+!> The numbers per block of module schur_preconditioner, and what its conjugate gradients do with them.
+!>
+!> Coarse parts of the image b, of the search direction d and of the response e are constant in a block.
+!> So what they add to the sums over the cells of N follows from a few sums per block, without a pass over
+!> the cells:
+!>     b = image + pending,   e = K d + addition,   d = correction - om b + beta d_old.
+!>
+!> Arrays hold the rows of blocks of the coarse level that this process holds. Products over all blocks are
+!> summed row by row.
+module schur_blocks
+   use asperity_errors, only : error_type
+   use asperity_precision, only : dp
+   use coarse_level, only : coarse_level_type
+   use regular_grid, only : grid_type
+   use schur_coarse, only : new_schur_coarse, om, schur_coarse_type
+   implicit none
+   private
+
+   public :: new_schur_blocks, schur_blocks_type
+
+   integer, parameter :: small = 16384         !! blocks below which one thread is faster
+
+   !> The numbers per block. Not to be copied.
+   type :: schur_blocks_type
+      type(schur_coarse_type), private :: model
+      integer, private :: threads = 1
+      real(dp), allocatable :: pending(:, :)      !! coarse part to be added to b, (nx, held rows of blocks)
+      real(dp), allocatable :: correction(:, :)   !! coarse part of W applied to -b
+      real(dp), allocatable, private :: addition(:, :)   !! coarse part of B d
+      ! Sums over the cells of N in each block:
+      real(dp), allocatable :: cells_off(:, :)      !! 1
+      real(dp), allocatable :: image_off(:, :)      !! b
+      real(dp), allocatable :: response_off(:, :)   !! K d
+      real(dp), allocatable, private :: search_off(:, :)   !! d
+   contains
+      procedure :: image_parts
+      procedure :: start
+      procedure :: weigh
+      procedure :: turn
+      procedure :: response_parts
+      procedure :: advance
+      procedure :: transforms
+      procedure :: destroy
+   end type schur_blocks_type
+
+contains
+
+   !> Make them for the coarse level of a grid. Collective where processes share the rows.
+   subroutine new_schur_blocks(self, grid, coarse, c0, threads, error)
+      type(schur_blocks_type), intent(out) :: self
+      type(grid_type), intent(in) :: grid
+      type(coarse_level_type), intent(in) :: coarse
+      real(dp), intent(in) :: c0                         !! of the stencil
+      integer, intent(in) :: threads
+      type(error_type), allocatable, intent(out) :: error
+
+      self%threads = merge(1, threads, real(coarse%nx, dp)*coarse%ny < small)
+      associate (nx => coarse%nx, first => coarse%held(1), last => coarse%held(2))
+         allocate (self%pending(nx, first:last), self%correction(nx, first:last), source=0.0_dp)
+         allocate (self%addition(nx, first:last), self%cells_off(nx, first:last), source=0.0_dp)
+         allocate (self%image_off(nx, first:last), self%response_off(nx, first:last), source=0.0_dp)
+         allocate (self%search_off(nx, first:last), source=0.0_dp)
+      end associate
+      call new_schur_coarse(self%model, grid, c0, coarse%h, coarse%nx, coarse%sharing, threads, error)
+   end subroutine new_schur_blocks
+
+   !> The coarse part of the image of the residual, and what it adds to the sums. Collective.
+   subroutine image_parts(self, coarse, form, square)
+      class(schur_blocks_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      real(dp), intent(out) :: form                      !! to r.B r
+      real(dp), intent(out) :: square                    !! to b^2 on N
+      real(dp) :: rows(2, coarse%held(1):coarse%held(2)), totals(2)
+      integer :: j
+
+      call self%model%add_missing(coarse%cells, coarse%mean, self%pending)
+      !$omp parallel do default(none) shared(self, coarse, rows) private(j) num_threads(self%threads)
+      do j = coarse%held(1), coarse%held(2)
+         rows(1, j) = sum(coarse%mean(:, j)*self%pending(:, j))
+         rows(2, j) = sum(self%pending(:, j)*(2.0_dp*self%image_off(:, j) &
+            + self%pending(:, j)*self%cells_off(:, j)))
+      end do
+      totals = coarse%block_totals(rows)
+      form = coarse%cells*totals(1)
+      square = totals(2)
+   end subroutine image_parts
+
+   !> Begin the conjugate gradients. Collective.
+   subroutine start(self, coarse)
+      class(schur_blocks_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      integer :: j
+
+      !$omp parallel do default(none) shared(self, coarse) private(j) num_threads(self%threads)
+      do j = coarse%held(1), coarse%held(2)
+         self%image_off(:, j) = self%image_off(:, j) + self%pending(:, j)*self%cells_off(:, j)
+         self%search_off(:, j) = 0.0_dp
+      end do
+      call self%model%set_weights(self%cells_off)
+   end subroutine start
+
+   !> The coarse part of W applied to -b. Collective.
+   subroutine weigh(self, coarse, product)
+      class(schur_blocks_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      real(dp), intent(out) :: product                   !! -b.(coarse part) on N
+      real(dp) :: rows(1, coarse%held(1):coarse%held(2)), totals(1)
+      integer :: j
+
+      call self%model%weigh(-1.0_dp, self%image_off, self%correction)
+      !$omp parallel do default(none) shared(self, coarse, rows) private(j) num_threads(self%threads)
+      do j = coarse%held(1), coarse%held(2)
+         rows(1, j) = sum(self%image_off(:, j)*self%correction(:, j))
+      end do
+      totals = coarse%block_totals(rows)
+      product = -totals(1)
+   end subroutine weigh
+
+   !> The next search direction and the coarse part of its response. Collective.
+   subroutine turn(self, coarse, beta)
+      class(schur_blocks_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      real(dp), intent(in) :: beta                       !! multiple of the old direction
+      integer :: j
+
+      !$omp parallel do default(none) shared(self, coarse, beta) private(j) num_threads(self%threads)
+      do j = coarse%held(1), coarse%held(2)
+         self%search_off(:, j) = self%correction(:, j)*self%cells_off(:, j) - om*self%image_off(:, j) &
+            + beta*self%search_off(:, j)
+      end do
+      call self%model%add_missing(1.0_dp, self%search_off, self%addition)
+   end subroutine turn
+
+   !> What the coarse part of the response adds to the sums; the step before is part of b from here on.
+   !> Collective.
+   subroutine response_parts(self, coarse, form, cross, square)
+      class(schur_blocks_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      real(dp), intent(out) :: form                      !! to d.e
+      real(dp), intent(out) :: cross                     !! to b.e on N
+      real(dp), intent(out) :: square                    !! to e^2 on N
+      real(dp) :: rows(3, coarse%held(1):coarse%held(2)), totals(3)
+      integer :: j
+
+      !$omp parallel do default(none) shared(self, coarse, rows) private(j) num_threads(self%threads)
+      do j = coarse%held(1), coarse%held(2)
+         self%pending(:, j) = 0.0_dp
+         rows(1, j) = sum(self%search_off(:, j)*self%addition(:, j))
+         rows(2, j) = sum(self%addition(:, j)*self%image_off(:, j))
+         rows(3, j) = sum(self%addition(:, j)*(2.0_dp*self%response_off(:, j) &
+            + self%addition(:, j)*self%cells_off(:, j)))
+      end do
+      totals = coarse%block_totals(rows)
+      form = totals(1)
+      cross = totals(2)
+      square = totals(3)
+   end subroutine response_parts
+
+   !> Take a step along the direction.
+   subroutine advance(self, coarse, length)
+      class(schur_blocks_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      real(dp), intent(in) :: length
+      integer :: j
+
+      !$omp parallel do default(none) shared(self, coarse, length) private(j) num_threads(self%threads)
+      do j = coarse%held(1), coarse%held(2)
+         self%image_off(:, j) = self%image_off(:, j) + length*(self%response_off(:, j) &
+            + self%addition(:, j)*self%cells_off(:, j))
+         self%pending(:, j) = length*self%addition(:, j)
+      end do
+   end subroutine advance
+
+   !> Transforms done so far, counted as those of the whole grid.
+   pure function transforms(self) result(count)
+      class(schur_blocks_type), intent(in) :: self
+      real(dp) :: count
+
+      count = self%model%transforms()
+   end function transforms
+
+   !> Free plans and memory.
+   subroutine destroy(self)
+      class(schur_blocks_type), intent(inout) :: self
+
+      call self%model%destroy()
+   end subroutine destroy
+
+end module schur_blocks

@@ -1,0 +1,238 @@
+"""Show that unsettled steps with constant shear have no solution, with dense matrices.
+
+The random cases are those of coupled_campaign.py; those with the law `constant_shear` are run by
+the program. Where the passes of a step do not settle, this tool solves the same step by itself. It
+shares nothing with the solver: the kernels, the spline of the road, the arms, the mass and the law
+are written again, and Newton's method with dense matrices takes all cells together. It starts from
+the first row, so it also solves all steps before; the column "before" has the largest difference
+from the program in any of those rows: the mean over all cells of the differences of pressures and
+tractions, relative to the mean pressure. Each row begins with the past of the program.
+
+The step is solved from the state that the program left it in or, if Newton's method fails there,
+from the row before, or by way of a bound that grows with a little pressure, less and less. With
+--thorough all these ways are gone (which takes several times as long): the column "partial" then
+has a number for each solution that differs from those before, and the trees count together.
+
+The plain law allows a cell two states: in contact (no gap, a pressure P >= 0, the whole strength)
+or open (a gap >= 0, no traction). The law that is solved here allows a third one between them: no
+gap, no pressure, and a part of the strength between 0 and 1. Every solution of the plain law also
+solves this one, in which no cell is partly sheared. Where cells are partly sheared, the tool looks
+for a plain solution: it forces such a cell open or into contact, solves the rest again under the
+law with three states, and goes on with the next cell that is partly sheared, until none is left
+(columns "states": ends of this tree, and "broken": those in which a forced cell overlaps with the
+road or is pulled). If the tree has too many branches, a branch also ends where a forced cell
+already breaks its condition ("cut").
+
+The last column is the test for one solution only: with the other cells as they are, linearised,
+the law with three states has exactly one solution if the determinants of all matrices that have,
+for each partly sheared cell, the column of one of its three states are positive (all for 7 cells or
+fewer, else 3000 random ones). Then the solution with partly sheared cells is the only one there,
+and the plain law has none there.
+
+usage: python tools/constant_shear.py [--count 500] [--seed 7741] [--only SEED] [--thorough]
+       [--program asperity]
+"""
+
+import argparse
+import itertools
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from coupled_campaign import make_case
+from dense_case import Case
+from dense_step import DenseStep
+
+ACCURATE = 1e-8          # of a residual
+LEAVES, SECONDS = 140, 40.0
+
+
+def fields(snapshot: h5py.Group) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return pressure, traction and gap of a snapshot, a value per cell; contact has no gap."""
+    p, x, y, gap, contact = (snapshot[name][:].ravel() for name in (
+        "pressure", "traction_x", "traction_y", "gap", "contact"))
+    return p, np.array([x, y]), np.where(contact > 0, 0.0, np.maximum(gap, 1e-30))
+
+
+def run_case(seed: int, folder: Path, program: str) -> tuple[str, int]:
+    """Run a case of the campaign with a snapshot of each row; return its text and status."""
+    text, about = make_case(seed, folder)
+    if about["law"] != "constant_shear":
+        return text, -1
+    text = text.replace("file = 'out.h5'", "file = 'out.h5', snapshot_every = 1")
+    (folder / "case.nml").write_text(text)
+    done = subprocess.run([program, "run", "case.nml", "--quiet"], cwd=folder,
+                          capture_output=True, check=False)
+    return text, done.returncode
+
+
+def run_starts(text: str, folder: Path, program: str) -> None:
+    """Run the first step in quarters: starts for its parts, if the rubber has arms."""
+    phase = re.search(r"duration = (\S+), steps = (\d+)", text)
+    text = text.replace(phase[0], f"duration = {float(phase[1]) / int(phase[2])!r}, steps = 4")
+    text = re.sub(r"&phase [^/]*ramp[^/]*/\n", "", text).replace("out.h5", "start.h5")
+    text = text.replace(
+        "threads = 1,", "threads = 1, time_scheme = 'exponential', coupling_tolerance = 1e9,")
+    (folder / "start.nml").write_text(text)
+    subprocess.run([program, "run", "start.nml", "--quiet"], cwd=folder, capture_output=True,
+                   check=False)
+
+
+def replay(folder: Path, text: str) -> dict[str, Any]:
+    """Solve all steps of a run but the last one, and begin that."""
+    with h5py.File(folder / "road.h5") as file:
+        case = Case(text, file["surface"][:])
+    with h5py.File(folder / "out.h5") as file:
+        history = {name: file["history"][name][:] for name in (
+            "step", "time", "road_x", "road_y", "pressure")}
+        states = [fields(file[f"snapshots/{step:06d}"]) for step in history["step"]]
+    whole = case.first_step_length
+    road = np.array([history["road_x"], history["road_y"]])
+    case.rest(states[0][0], history["pressure"][0])
+    now, worst = states[0], 0.0
+    for k in range(1, len(states)):
+        dt, way = history["time"][k] - history["time"][k - 1], road[:, k] - road[:, k - 1]
+        parts = [(dt, way)]
+        if case.starts(dt):
+            done = dt / whole
+            parts = [(whole * (b - a), way / done * (b - a))
+                     for a, b in ((0.0, 0.25), (0.25, 0.5), (0.5, 1.0)) if b <= done + 1e-6]
+        for i, (length, motion) in enumerate(parts):
+            case.begin(length, motion, history["pressure"][k])
+            step = DenseStep(case)
+            guesses = [states[k], now]
+            if k == 1 and case.starts(dt):
+                with h5py.File(folder / "start.h5") as file:
+                    guesses.insert(0, fields(file[f"snapshots/{(1, 2, 4)[i]:06d}"]))
+            last = i == len(parts) - 1
+            if last and k == len(states) - 1:
+                return {"step": step, "guesses": guesses, "before": worst, "row": k, "part": i + 1}
+            found, left = step.solve(guesses)
+            pressure, traction, gap = step.fields(found)
+            error = sum(np.abs(a - b).sum() for a, b in (
+                (pressure, states[k][0]), (traction, states[k][1]))) / np.abs(states[k][0]).sum()
+            if left > ACCURATE:
+                raise ArithmeticError(f"row {k}, part {i + 1}: residual {left:.1e}")
+            if last:                             # the past is that of the program
+                worst = max(worst, error)
+                pressure, traction, gap = states[k]
+            case.commit(pressure, traction)
+            now = (pressure, traction, np.maximum(gap, 0.0))
+    raise ValueError("a run of one row has no step")
+
+
+def look_for_plain(step: DenseStep, found: tuple, cut: bool) -> dict[str, Any]:
+    """Look for a solution without partly sheared cells by forcing them, one after the other."""
+    start = time.monotonic()
+    count = {"solved": 0, "states": 0, "broken": 0, "cut": 0, "failed": 0, "complete": True,
+             "plain": False}
+    stack = [({}, found)]
+    while stack:
+        if count["solved"] >= LEAVES or time.monotonic() - start > SECONDS:
+            count["complete"] = False
+            break
+        forced, guess = stack.pop()
+        step.force(forced)
+        state, left = step.follow(guess)
+        count["solved"] += 1
+        broken, partial = step.broken(state), step.partial(state)
+        step.force({})
+        if left > ACCURATE:
+            count["failed"] += 1
+        elif partial.size == 0 or (cut and broken.size > 0):
+            count["states"] += partial.size == 0
+            count["broken"] += broken.size > 0 and partial.size == 0
+            count["cut"] += partial.size > 0
+            if broken.size == 0:
+                count["plain"] = True
+                return count
+        else:
+            share = step.shares(state)[partial]
+            cell = int(partial[np.argmax(np.abs(share - 0.5))])
+            likely = "contact" if step.shares(state)[cell] > 0.5 else "open"
+            other = "open" if likely == "contact" else "contact"
+            stack += [({**forced, cell: other}, state), ({**forced, cell: likely}, state)]
+    return count
+
+
+def unique(step: DenseStep, found: tuple) -> float:
+    """Return the part of the mixed determinants of the partly sheared cells that is positive."""
+    if step.partial(found).size == 0:
+        return 1.0
+    columns = step.reduced(found)
+    cells = columns.shape[1]
+    if cells <= 7:
+        modes = np.array(list(itertools.product(range(3), repeat=cells)))
+    else:
+        modes = np.random.default_rng(0).integers(0, 3, (3000, cells))
+    signs = [np.linalg.slogdet(columns[m, :, np.arange(cells)])[0] for m in modes]
+    return float(np.mean(np.array(signs) > 0))
+
+
+def examine(seed: int, program: str, thorough: bool = False) -> str:
+    """Return the line of the table of a case, or nothing if its passes settle."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        text, status = run_case(seed, folder, program)
+        if status in (-1, 0):
+            return ""
+        if "prony" in text:
+            run_starts(text, folder, program)
+        start = time.monotonic()
+        try:
+            end = replay(folder, text)
+        except ArithmeticError as error:
+            return f"| {seed} | {error} |"
+    step = end["step"]
+    solutions = step.solve_all(end["guesses"]) if thorough else [step.solve(end["guesses"])]
+    solutions = [one for one in solutions if one[1] < ACCURATE]
+    line = f"| {seed} | {end['row']}.{end['part']} | {end['before']:.0e} |"
+    if not solutions:
+        return f"{line} not solved |"
+    trees, complete, plain = [], True, False
+    for found, _ in solutions:
+        tree = look_for_plain(step, found, cut=False)
+        if not (tree["complete"] or tree["plain"]):
+            tree = look_for_plain(step, found, cut=True)
+        complete, plain = complete and tree["complete"], plain or tree["plain"]
+        trees.append(tree)
+    found, left = solutions[0]
+    partial, shares = step.partial(found), step.shares(found)
+    counts = " | ".join(str(sum(tree[name] for tree in trees)) for name in (
+        "states", "broken", "cut", "failed"))
+    sizes = ", ".join(str(step.partial(one).size) for one, _ in solutions)
+    span = f"{shares[partial].min():.3f} to {shares[partial].max():.3f}" if partial.size else ""
+    signs = min(unique(step, one) for one, _ in solutions)
+    verdict = "found" if plain else "none" if complete else "open"
+    return (f"{line} {left:.0e} | {int((shares == 1).sum())} | {sizes} | {span} | {verdict} "
+            f"| {counts} | {100 * signs:.0f} % | {time.monotonic() - start:.0f} s |")
+
+
+def main() -> int:
+    """Examine the unsettled cases of the campaign and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
+    parser.add_argument("--count", type=int, default=500)
+    parser.add_argument("--seed", type=int, default=7741)
+    parser.add_argument("--program", default="asperity")
+    parser.add_argument("--only", type=int, help="examine the case of one seed")
+    parser.add_argument("--thorough", action="store_true", help="start in all ways")
+    given = parser.parse_args()
+    seeds = [given.only] if given.only is not None else [
+        given.seed * 100000 + k for k in range(given.count)]
+    print("| case | row.part | before | residual | contact | partial | shares | plain solution "
+          "| states | broken | cut | failed | unique | time |\n" + 14 * "| --- " + "|")
+    for seed in seeds:
+        line = examine(seed, given.program, given.thorough)
+        if line:
+            print(line, flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
