@@ -55,7 +55,7 @@ module friction_cg_fast
    use asperity_precision, only : dp, pi
    use fft_conv, only : columns_apply, columns_form, convolution_type, new_inverse_convolution
    use friction_cg_gradient, only : friction_gradient_type
-   use friction_directions, only : scaled_row, total_of, turn_sums_type, turned_row, uniform_type, &
+   use friction_directions, only : divided_row, scaled_row, total_of, turn_sums_type, turned_row, uniform_type, &
       unscaled_row, z_sums_type
    use friction_method, only : friction_goal_type, friction_method_type
    use friction_moves, only : move, move_total, pseudo_inverse
@@ -74,6 +74,8 @@ module friction_cg_fast
    real(dp), parameter :: overshoot = 0.5_dp, overshoot_near = 2.0_dp
    integer, parameter :: near_steps = 15
    integer, parameter :: gradient_steps = 100    !! of the fallback at a time
+   !> Where all points slip and their mean w is below it, M is left out: it costs transforms and changes little.
+   real(dp), parameter :: light = 0.1_dp
 
    !> The method with its preconditioner and work fields.
    type, extends(friction_method_type) :: friction_fast_type
@@ -270,12 +272,58 @@ contains
       type(z_sums_type), allocatable :: rows(:)
       type(z_sums_type) :: sums
       real(dp) :: inverse(2, 2), coupling(2, 2)
-      integer :: j
 
       allocate (rows(problem%rows))
       call mean_mode(problem, inverse, coupling)
       uniform%traction = matmul(inverse, problem%sums%residual)
       uniform%displacement = matmul(coupling, uniform%traction)
+      if (bounds_outweigh(problem)) then
+         call divide_rows(self, problem, uniform, rows)
+      else
+         call precondition_rows(self, problem, uniform, rows)
+      end if
+      sums = total_of(rows)
+      now%cross = 0.0_dp
+      if (.not. now%restart) now%cross = sums%cross
+      now%shift = uniform%traction &
+         - matmul(inverse, matmul(transpose(coupling), sums%total) + sums%bent)
+      now%gz = sums%gz + dot_product(problem%sums%residual, now%shift)
+   end subroutine precondition
+
+   !> Do all points slip, with bounds so curved that A hardly counts beside them? Then M is of no use.
+   pure function bounds_outweigh(problem) result(yes)
+      type(friction_problem_type), intent(in) :: problem
+      logical :: yes
+      real(dp) :: weights                          !! sum of w
+
+      weights = problem%sums%tangent(1) + problem%sums%tangent(3)
+      yes = problem%slipping == problem%cells .and. weights < light*problem%cells
+   end function bounds_outweigh
+
+   !> The rows of z without M.
+   subroutine divide_rows(self, problem, uniform, rows)
+      type(friction_fast_type), intent(inout) :: self
+      type(friction_problem_type), intent(in) :: problem
+      type(uniform_type), intent(in) :: uniform
+      type(z_sums_type), intent(out) :: rows(:)
+      integer :: j
+
+      !$omp parallel do default(none) shared(self, problem, uniform, rows) private(j) &
+      !$omp num_threads(problem%threads)
+      do j = 1, problem%rows
+         call divided_row(problem%compliance, uniform, problem%slip(:, :, j), &
+            problem%work%tangent(:, :, j), self%z(:, :, j), rows(j))
+      end do
+   end subroutine divide_rows
+
+   !> The rows of z with M.
+   subroutine precondition_rows(self, problem, uniform, rows)
+      type(friction_fast_type), intent(inout) :: self
+      type(friction_problem_type), intent(in) :: problem
+      type(uniform_type), intent(in) :: uniform
+      type(z_sums_type), intent(inout) :: rows(:)
+      integer :: j
+
       !$omp parallel do default(none) shared(self, problem, uniform, rows) private(j) &
       !$omp num_threads(problem%threads)
       do j = 1, problem%rows
@@ -287,13 +335,7 @@ contains
       do j = 1, problem%rows
          call unscale_row(self, problem, uniform, j, rows(j))
       end do
-      sums = total_of(rows)
-      now%cross = 0.0_dp
-      if (.not. now%restart) now%cross = sums%cross
-      now%shift = uniform%traction &
-         - matmul(inverse, matmul(transpose(coupling), sums%total) + sums%bent)
-      now%gz = sums%gz + dot_product(problem%sums%residual, now%shift)
-   end subroutine precondition
+   end subroutine precondition_rows
 
    !> K^-1 and (h/N) E; 0 where the mean mode is left alone.
    subroutine mean_mode(problem, inverse, coupling)
