@@ -12,7 +12,7 @@ module friction_directions
       z_sums_type
 
    !> The part of the mean mode that is treated apart from the preconditioner (module
-   !> `friction_cg_fast`): c, and what it displaces on average, (h/N) E c.
+   !> `friction_preconditioner`): c, and what it displaces on average, (h/N) E c.
    type :: uniform_type
       real(dp) :: traction(2) = 0.0_dp       !! c, Pa
       real(dp) :: displacement(2) = 0.0_dp   !! m

@@ -1,0 +1,233 @@
+!> The preconditioner of the tangential problem: from the slip that should vanish, the change of traction
+!> that would remove it if every point kept its state.
+!>
+!> With the names of module `friction_cg_fast`,
+!>
+!>     g = Z r                               the residual of module `friction_problem`
+!>     lam = curvature of the bound          about r.v/|v|^2, 0 where it sticks
+!>     w = a_0/(a_0 + lam)                   a_0: displacement of a cell under its own unit traction
+!>     z = Z [w M (w g) + (1-w)/(a_0+lam) g] M: inverse of the periodic 2 x 2 symbol
+!>
+!> Where all points slip far, lam is much larger than a_0 and w is small: what a cell displaces hardly
+!> counts beside the curvature of the bounds, and M less still, since it comes with the square of w. Then
+!> z = w/a_0 g, without transforms; the number of iterations stays the same.
+!>
+!> A thick block makes the mean mode h of a periodic operator (for G = 1) its largest by far. Every
+!> field that is zero outside the contact excites it. It is taken out of g and z by the two fields e = w
+!> Z of uniform traction: with E = sum of w Z, H = A + lam and A ~ h/N on the mean, H e = (h/N) E + lam
+!> w Z and K = e.H e = (h/N) E E + sum of lam w^2 Z,
+!>
+!>     c = K^-1 sum(w g)
+!>     Z (g - H e c) goes through the preconditioner to z0
+!>     z = z0 + e (c - K^-1 (H e).z0)
+!>
+!> The last term is left to the sweep that forms the next direction, which adds w Z `shift` to z.
+module friction_preconditioner
+   use asperity_errors, only : error_type
+   use asperity_precision, only : dp, pi
+   use fft_conv, only : columns_apply, convolution_type, new_inverse_convolution
+   use friction_directions, only : divided_row, scaled_row, total_of, uniform_type, unscaled_row, z_sums_type
+   use friction_moves, only : pseudo_inverse
+   use friction_problem, only : friction_problem_type
+   use kernels, only : kernel_type
+   use regular_grid, only : boundary_periodic, grid_type
+   implicit none
+   private
+
+   public :: friction_preconditioner_type, new_friction_preconditioner
+
+   real(dp), parameter :: light = 0.1_dp         !! mean w of points that all slip below which M is left out
+
+   !> The preconditioner, and what its last use found.
+   type :: friction_preconditioner_type
+      type(convolution_type), private :: inverse         !! M
+      real(dp), private :: half_wave = 0.0_dp            !! mean compliance where there is none, m
+      logical, private :: periodic = .true.
+      real(dp), allocatable :: z(:, :, :)                !! [nx, 2, rows]
+      real(dp) :: shift(2) = 0.0_dp                      !! w Z shift is still to be added to z
+      real(dp) :: gz = 0.0_dp                            !! g.z, with the shift
+      real(dp) :: cross = 0.0_dp                         !! g.z_old
+   contains
+      procedure :: set_mean_stiffness
+      procedure :: apply
+      procedure :: ffts
+      procedure :: destroy
+   end type friction_preconditioner_type
+
+contains
+
+   !> Make the preconditioner for a half-space.
+   subroutine new_friction_preconditioner(self, grid, kernel, error)
+      type(friction_preconditioner_type), intent(out) :: self
+      type(grid_type), intent(in) :: grid
+      type(kernel_type), intent(in) :: kernel        !! what the solid is, tangential
+      type(error_type), allocatable, intent(out) :: error
+      type(grid_type) :: periodic
+      type(kernel_type) :: block
+
+      self%periodic = grid%boundary == boundary_periodic
+      self%half_wave = max(grid%lx, grid%ly)/pi
+      periodic = grid
+      periodic%boundary = boundary_periodic
+      block = kernel
+      block%mean_mode = self%half_wave
+      call new_inverse_convolution(self%inverse, periodic, block, error)
+      if (allocated(error)) return
+      allocate (self%z(grid%nx, 2, grid%rows()), source=0.0_dp)
+   end subroutine new_friction_preconditioner
+
+   !> Let the mean mode of M be the inverse of the operator's.
+   subroutine set_mean_stiffness(self, operator)
+      class(friction_preconditioner_type), intent(inout) :: self
+      type(convolution_type), intent(in) :: operator
+      real(dp) :: mean
+
+      if (.not. self%periodic) return
+      mean = operator%mean_mode(1)*operator%grid%cells()
+      if (mean <= 0.0_dp) mean = self%half_wave
+      call self%inverse%set_mean_compliance(1.0_dp/mean)
+   end subroutine set_mean_stiffness
+
+   !> z from the residual, g.z and g.z_old.
+   subroutine apply(self, problem)
+      class(friction_preconditioner_type), intent(inout) :: self
+      type(friction_problem_type), intent(inout) :: problem
+      type(uniform_type) :: uniform
+      type(z_sums_type), allocatable :: rows(:)
+      type(z_sums_type) :: sums
+      real(dp) :: inverse(2, 2), coupling(2, 2)
+
+      allocate (rows(problem%rows))
+      call mean_mode(problem, inverse, coupling)
+      uniform%traction = matmul(inverse, problem%sums%residual)
+      uniform%displacement = matmul(coupling, uniform%traction)
+      if (bounds_outweigh(problem)) then
+         call divide_rows(self, problem, uniform, rows)
+      else
+         call precondition_rows(self, problem, uniform, rows)
+      end if
+      sums = total_of(rows)
+      self%cross = sums%cross
+      self%shift = uniform%traction &
+         - matmul(inverse, matmul(transpose(coupling), sums%total) + sums%bent)
+      self%gz = sums%gz + dot_product(problem%sums%residual, self%shift)
+   end subroutine apply
+
+   !> Do all points slip, with bounds so curved that A hardly counts beside them? Then M is of no use.
+   pure function bounds_outweigh(problem) result(yes)
+      type(friction_problem_type), intent(in) :: problem
+      logical :: yes
+      real(dp) :: weights                          !! sum of w
+
+      weights = problem%sums%tangent(1) + problem%sums%tangent(3)
+      yes = problem%slipping == problem%cells .and. weights < light*problem%cells
+   end function bounds_outweigh
+
+   !> The rows of z without M.
+   subroutine divide_rows(self, problem, uniform, rows)
+      type(friction_preconditioner_type), intent(inout) :: self
+      type(friction_problem_type), intent(in) :: problem
+      type(uniform_type), intent(in) :: uniform
+      type(z_sums_type), intent(out) :: rows(:)
+      integer :: j
+
+      !$omp parallel do default(none) shared(self, problem, uniform, rows) private(j) &
+      !$omp num_threads(problem%threads)
+      do j = 1, problem%rows
+         call divided_row(problem%compliance, uniform, problem%slip(:, :, j), &
+            problem%work%tangent(:, :, j), self%z(:, :, j), rows(j))
+      end do
+   end subroutine divide_rows
+
+   !> The rows of z with M.
+   subroutine precondition_rows(self, problem, uniform, rows)
+      type(friction_preconditioner_type), intent(inout) :: self
+      type(friction_problem_type), intent(in) :: problem
+      type(uniform_type), intent(in) :: uniform
+      type(z_sums_type), intent(inout) :: rows(:)
+      integer :: j
+
+      !$omp parallel do default(none) shared(self, problem, uniform, rows) private(j) &
+      !$omp num_threads(problem%threads)
+      do j = 1, problem%rows
+         call scale_row(self, problem, uniform, j, rows(j)%cross)
+      end do
+      call self%inverse%columns(columns_apply)
+      !$omp parallel do default(none) shared(self, problem, uniform, rows) private(j) &
+      !$omp num_threads(problem%threads)
+      do j = 1, problem%rows
+         call unscale_row(self, problem, uniform, j, rows(j))
+      end do
+   end subroutine precondition_rows
+
+   !> Transform a row of w Z (g - H e c).
+   subroutine scale_row(self, problem, uniform, j, cross)
+      type(friction_preconditioner_type), intent(inout) :: self
+      type(friction_problem_type), intent(in) :: problem
+      type(uniform_type), intent(in) :: uniform
+      integer, intent(in) :: j
+      real(dp), intent(out) :: cross               !! g.z_old
+      real(dp) :: g(problem%nx, 2)
+
+      call scaled_row(problem%compliance, uniform, problem%slip(:, :, j), &
+         problem%work%tangent(:, :, j), self%z(:, :, j), g, cross)
+      call self%inverse%forward_row(1, j, g(:, 1))
+      call self%inverse%forward_row(2, j, g(:, 2))
+   end subroutine scale_row
+
+   !> A row of z.
+   subroutine unscale_row(self, problem, uniform, j, sums)
+      type(friction_preconditioner_type), intent(inout) :: self
+      type(friction_problem_type), intent(in) :: problem
+      type(uniform_type), intent(in) :: uniform
+      integer, intent(in) :: j
+      type(z_sums_type), intent(inout) :: sums     !! comes with g.z_old
+
+      call self%inverse%backward_row(1, j, self%z(:, 1, j))
+      call self%inverse%backward_row(2, j, self%z(:, 2, j))
+      call unscaled_row(problem%compliance, uniform, problem%slip(:, :, j), &
+         problem%work%tangent(:, :, j), self%z(:, :, j), sums)
+   end subroutine unscale_row
+
+   !> K^-1 and (h/N) E; 0 where the mean mode is left alone.
+   subroutine mean_mode(problem, inverse, coupling)
+      type(friction_problem_type), intent(in) :: problem
+      real(dp), intent(out) :: inverse(2, 2)
+      real(dp), intent(out) :: coupling(2, 2)
+      real(dp) :: tangent(2, 2), k(2, 2)
+
+      inverse = 0.0_dp
+      coupling = 0.0_dp
+      if (.not. any(problem%mean_compliance > 0.0_dp)) return
+      tangent = matrix(problem%sums%tangent)
+      coupling(1, :) = problem%mean_compliance(1)*tangent(1, :)
+      coupling(2, :) = problem%mean_compliance(2)*tangent(2, :)
+      k = matmul(tangent, coupling) + matrix(problem%sums%curved)
+      inverse = pseudo_inverse([k(1, 1), 0.5_dp*(k(1, 2) + k(2, 1)), k(2, 2)], 1.0e-12_dp)
+   end subroutine mean_mode
+
+   !> The symmetric matrix of xx, xy, yy.
+   pure function matrix(elements)
+      real(dp), intent(in) :: elements(3)
+      real(dp) :: matrix(2, 2)
+
+      matrix = reshape([elements(1), elements(2), elements(2), elements(3)], [2, 2])
+   end function matrix
+
+   !> Transforms so far.
+   pure function ffts(self) result(count)
+      class(friction_preconditioner_type), intent(in) :: self
+      integer :: count
+
+      count = self%inverse%ffts
+   end function ffts
+
+   !> Free the plans and the field.
+   subroutine destroy(self)
+      class(friction_preconditioner_type), intent(inout) :: self
+
+      call self%inverse%destroy()
+      if (allocated(self%z)) deallocate (self%z)
+   end subroutine destroy
+
+end module friction_preconditioner
