@@ -22,6 +22,7 @@ module asperity
    use case_input, only : parse_case, read_case
    use case_run, only : run_type
    use case_settings, only : case_type
+   use contact_fields, only : contact_rows, field_rows
    use contact_solver, only : contact_solver_type
    use asperity_errors, only : error_convergence, error_file, error_input, error_type
    use fft_conv, only : convolution_type, new_convolution

@@ -9,6 +9,7 @@ module simulation_runs
    use asperity_precision, only : dp
    use asperity_schedule, only : count_rows
    use asperity_simulation, only : new_simulation, simulation_type
+   use contact_fields, only : field_rows
    implicit none
    private
 
@@ -70,7 +71,7 @@ contains
       record%pressure = sim%state%pressure
       record%gap = sim%state%gap
       allocate (record%displacement, mold=record%pressure)
-      call sim%field_rows('displacement_z', 1, record%displacement)
+      call field_rows(sim, 'displacement_z', 1, record%displacement)
       record%warnings = sim%warnings
       call sim%destroy()
    end subroutine run_case

@@ -746,7 +746,7 @@ contains
       self%drive_x = 0.1_dp
       call run_case(self, 'block', 1e-8_dp)
       call check_close(self%tx(3, 7), 0.1_dp/0.7_dp, 1e-8_dp, 'block: T = G DX/h')
-      call self%operator%set_mean_compliance(0.02_dp)
+      call self%operator%symbols%set_mean_compliance(0.02_dp)
       call run_case(self, 'block with inertia', 1e-8_dp)
       measured = sum(self%tx)/size(self%tx)
       call check_close(measured, 0.1_dp/0.02_dp, 1e-7_dp, 'mean compliance set by the caller')

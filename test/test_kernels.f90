@@ -155,11 +155,11 @@ contains
       none = 0.0_dp
       call new_convolution(operator, new_grid(6, 4, 1.0_dp, 1.0_dp, boundary_periodic), &
          tangential_half_space(0.4_dp, 0.25_dp), error)
-      call check_close(operator%mean_mode(1)*24.0_dp, 0.25_dp, 1e-16_dp, 'the thickness of the block')
-      call operator%set_mean_compliance(0.5_dp)
+      call check_close(operator%symbols%mean_mode(1)*24.0_dp, 0.25_dp, 1e-16_dp, 'the thickness of the block')
+      call operator%symbols%set_mean_compliance(0.5_dp)
       call operator%apply_vector(ones, none, ux, uy)
       call check_close(maxval(abs(ux - 0.5_dp)), 0.0_dp, 1e-15_dp, 'another mean compliance')
-      call operator%set_mean_mode(1, 0.0_dp)
+      call operator%symbols%set_mean_mode(1, 0.0_dp)
       call operator%apply_vector(ones, ones, ux, uy)
       call check_close(maxval(abs(ux)), 0.0_dp, 1e-15_dp, 'no mean mode along x')
       call check_close(maxval(abs(uy - 0.5_dp)), 0.0_dp, 1e-15_dp, 'the one along y stays')

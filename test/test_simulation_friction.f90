@@ -8,6 +8,7 @@ module test_simulation_friction
    use friction_bounds, only : largest_excess
    use asperity_precision, only : dp, int8
    use asperity_simulation, only : new_simulation, simulation_type
+   use contact_fields, only : contact_rows, field_rows
    use simulation_runs, only : check_books, check_same_rows, last, nl, record_type, run_case
    use text_tools, only : exact_text, to_text
    use stick_slip_watch, only : stick_slip_watch_type, watch_slip
@@ -179,10 +180,10 @@ contains
       do while (.not. sim%finished)
          call sim%advance(error)
          if (allocated(error)) exit
-         call sim%field_rows('pressure', 1, p)
-         call sim%field_rows('traction_x', 1, tx)
-         call sim%field_rows('traction_y', 1, ty)
-         call sim%contact_rows(1, contact)
+         call field_rows(sim, 'pressure', 1, p)
+         call field_rows(sim, 'traction_x', 1, tx)
+         call field_rows(sim, 'traction_y', 1, ty)
+         call contact_rows(sim, 1, contact)
          worst = max(worst, largest_excess(sim%tangential%law, p, none, none, contact, tx, ty) &
             /maxval(0.6_dp*p))
       end do
@@ -312,7 +313,7 @@ contains
             call sim%advance(error)
             call check_no_error(error, 'before motion: row')
             if (.not. allocated(contact)) allocate (contact(sim%grid%nx, sim%grid%ny))
-            call sim%contact_rows(1, contact)
+            call contact_rows(sim, 1, contact)
             call check_order(count(sim%state%pressure > 0.0_dp), '>', 100, 'before motion: contact')
             call check_that(all(contact == merge(state, 0, sim%state%pressure > 0.0_dp)), &
                'before motion: states')

@@ -252,7 +252,7 @@ contains
       if (columns /= operator%map%mx/2 + 1 .or. rows /= operator%map%my/2 + 1) then
          call fail(error, error_input, 'the symbol has another shape')
       else
-         values(:, :) = operator%map%symbol_of(int(part))/operator%modulus
+         values(:, :) = operator%map%symbols%part(int(part))/operator%modulus
       end if
       call report(error, status, message)
    end subroutine operator_symbol

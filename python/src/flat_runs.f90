@@ -12,6 +12,7 @@ module flat_runs
    use asperity_precision, only : dp, int8
    use asperity_signals, only : catch_stops, give_back_stops, stop_was_asked
    use asperity_simulation, only : simulation_type
+   use contact_fields, only : contact_rows, field_rows
    use case_files, only : overwritten_file
    use case_run, only : run_type
    use case_settings, only : case_type
@@ -211,10 +212,10 @@ contains
          values(:, :) = sim%height
       else if (name == 'contact') then
          allocate (states(nx, ny))
-         call sim%contact_rows(1, states)
+         call contact_rows(sim, 1, states)
          values(:, :) = real(states, dp)
       else
-         call sim%field_rows(name, 1, values)
+         call field_rows(sim, name, 1, values)
       end if
       call report(error, status, message)
    end subroutine run_field

@@ -1,5 +1,8 @@
 !> Errors as values: every procedure that can fail has a last argument
-!> `type(error_type), allocatable, intent(out) :: error`, left unallocated on success.
+!> `type(error_type), allocatable, intent(out) :: error`, left unallocated on success. Procedures that are
+!> called in sequence may declare it `intent(inout)`: they do nothing if it is already set, so that the
+!> caller looks at it once at the end. The two kinds do not mix in one sequence, because `intent(out)`
+!> clears an earlier error.
 module asperity_errors
    implicit none
    private

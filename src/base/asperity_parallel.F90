@@ -1,4 +1,5 @@
-!> Processes. This is the only module that calls MPI.
+!> Processes, and numbers that all of them need. Only this module and `process_exchange`, which moves parts of
+!> fields, call MPI.
 !>
 !> Built with the macro ASPERITY_MPI, the program runs as several processes, started by mpirun or srun,
 !> that share the rows of the grid (module `regular_grid`). Without the macro, and in a program that does not
@@ -13,20 +14,19 @@
 !> itself in the order of the rows (module `field_sums`).
 module asperity_parallel
 #ifdef ASPERITY_MPI
-   use mpi_f08, only : mpi_allgather, mpi_allgatherv, mpi_allreduce, mpi_alltoallv, mpi_bcast, &
-      mpi_character, mpi_comm, mpi_comm_free, mpi_comm_rank, mpi_comm_size, mpi_comm_split_type, &
-      mpi_comm_type_shared, mpi_comm_world, mpi_datatype, mpi_double_complex, mpi_double_precision, mpi_finalize, &
-      mpi_get_library_version, mpi_in_place, mpi_info_null, mpi_init_thread, mpi_integer, mpi_integer1, &
-      mpi_integer8, mpi_logical, mpi_lor, mpi_max, mpi_max_library_version_string, mpi_min, mpi_real, mpi_recv, &
-      mpi_send, mpi_status_ignore, mpi_sum, mpi_thread_serialized
+   use mpi_f08, only : mpi_allgather, mpi_allgatherv, mpi_allreduce, mpi_bcast, mpi_character, mpi_comm, &
+      mpi_comm_free, mpi_comm_rank, mpi_comm_size, mpi_comm_split_type, mpi_comm_type_shared, mpi_comm_world, &
+      mpi_double_precision, mpi_finalize, mpi_get_library_version, mpi_in_place, mpi_info_null, mpi_init_thread, &
+      mpi_integer, mpi_integer8, mpi_logical, mpi_lor, mpi_max, mpi_max_library_version_string, mpi_min, mpi_sum, &
+      mpi_thread_serialized
 #endif
-   use asperity_precision, only : dp, int64, int8, sp
+   use asperity_precision, only : dp, int64
    implicit none
    private
 
-   public :: any_process, end_processes, exchange, exchanged_bytes, gather_rows, global_max, global_min, global_sum, &
-      hand_to_first, is_first_process, on_any_process, parallel_library, process_count, process_number, &
-      processes_of_machine, rows_before, share, start_processes, take_from_first
+   public :: any_process, count_sent, end_processes, exchanged_bytes, gather_rows, global_max, global_min, global_sum, &
+      is_first_process, on_any_process, parallel_library, process_count, process_number, processes_of_machine, &
+      rows_before, share, start_processes
 
    !> Elementwise sum over the processes, of counts or of numbers of which all but one are 0: both are exact.
    interface global_sum
@@ -37,17 +37,6 @@ module asperity_parallel
    interface share
       module procedure :: share_integer, share_long, share_real, share_reals, share_logical, share_text
    end interface share
-
-   !> Send every process its part of an array, and receive the parts that the others have for this one. The
-   !> parts lie one after the other in the order of the processes.
-   interface exchange
-      module procedure :: exchange_complex, exchange_complex_single, exchange_real, exchange_real_single
-   end interface exchange
-
-   !> Bring values of one process to the first one, which writes files.
-   interface hand_to_first
-      module procedure :: hand_reals, hand_bytes
-   end interface hand_to_first
 
    logical :: joined = .false.           !! between the start and the end of the processes
    integer :: processes = 1              !! number of processes
@@ -131,6 +120,13 @@ contains
          mpi_comm_world)
 #endif
    end function exchanged_bytes
+
+   !> Add to what this process has sent to others.
+   subroutine count_sent(bytes)
+      real(dp), intent(in) :: bytes
+
+      sent = sent + bytes
+   end subroutine count_sent
 
    ! Numbers that all processes need. Collective.
 
@@ -300,116 +296,5 @@ contains
       if (length > 0) call mpi_bcast(text, length, mpi_character, 0, mpi_comm_world)
 #endif
    end subroutine share_text
-
-   ! Parts of fields. Collective.
-
-   !> Exchange complex numbers.
-   subroutine exchange_complex(send, send_counts, receive, receive_counts)
-      complex(dp), intent(in), contiguous :: send(:)
-      integer, intent(in) :: send_counts(:)        !! for each process
-      complex(dp), intent(inout), contiguous :: receive(:)
-      integer, intent(in) :: receive_counts(:)     !! from each process
-
-      call exchange_values(send, send_counts, receive, receive_counts, 16)
-   end subroutine exchange_complex
-
-   !> Exchange complex numbers in single precision.
-   subroutine exchange_complex_single(send, send_counts, receive, receive_counts)
-      complex(sp), intent(in), contiguous :: send(:)
-      integer, intent(in) :: send_counts(:)        !! for each process
-      complex(sp), intent(inout), contiguous :: receive(:)
-      integer, intent(in) :: receive_counts(:)     !! from each process
-
-      call exchange_values(send, send_counts, receive, receive_counts, 8)
-   end subroutine exchange_complex_single
-
-   !> Exchange real numbers.
-   subroutine exchange_real(send, send_counts, receive, receive_counts)
-      real(dp), intent(in), contiguous :: send(:)
-      integer, intent(in) :: send_counts(:)        !! for each process
-      real(dp), intent(inout), contiguous :: receive(:)
-      integer, intent(in) :: receive_counts(:)     !! from each process
-
-      call exchange_values(send, send_counts, receive, receive_counts, 8)
-   end subroutine exchange_real
-
-   !> Exchange real numbers in single precision.
-   subroutine exchange_real_single(send, send_counts, receive, receive_counts)
-      real(sp), intent(in), contiguous :: send(:)
-      integer, intent(in) :: send_counts(:)        !! for each process
-      real(sp), intent(inout), contiguous :: receive(:)
-      integer, intent(in) :: receive_counts(:)     !! from each process
-
-      call exchange_values(send, send_counts, receive, receive_counts, 4)
-   end subroutine exchange_real_single
-
-   !> Exchange values of any type; one process alone has nothing to exchange.
-   subroutine exchange_values(send, send_counts, receive, receive_counts, bytes)
-      type(*), intent(in) :: send(*)
-      integer, intent(in) :: send_counts(:)        !! for each process
-      type(*), intent(inout) :: receive(*)
-      integer, intent(in) :: receive_counts(:)     !! from each process
-      integer, intent(in) :: bytes                 !! of a value: 4, 8 or 16
-#ifdef ASPERITY_MPI
-      type(mpi_datatype) :: kind
-
-      kind = mpi_double_precision
-      if (bytes == 4) kind = mpi_real
-      if (bytes == 16) kind = mpi_double_complex
-      sent = sent + (sum(real(send_counts, dp)) - send_counts(number + 1))*bytes
-      call mpi_alltoallv(send, send_counts, starts_of(send_counts), kind, &
-         receive, receive_counts, starts_of(receive_counts), kind, mpi_comm_world)
-#endif
-   end subroutine exchange_values
-
-#ifdef ASPERITY_MPI
-   !> Where parts that lie one after the other begin.
-   pure function starts_of(counts) result(starts)
-      integer, intent(in) :: counts(:)
-      integer :: starts(size(counts))
-      integer :: p
-
-      starts(1) = 0
-      do p = 2, size(counts)
-         starts(p) = starts(p - 1) + counts(p - 1)
-      end do
-   end function starts_of
-#endif
-
-   !> Bring numbers from a process to the first one: only these two take part, and any other returns at once.
-   subroutine hand_reals(from, values)
-      integer, intent(in) :: from                  !! the process that has them
-      real(dp), intent(inout), contiguous :: values(:, :)
-#ifdef ASPERITY_MPI
-      if (from == 0) return
-      if (number == from) call mpi_send(values, size(values), mpi_double_precision, 0, 1, mpi_comm_world)
-      if (number == 0) call mpi_recv(values, size(values), mpi_double_precision, from, 1, mpi_comm_world, &
-         mpi_status_ignore)
-#endif
-   end subroutine hand_reals
-
-   !> The same for small integers.
-   subroutine hand_bytes(from, values)
-      integer, intent(in) :: from
-      integer(int8), intent(inout), contiguous :: values(:, :)
-#ifdef ASPERITY_MPI
-      if (from == 0) return
-      if (number == from) call mpi_send(values, size(values), mpi_integer1, 0, 1, mpi_comm_world)
-      if (number == 0) call mpi_recv(values, size(values), mpi_integer1, from, 1, mpi_comm_world, &
-         mpi_status_ignore)
-#endif
-   end subroutine hand_bytes
-
-   !> Bring numbers from the first process to another one: only these two take part.
-   subroutine take_from_first(to, values)
-      integer, intent(in) :: to                    !! the process that needs them
-      real(dp), intent(inout), contiguous :: values(:, :)
-#ifdef ASPERITY_MPI
-      if (to == 0) return
-      if (number == 0) call mpi_send(values, size(values), mpi_double_precision, to, 2, mpi_comm_world)
-      if (number == to) call mpi_recv(values, size(values), mpi_double_precision, 0, 2, mpi_comm_world, &
-         mpi_status_ignore)
-#endif
-   end subroutine take_from_first
 
 end module asperity_parallel

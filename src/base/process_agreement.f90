@@ -6,8 +6,9 @@
 !> and all of them continue, or all of them return.
 module process_agreement
    use asperity_errors, only : error_type, fail
-   use asperity_parallel, only : global_min, global_sum, hand_to_first, is_first_process, process_count, &
-      process_number, share
+   use asperity_parallel, only : global_min, global_sum, is_first_process, process_count, process_number, &
+      share
+   use process_exchange, only : hand_to_first
    use asperity_precision, only : dp, int8
    implicit none
    private

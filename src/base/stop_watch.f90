@@ -9,7 +9,8 @@
 module stop_watch
    use, intrinsic :: iso_c_binding, only : c_int
    use asperity_parallel, only : any_process
-   use asperity_precision, only : dp, int64
+   use asperity_precision, only : dp
+   use rising_clock, only : seconds_now
    implicit none
    private
 
@@ -26,7 +27,7 @@ module stop_watch
    ! gfortran gives this pointer its name in C, which must be found nowhere else.
    procedure(stop_question), pointer :: asperity_stop_question => null()   !! null: there is no watch
    real(dp) :: patience = 0.0_dp               !! with a computation in hand after a stop was asked for, s
-   integer(int64) :: since = -1                !! clock at which the answer was first yes
+   real(dp) :: since = -1.0_dp                 !! clock, s, at which the answer was first yes
 
 contains
 
@@ -47,17 +48,15 @@ contains
    !> Is the computation in hand to be given up? Collective.
    function stop_is_due() result(due)
       logical :: due
-      integer(int64) :: now, rate
 
       due = .false.
       if (.not. associated(asperity_stop_question)) return
       if (.not. any_process(asperity_stop_question() /= 0_c_int)) then
-         since = -1
+         since = -1.0_dp
          return
       end if
-      call system_clock(now, rate)
-      if (since < 0) since = now
-      due = any_process(real(now - since, dp) >= patience*real(rate, dp))
+      if (since < 0.0_dp) since = seconds_now()
+      due = any_process(seconds_now() - since >= patience)
    end function stop_is_due
 
 end module stop_watch

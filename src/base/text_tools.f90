@@ -4,7 +4,7 @@ module text_tools
    implicit none
    private
 
-   public :: exact_text, lower, nearest_name, ordinary, to_text
+   public :: add_line, exact_text, lower, nearest_name, ordinary, to_text
 
    !> A number as short text.
    interface to_text
@@ -12,6 +12,15 @@ module text_tools
    end interface to_text
 
 contains
+
+   !> Add a line to a text, which may be empty.
+   pure subroutine add_line(text, line)
+      character(:), allocatable, intent(inout) :: text
+      character(*), intent(in) :: line
+
+      if (len(text) > 0) text = text//new_line('a')
+      text = text//line
+   end subroutine add_line
 
    !> The word with its ASCII letters in lower case.
    pure function lower(word) result(lowered)

@@ -5,7 +5,8 @@
 !> the parcels take little memory. Each block is worked on by one thread, and all blocks have the same
 !> width, so that the result does not depend on the number of threads or processes.
 module field_columns
-   use asperity_parallel, only : exchange, process_count, process_number
+   use asperity_parallel, only : process_count, process_number
+   use process_exchange, only : exchange
    use asperity_precision, only : dp
    use regular_grid, only : grid_type
    implicit none

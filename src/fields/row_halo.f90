@@ -15,7 +15,8 @@
 !>
 !> Fetching is collective, and so is asking for a range: every process calls it, even one that needs nothing.
 module row_halo
-   use asperity_parallel, only : exchange, gather_rows, process_count, process_number
+   use asperity_parallel, only : gather_rows, process_count, process_number
+   use process_exchange, only : exchange
    use asperity_precision, only : dp, int8, sp
    use regular_grid, only : grid_type
    use row_sharing, only : row_sharing_type, sharing_on_grid

@@ -3,7 +3,8 @@
 !> A field goes to a file, and comes from it, in slabs of rows. A slab may hold rows of several processes,
 !> so that the largest array besides the parts of the owners is one slab.
 module row_slabs
-   use asperity_parallel, only : hand_to_first, process_count, process_number, take_from_first
+   use asperity_parallel, only : process_count, process_number
+   use process_exchange, only : hand_to_first, take_from_first
    use asperity_precision, only : dp, int8
    use regular_grid, only : grid_type
    implicit none

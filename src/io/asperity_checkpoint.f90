@@ -167,9 +167,9 @@ contains
       end if
       call check_block(path, error)
       if (allocated(error)) return
-      call self%file%open(path, 'read', error)
-      if (allocated(error)) return
-      call self%file%read_attribute('/', 'result_id', self%result_id, error)
+      call self%file%open(path, 'read')
+      call self%file%read_attribute('/', 'result_id', self%result_id)
+      call self%file%report(error)          ! the first fault of both calls
    end subroutine open_checkpoint
 
    !> Is there a result whose run has finished?
@@ -182,11 +182,10 @@ contains
 
       complete = .false.
       if (.not. file_exists(trim(result_path))) return
-      call file%open(trim(result_path), 'read', error)
-      if (allocated(error)) return
-      call file%read_attribute('/', 'finished', finished, error)
-      if (.not. allocated(error)) complete = finished == 1
+      call file%open(trim(result_path), 'read')
+      call file%read_attribute('/', 'finished', finished)
       call file%close(error)
+      if (.not. allocated(error)) complete = finished == 1
    end function is_complete
 
    !> Check that the checkpoint belongs to a case. Every setting that differs is a fault.

@@ -5,6 +5,7 @@ module asperity_progress
    use file_system, only : is_terminal
    use history_row, only : history_row_type
    use asperity_precision, only : dp, int64
+   use rising_clock, only : seconds_now
    implicit none
    private
 
@@ -48,7 +49,7 @@ contains
       self%rows = rows
       self%first_step = first_step
       self%shown_length = 0
-      self%started = clock()
+      self%started = seconds_now()
       self%shown = self%started
    end subroutine start
 
@@ -61,7 +62,7 @@ contains
       if (self%quiet) return
       self%row = row
       self%pending = .true.
-      now = clock()
+      now = seconds_now()
       if (now - self%shown >= merge(terminal_interval, plain_interval, self%terminal)) &
          call self%show(now)
    end subroutine update
@@ -71,7 +72,7 @@ contains
       class(progress_type), intent(inout) :: self
 
       if (self%quiet) return
-      if (self%pending) call self%show(clock())
+      if (self%pending) call self%show(seconds_now())
       if (self%terminal .and. self%shown_length > 0) write (error_unit, '(a)') ''
       self%shown_length = 0
    end subroutine finish
@@ -143,14 +144,5 @@ contains
       end if
       text = trim(buffer)
    end function duration_text
-
-   !> Time of a clock that never runs backwards, s.
-   function clock() result(seconds)
-      real(dp) :: seconds
-      integer(int64) :: count, rate
-
-      call system_clock(count, rate)
-      seconds = real(count, dp)/real(rate, dp)
-   end function clock
 
 end module asperity_progress

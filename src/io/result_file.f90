@@ -13,19 +13,18 @@ module result_file
    use file_system, only : name_of, remove_file, rename_file
    use hdf5_chunk_writer, only : chunk_writer_type
    use hdf5_file, only : hdf5_file_type
-   use hdf5_slabs, only : create_field, slab_rows
+   use hdf5_slabs, only : slab_rows
    use history_row, only : history_row_type, row_values
    use random_id, only : new_id
    use regular_grid, only : grid_type
-   use result_frame, only : height_path, read_grid, result_plan_type, write_axes, write_frame
-   use result_losses, only : drop_losses, put_losses
-   use result_history, only : append_values, count_history_rows, create_history_columns, &
-      shorten_history
+   use result_frame, only : height_path, result_plan_type, write_frame
+   use result_losses, only : put_losses
+   use result_history, only : append_values, create_history_columns
    use result_names, only : sibling_path
-   use result_restart, only : drop_snapshots, stop_mark
+   use result_restart, only : go_back
+   use result_snapshots, only : result_snapshots_type
    use result_target, only : check_place
-   use snapshot_fields, only : field_type, find_field
-   use xdmf, only : snapshot_name, snapshot_type, write_xdmf
+   use xdmf, only : write_xdmf
    implicit none
    private
 
@@ -40,9 +39,7 @@ module result_file
       integer :: expected_rows = 0
       integer :: compression = 0
       character(:), allocatable :: xdmf_path
-      type(snapshot_type), allocatable :: snapshots(:)
-      type(snapshot_type) :: current                 !! the snapshot under construction
-      character(:), allocatable :: current_path
+      type(result_snapshots_type) :: snapshots
       character(:), allocatable, public :: path      !! name of the file
       character(:), allocatable, public :: id        !! identity, which a checkpoint names
       integer, public :: rows = 0                    !! rows of the history
@@ -92,8 +89,7 @@ contains
       self%path = trim(path)
       self%id = new_id()
       self%xdmf_path = sibling_path(path, '.xdmf')
-      if (allocated(self%snapshots)) deallocate (self%snapshots)
-      allocate (self%snapshots(0))
+      call self%snapshots%forget()
 
       call check_place(self%path, error)
       if (allocated(error)) return
@@ -256,18 +252,7 @@ contains
       type(error_type), allocatable, intent(out), optional :: error
       logical, intent(in), optional :: at_stop   !! written by a stop; default no
 
-      self%current_path = '/snapshots/'//snapshot_name(step)
-      self%current%step = step
-      self%current%time = time
-      if (allocated(self%current%fields)) deallocate (self%current%fields)
-      allocate (self%current%fields(0))
-      call self%file%stage_group(self%current_path)
-      call self%file%write_attribute(self%current_path, 'step', step)
-      call self%file%write_attribute(self%current_path, 'time', time)
-      call self%file%write_attribute(self%current_path, 'phase', phase)
-      if (present(at_stop)) then
-         if (at_stop) call self%file%write_attribute(self%current_path, stop_mark, 1)
-      end if
+      call self%snapshots%begin(self%file, step, time, phase, at_stop)
       call self%file%report(error)
    end subroutine begin_snapshot
 
@@ -278,25 +263,10 @@ contains
       integer, intent(out) :: rows          !! of each slab; the last one may have fewer
       type(error_type), allocatable, intent(out), optional :: error
       type(error_type), allocatable :: fault
-      type(field_type) :: field
-      character(:), allocatable :: path
-      integer :: extent(2)
 
       rows = slab_rows(self%grid%nx)
-      field = find_field(name)
-      if (field%name == '') then
-         call fail(fault, error_input, 'snapshots have no field "'//trim(name)//'"')
-         call self%file%settle(fault, error)
-         return
-      end if
-      self%current%fields = [character(24) :: self%current%fields, name]
-      call self%writer%finish(self%file)
-      path = self%current_path//'/'//trim(name)
-      extent = [self%grid%nx, self%grid%ny]
-      call create_field(self%file, path, extent, name == 'contact', trim(field%units), trim(field%long_name), &
-         self%compression)
-      call self%writer%start(self%file, path, extent, name == 'contact', self%compression)
-      call self%file%report(error)
+      call self%snapshots%start_field(self%file, self%writer, name, self%grid, self%compression, fault)
+      call self%file%settle(fault, error)
    end subroutine start_field
 
    !> Write a slab of the field that was started last.
@@ -327,13 +297,9 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       call self%writer%finish(self%file)
-      call write_axes(self%file, self%current_path, self%grid, self%current%fields, &
-         self%compression)
-      call self%file%publish_group()
-      call self%file%report(error)
-      if (allocated(error)) return
-      self%snapshots = [self%snapshots, self%current]
-      call write_xdmf(self%xdmf_path, self%path, self%grid, self%snapshots, error)
+      call self%snapshots%finish(self%file, self%grid, self%compression, error)
+      if (.not. allocated(error)) call write_xdmf(self%xdmf_path, self%path, self%grid, &
+         self%snapshots%written, error)
    end subroutine end_snapshot
 
    !> Row of the last snapshot; -1 if there is none.
@@ -341,8 +307,7 @@ contains
       class(result_file_type), intent(in) :: self
       integer :: step
 
-      step = -1
-      if (size(self%snapshots) > 0) step = maxval(self%snapshots%step)
+      step = self%snapshots%last()
    end function last_snapshot
 
    !> Write where a state of steady sliding loses its energy, as a group /losses/NNNNNN.
@@ -426,39 +391,13 @@ contains
       call self%read_text('id', self%id, error)
       if (.not. allocated(error) .and. self%id /= id) call fail(error, error_input, self%path// &
          ': is not the result that '//sibling_path(path, '.checkpoint.h5')//' belongs to')
-      if (.not. allocated(error)) call go_back(self, last_step, error)
+      if (.not. allocated(error)) call go_back(self%file, last_step, self%grid, self%expected_rows, &
+         self%snapshots%written, error)
+      if (.not. allocated(error)) call self%finish(.false., error)
+      if (.not. allocated(error)) call write_xdmf(self%xdmf_path, self%path, self%grid, &
+         self%snapshots%written, error)
+      self%rows = last_step + 1
       if (allocated(error)) call self%file%close()
    end subroutine reopen_result
-
-   !> Remove what lies behind a row.
-   subroutine go_back(self, last_step, error)
-      class(result_file_type), intent(inout) :: self
-      integer, intent(in) :: last_step
-      type(error_type), allocatable, intent(out) :: error
-      character(120) :: text
-      logical :: shortened
-
-      self%rows = count_history_rows(self%file)
-      call self%file%report(error)
-      if (allocated(error)) return
-      if (last_step < 0 .or. last_step >= self%rows) then
-         write (text, '(": the history has ", i0, " rows, the run would go on after row ", i0)') &
-            self%rows, last_step
-         call fail(error, error_file, self%path//trim(text))
-         return
-      end if
-      call read_grid(self%file, self%grid)
-      call self%file%read_attribute('/', 'expected_rows', self%expected_rows)
-      shortened = self%rows > last_step + 1
-      if (shortened) call shorten_history(self%file, last_step + 1, self%expected_rows)
-      call drop_snapshots(self%file, last_step, self%snapshots)
-      call drop_losses(self%file, last_step)
-      call self%file%flush()
-      if (shortened) call self%file%publish_group()
-      self%rows = last_step + 1
-      call self%finish(.false., error)
-      if (allocated(error)) return
-      call write_xdmf(self%xdmf_path, self%path, self%grid, self%snapshots, error)
-   end subroutine go_back
 
 end module result_file

@@ -1,8 +1,8 @@
 !> The step loop: a rubber block pressed on a road and moved over it.
 !>
 !> A row of the history is one solve: `advance` takes the next from the schedule, moves the road,
-!> solves the contact, ends the step of the material and books the energies. Who calls it writes
-!> files or fills arrays.
+!> solves the contact, ends the step of the material and books the energies. The caller
+!> writes files or fills arrays.
 !>
 !> All that a row leaves to the next is in the component `state` (module `row_state`), which can be saved and
 !> taken up again (module `simulation_state`). `propose` finds the next state without changing the present
@@ -14,17 +14,17 @@
 module asperity_simulation
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use asperity_errors, only : error_type
-   use asperity_precision, only : dp, int64, int8
+   use asperity_precision, only : dp, int64
    use asperity_schedule, only : next_row, planned_row_type
    use asperity_surface, only : new_height
    use case_settings, only : case_type, road_moves
    use contact_model, only : commit_step, contact_type, new_contact, place_road, solve_normal
-   use contact_rule, only : touches
    use coupled_passes, only : coupled_passes_type, new_coupled_passes
    use coupling_advice, only : advice_on_passes
    use finite_fields, only : reason_overflow
    use history_row, only : row_values
    use pulled_road, only : guess_road, pull_outcome, take_road, watch_way
+   use rising_clock, only : seconds_now
    use road_motion, only : move_road
    use row_account, only : account, found_step_type
    use row_state, only : state_type
@@ -41,8 +41,9 @@ module asperity_simulation
 
    public :: new_simulation, simulation_type
 
-   !> What may remain of the coupling where the case limits the passes and gives no `coupling_tolerance`:
-   !> the mean friction of a run is then right within 1 %. Above this a warning says what remains.
+   !> Largest accepted mismatch of the passes if the case limits their number and gives no
+   !> `coupling_tolerance`: the mean friction of a run is then right within 1 %. A larger mismatch is reported
+   !> in a warning.
    real(dp), parameter :: large_mismatch = 1.0e-2_dp
 
    !> A run in hand. Not to be copied; its state may be.
@@ -65,8 +66,6 @@ module asperity_simulation
       procedure :: accept
       procedure :: reject
       procedure :: take_up
-      procedure :: field_rows
-      procedure :: contact_rows
       procedure :: destroy
    end type simulation_type
 
@@ -133,7 +132,7 @@ contains
       call self%take_up()
    end subroutine reject
 
-   !> Go on from the state as it is, which has been put there.
+   !> Go on from `state`, which the caller has replaced.
    subroutine take_up(self)
       class(simulation_type), intent(inout) :: self
 
@@ -205,17 +204,16 @@ contains
       type(planned_row_type), intent(inout) :: plan      !! where the road is found, if that is not prescribed
       type(error_type), allocatable, intent(out) :: error
       type(found_step_type) :: found
-      integer(int64) :: start, now, rate
+      real(dp) :: start
 
       call begin_step(self, plan, error)
       if (allocated(error)) return
-      call system_clock(start, rate)
+      start = seconds_now()
       call solve_step(self, plan, found)
       if (self%stop%given_up) return
       call judge(self, plan, found)
       if (.not. plan%steady) call commit_step(self)
-      call system_clock(now)
-      found%normal%seconds = real(now - start, dp)/real(rate, dp)
+      found%normal%seconds = seconds_now() - start
       call watch_edge(self, plan, self%warnings)
       call account(self, plan, found)
       call watch_stick_slip(self, plan, self%warnings)
@@ -297,8 +295,8 @@ contains
       if (found%passes > 0) call look_at_passes(self, plan, found)
    end subroutine judge
 
-   !> A row whose passes leave more than the case allows has not converged. Where the case allows
-   !> much, a warning says what remains.
+   !> A row has not converged if its passes leave a larger mismatch than the case allows. If the case allows
+   !> a large one, a warning reports it.
    subroutine look_at_passes(self, plan, found)
       type(simulation_type), intent(inout) :: self
       type(planned_row_type), intent(in) :: plan
@@ -331,63 +329,6 @@ contains
       self%converged = .false.
       self%reason = reason_overflow
    end subroutine look_for_overflow
-
-   !> Rows of a field of the state by its name in the result. They are counted on this process.
-   subroutine field_rows(self, name, first, values)
-      class(simulation_type), intent(in) :: self
-      character(*), intent(in) :: name              !! as in /snapshots, but for 'contact'
-      integer, intent(in) :: first                  !! the first row
-      real(dp), intent(out) :: values(:, :)         !! [nx, rows]
-      integer :: c, last
-
-      last = first + size(values, 2) - 1
-      select case (name)
-      case ('pressure')
-         values = self%state%pressure(:, first:last)
-      case ('gap')
-         ! Where the surfaces overlap by less than the tolerance they touch.
-         values = max(self%state%gap(:, first:last), 0.0_dp)
-      case ('displacement_z')
-         if (allocated(self%state%displacement)) then
-            values = self%state%displacement(:, first:last)
-         else if (self%state%first) then
-            values = 0.0_dp
-         else
-            values = self%state%gap(:, first:last) + self%height(:, first:last) + self%state%level
-         end if
-      case ('road_height')
-         values = self%height(:, first:last)
-      case default
-         values = 0.0_dp
-         if (.not. self%frictional) return
-         c = merge(1, 2, index(name, '_x') > 0)
-         if (index(name, 'traction') == 1) values = self%state%tangential%traction(:, c, first:last)
-         if (index(name, 'displacement') == 1) values = self%state%tangential%displacement(:, c, first:last)
-         if (index(name, 'slip') == 1) values = self%tangential%slip(:, c, first:last)
-      end select
-   end subroutine field_rows
-
-   !> The states of the cells of some rows: 0 open, 1 stick, 2 slip. Without friction all contact slips;
-   !> with it all sticks until the road moves. The rows are counted on this process.
-   subroutine contact_rows(self, first, states)
-      class(simulation_type), intent(in) :: self
-      integer, intent(in) :: first                  !! the first row
-      integer(int8), intent(out) :: states(:, :)    !! [nx, rows]
-      integer(int8) :: touching
-      integer :: j, k
-
-      touching = 2_int8
-      if (self%holds()) touching = 1_int8
-      do k = 1, size(states, 2)
-         j = first + k - 1
-         if (self%rubs()) then
-            states(:, k) = self%state%tangential%contact(:, j)
-         else
-            states(:, k) = merge(touching, 0_int8, &
-               touches(self%side%adhesive, self%state%pressure(:, j), self%state%gap(:, j)))
-         end if
-      end do
-   end subroutine contact_rows
 
    !> Free plans and fields.
    subroutine destroy(self)

@@ -73,7 +73,7 @@ contains
       modulus = self%height*self%mass*leading(self)/dt**2
    end function resistance
 
-   !> f' over dx/dt^2 and per mass: (1 - alpha)/beta, or 2 where the acceleration is uniform.
+   !> Factor c of f' = m c (x' - x)/dt^2 + (known part): (1 - alpha)/beta, or 2 for uniform acceleration.
    pure function leading(self) result(factor)
       class(block_motion_type), intent(in) :: self
       real(dp) :: factor

@@ -23,8 +23,8 @@ module contact_size
 
 contains
 
-   !> At the end of a phase: keep the widest patches so far. At the end of the run: say where not even
-   !> those are enough. On its way through a run a contact may well be small.
+   !> At the end of a phase: keep the widest patches so far. At the end of the run: warn if not even
+   !> those are wide enough. Earlier in the run the contact may be small: it has to grow from nothing.
    subroutine watch_contact_size(grid, across, ends, widest, message)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: across                 !! `cells_across` now

@@ -10,7 +10,8 @@ module coupling_advice
 
    public :: advice_on_passes
 
-   !> Part of the normal force on places where the friction cone is open uphill, from which it counts.
+   !> Fraction of the normal force on slopes steeper than 1/mu, where friction has no bound uphill, from which
+   !> the advice names them as the reason.
    real(dp), parameter :: much = 1.0e-3_dp
 
 contains

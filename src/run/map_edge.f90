@@ -3,14 +3,15 @@
 !> Outside the given map the road is at its lowest, and what moves off the map is lost. That is
 !> right as long as the points at the edge lie well below the contact: by a tenth of what the rubber is
 !> displaced by under the load, and, where it adheres, by some ranges of the attraction. (A tenth of the
-!> rms height is enough, too; but that of a long map on which a summit travels says nothing.)
+!> rms height is enough as well, except on a long map over which a summit travels: its rms height says
+!> nothing about the contact.)
 module map_edge
    use contact_rule, only : touches
    use asperity_precision, only : dp
    use field_sums, only : least_of_rows, row_total, row_totals
    use regular_grid, only : boundary_free, grid_type
    use row_state, only : edge_near, edge_touches, state_type
-   use text_tools, only : to_text
+   use text_tools, only : add_line, to_text
    implicit none
    private
 
@@ -41,7 +42,7 @@ contains
       call scan_edge(grid, adhesive, [wx, wy], state, touching, least)
       if (touching > 0 .and. state%edge < edge_touches) then
          state%edge = edge_touches
-         call add_line(to_text(touching)//' cells at the edge of the free map touch; what touches beyond '// &
+         call add_line(message, to_text(touching)//' cells at the edge of the free map touch; what touches beyond '// &
             'the map is left out: a larger map is needed')
       else if (any(abs(move) > 0.0_dp) .and. state%edge < edge_near) then
          reach = out_of_reach*range
@@ -50,21 +51,10 @@ contains
          near = max(well_below*min(depth, rms_height), reach)
          if (least >= near) return
          state%edge = edge_near
-         call add_line('points enter or leave the free map only '//to_text(least)// &
+         call add_line(message, 'points enter or leave the free map only '//to_text(least)// &
             ' m below the rubber, which is displaced by '//to_text(depth)//' m under the load: less than '// &
             to_text(near)//' m is near, a larger map is needed')
       end if
-
-   contains
-
-      !> Add a line.
-      subroutine add_line(line)
-         character(*), intent(in) :: line
-
-         if (len(message) > 0) message = message//new_line('a')
-         message = message//line
-      end subroutine add_line
-
    end subroutine look_at_edge
 
    !> Cells that touch, and the least gap, in a frame along the edge of the map.

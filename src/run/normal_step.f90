@@ -22,7 +22,7 @@ module normal_step
 
    public :: new_normal_step, normal_step_type, normal_task_type
 
-   !> The contact without adhesion is only where the one with adhesion begins: a share of its duality gap.
+   !> Tolerance (of the duality gap) of the contact without adhesion if it only starts the one with adhesion.
    real(dp), parameter :: start_tolerance = 1e-2_dp
 
    !> What a row asks of the normal side.
@@ -143,7 +143,8 @@ contains
       end if
    end subroutine load_of
 
-   !> The first state with adhesion: about the solution without, or mere touch where the load does not press.
+   !> The first state with adhesion: roughly the solution without adhesion, or mere touch if the load does
+   !> not press.
    subroutine start(self, task, height, pressure, gap, level, outcome, past)
       type(normal_step_type), intent(inout) :: self
       type(normal_task_type), intent(in) :: task
@@ -178,7 +179,7 @@ contains
       end do
    end subroutine start
 
-   !> The contact without adhesion; where adhesion follows, only about.
+   !> The contact without adhesion; only roughly if the contact with adhesion follows.
    subroutine solve_bare(self, task, height, pressure, gap, level, outcome, past)
       type(normal_step_type), intent(inout) :: self
       type(normal_task_type), intent(in) :: task

@@ -1,4 +1,4 @@
-!> Where the surface of the rubber will be in the next step, as the last steps let expect.
+!> Forecast of where the surface of the rubber will be in the next step, from the last steps.
 !>
 !> In steady sliding the displacement U_T around the contact moves over the rubber with the road and
 !> changes slowly on the way. Let B_n be the displacement of the row before, carried along to where the
@@ -15,7 +15,7 @@
 !> leads to a low order by itself.
 !>
 !> The differences belong to settled steps of one length and one speed. Where these change, or a row has
-!> not settled, they are forgotten: what such a row leaves over would be taken for a motion.
+!> not settled, they are forgotten: the error of such a row would be mistaken for a motion.
 !>
 !> Plain data, part of the state of a run. Fields of doubles: two components each of a and b.
 module place_forecast
@@ -81,7 +81,7 @@ contains
       end do
    end subroutine follow
 
-   !> The next row cannot be foretold from the rows so far.
+   !> Forget the differences: the next row cannot be forecast from the rows so far.
    pure subroutine forget(self)
       class(place_forecast_type), intent(inout) :: self
 

@@ -99,7 +99,7 @@ contains
       end if
    end subroutine watch_way
 
-   !> Why a row whose pull the friction does not hold has no solution.
+   !> Explain why a row has no solution if the friction cannot hold the pull.
    function pull_outcome(plan, tangential) result(reason)
       type(planned_row_type), intent(in) :: plan
       type(tangential_step_type), intent(in) :: tangential

@@ -1,6 +1,6 @@
 !> What a result holds, in words.
 !>
-!> Of a run that is not finished the root's text attribute `outcome` says why it ended; the warnings
+!> If the run is not finished, the text attribute `outcome` of the file says why it ended. The warnings
 !> of the input and of the run follow.
 module result_summary
    use case_input, only : parse_case
@@ -166,7 +166,8 @@ contains
       call file%report(error)
    end subroutine describe
 
-   !> How long the last row took, for a look at whether rows are added; '' where it is not known.
+   !> How long the last row took, so that the reader can judge whether the run still adds rows; '' if it is
+   !> not known.
    function row_note(file) result(note)
       type(hdf5_file_type), intent(inout) :: file
       character(:), allocatable :: note

@@ -13,7 +13,7 @@ module row_account
 
    public :: account, found_step_type
 
-   !> What solving a step came to.
+   !> The outcome of solving a step.
    type :: found_step_type
       type(solver_result_type) :: normal             !! all normal solves
       type(solver_result_type) :: rubbing            !! all tangential solves
@@ -182,7 +182,7 @@ contains
       end associate
    end subroutine fill_powers
 
-   !> What a row of steady sliding knows better than the sums over the cells.
+   !> Quantities that a row of steady sliding knows more accurately than the sums over the cells.
    subroutine fill_steady(contact, found, row, force)
       class(contact_type), intent(in) :: contact
       type(found_step_type), intent(in) :: found
@@ -198,7 +198,7 @@ contains
       row%sliding_speed = norm2(contact%state%velocity)
    end subroutine fill_steady
 
-   !> How the solvers found the row.
+   !> Iterations, times and residuals of the solvers.
    subroutine fill_solution(contact, found, row)
       class(contact_type), intent(in) :: contact
       type(found_step_type), intent(in) :: found

@@ -7,6 +7,7 @@ module snapshot_writer
    use asperity_parallel, only : is_first_process
    use asperity_precision, only : dp, int8
    use asperity_simulation, only : simulation_type
+   use contact_fields, only : contact_rows, field_rows
    use hdf5_slabs, only : slab_rows
    use process_agreement, only : agree
    use result_file, only : result_file_type
@@ -66,7 +67,7 @@ contains
          rows = min(slab_rows(sim%grid%nx), sim%grid%ny - first + 1)
          allocate (slab(sim%grid%nx, rows))
          part = own_part(sim%grid, first, rows)
-         if (part(1) <= part(2)) call sim%contact_rows(part(1) - sim%grid%first_row + 1, &
+         if (part(1) <= part(2)) call contact_rows(sim, part(1) - sim%grid%first_row + 1, &
             slab(:, part(1) - first + 1:part(2) - first + 1))
          call collect_rows(sim%grid, first, slab)
          if (is_first_process()) call result%write_rows(first, slab)
@@ -98,7 +99,7 @@ contains
       rows = min(slab_rows(sim%grid%nx), sim%grid%ny - first + 1)
       allocate (slab(sim%grid%nx, rows))
       part = own_part(sim%grid, first, rows)
-      if (part(1) <= part(2)) call sim%field_rows(name, part(1) - sim%grid%first_row + 1, &
+      if (part(1) <= part(2)) call field_rows(sim, name, part(1) - sim%grid%first_row + 1, &
          slab(:, part(1) - first + 1:part(2) - first + 1))
       call collect_rows(sim%grid, first, slab)
    end subroutine form_slab

@@ -4,8 +4,9 @@
 !> jump, or where the rate of the load or the speed of the road changes, there is no such step: the motion is taken
 !> for linear, which is coarse just where fast arms make it bend most. The step is therefore solved in
 !> three parts, a quarter, a quarter and a half: linear, then with the curvature that the first has
-!> shown. Two solves more, once per kink. In a point with five arms over four decades, eight steps per
-!> ramp, this leaves a quarter of the error of one linear step; more and finer parts gain nothing.
+!> shown. This takes two more solves per kink. At a point of a rubber with five arms over four decades,
+!> in a ramp of eight steps, the error is a quarter of that of one linear step; more and finer parts gain
+!> nothing.
 !>
 !> The parts make one row of the history: works and energies are cumulative, all else is that of the end,
 !> but for what `part_sums_type` adds up.

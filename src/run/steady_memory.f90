@@ -51,7 +51,7 @@ contains
 
    contains
 
-      !> The field through one response.
+      !> Multiply the modes of a field by a response and transform back.
       subroutine respond(which)
          integer, intent(in) :: which
          complex(dp), allocatable :: table(:, :)

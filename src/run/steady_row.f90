@@ -17,8 +17,8 @@ module steady_row
 
 contains
 
-   !> Find the row's state, and put it in the place of the last one. A solve that was stopped changes nothing
-   !> that the state has.
+   !> Find the row's state, and put it in the place of the last one. A solve that was stopped leaves the state
+   !> unchanged.
    subroutine slide_for_ever(contact, steady, plan, found)
       class(contact_type), intent(inout) :: contact
       type(steady_step_type), intent(inout) :: steady
@@ -45,7 +45,7 @@ contains
       call take_memory(contact, steady, plan)
    end subroutine slide_for_ever
 
-   !> The road is where the state finds it.
+   !> Move the road to the place that belongs to the state.
    subroutine take_place(contact, steady, plan)
       class(contact_type), intent(inout) :: contact
       type(steady_step_type), intent(in) :: steady

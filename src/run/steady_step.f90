@@ -240,7 +240,7 @@ contains
       end associate
    end subroutine start_from
 
-   !> How far to go on along the line through the last two states; 0: not at all.
+   !> How far to extrapolate along the line through the last two states; 0 means no extrapolation.
    pure function onward(self, target) result(part)
       type(steady_step_type), intent(in) :: self
       real(dp), intent(in) :: target                   !! mean pressure of the row, Pa
@@ -304,7 +304,7 @@ contains
       direction = self%medium%velocity/speed
       area = self%grid%area()
       self%power_friction = sums(4)*speed*area
-      ! Across the motion the slopes of the mesh are all there is.
+      ! There is no loss from which the force across the motion follows: the slopes of the mesh must do.
       self%viscous_force = -sums(1:2)
       self%viscous_force = self%viscous_force + direction*(self%losses%normal/(speed*area) + sums(3) &
          - dot_product(self%viscous_force, direction))

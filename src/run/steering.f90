@@ -32,9 +32,9 @@ contains
          .not. load > 0.0_dp) then
          call fail(error, error_input, control//' = '//to_text(load)// &
             ': must be positive without adhesion')
+      else
+         call change_load(sim%state%schedule, sim%case%phases, control, load)
       end if
-      if (allocated(error)) return
-      call change_load(sim%state%schedule, sim%case%phases, control, load)
    end subroutine steer_load
 
    !> Let the road move with a velocity.
@@ -49,10 +49,10 @@ contains
       else if (.not. sim%slides) then
          call fail(error, error_input, 'velocity: no phase of the case has a duration, so the road '// &
             'cannot move')
+      else
+         call change_velocity(sim%state%schedule, sim%case%phases, velocity, &
+            [sim%state%row%road_x, sim%state%row%road_y])
       end if
-      if (allocated(error)) return
-      call change_velocity(sim%state%schedule, sim%case%phases, velocity, &
-         [sim%state%row%road_x, sim%state%row%road_y])
    end subroutine steer_velocity
 
    !> Bring the rubber to a temperature: its relaxation times shift by the WLF law.

@@ -6,7 +6,7 @@ module step_watches
    use contact_size, only : cells_across, watch_contact_size
    use map_edge, only : look_at_edge
    use stick_slip_watch, only : watch_slip
-   use text_tools, only : to_text
+   use text_tools, only : add_line, to_text
    implicit none
    private
 
@@ -69,8 +69,7 @@ contains
       character(*), intent(in) :: message
 
       if (len(message) == 0) return
-      if (len(warnings) > 0) warnings = warnings//new_line('a')
-      warnings = warnings//'step '//to_text(step)//', t = '//to_text(time)//' s: '//message
+      call add_line(warnings, 'step '//to_text(step)//', t = '//to_text(time)//' s: '//message)
    end subroutine add_warning
 
 end module step_watches

@@ -24,7 +24,7 @@ module stick_slip_watch
 
 contains
 
-   !> Look at a step's mean slip; the message is left empty but once.
+   !> Look at a step's mean slip. The message is empty, except the first time that stick-slip is found.
    subroutine watch_slip(self, slip_speed, road_speed, passes, density, message)
       type(stick_slip_watch_type), intent(inout) :: self
       real(dp), intent(in) :: slip_speed              !! mean over the surface, m/s

@@ -89,7 +89,6 @@ contains
       if (allocated(error)) return
       call new_friction_solver(self%solver, self%grid, self%operator, error, &
          merge(friction_thesis, friction_fast, case%solver%method == 'thesis'))
-      if (allocated(error)) return
       self%solver%max_iterations = case%solver%max_iterations
       ! The passes of a step measure by the displacements whether the step is solved.
       self%solver%settle = .false.
@@ -167,7 +166,7 @@ contains
          self%mass_place = -self%q*means(self, state%displacement)
       end if
       do c = 1, 2
-         if (self%pulled(c)) call self%operator%set_mean_mode(c, 0.0_dp)
+         if (self%pulled(c)) call self%operator%symbols%set_mean_mode(c, 0.0_dp)
       end do
    end subroutine place_mass
 
@@ -231,8 +230,8 @@ contains
       force = -row_totals(rows)/self%grid%cells()
    end function outside_force
 
-   !> The step is solved: take over how far the pulled road has moved, which the displacements were
-   !> computed without.
+   !> The step is solved: add to the displacements how far the pulled road has moved. They were computed
+   !> without it.
    subroutine take_motion(self, motion)
       class(tangential_step_type), intent(inout) :: self
       real(dp), intent(out) :: motion(2)              !! of the road in the step, m
@@ -249,8 +248,8 @@ contains
       self%motion = self%found
    end subroutine take_motion
 
-   !> Start the step's traction from the change of the last step going on. To be called when the road
-   !> has moved, once a step.
+   !> Extrapolate the traction: the step starts as if the change of the last step continued. To be called
+   !> once per step, after the road has moved.
    subroutine extrapolate(self, state, steady)
       class(tangential_step_type), intent(inout) :: self
       type(tangential_state_type), intent(inout) :: state
@@ -278,7 +277,7 @@ contains
       type(tangential_step_type), intent(inout) :: self
       real(dp), intent(in) :: thickness
 
-      if (self%grid%boundary == boundary_periodic) call self%operator%set_mean_compliance(thickness)
+      if (self%grid%boundary == boundary_periodic) call self%operator%symbols%set_mean_compliance(thickness)
    end subroutine set_thickness
 
    !> Means of a vector field over the grid.

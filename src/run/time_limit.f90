@@ -7,6 +7,7 @@
 module time_limit
    use, intrinsic :: iso_c_binding, only : c_long
    use asperity_precision, only : dp, int64
+   use rising_clock, only : seconds_now
    implicit none
    private
 
@@ -98,15 +99,6 @@ contains
       come = .false.
       if (self%limited) come = seconds_now() + self%margin + 2.0_dp*self%longest_save > self%finish
    end function has_come
-
-   !> A clock that only rises, s.
-   function seconds_now() result(seconds)
-      real(dp) :: seconds
-      integer(int64) :: count, rate
-
-      call system_clock(count, rate)
-      seconds = real(count, dp)/real(rate, dp)
-   end function seconds_now
 
    !> Read a duration as Slurm writes it: M, M:S, H:M:S, D-H, D-H:M or D-H:M:S.
    subroutine read_duration(text, seconds, valid)

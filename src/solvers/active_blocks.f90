@@ -74,7 +74,8 @@ contains
       allocate (self%wide_runs(wide_rows), source=0)
    end subroutine new_active_blocks
 
-   !> Make no block active and zero the work fields: the step, which others use between solves, wholly.
+   !> Make no block active, and set the work fields to zero. Others use the step between solves, so all of its
+   !> cells are set.
    subroutine clear(self, residual, direction, search, step)
       class(active_blocks_type), intent(inout) :: self
       real(sp), intent(inout) :: residual(0:, 0:)  !! (0:nx+1, 0:rows+1), the rim is left

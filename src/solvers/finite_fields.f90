@@ -1,7 +1,7 @@
-!> A solution that is not a number is no solution.
+!> Rejects solutions that are not finite.
 !>
-!> Maxima and comparisons of Fortran pass over numbers that are not one (NaN), so that a measure of
-!> error may look small where fields have overflowed. The solvers look at the fields that they hand out.
+!> Maxima and comparisons ignore values that are not a number (NaN), so that a measure of error may look
+!> small although fields have overflowed. The solvers look at the fields that they hand out.
 module finite_fields
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use field_sums, only : row_total
@@ -16,7 +16,7 @@ module finite_fields
 
 contains
 
-   !> A record of a solve whose fields are not finite everywhere says that it did not converge.
+   !> If a field is not finite everywhere, record that the solve did not converge.
    subroutine reject_overflow(outcome, one, other, threads)
       type(solver_result_type), intent(inout) :: outcome
       real(dp), intent(in) :: one(:, :), other(:, :)

@@ -14,7 +14,7 @@
 !> The operator A is that of G = 1. For a scheme of time with the factor Q pass DX' = Q DX and the
 !> traction T_h of the memory: r = Q DX - A (T + T_h) is then Q times the slip, and the displacement
 !> is U = DX - r/Q, without another product. With inertia the mean mode of the operator differs from
-!> A(0): set it by the operator's `set_mean_compliance`.
+!> A(0): set it by `set_mean_compliance` of the operator's symbols.
 !>
 !> Methods: 'fast' (module `friction_cg_fast`, which falls back on `friction_cg_gradient`), 'gradient'
 !> (the fallback alone) and 'thesis' (`friction_cg_thesis`). Converged means both the criterion of
@@ -58,8 +58,8 @@ module friction_cg
 
    integer, parameter :: hangings = 60           !! of the spring, at most
    integer, parameter :: idle_hangings = 3       !! in full slip, after which nothing helps
-   !> Mean compliance over the length of the cell from where the fast method treats it apart. Below,
-   !> that costs iterations, above it saves them.
+   !> If the mean compliance over the length of the map exceeds this, the fast method treats the mean mode
+   !> apart. Below it, that would cost iterations; above, it saves them.
    real(dp), parameter :: thick = 0.2_dp
 
    !> The solver for one operator, kept from solve to solve. Not to be copied.
@@ -96,7 +96,7 @@ contains
 
       self%periodic = grid%boundary == boundary_periodic
       self%length = max(grid%lx, grid%ly)
-      self%compliance = operator%self_compliance()
+      self%compliance = operator%symbols%self_compliance(with_mean=.not. self%periodic)
       if (self%compliance <= 0.0_dp) self%compliance = self%length     ! one cell has no modes
       allocate (self%work%bound(grid%nx, 2, grid%rows()), self%work%tangent(grid%nx, 3, grid%rows()), &
          self%work%old(grid%nx, 2, grid%rows()), source=0.0_dp)
@@ -182,8 +182,8 @@ contains
       problem%settle = self%settle
       problem%near = self%near
       problem%least_scale = self%least_scale
-      if (self%periodic .and. operator%mean_mode(1)*operator%grid%cells() > thick*self%length) &
-         problem%mean_compliance = operator%mean_mode(1)
+      if (self%periodic .and. operator%symbols%mean_mode(1)*operator%grid%cells() > thick*self%length) &
+         problem%mean_compliance = operator%symbols%mean_mode(1)
       call self%pull%hang(problem, operator, thick*self%length)
    end subroutine set_problem
 

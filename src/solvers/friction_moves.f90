@@ -31,10 +31,11 @@ contains
       returned = sums%returned > 0.0_dp
    end subroutine move
 
-   !> The same, and the points that stuck keep the total of T + step d, where their bounds leave it: a
-   !> uniform traction c makes good for what those put back miss. A stiff mean mode would throw all
-   !> the contact for less. (What points that slip miss by turning is of second order.) What is missed,
-   !> m(c), is monotone: Newton's steps, each cut short where it goes too far.
+   !> The same, but the points that stuck keep the total of T + step d as far as their bounds allow it: a
+   !> uniform traction c makes up for what the points that are put back lose. Without it, a small change of
+   !> the total would move the whole contact if the mean mode is stiff. (What points that slip miss by
+   !> turning is of second order.) What is missed, m(c), is monotone: c is found by Newton's steps, each cut
+   !> short where it goes too far.
    subroutine move_total(problem, operator, step, direction, again, returned)
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator

@@ -83,9 +83,9 @@ contains
       real(dp) :: mean
 
       if (.not. self%periodic) return
-      mean = operator%mean_mode(1)*operator%grid%cells()
+      mean = operator%symbols%mean_mode(1)*operator%grid%cells()
       if (mean <= 0.0_dp) mean = self%half_wave
-      call self%inverse%set_mean_compliance(1.0_dp/mean)
+      call self%inverse%symbols%set_mean_compliance(1.0_dp/mean)
    end subroutine set_mean_stiffness
 
    !> z from the residual, g.z and g.z_old.

@@ -59,8 +59,8 @@ contains
       problem%pulled = self%along
       do c = 1, 2
          if (.not. self%along(c)) cycle
-         self%mean_mode(c) = operator%mean_mode(c)
-         call operator%set_mean_mode(c, 0.0_dp)
+         self%mean_mode(c) = operator%symbols%mean_mode(c)
+         call operator%symbols%set_mean_mode(c, 0.0_dp)
          problem%pull(c) = self%traction(c)*cells
          ! A patch of n cells is about as stiff as sqrt(n) cells side by side.
          problem%spring(c) = softer*problem%compliance/sqrt(touching)
@@ -69,7 +69,8 @@ contains
             - self%mean_mode(c)*(problem%pull(c) + past_total(problem, c))
          problem%mean_compliance(c) = merge(problem%spring(c), 0.0_dp, problem%spring(c)*cells > soft)
       end do
-      ! What the pull moves the road by at least. Where all sticks without strain there is no other measure.
+      ! Least distance that the pull moves the road. If everything sticks without strain, there is no other
+      ! measure.
       problem%least_scale = max(problem%least_scale, norm2(self%mean_mode*problem%pull), &
          problem%compliance/sqrt(touching)*norm2(problem%pull))
    end subroutine hang
@@ -84,7 +85,7 @@ contains
       self%offset = 0.0_dp
       do c = 1, 2
          if (.not. self%along(c)) cycle
-         call operator%set_mean_mode(c, self%mean_mode(c))
+         call operator%symbols%set_mean_mode(c, self%mean_mode(c))
          self%offset(c) = problem%offset(c) &
             + self%mean_mode(c)*(problem%total(c) + past_total(problem, c))
       end do

@@ -45,9 +45,8 @@ module normal_cg
    use gap_watch, only : gap_watch_type, new_gap_watch
    use normal_passes, only : clip_step, clip_type, find_clip, longest_multiple, &
       new_direction, new_normal_work, normal_work_type, survey, try_pressure, update_state
-   use normal_state, only : combine_measures, control_pressure, evaluate_gap, first_pressure, &
-      gap_measure_type, narrow_scale, normal_problem_type, prepare_problem, reason_converged, &
-      reason_iterations, reason_undetermined
+   use normal_state, only : combine_measures, control_pressure, evaluate_gap, first_pressure, gap_measure_type, &
+      hand_out, narrow_scale, normal_problem_type, prepare_problem, reason_iterations, reason_undetermined
    use normal_sums, only : state_sums_type, step_sums_type, total, trial_sums_type
    use omp_lib, only : omp_get_wtime
    use kernels, only : kernel_type
@@ -224,14 +223,8 @@ contains
             call project_simplex(pressure, task%target*cells)
             call compute_gap()
          end if
-         outcome%converged = determined .and. measure%error <= task%tolerance
          outcome%reason = now%reason
-         if (outcome%converged) outcome%reason = reason_converged
-         outcome%residual = measure%error
-         outcome%load_error = measure%load_error
-         call subtract_level(measure%weighted_level, self%operator%threads, gap)
-         level = measure%weighted_level - task%datum
-         if (problem%control /= control_pressure) level = problem%target
+         call hand_out(problem, task, measure, determined, self%operator%threads, gap, level, outcome)
          call reject_overflow(outcome, pressure, gap, self%operator%threads)
          ! A little more, so that a half is not rounded by the round-off of what was counted before.
          outcome%ffts = nint(transforms(self) - before + 1e-6_dp, int64)
@@ -381,19 +374,6 @@ contains
          now%alpha = min(now%alpha, longest_multiple(self%work, pressure, self%step))
       end if
    end subroutine choose_length
-
-   !> Count the gap from the level.
-   subroutine subtract_level(level, threads, gap)
-      real(dp), intent(in) :: level
-      integer, intent(in) :: threads
-      real(dp), contiguous, intent(inout) :: gap(:, :)
-      integer :: j
-
-      !$omp parallel do default(none) shared(gap, level) private(j) num_threads(threads)
-      do j = 1, size(gap, 2)
-         gap(:, j) = gap(:, j) - level
-      end do
-   end subroutine subtract_level
 
    !> Free plans and memory.
    subroutine destroy(self)

@@ -10,8 +10,8 @@ module normal_cg_thesis
    use fft_conv, only : new_convolution
    use finite_fields, only : reject_overflow
    use normal_state, only : control_pressure, evaluate_gap, first_pressure, gap_measure_type, &
-      measure_gap, narrow_scale, normal_problem_type, prepare_problem, reason_converged, &
-      reason_iterations, reason_undetermined
+      hand_out, measure_gap, narrow_scale, normal_problem_type, prepare_problem, reason_iterations, &
+      reason_undetermined
    use omp_lib, only : omp_get_wtime
    use field_sums, only : cell_count, row_total
    use kernels, only : kernel_type
@@ -87,14 +87,8 @@ contains
          call move(task, alpha, direction, pressure, outcome)
          if (outcome%reason /= reason_iterations) exit
       end do
-      outcome%converged = determined .and. measure%error <= task%tolerance
-      if (outcome%converged) outcome%reason = reason_converged
-      level = measure%weighted_level - task%datum
-      if (problem%control /= control_pressure) level = problem%target
-      outcome%residual = measure%error
-      outcome%load_error = measure%load_error
+      call hand_out(problem, task, measure, determined, self%operator%threads, gap, level, outcome)
       outcome%ffts = self%operator%ffts - before
-      gap(:, :) = gap - measure%weighted_level
       call reject_overflow(outcome, pressure, gap, self%operator%threads)
       outcome%seconds = omp_get_wtime() - began
 

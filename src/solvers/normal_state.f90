@@ -5,11 +5,12 @@ module normal_state
    use asperity_precision, only : dp, pi
    use normal_sums, only : state_sums_type, total
    use projection, only : project_simplex
+   use solver_result, only : solver_result_type
    use regular_grid, only : boundary_periodic, grid_type
    implicit none
    private
 
-   public :: combine_measures, evaluate_gap, first_pressure, gap_measure_type, measure_gap, &
+   public :: combine_measures, evaluate_gap, first_pressure, gap_measure_type, hand_out, measure_gap, &
       narrow_scale, normal_problem_type, prepare_problem, row_measure
 
    character(*), parameter, public :: reason_converged = 'converged'
@@ -329,5 +330,29 @@ contains
          pressure(:, j) = (target/load)*pressure(:, j)
       end do
    end subroutine rescale
+
+   !> Hand out a solution: what its measure says of it, and the gap counted from the level.
+   subroutine hand_out(problem, task, measure, determined, threads, gap, level, outcome)
+      type(normal_problem_type), intent(in) :: problem      !! as the caller gave it
+      type(normal_problem_type), intent(in) :: task         !! the problem, completed for its fields
+      type(gap_measure_type), intent(in) :: measure
+      logical, intent(in) :: determined                     !! the problem has a solution
+      integer, intent(in) :: threads
+      real(dp), contiguous, intent(inout) :: gap(:, :)      !! in: U - H, out: U - H - level, m
+      real(dp), intent(out) :: level                        !! U - H where the gap is zero, m
+      type(solver_result_type), intent(inout) :: outcome    !! with the reason for which the loop ended
+      integer :: j
+
+      outcome%converged = determined .and. measure%error <= task%tolerance
+      if (outcome%converged) outcome%reason = reason_converged
+      outcome%residual = measure%error
+      outcome%load_error = measure%load_error
+      !$omp parallel do default(none) shared(gap, measure) private(j) num_threads(threads)
+      do j = 1, size(gap, 2)
+         gap(:, j) = gap(:, j) - measure%weighted_level
+      end do
+      level = measure%weighted_level - task%datum
+      if (problem%control /= control_pressure) level = problem%target
+   end subroutine hand_out
 
 end module normal_state

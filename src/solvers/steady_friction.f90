@@ -36,29 +36,15 @@ module steady_friction
    use steady_contact, only : contact_mean, explain, read_road, steady_contact_type
    use steady_normal, only : new_steady_normal, steady_measure_type, steady_normal_type
    use steady_operator, only : steady_operator_type
+   use steady_pace, only : components, pace_type
    implicit none
    private
 
    public :: new_steady_friction, steady_friction_type
 
    integer, parameter :: pairs = 10              !! of the acceleration
-   integer, parameter :: components = 5          !! of a state: z, u, r
    integer, parameter :: doubtful = 100          !! rounds after which the best contact is kept
    integer, parameter :: looks = 25              !! rounds between two looks at it
-
-   !> How the rounds go: what is relaxed by how much, and whether they are accelerated.
-   type :: pace_type
-      real(dp) :: beta = 0.5_dp                  !! part of a change of u that is taken
-      integer :: inner = 4                       !! normal steps in a round
-      logical :: accelerated = .false.
-      real(dp) :: near = 0.03_dp                 !! change below which rounds are accelerated
-      real(dp) :: least = huge(1.0_dp)           !! change so far, while accelerated
-      real(dp) :: marked = huge(1.0_dp)          !! change some rounds ago
-      integer :: since = 0                       !! rounds since then
-      real(dp) :: weights(components) = 0.0_dp
-      real(dp) :: accepted = 0.0_dp              !! change below which a solution is checked
-      real(dp) :: best = huge(1.0_dp)            !! largest error of the kept contact
-   end type pace_type
 
    !> Work fields. Not to be copied.
    type :: steady_friction_type
@@ -273,7 +259,6 @@ contains
       real(dp), intent(in) :: beta
       real(dp) :: change
       real(dp), allocatable :: rows(:, :)
-      real(dp) :: sums(2)
       integer :: j
 
       allocate (rows(2, self%grid%rows()))
@@ -281,9 +266,18 @@ contains
          rows(1, j) = sum(self%residual(:, 2:3, j)**2)
          rows(2, j) = sum((self%state(:, 2:3, j) + self%residual(:, 2:3, j)/beta)**2)
       end do
-      sums = row_totals(rows)
-      change = sqrt(sums(1)/max(sums(2), tiny(1.0_dp)))/beta
+      change = ratio_of_lengths(rows)/beta
    end function relative_change
+
+   !> The length of one field over that of another, from the squares of both in each row.
+   function ratio_of_lengths(rows) result(ratio)
+      real(dp), intent(in) :: rows(:, :)             !! [2, rows of this process]
+      real(dp) :: ratio
+      real(dp) :: sums(2)
+
+      sums = row_totals(rows)
+      ratio = sqrt(sums(1)/max(sums(2), tiny(1.0_dp)))
+   end function ratio_of_lengths
 
    !> The next state: a relaxed or an accelerated step; and how the rounds go on.
    subroutine advance(self, operator, task, pace, rounds, change, measure)
@@ -294,33 +288,20 @@ contains
       integer, intent(in) :: rounds
       real(dp), intent(in) :: change
       type(steady_measure_type), intent(in) :: measure
-      logical :: changed
+      logical :: begins, changed
 
-      if (pace%accelerated .and. change > 4.0_dp*pace%least) then
-         pace%accelerated = .false.
-         pace%near = 0.3_dp*pace%least
-      else if (.not. pace%accelerated .and. change < pace%near) then
-         pace%accelerated = .true.
-         pace%least = change
+      call pace%choose(change, begins)
+      if (begins) then
          pace%weights = 0.0_dp
          pace%weights(1) = 1.0_dp
          pace%weights(2:3) = measure%size/max(length_of(self), tiny(1.0_dp))
          call self%memory%forget()
       end if
       if (pace%accelerated) then
-         pace%least = min(pace%least, change)
          call self%memory%step(pace%weights, self%residual, self%state, plain=.false.)
       else
          self%state = self%state + self%residual
-         pace%since = pace%since + 1
-         if (pace%since >= 25) then
-            if (change > 0.5_dp*pace%marked) then
-               pace%beta = max(0.15_dp, 0.6_dp*pace%beta)
-               pace%inner = min(12, pace%inner + 3)
-            end if
-            pace%marked = change
-            pace%since = 0
-         end if
+         call pace%note_plain(change)
       end if
       if (.not. any(rounds == [8, 16, 32, 64])) return
       self%normal%z(:, :) = self%state(:, 1, :)
@@ -371,7 +352,6 @@ contains
       type(solver_result_type), intent(inout) :: normal, rubbing
       type(gap_measure_type) :: found
       real(dp), allocatable :: again(:, :, :), rows(:, :)
-      real(dp) :: sums(2)
       integer :: j
 
       call operator%shear(contact%traction, contact%displacement, contact%slip)
@@ -395,8 +375,7 @@ contains
          rows(1, j) = sum((again(:, :, j) - contact%traction(:, :, j))**2)
          rows(2, j) = sum(contact%traction(:, :, j)**2)
       end do
-      sums = row_totals(rows)
-      rubbing%residual = sqrt(sums(1)/max(sums(2), tiny(1.0_dp)))
+      rubbing%residual = ratio_of_lengths(rows)
       rubbing%converged = rubbing%residual <= task%tolerance
       if (rubbing%converged) rubbing%reason = reason_converged
    end subroutine judge

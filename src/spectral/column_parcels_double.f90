@@ -1,6 +1,7 @@
 !> Blocks of columns that processes exchange, in double precision, for module `row_column_double`.
 module column_parcels_double
-   use asperity_parallel, only : exchange, global_max, process_number
+   use asperity_parallel, only : global_max, process_number
+   use process_exchange, only : exchange
    use asperity_precision, only : dp, wp => dp
    use transform_shape, only : transform_shape_type
    implicit none

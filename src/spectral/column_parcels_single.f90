@@ -1,6 +1,7 @@
 !> Blocks of columns that processes exchange, in single precision, for module `row_column_single`.
 module column_parcels_single
-   use asperity_parallel, only : exchange, global_max, process_number
+   use asperity_parallel, only : global_max, process_number
+   use process_exchange, only : exchange
    use asperity_precision, only : dp, wp => sp
    use transform_shape, only : transform_shape_type
    implicit none

@@ -18,15 +18,15 @@ module fft_conv
    use asperity_errors, only : error_input, error_type, fail
    use computed_symbol, only : columns_computed
    use kernels, only : kernel_type
-   use asperity_parallel, only : global_max, global_sum
    use asperity_threads, only : thread_count
-   use asperity_precision, only : dp, int64, sp, power_of_two
+   use asperity_precision, only : dp, int64, power_of_two
    use regular_grid, only : boundary_periodic, grid_type
    use row_column_double, only : new_row_column_double => new_row_column, &
       row_column_double_type => row_column_type
    use row_column_single, only : new_row_column_single => new_row_column, &
       row_column_single_type => row_column_type
    use row_sharing, only : row_sharing_type
+   use symbol_table, only : new_symbol_table, symbol_table_type
    use transform_shape, only : shape_on_grid, transform_shape_type, whole_shape
    implicit none
    private
@@ -58,14 +58,9 @@ module fft_conv
       logical :: shared = .false.           !! processes share the rows
       type(grid_type) :: grid               !! of an operator of a solid
       type(kernel_type) :: kernel           !! what the solid is
-      integer, private :: own(2) = 0        !! first and last wave number along x of this process
-      !> Symbols over (mx my): (own(1):own(2), 0:my/2, 1) or xx, yy, xy; zero beyond mx/2. Not there if
-      !> single or lean.
-      real(dp), allocatable, private :: symbol(:, :, :)
+      type(symbol_table_type) :: symbols    !! no values if lean
       type(row_column_double_type), private :: high        !! does the work if not single
       type(row_column_single_type), private :: low         !! does the work if single
-      real(sp), allocatable, private :: low_symbol(:, :, :)   !! the symbols for it ...
-      real(dp), private :: symbol_unit = 1.0_dp               !! ... over this power of two
    contains
       procedure :: apply
       procedure :: apply_inverse
@@ -78,13 +73,8 @@ module fft_conv
       procedure :: add_backward_row
       procedure :: set_unit
       procedure :: spectrum_memory
-      procedure :: symbol_of
-      procedure :: self_compliance
       procedure :: modes
       procedure :: set_symbol
-      procedure :: mean_mode
-      procedure :: set_mean_mode
-      procedure :: set_mean_compliance
       procedure :: destroy
    end type convolution_type
 
@@ -114,9 +104,11 @@ contains
       if (present(lean)) tabulated = .not. lean
       if (grid%boundary /= boundary_periodic .or. kernel%components > 1 .or. self%single) tabulated = .true.
       if (.not. tabulated) return
-      call new_table(self)
-      call kernel%symbols(grid, self%mx, self%my, self%symbol(self%own(1):last_mode(self), :, :), self%own(1))
-      call finish_symbol(self)
+      call self%symbols%make_room()
+      associate (table => self%symbols)
+         call kernel%symbols(grid, self%mx, self%my, table%values(table%first:table%last, :, :), table%first)
+      end associate
+      call self%symbols%finish()
    end subroutine new_convolution
 
    !> The inverse of the operator of a solid on a periodic grid: tractions from displacements, Pa/m.
@@ -130,9 +122,11 @@ contains
       if (allocated(error)) return
       self%grid = grid
       self%kernel = kernel
-      call new_table(self)
-      call kernel%inverse_symbols(grid, self%symbol(self%own(1):last_mode(self), :, :), self%own(1))
-      call finish_symbol(self)
+      call self%symbols%make_room()
+      associate (table => self%symbols)
+         call kernel%inverse_symbols(grid, table%values(table%first:table%last, :, :), table%first)
+      end associate
+      call self%symbols%finish()
    end subroutine new_inverse_convolution
 
    !> A periodic scalar operator from its symbol, even in both wave numbers, for fields that every process
@@ -163,7 +157,7 @@ contains
       class(convolution_type), intent(in) :: self
       integer :: modes(2)
 
-      modes = [self%own(1), last_mode(self)]
+      modes = [self%symbols%first, self%symbols%last]
    end function modes
 
    !> Set the symbol of an operator that was made without one. Collective.
@@ -171,31 +165,10 @@ contains
       class(convolution_type), intent(inout) :: self
       real(dp), intent(in) :: symbol(:, :)         !! [modes of this process, 0:my/2]
 
-      call new_table(self)
-      self%symbol(self%own(1):last_mode(self), :, 1) = symbol
-      call finish_symbol(self)
+      call self%symbols%make_room()
+      self%symbols%values(self%symbols%first:self%symbols%last, :, 1) = symbol
+      call self%symbols%finish()
    end subroutine set_symbol
-
-   !> Last wave number along x for which this process has a symbol.
-   pure integer function last_mode(self)
-      class(convolution_type), intent(in) :: self
-
-      last_mode = min(self%own(2), self%mx/2)
-   end function last_mode
-
-   !> Put the factor of the inverse transform into the symbol; in single precision where that works.
-   subroutine finish_symbol(self)
-      type(convolution_type), intent(inout) :: self
-
-      self%symbol = self%symbol/(real(self%mx, dp)*self%my)
-      if (.not. self%single) return
-      self%symbol_unit = maxval(abs(self%symbol))
-      if (self%shared) self%symbol_unit = global_max(self%symbol_unit)
-      self%symbol_unit = power_of_two(self%symbol_unit)
-      allocate (self%low_symbol(self%own(1):self%own(2), 0:self%my/2, size(self%symbol, 3)))
-      self%low_symbol = real(self%symbol/self%symbol_unit, sp)
-      deallocate (self%symbol)
-   end subroutine finish_symbol
 
    !> Sizes, buffers and plans.
    subroutine plan(self, shape, error, single, memory)
@@ -216,20 +189,12 @@ contains
       if (present(single)) self%single = single
       if (self%single) then
          call new_row_column_single(self%low, shape, self%threads, error, memory)
-         self%own = self%low%own_columns()
+         call new_symbol_table(self%symbols, shape, self%low%own_columns(), self%single)
       else
          call new_row_column_double(self%high, shape, self%threads, error, memory)
-         self%own = self%high%own_columns()
+         call new_symbol_table(self%symbols, shape, self%high%own_columns(), self%single)
       end if
    end subroutine plan
-
-   !> Room for the symbols.
-   subroutine new_table(self)
-      type(convolution_type), intent(inout) :: self
-
-      allocate (self%symbol(self%own(1):self%own(2), 0:self%my/2, merge(1, 3, self%components == 1)), &
-         source=0.0_dp)
-   end subroutine new_table
 
    !> The memory of the spectrum, aligned for FFTW, of at least a field of doubles (half of that if
    !> single). Others may use it while the operator is not at work.
@@ -378,85 +343,6 @@ contains
       if (self%single) call self%low%set_unit(power_of_two(size))
    end subroutine set_unit
 
-   !> One part of the symbol for a field and its transform without factors, in the first quarter of the
-   !> plane of wave numbers. Not for a single or lean operator, nor where processes share the rows.
-   pure function symbol_of(self, part) result(table)
-      class(convolution_type), intent(in) :: self
-      integer, intent(in) :: part                  !! 1; of a vector operator 1: xx, 2: yy, 3: xy
-      real(dp) :: table(0:self%mx/2, 0:self%my/2)  !! m/Pa
-
-      table = self%symbol(0:self%mx/2, :, part)*(real(self%mx, dp)*self%my)
-   end function symbol_of
-
-   !> Displacement of a cell under a unit traction on that cell alone, the mean of both components: the
-   !> mean of the symbols over the whole spectrum; without the mean mode where periodic. Not for a single
-   !> or lean operator. Collective where processes share the rows.
-   function self_compliance(self) result(compliance)
-      class(convolution_type), intent(in) :: self
-      real(dp) :: compliance
-      real(dp) :: symbols(0:self%mx/2), weight
-      integer :: i, j
-
-      compliance = 0.0_dp
-      do j = 0, self%my/2
-         symbols = 0.0_dp
-         do i = self%own(1), last_mode(self)
-            symbols(i) = self%symbol(i, j, 1) + self%symbol(i, j, self%components)
-         end do
-         ! All columns of a row at once: the sum is in the same order for any number of processes.
-         if (self%shared) symbols = global_sum(symbols)
-         do i = 0, self%mx/2
-            if (self%grid%boundary == boundary_periodic .and. i == 0 .and. j == 0) cycle
-            weight = merge(1.0_dp, 2.0_dp, i == 0 .or. 2*i == self%mx) &
-               *merge(1.0_dp, 2.0_dp, j == 0 .or. 2*j == self%my)
-            compliance = compliance + 0.5_dp*weight*symbols(i)
-         end do
-      end do
-   end function self_compliance
-
-   !> The mean mode: the uniform displacement that goes with tractions whose sum over the cells is 1 Pa.
-   !> Not for a single or lean operator, nor the procedures that set it. Collective where processes share
-   !> the rows.
-   function mean_mode(self, component) result(mode)
-      class(convolution_type), intent(in) :: self
-      integer, intent(in) :: component             !! 1, or 2 of a vector operator
-      real(dp) :: mode                             !! m/Pa
-      real(dp) :: modes(1)
-
-      modes = 0.0_dp
-      if (has_mean_mode(self)) modes = self%symbol(0, 0, component)
-      if (self%shared) modes = global_sum(modes)
-      mode = modes(1)
-   end function mean_mode
-
-   !> Does this process hold the symbol of the mean mode?
-   pure logical function has_mean_mode(self)
-      class(convolution_type), intent(in) :: self
-
-      has_mean_mode = self%own(1) == 0 .and. self%own(2) >= 0
-   end function has_mean_mode
-
-   !> Set the mean mode of one component.
-   subroutine set_mean_mode(self, component, mode)
-      class(convolution_type), intent(inout) :: self
-      integer, intent(in) :: component
-      real(dp), intent(in) :: mode                 !! as `mean_mode` gives it, m/Pa
-
-      if (has_mean_mode(self)) self%symbol(0, 0, component) = mode
-   end subroutine set_mean_mode
-
-   !> Set the mean mode of all components of a periodic operator by the compliance for a uniform traction:
-   !> u = compliance t. For a block at rest that is its thickness.
-   subroutine set_mean_compliance(self, compliance)
-      class(convolution_type), intent(inout) :: self
-      real(dp), intent(in) :: compliance           !! m/Pa
-      integer :: c
-
-      do c = 1, self%components
-         call self%set_mean_mode(c, compliance/(real(self%mx, dp)*self%my))
-      end do
-   end subroutine set_mean_compliance
-
    !> Between the rows' two passes: transform the columns, multiply by the symbol, transform back.
    subroutine columns(self, action, form)
       class(convolution_type), intent(inout) :: self
@@ -468,11 +354,11 @@ contains
       back = action /= columns_form
       self%ffts = self%ffts + merge(2, 1, back)*self%components
       if (self%single) then
-         call self%low%columns(self%low_symbol, self%symbol_unit, inverse, back, form)
-      else if (.not. allocated(self%symbol)) then
+         call self%low%columns(self%symbols%low_values, self%symbols%unit, inverse, back, form)
+      else if (.not. allocated(self%symbols%values)) then
          call columns_computed(self%high, self%grid, self%kernel, inverse, form)
       else
-         call self%high%columns(self%symbol, self%symbol_unit, inverse, back, form)
+         call self%high%columns(self%symbols%values, self%symbols%unit, inverse, back, form)
       end if
    end subroutine columns
 
@@ -482,8 +368,7 @@ contains
 
       call self%low%destroy()
       call self%high%destroy()
-      if (allocated(self%symbol)) deallocate (self%symbol)
-      if (allocated(self%low_symbol)) deallocate (self%low_symbol)
+      call self%symbols%destroy()
    end subroutine destroy
 
 end module fft_conv

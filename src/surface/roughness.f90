@@ -59,7 +59,6 @@ contains
       call height_moments(grid, height, statistics)
       statistics%rms_slope_differences = difference_slope(grid, height)
       call spectral_moments(grid, height, statistics%mean, moments, error)
-      if (allocated(error)) return
       statistics%rms_slope = sqrt(moments(1))
       statistics%rms_curvature = sqrt(moments(2))
       if (grid%ny > 1) statistics%rms_curvature = 0.5_dp*sqrt(moments(2))

@@ -1,0 +1,71 @@
+!> The fields of a contact by the names that they have in a result, some rows at a time: no field is copied
+!> as a whole. The rows are counted on this process.
+module contact_fields
+   use asperity_precision, only : dp, int8
+   use contact_model, only : contact_type
+   use contact_rule, only : touches
+   implicit none
+   private
+
+   public :: contact_rows, field_rows
+
+contains
+
+   !> Rows of a field. The states of the cells have another type: see `contact_rows`.
+   subroutine field_rows(self, name, first, values)
+      class(contact_type), intent(in) :: self
+      character(*), intent(in) :: name              !! as in /snapshots, but for 'contact'
+      integer, intent(in) :: first                  !! the first row
+      real(dp), intent(out) :: values(:, :)         !! [nx, rows]
+      integer :: c, last
+
+      last = first + size(values, 2) - 1
+      select case (name)
+      case ('pressure')
+         values = self%state%pressure(:, first:last)
+      case ('gap')
+         ! Where the surfaces overlap by less than the tolerance they touch.
+         values = max(self%state%gap(:, first:last), 0.0_dp)
+      case ('displacement_z')
+         if (allocated(self%state%displacement)) then
+            values = self%state%displacement(:, first:last)
+         else if (self%state%first) then
+            values = 0.0_dp
+         else
+            values = self%state%gap(:, first:last) + self%height(:, first:last) + self%state%level
+         end if
+      case ('road_height')
+         values = self%height(:, first:last)
+      case default
+         values = 0.0_dp
+         if (.not. self%frictional) return
+         c = merge(1, 2, index(name, '_x') > 0)
+         if (index(name, 'traction') == 1) values = self%state%tangential%traction(:, c, first:last)
+         if (index(name, 'displacement') == 1) values = self%state%tangential%displacement(:, c, first:last)
+         if (index(name, 'slip') == 1) values = self%tangential%slip(:, c, first:last)
+      end select
+   end subroutine field_rows
+
+   !> The states of the cells of some rows: 0 open, 1 stick, 2 slip. Without friction all contact slips;
+   !> with it all sticks until the road moves.
+   subroutine contact_rows(self, first, states)
+      class(contact_type), intent(in) :: self
+      integer, intent(in) :: first                  !! the first row
+      integer(int8), intent(out) :: states(:, :)    !! [nx, rows]
+      integer(int8) :: touching
+      integer :: j, k
+
+      touching = 2_int8
+      if (self%holds()) touching = 1_int8
+      do k = 1, size(states, 2)
+         j = first + k - 1
+         if (self%rubs()) then
+            states(:, k) = self%state%tangential%contact(:, j)
+         else
+            states(:, k) = merge(touching, 0_int8, &
+               touches(self%side%adhesive, self%state%pressure(:, j), self%state%gap(:, j)))
+         end if
+      end do
+   end subroutine contact_rows
+
+end module contact_fields

@@ -1,0 +1,345 @@
+!> The files of a run: its lock, its result and its checkpoint.
+!>
+!> The first process has the files. All procedures are collective: what fails on one process fails on all
+!> of them, with the same message (module `process_agreement`).
+!>
+!> The procedures whose `error` is `intent(inout)` do nothing if it is already set. A caller may therefore
+!> call several in sequence, and look at the error once at the end.
+module run_files
+   use asperity_checkpoint, only : checkpoint_path, checkpoint_reader_type, checkpoint_writer_type, &
+      remove_checkpoint
+   use asperity_errors, only : error_input, error_type, fail
+   use asperity_parallel, only : exchanged_bytes, is_first_process, process_count, share
+   use asperity_precision, only : dp
+   use asperity_simulation, only : simulation_type
+   use case_identity, only : identity_of
+   use case_record, only : checksums_of_maps, map_lines, write_material
+   use case_report, only : resolved_input
+   use file_lock, only : file_lock_type
+   use path_identity, only : real_path
+   use process_agreement, only : agree
+   use result_file, only : result_file_type, result_plan_type
+   use result_names, only : sibling_path
+   use result_target, only : check_place, check_replaced, damage_of_result
+   use simulation_state, only : load_state, save_state
+   use snapshot_writer, only : write_height, write_snapshot
+   use steady_losses, only : longest_wave
+   use text_tools, only : add_line, to_text
+   implicit none
+   private
+
+   public :: run_files_type
+
+   !> The files of a run in hand. Not to be copied.
+   type :: run_files_type
+      character(:), allocatable :: path                !! of the result
+      type(result_file_type), private :: result
+      type(file_lock_type), private :: lock            !! no other run writes this result meanwhile
+      character(:), allocatable, private :: settings   !! every resolved setting, one per line
+      character(:), allocatable, private :: identity   !! what must agree for a restart
+      character(:), allocatable, private :: warnings   !! all of the run, one per line
+   contains
+      procedure :: take_place
+      procedure :: begin
+      procedure :: take_up
+      procedure :: write_row
+      procedure :: snapshot
+      procedure :: save
+      procedure :: note_warnings
+      procedure :: leave_word
+      procedure :: finish
+      procedure :: close => close_files
+   end type run_files_type
+
+contains
+
+   !> Lock the place of the result and check that it may be written.
+   subroutine take_place(self, path, restart, overwrite, error)
+      class(run_files_type), intent(inout) :: self
+      character(*), intent(in) :: path             !! of the result
+      logical, intent(in) :: restart               !! go on from the checkpoint of the result
+      logical, intent(in) :: overwrite             !! replace an unfinished run and its checkpoint
+      type(error_type), allocatable, intent(out) :: error
+
+      self%path = path
+      self%warnings = ''
+      if (is_first_process()) call check_and_lock(self, restart, overwrite, error)
+      call agree(error)
+   end subroutine take_place
+
+   !> See that the result can be written where the case wants it, that no other run writes it, and
+   !> that nothing is lost by it.
+   subroutine check_and_lock(self, restart, overwrite, error)
+      type(run_files_type), intent(inout) :: self
+      logical, intent(in) :: restart, overwrite
+      type(error_type), allocatable, intent(out) :: error
+      logical :: exists
+
+      call check_place(self%path, error)
+      if (allocated(error)) return
+      ! A link to a result has the lock of the result.
+      call self%lock%acquire(sibling_path(real_path(self%path), '.lock'), self%path, error)
+      if (allocated(error)) return
+      if (restart) then
+         inquire (file=self%path, exist=exists)
+         if (exists) call damage_of_result(self%path, error)
+      else if (.not. overwrite) then
+         call check_replaced(self%path, error)
+      end if
+   end subroutine check_and_lock
+
+   !> Create a result with everything that is known before the first row.
+   subroutine begin(self, sim, rows, error)
+      class(run_files_type), intent(inout) :: self
+      type(simulation_type), intent(in) :: sim
+      integer, intent(in) :: rows                  !! of the whole run
+      type(error_type), allocatable, intent(out) :: error
+      type(result_plan_type) :: plan
+
+      call describe(self, sim)
+      associate (case => sim%case)
+         plan%title = trim(case%title)
+         plan%input = case%input
+         plan%settings = self%settings
+         plan%rows = rows
+         plan%snapshots = size(case%output%snapshot_times) + 1
+         if (case%output%snapshot_every > 0) &
+            plan%snapshots = plan%snapshots + rows/case%output%snapshot_every
+         if (sim%has_steady) plan%losses = count(case%phases%steady)
+         plan%compression = case%output%compression
+         if (is_first_process()) call self%result%create(self%path, sim%grid, plan, error)
+         call agree(error)
+         if (allocated(error)) return
+         call write_height(self%result, sim)
+         if (is_first_process()) then
+            call self%result%publish(error)
+            if (.not. allocated(error)) then
+               call write_material(self%result, case%material)
+               call self%result%write_text('height_maps', checksums_of_maps(sim))
+               call self%result%write_text('warnings', case%warnings)
+               call self%result%write_text('outcome', 'running')
+               call self%result%report(error)
+            end if
+         end if
+      end associate
+      call agree(error)
+   end subroutine begin
+
+   !> Note the settings of a run, and those that must agree for a restart.
+   subroutine describe(self, sim)
+      class(run_files_type), intent(inout) :: self
+      type(simulation_type), intent(in) :: sim
+
+      self%settings = resolved_input(sim%case)
+      self%identity = identity_of(self%settings)//map_lines(sim)
+   end subroutine describe
+
+   !> Go on from the checkpoint: the state, and a result without what came later.
+   subroutine take_up(self, sim, last_snapshot, error)
+      class(run_files_type), intent(inout) :: self
+      type(simulation_type), intent(inout) :: sim
+      integer, intent(out) :: last_snapshot        !! row of the last snapshot in the result; -1 if none
+      type(error_type), allocatable, intent(out) :: error
+      type(checkpoint_reader_type) :: reader
+
+      last_snapshot = -1
+      call describe(self, sim)
+      if (is_first_process()) call open_checkpoint(self, sim, reader, error)
+      call agree(error)
+      if (allocated(error)) return
+      call load_state(sim, reader, error)
+      if (is_first_process()) then
+         call reader%close()
+         if (.not. allocated(error)) call take_up_result(self, sim, reader%result_id, error)
+         if (.not. allocated(error)) last_snapshot = self%result%last_snapshot()
+      end if
+      call agree(error)
+      if (.not. allocated(error)) call share(last_snapshot)
+   end subroutine take_up
+
+   !> Open the checkpoint, and see that it is that of the case. On the first process.
+   subroutine open_checkpoint(self, sim, reader, error)
+      type(run_files_type), intent(in) :: self
+      type(simulation_type), intent(in) :: sim
+      type(checkpoint_reader_type), intent(inout) :: reader
+      type(error_type), allocatable, intent(out) :: error
+
+      call reader%open(self%path, error)
+      if (allocated(error)) return
+      call reader%compare(self%identity, error)
+      if (.not. allocated(error)) call compare_map(self, sim, reader, error)
+      if (allocated(error)) call reader%close()
+   end subroutine open_checkpoint
+
+   !> Open the result to go on after the last row of the checkpoint. On the first process.
+   subroutine take_up_result(self, sim, id, error)
+      type(run_files_type), intent(inout) :: self
+      type(simulation_type), intent(in) :: sim
+      character(*), intent(in) :: id               !! of the result that the checkpoint belongs to
+      type(error_type), allocatable, intent(out) :: error
+
+      call self%result%reopen(self%path, id, sim%state%row%step, &
+         sim%case%output%compression, error)
+      if (allocated(error)) return
+      call self%result%write_text('outcome', 'running', error)
+      if (.not. allocated(error)) call take_up_warnings(self, sim, error)
+   end subroutine take_up_result
+
+   !> See that the height map is that of the checkpoint. Maps from files are bound by their checksums
+   !> in the identity; a map that is computed may differ by rounding on another machine.
+   subroutine compare_map(self, sim, reader, error)
+      type(run_files_type), intent(in) :: self
+      type(simulation_type), intent(in) :: sim
+      type(checkpoint_reader_type), intent(inout) :: reader
+      type(error_type), allocatable, intent(out) :: error
+      real(dp), parameter :: rounding = 1e-9_dp
+      real(dp) :: rms_height, summit, allowed
+
+      call reader%get_number('rms_height', rms_height, error)
+      if (allocated(error)) return
+      call reader%get_number('summit', summit, error)
+      if (allocated(error)) return
+      allowed = rounding*max(sim%rms_height, abs(sim%summit))
+      if (abs(rms_height - sim%rms_height) <= allowed .and. &
+         abs(summit - sim%summit) <= allowed) return
+      call fail(error, error_input, checkpoint_path(self%path)//': the height map has the rms height '// &
+         to_text(rms_height)//' m and the summit '//to_text(summit)//' m in the checkpoint, '// &
+         to_text(sim%rms_height)//' m and '//to_text(sim%summit)//' m in the case')
+   end subroutine compare_map
+
+   !> Read the earlier warnings of the run, except those of rows that are computed again.
+   subroutine take_up_warnings(self, sim, error)
+      type(run_files_type), intent(inout) :: self
+      type(simulation_type), intent(in) :: sim
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: left, line
+      integer :: at, next, step, status
+
+      call self%result%read_text('run_warnings', left, error)
+      if (allocated(error)) return
+      at = 1
+      do while (at <= len(left))
+         next = index(left(at:), new_line('a'))
+         if (next == 0) next = len(left) - at + 2
+         line = left(at:at + next - 2)
+         at = at + next
+         read (line(min(6, len(line)):max(5, index(line, ',') - 1)), *, iostat=status) step
+         if (status == 0 .and. step > sim%state%row%step) cycle
+         call add_line(self%warnings, line)
+      end do
+   end subroutine take_up_warnings
+
+   !> Write the last row of the history and, if it is one of steady sliding, where it loses its energy.
+   subroutine write_row(self, sim, error)
+      class(run_files_type), intent(inout) :: self
+      type(simulation_type), intent(in) :: sim
+      type(error_type), allocatable, intent(inout) :: error
+
+      if (allocated(error)) return
+      if (is_first_process()) call append(self, sim, error)
+      call agree(error)
+   end subroutine write_row
+
+   !> The same on the first process.
+   subroutine append(self, sim, error)
+      type(run_files_type), intent(inout) :: self
+      type(simulation_type), intent(in) :: sim
+      type(error_type), allocatable, intent(out) :: error
+      integer :: k
+
+      call self%result%append_row(sim%state%row, error)
+      if (allocated(error) .or. .not. sim%state%steady%now) return
+      associate (losses => sim%steady%losses)
+         call self%result%write_losses(sim%state%row%step, &
+            [(longest_wave(sim%grid)/2.0_dp**(k - 1), k = 1, size(losses%octave))], losses%octave, &
+            sim%case%material%prony_tau, losses%arm, error)
+      end associate
+   end subroutine append
+
+   !> Write the fields that were asked for.
+   subroutine snapshot(self, sim, error, at_stop)
+      class(run_files_type), intent(inout) :: self
+      type(simulation_type), intent(in) :: sim
+      type(error_type), allocatable, intent(inout) :: error
+      logical, intent(in), optional :: at_stop     !! written for a stop only: a restart drops it
+
+      if (.not. allocated(error)) call write_snapshot(self%result, sim, error, at_stop)
+   end subroutine snapshot
+
+   !> Write a checkpoint of the state after the last row.
+   subroutine save(self, sim, error)
+      class(run_files_type), intent(inout) :: self
+      type(simulation_type), intent(inout) :: sim
+      type(error_type), allocatable, intent(inout) :: error
+      type(checkpoint_writer_type) :: writer
+
+      if (allocated(error)) return
+      if (is_first_process()) then
+         call writer%start(self%path, self%result%id, self%identity)
+         call writer%put_number('rms_height', sim%rms_height)
+         call writer%put_number('summit', sim%summit)
+      end if
+      call save_state(sim, writer)
+      if (is_first_process()) then
+         call writer%commit(error)                 ! reports the first fault of all these calls
+         if (.not. allocated(error)) call self%result%link_checkpoint(error)
+      end if
+      call agree(error)
+   end subroutine save
+
+   !> Keep new warnings for the result.
+   subroutine note_warnings(self, lines)
+      class(run_files_type), intent(inout) :: self
+      character(*), intent(in) :: lines
+
+      call add_line(self%warnings, lines)
+   end subroutine note_warnings
+
+   !> Leave in the result how the run ended, and what it warned of.
+   subroutine leave_word(self, outcome, error)
+      class(run_files_type), intent(inout) :: self
+      character(*), intent(in) :: outcome
+      type(error_type), allocatable, intent(inout) :: error
+
+      if (allocated(error)) return
+      if (is_first_process()) then
+         if (len(self%warnings) > 0) &
+            call self%result%write_text('run_warnings', self%warnings, error)
+         if (.not. allocated(error)) call self%result%write_text('outcome', outcome, error)
+      end if
+      call agree(error)
+   end subroutine leave_word
+
+   !> The run is complete: there is nothing to go on with.
+   subroutine finish(self, error)
+      class(run_files_type), intent(inout) :: self
+      type(error_type), allocatable, intent(inout) :: error
+      real(dp) :: exchanged
+
+      if (allocated(error)) return
+      exchanged = exchanged_bytes()
+      if (is_first_process()) then
+         call self%result%write_number('processes', real(process_count(), dp))
+         call self%result%write_number('exchanged_bytes', exchanged)
+         call self%result%unlink_checkpoint(error)
+         if (.not. allocated(error)) call remove_checkpoint(self%path)
+      end if
+      call agree(error)
+      call self%leave_word('finished', error)
+      if (is_first_process() .and. .not. allocated(error)) call self%result%finish(.true., error)
+      call agree(error)
+   end subroutine finish
+
+   !> Close the result and release the lock.
+   subroutine close_files(self, error)
+      class(run_files_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out) :: error
+
+      if (is_first_process()) then
+         call self%result%close(error)
+         call self%lock%release()
+      end if
+      call agree(error)
+   end subroutine close_files
+
+end module run_files
