@@ -1,5 +1,6 @@
 !> What this program was built with: the compiler and the versions of the libraries that are linked.
-!> Reports of faults and results from clusters need it.
+!> Reports of faults and results from clusters need it. With the macro ASPERITY_MKL the transforms are those
+!> of Intel's MKL, which has the interface of FFTW.
 module linked_libraries
    use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_f_pointer, c_int, c_ptr
    use, intrinsic :: iso_fortran_env, only : compiler_version
@@ -53,6 +54,29 @@ contains
          'MPI: '//parallel//new_line('a')
    end function linked_versions
 
+#ifdef ASPERITY_MKL
+   !> The version of MKL, which stands in for FFTW: "Intel(R) oneAPI Math Kernel Library Version 2026.2 ...".
+   function fftw_version() result(text)
+      character(:), allocatable :: text
+      character(kind=c_char) :: buffer(200)
+      integer :: i
+      interface
+         subroutine mkl_version(buffer, length) bind(c, name='MKL_Get_Version_String')
+            import :: c_char, c_int
+            character(kind=c_char), intent(out) :: buffer(*)
+            integer(c_int), value :: length
+         end subroutine mkl_version
+      end interface
+
+      call mkl_version(buffer, size(buffer, kind=c_int))
+      text = 'none, but '
+      do i = 1, size(buffer)
+         if (buffer(i) == achar(0)) exit
+         text = text//buffer(i)
+      end do
+      text = trim(text)
+   end function fftw_version
+#else
    !> The version of FFTW, from the first word of its wisdom.
    function fftw_version() result(text)
       character(:), allocatable :: text
@@ -71,5 +95,6 @@ contains
       end do
       call c_free(memory)
    end function fftw_version
+#endif
 
 end module linked_libraries
