@@ -71,8 +71,8 @@ contains
       type(case_type), intent(in) :: case
       real(dp) :: fields
 
-      fields = 10.7_dp
-      if (case%grid%boundary == boundary_free) fields = 54.0_dp
+      fields = 12.7_dp
+      if (case%grid%boundary == boundary_free) fields = 62.0_dp
       if (case%solver%method == 'thesis') fields = 3.4_dp
    end function adhesion_fields
 

@@ -24,7 +24,7 @@
 !> Python, could not be called.
 module adhesion_potential
    use asperity_errors, only : add_fault, error_input, error_type
-   use asperity_precision, only : dp
+   use asperity_precision, only : dp, int64
    implicit none
    private
 
@@ -245,29 +245,70 @@ contains
       end select
    end subroutine adhesive_terms
 
-   !> e' and e'' of a row of cells at once.
-   pure subroutine adhesive_slopes(self, gap, slope, curvature)
+   !> e' and e'' of a row of cells at once, and e.
+   pure subroutine adhesive_slopes(self, gap, slope, curvature, energy)
       type(adhesion_potential_type), intent(in) :: self
       real(dp), intent(in), contiguous :: gap(:)         !! m, >= 0
       real(dp), intent(out), contiguous :: slope(:)      !! e', Pa
       real(dp), intent(out), contiguous :: curvature(:)  !! e'', Pa/m
-      real(dp) :: energy, scale, stiffness
+      real(dp), intent(out), contiguous, optional :: energy(:)   !! e, J/m2
+      real(dp) :: value, scale, stiffness
       integer :: i
 
       if (self%kind /= potential_exponential) then
          do i = 1, size(gap)
-            call adhesive_terms(self, gap(i), energy, slope(i), curvature(i))
+            call adhesive_terms(self, gap(i), value, slope(i), curvature(i))
+            if (present(energy)) energy(i) = value
          end do
          return
       end if
+      call decay(1.0_dp/self%range, gap, slope)
       scale = self%energy/self%range
       stiffness = -1.0_dp/self%range
       do i = 1, size(gap)
-         slope(i) = 0.0_dp
-         if (gap(i) < far*self%range) slope(i) = scale*exp(-gap(i)/self%range)
+         slope(i) = scale*slope(i)
          curvature(i) = stiffness*slope(i)
       end do
+      if (present(energy)) energy(:) = -self%range*slope
    end subroutine adhesive_slopes
+
+   !> exp(-rate gap) of a row, to round-off; beyond `far` it is nothing beside 1. The loop has no call and no branch,
+   !> so that the compiler can treat several cells at once, which the library's exponential does not allow:
+   !> exp(-x) = 2^-k exp(-r) with the integer k next to x/ln 2, and |r| <= ln(2)/2 in a series of Taylor.
+   pure subroutine decay(rate, gap, values)
+      real(dp), intent(in) :: rate
+      real(dp), intent(in), contiguous :: gap(:)
+      real(dp), intent(out), contiguous :: values(:)
+      ! A sum with `rounder` is rounded to an integer, which its last bits then hold.
+      real(dp), parameter :: rounder = 1.5_dp*2.0_dp**52
+      ! ln 2 in two parts, the first with zeros at the end, so that k times it is exact.
+      real(dp), parameter :: log_high = 6.93147180369123816490e-01_dp, log_low = 1.90821492927058770002e-10_dp
+      integer(int64), parameter :: one = 1023_int64      !! exponent of the number 1
+      integer(int64) :: bits
+      real(dp) :: x, k, r, p
+      integer :: i
+
+      do i = 1, size(gap)
+         x = min(rate*gap(i), 2.0_dp*far)
+         k = x*(1.0_dp/log(2.0_dp)) + rounder
+         bits = shiftl(one - (transfer(k, bits) - transfer(rounder, bits)), 52)
+         k = k - rounder
+         r = (k*log_high - x) + k*log_low
+         p = 1.0_dp + r/13.0_dp
+         p = 1.0_dp + r*p*(1.0_dp/12.0_dp)
+         p = 1.0_dp + r*p*(1.0_dp/11.0_dp)
+         p = 1.0_dp + r*p*(1.0_dp/10.0_dp)
+         p = 1.0_dp + r*p*(1.0_dp/9.0_dp)
+         p = 1.0_dp + r*p*(1.0_dp/8.0_dp)
+         p = 1.0_dp + r*p*(1.0_dp/7.0_dp)
+         p = 1.0_dp + r*p*(1.0_dp/6.0_dp)
+         p = 1.0_dp + r*p*(1.0_dp/5.0_dp)
+         p = 1.0_dp + r*p*(1.0_dp/4.0_dp)
+         p = 1.0_dp + r*p*(1.0_dp/3.0_dp)
+         p = 1.0_dp + r*p*(1.0_dp/2.0_dp)
+         values(i) = (1.0_dp + r*p)*transfer(bits, p)
+      end do
+   end subroutine decay
 
    !> Is there no attraction at a gap?
    pure function is_far(self, gap)

@@ -1,11 +1,13 @@
 !> The fast method for adhesive contact, on periodic and on free grids.
 !>
-!> (Modules: adhesion_state has the equations, adhesion_patch what the grids differ in, adhesion_descent the
-!> step, adhesion_directions the iterations in it, adhesion_steps how far to go; thesis, 2.3.) The gap, not
+!> (Modules: adhesion_state has the equations, adhesion_patch what the grids differ in, adhesion_work the fields,
+!> adhesion_residual the residual, adhesion_descent the step in the model, adhesion_directions the iterations in
+!> it, adhesion_plane what the step before adds to it, adhesion_steps how far to go; thesis, 2.3.) The gap, not
 !> the pressure, is the unknown, so that the adhesive traction is exact in every residual. An iteration does
 !>
 !>     measure            G = P + e'(g);  r = -G where the cell is free: where g > 0, or where G < 0 opens it
 !>     approach_minimum   the step s to about a minimum of the energy with a local model B_h in place of B
+!>     widen_step         s with the right share of the step before (module adhesion_plane)
 !>     find_part          one product B s; the part t of the step
 !>     update             g = g + t s;  P = P + t Q B s
 !>
@@ -25,20 +27,22 @@
 !> the reason is 'detached'.
 !>
 !> Fields of doubles: H, g, P, and the work fields exchange, residual, direction, old residual, change,
-!> image, curvature, state and traction of the model; the spectrum of B. In free mode the work fields (but the
+!> image, the step before and its product, curvature, state and traction of the model; the spectrum of B. In free mode the work fields (but the
 !> curvature), the spectrum and three more fields (state, traction, psi) have 4 times the cells, and the
 !> transforms counted are of the doubled grid.
 module adhesion_cg_fast
    use adhesion_descent, only : approach_minimum
-   use adhesion_directions, only : adhesion_iteration_type, adhesion_work_type, fresh, measure, updated
    use adhesion_model, only : new_adhesion_model
    use adhesion_patch, only : is_detached, new_adhesion_patch
+   use adhesion_plane, only : keep_step, stretch_step, widen_step
    use adhesion_potential, only : stiffens
+   use adhesion_residual, only : measure
    use adhesion_start, only : begin_contact
    use adhesion_symbols, only : adhesion_symbols_type
    use adhesion_state, only : adhesion_method_type, adhesion_problem_type, control_approach, &
       reason_closed, reason_converged, reason_detached, reason_limit, reason_stalled
    use adhesion_steps, only : choose_step, form_step_row, known_of_step, step_sums_type
+   use adhesion_work, only : adhesion_iteration_type, adhesion_work_type, fresh, updated
    use asperity_errors, only : error_type
    use kernels, only : kernel_type
    use asperity_precision, only : dp, int64
@@ -53,7 +57,7 @@ module adhesion_cg_fast
    public :: adhesion_fast_type, new_adhesion_fast
 
    integer, parameter :: most_updates = 40      !! steps between fresh products with B
-   integer, parameter :: most_failures = 3      !! directions in a row that give no step
+   integer, parameter :: most_failures = 8      !! directions in a row that give no step
 
    !> The solver with its operators and work fields, kept from solve to solve. Not to be copied.
    type, extends(adhesion_method_type) :: adhesion_fast_type
@@ -85,7 +89,9 @@ contains
             allocate (work%exchange(mx, rows), work%residual(mx, rows), work%direction(mx, rows), &
                work%old(mx, rows), work%model_state(mx, rows), work%model_traction(mx, rows), &
                work%change(mx, rows + work%model%halo%foreign), work%image(mx, rows), &
+               work%last_step(mx, rows), work%last_image(mx, rows), &
                work%curvature(work%patch%nx, work%patch%rows), source=0.0_dp)
+            allocate (work%bumpy(rows + work%model%halo%foreign), source=.true.)
             if (.not. work%patch%periodic) &
                allocate (self%state(mx, rows), self%traction(mx, rows), source=0.0_dp)
          end associate
@@ -138,7 +144,7 @@ contains
       type(adhesion_fast_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(inout) :: now
       type(solver_result_type), intent(inout) :: outcome
-      real(dp) :: part
+      real(dp) :: form, part, stretch
 
       self%work%scaling = 0.0_dp
       if (stiffens(now%problem%potential)) &
@@ -167,8 +173,8 @@ contains
          outcome%iterations = outcome%iterations + 1
 
          call approach_minimum(self%work, now)
-         call find_part(self, now, part)
-         call update(self, now, part)
+         call find_part(self, now, part, form, stretch)
+         call update(self, now, part, form, stretch)
          if (now%updates == most_updates .or. now%failures == 2) call refresh(self, now)
       end do
       if (outcome%reason /= reason_converged) call take_last_look(self, now, outcome)
@@ -211,21 +217,28 @@ contains
    end function proven_residual
 
    !> How far to go along the step: t, after one product with B.
-   subroutine find_part(self, now, part)
+   subroutine find_part(self, now, part, form, stretch)
       type(adhesion_fast_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(inout) :: now
       real(dp), intent(out) :: part              !! 0: no part of the step lowers the energy
+      real(dp), intent(out) :: form              !! Q s.B s
+      real(dp), intent(out) :: stretch           !! of the step since its product was formed
       type(step_sums_type) :: known
 
+      call widen_step(self%work, now)
       call form_step(self, now, known)
+      stretch = 1.0_dp
+      form = 0.0_dp
       part = 0.0_dp
       if (.not. known%slope < 0.0_dp) return
       call self%work%patch%stiffness%columns(columns_apply, known%form)
       known%form = now%problem%modulus*known%form
+      call stretch_step(self%work, now, known, stretch)
       associate (nx => self%work%patch%nx, rows => self%work%patch%rows, threads => self%work%patch%threads)
          part = choose_step(known, now%problem, now%state(1:nx, 1:rows), self%work%direction(1:nx, 1:rows), &
             threads)
       end associate
+      form = known%form
    end subroutine find_part
 
    !> What is known of the step before B s; the change of the displacement with it, transformed along the
@@ -260,27 +273,34 @@ contains
    end subroutine form_step
 
    !> g = g + t s, u and level with it, and the traction by recurrence.
-   subroutine update(self, now, part)
+   subroutine update(self, now, part, form, stretch)
       type(adhesion_fast_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(inout) :: now
       real(dp), intent(in) :: part
+      real(dp), intent(in) :: form               !! Q s.B s
+      real(dp), intent(in) :: stretch            !! of the step since its product was formed
       integer :: j, n
 
       if (.not. part > 0.0_dp) then
          now%failures = now%failures + 1
+         now%caution = now%caution + 1
+         now%has_last = .false.
          return
       end if
-      !$omp parallel do default(none) shared(self, now, part) private(j, n) &
+      !$omp parallel do default(none) shared(self, now, part, stretch) private(j, n) &
       !$omp num_threads(self%work%patch%threads)
       do j = 1, self%work%patch%all_rows
-         call self%work%patch%stiffness%add_backward_row(1, j, part*now%problem%modulus, &
-            now%traction(:, j))
+         call self%work%patch%stiffness%backward_row(1, j, self%work%image(:, j))
+         self%work%image(:, j) = stretch*self%work%image(:, j)
+         now%traction(:, j) = now%traction(:, j) + part*now%problem%modulus*self%work%image(:, j)
          n = self%work%patch%inner(j)
          now%state(:, j) = now%state(:, j) + part*self%work%direction(:, j)
          now%state(1:n, j) = max(now%state(1:n, j), 0.0_dp)
       end do
       now%level = now%level + part*now%lift
+      call keep_step(self%work, now, form)
       now%failures = 0
+      now%caution = max(now%caution - 1, 0)
       now%source = updated
       now%updates = now%updates + 1
    end subroutine update
@@ -301,7 +321,8 @@ contains
       call self%work%model%destroy()
       if (allocated(self%work%exchange)) deallocate (self%work%exchange, self%work%residual, &
          self%work%direction, self%work%old, self%work%model_state, self%work%model_traction, &
-         self%work%change, self%work%image, self%work%curvature)
+         self%work%change, self%work%bumpy, self%work%image, self%work%last_step, &
+         self%work%last_image, self%work%curvature)
       if (allocated(self%state)) deallocate (self%state, self%traction)
    end subroutine destroy
 

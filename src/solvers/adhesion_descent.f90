@@ -6,18 +6,24 @@
 !> size, so that the long way of an edge that advances cell by cell takes few of those. A step ends after
 !> `most_iterations`: more would make it exact for B_h, which is not B.
 !>
+!> Gaps that would be negative after an iteration are closed. The traction then needs the product of what that
+!> added to the step, too: its stencil part is enough, since the cells are scattered and a product with B follows
+!> the step. All of the product is formed where the sum of the gap is kept, which moves all open cells; where the
+!> attraction jumps, since then an iteration may close gaps by far; and after steps that failed.
+!>
 !> Where the attraction is strong the energy has many minima, and a long step can leap over the one that
 !> a slow motion would stop at. Therefore no iteration changes g + z_0 of a cell by more than a share of it:
 !> the attraction changes little, and the cells that have come into contact resist before their neighbours
 !> follow. Without this limit rough surfaces end with 5 to 10 % more contact.
 module adhesion_descent
-   use adhesion_directions, only : adhesion_iteration_type, adhesion_work_type, find_direction, measure
+   use adhesion_directions, only : find_direction
    use adhesion_potential, only : has_smooth_potential
    use adhesion_state, only : control_approach
-   use adhesion_steps, only : sum_shift
+   use adhesion_residual, only : measure
+   use adhesion_steps, only : stepped_gap, sum_shift
+   use adhesion_work, only : adhesion_iteration_type, adhesion_work_type
    use asperity_parallel, only : any_process
    use asperity_precision, only : dp
-   use field_sums, only : least_of_rows
    implicit none
    private
 
@@ -32,7 +38,7 @@ module adhesion_descent
 contains
 
    !> The step from the gap that is at hand, measured, towards a minimum of the model: in work%direction and
-   !> now%lift. After steps that failed it is shorter.
+   !> now%lift. After steps that failed it is shorter, until as many have not failed.
    subroutine approach_minimum(work, now)
       type(adhesion_work_type), intent(inout) :: work
       type(adhesion_iteration_type), intent(inout) :: now
@@ -51,10 +57,13 @@ contains
       end do
       inner%old_rz = 0.0_dp
       inner%lift = 0.0_dp
-      most = max(1, most_iterations/4**now%failures)
-      share = longest/4**now%failures
+      inner%held = .false.
+      inner%pending = 0.0_dp
+      inner%bumped = .false.
+      most = max(1, most_iterations/4**min(now%caution, 10))
+      share = longest/4**min(now%caution, 10)
       ! A jump of the attraction would hold every cell that comes to it in a small step.
-      if (.not. has_smooth_potential(now%problem%potential)) share = boldest/4**now%failures
+      if (.not. has_smooth_potential(now%problem%potential)) share = boldest/4**min(now%caution, 10)
       do k = 1, most
          if (k > 1) call measure(work, inner)
          if (k > 1 .and. inner%residual <= goal*now%residual) exit
@@ -67,6 +76,7 @@ contains
          work%direction(:, j) = inner%state(:, j) - now%state(:, j)
       end do
       now%lift = inner%level - now%level
+      now%held = inner%held
    end subroutine approach_minimum
 
    !> An iteration in the model: along the direction by the length that its curvature predicts.
@@ -74,59 +84,35 @@ contains
       type(adhesion_work_type), intent(inout) :: work
       type(adhesion_iteration_type), intent(inout) :: inner
       real(dp), intent(in) :: share                    !! by which g + z_0 may change
-      real(dp) :: alpha, curvature, form, farthest, shift, stiffness
-      logical :: clipped
+      real(dp) :: alpha, form, shift, stiffness
+      logical :: clipped, keeps_sum, whole
 
-      call form_change(work, inner, curvature, farthest)
       call form_product(work, form)
       form = inner%problem%modulus*form
-      stiffness = max(form + curvature, least_stiffness*form)
-      alpha = share*farthest
-      if (stiffness*alpha > inner%slope) alpha = inner%slope/stiffness
+      stiffness = max(form + inner%bend, least_stiffness*form)
+      alpha = share*inner%farthest
+      if (stiffness*alpha > inner%slope) then
+         alpha = inner%slope/stiffness
+      else
+         inner%held = .true.
+      end if
       shift = 0.0_dp
-      associate (patch => work%patch)
-         if (patch%periodic .and. inner%problem%control == control_approach) shift = sum_shift( &
-            inner%state, work%direction, alpha, inner%gap_sum, patch%threads)
-      end associate
-      call move(work, inner, alpha, shift, clipped)
+      keeps_sum = work%patch%periodic .and. inner%problem%control == control_approach
+      whole = keeps_sum .or. inner%caution > 0 .or. .not. has_smooth_potential(inner%problem%potential)
+      if (keeps_sum) shift = sum_shift(inner%state, work%direction, alpha, inner%gap_sum, work%patch%threads)
+      call move(work, inner, alpha, shift, whole, clipped)
       inner%level = inner%level + alpha*inner%lift
-      ! Gaps that closed on the way: the traction needs a product of the step that was really made.
-      if (clipped) call form_product(work, form)
-      call add_product(work, inner, merge(1.0_dp, alpha, clipped))
+      inner%pending = inner%problem%modulus*alpha
+      inner%bumped = clipped .and. .not. whole
+      if (.not. (clipped .or. abs(shift) > 0.0_dp)) return
+      if (whole) then
+         ! The shift moves all open cells: the traction needs a product of the step that was really made.
+         call form_product(work, form)
+         inner%pending = inner%problem%modulus
+      else
+         call work%model%halo%fetch(work%change)
+      end if
    end subroutine descend
-
-   !> The change of the displacement along d; d.e'' d, and the length at which a gap plus z_0 would be gone.
-   subroutine form_change(work, inner, curvature, farthest)
-      type(adhesion_work_type), intent(inout) :: work
-      type(adhesion_iteration_type), intent(in) :: inner
-      real(dp), intent(out) :: curvature, farthest
-      real(dp), allocatable :: rows(:, :), least(:)
-      real(dp) :: d, sums(1), slowest, total
-      integer :: i, j, n
-
-      allocate (rows(1, work%patch%all_rows), least(work%patch%all_rows))
-      !$omp parallel do default(none) shared(work, inner, rows, least) private(d, i, j, n, slowest, total) &
-      !$omp num_threads(work%patch%threads)
-      do j = 1, work%patch%all_rows
-         n = work%patch%inner(j)
-         total = 0.0_dp
-         slowest = huge(1.0_dp)
-         do i = 1, n
-            d = work%direction(i, j)
-            work%change(i, j) = d + inner%lift
-            if (.not. abs(d) > 0.0_dp) cycle
-            total = total + d**2*work%curvature(i, j)
-            slowest = min(slowest, (inner%state(i, j) + inner%units%length)/abs(d))
-         end do
-         rows(1, j) = total
-         least(j) = slowest
-         work%change(n + 1:work%patch%mx, j) = work%direction(n + 1:, j)
-         call work%model%put_row(j, work%change(:, j))
-      end do
-      sums = work%patch%sharing%totals(rows)
-      curvature = sums(1)
-      farthest = least_of_rows(least)
-   end subroutine form_change
 
    !> B_h of the change of the displacement, whose rows have been put, and the form.
    subroutine form_product(work, form)
@@ -148,50 +134,53 @@ contains
       form = sums(1)
    end subroutine form_product
 
-   !> g = g + alpha d, closed where it would be negative; and the change of the displacement.
-   subroutine move(work, inner, alpha, shift, clipped)
+   !> g = g + alpha d, closed where it would be negative; and the change of the displacement, the whole of it or
+   !> what it has beyond alpha times that of before.
+   subroutine move(work, inner, alpha, shift, whole, clipped)
       type(adhesion_work_type), intent(inout) :: work
       type(adhesion_iteration_type), intent(inout) :: inner
       real(dp), intent(in) :: alpha, shift
+      logical, intent(in) :: whole
       logical, intent(out) :: clipped                  !! the change is not alpha times that of before
       real(dp) :: next, old, trial
       integer :: i, j, n
       logical :: any_clipped
 
       any_clipped = .false.
-      !$omp parallel do default(none) shared(work, inner, alpha, shift) private(i, j, n, next, old, trial) &
+      work%bumpy(:) = .true.
+      !$omp parallel do default(none) shared(work, inner, alpha, shift, whole) private(i, j, n, next, old, trial) &
       !$omp reduction(.or.: any_clipped) num_threads(work%patch%threads)
       do j = 1, work%patch%all_rows
          n = work%patch%inner(j)
-         do i = 1, n
-            old = inner%state(i, j)
-            trial = old + alpha*work%direction(i, j)
-            next = max(trial - shift, 0.0_dp)
-            if (.not. trial > 0.0_dp) next = 0.0_dp
-            any_clipped = any_clipped .or. next > trial - shift
-            work%change(i, j) = next - old + alpha*inner%lift
-            inner%state(i, j) = next
-         end do
-         do i = n + 1, work%patch%mx
-            work%change(i, j) = alpha*work%direction(i, j)
-            inner%state(i, j) = inner%state(i, j) + work%change(i, j)
-         end do
-         call work%model%put_row(j, work%change(:, j))
+         if (whole) then
+            do i = 1, n
+               old = inner%state(i, j)
+               next = stepped_gap(old, work%direction(i, j), alpha, shift)
+               any_clipped = any_clipped .or. next > old + alpha*work%direction(i, j) - shift
+               work%change(i, j) = next - old + alpha*inner%lift
+               inner%state(i, j) = next
+            end do
+            do i = n + 1, work%patch%mx
+               work%change(i, j) = alpha*work%direction(i, j)
+               inner%state(i, j) = inner%state(i, j) + work%change(i, j)
+            end do
+            call work%model%put_row(j, work%change(:, j))
+         else
+            do i = 1, n
+               trial = inner%state(i, j) + alpha*work%direction(i, j)
+               next = max(trial, 0.0_dp)
+               work%change(i, j) = next - trial
+               inner%state(i, j) = next
+            end do
+            work%bumpy(j) = any(work%change(1:n, j) > 0.0_dp)
+            any_clipped = any_clipped .or. work%bumpy(j)
+            do i = n + 1, work%patch%mx
+               inner%state(i, j) = inner%state(i, j) + alpha*work%direction(i, j)
+               work%change(i, j) = 0.0_dp
+            end do
+         end if
       end do
       clipped = any_process(any_clipped)
    end subroutine move
-
-   !> Add a multiple of the product to the traction of the model.
-   subroutine add_product(work, inner, part)
-      type(adhesion_work_type), intent(in) :: work
-      type(adhesion_iteration_type), intent(inout) :: inner
-      real(dp), intent(in) :: part
-      integer :: j
-
-      !$omp parallel do default(none) shared(work, inner, part) private(j) num_threads(work%patch%threads)
-      do j = 1, work%patch%all_rows
-         inner%traction(:, j) = inner%traction(:, j) + part*inner%problem%modulus*work%image(:, j)
-      end do
-   end subroutine add_product
 
 end module adhesion_descent

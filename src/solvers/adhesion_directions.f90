@@ -1,65 +1,19 @@
-!> Residuals and directions of the fast method for adhesive contact (module adhesion_cg_fast).
-!>
-!> The work fields of the method, where its iteration stands, and the first two parts of an iteration:
-!> `measure` finds r and the error from the traction at hand, `find_direction` the direction d = z + beta d
-!> with z = M r.
+!> Directions of the fast method for adhesive contact (module adhesion_cg_fast): d = z + beta d with z = M r, from
+!> the residual r that was measured.
 module adhesion_directions
-   use adhesion_patch, only : adhesion_contact_type, adhesion_patch_type, evaluate_gradient
-   use adhesion_potential, only : adhesive_slopes
-   use adhesion_model, only : adhesion_model_type
    use adhesion_state, only : control_approach, control_pressure, diagonal_scaling
+   use adhesion_work, only : adhesion_iteration_type, adhesion_work_type
    use asperity_precision, only : dp
-   use field_sums, only : largest_of_rows, least_of_rows
+   use field_sums, only : largest_of_rows
    use row_sharing, only : row_sharing_type
    implicit none
    private
 
-   public :: adhesion_iteration_type, adhesion_work_type, find_direction, measure
+   public :: find_direction
 
    ! Passes over z. The first is left out where the sum of the gap is free.
    integer, parameter :: sum_pass = 0           !! add up
    integer, parameter :: last_pass = 2          !! z is what it will be
-
-   !> Errors in the padding count more: they are smooth and of one sign, and add up in energies.
-   real(dp), parameter :: strictness = 10.0_dp
-
-   ! Where the traction comes from. Only a fresh one proves a solution.
-   integer, parameter, public :: updated = 1    !! it was updated with the steps: it has gathered round-off
-   integer, parameter, public :: fresh = 2      !! it is a product with B
-
-   !> The operators and work fields of the method.
-   type :: adhesion_work_type
-      type(adhesion_patch_type) :: patch
-      type(adhesion_model_type) :: model
-      !> What is exchanged with M: G, of which `measure` makes the input of M, and then z = M r.
-      real(dp), allocatable :: exchange(:, :)
-      real(dp), allocatable :: residual(:, :)        !! r
-      real(dp), allocatable :: curvature(:, :)       !! e'' at the gap that was measured last, on the patch
-      real(dp), allocatable :: old(:, :)             !! r of the iteration before
-      real(dp), allocatable :: direction(:, :)       !! d
-      ! The contact in the local model of its energy:
-      real(dp), pointer, contiguous :: model_state(:, :) => null()
-      real(dp), pointer, contiguous :: model_traction(:, :) => null()
-      real(dp), allocatable :: change(:, :)          !! of the displacement, with the foreign rows of the model
-      real(dp), allocatable :: image(:, :)           !! its product
-      real(dp) :: scaling = 0.0_dp                   !! k of the Gauss potential, Pa/m; 0: none
-   end type adhesion_work_type
-
-   !> A contact that is being solved, and where its iteration stands.
-   type, extends(adhesion_contact_type) :: adhesion_iteration_type
-      integer :: source = fresh                  !! of the traction
-      integer :: updates = 0                     !! of the traction since it was fresh
-      integer :: failures = 0                    !! directions in a row that gave no step
-      real(dp) :: residual = 0.0_dp              !! natural residual by the traction at hand
-      real(dp) :: limit = 0.0_dp                 !! residual at which a solution is checked
-      real(dp) :: least = 0.0_dp                 !! least gap, m
-      real(dp) :: missing = 0.0_dp               !! prescribed force less sum of P, free mode, Pa
-      real(dp) :: old_missing = 0.0_dp           !! in the iteration before
-      real(dp) :: psi_r = 0.0_dp                 !! psi.r of the padding, Pa
-      real(dp) :: old_rz = 0.0_dp                !! r.z of the iteration before; 0: directions start anew
-      real(dp) :: lift = 0.0_dp                  !! d of the level
-      real(dp) :: slope = 0.0_dp                 !! r.d
-   end type adhesion_iteration_type
 
    !> Sums of a row of z.
    type :: z_sums_type
@@ -70,75 +24,6 @@ module adhesion_directions
    end type z_sums_type
 
 contains
-
-   !> The gradient G, the natural residual, and r, which is handed to the preconditioner.
-   subroutine measure(self, now)
-      type(adhesion_work_type), intent(inout) :: self
-      type(adhesion_iteration_type), intent(inout) :: now
-      real(dp), allocatable :: rows(:, :)
-      real(dp) :: worst, least, padding, sums(2)
-      integer :: j
-
-      if (self%patch%periodic .and. now%problem%control == control_approach) &
-         call evaluate_gradient(self%patch, now, self%exchange)
-      allocate (rows(2, self%patch%all_rows))
-      worst = 0.0_dp
-      least = huge(1.0_dp)
-      !$omp parallel do default(none) shared(self, now, rows) private(j, padding) &
-      !$omp reduction(max: worst) reduction(min: least) num_threads(self%patch%threads)
-      do j = 1, self%patch%all_rows
-         call measure_row(self, now, j, worst, least, padding)
-         rows(:, j) = [padding, sum(now%traction(1:self%patch%inner(j), j))]
-         call self%model%put_row(j, self%exchange(:, j))
-      end do
-      now%residual = largest_of_rows([worst])
-      now%least = least_of_rows([least])
-      if (self%patch%periodic) return
-      sums = self%patch%sharing%totals(rows)
-      now%psi_r = sums(1)
-      if (now%problem%control /= control_pressure) return
-      now%old_missing = now%missing
-      now%missing = now%force - sums(2)
-      now%residual = max(now%residual, abs(now%missing)/max(abs(now%force), now%units%traction))
-   end subroutine measure
-
-   !> A row of r and of M's input, from the row of G less p.
-   subroutine measure_row(self, now, j, worst, least, padding)
-      type(adhesion_work_type), intent(inout) :: self
-      type(adhesion_iteration_type), intent(in) :: now
-      integer, intent(in) :: j
-      real(dp), intent(inout) :: worst                 !! natural residual
-      real(dp), intent(inout) :: least                 !! least gap, m
-      real(dp), intent(out) :: padding                 !! psi.r of the padding, Pa
-      real(dp) :: g, gap, r
-      integer :: i, n
-
-      n = self%patch%inner(j)
-      call adhesive_slopes(now%problem%potential, now%state(1:n, j), self%exchange(1:n, j), &
-         self%curvature(1:n, j))
-      do i = 1, n
-         gap = now%state(i, j)
-         g = now%traction(i, j) + self%exchange(i, j) + now%load
-         worst = max(worst, abs(min(gap/now%units%length, g/now%units%traction)))
-         least = min(least, gap)
-         r = 0.0_dp
-         if (gap > 0.0_dp .or. g < 0.0_dp) r = -g
-         self%old(i, j) = self%residual(i, j)
-         self%residual(i, j) = r
-         self%exchange(i, j) = r
-      end do
-      if (self%scaling > 0.0_dp) self%exchange(1:n, j) = self%exchange(1:n, j)*diagonal_scaling(now%problem, &
-         now%state(1:n, j), self%scaling)
-      padding = 0.0_dp
-      do i = n + 1, self%patch%mx
-         r = -now%traction(i, j)
-         worst = max(worst, strictness*abs(r)/now%units%traction)
-         padding = padding + self%patch%psi(i, j)*r
-         self%old(i, j) = self%residual(i, j)
-         self%residual(i, j) = r
-         self%exchange(i, j) = r
-      end do
-   end subroutine measure_row
 
    !> The direction d = z + beta d, or d = z where that one does not descend.
    subroutine find_direction(self, now)
@@ -181,9 +66,17 @@ contains
       allocate (z(self%patch%mx))
       !$omp do
       do j = 1, self%patch%all_rows
-         call self%model%inverse_row(j, self%exchange(:, j), z)
+         if (self%scaling > 0.0_dp) then
+            call self%model%inverse_row(j, self%exchange(:, j), z)
+         else
+            call self%model%inverse_row(j, self%residual(:, j), z)
+         end if
          call take_z_row(self, now, level_z, j, z)
-         call center_row(self, now, first, 0.0_dp, j, rows(j))
+         if (first == last_pass) then
+            call sum_z_row(self, now, j, rows(j))
+         else
+            call center_row(self, now, first, 0.0_dp, j, rows(j))
+         end if
       end do
       !$omp end do
       !$omp end parallel
@@ -219,6 +112,33 @@ contains
       if (n < self%patch%mx) z(n + 1:) = z(n + 1:) + level_z*self%patch%psi(n + 1:, j)
       self%exchange(:, j) = z
    end subroutine take_z_row
+
+   !> Keep cells in contact from closing in a row of z whose mean is free; the sums of the row.
+   subroutine sum_z_row(self, now, j, sums)
+      type(adhesion_work_type), intent(inout) :: self
+      type(adhesion_iteration_type), intent(in) :: now
+      integer, intent(in) :: j
+      type(z_sums_type), intent(out) :: sums
+      real(dp) :: z, rz, old_rz
+      integer :: i, n
+
+      n = self%patch%inner(j)
+      rz = 0.0_dp
+      old_rz = 0.0_dp
+      do i = 1, n
+         z = self%exchange(i, j)
+         z = merge(z, max(z, 0.0_dp), now%state(i, j) > 0.0_dp)
+         self%exchange(i, j) = z
+         rz = rz + z*self%residual(i, j)
+         old_rz = old_rz + z*self%old(i, j)
+      end do
+      do i = n + 1, self%patch%mx
+         rz = rz + self%exchange(i, j)*self%residual(i, j)
+         old_rz = old_rz + self%exchange(i, j)*self%old(i, j)
+      end do
+      sums%rz = rz
+      sums%old_rz = old_rz
+   end subroutine sum_z_row
 
    !> Take the mean off a row of z, and keep cells in contact from closing; the sums of the row.
    subroutine center_row(self, now, pass, mean, j, sums)
@@ -270,35 +190,62 @@ contains
       sums = z_sums_type(totals(1), totals(2), totals(3), totals(4))
    end function sum_of
 
-   !> d = z + beta d on the free cells and in the padding, 0 elsewhere; the level's alike.
+   !> d = z + beta d on the free cells and in the padding, 0 elsewhere; the level's alike. The change of the
+   !> displacement along d is handed to the model.
    subroutine turn(self, beta, level_z, now)
       type(adhesion_work_type), intent(inout) :: self
       real(dp), intent(in) :: beta
       real(dp), intent(in) :: level_z                  !! z of the level, m
       type(adhesion_iteration_type), intent(inout) :: now
-      real(dp), allocatable :: rows(:, :)
-      real(dp) :: d, slope, sums(1)
-      integer :: i, j, n
+      real(dp), allocatable :: rows(:, :), quickest(:)
+      real(dp) :: sums(2)
+      integer :: j
 
       now%lift = level_z + beta*now%lift
-      allocate (rows(1, self%patch%all_rows))
-      !$omp parallel do default(none) shared(self, now, beta, rows) private(i, j, n, d, slope) &
+      allocate (rows(2, self%patch%all_rows), quickest(self%patch%all_rows))
+      !$omp parallel do default(none) shared(self, now, beta, rows, quickest) private(j) &
       !$omp num_threads(self%patch%threads)
       do j = 1, self%patch%all_rows
-         n = self%patch%inner(j)
-         slope = 0.0_dp
-         do i = 1, self%patch%mx
-            d = self%exchange(i, j) + beta*self%direction(i, j)
-            if (i <= n) then
-               if (.not. (now%state(i, j) > 0.0_dp .or. self%exchange(i, j) > 0.0_dp)) d = 0.0_dp
-            end if
-            slope = slope + self%residual(i, j)*d
-            self%direction(i, j) = d
-         end do
-         rows(1, j) = slope
+         call turn_row(self, now, beta, j, rows(:, j), quickest(j))
+         call self%model%put_row(j, self%change(:, j))
       end do
       sums = self%patch%sharing%totals(rows)
       now%slope = sums(1) + now%missing*now%lift
+      now%bend = sums(2)
+      now%farthest = 1.0_dp/max(largest_of_rows(quickest), tiny(1.0_dp))
    end subroutine turn
+
+   !> Row j of d and of the change of the displacement along it, with its parts of r.d and d.e'' d, and the
+   !> greatest |d|/(g + z_0).
+   subroutine turn_row(self, now, beta, j, row, quickest)
+      type(adhesion_work_type), intent(inout) :: self
+      type(adhesion_iteration_type), intent(in) :: now
+      real(dp), intent(in) :: beta
+      integer, intent(in) :: j
+      real(dp), intent(out) :: row(2), quickest
+      real(dp) :: d, slope, bend
+      integer :: i, n
+
+      n = self%patch%inner(j)
+      slope = 0.0_dp
+      bend = 0.0_dp
+      quickest = 0.0_dp
+      do i = 1, n
+         d = self%exchange(i, j) + beta*self%direction(i, j)
+         d = merge(d, 0.0_dp, now%state(i, j) > 0.0_dp .or. self%exchange(i, j) > 0.0_dp)
+         slope = slope + self%residual(i, j)*d
+         bend = bend + d**2*self%curvature(i, j)
+         quickest = max(quickest, abs(d)/(now%state(i, j) + now%units%length))
+         self%direction(i, j) = d
+         self%change(i, j) = d + now%lift
+      end do
+      do i = n + 1, self%patch%mx
+         d = self%exchange(i, j) + beta*self%direction(i, j)
+         slope = slope + self%residual(i, j)*d
+         self%direction(i, j) = d
+         self%change(i, j) = d
+      end do
+      row(:) = [slope, bend]
+   end subroutine turn_row
 
 end module adhesion_directions

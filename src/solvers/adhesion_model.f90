@@ -60,6 +60,8 @@ module adhesion_model
       procedure :: transform_product
       procedure :: transform_inverse
       procedure :: product_row
+      procedure :: stencil_row
+      procedure :: around
       procedure :: inverse_row
       procedure :: transforms
       procedure :: destroy
@@ -280,19 +282,31 @@ contains
       real(dp), intent(out), contiguous :: product(:)
 
       call interpolate(self, j, product)
-      call add_stencil(self%weights, s(:, at(-2)), s(:, at(-1)), s(:, at(0)), s(:, at(1)), s(:, at(2)), product)
-
-   contains
-
-      !> Where a row near row j is.
-      pure function at(distance) result(place)
-         integer, intent(in) :: distance
-         integer :: place
-
-         place = self%halo%place(modulo(self%own(j) - 1 + distance, self%ny) + 1)
-      end function at
-
+      call self%stencil_row(j, s, product)
    end subroutine product_row
+
+   !> Add the stencil's part of row j of B_h s, which is all at short waves.
+   subroutine stencil_row(self, j, s, product)
+      class(adhesion_model_type), intent(in) :: self
+      integer, intent(in) :: j
+      real(dp), intent(in), contiguous :: s(:, :)   !! with the foreign rows of `halo`
+      real(dp), intent(inout), contiguous :: product(:)
+
+      integer :: at(2*reach + 1)
+
+      at = self%around(j)
+      call add_stencil(self%weights, s(:, at(1)), s(:, at(2)), s(:, at(3)), s(:, at(4)), s(:, at(5)), product)
+   end subroutine stencil_row
+
+   !> Where the rows are that the stencil reads for row j.
+   pure function around(self, j) result(places)
+      class(adhesion_model_type), intent(in) :: self
+      integer, intent(in) :: j
+      integer :: places(2*reach + 1)
+      integer :: k
+
+      places = self%halo%place(modulo(self%own(j) - 1 + [(k, k=-reach, reach)], self%ny) + 1)
+   end function around
 
    !> Row j of M r.
    subroutine inverse_row(self, j, r, z)

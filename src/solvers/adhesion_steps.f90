@@ -5,7 +5,7 @@
 !>
 !> Sums are made row by row and then in the order of the rows: they do not depend on the threads.
 module adhesion_steps
-   use adhesion_potential, only : adhesive_terms, has_smooth_potential
+   use adhesion_potential, only : adhesive_slopes, has_smooth_potential
    use adhesion_state, only : adhesion_problem_type
    use asperity_precision, only : dp
    use field_sums, only : row_totals
@@ -23,6 +23,7 @@ module adhesion_steps
       real(dp) :: form = 0.0_dp             !! Q s.B s, known for all rows only
       real(dp) :: adhesive_slope = 0.0_dp   !! s.e'(g)
       real(dp) :: energy = 0.0_dp           !! sum e(g)
+      real(dp) :: curvature = 0.0_dp        !! s.e''(g) s
    end type step_sums_type
 
    !> Two ends between which a function that rises has its root.
@@ -122,20 +123,24 @@ contains
       real(dp), intent(in), contiguous :: wall(:)      !! G less e', Pa
       real(dp), intent(in), contiguous :: s(:)         !! m
       type(step_sums_type), intent(out) :: sums
-      real(dp) :: slope, adhesive, energy, e, e1, e2
+      real(dp) :: slope, adhesive, curvature, energy
+      real(dp), dimension(size(gap)) :: e, e1, e2
       integer :: i
 
       slope = 0.0_dp
       adhesive = 0.0_dp
+      curvature = 0.0_dp
       energy = 0.0_dp
+      call adhesive_slopes(problem%potential, gap, e1, e2, e)
       do i = 1, size(gap)
-         call adhesive_terms(problem%potential, gap(i), e, e1, e2)
-         slope = slope + (wall(i) + e1)*s(i)
-         adhesive = adhesive + s(i)*e1
-         energy = energy + e
+         slope = slope + (wall(i) + e1(i))*s(i)
+         adhesive = adhesive + s(i)*e1(i)
+         curvature = curvature + s(i)**2*e2(i)
+         energy = energy + e(i)
       end do
       sums%slope = slope
       sums%adhesive_slope = adhesive
+      sums%curvature = curvature
       sums%energy = energy
    end subroutine form_step_row
 
@@ -145,17 +150,18 @@ contains
       type(row_sharing_type), intent(in) :: sharing    !! of the rows
       type(step_sums_type) :: known
       real(dp), allocatable :: parts(:, :)
-      real(dp) :: sums(3)
+      real(dp) :: sums(4)
       integer :: j
 
-      allocate (parts(3, size(rows)))
+      allocate (parts(4, size(rows)))
       do j = 1, size(rows)
-         parts(:, j) = [rows(j)%slope, rows(j)%adhesive_slope, rows(j)%energy]
+         parts(:, j) = [rows(j)%slope, rows(j)%adhesive_slope, rows(j)%energy, rows(j)%curvature]
       end do
       sums = sharing%totals(parts)
       known%slope = sums(1)
       known%adhesive_slope = sums(2)
       known%energy = sums(3)
+      known%curvature = sums(4)
    end function known_of_step
 
    !> How far to go along the segment s: all of it, or t near a minimum of the energy on the way, never where
@@ -216,21 +222,22 @@ contains
          real(dp), intent(in) :: at
          real(dp), intent(out) :: slope_sum, energy_sum
          real(dp), allocatable :: rows(:, :)
-         real(dp) :: sums(2), s, e, e1, e2, s1, s2
+         real(dp), dimension(size(gap, 1)) :: moved, e, e1, e2
+         real(dp) :: sums(2), s1, s2
          integer :: i, j
 
          allocate (rows(2, size(gap, 2)))
          !$omp parallel do default(none) &
          !$omp shared(problem, gap, step, rows, at) &
-         !$omp private(i, j, s, e, e1, e2, s1, s2) num_threads(threads)
+         !$omp private(i, j, moved, e, e1, e2, s1, s2) num_threads(threads)
          do j = 1, size(gap, 2)
             s1 = 0.0_dp
             s2 = 0.0_dp
+            moved(:) = max(gap(:, j) + at*step(:, j), 0.0_dp)
+            call adhesive_slopes(problem%potential, moved, e1, e2, e)
             do i = 1, size(gap, 1)
-               s = step(i, j)
-               call adhesive_terms(problem%potential, max(gap(i, j) + at*s, 0.0_dp), e, e1, e2)
-               s1 = s1 + s*e1
-               s2 = s2 + e
+               s1 = s1 + step(i, j)*e1(i)
+               s2 = s2 + e(i)
             end do
             rows(:, j) = [s1, s2]
          end do
