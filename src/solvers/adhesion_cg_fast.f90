@@ -27,8 +27,8 @@
 !> the reason is 'detached'.
 !>
 !> Fields of doubles: H, g, P, and the work fields exchange, residual, direction, old residual, change,
-!> image, the step before and its product, curvature, state and traction of the model; the spectrum of B. In free mode the work fields (but the
-!> curvature), the spectrum and three more fields (state, traction, psi) have 4 times the cells, and the
+!> image, the step before and its product, curvature, state and traction of the model; the spectrum of B.
+!> In free mode the work fields (but the curvature), the spectrum and three more fields (state, traction, psi) have 4 times the cells, and the
 !> transforms counted are of the doubled grid.
 module adhesion_cg_fast
    use adhesion_descent, only : approach_minimum
