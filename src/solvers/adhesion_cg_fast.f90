@@ -28,8 +28,8 @@
 !>
 !> Fields of doubles: H, g, P, and the work fields exchange, residual, direction, old residual, change,
 !> image, the step before and its product, curvature, state and traction of the model; the spectrum of B.
-!> In free mode the work fields (but the curvature), the spectrum and three more fields (state, traction, psi) have 4 times the cells, and the
-!> transforms counted are of the doubled grid.
+!> In free mode the work fields (but the curvature), the spectrum and three more fields (state, traction,
+!> psi) have 4 times the cells, and the transforms counted are of the doubled grid.
 module adhesion_cg_fast
    use adhesion_descent, only : approach_minimum
    use adhesion_model, only : new_adhesion_model
