@@ -58,6 +58,7 @@ module adhesion_cg_fast
 
    integer, parameter :: most_updates = 40      !! steps between fresh products with B
    integer, parameter :: most_failures = 8      !! directions in a row that give no step
+   real(dp), parameter :: short = 0.01_dp       !! part of a step below which the model was wrong
 
    !> The solver with its operators and work fields, kept from solve to solve. Not to be copied.
    type, extends(adhesion_method_type) :: adhesion_fast_type
@@ -300,7 +301,7 @@ contains
       now%level = now%level + part*now%lift
       call keep_step(self%work, now, form)
       now%failures = 0
-      now%caution = max(now%caution - 1, 0)
+      now%caution = merge(now%caution + 1, max(now%caution - 1, 0), part < short)
       now%source = updated
       now%updates = now%updates + 1
    end subroutine update

@@ -9,7 +9,9 @@
 !> Gaps that would be negative after an iteration are closed. The traction then needs the product of what that
 !> added to the step, too: its stencil part is enough, since the cells are scattered and a product with B follows
 !> the step. All of the product is formed where the sum of the gap is kept, which moves all open cells; where the
-!> attraction jumps, since then an iteration may close gaps by far; and after steps that failed.
+!> attraction jumps, since then an iteration may close gaps by far; on free grids, where the cells that close may
+!> be a large part of the contact, and what their product lacks far away adds up in the level; and after steps
+!> that failed.
 !>
 !> Where the attraction is strong the energy has many minima, and a long step can leap over the one that
 !> a slow motion would stop at. Therefore no iteration changes g + z_0 of a cell by more than a share of it:
@@ -38,7 +40,8 @@ module adhesion_descent
 contains
 
    !> The step from the gap that is at hand, measured, towards a minimum of the model: in work%direction and
-   !> now%lift. After steps that failed it is shorter, until as many have not failed.
+   !> now%lift. After steps that failed, or of which hardly anything could be taken, it is shorter, until as
+   !> many have been taken.
    subroutine approach_minimum(work, now)
       type(adhesion_work_type), intent(inout) :: work
       type(adhesion_iteration_type), intent(inout) :: now
@@ -98,7 +101,8 @@ contains
       end if
       shift = 0.0_dp
       keeps_sum = work%patch%periodic .and. inner%problem%control == control_approach
-      whole = keeps_sum .or. inner%caution > 0 .or. .not. has_smooth_potential(inner%problem%potential)
+      whole = keeps_sum .or. inner%caution > 0 .or. .not. work%patch%periodic &
+         .or. .not. has_smooth_potential(inner%problem%potential)
       if (keeps_sum) shift = sum_shift(inner%state, work%direction, alpha, inner%gap_sum, work%patch%threads)
       call move(work, inner, alpha, shift, whole, clipped)
       inner%level = inner%level + alpha*inner%lift
