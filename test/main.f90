@@ -13,6 +13,7 @@ program main
    use test_checkpoint, only : run_checkpoint
    use test_chunk_writer, only : run_chunk_writer
    use test_coupled_passes, only : run_coupled_passes
+   use test_joint_step, only : run_joint_step
    use test_coupled_runs, only : run_coupled_runs
    use test_facade, only : run_facade
    use test_fft_conv, only : run_fft_conv
@@ -83,6 +84,7 @@ program main
          suite_type('simulation_sliding', run_simulation_sliding), &
          suite_type('steady', run_steady), &
          suite_type('coupled_passes', run_coupled_passes), &
+         suite_type('joint_step', run_joint_step), &
          suite_type('coupled_runs', run_coupled_runs), &
          suite_type('simulation_pull', run_simulation_pull), &
          suite_type('simulation_friction', run_simulation_friction), &

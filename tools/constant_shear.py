@@ -1,14 +1,15 @@
-"""Show that unsettled steps with constant shear have no solution, with dense matrices.
+"""Compare steps with constant shear with dense matrices, and find those without a plain solution.
 
 The random cases are those of coupled_campaign.py; those with the law `constant_shear` are run by
-the program. Where the passes of a step do not settle, this tool solves the same step by itself. It
-shares nothing with the solver: the kernels, the spline of the road, the arms, the mass and the law
-are written again, and Newton's method with dense matrices takes all cells together. It starts from
-the first row, so it also solves all steps before; the column "before" has the largest difference
-from the program in any of those rows: the mean over all cells of the differences of pressures and
-tractions, relative to the mean pressure. Each row begins with the past of the program.
+the program, and this tool solves the same steps by itself, row by row. It shares nothing with the
+solver: the kernels, the spline of the road, the arms, the mass and the law are written again, and
+Newton's method with dense matrices takes all cells together. The column "difference" has the
+largest difference from the program in any row: the mean over all cells of the differences of
+pressures and tractions, relative to the mean pressure. Each row begins with the past of the
+program. "rows" counts the rows compared, and "divided" those in which cells are partly sheared.
 
-The step is solved from the state that the program left it in or, if Newton's method fails there,
+The tool then examines the first step with partly sheared cells, or the last one if the program did
+not settle it. The step is solved from the state that the program left it in or, if Newton's method fails there,
 from the row before, or by way of a bound that grows with a little pressure, less and less. With
 --thorough all these ways are gone (which takes several times as long): the column "partial" then
 has a number for each solution that differs from those before, and the trees count together.
@@ -34,6 +35,7 @@ usage: python tools/constant_shear.py [--count 500] [--seed 7741] [--only SEED] 
 """
 
 import argparse
+import copy
 import itertools
 import re
 import subprocess
@@ -84,8 +86,13 @@ def run_starts(text: str, folder: Path, program: str) -> None:
                    check=False)
 
 
-def replay(folder: Path, text: str) -> dict[str, Any]:
-    """Solve all steps of a run but the last one, and begin that."""
+def replay(folder: Path, text: str, settled: bool = False) -> dict[str, Any]:
+    """Solve all steps of a run but the last one, and begin that; if settled, solve that, too.
+
+    The step returned is the first one with partly sheared cells, or else the last one.
+    """
+    kept: dict[str, Any] = {}
+    divided = 0
     with h5py.File(folder / "road.h5") as file:
         case = Case(text, file["surface"][:])
     with h5py.File(folder / "out.h5") as file:
@@ -111,8 +118,9 @@ def replay(folder: Path, text: str) -> dict[str, Any]:
                 with h5py.File(folder / "start.h5") as file:
                     guesses.insert(0, fields(file[f"snapshots/{(1, 2, 4)[i]:06d}"]))
             last = i == len(parts) - 1
-            if last and k == len(states) - 1:
-                return {"step": step, "guesses": guesses, "before": worst, "row": k, "part": i + 1}
+            end = {"step": step, "guesses": guesses, "row": k, "part": i + 1}
+            if last and k == len(states) - 1 and not settled:
+                return {**(kept or end), "before": worst, "divided": divided, "rows": k - 1}
             found, left = step.solve(guesses)
             pressure, traction, gap = step.fields(found)
             error = sum(np.abs(a - b).sum() for a, b in (
@@ -122,6 +130,11 @@ def replay(folder: Path, text: str) -> dict[str, Any]:
             if last:                             # the past is that of the program
                 worst = max(worst, error)
                 pressure, traction, gap = states[k]
+                if step.partial(found).size > 0:
+                    divided += 1
+                    kept = kept or {**end, "step": copy.deepcopy(step)}
+                if k == len(states) - 1:
+                    return {**(kept or end), "before": worst, "divided": divided, "rows": k}
             case.commit(pressure, traction)
             now = (pressure, traction, np.maximum(gap, 0.0))
     raise ValueError("a run of one row has no step")
@@ -176,23 +189,26 @@ def unique(step: DenseStep, found: tuple) -> float:
 
 
 def examine(seed: int, program: str, thorough: bool = False) -> str:
-    """Return the line of the table of a case, or nothing if its passes settle."""
+    """Return the line of the table of a case, or nothing if it has another law."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         text, status = run_case(seed, folder, program)
-        if status in (-1, 0):
+        if status == -1:
             return ""
         if "prony" in text:
             run_starts(text, folder, program)
         start = time.monotonic()
         try:
-            end = replay(folder, text)
+            end = replay(folder, text, settled=status == 0)
         except ArithmeticError as error:
             return f"| {seed} | {error} |"
     step = end["step"]
     solutions = step.solve_all(end["guesses"]) if thorough else [step.solve(end["guesses"])]
     solutions = [one for one in solutions if one[1] < ACCURATE]
-    line = f"| {seed} | {end['row']}.{end['part']} | {end['before']:.0e} |"
+    line = (f"| {seed} | {status} | {end['rows']} | {end['divided']} | {end['before']:.0e} "
+            f"| {end['row']}.{end['part']} |")
+    if status == 0 and end["divided"] == 0:
+        return line
     if not solutions:
         return f"{line} not solved |"
     trees, complete, plain = [], True, False
@@ -215,7 +231,7 @@ def examine(seed: int, program: str, thorough: bool = False) -> str:
 
 
 def main() -> int:
-    """Examine the unsettled cases of the campaign and print the table."""
+    """Examine the cases of the campaign and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("--count", type=int, default=500)
     parser.add_argument("--seed", type=int, default=7741)
@@ -225,8 +241,8 @@ def main() -> int:
     given = parser.parse_args()
     seeds = [given.only] if given.only is not None else [
         given.seed * 100000 + k for k in range(given.count)]
-    print("| case | row.part | before | residual | contact | partial | shares | plain solution "
-          "| states | broken | cut | failed | unique | time |\n" + 14 * "| --- " + "|")
+    print("| case | status | rows | divided | difference | row.part | residual | contact | partial | shares | plain solution "
+          "| states | broken | cut | failed | unique | time |\n" + 17 * "| --- " + "|")
     for seed in seeds:
         line = examine(seed, given.program, given.thorough)
         if line:

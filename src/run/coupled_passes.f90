@@ -30,7 +30,9 @@
 !> mismatch is within the tolerance, and the solves of the pass were asked to be that accurate too, the
 !> row is solved. Otherwise `pass_control` judges the pass, which sets the accuracy of the next one and
 !> how far to go, and `choose_place` goes to the next place. When the passes run out, the row keeps
-!> what the last pass has left; the last of more than ten passes is done at the best place so far. A
+!> what the last pass has left; the last of more than ten passes is done at the best place so far. Passes
+!> that have stalled are left for module `joint_step`, which solves the step at once; the next pass is then
+!> done at its solution, with its shares of the bounds, and proves it. A
 !> normal solve that does not converge ends the loop. A row that is given up for a stop (module
 !> `row_stop`) is left as it is.
 !>
@@ -42,6 +44,8 @@ module coupled_passes
    use contact_model, only : contact_mean, contact_type, solve_normal
    use asperity_interpolation, only : displaced
    use field_sums, only : row_totals
+   use friction_law, only : law_constant_shear
+   use joint_step, only : joint_step_type
    use pass_control, only : pass_control_type
    use asperity_precision, only : dp
    use regular_grid, only : grid_type
@@ -58,6 +62,9 @@ module coupled_passes
    integer, parameter :: pairs = 6                      !! of passes that the acceleration remembers
    real(dp), parameter :: largest_factor = 1.0e3_dp     !! of a remembered pair; a larger one is round-off
 
+   !> Accuracy of the pass that proves a joint solution, in tolerances.
+   real(dp), parameter :: proof = 1.0e-3_dp
+
    !> Slopes in the contact count as at least this part of the rms slope of the map.
    real(dp), parameter :: least_slope = 0.1_dp
 
@@ -70,6 +77,7 @@ module coupled_passes
       real(dp), allocatable, private :: residuals(:, :, :)  !! U_T, carried, less z, m
       real(dp), allocatable, private :: best_place(:, :, :) !! z of the least mismatch, m
       type(anderson_type), private :: mixing
+      type(joint_step_type), private :: joint
    contains
       procedure :: solve
    end type coupled_passes_type
@@ -107,6 +115,7 @@ contains
       unlike = plan%instantaneous .or. plan%new_speed
       call predict(self, contact, plan%dt, motion, goes_on=.not. unlike)
       call control%start(tolerance, merge(1.0_dp, contact%state%first_mismatch, unlike))
+      control%jumps = contact%tangential%law%law == law_constant_shear
       if (.not. plan%instantaneous) &
          call contact%tangential%extrapolate(contact%state%tangential, .not. plan%new_speed)
 
@@ -121,9 +130,14 @@ contains
          if (self%passes == 1 .and. .not. plan%instantaneous) contact%state%first_mismatch = self%residual
          if (self%passes == most .or. .not. normal%converged) exit
          if (control%accuracy <= tolerance .and. self%residual <= tolerance) exit
+         if (allocated(contact%tangential%share)) deallocate (contact%tangential%share)
          contact%stop%given_up = stop_is_due()
          if (contact%stop%given_up) return
          call control%judge(self%residual)
+         if (control%joint_due) then
+            call solve_jointly(self, contact, plan, control, rubbing)
+            if (allocated(contact%tangential%share)) cycle
+         end if
          call choose_place(self, contact, control)
          ! The last of many passes is for the best place that was found.
          if (self%passes == most - 1 .and. most > 10) self%place(:, :, :) = self%best_place
@@ -136,6 +150,24 @@ contains
          end if
       end associate
    end subroutine solve
+
+   !> Where the passes have stalled: solve the step all at once. If that succeeds, the next pass is done at
+   !> its solution, and accurately: it proves that the step is solved.
+   subroutine solve_jointly(self, contact, plan, control, rubbing)
+      class(coupled_passes_type), intent(inout) :: self
+      class(contact_type), intent(inout) :: contact
+      type(planned_row_type), intent(in) :: plan
+      type(pass_control_type), intent(inout) :: control
+      type(solver_result_type), intent(inout) :: rubbing   !! all tangential solves; its transforms are added
+      integer :: transforms
+      logical :: solved
+
+      call self%joint%solve(contact, plan, solved, transforms)
+      rubbing%ffts = rubbing%ffts + transforms
+      if (.not. solved) return
+      self%place(:, :, :) = contact%tangential%trial
+      control%accuracy = proof*contact%case%solver%tolerance
+   end subroutine solve_jointly
 
    !> One pass at the place, and the mismatch that it leaves.
    subroutine do_pass(self, contact, plan, accuracy, normal, rubbing)

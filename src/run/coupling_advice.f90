@@ -24,9 +24,9 @@ contains
 
       jammed = jammed_part(self)
       if (self%tangential%law%law == law_constant_shear) then
-         advice = 'With constant shear a cell at the edge of the contact carries the whole strength or '// &
-            'nothing, so there may be no solution; law = ''coulomb_orowan'', whose strength grows from '// &
-            'zero with the pressure, usually settles with a coefficient of up to about 1'
+         advice = 'With constant shear the traction jumps where the contact ends; solving the step all at '// &
+            'once did not help, though without adhesion it has a solution; law = ''coulomb_orowan'', whose '// &
+            'strength grows from zero with the pressure, usually settles with a coefficient of up to about 1'
       else if (jammed > much) then
          advice = to_text(100.0_dp*jammed)//' % of the normal force is on slopes above '// &
             '1/coefficient, where friction holds any force uphill and there may be no solution: take a '// &

@@ -21,6 +21,9 @@
 !>   vanishes where it turns. When the mismatch has fallen to a tenth, or after `stalled_plain` passes
 !>   without halving it, the acceleration begins again from the place reached; what was the best place
 !>   before is forgotten, since it belongs to the state that ended.
+!>
+!> Passes that stall with an accelerated step where a traction jumps, or with plain steps, may not come
+!> to an end at all: then the step should be solved all at once (`joint_due`).
 module pass_control
    use asperity_precision, only : dp
    implicit none
@@ -54,6 +57,8 @@ module pass_control
       logical :: go_back = .false.                  !! to the best place so far
       logical :: plain = .false.                    !! the steps are not accelerated
       logical :: best_yet = .false.                 !! the last pass was the best
+      logical :: jumps = .false.                    !! a traction jumps where the contact ends; to be set after `start`
+      logical :: joint_due = .false.                !! the step should be solved all at once
       real(dp), private :: tolerance = 0.0_dp
       real(dp), private :: share = usual_share
       real(dp), private :: length = 1.0_dp          !! of plain steps
@@ -106,6 +111,7 @@ contains
 
       self%forget = mismatch > astray*self%least .and. .not. self%plain
       self%go_back = .false.
+      self%joint_due = .false.
       self%best_yet = mismatch < self%least
       self%least = min(self%least, mismatch)
       self%since = self%since + 1
@@ -114,7 +120,8 @@ contains
          self%since = 0
       end if
       if (self%plain) then
-         if (self%since >= stalled_plain .or. mismatch < gained*self%plain_start) call accelerate(self, mismatch)
+         self%joint_due = self%since >= stalled_plain
+         if (self%joint_due .or. mismatch < gained*self%plain_start) call accelerate(self, mismatch)
       else if (self%since >= stalled) then
          call go_plain(self)
       end if
@@ -140,6 +147,7 @@ contains
       self%damping = self%length
       self%momentum = 0.0_dp
       self%plain_start = self%least
+      self%joint_due = self%jumps
    end subroutine go_plain
 
    !> End the plain steps: the acceleration begins again from here.

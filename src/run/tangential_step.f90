@@ -13,11 +13,10 @@
 module tangential_step
    use adhesion_potential, only : adhesion_potential_type, adhesive_slope, new_adhesion_potential
    use case_settings, only : case_type
-   use contact_rule, only : touches
    use asperity_errors, only : error_type
    use friction_books, only : book_friction, rubbed_type
-   use field_sums, only : field_count, row_totals, vector_sum
-   use fft_conv, only : convolution_type, new_convolution
+   use field_sums, only : field_count, vector_sum
+   use fft_conv, only : columns_apply, convolution_type, new_convolution
    use friction_cg, only : friction_fast, friction_fields_type, friction_solver_type, friction_thesis, &
       new_friction_solver
    use friction_law, only : friction_law_type, new_friction_law
@@ -25,6 +24,7 @@ module tangential_step
    use regular_grid, only : boundary_periodic, grid_type
    use rubber_kernels, only : tangential_kernel
    use solver_result, only : solver_result_type
+   use touching_cells, only : force_beside, mark_contact
    use tangential_state, only : tangential_state_type
    use viscoelastic_energy, only : book_step
    use arm_state, only : commit_arms, new_products, past_traction, products_type
@@ -46,6 +46,9 @@ module tangential_step
       real(dp) :: pull(2) = 0.0_dp                    !! that force, over the cell, Pa
       logical :: slides_off = .false.                 !! it is more than the friction holds,
       real(dp) :: held(2) = 0.0_dp                    !! which is this, Pa
+      !> The share of its bound that each cell may carry, in place of the rule of contact [nx, rows];
+      !> not allocated: not given.
+      real(dp), allocatable :: share(:, :)
       type(convolution_type), private :: operator
       type(friction_solver_type), private :: solver
       real(dp), allocatable, private :: drive(:, :, :)    !! DX'
@@ -61,6 +64,8 @@ module tangential_step
       procedure :: begin
       procedure :: extrapolate
       procedure :: solve
+      procedure :: try
+      procedure :: cell_compliance
       procedure :: take_motion
       procedure :: commit
       procedure :: sums
@@ -116,6 +121,7 @@ contains
       self%found = motion
       self%solver%near = .false.
       self%slides_off = .false.
+      if (allocated(self%share)) deallocate (self%share)
       state%moved = state%moved .or. any(abs(motion) > 0.0_dp) .or. any(pulled .and. abs(pull) > 0.0_dp)
       if (.not. state%moved) return
       ! A road that goes back where it began leaves displacements of round-off.
@@ -181,7 +187,9 @@ contains
       associate (pull => self%solver%pull)
          pull%along = self%pulled
          if (.not. any(self%pulled)) return
-         pull%traction = self%pull - outside_force(self, state, pressure, slope_x, slope_y)
+         pull%traction = self%pull
+         if (self%adhesive .or. .not. self%law%slope) pull%traction = self%pull &
+            - force_beside(state%contact, self%law%slope, pressure, slope_x, slope_y)/self%grid%cells()
          if (state%block%mass > 0.0_dp) then
             pull%offset = self%mass_place
             pull%yielding = self%mass_yields
@@ -207,28 +215,6 @@ contains
             self%pulled)
       end associate
    end subroutine find_motion
-
-   !> Mean horizontal force of the road on the rubber that T does not hold, Pa.
-   function outside_force(self, state, pressure, slope_x, slope_y) result(force)
-      type(tangential_step_type), intent(in) :: self
-      type(tangential_state_type), intent(in) :: state
-      real(dp), intent(in) :: pressure(:, :), slope_x(:, :), slope_y(:, :)
-      real(dp) :: force(2)
-      real(dp), allocatable :: rows(:, :)
-      logical, allocatable :: counts(:)
-      integer :: j
-
-      force = 0.0_dp
-      if (self%law%slope .and. .not. self%adhesive) return
-      allocate (rows(2, self%grid%rows()))
-      !$omp parallel do default(none) shared(self, state, pressure, slope_x, slope_y, rows) private(j, counts)
-      do j = 1, self%grid%rows()
-         counts = state%contact(:, j) == 0_int8 .or. .not. self%law%slope
-         rows(1, j) = sum(pressure(:, j)*slope_x(:, j), counts)
-         rows(2, j) = sum(pressure(:, j)*slope_y(:, j), counts)
-      end do
-      force = -row_totals(rows)/self%grid%cells()
-   end function outside_force
 
    !> The step is solved: add to the displacements how far the pulled road has moved. They were computed
    !> without it.
@@ -300,12 +286,18 @@ contains
       real(dp), intent(in), contiguous, target :: slope_x(:, :), slope_y(:, :)
       type(solver_result_type), intent(out) :: outcome
       type(friction_fields_type) :: fields
-      integer :: j, c
+      real(dp), allocatable, target :: weighed(:, :)
 
       self%solver%tolerance = self%tolerance
-      call mark_contact(self, state, pressure, gap)
-      call hang_road(self, state, pressure, slope_x, slope_y)
       fields%pressure => pressure
+      if (allocated(self%share)) then
+         weighed = pressure*self%share
+         fields%pressure => weighed
+         fields%share => self%share
+      else
+         call mark_contact(self%adhesive, pressure, gap, state%contact)
+      end if
+      call hang_road(self, state, pressure, slope_x, slope_y)
       fields%slope_x => slope_x
       fields%slope_y => slope_y
       fields%drive => self%drive
@@ -315,6 +307,15 @@ contains
       fields%contact => state%contact
       call self%solver%solve(self%operator, self%law, fields, outcome)
       call find_motion(self, state)
+      call find_trial(self, state)
+   end subroutine solve
+
+   !> The trial displacement from Q times the slip, which becomes the slip.
+   subroutine find_trial(self, state)
+      type(tangential_step_type), intent(inout) :: self
+      type(tangential_state_type), intent(in) :: state
+      integer :: c, j
+
       !$omp parallel do default(none) shared(self, state) private(c, j)
       do j = 1, self%grid%rows()
          do c = 1, 2
@@ -322,26 +323,39 @@ contains
             self%trial(:, c, j) = state%displacement(:, c, j) + self%motion(c) - self%slip(:, c, j)
          end do
       end do
-   end subroutine solve
+   end subroutine find_trial
 
-   !> Mark the cells that may carry friction, those that touch. A cell that slipped is still marked so.
-   subroutine mark_contact(self, state, pressure, gap)
-      type(tangential_step_type), intent(inout) :: self
-      type(tangential_state_type), intent(inout) :: state
-      real(dp), intent(in) :: pressure(:, :), gap(:, :)
-      integer :: i, j
+   !> Slip and trial displacement under given tractions. Not where the road is pulled.
+   subroutine try(self, state, traction)
+      class(tangential_step_type), intent(inout) :: self
+      type(tangential_state_type), intent(in) :: state
+      real(dp), intent(in) :: traction(:, :, :)       !! [nx, 2, rows] Pa
+      integer :: c, j
 
-      !$omp parallel do default(none) shared(self, state, pressure, gap) private(i, j)
+      !$omp parallel do default(none) shared(self, traction) private(c, j) num_threads(self%operator%threads)
       do j = 1, self%grid%rows()
-         do i = 1, self%grid%nx
-            if (.not. touches(self%adhesive, pressure(i, j), gap(i, j))) then
-               state%contact(i, j) = 0_int8
-            else if (state%contact(i, j) == 0_int8) then
-               state%contact(i, j) = 1_int8
-            end if
+         do c = 1, 2
+            call self%operator%forward_row(c, j, traction(:, c, j) + self%past(:, c, j))
          end do
       end do
-   end subroutine mark_contact
+      call self%operator%columns(columns_apply)
+      !$omp parallel do default(none) shared(self) private(c, j) num_threads(self%operator%threads)
+      do j = 1, self%grid%rows()
+         do c = 1, 2
+            call self%operator%backward_row(c, j, self%slip(:, c, j))
+            self%slip(:, c, j) = self%drive(:, c, j) - self%slip(:, c, j)
+         end do
+      end do
+      call find_trial(self, state)
+   end subroutine try
+
+   !> Displacement of a cell under its own unit traction, m/Pa; 0 if there is but one cell.
+   function cell_compliance(self) result(compliance)
+      class(tangential_step_type), intent(in) :: self
+      real(dp) :: compliance
+
+      compliance = self%operator%self_compliance()/self%q
+   end function cell_compliance
 
    !> End the step: arms, energies, the motion of the mass.
    subroutine commit(self, state, material, pressure, slope_x, slope_y)
@@ -366,7 +380,11 @@ contains
       call commit_arms(state%arms, material, state%traction, state%displacement, self%trial, &
          products, carried)
       call book_step(state%books, material, products)
-      call book_friction(state, self%law, self%trial, self%slip, pressure, slope_x, slope_y, rubbed)
+      if (allocated(self%share)) then
+         call book_friction(state, self%law, self%trial, self%slip, pressure*self%share, slope_x, slope_y, rubbed)
+      else
+         call book_friction(state, self%law, self%trial, self%slip, pressure, slope_x, slope_y, rubbed)
+      end if
       state%lost_friction = state%lost_friction + rubbed%loss*self%grid%cell_area()
       if (self%dt > 0.0_dp .and. rubbed%cells > 0.0_dp) state%rate = rubbed%way/(rubbed%cells*self%dt)
       state%displacement(:, :, :) = self%trial

@@ -63,19 +63,18 @@ contains
       type(friction_gradient_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
       real(dp), intent(in) :: alpha
-      real(dp) :: slope(2), r(2), t(2)
-      logical :: returned
+      real(dp) :: slope(2), r(2), s, t(2)
       integer :: i, j
 
       !$omp parallel do default(none) shared(self, problem, alpha) &
-      !$omp private(i, j, slope, r, t, returned) num_threads(problem%threads)
+      !$omp private(i, j, slope, r, s, t) num_threads(problem%threads)
       do j = 1, problem%rows
          do i = 1, problem%nx
             if (problem%contact(i, j) == contact_open) cycle
             slope = problem%slope_at(i, j)
             r = problem%law%slip_along_slope(slope, problem%slip(i, :, j))
             t = problem%traction(i, :, j) + alpha*r
-            call problem%law%return_to_bound(problem%pressure(i, j), slope, t, returned)
+            call problem%place_on_bound(i, j, 1.0_dp, t, s)
             self%slip(i, :, j) = r
             self%step(i, :, j) = t - problem%traction(i, :, j)
             problem%contact(i, j) = contact_stick

@@ -17,6 +17,10 @@ module friction_fields
       !> [nx, 2, rows] T_h, a given traction, Pa: r = DX' - A (T + T_h) at no cost of a product. May be
       !> missing.
       real(dp), pointer, contiguous :: past(:, :, :) => null()
+      !> [nx, rows] The share of its bound that a cell may carry, 0 to 1: 0 where it is open, 1 where it is in
+      !> contact; in between it touches without pressure, in a part of its area. `pressure` is then P times
+      !> the share, and the states are only looked at for cells that likely slip. May be missing.
+      real(dp), pointer, contiguous :: share(:, :) => null()
       real(dp), pointer, contiguous :: traction(:, :, :) => null() !! [nx, 2, rows] T, Pa; in: the start
       real(dp), pointer, contiguous :: slip(:, :, :) => null()     !! [nx, 2, rows] out: r, everywhere, m
       !> [nx, rows] In: 0 open, 1 in contact, 2 in contact and likely to slip, as it did in the step

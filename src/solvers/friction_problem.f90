@@ -77,6 +77,7 @@ module friction_problem
    contains
       procedure :: start
       procedure :: slope_at
+      procedure :: place_on_bound
       procedure :: gather_site
       procedure :: update_slip
       procedure :: refresh_slip
@@ -124,20 +125,28 @@ contains
       integer, intent(in) :: j
       integer, intent(out) :: cells                !! in contact
       real(dp), intent(out) :: size                !! |T|^2, Pa^2
-      real(dp) :: site(self%nx, site_columns), t(2)
+      real(dp) :: limit, s, site(self%nx, site_columns), t(2)
       integer :: i
 
       call self%gather_site(j, site)
       call self%law%bound_row(self%nx, site(:, 1), site(:, 2), site(:, 3), self%work%bound(:, :, j))
+      if (associated(self%share)) then
+         self%work%bound(:, 1, j) = self%work%bound(:, 1, j)*self%share(:, j)
+         self%contact(:, j) = merge(max(self%contact(:, j), contact_stick), contact_open, &
+            self%share(:, j) > 0.0_dp)
+      else if (self%law%adhesive_pressure <= 0.0_dp) then
+         self%contact(:, j) = merge(self%contact(:, j), contact_open, self%pressure(:, j) > 0.0_dp)
+      end if
       cells = 0
       size = 0.0_dp
       do i = 1, self%nx
-         if (self%pressure(i, j) <= 0.0_dp .and. self%law%adhesive_pressure <= 0.0_dp) &
-            self%contact(i, j) = contact_open
          t = 0.0_dp
          if (self%contact(i, j) /= contact_open) then
             t = self%traction(i, :, j)
-            call put_back(self, i, j, t, self%contact(i, j))
+            ! Slip points go back on their bound from both sides, others only from outside.
+            limit = merge(outermost, 1.0_dp, self%contact(i, j) == contact_slip)
+            call self%place_on_bound(i, j, limit, t, s)
+            self%contact(i, j) = merge(contact_slip, contact_stick, s < limit .or. s <= on_bound)
             cells = cells + 1
             size = size + (t(1)**2 + t(2)**2)
          end if
@@ -146,19 +155,22 @@ contains
       end do
    end subroutine start_row
 
-   !> The traction and the state of a point: slip points go back on their bound from both sides, others
-   !> only from outside.
-   pure subroutine put_back(self, i, j, t, state)
-      type(friction_problem_type), intent(in) :: self
+   !> Put the traction of a point on its bound if its s is below a limit.
+   pure subroutine place_on_bound(self, i, j, limit, t, s)
+      class(friction_problem_type), intent(in) :: self
       integer, intent(in) :: i, j
+      real(dp), intent(in) :: limit                !! of s
       real(dp), intent(inout) :: t(2)              !! Pa
-      integer(int8), intent(inout) :: state
-      real(dp) :: limit, s
+      real(dp), intent(out) :: s                   !! before
+      type(friction_law_type) :: law
 
-      limit = merge(outermost, 1.0_dp, state == contact_slip)
-      call self%law%place_on_bound(self%pressure(i, j), self%slope_at(i, j), limit, t, s)
-      state = merge(contact_slip, contact_stick, s < limit .or. s <= on_bound)
-   end subroutine put_back
+      law = self%law
+      if (associated(self%share)) then
+         law%coefficient = law%coefficient*self%share(i, j)
+         law%shear_strength = law%shear_strength*self%share(i, j)
+      end if
+      call law%place_on_bound(self%pressure(i, j), self%slope_at(i, j), limit, t, s)
+   end subroutine place_on_bound
 
    !> grad H at a point, 0 where the slope does not count.
    pure function slope_at(self, i, j) result(slope)

@@ -1,0 +1,140 @@
+!> The states of a cell in the joint equations of a step with friction, in one number per cell.
+!>
+!> A cell is open, or it touches without pressure in a part of its area, or it is in contact. The number
+!> s, m, says which:
+!>
+!>     s < 0              open: the gap is -s, no pressure but that of adhesion, no traction
+!>     0 <= s <= width    touches: no gap, no pressure of the wall, the share s/width of the bound
+!>     s > width          in contact: no gap, a pressure of the wall in proportion to s - width
+!>
+!> so that pressure, gap and share are continuous functions of s. The second range is there where the
+!> traction would jump as the cell opens: with constant shear stress; with adhesion on a slope, where T* is
+!> not zero at that moment; and on slopes above 1/coefficient. Elsewhere the width is 0.
+module joint_cells
+   use adhesion_potential, only : adhesion_potential_type, adhesive_slope
+   use asperity_precision, only : dp
+   use friction_law, only : friction_law_type, law_constant_shear
+   implicit none
+   private
+
+   public :: cell_rules_type
+
+   !> What a cell does.
+   type :: cell_rules_type
+      type(adhesion_potential_type) :: potential
+      type(friction_law_type) :: law
+      real(dp) :: soft = 0.0_dp                     !! displacement of a cell under its own unit pressure, m/Pa
+      real(dp) :: soft_along = 0.0_dp               !! the same of the tangential traction, m/Pa
+      real(dp) :: width = 0.0_dp                    !! of the second range, m
+      real(dp) :: attraction = 0.0_dp               !! of a cell without a gap, Pa
+      !> Part of its rise above the second range with which the pressure rises within it. 0 is the law; with
+      !> more there is no jump.
+      real(dp) :: rise = 0.0_dp
+   contains
+      procedure :: has_jump
+      procedure :: number_of
+      procedure :: gap_of
+      procedure :: pressure_of
+      procedure :: share_of
+      procedure :: lacking
+      procedure :: slips
+   end type cell_rules_type
+
+contains
+
+   !> Does the traction of a cell jump as it opens?
+   elemental function has_jump(self, slope_x, slope_y) result(yes)
+      class(cell_rules_type), intent(in) :: self
+      real(dp), intent(in) :: slope_x, slope_y
+      logical :: yes
+
+      yes = self%law%law == law_constant_shear
+      if (.not. self%law%slope) return
+      yes = yes .or. self%attraction > 0.0_dp .or. self%law%coefficient*hypot(slope_x, slope_y) > 1.0_dp
+   end function has_jump
+
+   !> s of a cell in contact or open.
+   elemental function number_of(self, width, touching, pressure, gap) result(s)
+      class(cell_rules_type), intent(in) :: self
+      real(dp), intent(in) :: width
+      logical, intent(in) :: touching
+      real(dp), intent(in) :: pressure, gap
+      real(dp) :: s
+
+      s = -max(gap, tiny(1.0_dp))
+      if (touching) s = width + max(pressure + self%attraction, 0.0_dp)*self%soft
+   end function number_of
+
+   !> Gap, m.
+   elemental function gap_of(self, s) result(gap)
+      class(cell_rules_type), intent(in) :: self
+      real(dp), intent(in) :: s
+      real(dp) :: gap
+
+      gap = max(-s, 0.0_dp)
+   end function gap_of
+
+   !> Pressure, attraction included, Pa.
+   elemental function pressure_of(self, width, s) result(pressure)
+      class(cell_rules_type), intent(in) :: self
+      real(dp), intent(in) :: width, s
+      real(dp) :: pressure
+
+      pressure = (self%rise*min(s, width) + max(s - width, 0.0_dp))/self%soft - self%attraction
+      if (s < 0.0_dp) pressure = -adhesive_slope(self%potential, -s)
+   end function pressure_of
+
+   !> The share of the bound.
+   elemental function share_of(self, width, s) result(share)
+      class(cell_rules_type), intent(in) :: self
+      real(dp), intent(in) :: width, s
+      real(dp) :: share
+
+      share = merge(1.0_dp, 0.0_dp, s >= 0.0_dp)
+      if (s >= 0.0_dp .and. s < width) share = s/width
+   end function share_of
+
+   !> By how much the traction of a cell differs from the one on or within its bound that it and its slip
+   !> lead to: zero where the cell obeys the law.
+   pure function lacking(self, share, pressure, slope, slip, t) result(left)
+      class(cell_rules_type), intent(in) :: self
+      real(dp), intent(in) :: share
+      real(dp), intent(in) :: pressure              !! Pa
+      real(dp), intent(in) :: slope(2)
+      real(dp), intent(in) :: slip(2)               !! m
+      real(dp), intent(in) :: t(2)                  !! Pa
+      real(dp) :: left(2)
+      type(friction_law_type) :: law
+      real(dp) :: wanted(2), s
+
+      left = t
+      if (.not. share > 0.0_dp) return
+      wanted = t + self%law%slip_along_slope(slope, slip)/self%soft_along
+      if (self%law%law == law_constant_shear) then
+         law = self%law
+         law%shear_strength = share*law%shear_strength
+         call law%place_on_bound(share*pressure, slope, 1.0_dp, wanted, s)
+         left = t - wanted
+      else
+         call self%law%place_on_bound(pressure, slope, 1.0_dp, wanted, s)
+         left = t - share*wanted
+      end if
+   end function lacking
+
+   !> Is the traction of a cell on its bound?
+   pure function slips(self, share, pressure, slope, t) result(yes)
+      class(cell_rules_type), intent(in) :: self
+      real(dp), intent(in) :: share
+      real(dp), intent(in) :: pressure              !! Pa
+      real(dp), intent(in) :: slope(2)
+      real(dp), intent(in) :: t(2)                  !! Pa
+      logical :: yes
+      type(friction_law_type) :: law
+      real(dp), parameter :: nearly = 1.0_dp + 1.0e-6_dp
+
+      law = self%law
+      law%shear_strength = share*law%shear_strength
+      yes = law%bound_ratio(share*pressure, slope, t - law%normal_traction(share*pressure, slope)) < nearly
+   end function slips
+
+end module joint_cells

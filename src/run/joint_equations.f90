@@ -1,0 +1,228 @@
+!> The equations of a step with friction for all cells at once.
+!>
+!> Unknown are a number s per cell (module `joint_cells`: gap, pressure and share of the bound), its traction
+!> T, and the level. With the road H read at the displacement that T makes, the equations are
+!>
+!>     U_z - H - level = gap            of every cell, U_z = A_z (P + P_h)/Q
+!>     T = bound(T + r/a)               r the slip, a the tangential compliance of a cell; 0 where open
+!>     mean of P = load                 or the level is given
+!>
+!> Each is scaled: lengths by what the mean pressure of the contact presses a cell in, tractions by that
+!> pressure or by the strength, whichever is larger.
+module joint_equations
+   use adhesion_potential, only : adhesive_slope
+   use asperity_errors, only : error_type
+   use asperity_interpolation, only : displaced
+   use asperity_precision, only : dp, int8
+   use asperity_schedule, only : planned_row_type
+   use contact_model, only : contact_type
+   use contact_rule, only : touches
+   use fft_conv, only : columns_apply, convolution_type, new_convolution
+   use field_sums, only : field_count, field_sum, largest_of_rows, row_totals
+   use friction_law, only : law_constant_shear
+   use joint_cells, only : cell_rules_type
+   use rubber_kernels, only : normal_kernel
+   implicit none
+   private
+
+   public :: joint_equations_type, joint_state_type
+
+   real(dp), parameter :: least_slope = 0.05_dp        !! of the road, in the width of the second range of s
+
+   !> A state of all cells, and what it leaves of the equations.
+   type :: joint_state_type
+      real(dp), allocatable :: s(:, :)                 !! m [nx, rows]
+      real(dp), allocatable :: t(:, :, :)              !! Pa [nx, 2, rows]
+      real(dp) :: level = 0.0_dp                       !! m
+      real(dp), allocatable :: left(:, :, :)           !! of the equations of a cell, scaled [nx, 3, rows]
+      real(dp) :: left_load = 0.0_dp                   !! of the load, scaled, times the root of the cells in contact
+      real(dp) :: merit = 0.0_dp                       !! root of the sum of squares
+      real(dp) :: worst = 0.0_dp                       !! largest
+   end type joint_state_type
+
+   !> The equations and their work space. Not to be copied.
+   type :: joint_equations_type
+      logical :: ready = .false.
+      integer :: evaluations = 0                       !! so far, of six transforms each
+      type(cell_rules_type) :: rules
+      real(dp), allocatable :: width(:, :)             !! of the second range of s, m [nx, rows]
+      real(dp) :: unit_length = 1.0_dp                 !! of s, m
+      real(dp) :: unit_traction = 1.0_dp               !! Pa
+      real(dp) :: root = 1.0_dp                        !! of the number of cells in contact at the start
+      real(dp), private :: unit_pressure = 1.0_dp      !! of the mean, Pa
+      type(convolution_type), private :: operator      !! A_z, G = 1
+      real(dp), allocatable, private :: pressure(:, :), height(:, :), slope_x(:, :), slope_y(:, :)
+   contains
+      procedure :: prepare
+      procedure :: start
+      procedure :: evaluate
+      procedure :: hand_out
+   end type joint_equations_type
+
+contains
+
+   !> Operator and work space.
+   subroutine prepare(self, contact, state)
+      class(joint_equations_type), intent(inout) :: self
+      class(contact_type), intent(in) :: contact
+      type(joint_state_type), intent(inout) :: state   !! out: with its fields
+      type(error_type), allocatable :: error
+      integer :: nx, ny
+
+      call new_convolution(self%operator, contact%grid, normal_kernel(contact%case%material), error)
+      if (allocated(error)) return
+      nx = contact%grid%nx
+      ny = contact%grid%rows()
+      allocate (self%width(nx, ny), state%s(nx, ny), state%t(nx, 2, ny), state%left(nx, 3, ny), source=0.0_dp)
+      allocate (self%pressure, self%height, self%slope_x, self%slope_y, source=self%width)
+      self%rules%soft = self%operator%self_compliance()
+      self%ready = self%rules%soft > 0.0_dp
+   end subroutine prepare
+
+   !> The start: the state of the contact; and the units.
+   subroutine start(self, contact, begun)
+      class(joint_equations_type), intent(inout) :: self
+      class(contact_type), intent(in) :: contact
+      type(joint_state_type), intent(inout) :: begun
+      logical, allocatable :: touching(:, :)
+      real(dp) :: slope
+      integer :: c
+
+      associate (rules => self%rules, state => contact%state)
+         rules%potential = contact%side%potential
+         rules%law = contact%tangential%law
+         rules%attraction = 0.0_dp
+         if (contact%side%adhesive) rules%attraction = adhesive_slope(rules%potential, 0.0_dp)
+         rules%soft = self%operator%self_compliance()/contact%material%q
+         rules%soft_along = contact%tangential%cell_compliance()
+         touching = touches(contact%side%adhesive, state%pressure, state%gap)
+         self%root = sqrt(max(real(field_count(touching), dp), 1.0_dp))
+         self%unit_pressure = max(field_sum(abs(state%pressure)), tiny(1.0_dp))/contact%grid%cells()
+         self%unit_traction = self%unit_pressure*contact%grid%cells()/self%root**2
+         self%unit_length = rules%soft*self%unit_traction
+         if (rules%law%law == law_constant_shear) self%unit_traction = max(self%unit_traction, rules%law%shear_strength)
+         slope = max(contact%rms_slope, 0.05_dp)
+         rules%width = rules%soft_along*slope*self%unit_traction
+         if (rules%law%law == law_constant_shear) rules%width = rules%soft_along*slope*rules%law%shear_strength
+         self%width(:, :) = merge(rules%width, 0.0_dp, rules%has_jump(contact%slope_x, contact%slope_y))
+         begun%s(:, :) = rules%number_of(self%width, touching, state%pressure, state%gap)
+         do c = 1, 2
+            begun%t(:, c, :) = merge(state%tangential%traction(:, c, :), 0.0_dp, touching)
+         end do
+         begun%level = state%level
+      end associate
+   end subroutine start
+
+   !> What a state leaves of the equations.
+   subroutine evaluate(self, contact, plan, state)
+      class(joint_equations_type), intent(inout) :: self
+      class(contact_type), intent(inout) :: contact
+      type(planned_row_type), intent(in) :: plan
+      type(joint_state_type), intent(inout) :: state
+      real(dp), allocatable :: rows(:, :), largest(:)
+      real(dp) :: sums(2)
+      integer :: j
+
+      self%evaluations = self%evaluations + 1
+      call form_pressure(self, contact, state%s)
+      call contact%tangential%try(contact%state%tangential, state%t)
+      call displaced(contact%road, plan%road_x, plan%road_y, contact%tangential%trial(:, 1, :), &
+         contact%tangential%trial(:, 2, :), self%height, self%slope_x, self%slope_y)
+      allocate (rows(2, contact%grid%rows()), largest(contact%grid%rows()))
+      !$omp parallel do default(none) shared(self, contact, state, rows, largest) private(j) &
+      !$omp num_threads(self%operator%threads)
+      do j = 1, contact%grid%rows()
+         call evaluate_row(self, contact, state, j)
+         rows(:, j) = [sum(state%left(:, :, j)**2), sum(self%pressure(:, j))]
+         largest(j) = maxval(abs(state%left(:, :, j)))
+      end do
+      sums = row_totals(rows)
+      if (plan%control == 'displacement') then
+         state%left_load = (state%level - (plan%load - contact%summit))/self%unit_length
+      else
+         state%left_load = (sums(2)/contact%grid%cells() - wanted_mean(contact, plan))/self%unit_pressure
+      end if
+      state%worst = max(largest_of_rows(largest), abs(state%left_load))
+      state%left_load = state%left_load*self%root
+      state%merit = sqrt(sums(1) + state%left_load**2)
+   end subroutine evaluate
+
+   !> The mean pressure that is prescribed, Pa.
+   pure function wanted_mean(contact, plan) result(mean)
+      class(contact_type), intent(in) :: contact
+      type(planned_row_type), intent(in) :: plan
+      real(dp) :: mean
+
+      mean = plan%load
+      if (plan%control == 'force') mean = plan%load/contact%grid%area()
+   end function wanted_mean
+
+   !> P of a state, and the transforms of its displacement.
+   subroutine form_pressure(self, contact, s)
+      class(joint_equations_type), intent(inout) :: self
+      class(contact_type), intent(in) :: contact
+      real(dp), intent(in) :: s(:, :)                  !! m
+      integer :: j
+
+      !$omp parallel do default(none) shared(self, contact, s) private(j) num_threads(self%operator%threads)
+      do j = 1, contact%grid%rows()
+         self%pressure(:, j) = self%rules%pressure_of(self%width(:, j), s(:, j))
+         if (allocated(contact%past)) then
+            call self%operator%forward_row(1, j, self%pressure(:, j) + contact%past(:, j))
+         else
+            call self%operator%forward_row(1, j, self%pressure(:, j))
+         end if
+      end do
+      call self%operator%columns(columns_apply)
+   end subroutine form_pressure
+
+   !> A row of what is left of the equations.
+   subroutine evaluate_row(self, contact, state, j)
+      class(joint_equations_type), intent(inout) :: self
+      class(contact_type), intent(in) :: contact
+      type(joint_state_type), intent(inout) :: state
+      integer, intent(in) :: j
+      real(dp) :: u(size(state%s, 1)), share(size(state%s, 1)), slope(2)
+      integer :: i
+
+      call self%operator%backward_row(1, j, u)
+      state%left(:, 1, j) = (u/contact%material%q - self%height(:, j) - state%level &
+         - self%rules%gap_of(state%s(:, j)))/self%unit_length
+      share = self%rules%share_of(self%width(:, j), state%s(:, j))
+      slope = 0.0_dp
+      do i = 1, size(u)
+         if (self%rules%law%slope) slope = [self%slope_x(i, j), self%slope_y(i, j)]
+         state%left(i, 2:3, j) = self%rules%lacking(share(i), self%pressure(i, j), slope, &
+            contact%tangential%slip(i, :, j), state%t(i, :, j))/self%unit_traction
+      end do
+   end subroutine evaluate_row
+
+   !> Hand the solution to the contact.
+   subroutine hand_out(self, contact, plan, found)
+      class(joint_equations_type), intent(inout) :: self
+      class(contact_type), intent(inout) :: contact
+      type(planned_row_type), intent(in) :: plan
+      type(joint_state_type), intent(inout) :: found
+      real(dp) :: slope(2)
+      integer :: i, j
+
+      call evaluate(self, contact, plan, found)
+      slope = 0.0_dp
+      associate (state => contact%state, rubbing => contact%state%tangential)
+         state%pressure(:, :) = self%pressure
+         state%gap(:, :) = self%rules%gap_of(found%s)
+         state%level = found%level
+         rubbing%traction(:, :, :) = found%t
+         contact%tangential%share = self%rules%share_of(self%width, found%s)
+         do j = 1, contact%grid%rows()
+            do i = 1, contact%grid%nx
+               if (self%rules%law%slope) slope = [self%slope_x(i, j), self%slope_y(i, j)]
+               rubbing%contact(i, j) = 0_int8
+               if (contact%tangential%share(i, j) > 0.0_dp) rubbing%contact(i, j) = merge(2_int8, 1_int8, &
+                  self%rules%slips(contact%tangential%share(i, j), self%pressure(i, j), slope, found%t(i, :, j)))
+            end do
+         end do
+      end associate
+   end subroutine hand_out
+
+end module joint_equations

@@ -1,0 +1,311 @@
+!> All of a step with friction at once: Newton's method for pressures, gaps, tractions and the level.
+!>
+!> For steps whose passes do not settle. A pass takes pressure, traction and place one after the other; where
+!> the traction of a cell jumps as the cell opens, the passes swing between two states. The equations of
+!> module `joint_equations` have all unknowns at once, and are continuous.
+!>
+!> Newton's steps are solved by GMRES with products from differences of the equations, and shortened where
+!> the equations are not met better. Open cells are not unknown: their gaps follow (with adhesion only those
+!> that are attracted hardly). If this fails and some traction may jump, the steps are done with a pressure
+!> that rises in partly sheared cells, which takes the jump away, and the rise goes to nothing (`descend`).
+!>
+!> Fields of doubles, from the first use on: 29; and the directions of GMRES, 3 numbers of single
+!> precision per unknown cell and direction.
+module joint_step
+   use adhesion_potential, only : adhesive_curvature
+   use asperity_precision, only : dp
+   use asperity_schedule, only : planned_row_type
+   use contact_model, only : contact_type
+   use field_sums, only : field_count, largest_of_rows
+   use gmres, only : cell_vector_type, gmres_type
+   use joint_equations, only : joint_equations_type, joint_state_type
+   use stop_watch, only : stop_is_due
+   implicit none
+   private
+
+   public :: joint_step_type
+
+   integer, parameter :: most_steps = 25
+   integer, parameter :: most_directions = 120         !! of GMRES, for a step
+   real(dp), parameter :: accuracy = 1.0e-4_dp         !! of a solve by GMRES
+   real(dp), parameter :: difference = 1.0e-7_dp       !! largest change of an unknown in a product, scaled
+   real(dp), parameter :: attracted = 1.0e-4_dp        !! e'' over the stiffness of a cell, for it to be unknown
+   real(dp), parameter :: astray = 100.0_dp            !! times what was left at the start
+   real(dp), parameter :: idle = 1.0e-4_dp             !! part by which a step must lower what is left
+   real(dp), parameter :: share_of_tolerance = 1.0e-3_dp, round_off = 1.0e-11_dp
+   real(dp), parameter :: lengths(10) = [1.0_dp, 0.7_dp, 0.5_dp, 0.3_dp, 0.15_dp, 0.07_dp, 0.03_dp, 0.01_dp, &
+      0.003_dp, 0.001_dp]                              !! of a step
+   ! The rise of the pressure in partly sheared cells:
+   integer, parameter :: most_descents = 30            !! solves with one
+   real(dp), parameter :: first_factor = 0.1_dp        !! from one solve to the next
+   real(dp), parameter :: last_factor = 0.95_dp        !! a solution ends between two rises as close as this
+   real(dp), parameter :: least_rise = 1.0e-5_dp, most_rise = 1.0e2_dp
+
+   !> The method and its work space. Not to be copied.
+   type :: joint_step_type
+      type(joint_equations_type), private :: equations
+      integer, allocatable, private :: first(:)        !! [rows + 1] of the list of unknown cells
+      integer, allocatable, private :: cell(:)         !! its cells, i
+      type(joint_state_type), private :: now, trial, best, begun
+   contains
+      procedure :: solve
+   end type joint_step_type
+
+contains
+
+   !> Solve a step from the state that the last pass has left. If it is solved the state of the contact, the
+   !> trial displacement and the shares of the cells are those of the solution.
+   subroutine solve(self, contact, plan, solved, transforms)
+      class(joint_step_type), intent(inout) :: self
+      class(contact_type), intent(inout) :: contact
+      type(planned_row_type), intent(in) :: plan
+      logical, intent(out) :: solved
+      integer, intent(out) :: transforms               !! that it took
+
+      solved = .false.
+      transforms = 0
+      if (any(contact%tangential%pulled)) return
+      associate (equations => self%equations)
+         if (.not. equations%ready) call equations%prepare(contact, self%now)
+         if (.not. equations%ready) return
+         equations%evaluations = 0
+         call equations%start(contact, self%now)
+         self%begun = self%now
+         self%trial = self%now
+         call iterate(self, contact, plan, solved)
+         if (.not. solved .and. field_count(equations%width > 0.0_dp) > 0) &
+            call descend(self, contact, plan, solved)
+         if (solved) call equations%hand_out(contact, plan, self%now)
+         transforms = 6*equations%evaluations
+      end associate
+   end subroutine solve
+
+   !> Newton's steps from the state at hand.
+   subroutine iterate(self, contact, plan, solved)
+      class(joint_step_type), intent(inout) :: self
+      class(contact_type), intent(inout) :: contact
+      type(planned_row_type), intent(in) :: plan
+      logical, intent(out) :: solved
+      type(cell_vector_type) :: step
+      real(dp) :: goal, first
+      integer :: k
+
+      goal = max(share_of_tolerance*contact%case%solver%tolerance, round_off)
+      call self%equations%evaluate(contact, plan, self%now)
+      first = self%now%merit
+      do k = 1, most_steps
+         if (.not. self%now%worst > goal .or. self%now%merit > astray*first) exit
+         if (stop_is_due()) exit
+         call find_step(self, contact, plan, step)
+         call take_step(self, contact, plan, step, k)
+      end do
+      solved = self%now%worst <= goal
+   end subroutine iterate
+
+   !> Solve with a pressure that rises within the second range, and let this rise go to nothing. Each
+   !> solution is the start of the next.
+   subroutine descend(self, contact, plan, solved)
+      class(joint_step_type), intent(inout) :: self
+      class(contact_type), intent(inout) :: contact
+      type(planned_row_type), intent(in) :: plan
+      logical, intent(out) :: solved
+      real(dp) :: factor, last
+      integer :: k
+
+      last = 0.0_dp
+      factor = first_factor
+      call set_rise(self, self%begun, 1.0_dp)
+      do k = 1, most_descents
+         self%now = self%begun
+         call iterate(self, contact, plan, solved)
+         if (solved) then
+            if (.not. self%equations%rules%rise > 0.0_dp) exit
+            self%begun = self%now
+            last = self%equations%rules%rise
+            factor = max(factor**1.5_dp, first_factor)
+            call set_rise(self, self%begun, merge(last*factor, 0.0_dp, last > least_rise))
+         else if (.not. last > 0.0_dp) then
+            call set_rise(self, self%begun, 10.0_dp*self%equations%rules%rise)
+         else
+            factor = sqrt(factor)
+            call set_rise(self, self%begun, last*factor)
+         end if
+         if (self%equations%rules%rise > most_rise .or. factor > last_factor) exit
+      end do
+      solved = solved .and. .not. self%equations%rules%rise > 0.0_dp
+      self%equations%rules%rise = 0.0_dp
+   end subroutine descend
+
+   !> Change the rise, and s in cells with a pressure such that it remains.
+   subroutine set_rise(self, state, rise)
+      class(joint_step_type), intent(inout) :: self
+      type(joint_state_type), intent(inout) :: state
+      real(dp), intent(in) :: rise
+      real(dp) :: pressed, width
+      integer :: i, j
+
+      do j = 1, size(state%s, 2)
+         do i = 1, size(state%s, 1)
+            width = self%equations%width(i, j)
+            if (state%s(i, j) < width .or. .not. width > 0.0_dp) cycle
+            pressed = state%s(i, j) - width + self%equations%rules%rise*width
+            if (pressed >= rise*width) then
+               state%s(i, j) = pressed - rise*width + width
+            else
+               state%s(i, j) = pressed/rise
+            end if
+         end do
+      end do
+      self%equations%rules%rise = rise
+   end subroutine set_rise
+
+   !> Newton's step, scaled.
+   subroutine find_step(self, contact, plan, step)
+      class(joint_step_type), intent(inout) :: self
+      class(contact_type), intent(inout) :: contact
+      type(planned_row_type), intent(in) :: plan
+      type(cell_vector_type), intent(inout) :: step
+      type(gmres_type) :: krylov
+      type(cell_vector_type) :: v
+
+      call list_cells(self)
+      v%cells = gathered(self, self%now%left)
+      v%cells = -v%cells
+      v%beside = -self%now%left_load
+      call krylov%begin(v, self%first, most_directions, accuracy)
+      do while (krylov%unsolved())
+         call krylov%next(v)
+         call change(self, contact, plan, v)
+         v%cells = gathered(self, self%trial%left)
+         v%beside = self%trial%left_load
+         call krylov%take(v)
+      end do
+      step = v
+      call krylov%solution(step)
+   end subroutine find_step
+
+   !> The list of unknown cells.
+   subroutine list_cells(self)
+      class(joint_step_type), intent(inout) :: self
+      logical :: unknown(size(self%now%s, 1))
+      integer :: i, j, n
+
+      n = size(self%now%s, 2)
+      if (.not. allocated(self%first)) allocate (self%first(n + 1))
+      if (.not. allocated(self%cell)) allocate (self%cell(size(self%now%s)))
+      self%first(1) = 1
+      do j = 1, n
+         unknown = self%now%s(:, j) >= 0.0_dp .or. abs(adhesive_curvature(self%equations%rules%potential, &
+            max(-self%now%s(:, j), 0.0_dp)))*self%equations%rules%soft > attracted
+         self%first(j + 1) = self%first(j) + count(unknown)
+         self%cell(self%first(j):self%first(j + 1) - 1) = pack([(i, i=1, size(unknown))], unknown)
+      end do
+   end subroutine list_cells
+
+   !> The equations' change with a vector of the unknowns, in `trial%left` of all cells.
+   subroutine change(self, contact, plan, v)
+      class(joint_step_type), intent(inout) :: self
+      class(contact_type), intent(inout) :: contact
+      type(planned_row_type), intent(in) :: plan
+      type(cell_vector_type), intent(in) :: v
+      real(dp) :: length
+      integer :: j
+
+      length = difference/max(largest_of_rows([maxval(abs(v%cells))]), abs(v%beside)/self%equations%root, tiny(1.0_dp))
+      call add(self, v, length)
+      call self%equations%evaluate(contact, plan, self%trial)
+      !$omp parallel do default(none) shared(self, length) private(j)
+      do j = 1, size(self%now%s, 2)
+         self%trial%left(:, :, j) = (self%trial%left(:, :, j) - self%now%left(:, :, j))/length
+      end do
+      self%trial%left_load = (self%trial%left_load - self%now%left_load)/length
+   end subroutine change
+
+   !> The state at hand and a multiple of a vector, as `trial`.
+   subroutine add(self, v, length)
+      class(joint_step_type), intent(inout) :: self
+      type(cell_vector_type), intent(in) :: v
+      real(dp), intent(in) :: length
+      integer :: i, j, k
+
+      self%trial%level = self%now%level + length*v%beside*self%equations%unit_length/self%equations%root
+      !$omp parallel do default(none) shared(self, v, length) private(i, j, k)
+      do j = 1, size(self%now%s, 2)
+         self%trial%s(:, j) = self%now%s(:, j)
+         self%trial%t(:, :, j) = self%now%t(:, :, j)
+         do k = self%first(j), self%first(j + 1) - 1
+            i = self%cell(k)
+            self%trial%s(i, j) = self%trial%s(i, j) + length*v%cells(1, k)*self%equations%unit_length
+            self%trial%t(i, :, j) = self%trial%t(i, :, j) + length*v%cells(2:3, k)*self%equations%unit_traction
+         end do
+      end do
+   end subroutine add
+
+   !> The unknown cells of a field.
+   function gathered(self, field) result(cells)
+      class(joint_step_type), intent(in) :: self
+      real(dp), intent(in) :: field(:, :, :)           !! [nx, 3, rows]
+      real(dp), allocatable :: cells(:, :)
+      integer :: j, k
+
+      allocate (cells(3, self%first(size(self%first)) - 1))
+      do j = 1, size(field, 3)
+         do k = self%first(j), self%first(j + 1) - 1
+            cells(:, k) = field(self%cell(k), :, j)
+         end do
+      end do
+   end function gathered
+
+   !> Go along the step as far as the equations are met better.
+   subroutine take_step(self, contact, plan, step, round)
+      class(joint_step_type), intent(inout) :: self
+      class(contact_type), intent(inout) :: contact
+      type(planned_row_type), intent(in) :: plan
+      type(cell_vector_type), intent(in) :: step
+      integer, intent(in) :: round
+      real(dp), allocatable :: follow(:, :)            !! change of s of the cells that are not unknown, m
+      integer :: k, turn
+
+      call change(self, contact, plan, step)
+      follow = -(self%now%left(:, 1, :) + self%trial%left(:, 1, :))*self%equations%unit_length
+      do k = 1, size(follow, 2)
+         follow(self%cell(self%first(k):self%first(k + 1) - 1), k) = 0.0_dp
+      end do
+      self%best%merit = huge(1.0_dp)
+      do k = 1, size(lengths)
+         call try_length(self, contact, plan, step, follow, lengths(k))
+         if (self%trial%merit < self%best%merit) self%best = self%trial
+         if (self%trial%merit < (1.0_dp - 0.2_dp*lengths(k))*self%now%merit) then
+            self%now = self%trial
+            return
+         end if
+      end do
+      if (round > 2 .and. self%best%merit >= (1.0_dp - idle)*self%now%merit) then
+         ! No length helps: any way out of the corner.
+         turn = 1 + modulo(7*round, 4)
+         call try_length(self, contact, plan, step, follow, lengths(turn))
+         self%best = self%trial
+      end if
+      self%now = self%best
+   end subroutine take_step
+
+   !> The state after a part of a step, as `trial`.
+   subroutine try_length(self, contact, plan, step, follow, length)
+      class(joint_step_type), intent(inout) :: self
+      class(contact_type), intent(inout) :: contact
+      type(planned_row_type), intent(in) :: plan
+      type(cell_vector_type), intent(in) :: step
+      real(dp), intent(in) :: follow(:, :), length
+      integer :: c, j
+
+      call add(self, step, length)
+      do j = 1, size(follow, 2)
+         self%trial%s(:, j) = self%trial%s(:, j) + length*follow(:, j)
+         do c = 1, 2
+            where (self%trial%s(:, j) < 0.0_dp) self%trial%t(:, c, j) = 0.0_dp
+         end do
+      end do
+      call self%equations%evaluate(contact, plan, self%trial)
+   end subroutine try_length
+
+end module joint_step
