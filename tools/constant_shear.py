@@ -9,8 +9,8 @@ pressures and tractions, relative to the mean pressure. Each row begins with the
 program. "rows" counts the rows compared, and "divided" those in which cells are partly sheared.
 
 The tool then examines the first step with partly sheared cells, or the last one if the program did
-not settle it. The step is solved from the state that the program left it in or, if Newton's method fails there,
-from the row before, or by way of a bound that grows with a little pressure, less and less. With
+not settle it. The step is solved from the state that the program left it in or, if Newton's method
+fails there, from the row before, or by way of a bound that grows with a little pressure, less and less. With
 --thorough all these ways are gone (which takes several times as long): the column "partial" then
 has a number for each solution that differs from those before, and the trees count together.
 
@@ -241,8 +241,8 @@ def main() -> int:
     given = parser.parse_args()
     seeds = [given.only] if given.only is not None else [
         given.seed * 100000 + k for k in range(given.count)]
-    print("| case | status | rows | divided | difference | row.part | residual | contact | partial | shares | plain solution "
-          "| states | broken | cut | failed | unique | time |\n" + 17 * "| --- " + "|")
+    print("| case | status | rows | divided | difference | row.part | residual | contact "
+          "| partial | shares | plain solution | states | broken | cut | failed | unique | time |\n" + 17 * "| --- " + "|")
     for seed in seeds:
         line = examine(seed, given.program, given.thorough)
         if line:
