@@ -10,9 +10,10 @@ program. "rows" counts the rows compared, and "divided" those in which cells are
 
 The tool then examines the first step with partly sheared cells, or the last one if the program did
 not settle it. The step is solved from the state that the program left it in or, if Newton's method
-fails there, from the row before, or by way of a bound that grows with a little pressure, less and less. With
---thorough all these ways are gone (which takes several times as long): the column "partial" then
-has a number for each solution that differs from those before, and the trees count together.
+fails there, from the row before, or by way of a bound that grows with a little pressure, less and
+less. With --thorough all these ways are gone (which takes several times as long): the column
+"partial" then has a number for each solution that differs from those before, and the trees count
+together.
 
 The plain law allows a cell two states: in contact (no gap, a pressure P >= 0, the whole strength)
 or open (a gap >= 0, no traction). The law that is solved here allows a third one between them: no
@@ -242,7 +243,8 @@ def main() -> int:
     seeds = [given.only] if given.only is not None else [
         given.seed * 100000 + k for k in range(given.count)]
     print("| case | status | rows | divided | difference | row.part | residual | contact "
-          "| partial | shares | plain solution | states | broken | cut | failed | unique | time |\n" + 17 * "| --- " + "|")
+          "| partial | shares | plain solution "
+          "| states | broken | cut | failed | unique | time |\n" + 17 * "| --- " + "|")
     for seed in seeds:
         line = examine(seed, given.program, given.thorough)
         if line:
