@@ -21,6 +21,7 @@ module joint_equations
    use field_sums, only : field_count, field_sum, largest_of_rows, row_totals
    use friction_law, only : law_constant_shear
    use joint_cells, only : cell_rules_type
+   use regular_grid, only : boundary_periodic, grid_type
    use rubber_kernels, only : normal_kernel
    implicit none
    private
@@ -75,9 +76,18 @@ contains
       ny = contact%grid%rows()
       allocate (self%width(nx, ny), state%s(nx, ny), state%t(nx, 2, ny), state%left(nx, 3, ny), source=0.0_dp)
       allocate (self%pressure, self%height, self%slope_x, self%slope_y, source=self%width)
-      self%rules%soft = self%operator%self_compliance()
+      self%rules%soft = cell_compliance(self, contact%grid)
       self%ready = self%rules%soft > 0.0_dp
    end subroutine prepare
+
+   !> Displacement of a cell under its own unit pressure with G = 1, m/Pa; 0 if there is but one cell.
+   function cell_compliance(self, grid) result(compliance)
+      class(joint_equations_type), intent(in) :: self
+      type(grid_type), intent(in) :: grid
+      real(dp) :: compliance
+
+      compliance = self%operator%symbols%self_compliance(with_mean=grid%boundary /= boundary_periodic)
+   end function cell_compliance
 
    !> The start: the state of the contact; and the units.
    subroutine start(self, contact, begun)
@@ -93,7 +103,7 @@ contains
          rules%law = contact%tangential%law
          rules%attraction = 0.0_dp
          if (contact%side%adhesive) rules%attraction = adhesive_slope(rules%potential, 0.0_dp)
-         rules%soft = self%operator%self_compliance()/contact%material%q
+         rules%soft = cell_compliance(self, contact%grid)/contact%material%q
          rules%soft_along = contact%tangential%cell_compliance()
          touching = touches(contact%side%adhesive, state%pressure, state%gap)
          self%root = sqrt(max(real(field_count(touching), dp), 1.0_dp))

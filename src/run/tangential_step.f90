@@ -354,7 +354,7 @@ contains
       class(tangential_step_type), intent(in) :: self
       real(dp) :: compliance
 
-      compliance = self%operator%self_compliance()/self%q
+      compliance = self%operator%symbols%self_compliance(with_mean=self%grid%boundary /= boundary_periodic)/self%q
    end function cell_compliance
 
    !> End the step: arms, energies, the motion of the mass.
