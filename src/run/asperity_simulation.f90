@@ -339,6 +339,7 @@ contains
       if (allocated(self%state)) deallocate (self%state)
       if (allocated(self%proposed)) deallocate (self%proposed)
       if (self%frictional) call self%tangential%destroy()
+      if (self%frictional) call self%passes%destroy()
       if (self%has_steady) call self%steady%destroy()
    end subroutine destroy
 

@@ -80,6 +80,7 @@ module coupled_passes
       type(joint_step_type), private :: joint
    contains
       procedure :: solve
+      procedure :: destroy
    end type coupled_passes_type
 
 contains
@@ -296,5 +297,12 @@ contains
       total%iterations = before%iterations + part%iterations
       total%ffts = before%ffts + part%ffts
    end subroutine add_result
+
+   !> Free the operator of the joint step.
+   subroutine destroy(self)
+      class(coupled_passes_type), intent(inout) :: self
+
+      call self%joint%destroy()
+   end subroutine destroy
 
 end module coupled_passes

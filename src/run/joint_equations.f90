@@ -58,6 +58,7 @@ module joint_equations
       procedure :: start
       procedure :: evaluate
       procedure :: hand_out
+      procedure :: destroy
    end type joint_equations_type
 
 contains
@@ -234,5 +235,13 @@ contains
          end do
       end associate
    end subroutine hand_out
+
+   !> Free the operator.
+   subroutine destroy(self)
+      class(joint_equations_type), intent(inout) :: self
+
+      call self%operator%destroy()
+      self%ready = .false.
+   end subroutine destroy
 
 end module joint_equations

@@ -49,6 +49,7 @@ module joint_step
       type(joint_state_type), private :: now, trial, best, begun
    contains
       procedure :: solve
+      procedure :: destroy
    end type joint_step_type
 
 contains
@@ -307,5 +308,12 @@ contains
       end do
       call self%equations%evaluate(contact, plan, self%trial)
    end subroutine try_length
+
+   !> Free the operator.
+   subroutine destroy(self)
+      class(joint_step_type), intent(inout) :: self
+
+      call self%equations%destroy()
+   end subroutine destroy
 
 end module joint_step
