@@ -102,7 +102,11 @@ def test_law_in_three_dimensions(tmp_path, law, slope, slip_law, seed, interpola
     for snapshot in run.snapshots[1:]:
         touching = snapshot.pressure > 0
         state = np.asarray(snapshot.contact)
-        assert ((state > 0) == touching).all()
+        assert (state[touching] > 0).all()
+        # With constant shear a cell that touches without pressure carries a part of the strength.
+        partly = (state > 0) & ~touching
+        assert not partly.any() or law == "constant_shear"
+        assert np.abs(snapshot.gap[partly]).max(initial=0) < 1e-8 * np.ptp(run.height)
         seen += np.bincount(state.ravel(), minlength=3)
         hx = hy = np.zeros_like(snapshot.pressure)
         if slope:
@@ -121,10 +125,10 @@ def test_law_in_three_dimensions(tmp_path, law, slope, slip_law, seed, interpola
             limits.append(np.full_like(push, STRENGTH))
         limit = np.min(limits, axis=0)
         top = limit[touching].max()
-        assert (snapshot.traction_x[~touching] == 0).all()
-        assert (snapshot.traction_y[~touching] == 0).all()
-        assert (size - limit)[touching].max() < 1e-5 * top, "outside the bound"
-        stick, slips = state == 1, state == 2
+        assert (snapshot.traction_x[state == 0] == 0).all()
+        assert (snapshot.traction_y[state == 0] == 0).all()
+        assert (size - limit)[state > 0].max() < 1e-5 * top, "outside the bound"
+        stick, slips = state == 1, (state == 2) & touching
         slip = np.stack([snapshot.slip_x, snapshot.slip_y])
         far = np.hypot(*slip).max()
         # The tolerance, 1e-8, is one of displacements.
