@@ -13,6 +13,7 @@ module joint_equations
    use adhesion_potential, only : adhesive_slope
    use asperity_errors, only : error_type
    use asperity_interpolation, only : displaced
+   use asperity_parallel, only : any_process
    use asperity_precision, only : dp, int8
    use asperity_schedule, only : planned_row_type
    use contact_model, only : contact_type
@@ -39,6 +40,9 @@ module joint_equations
       real(dp) :: left_load = 0.0_dp                   !! of the load, scaled, times the root of the cells in contact
       real(dp) :: merit = 0.0_dp                       !! root of the sum of squares
       real(dp) :: worst = 0.0_dp                       !! largest
+   contains
+      procedure :: make_room
+      procedure :: copy
    end type joint_state_type
 
    !> The equations and their work space. Not to be copied.
@@ -51,6 +55,7 @@ module joint_equations
       real(dp) :: unit_traction = 1.0_dp               !! Pa
       real(dp) :: root = 1.0_dp                        !! of the number of cells in contact at the start
       real(dp), private :: unit_pressure = 1.0_dp      !! of the mean, Pa
+      real(dp), private :: compliance = 0.0_dp         !! of a cell under its own unit pressure, G = 1, m/Pa
       type(convolution_type), private :: operator      !! A_z, G = 1
       real(dp), allocatable, private :: pressure(:, :), height(:, :), slope_x(:, :), slope_y(:, :)
    contains
@@ -63,32 +68,51 @@ module joint_equations
 
 contains
 
-   !> Operator and work space.
-   subroutine prepare(self, contact, state)
+   !> Allocate the fields of a state.
+   subroutine make_room(self, grid, status)
+      class(joint_state_type), intent(inout) :: self
+      type(grid_type), intent(in) :: grid
+      integer, intent(out) :: status                   !! not 0: there is not enough memory
+
+      allocate (self%s(grid%nx, grid%rows()), source=0.0_dp, stat=status)
+      if (status == 0) allocate (self%t(grid%nx, 2, grid%rows()), source=0.0_dp, stat=status)
+      if (status == 0) allocate (self%left(grid%nx, 3, grid%rows()), source=0.0_dp, stat=status)
+   end subroutine make_room
+
+   !> Copy another state into the fields that are there.
+   subroutine copy(self, other)
+      class(joint_state_type), intent(inout) :: self
+      type(joint_state_type), intent(in) :: other
+
+      self%s(:, :) = other%s
+      self%t(:, :, :) = other%t
+      self%left(:, :, :) = other%left
+      self%level = other%level
+      self%left_load = other%left_load
+      self%merit = other%merit
+      self%worst = other%worst
+   end subroutine copy
+
+   !> Operator and work space. Where there is no memory for them, or only one cell, `ready` remains .false.
+   subroutine prepare(self, contact)
       class(joint_equations_type), intent(inout) :: self
       class(contact_type), intent(in) :: contact
-      type(joint_state_type), intent(inout) :: state   !! out: with its fields
       type(error_type), allocatable :: error
-      integer :: nx, ny
+      integer :: nx, ny, status(5)
 
       call new_convolution(self%operator, contact%grid, normal_kernel(contact%case%material), error)
       if (allocated(error)) return
       nx = contact%grid%nx
       ny = contact%grid%rows()
-      allocate (self%width(nx, ny), state%s(nx, ny), state%t(nx, 2, ny), state%left(nx, 3, ny), source=0.0_dp)
-      allocate (self%pressure, self%height, self%slope_x, self%slope_y, source=self%width)
-      self%rules%soft = cell_compliance(self, contact%grid)
-      self%ready = self%rules%soft > 0.0_dp
+      allocate (self%width(nx, ny), source=0.0_dp, stat=status(1))
+      allocate (self%pressure(nx, ny), source=0.0_dp, stat=status(2))
+      allocate (self%height(nx, ny), source=0.0_dp, stat=status(3))
+      allocate (self%slope_x(nx, ny), source=0.0_dp, stat=status(4))
+      allocate (self%slope_y(nx, ny), source=0.0_dp, stat=status(5))
+      self%compliance = self%operator%symbols%self_compliance( &
+         with_mean=contact%grid%boundary /= boundary_periodic)
+      self%ready = self%compliance > 0.0_dp .and. .not. any_process(any(status /= 0))
    end subroutine prepare
-
-   !> Displacement of a cell under its own unit pressure with G = 1, m/Pa; 0 if there is but one cell.
-   function cell_compliance(self, grid) result(compliance)
-      class(joint_equations_type), intent(in) :: self
-      type(grid_type), intent(in) :: grid
-      real(dp) :: compliance
-
-      compliance = self%operator%symbols%self_compliance(with_mean=grid%boundary /= boundary_periodic)
-   end function cell_compliance
 
    !> The start: the state of the contact; and the units.
    subroutine start(self, contact, begun)
@@ -104,7 +128,7 @@ contains
          rules%law = contact%tangential%law
          rules%attraction = 0.0_dp
          if (contact%side%adhesive) rules%attraction = adhesive_slope(rules%potential, 0.0_dp)
-         rules%soft = cell_compliance(self, contact%grid)/contact%material%q
+         rules%soft = self%compliance/contact%material%q
          rules%soft_along = contact%tangential%cell_compliance()
          touching = touches(contact%side%adhesive, state%pressure, state%gap)
          self%root = sqrt(max(real(field_count(touching), dp), 1.0_dp))
@@ -112,7 +136,7 @@ contains
          self%unit_traction = self%unit_pressure*contact%grid%cells()/self%root**2
          self%unit_length = rules%soft*self%unit_traction
          if (rules%law%law == law_constant_shear) self%unit_traction = max(self%unit_traction, rules%law%shear_strength)
-         slope = max(contact%rms_slope, 0.05_dp)
+         slope = max(contact%rms_slope, least_slope)
          rules%width = rules%soft_along*slope*self%unit_traction
          if (rules%law%law == law_constant_shear) rules%width = rules%soft_along*slope*rules%law%shear_strength
          self%width(:, :) = merge(rules%width, 0.0_dp, rules%has_jump(contact%slope_x, contact%slope_y))

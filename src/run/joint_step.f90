@@ -13,6 +13,7 @@
 !> precision per unknown cell and direction.
 module joint_step
    use adhesion_potential, only : adhesive_curvature
+   use asperity_parallel, only : any_process
    use asperity_precision, only : dp
    use asperity_schedule, only : planned_row_type
    use contact_model, only : contact_type
@@ -67,12 +68,11 @@ contains
       transforms = 0
       if (any(contact%tangential%pulled)) return
       associate (equations => self%equations)
-         if (.not. equations%ready) call equations%prepare(contact, self%now)
+         if (.not. equations%ready) call prepare(self, contact)
          if (.not. equations%ready) return
          equations%evaluations = 0
          call equations%start(contact, self%now)
-         self%begun = self%now
-         self%trial = self%now
+         call self%begun%copy(self%now)
          call iterate(self, contact, plan, solved)
          if (.not. solved .and. field_count(equations%width > 0.0_dp) > 0) &
             call descend(self, contact, plan, solved)
@@ -80,6 +80,21 @@ contains
          transforms = 6*equations%evaluations
       end associate
    end subroutine solve
+
+   !> The equations, and room for the states. Where there is not enough memory, the equations are not ready.
+   subroutine prepare(self, contact)
+      class(joint_step_type), intent(inout) :: self
+      class(contact_type), intent(in) :: contact
+      integer :: status(4)
+
+      call self%equations%prepare(contact)
+      if (.not. self%equations%ready) return
+      call self%now%make_room(contact%grid, status(1))
+      call self%trial%make_room(contact%grid, status(2))
+      call self%best%make_room(contact%grid, status(3))
+      call self%begun%make_room(contact%grid, status(4))
+      if (any_process(any(status /= 0))) call self%equations%destroy()
+   end subroutine prepare
 
    !> Newton's steps from the state at hand.
    subroutine iterate(self, contact, plan, solved)
@@ -112,16 +127,20 @@ contains
       logical, intent(out) :: solved
       real(dp) :: factor, last
       integer :: k
+      logical :: met                                   !! the equations with the rise at hand
 
+      solved = .false.
       last = 0.0_dp
       factor = first_factor
       call set_rise(self, self%begun, 1.0_dp)
       do k = 1, most_descents
-         self%now = self%begun
-         call iterate(self, contact, plan, solved)
-         if (solved) then
-            if (.not. self%equations%rules%rise > 0.0_dp) exit
-            self%begun = self%now
+         if (stop_is_due()) exit
+         call self%now%copy(self%begun)
+         call iterate(self, contact, plan, met)
+         solved = met .and. .not. self%equations%rules%rise > 0.0_dp
+         if (solved) exit
+         if (met) then
+            call self%begun%copy(self%now)
             last = self%equations%rules%rise
             factor = max(factor**1.5_dp, first_factor)
             call set_rise(self, self%begun, merge(last*factor, 0.0_dp, last > least_rise))
@@ -133,7 +152,6 @@ contains
          end if
          if (self%equations%rules%rise > most_rise .or. factor > last_factor) exit
       end do
-      solved = solved .and. .not. self%equations%rules%rise > 0.0_dp
       self%equations%rules%rise = 0.0_dp
    end subroutine descend
 
@@ -175,6 +193,7 @@ contains
       v%beside = -self%now%left_load
       call krylov%begin(v, self%first, most_directions, accuracy)
       do while (krylov%unsolved())
+         if (stop_is_due()) exit
          call krylov%next(v)
          call change(self, contact, plan, v)
          v%cells = gathered(self, self%trial%left)
@@ -275,9 +294,9 @@ contains
       self%best%merit = huge(1.0_dp)
       do k = 1, size(lengths)
          call try_length(self, contact, plan, step, follow, lengths(k))
-         if (self%trial%merit < self%best%merit) self%best = self%trial
+         if (self%trial%merit < self%best%merit) call self%best%copy(self%trial)
          if (self%trial%merit < (1.0_dp - 0.2_dp*lengths(k))*self%now%merit) then
-            self%now = self%trial
+            call self%now%copy(self%trial)
             return
          end if
       end do
@@ -285,9 +304,9 @@ contains
          ! No length helps: any way out of the corner.
          turn = 1 + modulo(7*round, 4)
          call try_length(self, contact, plan, step, follow, lengths(turn))
-         self%best = self%trial
+         call self%best%copy(self%trial)
       end if
-      self%now = self%best
+      call self%now%copy(self%best)
    end subroutine take_step
 
    !> The state after a part of a step, as `trial`.

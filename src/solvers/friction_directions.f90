@@ -8,8 +8,7 @@ module friction_directions
    implicit none
    private
 
-   public :: divided_row, scaled_row, total_of, turn_sums_type, turned_row, uniform_type, unscaled_row, &
-      z_sums_type
+   public :: scaled_row, total_of, turn_sums_type, turned_row, uniform_type, unscaled_row, z_sums_type
 
    !> The part of the mean mode that is treated apart from the preconditioner (module
    !> `friction_preconditioner`): c, and what it displaces on average, (h/N) E c.
@@ -115,53 +114,6 @@ contains
       sums%total = [sx, sy]
       sums%bent = [bx, by]
    end subroutine unscaled_row
-
-   !> z of a row where the curvature of the bounds outweighs the operator: `scaled_row` and `unscaled_row`
-   !> in one, with 1/a_0 for M, so that z = w/a_0 Z (g - H e c).
-   pure subroutine divided_row(compliance, uniform, r, tangent, z, sums)
-      real(dp), intent(in) :: compliance
-      type(uniform_type), intent(in) :: uniform
-      real(dp), intent(in), contiguous :: r(:, :)          !! [nx, 2] m
-      real(dp), intent(in), contiguous :: tangent(:, :)    !! [nx, 3]
-      real(dp), intent(inout), contiguous :: z(:, :)       !! [nx, 2] in: z_old
-      type(z_sums_type), intent(out) :: sums
-      real(dp) :: rv, rx_z, ry_z, gx, gy, bent, part, rz, cross, sx, sy, bx, by, cx, cy, mean_x, mean_y
-      integer :: i
-
-      cx = uniform%traction(1)
-      cy = uniform%traction(2)
-      mean_x = uniform%displacement(1)
-      mean_y = uniform%displacement(2)
-      rz = 0.0_dp
-      cross = 0.0_dp
-      sx = 0.0_dp
-      sy = 0.0_dp
-      bx = 0.0_dp
-      by = 0.0_dp
-      !$omp simd private(rv, rx_z, ry_z, gx, gy, bent, part) reduction(+: rz, cross, sx, sy, bx, by)
-      do i = 1, size(r, 1)
-         part = tangent(i, 3)/compliance
-         bent = compliance*(1.0_dp - tangent(i, 3))
-         ! The part of r along v goes first: beside a long slip, g is otherwise lost in its round-off.
-         rv = r(i, 1)*tangent(i, 1) + r(i, 2)*tangent(i, 2)
-         rx_z = r(i, 1) - rv*tangent(i, 1)
-         ry_z = r(i, 2) - rv*tangent(i, 2)
-         cross = cross + merge(rx_z*z(i, 1) + ry_z*z(i, 2), 0.0_dp, tangent(i, 3) > 0.0_dp)
-         gx = rx_z - mean_x - bent*cx
-         gy = ry_z - mean_y - bent*cy
-         rv = gx*tangent(i, 1) + gy*tangent(i, 2)
-         gx = part*(gx - rv*tangent(i, 1))
-         gy = part*(gy - rv*tangent(i, 2))
-         z(i, 1) = gx
-         z(i, 2) = gy
-         rz = rz + rx_z*gx + ry_z*gy
-         sx = sx + gx
-         sy = sy + gy
-         bx = bx + bent*gx
-         by = by + bent*gy
-      end do
-      sums = z_sums_type(rz, cross, [sx, sy], [bx, by])
-   end subroutine divided_row
 
    !> d = z + w Z c + beta Z d of a row, z' = z + w Z c; g.d and the curvature of the bounds along d.
    pure subroutine turned_row(compliance, beta, c, r, tangent, z, d, sums)

@@ -26,7 +26,7 @@ module friction_preconditioner
    use asperity_errors, only : error_type
    use asperity_precision, only : dp, pi
    use fft_conv, only : columns_apply, convolution_type, new_inverse_convolution
-   use friction_directions, only : divided_row, scaled_row, total_of, uniform_type, unscaled_row, z_sums_type
+   use friction_directions, only : scaled_row, total_of, uniform_type, unscaled_row, z_sums_type
    use friction_moves, only : pseudo_inverse
    use friction_problem, only : friction_problem_type
    use kernels, only : kernel_type
@@ -123,18 +123,22 @@ contains
       yes = problem%slipping == problem%cells .and. weights < light*problem%cells
    end function bounds_outweigh
 
-   !> The rows of z without M.
+   !> The rows of z with 1/a_0 for M, which needs no transforms: what is left is z = w/a_0 Z (g - H e c).
    subroutine divide_rows(self, problem, uniform, rows)
       type(friction_preconditioner_type), intent(inout) :: self
       type(friction_problem_type), intent(in) :: problem
       type(uniform_type), intent(in) :: uniform
-      type(z_sums_type), intent(out) :: rows(:)
+      type(z_sums_type), intent(inout) :: rows(:)
+      real(dp) :: g(problem%nx, 2)
       integer :: j
 
-      !$omp parallel do default(none) shared(self, problem, uniform, rows) private(j) &
+      !$omp parallel do default(none) shared(self, problem, uniform, rows) private(j, g) &
       !$omp num_threads(problem%threads)
       do j = 1, problem%rows
-         call divided_row(problem%compliance, uniform, problem%slip(:, :, j), &
+         call scaled_row(problem%compliance, uniform, problem%slip(:, :, j), &
+            problem%work%tangent(:, :, j), self%z(:, :, j), g, rows(j)%cross)
+         self%z(:, :, j) = g/problem%compliance
+         call unscaled_row(problem%compliance, uniform, problem%slip(:, :, j), &
             problem%work%tangent(:, :, j), self%z(:, :, j), rows(j))
       end do
    end subroutine divide_rows
