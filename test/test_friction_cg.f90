@@ -12,7 +12,9 @@ module test_friction_cg
    use kernels, only : tangential_half_space
    use asperity_precision, only : dp, int8, pi
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
+   use, intrinsic :: iso_c_binding, only : c_int
    use solver_result, only : solver_result_type
+   use stop_watch, only : begin_watch, end_watch
    implicit none
    private
 
@@ -30,6 +32,8 @@ module test_friction_cg
       integer(int8), allocatable :: contact(:, :)
    end type case_type
 
+   integer :: questions = 0        !! that `asked` will still answer with no
+
 contains
 
    subroutine run_friction_cg()
@@ -46,6 +50,7 @@ contains
       if (selected('turned_and_mirrored_contacts_agree')) call turned_and_mirrored_contacts_agree()
       if (selected('rough_contacts_meet_the_law')) call rough_contacts_meet_the_law()
       if (selected('methods_agree')) call methods_agree()
+      if (selected('a_stop_ends_the_solve')) call a_stop_ends_the_solve()
       if (selected('frictionless_traction_on_slopes')) call frictionless_traction_on_slopes()
       if (selected('constant_shear_up_to_the_edge')) call constant_shear_up_to_the_edge()
       if (selected('adhesion_widens_the_bound')) call adhesion_widens_the_bound()
@@ -592,6 +597,67 @@ contains
          end do
       end do
    end subroutine methods_agree
+
+   !> Where a stop is asked for, each method returns within an iteration, with and without a pull. The solver and the
+   !> operator are then as they were: the next solve gives the same bits.
+   subroutine a_stop_ends_the_solve()
+      type(case_type) :: self
+      real(dp), allocatable :: tx(:, :)
+      integer, parameter :: methods(3) = [friction_fast, friction_thesis, friction_gradient]
+      type(error_type), allocatable :: error
+      integer :: k, most, pulled, part
+
+      call new_case(self, 40, 28, 1.0_dp, 0.8_dp, boundary_periodic, 0.4_dp, 0.3_dp)
+      call set_rough(self, 17, 0.1_dp, 0.3_dp)
+      self%law = new_friction_law('coulomb_orowan', 0.4_dp, 0.3_dp, 0.0_dp, .false., .true.)
+      self%drive_x = 0.1_dp*sum(self%p)/size(self%p)
+      do k = 1, 3
+         call self%solver%destroy()
+         call new_friction_solver(self%solver, self%grid, self%operator, error, methods(k))
+         call check_no_error(error, 'method')
+         self%solver%max_iterations = 5000
+         do pulled = 0, 1
+            call solve_from_zero(self, pulled == 1)
+            call check_that(self%result%converged .and. .not. self%result%stopped, 'without a stop: solved')
+            most = self%result%iterations
+            tx = self%tx
+            do part = 0, 4
+               questions = (most - 1)*part/4
+               call begin_watch(asked, 0.0_dp)
+               call solve_from_zero(self, pulled == 1)
+               call end_watch()
+               call check_that(self%result%stopped .and. .not. self%result%converged, 'with a stop: given up')
+               call check_that(self%result%iterations == (most - 1)*part/4, 'given up at the iteration of the stop')
+               call solve_from_zero(self, pulled == 1)
+               call check_that(self%result%iterations == most .and. .not. any(abs(self%tx - tx) > 0.0_dp), &
+                  'after a stop: the same bits')
+            end do
+         end do
+      end do
+      call end_case(self)
+   end subroutine a_stop_ends_the_solve
+
+   !> Solve from no traction, with the road driven or pulled.
+   subroutine solve_from_zero(self, pulled)
+      type(case_type), intent(inout) :: self
+      logical, intent(in) :: pulled
+
+      self%tx = 0.0_dp
+      self%ty = 0.0_dp
+      self%solver%pull%along = pulled
+      self%solver%pull%traction = [0.2_dp, 0.1_dp]*sum(self%p)/size(self%p)
+      self%solver%pull%offset = 0.0_dp
+      where (self%contact /= contact_open) self%contact = contact_stick
+      call solve_case(self)
+   end subroutine solve_from_zero
+
+   !> Is a stop asked for? No, as often as `questions` says, then yes.
+   function asked() bind(c, name='asked_of_friction_cg') result(yes)
+      integer(c_int) :: yes
+
+      yes = merge(0_c_int, 1_c_int, questions > 0)
+      questions = questions - 1
+   end function asked
 
    !> A turn by 90 degrees and a mirror, on a grid with nx /= ny, dx /= dy.
    subroutine turned_and_mirrored_contacts_agree()

@@ -53,6 +53,10 @@ contains
    !> Rows are given up whatever acts, those with friction between passes and within them.
    subroutine give_up_advance()
       call give_up_case(slides, 3, 'friction')
+      call give_up_case(slides//nl//'&solver method = ''thesis'' /', 29, 'friction by the method of the thesis')
+      call give_up_case(grid//rubber//', density = 1e3 /'//nl//rubs//'&phase pressure = 1e5 /'//nl// &
+         '&phase traction_x = 1e4, traction_y = 5e3, ramp = ''linear'', duration = 2e-3, steps = 2 /', 11, &
+         'a pulled road')
       call give_up_case(grid//rubber//' /'//nl//'&phase pressure = 1e5 /'//nl// &
          '&phase pressure = 2e5, ramp = ''linear'', duration = 4e-3, steps = 2 /', 1, 'load')
       call give_up_case(grid//rubber//' /'//nl//'&phase pressure = 1e5, velocity_x = 0.5, steady = .true., '// &

@@ -126,7 +126,7 @@ contains
          ! Early passes are solved coarsely; what the row keeps is solved to the tolerance.
          if (self%passes == most) control%accuracy = min(control%accuracy, tolerance)
          call do_pass(self, contact, plan, control%accuracy, normal, rubbing)
-         contact%stop%given_up = normal%stopped
+         contact%stop%given_up = normal%stopped .or. rubbing%stopped
          if (contact%stop%given_up) return
          if (self%passes == 1 .and. .not. plan%instantaneous) contact%state%first_mismatch = self%residual
          if (self%passes == most .or. .not. normal%converged) exit
@@ -189,6 +189,7 @@ contains
       call contact%tangential%solve(contact%state%tangential, contact%state%pressure, contact%state%gap, &
          contact%slope_x, contact%slope_y, part)
       call add_result(rubbing, part)
+      if (rubbing%stopped) return
       self%residual = mismatch(contact, plan)
    end subroutine do_pass
 

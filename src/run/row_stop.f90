@@ -2,8 +2,8 @@
 !>
 !> A row may take minutes: a large contact, or passes that do not settle. A run that is asked to stop lets
 !> the row end if that takes no longer than `patience`; otherwise the row is given up, and the state is that
-!> of the row before. Solvers ask for it at each iteration (module `stop_watch`), rows with friction also
-!> between two passes.
+!> of the row before. Solvers, normal and tangential, ask for it at each iteration (module `stop_watch`), rows
+!> with friction also between two passes.
 !>
 !> For this `keep` copies, at the start of a row, what the row changes before it commits a step: P, the
 !> gap, T and T of the step before, the forecast, the states of contact, and all scalars. Before the first

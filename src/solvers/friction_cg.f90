@@ -144,9 +144,11 @@ contains
       goal = friction_goal_type(tolerance=self%tolerance, most_iterations=self%max_iterations)
       call set_problem(self, operator, law, fields, problem)
       call problem%start(operator)
+      self%method%stopped = .false.
       do
          if (problem%residual > self%tolerance) &
             call self%method%iterate(problem, operator, goal, result%iterations)
+         if (self%method%stopped) exit
          result%converged = problem%solved(self%tolerance)
          if (result%converged .and. any(self%pull%along)) &
             call meet_pull(self, problem, operator, result%iterations, result%converged)
@@ -156,6 +158,7 @@ contains
          call problem%refresh_slip(operator)
          if (problem%residual <= self%tolerance) exit
       end do
+      result%stopped = self%method%stopped
       result%residual = problem%residual
       result%load_error = self%pull%missed(problem)
       result%reason = reason(self, problem, result)
@@ -233,6 +236,7 @@ contains
          converged = .false.
          before = self%pull%lacking(problem)
          call move_springs(self, problem, operator, factor*problem%spring*before, iterations)
+         if (self%method%stopped) return
          gained = dot_product(before, before - self%pull%lacking(problem)) &
             /max(dot_product(before, before), tiny(1.0_dp))
          idle = merge(idle + 1, 0, problem%slipping == problem%cells .and. gained < 0.01_dp)

@@ -52,6 +52,7 @@ module friction_cg_fast
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use kernels, only : kernel_type
    use regular_grid, only : grid_type
+   use stop_watch, only : stop_is_due
    implicit none
    private
 
@@ -111,14 +112,18 @@ contains
       integer, intent(inout) :: iterations
       type(friction_goal_type) :: some_steps
 
+      self%stopped = .false.
       call self%preconditioner%set_mean_stiffness(operator)
       do while (iterations < goal%most_iterations)
          call iterate_gradients(self, problem, operator, goal, iterations)
+         if (self%stopped) exit
          if (problem%solved(goal%tolerance) .or. .not. ieee_is_finite(problem%residual)) exit
          some_steps = goal
          some_steps%fall = 0.1_dp
          some_steps%most_iterations = min(goal%most_iterations, iterations + gradient_steps)
          call self%fallback%iterate(problem, operator, some_steps, iterations)
+         self%stopped = self%fallback%stopped
+         if (self%stopped) exit
          if (problem%solved(goal%tolerance)) exit
       end do
       self%ffts = self%preconditioner%ffts()
@@ -136,6 +141,8 @@ contains
       now%milestone = problem%residual
       now%since = iterations
       do while (iterations < goal%most_iterations)
+         self%stopped = stop_is_due()
+         if (self%stopped) return
          iterations = iterations + 1
          now%excess = merge(overshoot_near, overshoot, problem%near .and. iterations <= near_steps)
 

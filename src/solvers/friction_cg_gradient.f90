@@ -15,6 +15,7 @@ module friction_cg_gradient
    use friction_method, only : friction_goal_type, friction_method_type
    use friction_moves, only : move
    use friction_problem, only : friction_problem_type
+   use stop_watch, only : stop_is_due
    implicit none
    private
 
@@ -44,10 +45,13 @@ contains
       if (.not. allocated(self%step)) &
          allocate (self%slip(problem%nx, 2, problem%rows), &
             self%step(problem%nx, 2, problem%rows), source=0.0_dp)
+      self%stopped = .false.
       first = problem%residual
       first_alpha = 1.0_dp/(problem%compliance*sqrt(real(max(problem%cells, 1), dp)))
       alpha = first_alpha
       do while (iterations < goal%most_iterations)
+         self%stopped = stop_is_due()
+         if (self%stopped) return
          iterations = iterations + 1
          call form_step(self, problem, alpha)
          call move(problem, operator, 1.0_dp, self%step, .false., .true., returned)

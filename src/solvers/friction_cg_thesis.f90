@@ -21,6 +21,7 @@ module friction_cg_thesis
    use friction_method, only : friction_goal_type, friction_method_type
    use friction_moves, only : move
    use friction_problem, only : friction_problem_type
+   use stop_watch, only : stop_is_due
    implicit none
    private
 
@@ -54,8 +55,11 @@ contains
          allocate (self%gradient(problem%nx, 2, problem%rows), source=0.0_dp)
          allocate (self%direction, self%tangent, source=self%gradient)
       end if
+      self%stopped = .false.
       beta = 0.0_dp
       do while (iterations < goal%most_iterations)
+         self%stopped = stop_is_due()
+         if (self%stopped) return
          iterations = iterations + 1
          call new_direction(self, problem, operator, beta, ascent, bend)
          if (ascent <= 0.0_dp) call new_direction(self, problem, operator, 0.0_dp, ascent, bend)

@@ -1,8 +1,9 @@
 !> What a method for the tangential problem is.
 !>
 !> A method iterates on a `friction_problem_type` until it is solved. It may give up: the solver sees
-!> from `solved` whether it has. To add a method: extend the type, and make it in `choose_method` of
-!> module `friction_cg`.
+!> from `solved` whether it has. It asks once in each iteration whether the solve is to be given up
+!> (module `stop_watch`); if so it returns with `stopped`. To add a method: extend the type, and make it
+!> in `choose_method` of module `friction_cg`.
 module friction_method
    use asperity_precision, only : dp, int64
    use fft_conv, only : convolution_type
@@ -22,6 +23,7 @@ module friction_method
    !> A method with its work fields. Not to be copied.
    type, abstract :: friction_method_type
       integer(int64) :: ffts = 0             !! transforms done so far beside those of the operator
+      logical :: stopped = .false.           !! the last call of `iterate` was given up
    contains
       procedure(iterate_method), deferred :: iterate
       procedure(free_memory), deferred :: destroy
