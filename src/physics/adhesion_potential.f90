@@ -252,8 +252,9 @@ contains
       real(dp), intent(out), contiguous :: slope(:)      !! e', Pa
       real(dp), intent(out), contiguous :: curvature(:)  !! e'', Pa/m
       real(dp), intent(out), contiguous, optional :: energy(:)   !! e, J/m2
-      real(dp) :: value, scale, stiffness
-      integer :: i
+      integer, parameter :: block = 64         !! cells that may be far off together
+      real(dp) :: value, scale
+      integer :: i, first, last
 
       if (self%kind /= potential_exponential) then
          do i = 1, size(gap)
@@ -262,19 +263,20 @@ contains
          end do
          return
       end if
-      call decay(1.0_dp/self%range, gap, slope)
       scale = self%energy/self%range
-      stiffness = -1.0_dp/self%range
-      do i = 1, size(gap)
-         slope(i) = scale*slope(i)
-         curvature(i) = stiffness*slope(i)
+      do first = 1, size(gap), block
+         last = min(first + block - 1, size(gap))
+         call decay(1.0_dp/self%range, gap(first:last), slope(first:last))
       end do
+      slope(:) = scale*slope
+      curvature(:) = (-1.0_dp/self%range)*slope
       if (present(energy)) energy(:) = -self%range*slope
    end subroutine adhesive_slopes
 
-   !> exp(-rate gap) of a row, to round-off; beyond `far` it is nothing beside 1. The loop has no call and no branch,
-   !> so that the compiler can treat several cells at once, which the library's exponential does not allow:
-   !> exp(-x) = 2^-k exp(-r) with the integer k next to x/ln 2, and |r| <= ln(2)/2 in a series of Taylor.
+   !> exp(-rate gap) of some cells, to round-off; beyond `far` it is nothing beside 1. The last loop has no call and
+   !> no branch, so that the compiler can treat several cells at once, which the library's exponential does not
+   !> allow: exp(-x) = 2^-k exp(r) with the integer k next to x/ln 2, and |r| <= ln(2)/2 in Taylor's series. Its
+   !> odd and even terms are summed apart, so that the processor need not wait for one sum to begin the other.
    pure subroutine decay(rate, gap, values)
       real(dp), intent(in) :: rate
       real(dp), intent(in), contiguous :: gap(:)
@@ -284,9 +286,21 @@ contains
       ! ln 2 in two parts, the first with zeros at the end, so that k times it is exact.
       real(dp), parameter :: log_high = 6.93147180369123816490e-01_dp, log_low = 1.90821492927058770002e-10_dp
       integer(int64), parameter :: one = 1023_int64      !! exponent of the number 1
+      integer, parameter :: last = 13                    !! term of the series
+      integer :: n
+      real(dp), parameter :: c(last) = [(1.0_dp/gamma(n + 1.0_dp), n=1, last)]
       integer(int64) :: bits
-      real(dp) :: x, k, r, p
+      real(dp) :: x, k, r, square, odd, even, least
       integer :: i
+
+      least = huge(1.0_dp)
+      do i = 1, size(gap)
+         least = min(least, gap(i))
+      end do
+      if (rate*least >= far) then
+         values(:) = 0.0_dp
+         return
+      end if
 
       do i = 1, size(gap)
          x = min(rate*gap(i), 2.0_dp*far)
@@ -294,19 +308,10 @@ contains
          bits = shiftl(one - (transfer(k, bits) - transfer(rounder, bits)), 52)
          k = k - rounder
          r = (k*log_high - x) + k*log_low
-         p = 1.0_dp + r/13.0_dp
-         p = 1.0_dp + r*p*(1.0_dp/12.0_dp)
-         p = 1.0_dp + r*p*(1.0_dp/11.0_dp)
-         p = 1.0_dp + r*p*(1.0_dp/10.0_dp)
-         p = 1.0_dp + r*p*(1.0_dp/9.0_dp)
-         p = 1.0_dp + r*p*(1.0_dp/8.0_dp)
-         p = 1.0_dp + r*p*(1.0_dp/7.0_dp)
-         p = 1.0_dp + r*p*(1.0_dp/6.0_dp)
-         p = 1.0_dp + r*p*(1.0_dp/5.0_dp)
-         p = 1.0_dp + r*p*(1.0_dp/4.0_dp)
-         p = 1.0_dp + r*p*(1.0_dp/3.0_dp)
-         p = 1.0_dp + r*p*(1.0_dp/2.0_dp)
-         values(i) = (1.0_dp + r*p)*transfer(bits, p)
+         square = r*r
+         odd = c(3) + square*(c(5) + square*(c(7) + square*(c(9) + square*(c(11) + square*c(13)))))
+         even = c(2) + square*(c(4) + square*(c(6) + square*(c(8) + square*(c(10) + square*c(12)))))
+         values(i) = (1.0_dp + (r + square*(even + r*odd)))*transfer(bits, r)
       end do
    end subroutine decay
 

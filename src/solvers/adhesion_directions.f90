@@ -4,7 +4,7 @@ module adhesion_directions
    use adhesion_state, only : control_approach, control_pressure, diagonal_scaling
    use adhesion_work, only : adhesion_iteration_type, adhesion_work_type
    use asperity_precision, only : dp
-   use field_sums, only : largest_of_rows
+   use field_sums, only : largest_of_rows, row_product
    use row_sharing, only : row_sharing_type
    implicit none
    private
@@ -100,18 +100,30 @@ contains
       real(dp), intent(in) :: level_z                  !! m
       integer, intent(in) :: j
       real(dp), intent(inout) :: z(:)                  !! in: M r for Q = 1
-      integer :: i, n
+      integer :: n
 
       n = self%patch%inner(j)
-      z(:) = z*(1.0_dp/now%problem%modulus)
-      do i = 1, n
-         z(i) = merge(z(i), 0.0_dp, now%state(i, j) > 0.0_dp .or. self%residual(i, j) > 0.0_dp)
-      end do
+      call take_free_cells(1.0_dp/now%problem%modulus, now%state(1:n, j), self%residual(1:n, j), z(1:n))
+      z(n + 1:) = z(n + 1:)*(1.0_dp/now%problem%modulus)
       if (self%scaling > 0.0_dp) &
          z(1:n) = z(1:n)*diagonal_scaling(now%problem, now%state(1:n, j), self%scaling)
       if (n < self%patch%mx) z(n + 1:) = z(n + 1:) + level_z*self%patch%psi(n + 1:, j)
       self%exchange(:, j) = z
    end subroutine take_z_row
+
+   !> z = z factor on the free cells, 0 on the others.
+   pure subroutine take_free_cells(factor, state, residual, z)
+      real(dp), intent(in) :: factor
+      real(dp), intent(in), contiguous :: state(:), residual(:)
+      real(dp), intent(inout), contiguous :: z(:)
+      integer :: i
+
+      z(:) = factor*z
+      !$omp simd
+      do i = 1, size(z)
+         z(i) = merge(z(i), 0.0_dp, state(i) > 0.0_dp .or. residual(i) > 0.0_dp)
+      end do
+   end subroutine take_free_cells
 
    !> Keep cells in contact from closing in a row of z whose mean is free; the sums of the row.
    subroutine sum_z_row(self, now, j, sums)
@@ -119,26 +131,24 @@ contains
       type(adhesion_iteration_type), intent(in) :: now
       integer, intent(in) :: j
       type(z_sums_type), intent(out) :: sums
-      real(dp) :: z, rz, old_rz
-      integer :: i, n
 
-      n = self%patch%inner(j)
-      rz = 0.0_dp
-      old_rz = 0.0_dp
-      do i = 1, n
-         z = self%exchange(i, j)
-         z = merge(z, max(z, 0.0_dp), now%state(i, j) > 0.0_dp)
-         self%exchange(i, j) = z
-         rz = rz + z*self%residual(i, j)
-         old_rz = old_rz + z*self%old(i, j)
-      end do
-      do i = n + 1, self%patch%mx
-         rz = rz + self%exchange(i, j)*self%residual(i, j)
-         old_rz = old_rz + self%exchange(i, j)*self%old(i, j)
-      end do
-      sums%rz = rz
-      sums%old_rz = old_rz
+      associate (n => self%patch%inner(j))
+         call keep_contact(now%state(1:n, j), self%exchange(1:n, j))
+      end associate
+      sums%rz = row_product(self%exchange(:, j), self%residual(:, j))
+      sums%old_rz = row_product(self%exchange(:, j), self%old(:, j))
    end subroutine sum_z_row
+
+   !> z without cells in contact that it would close.
+   pure subroutine keep_contact(state, z)
+      real(dp), intent(in), contiguous :: state(:)
+      real(dp), intent(inout), contiguous :: z(:)
+      integer :: i
+
+      do i = 1, size(z)
+         z(i) = max(z(i), merge(-huge(1.0_dp), 0.0_dp, state(i) > 0.0_dp))
+      end do
+   end subroutine keep_contact
 
    !> Take the mean off a row of z, and keep cells in contact from closing; the sums of the row.
    subroutine center_row(self, now, pass, mean, j, sums)
@@ -167,10 +177,8 @@ contains
          self%exchange(i, j) = z
          sums%total = sums%total + z
       end do
-      do i = 1, self%patch%mx
-         sums%rz = sums%rz + self%exchange(i, j)*self%residual(i, j)
-         sums%old_rz = sums%old_rz + self%exchange(i, j)*self%old(i, j)
-      end do
+      sums%rz = row_product(self%exchange(:, j), self%residual(:, j))
+      sums%old_rz = row_product(self%exchange(:, j), self%old(:, j))
    end subroutine center_row
 
    !> Sums of all rows, in order.
@@ -223,29 +231,38 @@ contains
       real(dp), intent(in) :: beta
       integer, intent(in) :: j
       real(dp), intent(out) :: row(2), quickest
-      real(dp) :: d, slope, bend
+      real(dp) :: bent(self%patch%inner(j)), d
       integer :: i, n
 
       n = self%patch%inner(j)
-      slope = 0.0_dp
-      bend = 0.0_dp
-      quickest = 0.0_dp
-      do i = 1, n
-         d = self%exchange(i, j) + beta*self%direction(i, j)
-         d = merge(d, 0.0_dp, now%state(i, j) > 0.0_dp .or. self%exchange(i, j) > 0.0_dp)
-         slope = slope + self%residual(i, j)*d
-         bend = bend + d**2*self%curvature(i, j)
-         quickest = max(quickest, abs(d)/(now%state(i, j) + now%units%length))
-         self%direction(i, j) = d
-         self%change(i, j) = d + now%lift
-      end do
+      call turn_cells(now%state(1:n, j), self%exchange(1:n, j), beta, now%units%length, self%direction(1:n, j), &
+         quickest)
+      self%change(1:n, j) = self%direction(1:n, j) + now%lift
+      bent(:) = self%direction(1:n, j)*self%curvature(1:n, j)
       do i = n + 1, self%patch%mx
          d = self%exchange(i, j) + beta*self%direction(i, j)
-         slope = slope + self%residual(i, j)*d
          self%direction(i, j) = d
          self%change(i, j) = d
       end do
-      row(:) = [slope, bend]
+      row(1) = row_product(self%residual(:, j), self%direction(:, j))
+      row(2) = row_product(self%direction(1:n, j), bent)
    end subroutine turn_row
+
+   !> d = z + beta d on the cells that are free or that z opens, 0 on the others; the greatest |d|/(g + z_0).
+   pure subroutine turn_cells(state, z, beta, length, d, quickest)
+      real(dp), intent(in), contiguous :: state(:), z(:)     !! g and z, m
+      real(dp), intent(in) :: beta
+      real(dp), intent(in) :: length                         !! z_0, m
+      real(dp), intent(inout), contiguous :: d(:)
+      real(dp), intent(out) :: quickest
+      integer :: i
+
+      quickest = 0.0_dp
+      !$omp simd reduction(max: quickest)
+      do i = 1, size(d)
+         d(i) = merge(z(i) + beta*d(i), 0.0_dp, state(i) > 0.0_dp .or. z(i) > 0.0_dp)
+         quickest = max(quickest, abs(d(i))/(state(i) + length))
+      end do
+   end subroutine turn_cells
 
 end module adhesion_directions

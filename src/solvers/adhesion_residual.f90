@@ -87,26 +87,15 @@ contains
       real(dp), intent(inout) :: worst                 !! natural residual
       real(dp), intent(inout) :: least                 !! least gap, m
       real(dp), intent(out) :: padding                 !! psi.r of the padding, Pa
-      real(dp) :: slope(self%patch%inner(j)), g, gap, r, per_length, per_traction, smallest, greatest
+      real(dp) :: slope(self%patch%inner(j)), r, per_traction
       integer :: i, n
 
       n = self%patch%inner(j)
-      call adhesive_slopes(now%problem%potential, now%state(1:n, j), slope, self%curvature(1:n, j))
-      per_length = 1.0_dp/now%units%length
       per_traction = 1.0_dp/now%units%traction
-      greatest = 0.0_dp
-      smallest = huge(1.0_dp)
-      do i = 1, n
-         gap = now%state(i, j)
-         g = now%traction(i, j) + slope(i) + now%load
-         greatest = max(greatest, abs(min(gap*per_length, g*per_traction)))
-         smallest = min(smallest, gap)
-         r = 0.0_dp
-         if (gap > 0.0_dp .or. g < 0.0_dp) r = -g
-         self%residual(i, j) = r
-      end do
-      least = min(least, smallest)
-      worst = max(worst, greatest)
+      call adhesive_slopes(now%problem%potential, now%state(1:n, j), slope, self%curvature(1:n, j))
+      slope(:) = now%traction(1:n, j) + slope + now%load
+      call measure_cells(now%state(1:n, j), slope, 1.0_dp/now%units%length, per_traction, self%residual(1:n, j), &
+         worst, least)
       padding = 0.0_dp
       do i = n + 1, self%patch%mx
          r = -now%traction(i, j)
@@ -123,5 +112,21 @@ contains
          call self%model%put_row(j, self%residual(:, j))
       end if
    end subroutine measure_row
+
+   !> r of the cells of a row, from G.
+   pure subroutine measure_cells(gap, gradient, per_length, per_traction, residual, worst, least)
+      real(dp), intent(in), contiguous :: gap(:), gradient(:)    !! g, m, and G, Pa
+      real(dp), intent(in) :: per_length, per_traction           !! 1/m, 1/Pa
+      real(dp), intent(out), contiguous :: residual(:)           !! r, Pa
+      real(dp), intent(inout) :: worst                           !! natural residual
+      real(dp), intent(inout) :: least                           !! least gap, m
+      integer :: i
+
+      do i = 1, size(gap)
+         worst = max(worst, abs(min(gap(i)*per_length, gradient(i)*per_traction)))
+         least = min(least, gap(i))
+         residual(i) = merge(-gradient(i), 0.0_dp, max(gap(i), -gradient(i)) > 0.0_dp)
+      end do
+   end subroutine measure_cells
 
 end module adhesion_residual
