@@ -3,7 +3,7 @@
 module test_checkpoint
    use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use check, only : begin_suite, check_close, check_error, check_no_error, check_that, selected
-   use asperity_checkpoint, only : checkpoint_path, checkpoint_reader_type, checkpoint_writer_type, &
+   use asperity_checkpoint, only : checkpoint_reader_type, checkpoint_writer_type, &
       remove_checkpoint
    use asperity_checksum, only : checksum_of_field, checksum_of_file, checksum_of_text, &
       crc32_of_values, hexadecimal
@@ -11,6 +11,7 @@ module test_checkpoint
    use file_system, only : file_exists
    use asperity_precision, only : dp, int64, int8
    use state_table, only : state_table_type
+   use result_names, only : checkpoint_path
    implicit none
    private
 

@@ -2,7 +2,6 @@
 module test_result_file
    use check, only : begin_suite, check_close, check_error, check_no_error, check_order, &
       check_that, selected
-   use asperity_checkpoint, only : checkpoint_path
    use asperity_errors, only : error_file, error_type
    use file_system, only : file_exists, remove_file
    use hdf5_file, only : hdf5_file_type
@@ -10,7 +9,7 @@ module test_result_file
    use asperity_precision, only : dp
    use regular_grid, only : boundary_free, grid_type, new_grid
    use result_file, only : result_file_type, result_plan_type
-   use result_names, only : sibling_path
+   use result_names, only : checkpoint_path, sibling_path
    use result_writer, only : nx, ny, pressure_of, write_result
    implicit none
    private

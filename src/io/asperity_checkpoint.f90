@@ -14,13 +14,13 @@ module asperity_checkpoint
    use file_system, only : file_exists, remove_file, rename_file, sync_file
    use hdf5_file, only : hdf5_file_type
    use process_agreement, only : agree
-   use result_names, only : sibling_path
+   use result_names, only : checkpoint_path
    use state_table, only : state_table_type
    use text_tools, only : to_text
    implicit none
    private
 
-   public :: checkpoint_writer_type, checkpoint_reader_type, checkpoint_path, remove_checkpoint
+   public :: checkpoint_writer_type, checkpoint_reader_type, remove_checkpoint
 
    !> A checkpoint under construction.
    type :: checkpoint_writer_type
@@ -49,14 +49,6 @@ module asperity_checkpoint
    end type checkpoint_reader_type
 
 contains
-
-   !> Name of the checkpoint of a result.
-   pure function checkpoint_path(result_path) result(path)
-      character(*), intent(in) :: result_path
-      character(:), allocatable :: path
-
-      path = sibling_path(result_path, '.checkpoint.h5')
-   end function checkpoint_path
 
    !> Remove the checkpoint of a result, and an unfinished one that a killed run has left.
    subroutine remove_checkpoint(result_path)

@@ -10,7 +10,8 @@
 module result_file
    use asperity_errors, only : error_file, error_input, error_type, fail
    use asperity_precision, only : dp, int8
-   use file_system, only : name_of, remove_file, rename_file
+   use checkpoint_link, only : add_link, remove_link
+   use file_system, only : remove_file, rename_file
    use hdf5_chunk_writer, only : chunk_writer_type
    use hdf5_file, only : hdf5_file_type
    use hdf5_slabs, only : slab_rows
@@ -20,7 +21,7 @@ module result_file
    use result_frame, only : height_path, result_plan_type, write_frame
    use result_losses, only : put_losses
    use result_history, only : append_values, create_history_columns
-   use result_names, only : sibling_path
+   use result_names, only : checkpoint_path, sibling_path
    use result_restart, only : go_back
    use result_snapshots, only : result_snapshots_type
    use result_target, only : check_place
@@ -34,7 +35,7 @@ module result_file
    type :: result_file_type
       private
       type(hdf5_file_type) :: file
-      type(chunk_writer_type) :: writer              !! of the field in hand
+      type(chunk_writer_type) :: writer              !! of the field that was started last
       type(grid_type) :: grid
       integer :: expected_rows = 0
       integer :: compression = 0
@@ -94,7 +95,8 @@ contains
       call check_place(self%path, error)
       if (allocated(error)) return
       call write_frame(self%file, new_path(self), self%id, grid, plan)
-      ! The link is made and removed, so that the root group keeps the room for its name.
+      ! The link is added and removed at once, so that the root group has space for its name from the
+      ! start.
       call self%link_checkpoint()
       call self%unlink_checkpoint()
       call self%writer%start(self%file, height_path, [grid%nx, grid%ny], .false., self%compression)
@@ -126,7 +128,7 @@ contains
          call give_up(self, error)
          return
       end if
-      call remove_file(sibling_path(self%path, '.checkpoint.h5'))
+      call remove_file(checkpoint_path(self%path))
       call remove_file(self%xdmf_path)
       call rename_file(new_path(self), self%path, error)
       if (allocated(error)) return
@@ -218,15 +220,15 @@ contains
       call self%file%name_axes('/material', ['prony_tau'], ['prony_g'], error)
    end subroutine pair_arms
 
-   !> Add a row to the history. A kill that comes later cannot take it away.
+   !> Add a row to the history, and flush it: a run that is killed later keeps it.
    subroutine append_row(self, row, error)
       class(result_file_type), intent(inout) :: self
       type(history_row_type), intent(in) :: row
       type(error_type), allocatable, intent(out) :: error
 
       if (self%rows == 0) then
-         ! The first row sets the space of the columns aside, which takes several blocks of the
-         ! file. Therefore it is written into a new group that takes the empty one's place.
+         ! The first row allocates the columns, which takes several writes. They go into a new group
+         ! that replaces the empty one, so that a killed run never leaves half of the columns.
          call self%file%flush()
          call self%file%stage_group('/history')
          call create_history_columns(self%file, self%expected_rows)
@@ -280,7 +282,7 @@ contains
       call self%file%report(error)
    end subroutine write_real_rows
 
-   !> The same for a field of states.
+   !> Write a slab of a field of contact states, as `write_real_rows` does for numbers.
    subroutine write_state_rows(self, first, values, error)
       class(result_file_type), intent(inout) :: self
       integer, intent(in) :: first
@@ -326,25 +328,20 @@ contains
 
    ! --- the checkpoint, the end, and a restart -----------------------------------------------
 
-   !> Let /checkpoint of the result stand for the checkpoint, a file of its own.
+   !> Add the link /checkpoint to the file of the checkpoint (see `checkpoint_link`).
    subroutine link_checkpoint(self, error)
       class(result_file_type), intent(inout) :: self
       type(error_type), allocatable, intent(out), optional :: error
 
-      if (self%file%has_link('/checkpoint')) return
-      call self%file%link_external('/checkpoint', name_of(sibling_path(self%path, &
-         '.checkpoint.h5')), '/')
-      call self%file%flush(error)
+      call add_link(self%file, self%path, error)
    end subroutine link_checkpoint
 
-   !> Remove /checkpoint.
+   !> Remove the link /checkpoint.
    subroutine unlink_checkpoint(self, error)
       class(result_file_type), intent(inout) :: self
       type(error_type), allocatable, intent(out), optional :: error
 
-      if (.not. self%file%has_link('/checkpoint')) return
-      call self%file%remove('/checkpoint')
-      call self%file%flush(error)
+      call remove_link(self%file, error)
    end subroutine unlink_checkpoint
 
    !> Get the first fault of the calls that had no `error`.
@@ -355,7 +352,7 @@ contains
       call self%file%report(error)
    end subroutine report
 
-   !> Note whether the run has finished.
+   !> Write whether the run has finished, as the attribute `finished`: 1 or 0.
    subroutine finish_result(self, finished, error)
       class(result_file_type), intent(inout) :: self
       logical, intent(in) :: finished
@@ -390,7 +387,7 @@ contains
       if (allocated(error)) return
       call self%read_text('id', self%id, error)
       if (.not. allocated(error) .and. self%id /= id) call fail(error, error_input, self%path// &
-         ': is not the result that '//sibling_path(path, '.checkpoint.h5')//' belongs to')
+         ': is not the result that '//checkpoint_path(path)//' belongs to')
       if (.not. allocated(error)) call go_back(self%file, last_step, self%grid, self%expected_rows, &
          self%snapshots%written, error)
       if (.not. allocated(error)) call self%finish(.false., error)

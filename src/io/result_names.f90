@@ -3,7 +3,7 @@ module result_names
    implicit none
    private
 
-   public :: sibling_path, side_file
+   public :: checkpoint_path, sibling_path, side_file
 
    integer, parameter, public :: side_files = 6     !! files beside the result itself
 
@@ -23,6 +23,14 @@ contains
       sibling = path(:length)//ending
    end function sibling_path
 
+   !> Name of the checkpoint that belongs to a result.
+   pure function checkpoint_path(path) result(name)
+      character(*), intent(in) :: path      !! name of the result
+      character(:), allocatable :: name
+
+      name = sibling_path(path, '.checkpoint.h5')
+   end function checkpoint_path
+
    !> Name of the file number `n` that a run writes beside a result, temporarily or permanently.
    pure function side_file(path, n) result(name)
       character(*), intent(in) :: path      !! name of the result
@@ -33,7 +41,7 @@ contains
       case (1)
          name = trim(path)//'.new'
       case (2)
-         name = sibling_path(path, '.checkpoint.h5')
+         name = checkpoint_path(path)
       case (3)
          name = sibling_path(path, '.checkpoint.h5.new')
       case (4)

@@ -10,7 +10,7 @@ module result_target
    use file_system, only : file_exists, folder_of, is_folder
    use hdf5_file, only : hdf5_file_type
    use result_check, only : damage_type, find_damage
-   use result_names, only : side_file, side_files, sibling_path
+   use result_names, only : checkpoint_path, side_file, side_files
    use trial_process, only : trial_type
    implicit none
    private
@@ -86,7 +86,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       character(:), allocatable :: checkpoint
 
-      checkpoint = sibling_path(path, '.checkpoint.h5')
+      checkpoint = checkpoint_path(path)
       if (file_start(path, 1) /= '') then
          call damage_of_result(path, error)
          if (allocated(error)) then

@@ -6,7 +6,7 @@
 !> The procedures whose `error` is `intent(inout)` do nothing if it is already set. A caller may therefore
 !> call several in sequence, and look at the error once at the end.
 module run_files
-   use asperity_checkpoint, only : checkpoint_path, checkpoint_reader_type, checkpoint_writer_type, &
+   use asperity_checkpoint, only : checkpoint_reader_type, checkpoint_writer_type, &
       remove_checkpoint
    use asperity_errors, only : error_input, error_type, fail
    use asperity_parallel, only : exchanged_bytes, is_first_process, process_count, share
@@ -19,7 +19,7 @@ module run_files
    use path_identity, only : real_path
    use process_agreement, only : agree
    use result_file, only : result_file_type, result_plan_type
-   use result_names, only : sibling_path
+   use result_names, only : checkpoint_path, sibling_path
    use result_target, only : check_place, check_replaced, damage_of_result
    use simulation_state, only : load_state, save_state
    use snapshot_writer, only : write_height, write_snapshot

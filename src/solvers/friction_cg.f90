@@ -190,7 +190,7 @@ contains
       call self%pull%hang(problem, operator, thick*self%length)
    end subroutine set_problem
 
-   !> Why the solve ended.
+   !> Say why the solve ended.
    function reason(self, problem, result) result(text)
       class(friction_solver_type), intent(in) :: self
       type(friction_problem_type), intent(in) :: problem
@@ -212,8 +212,8 @@ contains
       end if
    end function reason
 
-   !> Move the ends of the springs until the total of T is the pull. Near full slip the total follows ever
-   !> less: each way is lengthened by what the last one has brought.
+   !> Move the ends of the springs until the total of T is the pull. Near full slip each move changes the
+   !> total less than the one before. Therefore a move that brought little makes the next one longer.
    subroutine meet_pull(self, problem, operator, iterations, converged)
       type(friction_solver_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
@@ -226,7 +226,7 @@ contains
       self%pull%slides_off = problem%cells == 0 .and. self%pull%missed(problem) > 0.0_dp
       converged = .not. self%pull%slides_off
       if (problem%cells == 0) return
-      first = problem%spring_end
+      first = problem%spring%end
       factor = 1.0_dp
       idle = 0
       do k = 1, hangings
@@ -235,21 +235,21 @@ contains
          if (self%pull%missed(problem) <= self%tolerance) return
          converged = .false.
          before = self%pull%lacking(problem)
-         call move_springs(self, problem, operator, factor*problem%spring*before, iterations)
+         call move_springs(self, problem, operator, factor*problem%spring%compliance*before, iterations)
          if (self%method%stopped) return
          gained = dot_product(before, before - self%pull%lacking(problem)) &
             /max(dot_product(before, before), tiny(1.0_dp))
          idle = merge(idle + 1, 0, problem%slipping == problem%cells .and. gained < 0.01_dp)
          self%pull%slides_off = idle >= idle_hangings
          if (self%pull%slides_off) then
-            call problem%hang_anew(first - problem%offset)
+            call problem%move_spring_end(first - problem%spring%offset)
             return
          end if
          factor = max(1.0_dp, min(10.0_dp*factor, factor/max(gained, 0.01_dp)))
       end do
    end subroutine meet_pull
 
-   !> Move the ends of the springs by a way, and let the contact follow.
+   !> Move the ends of the springs by a distance, and solve the contact again.
    subroutine move_springs(self, problem, operator, way, iterations)
       type(friction_solver_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
@@ -258,8 +258,8 @@ contains
       integer, intent(inout) :: iterations
       type(friction_goal_type) :: goal
 
-      call problem%hang_anew(way)
-      ! The contact has to follow a way that is within its tolerance, too.
+      call problem%move_spring_end(way)
+      ! A move smaller than the tolerance must still change T, so the tolerance shrinks with the move.
       goal%tolerance = max(1.0e-3_dp*self%tolerance, &
          min(self%tolerance, 0.1_dp*norm2(way)/problem%scale))
       goal%most_iterations = self%max_iterations

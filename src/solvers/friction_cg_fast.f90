@@ -179,7 +179,7 @@ contains
          call turn(self, problem, operator, 0.0_dp, now)
       end if
       call operator%columns(merge(columns_form, columns_apply, problem%slipping > 0), now%form)
-      call problem%add_spring(self%d, now%form)
+      call problem%spring%add_form(self%d, now%form)
    end subroutine find_direction
 
    !> T' = T + alpha d, put back, and the slip that it leaves. Where that has overshot, a shorter step.

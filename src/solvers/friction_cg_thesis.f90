@@ -64,7 +64,7 @@ contains
          call new_direction(self, problem, operator, beta, ascent, bend)
          if (ascent <= 0.0_dp) call new_direction(self, problem, operator, 0.0_dp, ascent, bend)
          call operator%columns(columns_form, form)
-         call problem%add_spring(self%tangent, form)
+         call problem%spring%add_form(self%tangent, form)
          if (.not. (form > 0.0_dp .and. abs(ascent) > 0.0_dp)) return
          ! The bound bends towards the solution or away: keep the step positive and finite.
          alpha = ascent/max(form - bend, 0.1_dp*form)

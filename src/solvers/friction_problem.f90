@@ -16,13 +16,8 @@
 !> the product A d that the method has at hand. Whoever changes T or r measures again: `tangent`, the
 !> states of the points, the residual and the sums of the last measure always belong to T and r.
 !>
-!> The total of T can be prescribed, along x, y or both. Then the place c of the road along this
-!> direction is unknown too: r = DX + c - A (T + T_h). The road hangs on a spring of compliance kappa,
-!>
-!>     c = X - kappa (sum(T) - F)
-!>
-!> which makes sum(T) = F where X = c (method of multipliers: `hang_anew` moves X there). A spring much
-!> softer than the contact needs few such moves. A mass in the place of a spring needs none.
+!> Where the total of T is prescribed, the position c of the road is unknown too: r = DX + c - A (T + T_h).
+!> Module `road_spring` gives c as a function of the total.
 !>
 !> Each pass over the fields is one loop over rows, fused with the transforms of its row. Sums are
 !> formed by row and added up in order: the results do not depend on the number of threads or processes.
@@ -31,16 +26,18 @@ module friction_problem
    use fft_conv, only : columns_apply, convolution_type
    use friction_fields, only : friction_fields_type, friction_work_type
    use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type
-   use field_sums, only : row_total, vector_sum
+   use field_sums, only : row_total
    use friction_rows, only : measure_sums_type, measured_row, row_constants_type, site_columns, &
       tangent_row, total_of
+   use road_spring, only : road_spring_type
    implicit none
    private
 
    public :: friction_problem_type
 
-   real(dp), parameter :: on_bound = 1.0_dp + 1.0e-9_dp   !! a point with s below it is on its bound
-   real(dp), parameter :: outermost = 4.0_dp              !! a slipping point with s beyond it sticks
+   !> A point whose s (module `friction_law`) is below this is on its bound.
+   real(dp), parameter :: on_bound = 1.0_dp + 1.0e-9_dp
+   real(dp), parameter :: outermost = 4.0_dp              !! a slipping point whose s is above it sticks
    real(dp), parameter :: stiffest = 1.0e15_dp            !! curvature of a bound, in units of a_0
 
    !> The problem, and the state of its solution.
@@ -50,19 +47,13 @@ module friction_problem
       integer :: rows = 0                    !! of this process
       integer :: threads = 1
       real(dp) :: compliance = 0.0_dp        !! a_0: displacement of a cell under its own unit traction
-      !> Of the mean mode along x and y where it is soft, over the number of cells; else 0.
+      !> Compliance of the mean mode along x and y over the number of cells, where this mode is soft and
+      !> is therefore treated apart; else 0.
       real(dp) :: mean_compliance(2) = 0.0_dp
-      real(dp) :: least_scale = 0.0_dp       !! of the displacements, m: less than this does not count
+      real(dp) :: least_scale = 0.0_dp       !! least `scale`, m: keeps round-off from counting as displacement
       logical :: near = .false.              !! T starts near the solution
-      logical :: settle = .true.             !! T has to settle for the problem to be solved
-      ! A prescribed total, see the header.
-      logical :: pulled(2) = .false.         !! the total along this direction is prescribed
-      real(dp) :: pull(2) = 0.0_dp           !! F: the sum of T over the cells that is prescribed, Pa
-      real(dp) :: spring(2) = 0.0_dp         !! kappa: compliance of the spring, m/Pa of the sum
-      real(dp) :: spring_end(2) = 0.0_dp     !! X: where the spring would leave the road under F, m
-      real(dp) :: total(2) = 0.0_dp          !! sum of T, Pa
-      real(dp) :: offset(2) = 0.0_dp         !! c: how far the road is, m
-      real(dp), private :: offset_step(2) = 0.0_dp   !! change of c that r still lacks, m
+      logical :: settle = .true.             !! the problem is solved only when T no longer changes, too
+      type(road_spring_type) :: spring       !! holds the road where the total of T is prescribed
       ! The state of the solution.
       type(friction_work_type), pointer :: work => null()
       type(row_constants_type) :: constants
@@ -85,14 +76,13 @@ module friction_problem
       procedure :: transform_row
       procedure :: transform_tractions
       procedure :: solved
-      procedure :: hang_anew
-      procedure :: add_spring
+      procedure :: move_spring_end
    end type friction_problem_type
 
 contains
 
-   !> Bring the first T within its bound, slip points of the step before onto it; then the slip of this
-   !> T and its measures.
+   !> Project the first T: points that slipped in the step before go onto their bound, others within it.
+   !> Then compute the slip of this T and measure it.
    subroutine start(self, operator)
       class(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
@@ -119,7 +109,7 @@ contains
       end if
    end subroutine start
 
-   !> The bound of a row, and its first T.
+   !> Compute the bound of a row and its first T.
    subroutine start_row(self, j, cells, size)
       type(friction_problem_type), intent(inout) :: self
       integer, intent(in) :: j
@@ -161,7 +151,7 @@ contains
       integer, intent(in) :: i, j
       real(dp), intent(in) :: limit                !! of s
       real(dp), intent(inout) :: t(2)              !! Pa
-      real(dp), intent(out) :: s                   !! before
+      real(dp), intent(out) :: s                   !! s of the traction that was given
       type(friction_law_type) :: law
 
       law = self%law
@@ -182,7 +172,8 @@ contains
       if (self%law%slope) slope = [self%slope_x(i, j), self%slope_y(i, j)]
    end function slope_at
 
-   !> What does not change in a solve at the points of a row, as module `friction_rows` wants it.
+   !> Gather what stays constant during a solve at the points of a row, in the columns that module
+   !> `friction_rows` expects: pressure, slopes and the two columns of the bound.
    pure subroutine gather_site(self, j, site)
       class(friction_problem_type), intent(in) :: self
       integer, intent(in) :: j
@@ -241,7 +232,7 @@ contains
       type(convolution_type), intent(inout) :: operator
 
       self%fresh = .true.
-      call follow_total(self)
+      call self%spring%follow(self%traction)
       call operator%columns(columns_apply)
       call take_slip(self, operator, 1.0_dp)
    end subroutine update_slip
@@ -253,11 +244,11 @@ contains
       real(dp), intent(in) :: step
 
       self%fresh = .false.
-      call follow_total(self)
+      call self%spring%follow(self%traction)
       call take_slip(self, operator, step)
    end subroutine advance_slip
 
-   !> The rows of `update_slip` and `advance_slip`.
+   !> Transform all rows back, update r and measure it: what `update_slip` and `advance_slip` share.
    subroutine take_slip(self, operator, factor)
       type(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
@@ -275,7 +266,7 @@ contains
       call finish_measure(self, rows)
    end subroutine take_slip
 
-   !> One row of r.
+   !> Update one row of r from the inverse transform: r = DX + c - u, or r = r - factor u.
    subroutine take_slip_row(self, operator, factor, j)
       type(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
@@ -287,38 +278,37 @@ contains
       do c = 1, 2
          call operator%backward_row(c, j, u)
          if (self%fresh) then
-            self%slip(:, c, j) = self%drive(:, c, j) + self%offset(c) - u
+            self%slip(:, c, j) = self%drive(:, c, j) + self%spring%offset(c) - u
          else
-            self%slip(:, c, j) = self%slip(:, c, j) + self%offset_step(c) - factor*u
+            self%slip(:, c, j) = self%slip(:, c, j) + self%spring%offset_step(c) - factor*u
          end if
       end do
    end subroutine take_slip_row
 
-   !> r = DX where T is zero everywhere.
+   !> r = DX + c, without a product, because T is zero everywhere.
    subroutine start_from_rest(self)
       type(friction_problem_type), intent(inout) :: self
       integer :: c, j
 
       self%fresh = .true.
-      call follow_total(self)
+      call self%spring%follow(self%traction)
       do c = 1, 2
          !$omp parallel do default(none) shared(self, c) private(j) num_threads(self%threads)
          do j = 1, self%rows
             self%slip(:, c, j) = self%drive(:, c, j)
          end do
       end do
-      call shift_slip(self, self%offset)
+      call shift_slip(self, self%spring%offset)
    end subroutine start_from_rest
 
    !> Move the free end of the spring by `way`, and the road with it; then measure.
-   subroutine hang_anew(self, way)
+   subroutine move_spring_end(self, way)
       class(friction_problem_type), intent(inout) :: self
       real(dp), intent(in) :: way(2)               !! m
 
-      self%spring_end = self%spring_end + way
-      self%offset = self%offset + way
+      call self%spring%move_end(way)
       call shift_slip(self, way)
-   end subroutine hang_anew
+   end subroutine move_spring_end
 
    !> r = r + way; then measure.
    subroutine shift_slip(self, way)
@@ -336,30 +326,6 @@ contains
       end do
       call finish_measure(self, rows)
    end subroutine shift_slip
-
-   !> The total of T where it is prescribed, and where the road then is.
-   subroutine follow_total(self)
-      type(friction_problem_type), intent(inout) :: self
-      real(dp) :: before(2)
-
-      if (.not. any(self%pulled)) return
-      before = self%offset
-      self%total = vector_sum(self%traction)
-      where (self%pulled) self%offset = self%spring_end - self%spring*(self%total - self%pull)
-      self%offset_step = self%offset - before
-   end subroutine follow_total
-
-   !> Add the part of the spring to the form d.A d of a direction.
-   subroutine add_spring(self, direction, form)
-      class(friction_problem_type), intent(inout) :: self
-      real(dp), intent(in), contiguous :: direction(:, :, :)   !! [nx, 2, rows]
-      real(dp), intent(inout) :: form
-      real(dp) :: total(2)
-
-      if (.not. any(self%pulled)) return
-      total = vector_sum(direction)
-      form = form + sum(self%spring*total**2, self%pulled)
-   end subroutine add_spring
 
    !> Release the points of a row that slip against their traction, and sum its residuals.
    subroutine measure_row(self, j, sums)
@@ -387,7 +353,7 @@ contains
       self%released = nint(self%sums%released)
       self%slipping = nint(self%sums%slipping)
       self%scale = max(sqrt(max(self%sums%drive, self%sums%displaced)/max(self%cells, 1)), &
-         self%least_scale, norm2(self%offset))
+         self%least_scale, norm2(self%spring%offset))
       if (.not. self%scale > 0.0_dp) self%scale = 1.0_dp
       self%residual = sqrt(self%sums%largest)/self%scale
    end subroutine finish_measure

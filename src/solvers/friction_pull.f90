@@ -1,7 +1,7 @@
 !> A prescribed total of the traction, for the tangential solver.
 !>
 !> Along x, y or both the mean of T over the grid can be prescribed. How far the road is, `offset`, is
-!> then found: r = DX' + offset - A (T + T_h). The road hangs on springs (module `friction_problem`) that
+!> then found: r = DX' + offset - A (T + T_h). The road hangs on springs (module `road_spring`) that
 !> are much softer than the contact, and their ends are moved until the total is right.
 !>
 !> The mean mode of the operator adds a uniform displacement that only the road's place depends on. It
@@ -24,7 +24,7 @@ module friction_pull
 
    real(dp), parameter :: softer = 100.0_dp      !! the spring against the contact
 
-   !> What is prescribed, and what comes of it.
+   !> The prescribed mean traction, and the road's offset that the solver found for it.
    type :: friction_pull_type
       logical :: along(2) = .false.              !! the mean of T is prescribed along x, y
       real(dp) :: traction(2) = 0.0_dp           !! that mean, Pa
@@ -56,26 +56,27 @@ contains
       if (.not. any(self%along)) return
       cells = operator%grid%cells()
       touching = max(1.0_dp, field_count(problem%contact /= contact_open))
-      problem%pulled = self%along
+      problem%spring%pulled = self%along
       do c = 1, 2
          if (.not. self%along(c)) cycle
          self%mean_mode(c) = operator%symbols%mean_mode(c)
          call operator%symbols%set_mean_mode(c, 0.0_dp)
-         problem%pull(c) = self%traction(c)*cells
+         problem%spring%pull(c) = self%traction(c)*cells
          ! A patch of n cells is about as stiff as sqrt(n) cells side by side.
-         problem%spring(c) = softer*problem%compliance/sqrt(touching)
-         if (self%yielding(c) > 0.0_dp) problem%spring(c) = self%yielding(c)/cells
-         problem%spring_end(c) = self%offset(c) &
-            - self%mean_mode(c)*(problem%pull(c) + past_total(problem, c))
-         problem%mean_compliance(c) = merge(problem%spring(c), 0.0_dp, problem%spring(c)*cells > soft)
+         problem%spring%compliance(c) = softer*problem%compliance/sqrt(touching)
+         if (self%yielding(c) > 0.0_dp) problem%spring%compliance(c) = self%yielding(c)/cells
+         problem%spring%end(c) = self%offset(c) &
+            - self%mean_mode(c)*(problem%spring%pull(c) + past_total(problem, c))
+         problem%mean_compliance(c) = merge(problem%spring%compliance(c), 0.0_dp, &
+            problem%spring%compliance(c)*cells > soft)
       end do
       ! Least distance that the pull moves the road. If everything sticks without strain, there is no other
       ! measure.
-      problem%least_scale = max(problem%least_scale, norm2(self%mean_mode*problem%pull), &
-         problem%compliance/sqrt(touching)*norm2(problem%pull))
+      problem%least_scale = max(problem%least_scale, norm2(self%mean_mode*problem%spring%pull), &
+         problem%compliance/sqrt(touching)*norm2(problem%spring%pull))
    end subroutine hang
 
-   !> Give the operator its mean mode back, which is part of the road's place.
+   !> Give the operator its mean mode back, and add the displacement of this mode to the road's offset.
    subroutine take_off(self, problem, operator)
       class(friction_pull_type), intent(inout) :: self
       type(friction_problem_type), intent(in) :: problem
@@ -86,8 +87,8 @@ contains
       do c = 1, 2
          if (.not. self%along(c)) cycle
          call operator%symbols%set_mean_mode(c, self%mean_mode(c))
-         self%offset(c) = problem%offset(c) &
-            + self%mean_mode(c)*(problem%total(c) + past_total(problem, c))
+         self%offset(c) = problem%spring%offset(c) &
+            + self%mean_mode(c)*(problem%spring%total(c) + past_total(problem, c))
       end do
    end subroutine take_off
 
@@ -101,18 +102,18 @@ contains
       if (associated(problem%past)) total = field_sum(problem%past(:, c, :))
    end function past_total
 
-   !> What the total of T lacks of the pull, Pa; 0 along a direction that has none or yields.
+   !> The pull minus the total of T, Pa; 0 along a direction that is not pulled or whose mass yields.
    pure function lacking(self, problem) result(difference)
       class(friction_pull_type), intent(in) :: self
       type(friction_problem_type), intent(in) :: problem
       real(dp) :: difference(2)
 
-      difference = merge(problem%pull - problem%total, 0.0_dp, &
+      difference = merge(problem%spring%pull - problem%spring%total, 0.0_dp, &
          self%along .and. .not. self%yielding > 0.0_dp)
    end function lacking
 
-   !> The same, relative: over the pull, the total, or the force that displaces road and contact by as much
-   !> as they are displaced, whichever is largest.
+   !> Size of `lacking` relative to the largest of three forces: the pull, the total, and the force that
+   !> would displace road and contact as far as they are displaced.
    pure function missed(self, problem) result(part)
       class(friction_pull_type), intent(in) :: self
       type(friction_problem_type), intent(in) :: problem
@@ -121,8 +122,8 @@ contains
 
       part = norm2(self%lacking(problem))
       if (.not. part > 0.0_dp) return
-      compliance = maxval(problem%spring)/softer + maxval(self%mean_mode)
-      size = max(norm2(problem%pull), norm2(problem%total), problem%scale/compliance)
+      compliance = maxval(problem%spring%compliance)/softer + maxval(self%mean_mode)
+      size = max(norm2(problem%spring%pull), norm2(problem%spring%total), problem%scale/compliance)
       part = part/size
    end function missed
 
