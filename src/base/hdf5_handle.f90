@@ -6,11 +6,9 @@
 !> * The file format is that of HDF5 1.8 (superblock 2), which has no flag "open for writing", and
 !>   files are not locked.
 !> * The system may interrupt a write at the end of a page of memory (4096 bytes). Small blocks
-!> start
-!>   at multiples of 512 bytes and therefore lie in one page.
+!>   start at multiples of 512 bytes and therefore lie in one page.
 !> * After a write has failed nothing more is written: neither a flush, nor closing the file, nor
-!> the
-!>   end of the program writes what HDF5 still holds in memory.
+!>   the end of the program writes what HDF5 still holds in memory.
 !>
 !> Faults. Nearly all procedures of an open file have an optional argument `error`.
 !>
@@ -227,7 +225,7 @@ contains
       self%staged = -1
    end subroutine close_file
 
-   !> Hand everything to the operating system. A kill that comes later loses nothing of it.
+   !> Hand everything to the operating system, so that nothing is lost if the program is killed later.
    subroutine flush_file(self, error)
       class(hdf5_handle_type), intent(inout) :: self
       type(error_type), allocatable, intent(out), optional :: error

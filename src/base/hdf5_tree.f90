@@ -5,8 +5,8 @@
 !> linked (`stage_group`, `publish_group`). The groups that receive such links keep them in one
 !> block that is large enough from the start (`create_group` with `expected`), so that the link
 !> appears with one write. In a file that is opened with an alignment of 4096, a group has about 150
-!> names in its first page of memory. The block of a larger group can be torn if a kill comes within
-!> the microsecond or so in which it is written.
+!> names in its first page of memory. The block of a larger group is left half written if the program is killed
+!> within the microsecond or so that the write takes.
 !>
 !> Paths within a file start with '/'. The optional argument `error` is explained in `hdf5_handle`.
 module hdf5_tree
@@ -285,7 +285,7 @@ contains
       call self%settle(fault, error)
    end subroutine remove_object
 
-   !> Let a name stand for an object of another file. The other file may be missing.
+   !> Create an external link: a name for an object of another file, which may be missing.
    subroutine link_external(self, path, file, object, error)
       class(hdf5_tree_type), intent(inout) :: self
       character(*), intent(in) :: path

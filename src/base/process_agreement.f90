@@ -1,8 +1,8 @@
 !> Errors that concern all processes of a run.
 !>
-!> A fault may show on one process only: files are the matter of the first one, and memory may be short on
-!> any. A process that left a procedure because of its own fault while the others go on would let them wait
-!> for ever in the next exchange. Therefore every process calls `agree` where one of them may have failed,
+!> A fault may occur on one process only: only the first one reads and writes files, and any of them may run
+!> out of memory. If this process returned while the others continued, they would wait for it for ever in the
+!> next exchange. Therefore every process calls `agree` where one of them may have failed,
 !> and all of them continue, or all of them return.
 module process_agreement
    use asperity_errors, only : error_type, fail

@@ -10,8 +10,9 @@ module carried_field
 
 contains
 
-   !> A field around the contact after the contact has moved along the rubber by -motion, bilinear. On a
-   !> free grid the rim goes on outside. Collective.
+   !> Interpolate a field of the rubber at the cells of the contact, after the contact has moved along the
+   !> rubber by -motion. The interpolation is bilinear. Beyond a free grid the field continues with its values
+   !> at the rim. Collective.
    subroutine carry(grid, field, motion, moved)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in), target :: field(:, :)   !! [nx, rows of this process]
@@ -53,7 +54,7 @@ contains
 
    end subroutine carry
 
-   !> A row of a field that is carried, from the two rows between which it lies.
+   !> One row of the result of `carry`, interpolated between the two rows beside it.
    pure subroutine blend_rows(grid, cells, part, below, above, moved)
       type(grid_type), intent(in) :: grid
       integer, intent(in) :: cells               !! whole cells along x
@@ -72,7 +73,8 @@ contains
       end associate
    end subroutine blend_rows
 
-   !> The cell itself, its image, or the nearest at the rim.
+   !> Which of n cells a cell number stands for: the cell itself or, beyond the grid, the cell that it repeats
+   !> (periodic) or the nearest one at the rim (free).
    elemental function within(grid, i, n) result(k)
       type(grid_type), intent(in) :: grid
       integer, intent(in) :: i
@@ -110,7 +112,7 @@ contains
       end do
    end subroutine shift_field
 
-   !> The same for the states of contact.
+   !> Shift the states of contact by whole cells, as `shift_field` for real fields.
    subroutine shift_states(grid, cells, states)
       type(grid_type), intent(in) :: grid
       integer, intent(in) :: cells(2)

@@ -18,7 +18,7 @@ module field_columns
    integer, parameter :: most_rounds = 16       !! of an exchange
    integer, parameter :: least_parcel = 65536   !! numbers that are sent at once in any case
 
-   !> What is done with the columns: an extension says it.
+   !> The work on the columns, which an extension of this type defines.
    type, abstract :: column_work_type
       integer :: before = 0                     !! room in front of a column, for the work
       integer :: behind = 0                     !! room behind it
@@ -156,7 +156,7 @@ contains
       range = [int(int(n - 1, kind=8)*blocks/parts) + 1, int(int(n, kind=8)*blocks/parts)]
    end function blocks_of
 
-   !> How many numbers this process sends to each (1), and receives from each (2), before the work.
+   !> How many numbers this process sends to each process (1), and receives from each (2), before the work.
    pure function parcel_counts(rows, round, rounds, blocks) result(counts)
       integer, intent(in) :: rows(:)                    !! of each process
       integer, intent(in) :: round, rounds, blocks

@@ -1,4 +1,4 @@
-!> Projections of fields on what a solution must satisfy.
+!> Projection of a field onto the fields that are nowhere negative and have a given sum.
 module projection
    use asperity_parallel, only : rows_before
    use asperity_precision, only : dp
@@ -8,13 +8,13 @@ module projection
 
    public :: project_simplex
 
-   integer, parameter :: sample = 16        !! one row of so many gives a first level
+   integer, parameter :: sample = 16        !! one row in so many is used to compute the first level
 
 contains
 
    !> The nearest field to x that is nowhere negative and has the sum `total`: max(x - t, 0).
-   !> A field that is already so is left alone to the last bit. A total that all but drowns in the
-   !> round-off of x is met all the same, in the proportions that are left.
+   !> A field that already satisfies both conditions is not changed in any bit. If the total is so small that
+   !> it is nearly lost in the round-off of x, the values that remain are scaled to meet it.
    subroutine project_simplex(x, total)
       real(dp), intent(inout) :: x(:, :)       !! [nx, ny]
       real(dp), intent(in) :: total            !! x becomes 0 where this is 0 or less
@@ -33,8 +33,9 @@ contains
       end if
       call sum_above(0.0_dp, above, count, negative)
       if (abs(above - total) <= 1e-15_dp*count*total .and. abs(negative) <= 0.0_dp) return
-      ! The first level is below the solution; Newton's steps rise to it. From any other level the
-      ! first step leads below it, too: a few rows tell one that is close.
+      ! The level t is found by Newton's method. This first level is below the solution, and the steps rise
+      ! to it. The first step from any other level leads below the solution, too, so a level that is already
+      ! close, computed from a few rows, saves steps.
       level = (above + negative - total)/cells
       all_rows = cell_count(x(:1, :))
       if (all_rows >= 4.0_dp*sample) call guess()

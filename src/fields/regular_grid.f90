@@ -14,7 +14,7 @@ module regular_grid
 
    public :: grid_type, new_grid
 
-   integer, parameter, public :: boundary_periodic = 1   !! the surface repeats for ever
+   integer, parameter, public :: boundary_periodic = 1   !! the surface repeats without end
    integer, parameter, public :: boundary_free = 2       !! a patch on an unbounded half-space
 
    real(dp), parameter, public :: block_cells = 8.0_dp   !! cells of a block along a side, if square
@@ -86,12 +86,13 @@ contains
       range = [1, self%ny]
       if (.not. self%shared) return
       blocks = self%blocks()
-      ! Strips before those of this process and of the next.
+      ! Number of strips that come before those of this process, and before those of the next one.
       strips = int([process, process + 1]*int(blocks(2), int64)/process_count())
       range = [self%strip_start(strips(1) + 1), self%strip_start(strips(2) + 1) - 1]
    end function rows_of
 
-   !> The column of cells at a place that may lie beyond the grid: its image on a periodic grid, 0 beyond a free one.
+   !> Column of a place that may lie beyond the grid: a periodic grid repeats its columns; beyond a free grid
+   !> there is none, and the result is 0.
    elemental function column_at(self, place) result(column)
       class(grid_type), intent(in) :: self
       integer, intent(in) :: place                 !! from 1
@@ -100,7 +101,7 @@ contains
       column = image(self%boundary, self%nx, place)
    end function column_at
 
-   !> The same for the rows.
+   !> Row of a place that may lie beyond the grid, as `column_at` for columns.
    elemental function row_at(self, place) result(row)
       class(grid_type), intent(in) :: self
       integer, intent(in) :: place                 !! from 1
@@ -109,7 +110,7 @@ contains
       row = image(self%boundary, self%ny, place)
    end function row_at
 
-   !> The one of n cells that a place is or repeats; 0: none.
+   !> Which of n cells, 1 to n, a place is or repeats; 0 beyond a free grid.
    elemental function image(boundary, n, place) result(cell)
       integer, intent(in) :: boundary, n, place
       integer :: cell
@@ -120,7 +121,8 @@ contains
       if (boundary == boundary_periodic) cell = modulo(place - 1, n) + 1
    end function image
 
-   !> Number of blocks of the coarse level along x and y: about as long as wide, in metres, of whole cells.
+   !> Number of blocks of the coarse level along x and y. A block consists of whole cells and is about as long
+   !> as it is wide, in metres.
    pure function blocks(self)
       class(grid_type), intent(in) :: self
       integer :: blocks(2)
@@ -131,7 +133,8 @@ contains
       blocks(2) = min(max(1, nint(self%ly/side)), self%ny)
    end function blocks
 
-   !> First row of a strip, the rows of one row of blocks; of the strip after the last, ny + 1.
+   !> First row of a strip, which consists of the rows of one row of blocks. The strip after the last one
+   !> starts at row ny + 1.
    pure function strip_start(self, strip) result(row)
       class(grid_type), intent(in) :: self
       integer, intent(in) :: strip                 !! from 1
@@ -160,7 +163,7 @@ contains
       rows = self%last_row - self%first_row + 1
    end function rows
 
-   !> Number of cells of the whole grid. Real, since it may exceed the integers.
+   !> Number of cells of the whole grid. It is real because it may exceed the largest integer.
    pure function cells(self)
       class(grid_type), intent(in) :: self
       real(dp) :: cells

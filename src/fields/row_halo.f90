@@ -1,17 +1,18 @@
 !> Rows of a field that other processes hold.
 !>
 !> Each process holds some rows of every field (modules `regular_grid` and `row_sharing`). A shift, an
-!> interpolation or a stencil reads rows of others, too: the halo of a process. The type `row_halo_type` knows
-!> which rows each process needs, and brings them as often as their values change: behind the rows of this
-!> process, in the same field, or elsewhere. The component `place` says where each row is then.
+!> interpolation or a stencil reads rows of others, too: the halo of a process. The type `row_halo_type`
+!> holds the list of rows that each process needs, and fetches them whenever their values have changed. They
+!> are put behind the rows of this process in the same field, or into an array of their own. The component
+!> `place` then gives the position of each row.
 !>
 !> Which rows a process needs either follows from the grid, so that all processes know it (`new_row_halo`, and
 !> for stencils `new_rim_halo` and `fetch_beside`), or each process says it for itself (`new_range_halo`,
 !> `fetch_rows`).
 !>
 !> A range counts rows from 1 and may leave the grid: on a periodic grid the rows then repeat, and beyond a free
-!> grid they are zero. It may be empty, or longer than what the process holds. Where a grid is not shared
-!> all rows are at hand.
+!> grid they are zero. It may be empty, or longer than what the process holds. If a grid is not
+!> shared, every process holds all rows and nothing is fetched.
 !>
 !> Fetching is collective, and so is asking for a range: every process calls it, even one that needs nothing.
 module row_halo
@@ -25,7 +26,7 @@ module row_halo
 
    public :: fetch_beside, fetch_rows, new_range_halo, new_rim_halo, new_row_halo, row_halo_type
 
-   integer, parameter :: least_parcel = 65536       !! numbers that are sent at once in any case
+   integer, parameter :: least_parcel = 65536       !! fields of fewer numbers are sent in one round
    integer, parameter :: most_rounds = 16           !! of an exchange, where the parcels are larger
 
    !> The rows of others that a process needs.
@@ -54,7 +55,7 @@ module row_halo
 
 contains
 
-   ! Which rows are needed.
+   ! --- which rows are needed ----------------------------------------------------------------
 
    !> Prepare for rows that processes need: process users(k) needs row rows(k). Pairs may be repeated, and a
    !> process may be said to need its own rows. All processes must give the same pairs.
@@ -155,9 +156,9 @@ contains
       end associate
    end subroutine new_grid_halo
 
-   ! Rows that are brought. Collective.
+   ! --- fetching the rows (collective) -------------------------------------------------------
 
-   !> Bring the rows of others behind those of this process.
+   !> Fetch the rows of others into the same field, behind the rows of this process.
    subroutine fetch_behind(self, field)
       class(row_halo_type), intent(in) :: self
       real(dp), intent(inout) :: field(:, :)       !! [n, own + foreign]; n is the same for all
@@ -165,8 +166,8 @@ contains
       call self%fetch_apart(field(:, :self%own), field(:, self%own + 1:))
    end subroutine fetch_behind
 
-   !> Bring the rows of others to a place of their own. They travel in several rounds, each with a part of every
-   !> row, so that the parcels take little memory.
+   !> Fetch the rows of others into an array of their own. They are sent in several rounds, each with a part of
+   !> every row, so that the parcels take little memory.
    subroutine fetch_apart(self, field, rows, columns)
       class(row_halo_type), intent(in) :: self
       real(dp), intent(in) :: field(:, :)          !! [n, own]
@@ -243,7 +244,7 @@ contains
       end do
    end subroutine fetch_real_rows
 
-   !> The same for small integers. They travel as the bytes of real numbers.
+   !> Fetch the rows of a range of small integers, which are sent as the bytes of real numbers.
    subroutine fetch_byte_rows(grid, field, range, rows)
       type(grid_type), intent(in) :: grid
       integer(int8), intent(in) :: field(:, :)     !! [n, rows of this process]

@@ -1,8 +1,8 @@
 !> Which process holds which rows of a field, where these are not consecutive.
 !>
 !> The rows of the road's grid are shared in consecutive parts (module `regular_grid`). Fields that go with
-!> them, such as padded or coarser ones, are shared so that what belongs together is on one process: row j of
-!> the padding beside row j of the road, a coarse row beside the rows around its centre. A process keeps its
+!> them, such as padded or coarser ones, are shared so that rows that are used together are on one process:
+!> row j of the padding with row j of the road, a coarse row with the rows around its centre. A process keeps its
 !> rows in ascending order.
 module row_sharing
    use asperity_parallel, only : gather_rows, process_count, process_number

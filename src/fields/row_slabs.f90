@@ -1,4 +1,4 @@
-!> Rows of a shared grid on their way between their owners and the first process, which alone has files.
+!> Transfer of rows of a shared grid between their owners and the first process, which alone opens files.
 !>
 !> A field goes to a file, and comes from it, in slabs of rows. A slab may hold rows of several processes,
 !> so that the largest array besides the parts of the owners is one slab.
@@ -35,7 +35,7 @@ contains
       part = [max(part(1), first), min(part(2), first + rows - 1)]
    end function own_part
 
-   !> Reals.
+   !> Complete a slab of real numbers.
    subroutine collect_reals(grid, first, slab)
       type(grid_type), intent(in) :: grid          !! shared
       integer, intent(in) :: first                 !! row of the grid where the slab begins, from 1
@@ -48,7 +48,7 @@ contains
       end do
    end subroutine collect_reals
 
-   !> Bytes.
+   !> Complete a slab of bytes.
    subroutine collect_bytes(grid, first, slab)
       type(grid_type), intent(in) :: grid
       integer, intent(in) :: first

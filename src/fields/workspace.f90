@@ -5,8 +5,8 @@
 !> back serve the next stage, so that the memory is that of the stage that needs most. No stage therefore has
 !> to use a field of another one, or to keep a field that it needs for a moment only.
 !>
-!> A borrowed field holds what its last user has left. A workspace is not to be copied, and not to be used by
-!> several threads at once; the fields that it lends may be.
+!> The values of a borrowed field are undefined until the borrower sets them. A workspace must not be copied or
+!> used by several threads at once. Several threads may use a field that it has lent.
 module workspace
    use asperity_precision, only : dp
    implicit none

@@ -281,7 +281,7 @@ contains
       real(dp), intent(in) :: rate
       real(dp), intent(in), contiguous :: gap(:)
       real(dp), intent(out), contiguous :: values(:)
-      ! A sum with `rounder` is rounded to an integer, which its last bits then hold.
+      ! Adding `rounder` rounds a number to an integer, which is then in the last bits of the sum.
       real(dp), parameter :: rounder = 1.5_dp*2.0_dp**52
       ! ln 2 in two parts, the first with zeros at the end, so that k times it is exact.
       real(dp), parameter :: log_high = 6.93147180369123816490e-01_dp, log_low = 1.90821492927058770002e-10_dp
@@ -347,7 +347,7 @@ contains
          - t*(c(1) + t*(c(2)/2.0_dp + t*(c(3)/3.0_dp + t*c(4)/4.0_dp))))
    end subroutine table_terms
 
-   !> The same of maugis_dugdale: a constant attraction, and the edge of its range.
+   !> e, e' and e'' of maugis_dugdale: a constant attraction, and the edge of its range.
    pure subroutine constant_terms(self, gap, energy, slope, curvature)
       type(adhesion_potential_type), intent(in) :: self
       real(dp), intent(in) :: gap              !! m, >= 0

@@ -1,9 +1,9 @@
 !> The state of the arms: what a viscoelastic solid remembers, as fields of tractions.
 !>
 !> Module `zener` has the equations. S is the traction that would hold the displacement in an elastic solid of
-!> unit modulus, p_k the traction of arm k. `past_traction` makes of them the traction of the past P_h, which a
-!> contact solver adds to P; `commit_arms` moves them to the end of the step, and sums what the energy books
-!> need in the same pass.
+!> unit modulus, p_k the traction of arm k. `past_traction` computes from them the traction of the past P_h, which
+!> a contact solver adds to P. `commit_arms` advances them to the end of the step, and in the same pass forms
+!> the sums that the energy books need.
 !>
 !> Memory: S and one field per arm; one more (S - S_old) for exponential2; none for an elastic body.
 !> Results do not depend on the number of threads or processes: sums are formed row by row.
@@ -80,7 +80,7 @@ contains
       allocate (products%arm_du(size(material%g)), source=0.0_dp)
    end function new_products
 
-   !> Room for the sums of the books of one row, which `commit_arm_row` fills.
+   !> Allocate the sums of the energy books for one row, which `commit_arm_row` fills.
    pure function new_row_sums(material, rows) result(sums)
       type(zener_type), intent(in) :: material
       integer, intent(in) :: rows            !! rows of this process
@@ -178,7 +178,7 @@ contains
       end do
    end subroutine commit_arms
 
-   !> End the step in hand for row j of a component. May be called for several rows at once.
+   !> End the step in hand for row j of a component. Several threads may call this for different rows.
    pure subroutine commit_arm_row(self, material, c, j, p, u_old, u_new, sums)
       type(arm_state_type), intent(inout) :: self
       type(zener_type), intent(in) :: material        !! after start_step, _jump or _relaxed

@@ -88,7 +88,7 @@ contains
 
    !> Creep compliance J(t), 1/Pa: the strain of a unit stress held since t = 0.
    !>
-   !> Exact for any number of arms; with G_e = 0 the material flows and J grows for ever.
+   !> Exact for any number of arms; with G_e = 0 the material flows and J grows without limit.
    pure function creep_compliance(g_e, g, tau, time) result(compliance)
       real(dp), intent(in) :: g_e           !! long-term modulus, Pa
       real(dp), intent(in) :: g(:)          !! moduli of the arms, Pa

@@ -79,7 +79,7 @@ contains
       self%numerical = self%numerical + numerical
    end subroutine book_step
 
-   !> Book a state that is not reached by a step: its work is what it stores more than the last one.
+   !> Book a state that is not reached by a step. The work is the increase of the stored energy.
    pure subroutine book_state(self, g_e, g, u_s, du_ds, arm, arm_du)
       type(energy_books_type), intent(inout) :: self
       real(dp), intent(in) :: g_e           !! long-term modulus, Pa

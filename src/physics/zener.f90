@@ -106,7 +106,7 @@ contains
       elastic = size(self%g) == 0
    end function is_elastic
 
-   !> Does the scheme look back to the step before?
+   !> Does the scheme use the displacement of the step before?
    pure function extrapolates(self) result(yes)
       type(zener_type), intent(in) :: self
       logical :: yes
@@ -185,7 +185,7 @@ contains
       self%q = self%g_e
    end subroutine start_relaxed
 
-   !> The step in hand is over: the arms are committed and the energies booked.
+   !> Finish the step in hand, after the arms have been committed and the energies booked.
    pure subroutine finish_step(self)
       type(zener_type), intent(inout) :: self
 
@@ -193,7 +193,8 @@ contains
       if (self%kind == step_regular) self%dt_old = self%dt
    end subroutine finish_step
 
-   !> The load or the speed changes abruptly: the next step does not look back beyond the last.
+   !> Note that the load or the speed changes abruptly: the next step does not extrapolate from the step
+   !> before.
    pure subroutine restart_order(self)
       type(zener_type), intent(inout) :: self
 

@@ -4,7 +4,7 @@
 !> Slip of a step: r = DX - U', DX = U + (D' - D), U' = A(T + T_h)/Q with the traction T_h of the
 !> past. The solver works with Q r = DX' - A(T + T_h), DX' = Q DX. The mean of a block
 !> with mass moves by the rule of module block_motion; the part of the mean traction that accelerates the
-!> mass does not strain the rubber.
+!> mass does not deform the rubber.
 !>
 !> The loss by friction is that of the mean traction over the step, second order in its length.
 !>
@@ -44,8 +44,8 @@ module tangential_step
       real(dp), allocatable :: slip(:, :, :)          !! of the step, m
       logical :: pulled(2) = .false.                  !! the road hangs on a force along x, y
       real(dp) :: pull(2) = 0.0_dp                    !! that force, over the cell, Pa
-      logical :: slides_off = .false.                 !! it is more than the friction holds,
-      real(dp) :: held(2) = 0.0_dp                    !! which is this, Pa
+      logical :: slides_off = .false.                 !! that force is more than the friction can hold
+      real(dp) :: held(2) = 0.0_dp                    !! the most that the friction can hold, Pa
       !> The share of its bound that each cell may carry, in place of the rule of contact [nx, rows];
       !> not allocated: not given.
       real(dp), allocatable :: share(:, :)
@@ -56,7 +56,7 @@ module tangential_step
       real(dp), private :: motion(2) = 0.0_dp             !! D' - D of the step in hand, m; a guess where pulled
       real(dp), private :: found(2) = 0.0_dp              !! D' - D as found by the last solve, m
       real(dp), private :: mass_place(2) = 0.0_dp         !! of a pulled mass, in the units of DX'
-      real(dp), private :: mass_yields = 0.0_dp           !! a pulled mass yields to T - F by this
+      real(dp), private :: mass_yields = 0.0_dp           !! displacement of a pulled mass per T - F
       real(dp), private :: dt = 0.0_dp
       real(dp), private :: q = 0.0_dp
       real(dp), private :: past_mean(2) = 0.0_dp
@@ -101,7 +101,8 @@ contains
       allocate (self%slip, self%drive, self%past, source=self%trial)
    end subroutine new_tangential_step
 
-   !> Begin a step: what the road's motion and the past ask for. The material's step has begun.
+   !> Begin a step: compute DX' from the road's motion, and T_h from the state of the arms. The caller has
+   !> begun the step of the material.
    subroutine begin(self, state, material, motion, dt, pulled, pull)
       class(tangential_step_type), intent(inout) :: self
       type(tangential_state_type), intent(inout) :: state
@@ -124,7 +125,8 @@ contains
       if (allocated(self%share)) deallocate (self%share)
       state%moved = state%moved .or. any(abs(motion) > 0.0_dp) .or. any(pulled .and. abs(pull) > 0.0_dp)
       if (.not. state%moved) return
-      ! A road that goes back where it began leaves displacements of round-off.
+      ! When the road returns to where it began, only round-off is left of the displacements: it must not be
+      ! the scale of the residual.
       self%solver%least_scale = self%q*norm2(merge(0.0_dp, motion, pulled))
       if (.not. dt > 0.0_dp) state%pace = 0.0_dp
       call past_traction(state%arms, material, self%past)
@@ -132,11 +134,12 @@ contains
       height = state%block%height
       shift = self%q*motion
       if (state%block%inert(dt)) then
-         ! A mass makes the mean stiffer: like a lower block, moved by what is known of the mass.
+         ! A mass makes the mean mode stiffer, like a block of less height. The known part of its motion is
+         ! added to the displacement of the road.
          height = self%q*height/(self%q + state%block%resistance(dt))
          shift = shift - height*state%block%known(means(self, state%displacement), motion, dt)
       else if (state%block%mass > 0.0_dp) then
-         ! A mass does not move in no time: the mean of the surface stays.
+         ! A mass cannot move in an instantaneous step, so the mean displacement of the surface stays.
          height = 0.0_dp
          shift = shift - self%q*means(self, state%displacement)
       end if
@@ -176,9 +179,9 @@ contains
       end do
    end subroutine place_mass
 
-   !> Tell the solver what pulls the road. The rest of the horizontal force is not in T: without
-   !> `slope_effect` that of all slopes, else that of the slopes which attraction pulls at outside the
-   !> contact.
+   !> Set the mean of T that the solver must reach where the road is pulled. The pull minus this mean acts on
+   !> the slopes of the road without friction: on all slopes if `slope_effect` is off, otherwise on the slopes
+   !> outside the contact, which attraction pulls at.
    subroutine hang_road(self, state, pressure, slope_x, slope_y)
       type(tangential_step_type), intent(inout) :: self
       type(tangential_state_type), intent(in) :: state
@@ -200,7 +203,7 @@ contains
       end associate
    end subroutine hang_road
 
-   !> How far the pulled road has moved, from what the solver has found.
+   !> Compute the motion of the pulled road from the offset that the solver has found.
    subroutine find_motion(self, state)
       type(tangential_step_type), intent(inout) :: self
       type(tangential_state_type), intent(in) :: state
@@ -216,8 +219,8 @@ contains
       end associate
    end subroutine find_motion
 
-   !> The step is solved: add to the displacements how far the pulled road has moved. They were computed
-   !> without it.
+   !> After the step is solved, add the motion of the pulled road to the displacements, which were computed
+   !> with a guess of it.
    subroutine take_motion(self, motion)
       class(tangential_step_type), intent(inout) :: self
       real(dp), intent(out) :: motion(2)              !! of the road in the step, m
@@ -258,7 +261,7 @@ contains
       self%solver%near = factor > 0.0_dp
    end subroutine extrapolate
 
-   !> The compliance of the mean mode, periodic mode only.
+   !> Set the compliance of the mean mode. On a free grid there is no mean mode to set.
    subroutine set_thickness(self, thickness)
       type(tangential_step_type), intent(inout) :: self
       real(dp), intent(in) :: thickness
@@ -275,9 +278,9 @@ contains
       mean = vector_sum(field)/self%grid%cells()
    end function means
 
-   !> Solve for the traction under a pressure: T, the trial displacement, the slip. Where the road is
-   !> pulled, the trial displacement is computed as if the road had moved by the guess: U - (D' - D) is
-   !> right, and the road is read by that. `take_motion` ends this.
+   !> Solve for T under a pressure, and compute the trial displacement and the slip. Where the road is pulled,
+   !> the trial displacement belongs to the guessed motion of the road. The difference U - (D' - D) is right,
+   !> and only this difference is used to read the road. `take_motion` corrects the displacement in the end.
    subroutine solve(self, state, pressure, gap, slope_x, slope_y, outcome)
       class(tangential_step_type), intent(inout), target :: self
       type(tangential_state_type), intent(inout), target :: state
@@ -310,7 +313,7 @@ contains
       call find_trial(self, state)
    end subroutine solve
 
-   !> The trial displacement from Q times the slip, which becomes the slip.
+   !> Divide Q times the slip by Q, and compute the trial displacement from the slip.
    subroutine find_trial(self, state)
       type(tangential_step_type), intent(inout) :: self
       type(tangential_state_type), intent(in) :: state
@@ -325,7 +328,7 @@ contains
       end do
    end subroutine find_trial
 
-   !> Slip and trial displacement under given tractions. Not where the road is pulled.
+   !> Slip and trial displacement under given tractions. This does not apply where the road is pulled.
    subroutine try(self, state, traction)
       class(tangential_step_type), intent(inout) :: self
       type(tangential_state_type), intent(in) :: state
@@ -349,7 +352,7 @@ contains
       call find_trial(self, state)
    end subroutine try
 
-   !> Displacement of a cell under its own unit traction, m/Pa; 0 if there is but one cell.
+   !> Displacement of a cell under its own unit traction, m/Pa; 0 if there is only one cell.
    function cell_compliance(self) result(compliance)
       class(tangential_step_type), intent(in) :: self
       real(dp) :: compliance
@@ -357,7 +360,7 @@ contains
       compliance = self%operator%symbols%self_compliance(with_mean=self%grid%boundary /= boundary_periodic)/self%q
    end function cell_compliance
 
-   !> End the step: arms, energies, the motion of the mass.
+   !> End the step: update the arms, the energies and the motion of the mass.
    subroutine commit(self, state, material, pressure, slope_x, slope_y)
       class(tangential_step_type), intent(inout) :: self
       type(tangential_state_type), intent(inout) :: state
@@ -390,7 +393,7 @@ contains
       state%displacement(:, :, :) = self%trial
    end subroutine commit
 
-   !> Means of the traction, part of the grid that sticks, mean slip of the step.
+   !> Mean traction, fraction of the grid that sticks, and mean slip of the step.
    subroutine sums(self, state, traction, stick, slip)
       class(tangential_step_type), intent(in) :: self
       type(tangential_state_type), intent(in) :: state

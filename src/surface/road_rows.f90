@@ -4,8 +4,8 @@
 !> present. These are fetched from their owners when the road has moved on, with some more on either side, so that
 !> most steps find what they need. The map does not change, so that what has been fetched remains right.
 !>
-!> Rows are numbered from 0 in this module. What a row holds, heights or coefficients of a spline, is not
-!> known here.
+!> Rows are numbered from 0 in this module. The values of a row may be heights or
+!> coefficients of a spline; this module does not use them.
 module road_rows
    use asperity_parallel, only : any_process
    use asperity_precision, only : dp
@@ -35,7 +35,7 @@ module road_rows
 
 contains
 
-   !> Make room; the caller sets the rows of this process, and then those of the rim: rows -1 and ny.
+   !> Allocate the rows; the caller sets the rows of this process, and then those of the rim: rows -1 and ny.
    subroutine new_road_rows(self, grid, n, with_rim)
       type(road_rows_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
@@ -54,7 +54,8 @@ contains
       call place_own_rows(self)
    end subroutine new_road_rows
 
-   !> Have the rows that are read at these places along y. Collective.
+   !> Fetch the rows that are needed to read the map at these places along y, unless they are here already.
+   !> Collective.
    subroutine have(self, least, largest)
       class(road_rows_type), intent(inout) :: self
       integer, intent(in) :: least, largest           !! cells from 0, of this process
@@ -80,7 +81,7 @@ contains
       integer :: range(2)
 
       if (grid%boundary /= boundary_periodic) then
-         ! Beyond the rim the map goes on as at the rim.
+         ! Beyond the rim the map continues with the heights of the rim.
          range(1) = min(max(wanted(1), 0), max(grid%ny - 2 + reach(1), 0))
          range(2) = max(min(wanted(2), grid%ny - 1), min(reach(2), grid%ny - 1))
       else if (wanted(2) - wanted(1) < grid%ny) then

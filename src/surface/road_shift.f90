@@ -1,4 +1,4 @@
-!> The displacement of the road under the rubber, in whole cells and a rest.
+!> The displacement of the road under the rubber, split into whole cells and a part of a cell.
 !>
 !> A displacement that differs from whole cells by less than 1e-9 of a cell counts as whole.
 module road_shift
