@@ -17,7 +17,8 @@ inputs    damaged inputs end with status 0, 2, 3 or 4 and a message
 flips     no damaged checkpoint is continued; damaged results and maps never crash the program
 kills     a run that is killed or stopped again and again gives the numbers of one that was not
 twins     of several runs on one result one goes on, and the others say so
-memory    whatever the limit of memory, a run ends well or with status 3 and a message
+memory    whatever the limit of memory, a run ends well or with status 3 and a message; a run that
+          takes longer than a minute is sent SIGTERM and ends within half a minute
 """
 
 import argparse
@@ -42,6 +43,7 @@ import asperity
 TIMES = {"seconds"}
 CRASHES = ("Backtrace", "Fortran runtime", "SIGSEGV", "HDF5-DIAG", "libgomp:", "terminate called")
 PATIENCE = 300.0
+ANSWER = 30.0  # most seconds from SIGTERM to the end of a run
 
 
 class Wrong(Exception):  # noqa: N818 - an outcome, not an error of the script
@@ -55,11 +57,29 @@ def program():
     return find()
 
 
-def call(*words, cwd, statuses=(0, 2, 3, 4), **options):
-    """Run the program to its end; a crash, a hang or another status is wrong."""
+def run_or_stop(command, stop_after, **options):
+    """Run a command; where it takes longer than some seconds, send SIGTERM and wait for the end."""
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **options)
     try:
-        done = subprocess.run([program(), *map(str, words)], cwd=cwd, capture_output=True,
-                              timeout=PATIENCE, check=False, **options)
+        outputs = process.communicate(timeout=stop_after)
+    except subprocess.TimeoutExpired:
+        process.terminate()
+        try:
+            outputs = process.communicate(timeout=ANSWER)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.communicate()
+            raise
+    return subprocess.CompletedProcess(command, process.returncode, *outputs)
+
+
+def call(*words, cwd, statuses=(0, 2, 3, 4), stop_after=PATIENCE, **options):
+    """Run the program to its end; a crash, a hang or another status is wrong.
+
+    A run that takes longer than `stop_after` seconds is stopped: its status 143 must be allowed.
+    """
+    try:
+        done = run_or_stop([program(), *map(str, words)], stop_after, cwd=cwd, **options)
     except subprocess.TimeoutExpired:
         raise Wrong(f"{' '.join(map(str, words))}: does not come to an end") from None
     done.message = done.stderr.decode(errors="replace")
@@ -409,7 +429,8 @@ def try_memory(chance, folder):
     """Run with a random limit of the address space."""
     (folder / "case.nml").write_text(random_case(chance, rows=2, largest=500))
     limit = int(10 ** chance.uniform(7.8, 9.2))
-    done = call("run", "case.nml", "--quiet", cwd=folder, statuses=(0, 3, 4, 127),
+    done = call("run", "case.nml", "--quiet", cwd=folder, statuses=(0, 3, 4, 127, 143),
+                stop_after=60.0,  # a row with friction on a steep road may take many minutes
                 preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)))
     if done.returncode == 127:
         return "too little to load the program"
