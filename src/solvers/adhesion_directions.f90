@@ -238,7 +238,9 @@ contains
       call turn_cells(now%state(1:n, j), self%exchange(1:n, j), beta, now%units%length, self%direction(1:n, j), &
          quickest)
       self%change(1:n, j) = self%direction(1:n, j) + now%lift
-      bent(:) = self%direction(1:n, j)*self%curvature(1:n, j)
+      do i = 1, n
+         bent(i) = self%direction(i, j)*self%curvature(i, j)
+      end do
       do i = n + 1, self%patch%mx
          d = self%exchange(i, j) + beta*self%direction(i, j)
          self%direction(i, j) = d
