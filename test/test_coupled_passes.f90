@@ -4,10 +4,12 @@ module test_coupled_passes
    use check, only : begin_suite, check_close, check_order, check_that, selected
    use carried_field, only : carry
    use pass_control, only : pass_control_type
-   use asperity_precision, only : dp
+   use adhesion_potential, only : adhesion_potential_type
+   use asperity_precision, only : dp, int8
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use place_forecast, only : new_place_forecast, place_forecast_type
    use simulation_runs, only : check_books, nl, record_type, run_case
+   use touching_cells, only : edge_error, mark_contact
    implicit none
    private
 
@@ -25,6 +27,7 @@ contains
       if (selected('mixing_settles_where_plain_passes_fail')) &
          call mixing_settles_where_plain_passes_fail()
       if (selected('accuracy_follows_the_mismatch')) call accuracy_follows_the_mismatch()
+      if (selected('edge_cells_are_judged_one_by_one')) call edge_cells_are_judged_one_by_one()
       if (selected('thick_block_on_steep_wave_settles')) call thick_block_on_steep_wave_settles()
       if (selected('steep_road_settles_and_books_close')) call steep_road_settles_and_books_close()
    end subroutine run_coupled_passes
@@ -54,6 +57,29 @@ contains
       call check_close(moved(3, 2), 0.5_dp*(field(4, 2) + field(5, 2)), 1.0e-14_dp, 'free, inside')
       call check_close(moved(nx, 2), field(nx, 2), 1.0e-14_dp, 'free, at the rim')
    end subroutine carried_fields_move_with_the_contact
+
+   !> Four cells: in contact, open, open with a pressure of round-off, and one whose gap is meant to be 0.
+   subroutine edge_cells_are_judged_one_by_one()
+      real(dp), parameter :: soft = 1.0e-12_dp
+      real(dp), parameter :: pressure(4, 1) = reshape([3.0e6_dp, 0.0_dp, 1.0e-8_dp, 1.0e6_dp], [4, 1])
+      real(dp), parameter :: gap(4, 1) = reshape([0.0_dp, 1.0e-6_dp, 1.0e-6_dp, 1.0e-9_dp], [4, 1])
+      type(adhesion_potential_type) :: none
+      integer(int8) :: contact(4, 1)
+
+      contact = 0_int8
+      call mark_contact(.false., 0.0_dp, pressure, gap, contact)
+      call check_that(all(contact(:, 1) == [1, 0, 1, 1]), 'the pressure alone decides')
+      contact(1, 1) = 2_int8
+      call mark_contact(.false., soft, pressure, gap, contact)
+      call check_that(all(contact(:, 1) == [2, 0, 0, 1]), 'the gap counts, and a cell that slipped keeps its mark')
+      ! The mean pressure of three cells presses in by 4/3 um.
+      call check_close(edge_error(none, soft, contact, pressure, gap), 0.75e-3_dp, 1.0e-9_dp, 'gap of a cell in contact')
+      call check_close(edge_error(none, soft, contact, pressure, gap - 3.0e-6_dp), 3.0_dp*0.75_dp, 1.0e-3_dp, &
+         'overlap of cells in contact')
+      contact(1, 1) = 0_int8
+      call check_close(edge_error(none, soft, contact, pressure, gap), 3.0_dp*0.75_dp, 1.0e-9_dp, &
+         'pressure of an open cell')
+   end subroutine edge_cells_are_judged_one_by_one
 
    !> A displacement that moves along by a cell a step and grows with the square of the time is forecast
    !> exactly after four steps; after a step of another length nothing is taken for granted.

@@ -36,9 +36,11 @@ class Road:
         """Return H, H_x, H_y, H_xx, H_xy and H_yy at places of shape (2, n), m."""
         u, v = place / self.dx
         i, j = np.floor(u).astype(int), np.floor(v).astype(int)
-        outside = np.zeros(u.shape, bool)
-        if self.free:
-            outside = (u < 0) | (u > self.nx - 1) | (v < 0) | (v > self.ny - 1)
+        inside = np.ones(u.shape)
+        if self.free:                            # beyond the rim the road falls within one cell
+            for w, n in ((u, self.nx), (v, self.ny)):
+                inside = inside * np.clip(1 - np.maximum(-w, w - (n - 1)), 0, 1)
+            u, v = np.clip(u, 0, self.nx - 1), np.clip(v, 0, self.ny - 1)
             i, j = np.clip(i, 0, self.nx - 2), np.clip(j, 0, self.ny - 2)
         a, b = weights(u - i), weights(v - j)
         found = np.zeros((6, *u.shape))
@@ -49,8 +51,8 @@ class Road:
                 a[0][k] * b[0][m], a[1][k] * b[0][m] / self.dx, a[0][k] * b[1][m] / self.dx,
                 a[2][k] * b[0][m] / self.dx**2, a[1][k] * b[1][m] / self.dx**2,
                 a[0][k] * b[2][m] / self.dx**2])
-        found[:, outside] = 0.0
-        found[0, outside] = self.lowest
+        found *= inside
+        found[0] += (1 - inside) * self.lowest
         return found
 
 
@@ -128,10 +130,12 @@ class Kernel:
 
 
 class Memory:
-    """The arms of the rubber under a field of tractions: exponential2 and jumps."""
+    """The arms of the rubber under a field of tractions: exponential schemes and jumps."""
 
-    def __init__(self, modulus: float, g: list[float], tau: list[float], shape: tuple) -> None:
-        """Start without load."""
+    def __init__(self, modulus: float, g: list[float], tau: list[float], shape: tuple,
+                 order: int) -> None:
+        """Start without load; order 1 or 2: `exponential` or `exponential2`."""
+        self.order = order
         self.modulus, self.g, self.tau = modulus, np.array(g), np.array(tau)
         self.s, self.old, self.p = np.zeros(shape), np.zeros(shape), np.zeros((len(g), *shape))
         self.dt = self.dt_old = 0.0
@@ -142,7 +146,7 @@ class Memory:
         if dt == 0.0:
             self.keep, self.b1, self.b2 = np.ones_like(self.g), self.g, 0 * self.g
         else:
-            ratio = dt / self.dt_old if self.dt_old > 0 else 0.0
+            ratio = dt / self.dt_old if self.dt_old > 0 and self.order == 2 else 0.0
             w = 2 * ratio / (1 + ratio) * min(1.0, (2 / max(ratio, 1e-9))**2)
             x = dt / self.tau
             at, part = np.polynomial.legendre.leggauss(24)
@@ -182,8 +186,9 @@ class Case:
         arms = re.search(r"prony_g = (\d)\*([\d.e+-]+), prony_tau = ([^/]*)/", text)
         g = [float(arms[2])] * int(arms[1]) if arms else []
         tau = [float(one) for one in arms[3].split(",")] if arms else []
-        self.normal = Memory(number("shear_modulus"), g, tau, (self.cells,))
-        self.tangential = Memory(number("shear_modulus"), g, tau, (2, self.cells))
+        self.order = 1 if "time_scheme = 'exponential'," in text else 2
+        self.normal = Memory(number("shear_modulus"), g, tau, (self.cells,), self.order)
+        self.tangential = Memory(number("shear_modulus"), g, tau, (2, self.cells), self.order)
         self.strength = number("shear_strength")
         self.slope = "slope_effect = .false." not in text
         self.range = number("range", 1.0)
@@ -202,7 +207,8 @@ class Case:
 
     def starts(self, dt: float) -> bool:
         """Tell whether a step is taken in three parts."""
-        return len(self.normal.g) > 0 and self.normal.dt_old == 0.0 and dt > 0.0
+        return (self.order == 2 and len(self.normal.g) > 0 and self.normal.dt_old == 0.0
+                and dt > 0.0)
 
     def begin(self, dt: float, motion: np.ndarray, load: float) -> None:
         """Begin a step: what the past and the mass add to the displacements."""

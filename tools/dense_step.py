@@ -81,10 +81,14 @@ class DenseStep:
         slope = np.array([hx, hy]) * (1.0 if self.case.slope else 0.0)
         normal = -share * p * slope
         d = t - normal + self.stiff * (slip + slope * (slope * slip).sum(axis=0))
-        size = np.sqrt((d**2).sum(axis=0) - (slope * d).sum(axis=0)**2
-                       / (1 + (slope**2).sum(axis=0)) + 1e-300)
-        ratio = share * self.case.strength / size
+        ratio = share * self.case.strength / self.size(d, slope)
         return np.where(ratio.real < 1, ratio, 1.0) * d + normal
+
+    @staticmethod
+    def size(t: np.ndarray, slope: np.ndarray) -> np.ndarray:
+        """Return the size of horizontal tractions as the law measures it, along the slope."""
+        return np.sqrt((t**2).sum(axis=0) - (slope * t).sum(axis=0)**2
+                       / (1 + (slope**2).sum(axis=0)) + 1e-300)
 
     def surface(self, found: Found, p: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the road under the surface, the gap and the slip."""
@@ -159,7 +163,8 @@ class DenseStep:
             return (float(np.sqrt((gap**2).sum() + (law**2).sum() + case.cells * load**2)), left,
                     max(np.abs(gap).max(), np.abs(law).max(), abs(load)))
 
-        now = measure(found)
+        now = kept = measure(found)
+        least = found
         for k in range(most):
             if now[2] < 1e-10 or not np.isfinite(now[0]):
                 break
@@ -191,7 +196,9 @@ class DenseStep:
             if best[0][0] >= (1 - 1e-4) * now[0] and k > 1:
                 best = tried[int(random.integers(min(4, len(tried))))]
             now, found = best
-        return found, now[2]
+            if now[2] < kept[2]:
+                kept, least = now, found
+        return least, kept[2]
 
     def tidy(self, found: Found) -> Found:
         """Take the traction off open cells."""
@@ -201,10 +208,14 @@ class DenseStep:
         """Return a state found elsewhere in these terms."""
         case = self.case
         touches = gap <= 0.0
-        level = self.surface((gap, traction, 0.0), pressure)[1]
-        s = np.where(touches, self.width + np.maximum(pressure + case.attraction, 0) * self.soft,
-                     -gap)
-        return self.tidy((s, traction, float(level[touches].mean())))
+        road, level, _ = self.surface((gap, traction, 0.0), pressure)
+        wall = np.maximum(pressure + case.attraction, 0)
+        slope = road[1:3] * (1.0 if case.slope else 0.0)
+        share = self.size(traction + pressure * slope, slope) / case.strength
+        partly = touches & (wall < 1e-6 * case.load) & (share < 1 - 1e-6)
+        s = np.where(touches, self.width + wall * self.soft, -gap)
+        s = np.where(partly, np.clip(share, 0, 1) * self.width, s)
+        return self.tidy((s, traction, float(level[touches].mean()) if touches.any() else 0.0))
 
     def solve(self, guesses: list[tuple]) -> tuple[Found, float]:
         """Solve the step with partly sheared cells, from the best start that works."""

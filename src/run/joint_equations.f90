@@ -17,7 +17,6 @@ module joint_equations
    use asperity_precision, only : dp, int8
    use asperity_schedule, only : planned_row_type
    use contact_model, only : contact_type
-   use contact_rule, only : touches
    use fft_conv, only : columns_apply, convolution_type, new_convolution
    use field_sums, only : field_count, field_sum, largest_of_rows, row_totals
    use friction_law, only : law_constant_shear
@@ -130,7 +129,7 @@ contains
          if (contact%side%adhesive) rules%attraction = adhesive_slope(rules%potential, 0.0_dp)
          rules%soft = self%compliance/contact%material%q
          rules%soft_along = contact%tangential%cell_compliance()
-         touching = touches(contact%side%adhesive, state%pressure, state%gap)
+         touching = state%tangential%contact /= 0_int8
          self%root = sqrt(max(real(field_count(touching), dp), 1.0_dp))
          self%unit_pressure = max(field_sum(abs(state%pressure)), tiny(1.0_dp))/contact%grid%cells()
          self%unit_traction = self%unit_pressure*contact%grid%cells()/self%root**2

@@ -19,7 +19,7 @@ module tangential_step
    use fft_conv, only : columns_apply, convolution_type, new_convolution
    use friction_cg, only : friction_fast, friction_fields_type, friction_solver_type, friction_thesis, &
       new_friction_solver
-   use friction_law, only : friction_law_type, new_friction_law
+   use friction_law, only : friction_law_type, law_constant_shear, new_friction_law
    use asperity_precision, only : dp, int8
    use regular_grid, only : boundary_periodic, grid_type
    use rubber_kernels, only : tangential_kernel
@@ -60,6 +60,7 @@ module tangential_step
       real(dp), private :: dt = 0.0_dp
       real(dp), private :: q = 0.0_dp
       real(dp), private :: past_mean(2) = 0.0_dp
+      real(dp), private :: compliance = 0.0_dp            !! of a cell under its own unit traction, G = 1, m/Pa
    contains
       procedure :: begin
       procedure :: extrapolate
@@ -92,6 +93,7 @@ contains
          case%solver%slip_law == 'physical')
       call new_convolution(self%operator, self%grid, tangential_kernel(case%material), error)
       if (allocated(error)) return
+      self%compliance = self%operator%symbols%self_compliance(with_mean=self%grid%boundary /= boundary_periodic)
       call new_friction_solver(self%solver, self%grid, self%operator, error, &
          merge(friction_thesis, friction_fast, case%solver%method == 'thesis'))
       self%solver%max_iterations = case%solver%max_iterations
@@ -298,7 +300,8 @@ contains
          fields%pressure => weighed
          fields%share => self%share
       else
-         call mark_contact(self%adhesive, pressure, gap, state%contact)
+         call mark_contact(self%adhesive, merge(self%cell_compliance(), 0.0_dp, self%law%law == law_constant_shear), &
+            pressure, gap, state%contact)
       end if
       call hang_road(self, state, pressure, slope_x, slope_y)
       fields%slope_x => slope_x
@@ -353,11 +356,11 @@ contains
    end subroutine try
 
    !> Displacement of a cell under its own unit traction, m/Pa; 0 if there is only one cell.
-   function cell_compliance(self) result(compliance)
+   pure function cell_compliance(self) result(compliance)
       class(tangential_step_type), intent(in) :: self
       real(dp) :: compliance
 
-      compliance = self%operator%symbols%self_compliance(with_mean=self%grid%boundary /= boundary_periodic)/self%q
+      compliance = self%compliance/self%q
    end function cell_compliance
 
    !> End the step: update the arms, the energies and the motion of the mass.

@@ -1,27 +1,39 @@
 !> The cells that may carry friction, and the horizontal force of the road beside their tractions.
 module touching_cells
+   use adhesion_potential, only : adhesion_potential_type, adhesive_slope
    use asperity_precision, only : dp, int8
    use contact_rule, only : touches
-   use field_sums, only : row_totals
+   use field_sums, only : largest_of_rows, row_totals
    implicit none
    private
 
-   public :: force_beside, mark_contact
+   public :: edge_error, force_beside, mark_contact
 
 contains
 
    !> Mark the cells that may carry friction, those that touch. A cell that slipped is still marked so.
-   subroutine mark_contact(adhesive, pressure, gap, contact)
+   !>
+   !> Without adhesion the solver of the normal contact leaves small pressures, of round-off or of its
+   !> tolerance, in cells with a gap. That does no harm to a traction in proportion to the pressure. A cell
+   !> that carries the same traction under any pressure therefore counts as touching only if its gap is smaller
+   !> than the length by which its pressure presses it in: then it is the gap that is meant to be 0, and otherwise
+   !> the pressure.
+   subroutine mark_contact(adhesive, soft, pressure, gap, contact)
       logical, intent(in) :: adhesive                 !! the contact has an adhesive potential
+      real(dp), intent(in) :: soft                    !! displacement of a cell under its own unit traction, m/Pa;
+                                                      !! 0: the pressure alone decides
       real(dp), intent(in) :: pressure(:, :)          !! Pa
       real(dp), intent(in) :: gap(:, :)               !! m
       integer(int8), intent(inout) :: contact(:, :)   !! 0 open, 1 stick, 2 slip
+      logical :: open
       integer :: i, j
 
-      !$omp parallel do default(none) shared(adhesive, pressure, gap, contact) private(i, j)
+      !$omp parallel do default(none) shared(adhesive, soft, pressure, gap, contact) private(i, j, open)
       do j = 1, size(contact, 2)
          do i = 1, size(contact, 1)
-            if (.not. touches(adhesive, pressure(i, j), gap(i, j))) then
+            open = .not. touches(adhesive, pressure(i, j), gap(i, j))
+            if (soft > 0.0_dp .and. .not. adhesive) open = open .or. gap(i, j) >= soft*pressure(i, j)
+            if (open) then
                contact(i, j) = 0_int8
             else if (contact(i, j) == 0_int8) then
                contact(i, j) = 1_int8
@@ -29,6 +41,33 @@ contains
          end do
       end do
    end subroutine mark_contact
+
+   !> By how much a contact breaks its conditions in any cell, over the length by which the mean pressure of
+   !> the contact presses a cell in: the gap of cells that carry friction, and the pressure of the wall and the
+   !> overlap with the road of the others. Collective where processes share the rows.
+   function edge_error(potential, soft, contact, pressure, gap) result(error)
+      type(adhesion_potential_type), intent(in) :: potential
+      real(dp), intent(in) :: soft                    !! displacement of a cell under its own unit traction, m/Pa
+      integer(int8), intent(in) :: contact(:, :)      !! 0 open, 1 stick, 2 slip
+      real(dp), intent(in) :: pressure(:, :)          !! attraction included, Pa
+      real(dp), intent(in) :: gap(:, :)               !! m
+      real(dp) :: error
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: sums(2), wall(size(gap, 1))
+      integer :: j
+
+      allocate (rows(3, size(gap, 2)))
+      !$omp parallel do default(none) shared(potential, soft, contact, pressure, gap, rows) private(j, wall)
+      do j = 1, size(gap, 2)
+         wall(:) = pressure(:, j) + adhesive_slope(potential, max(gap(:, j), 0.0_dp))
+         rows(1, j) = sum(abs(pressure(:, j)))
+         rows(2, j) = count(pressure(:, j) > 0.0_dp)
+         rows(3, j) = maxval(merge(max(soft*abs(wall), -gap(:, j)), abs(gap(:, j)), contact(:, j) == 0_int8))
+      end do
+      sums = row_totals(rows(:2, :))
+      error = largest_of_rows(rows(3, :))
+      if (sums(1) > 0.0_dp) error = error*max(sums(2), 1.0_dp)/(soft*sums(1))
+   end function edge_error
 
    !> The horizontal force of the road on the rubber that T does not hold, over the area of a cell: without
    !> slope that of all slopes, else that of the slopes which attraction pulls at outside the contact.
