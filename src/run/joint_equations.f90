@@ -111,6 +111,7 @@ contains
       self%compliance = self%operator%symbols%self_compliance( &
          with_mean=contact%grid%boundary /= boundary_periodic)
       self%ready = self%compliance > 0.0_dp .and. .not. any_process(any(status /= 0))
+      if (.not. self%ready) call destroy(self)
    end subroutine prepare
 
    !> The start: the state of the contact; and the units.
@@ -231,15 +232,24 @@ contains
       end do
    end subroutine evaluate_row
 
-   !> Hand the solution to the contact.
-   subroutine hand_out(self, contact, plan, found)
+   !> Hand the solution to the contact, if there is memory for the shares of the cells.
+   subroutine hand_out(self, contact, plan, found, done)
       class(joint_equations_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact
       type(planned_row_type), intent(in) :: plan
       type(joint_state_type), intent(inout) :: found
+      logical, intent(out) :: done
       real(dp) :: slope(2)
-      integer :: i, j
+      integer :: i, j, status
 
+      status = 0
+      if (.not. allocated(contact%tangential%share)) &
+         allocate (contact%tangential%share(contact%grid%nx, contact%grid%rows()), stat=status)
+      done = .not. any_process(status /= 0)
+      if (.not. done) then
+         if (allocated(contact%tangential%share)) deallocate (contact%tangential%share)
+         return
+      end if
       call evaluate(self, contact, plan, found)
       slope = 0.0_dp
       associate (state => contact%state, rubbing => contact%state%tangential)
@@ -247,7 +257,7 @@ contains
          state%gap(:, :) = self%rules%gap_of(found%s)
          state%level = found%level
          rubbing%traction(:, :, :) = found%t
-         contact%tangential%share = self%rules%share_of(self%width, found%s)
+         contact%tangential%share(:, :) = self%rules%share_of(self%width, found%s)
          do j = 1, contact%grid%rows()
             do i = 1, contact%grid%nx
                if (self%rules%law%slope) slope = [self%slope_x(i, j), self%slope_y(i, j)]
@@ -264,6 +274,11 @@ contains
       class(joint_equations_type), intent(inout) :: self
 
       call self%operator%destroy()
+      if (allocated(self%width)) deallocate (self%width)
+      if (allocated(self%pressure)) deallocate (self%pressure)
+      if (allocated(self%height)) deallocate (self%height)
+      if (allocated(self%slope_x)) deallocate (self%slope_x)
+      if (allocated(self%slope_y)) deallocate (self%slope_y)
       self%ready = .false.
    end subroutine destroy
 

@@ -9,8 +9,8 @@
 !> that are attracted hardly). If this fails and some traction may jump, the steps are done with a pressure
 !> that rises in partly sheared cells, which takes the jump away, and the rise goes to nothing (`descend`).
 !>
-!> Fields of doubles, from the first use on: 29; and the directions of GMRES, 3 numbers of single
-!> precision per unknown cell and direction.
+!> Fields of doubles, from the first use on: 30; and the directions of GMRES, 3 numbers of single
+!> precision per unknown cell and direction. Where there is not enough memory, the step is not solved.
 module joint_step
    use adhesion_potential, only : adhesive_curvature
    use asperity_parallel, only : any_process
@@ -48,6 +48,7 @@ module joint_step
       integer, allocatable, private :: first(:)        !! [rows + 1] of the list of unknown cells
       integer, allocatable, private :: cell(:)         !! its cells, i
       type(joint_state_type), private :: now, trial, best, begun
+      real(dp), allocatable, private :: follow(:, :)   !! change of s of the cells that are not unknown, m [nx, rows]
    contains
       procedure :: solve
       procedure :: destroy
@@ -76,7 +77,7 @@ contains
          call iterate(self, contact, plan, solved)
          if (.not. solved .and. field_count(equations%width > 0.0_dp) > 0) &
             call descend(self, contact, plan, solved)
-         if (solved) call equations%hand_out(contact, plan, self%now)
+         if (solved) call equations%hand_out(contact, plan, self%now, solved)
          transforms = 6*equations%evaluations
       end associate
    end subroutine solve
@@ -85,7 +86,7 @@ contains
    subroutine prepare(self, contact)
       class(joint_step_type), intent(inout) :: self
       class(contact_type), intent(in) :: contact
-      integer :: status(4)
+      integer :: status(7), n
 
       call self%equations%prepare(contact)
       if (.not. self%equations%ready) return
@@ -93,7 +94,11 @@ contains
       call self%trial%make_room(contact%grid, status(2))
       call self%best%make_room(contact%grid, status(3))
       call self%begun%make_room(contact%grid, status(4))
-      if (any_process(any(status /= 0))) call self%equations%destroy()
+      n = contact%grid%rows()
+      allocate (self%follow(contact%grid%nx, n), source=0.0_dp, stat=status(5))
+      allocate (self%first(n + 1), source=1, stat=status(6))
+      allocate (self%cell(contact%grid%nx*n), source=0, stat=status(7))
+      if (any_process(any(status /= 0))) call self%destroy()
    end subroutine prepare
 
    !> Newton's steps from the state at hand.
@@ -105,6 +110,7 @@ contains
       type(cell_vector_type) :: step
       real(dp) :: goal, first
       integer :: k
+      logical :: found
 
       goal = max(share_of_tolerance*contact%case%solver%tolerance, round_off)
       call self%equations%evaluate(contact, plan, self%now)
@@ -112,7 +118,8 @@ contains
       do k = 1, most_steps
          if (.not. self%now%worst > goal .or. self%now%merit > astray*first) exit
          if (stop_is_due()) exit
-         call find_step(self, contact, plan, step)
+         call find_step(self, contact, plan, step, found)
+         if (.not. found) exit
          call take_step(self, contact, plan, step, k)
       end do
       solved = self%now%worst <= goal
@@ -178,17 +185,26 @@ contains
       self%equations%rules%rise = rise
    end subroutine set_rise
 
-   !> Newton's step, scaled.
-   subroutine find_step(self, contact, plan, step)
+   !> Newton's step, scaled. There is none where memory runs out.
+   subroutine find_step(self, contact, plan, step, found)
       class(joint_step_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact
       type(planned_row_type), intent(in) :: plan
       type(cell_vector_type), intent(inout) :: step
+      logical, intent(out) :: found
       type(gmres_type) :: krylov
       type(cell_vector_type) :: v
+      integer :: cells, status(2)
 
       call list_cells(self)
-      v%cells = gathered(self, self%now%left)
+      cells = self%first(size(self%first)) - 1
+      if (allocated(step%cells)) deallocate (step%cells)
+      allocate (step%cells(3, cells), stat=status(1))
+      allocate (v%cells(3, cells), stat=status(2))
+      found = .not. any_process(any(status /= 0))
+      if (.not. found) return
+
+      call gather(self, self%now%left, v)
       v%cells = -v%cells
       v%beside = -self%now%left_load
       call krylov%begin(v, self%first, most_directions, accuracy)
@@ -196,11 +212,10 @@ contains
          if (stop_is_due()) exit
          call krylov%next(v)
          call change(self, contact, plan, v)
-         v%cells = gathered(self, self%trial%left)
+         call gather(self, self%trial%left, v)
          v%beside = self%trial%left_load
          call krylov%take(v)
       end do
-      step = v
       call krylov%solution(step)
    end subroutine find_step
 
@@ -208,13 +223,10 @@ contains
    subroutine list_cells(self)
       class(joint_step_type), intent(inout) :: self
       logical :: unknown(size(self%now%s, 1))
-      integer :: i, j, n
+      integer :: i, j
 
-      n = size(self%now%s, 2)
-      if (.not. allocated(self%first)) allocate (self%first(n + 1))
-      if (.not. allocated(self%cell)) allocate (self%cell(size(self%now%s)))
       self%first(1) = 1
-      do j = 1, n
+      do j = 1, size(self%now%s, 2)
          unknown = self%now%s(:, j) >= 0.0_dp .or. abs(adhesive_curvature(self%equations%rules%potential, &
             max(-self%now%s(:, j), 0.0_dp)))*self%equations%rules%soft > attracted
          self%first(j + 1) = self%first(j) + count(unknown)
@@ -262,19 +274,18 @@ contains
    end subroutine add
 
    !> The unknown cells of a field.
-   function gathered(self, field) result(cells)
+   subroutine gather(self, field, v)
       class(joint_step_type), intent(in) :: self
       real(dp), intent(in) :: field(:, :, :)           !! [nx, 3, rows]
-      real(dp), allocatable :: cells(:, :)
+      type(cell_vector_type), intent(inout) :: v
       integer :: j, k
 
-      allocate (cells(3, self%first(size(self%first)) - 1))
       do j = 1, size(field, 3)
          do k = self%first(j), self%first(j + 1) - 1
-            cells(:, k) = field(self%cell(k), :, j)
+            v%cells(:, k) = field(self%cell(k), :, j)
          end do
       end do
-   end function gathered
+   end subroutine gather
 
    !> Go along the step as far as the equations are met better.
    subroutine take_step(self, contact, plan, step, round)
@@ -283,17 +294,16 @@ contains
       type(planned_row_type), intent(in) :: plan
       type(cell_vector_type), intent(in) :: step
       integer, intent(in) :: round
-      real(dp), allocatable :: follow(:, :)            !! change of s of the cells that are not unknown, m
-      integer :: k, turn
+      integer :: j, k, turn
 
       call change(self, contact, plan, step)
-      follow = -(self%now%left(:, 1, :) + self%trial%left(:, 1, :))*self%equations%unit_length
-      do k = 1, size(follow, 2)
-         follow(self%cell(self%first(k):self%first(k + 1) - 1), k) = 0.0_dp
+      do j = 1, size(self%follow, 2)
+         self%follow(:, j) = -(self%now%left(:, 1, j) + self%trial%left(:, 1, j))*self%equations%unit_length
+         self%follow(self%cell(self%first(j):self%first(j + 1) - 1), j) = 0.0_dp
       end do
       self%best%merit = huge(1.0_dp)
       do k = 1, size(lengths)
-         call try_length(self, contact, plan, step, follow, lengths(k))
+         call try_length(self, contact, plan, step, lengths(k))
          if (self%trial%merit < self%best%merit) call self%best%copy(self%trial)
          if (self%trial%merit < (1.0_dp - 0.2_dp*lengths(k))*self%now%merit) then
             call self%now%copy(self%trial)
@@ -303,24 +313,24 @@ contains
       if (round > 2 .and. self%best%merit >= (1.0_dp - idle)*self%now%merit) then
          ! No length helps: any way out of the corner.
          turn = 1 + modulo(7*round, 4)
-         call try_length(self, contact, plan, step, follow, lengths(turn))
+         call try_length(self, contact, plan, step, lengths(turn))
          call self%best%copy(self%trial)
       end if
       call self%now%copy(self%best)
    end subroutine take_step
 
    !> The state after a part of a step, as `trial`.
-   subroutine try_length(self, contact, plan, step, follow, length)
+   subroutine try_length(self, contact, plan, step, length)
       class(joint_step_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact
       type(planned_row_type), intent(in) :: plan
       type(cell_vector_type), intent(in) :: step
-      real(dp), intent(in) :: follow(:, :), length
+      real(dp), intent(in) :: length
       integer :: c, j
 
       call add(self, step, length)
-      do j = 1, size(follow, 2)
-         self%trial%s(:, j) = self%trial%s(:, j) + length*follow(:, j)
+      do j = 1, size(self%follow, 2)
+         self%trial%s(:, j) = self%trial%s(:, j) + length*self%follow(:, j)
          do c = 1, 2
             where (self%trial%s(:, j) < 0.0_dp) self%trial%t(:, c, j) = 0.0_dp
          end do
@@ -328,11 +338,19 @@ contains
       call self%equations%evaluate(contact, plan, self%trial)
    end subroutine try_length
 
-   !> Free the operator.
+   !> Free the operator and the fields.
    subroutine destroy(self)
       class(joint_step_type), intent(inout) :: self
+      type(joint_state_type) :: none
 
       call self%equations%destroy()
+      self%now = none
+      self%trial = none
+      self%best = none
+      self%begun = none
+      if (allocated(self%follow)) deallocate (self%follow)
+      if (allocated(self%first)) deallocate (self%first)
+      if (allocated(self%cell)) deallocate (self%cell)
    end subroutine destroy
 
 end module joint_step

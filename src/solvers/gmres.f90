@@ -14,8 +14,10 @@
 !>
 !> A vector has three numbers per cell of a list and one number beside them. The list is ordered by the
 !> rows of the grid, and sums are formed by row and added up in order: they do not depend on the threads
-!> or processes. The directions are stored in single precision, which limits the accuracy of x to 1e-6.
+!> or processes. The directions are stored in single precision, which limits the accuracy of x to 1e-6. Memory
+!> is taken for each direction as it comes; where there is none left, no more directions are wanted.
 module gmres
+   use asperity_parallel, only : any_process
    use asperity_precision, only : dp, sp
    use field_sums, only : row_totals
    implicit none
@@ -29,16 +31,22 @@ module gmres
       real(dp) :: beside = 0.0_dp
    end type cell_vector_type
 
+   !> A direction, of unit length.
+   type :: direction_type
+      real(sp), allocatable :: cells(:, :)          !! [3, cells of this process]
+      real(dp) :: beside = 0.0_dp
+   end type direction_type
+
    !> A system that is being solved.
    type :: gmres_type
       integer :: used = 0                           !! directions that have been taken
       real(dp) :: left = 0.0_dp                     !! |b - A x|/|b|
+      logical :: short_of_memory = .false.          !! there was no memory for another direction
       integer, private :: most = 0
       real(dp), private :: tolerance = 0.0_dp
       real(dp), private :: length = 0.0_dp          !! |b|
       integer, allocatable, private :: first(:)     !! [rows + 1] the first cell of each row in the list
-      real(sp), allocatable, private :: basis(:, :, :)   !! [3, cells, most + 1]
-      real(dp), allocatable, private :: beside(:)   !! [most + 1]
+      type(direction_type), allocatable, private :: basis(:)   !! [most + 1], so far used + 1
       real(dp), allocatable, private :: triangle(:, :), rotation(:, :), right(:)
    contains
       procedure :: begin
@@ -64,27 +72,43 @@ contains
       self%most = most
       self%tolerance = tolerance
       self%used = 0
-      if (allocated(self%basis)) deallocate (self%basis, self%beside, self%triangle, self%rotation, self%right)
-      allocate (self%basis(3, size(b%cells, 2), most + 1), self%beside(most + 1), &
-         self%triangle(most, most), self%rotation(2, most), self%right(most + 1))
-      self%basis(:, :, 1) = real(b%cells, sp)
-      self%beside(1) = b%beside
+      self%left = 1.0_dp
+      self%short_of_memory = .false.
+      if (allocated(self%basis)) deallocate (self%basis, self%triangle, self%rotation, self%right)
+      allocate (self%basis(most + 1), self%triangle(most, most), self%rotation(2, most), self%right(most + 1))
+      self%right = 0.0_dp
+      call keep(self, 1, b, 1.0_dp)
+      if (self%short_of_memory) return
       square = self%products(b, 1)
       self%length = sqrt(square(1))
       self%left = merge(1.0_dp, 0.0_dp, self%length > 0.0_dp)
       if (.not. self%length > 0.0_dp) return
-      self%basis(:, :, 1) = real(b%cells/self%length, sp)
-      self%beside(1) = b%beside/self%length
-      self%right = 0.0_dp
+      call keep(self, 1, b, self%length)
       self%right(1) = self%length
    end subroutine begin
+
+   !> Keep a vector over its length as a direction, if there is memory for it on all processes.
+   subroutine keep(self, n, v, length)
+      class(gmres_type), intent(inout) :: self
+      integer, intent(in) :: n                      !! number of the direction
+      type(cell_vector_type), intent(in) :: v
+      real(dp), intent(in) :: length
+      integer :: status
+
+      status = 0
+      if (.not. allocated(self%basis(n)%cells)) allocate (self%basis(n)%cells(3, size(v%cells, 2)), stat=status)
+      self%short_of_memory = any_process(status /= 0)
+      if (self%short_of_memory) return
+      self%basis(n)%cells(:, :) = real(v%cells/length, sp)
+      self%basis(n)%beside = v%beside/length
+   end subroutine keep
 
    !> Is another direction wanted?
    pure function unsolved(self) result(yes)
       class(gmres_type), intent(in) :: self
       logical :: yes
 
-      yes = self%left > self%tolerance .and. self%used < self%most
+      yes = self%left > self%tolerance .and. self%used < self%most .and. .not. self%short_of_memory
    end function unsolved
 
    !> The direction whose product is wanted.
@@ -92,8 +116,8 @@ contains
       class(gmres_type), intent(in) :: self
       type(cell_vector_type), intent(inout) :: v
 
-      v%cells = real(self%basis(:, :, self%used + 1), dp)
-      v%beside = self%beside(self%used + 1)
+      v%cells = real(self%basis(self%used + 1)%cells, dp)
+      v%beside = self%basis(self%used + 1)%beside
    end subroutine next
 
    !> Take the product: its part across all directions is the next one (Gram-Schmidt, twice).
@@ -110,19 +134,17 @@ contains
          part = self%products(w, n)
          column(:n) = column(:n) + part
          do k = 1, n
-            w%cells = w%cells - part(k)*self%basis(:, :, k)
-            w%beside = w%beside - part(k)*self%beside(k)
+            w%cells = w%cells - part(k)*self%basis(k)%cells
+            w%beside = w%beside - part(k)*self%basis(k)%beside
          end do
       end do
-      self%basis(:, :, n + 1) = real(w%cells, sp)
-      self%beside(n + 1) = w%beside
+      call keep(self, n + 1, w, 1.0_dp)
+      if (self%short_of_memory) return
       part = self%products(w, n + 1)
       length = sqrt(max(part(n + 1), 0.0_dp))
       column(n + 1) = length
-      if (length > 0.0_dp) then
-         self%basis(:, :, n + 1) = real(w%cells/length, sp)
-         self%beside(n + 1) = w%beside/length
-      end if
+      if (length > 0.0_dp) call keep(self, n + 1, w, length)
+
       ! The matrix of all columns so far becomes a triangle by rotations.
       do k = 1, n - 1
          turned = self%rotation(1, k)*column(k) + self%rotation(2, k)*column(k + 1)
@@ -155,8 +177,8 @@ contains
          y(k) = (self%right(k) - dot_product(self%triangle(k, k + 1:self%used), y(k + 1:)))/self%triangle(k, k)
       end do
       do k = 1, self%used
-         x%cells = x%cells + y(k)*self%basis(:, :, k)
-         x%beside = x%beside + y(k)*self%beside(k)
+         x%cells = x%cells + y(k)*self%basis(k)%cells
+         x%beside = x%beside + y(k)*self%basis(k)%beside
       end do
    end subroutine solution
 
@@ -174,11 +196,11 @@ contains
       do j = 1, size(self%first) - 1
          do k = 1, n
             do i = self%first(j), self%first(j + 1) - 1
-               rows(k, j) = rows(k, j) + sum(w%cells(:, i)*self%basis(:, i, k))
+               rows(k, j) = rows(k, j) + sum(w%cells(:, i)*self%basis(k)%cells(:, i))
             end do
          end do
       end do
-      sums = row_totals(rows) + w%beside*self%beside(:n)
+      sums = row_totals(rows) + w%beside*self%basis(:n)%beside
    end function products
 
 end module gmres
