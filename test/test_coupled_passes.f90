@@ -72,12 +72,12 @@ contains
       contact(1, 1) = 2_int8
       call mark_contact(.false., soft, pressure, gap, contact)
       call check_that(all(contact(:, 1) == [2, 0, 0, 1]), 'the gap counts, and a cell that slipped keeps its mark')
-      ! The mean pressure of three cells presses in by 4/3 um.
-      call check_close(edge_error(none, soft, contact, pressure, gap), 0.75e-3_dp, 1.0e-9_dp, 'gap of a cell in contact')
-      call check_close(edge_error(none, soft, contact, pressure, gap - 3.0e-6_dp), 3.0_dp*0.75_dp, 1.0e-3_dp, &
-         'overlap of cells in contact')
+      ! The pressures press the cells in by 4 um in all.
+      call check_close(edge_error(none, soft, contact, pressure, gap), 0.25e-3_dp, 1.0e-9_dp, 'gap of a cell in contact')
+      call check_close(edge_error(none, soft, contact, pressure, gap - 3.0e-6_dp), 2.5_dp, 1.0e-3_dp, &
+         'overlap of all cells')
       contact(1, 1) = 0_int8
-      call check_close(edge_error(none, soft, contact, pressure, gap), 3.0_dp*0.75_dp, 1.0e-9_dp, &
+      call check_close(edge_error(none, soft, contact, pressure, gap), 0.75_dp + 0.25e-3_dp, 1.0e-9_dp, &
          'pressure of an open cell')
    end subroutine edge_cells_are_judged_one_by_one
 

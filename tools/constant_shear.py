@@ -36,13 +36,14 @@ for each partly sheared cell, the column of one of its three states are positive
 fewer, else 3000 random ones). Then the solution with partly sheared cells is the only one there,
 and the plain law has none there.
 
-usage: python tools/constant_shear.py [--count 500] [--seed 7741] [--only SEED] [--thorough]
-       [--scheme exponential] [--program asperity]
+usage: python tools/constant_shear.py [--count 500] [--seed 7741] [--only SEED] [--cells 640]
+       [--thorough] [--scheme exponential] [--program asperity]
 """
 
 import argparse
 import copy
 import itertools
+import math
 import re
 import subprocess
 import sys
@@ -68,11 +69,19 @@ def fields(snapshot: h5py.Group) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return p, np.array([x, y]), np.where(contact > 0, 0.0, np.maximum(gap, 1e-30))
 
 
+def grid_cells(text: str) -> int:
+    """Return the number of cells of a case."""
+    return math.prod(int(n) for n in re.findall(r"\bn[xy] = (\d+)", text))
+
+
 def run_case(seed: int, folder: Path, program: str, scheme: str = "exponential2",
-             ) -> tuple[str, int]:
-    """Run a case of the campaign with a snapshot of each row; return its text and status."""
+             cells: int = 10**9) -> tuple[str, int]:
+    """Run a case of the campaign with a snapshot of each row; return its text and status.
+
+    The status is -1, and nothing is run, if the law is another one or the grid has more cells.
+    """
     text, about = make_case(seed, folder)
-    if about["law"] != "constant_shear":
+    if about["law"] != "constant_shear" or grid_cells(text) > cells:
         return text, -1
     text = text.replace("file = 'out.h5'", "file = 'out.h5', snapshot_every = 1")
     text = text.replace("threads = 1,", f"threads = 1, time_scheme = '{scheme}',")
@@ -195,11 +204,12 @@ def unique(step: DenseStep, found: tuple) -> float:
     return float(np.mean(np.array(signs) > 0))
 
 
-def examine(seed: int, program: str, thorough: bool = False, scheme: str = "exponential2") -> str:
-    """Return the line of the table of a case, or nothing if it has another law."""
+def examine(seed: int, program: str, thorough: bool = False, scheme: str = "exponential2",
+            cells: int = 10**9) -> str:
+    """Return the line of the table of a case; nothing if it is not one to be examined."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        text, status = run_case(seed, folder, program, scheme)
+        text, status = run_case(seed, folder, program, scheme, cells)
         if status == -1:
             return ""
         if "prony" in text and scheme == "exponential2":
@@ -244,6 +254,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=7741)
     parser.add_argument("--program", default="asperity")
     parser.add_argument("--only", type=int, help="examine the case of one seed")
+    parser.add_argument("--cells", type=int, default=10**9, help="largest number of cells")
     parser.add_argument("--scheme", choices=("exponential2", "exponential"),
                         default="exponential2", help="time scheme of both")
     parser.add_argument("--thorough", action="store_true", help="start in all ways")
@@ -254,7 +265,7 @@ def main() -> int:
           "| partial | shares | plain solution "
           "| states | broken | cut | failed | unique | time |\n" + 17 * "| --- " + "|")
     for seed in seeds:
-        line = examine(seed, given.program, given.thorough, given.scheme)
+        line = examine(seed, given.program, given.thorough, given.scheme, given.cells)
         if line:
             print(line, flush=True)
     return 0

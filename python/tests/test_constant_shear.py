@@ -36,18 +36,16 @@ def test_settled_rows(program, tmp_path, seed, allowed):
 
 
 # When the passes did not look at single cells, cells with a gap carried the whole strength (first
-# case: differences of 1e-3), and cells at the edge overlapped with the road (second case: 3e-2). In
-# the third case, a free patch with adhesion, the rim of the map is attracted.
-@pytest.mark.parametrize("seed", [774100294, 774100290, 774100124])
+# case, differences of 1e-3), and cells at the edge overlapped with the road (second case, 4e-5). The
+# third case was right before, too: on a free patch with adhesion, the rim of the map is attracted.
+@pytest.mark.parametrize("seed", [774100294, 774100367, 774100124])
 def test_cells_at_the_edge(program, tmp_path, seed):
     """Every row agrees with the dense step where cells at the edge of the contact decide."""
-    text, status = run_case(seed, tmp_path, program)
+    text, status = run_case(seed, tmp_path, program, scheme="exponential")
     assert status == 0
-    if "prony" in text:
-        run_starts(text, tmp_path, program)
     end = replay(tmp_path, text, settled=True)
     assert end["rows"] == 15
-    assert end["before"] < 1e-4
+    assert end["before"] < 3e-5
 
 
 def test_step_without_plain_solution(program, tmp_path):

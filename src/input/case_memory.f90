@@ -2,9 +2,10 @@
 !>
 !> Parts of the program whose memory depends on how a run goes are taken as they were measured
 !> (`tools/bench/memory.py` compares all of it with the peak of runs, which differs by less than a tenth):
-!> the acceleration of passes, which keeps more steps where passes are many, of steady sliding, and the joint
-!> step of constant shear on slopes. Not counted: a dense system of few cells in contact (module
-!> `steady_active`, at most 20 fields for as long as it is solved).
+!> the acceleration of passes, which keeps more steps where passes are many, and of steady sliding. Not
+!> counted: a dense system of few cells in contact (module `steady_active`, at most 20 fields for as long as
+!> it is solved), and steps that are solved all at once where their passes stall (module `joint_step`, 30
+!> fields and up to 180 for the cells in contact; it gives up where there is no memory for them).
 module case_memory
    use asperity_precision, only : dp
    use asperity_schedule, only : count_rows
@@ -92,8 +93,6 @@ contains
       ! The arms before a row that is taken in parts (module row_stop), of both directions: 6 + 3 arms,
       ! but the passes remember most in other rows.
       if (in_time .and. arms > 0) fields = fields + min(6.0_dp + 3.0_dp*arms, 20.0_dp)
-      ! Steps whose passes stall are solved at once (module joint_step); as measured with a tenth in contact.
-      if (in_time .and. case%friction%law == 'constant_shear' .and. case%friction%slope_effect) fields = fields + 65.0_dp
    end function friction_fields
 
 end module case_memory

@@ -66,11 +66,6 @@ module coupled_passes
    !> Accuracy of the pass that proves a joint solution, in tolerances.
    real(dp), parameter :: proof = 1.0e-3_dp
 
-   !> The error of a single cell may be larger than the tolerance by this factor. With constant shear a cell
-   !> with hardly any pressure carries as much as any other, so that means weighted by the pressure do not see
-   !> whether it obeys the law.
-   real(dp), parameter :: looser = 100.0_dp
-
    !> Slopes in the contact count as at least this part of the rms slope of the map.
    real(dp), parameter :: least_slope = 0.1_dp
 
@@ -259,8 +254,9 @@ contains
 
    !> What remains of the coupling: by how much the road at U_T differs from the road solved on. The
    !> larger of two means that are weighted by the pressure: the difference of the heights over the
-   !> rms height of the map, and that of the slopes over the slopes in the contact. With constant shear also
-   !> a part of the error of any cell, `edge_error`.
+   !> rms height of the map, and that of the slopes over the slopes in the contact. With constant shear a cell
+   !> with hardly any pressure carries as much as any other, and these means do not see whether it obeys the
+   !> law: there the mean error of the cells at the edge counts as well, `edge_error`.
    function mismatch(contact, plan) result(residual)
       class(contact_type), intent(inout) :: contact
       type(planned_row_type), intent(in) :: plan
@@ -287,6 +283,7 @@ contains
       sums = row_totals(rows)
       edges = 0.0_dp
       if (contact%tangential%law%law == law_constant_shear) then
+         ! From here on `height` holds the gap over the road at U_T.
          !$omp parallel do default(none) shared(contact, height) private(j)
          do j = 1, contact%grid%rows()
             height(:, j) = contact%state%gap(:, j) + contact%height(:, j) - height(:, j)
@@ -297,7 +294,7 @@ contains
       call contact%work%take_back(height)
       call contact%work%take_back(slope_x)
       call contact%work%take_back(slope_y)
-      residual = edges/looser
+      residual = edges
       if (.not. sums(1) > 0.0_dp) return
       residual = max(residual, sums(2)/max(contact%rms_height*sums(1), tiny(1.0_dp)), &
          sums(3)/max(sums(4), least_slope*contact%rms_slope*sums(1), tiny(1.0_dp)))

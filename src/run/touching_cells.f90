@@ -3,7 +3,7 @@ module touching_cells
    use adhesion_potential, only : adhesion_potential_type, adhesive_slope
    use asperity_precision, only : dp, int8
    use contact_rule, only : touches
-   use field_sums, only : largest_of_rows, row_totals
+   use field_sums, only : row_totals
    implicit none
    private
 
@@ -42,9 +42,10 @@ contains
       end do
    end subroutine mark_contact
 
-   !> By how much a contact breaks its conditions in any cell, over the length by which the mean pressure of
-   !> the contact presses a cell in: the gap of cells that carry friction, and the pressure of the wall and the
-   !> overlap with the road of the others. Collective where processes share the rows.
+   !> By how much the cells break the conditions of contact, in sum and over the sum of the lengths by which
+   !> their pressures press them in. The error of a cell that carries friction is its gap; that of any other cell
+   !> is its overlap with the road or the length for its pressure of the wall. 0 where there is no such length:
+   !> without any pressure, and on a grid of one cell. Collective where processes share the rows.
    function edge_error(potential, soft, contact, pressure, gap) result(error)
       type(adhesion_potential_type), intent(in) :: potential
       real(dp), intent(in) :: soft                    !! displacement of a cell under its own unit traction, m/Pa
@@ -56,17 +57,16 @@ contains
       real(dp) :: sums(2), wall(size(gap, 1))
       integer :: j
 
-      allocate (rows(3, size(gap, 2)))
+      allocate (rows(2, size(gap, 2)))
       !$omp parallel do default(none) shared(potential, soft, contact, pressure, gap, rows) private(j, wall)
       do j = 1, size(gap, 2)
          wall(:) = pressure(:, j) + adhesive_slope(potential, max(gap(:, j), 0.0_dp))
          rows(1, j) = sum(abs(pressure(:, j)))
-         rows(2, j) = count(pressure(:, j) > 0.0_dp)
-         rows(3, j) = maxval(merge(max(soft*abs(wall), -gap(:, j)), abs(gap(:, j)), contact(:, j) == 0_int8))
+         rows(2, j) = sum(merge(max(soft*abs(wall), -gap(:, j)), abs(gap(:, j)), contact(:, j) == 0_int8))
       end do
-      sums = row_totals(rows(:2, :))
-      error = largest_of_rows(rows(3, :))
-      if (sums(1) > 0.0_dp) error = error*max(sums(2), 1.0_dp)/(soft*sums(1))
+      sums = row_totals(rows)
+      error = 0.0_dp
+      if (soft*sums(1) > 0.0_dp) error = sums(2)/(soft*sums(1))
    end function edge_error
 
    !> The horizontal force of the road on the rubber that T does not hold, over the area of a cell: without

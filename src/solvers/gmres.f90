@@ -95,10 +95,11 @@ contains
       real(dp), intent(in) :: length
       integer :: status
 
-      status = 0
-      if (.not. allocated(self%basis(n)%cells)) allocate (self%basis(n)%cells(3, size(v%cells, 2)), stat=status)
-      self%short_of_memory = any_process(status /= 0)
-      if (self%short_of_memory) return
+      if (.not. allocated(self%basis(n)%cells)) then
+         allocate (self%basis(n)%cells(3, size(v%cells, 2)), stat=status)
+         self%short_of_memory = any_process(status /= 0)
+         if (self%short_of_memory) return
+      end if
       self%basis(n)%cells(:, :) = real(v%cells/length, sp)
       self%basis(n)%beside = v%beside/length
    end subroutine keep
@@ -165,11 +166,11 @@ contains
    !> The x with the least |b - A x|.
    subroutine solution(self, x)
       class(gmres_type), intent(in) :: self
-      type(cell_vector_type), intent(inout) :: x
+      type(cell_vector_type), intent(inout) :: x    !! its values are not read
       real(dp) :: y(self%used)
       integer :: k
 
-      x%cells = 0.0_dp*x%cells
+      x%cells(:, :) = 0.0_dp
       x%beside = 0.0_dp
       do k = self%used, 1, -1
          y(k) = 0.0_dp

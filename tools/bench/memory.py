@@ -32,6 +32,7 @@ ADHESION = "&adhesion potential = '{}', energy = 0.05, range = 2e-8 /"
 EXPONENTIAL = ADHESION.format("exponential")
 MAUGIS = ADHESION.format("maugis_dugdale")
 FRICTION = "&friction law = 'coulomb', coefficient = 0.3 /"
+SHEAR = "&friction law = 'constant_shear', shear_strength = 3e5 /"
 BOTH = FRICTION + "\n" + EXPONENTIAL
 
 # name: surface, material, laws, phases, boundary, solver
@@ -61,6 +62,7 @@ CASES = {
     "friction, free": (SPHERE, ARMS, FRICTION, TOUCH, "free", ""),
     "friction, thesis": (ROUGH, BLOCK, FRICTION, REST, "periodic", "method = 'thesis'"),
     "friction, adhesive": (ROUGH, BLOCK, BOTH, REST, "periodic", ""),
+    "friction, constant shear": (ROUGH, BLOCK, SHEAR, REST, "periodic", ""),
     "steady": (ROUGH, BLOCK, "", STEADY, "periodic", ""),
     "steady, friction": (ROUGH, BLOCK, FRICTION, STEADY, "periodic", ""),
     "steady, elastic, friction": (ROUGH, ELASTIC, FRICTION, STEADY, "periodic", ""),
