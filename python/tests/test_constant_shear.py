@@ -36,8 +36,8 @@ def test_settled_rows(program, tmp_path, seed, allowed):
 
 
 # When the passes did not look at single cells, cells with a gap carried the whole strength (first
-# case, differences of 1e-3), and cells at the edge overlapped with the road (second case, 4e-5). The
-# third case was right before, too: on a free patch with adhesion, the rim of the map is attracted.
+# case, differences of 1e-3), and cells at the edge overlapped with the road (second case, 4e-5).
+# The third case was right before, too: on a free patch with adhesion, the rim is attracted.
 @pytest.mark.parametrize("seed", [774100294, 774100367, 774100124])
 def test_cells_at_the_edge(program, tmp_path, seed):
     """Every row agrees with the dense step where cells at the edge of the contact decide."""
