@@ -17,5 +17,6 @@ ASPERITY_CHECK=$PWD/$(fpm test --profile release --runner echo 2>/dev/null | gre
 export ASPERITY_CHECK
 
 . tools/install_editable.sh
-python -m pytest -q || status=1
+# Two tests at a time, which halves the time; most tests use one thread.
+python -m pytest -q -n 2 --dist worksteal || status=1
 exit $status
