@@ -290,7 +290,7 @@ contains
       if (found%normal%converged .and. .not. found%rubbing%converged) then
          self%reason = 'friction: '//trim(found%rubbing%reason)
          self%residual = found%rubbing%residual
-         if (self%tangential%slides_off) self%reason = pull_outcome(plan, self%tangential)
+         if (self%tangential%road%slides_off) self%reason = pull_outcome(plan, self%tangential)
       end if
       if (found%passes > 0) call look_at_passes(self, plan, found)
    end subroutine judge

@@ -2,7 +2,7 @@
 !> it has been found.
 !>
 !> The tangential solver finds how far the road has moved in a row (modules `friction_pull`,
-!> `tangential_step`). Until then the row is computed with a guess, the motion of the last step. The
+!> `road_pull`). Until then the row is computed with a guess, the motion of the last step. The
 !> guess changes no result beyond the tolerance: heights are read at U_T - D, which the tangential
 !> solver returns without the guess.
 module pulled_road
@@ -106,7 +106,7 @@ contains
       character(:), allocatable :: reason
 
       reason = 'the road is pulled by '//to_text(norm2(merge(plan%pull, 0.0_dp, plan%pulled)))// &
-         ' Pa over the cell, and the friction holds at most '//to_text(norm2(tangential%held))// &
+         ' Pa over the cell, and the friction holds at most '//to_text(norm2(tangential%road%held))// &
          ' Pa: nothing is in balance. A block with density would move on'
    end function pull_outcome
 

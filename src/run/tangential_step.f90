@@ -22,6 +22,7 @@ module tangential_step
    use friction_law, only : friction_law_type, law_constant_shear, new_friction_law
    use asperity_precision, only : dp, int8
    use regular_grid, only : boundary_periodic, grid_type
+   use road_pull, only : road_pull_type
    use rubber_kernels, only : tangential_kernel
    use solver_result, only : solver_result_type
    use touching_cells, only : force_beside, mark_contact
@@ -42,10 +43,8 @@ module tangential_step
       real(dp) :: tolerance = 1e-6_dp                 !! of the next solve
       real(dp), allocatable :: trial(:, :, :)         !! U_T at the end of the step, m [nx, 2, rows]
       real(dp), allocatable :: slip(:, :, :)          !! of the step, m
-      logical :: pulled(2) = .false.                  !! the road hangs on a force along x, y
-      real(dp) :: pull(2) = 0.0_dp                    !! that force, over the cell, Pa
-      logical :: slides_off = .false.                 !! that force is more than the friction can hold
-      real(dp) :: held(2) = 0.0_dp                    !! the most that the friction can hold, Pa
+      logical :: pulled(2) = .false.                  !! the road is pulled by a force along x, y
+      type(road_pull_type) :: road                    !! that force, and the motion that follows from it
       !> The share of its bound that each cell may carry, in place of the rule of contact [nx, rows];
       !> not allocated: not given.
       real(dp), allocatable :: share(:, :)
@@ -54,9 +53,6 @@ module tangential_step
       real(dp), allocatable, private :: drive(:, :, :)    !! DX'
       real(dp), allocatable, private :: past(:, :, :)     !! T_h
       real(dp), private :: motion(2) = 0.0_dp             !! D' - D of the step in hand, m; a guess where pulled
-      real(dp), private :: found(2) = 0.0_dp              !! D' - D as found by the last solve, m
-      real(dp), private :: mass_place(2) = 0.0_dp         !! of a pulled mass, in the units of DX'
-      real(dp), private :: mass_yields = 0.0_dp           !! displacement of a pulled mass per T - F
       real(dp), private :: dt = 0.0_dp
       real(dp), private :: q = 0.0_dp
       real(dp), private :: past_mean(2) = 0.0_dp
@@ -120,10 +116,9 @@ contains
       self%dt = dt
       self%q = material%q
       self%pulled = pulled
-      self%pull = pull
-      self%found = motion
+      self%solver%pull%along = pulled
       self%solver%near = .false.
-      self%slides_off = .false.
+      call self%road%begin(pull, motion, self%q)
       if (allocated(self%share)) deallocate (self%share)
       state%moved = state%moved .or. any(abs(motion) > 0.0_dp) .or. any(pulled .and. abs(pull) > 0.0_dp)
       if (.not. state%moved) return
@@ -153,72 +148,38 @@ contains
          end do
       end do
       call set_thickness(self, height)
-      if (any(pulled) .and. state%block%mass > 0.0_dp) call place_mass(self, state)
+      if (any(pulled) .and. state%block%mass > 0.0_dp) then
+         call self%road%place_mass(state%block, means(self, state%displacement), dt)
+         do c = 1, 2
+            if (pulled(c)) call self%operator%symbols%set_mean_mode(c, 0.0_dp)
+         end do
+      end if
    end subroutine begin
 
-   !> A pulled mass: the rubber carries the pull F from its top to the mass, which T brakes. Means:
-   !>
-   !>    U' = h (F + T_h)/Q,   T - F = f' = R (U' - (D' - D))/h - k
-   !>
-   !> with the force f' on the mass, its resistance R and what is known of it, k, by module
-   !> `block_motion`. So Q (D' - D) - Q U' = -Q h/R (k + T - F): a spring for the solver, whose operator
-   !> needs no mean mode. In no time the mass does not move.
-   subroutine place_mass(self, state)
-      type(tangential_step_type), intent(inout) :: self
-      type(tangential_state_type), intent(in) :: state
-      integer :: c
-
-      if (state%block%inert(self%dt)) then
-         self%mass_yields = self%q*state%block%height/state%block%resistance(self%dt)
-         self%mass_place = -self%mass_yields &
-            *state%block%known(means(self, state%displacement), [0.0_dp, 0.0_dp], self%dt)
-      else
-         self%mass_yields = tiny(1.0_dp)
-         self%mass_place = -self%q*means(self, state%displacement)
-      end if
-      do c = 1, 2
-         if (self%pulled(c)) call self%operator%symbols%set_mean_mode(c, 0.0_dp)
-      end do
-   end subroutine place_mass
-
-   !> Set the mean of T that the solver must reach where the road is pulled. The pull minus this mean acts on
-   !> the slopes of the road without friction: on all slopes if `slope_effect` is off, otherwise on the slopes
-   !> outside the contact, which attraction pulls at.
+   !> Tell the solver how the road is pulled. The pull minus the mean of T acts on the slopes of the road without
+   !> friction: on all slopes if `slope_effect` is off, otherwise on the slopes outside the contact, which
+   !> attraction pulls at.
    subroutine hang_road(self, state, pressure, slope_x, slope_y)
       type(tangential_step_type), intent(inout) :: self
       type(tangential_state_type), intent(in) :: state
       real(dp), intent(in) :: pressure(:, :), slope_x(:, :), slope_y(:, :)
+      real(dp) :: beside(2)
 
-      associate (pull => self%solver%pull)
-         pull%along = self%pulled
-         if (.not. any(self%pulled)) return
-         pull%traction = self%pull
-         if (self%adhesive .or. .not. self%law%slope) pull%traction = self%pull &
-            - force_beside(state%contact, self%law%slope, pressure, slope_x, slope_y)/self%grid%cells()
-         if (state%block%mass > 0.0_dp) then
-            pull%offset = self%mass_place
-            pull%yielding = self%mass_yields
-         else
-            pull%offset = self%q*self%found
-            pull%yielding = 0.0_dp
-         end if
-      end associate
+      if (.not. any(self%pulled)) return
+      beside = 0.0_dp
+      if (self%adhesive .or. .not. self%law%slope) &
+         beside = force_beside(state%contact, self%law%slope, pressure, slope_x, slope_y)/self%grid%cells()
+      call self%road%hang(self%solver%pull, state%block, beside)
    end subroutine hang_road
 
-   !> Compute the motion of the pulled road from the offset that the solver has found.
+   !> Compute the motion of the pulled road from what the solver has found.
    subroutine find_motion(self, state)
       type(tangential_step_type), intent(inout) :: self
       type(tangential_state_type), intent(in) :: state
 
       if (.not. any(self%pulled)) return
-      associate (pull => self%solver%pull)
-         if (state%block%mass > 0.0_dp) pull%offset = pull%offset + &
-            state%block%height*(pull%traction + self%past_mean)
-         self%found = merge(pull%offset/self%q, self%motion, self%pulled)
-         self%slides_off = pull%slides_off
-         if (self%slides_off) self%held = merge(means(self, state%traction) + self%pull - pull%traction, 0.0_dp, &
-            self%pulled)
-      end associate
+      call self%road%find_motion(self%solver%pull, state%block, self%past_mean)
+      if (self%road%slides_off) call self%road%find_held(self%solver%pull, means(self, state%traction))
    end subroutine find_motion
 
    !> After the step is solved, add the motion of the pulled road to the displacements, which were computed
@@ -228,15 +189,15 @@ contains
       real(dp), intent(out) :: motion(2)              !! of the road in the step, m
       integer :: c, j
 
-      motion = self%found
+      motion = self%road%motion
       do c = 1, 2
          if (.not. self%pulled(c)) cycle
-         !$omp parallel do default(none) shared(self, c) private(j)
+         !$omp parallel do default(none) shared(self, c, motion) private(j)
          do j = 1, self%grid%rows()
-            self%trial(:, c, j) = self%trial(:, c, j) + (self%found(c) - self%motion(c))
+            self%trial(:, c, j) = self%trial(:, c, j) + (motion(c) - self%motion(c))
          end do
       end do
-      self%motion = self%found
+      self%motion = motion
    end subroutine take_motion
 
    !> Extrapolate the traction: the step starts as if the change of the last step continued. To be called
