@@ -15,6 +15,7 @@ module case_input
    use asperity_precision, only : dp
    use process_agreement, only : agree
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
+   use shear_laws, only : law_uses, law_variables
    use surface_warnings, only : find_warnings, warning_length
    use asperity_text_file, only : read_text_file
    use text_tools, only : to_text
@@ -118,14 +119,17 @@ contains
       type(group_values_type), intent(in) :: groups(:)
       type(case_type), intent(inout) :: case
       type(group_values_type) :: group
+      character(:), allocatable :: variable
+      integer :: i
 
       call pick(groups, 'friction', group)
-      if (case%friction%law == 'coulomb' .and. group%given('shear_strength')) call add_warning(case, &
-         '&friction: shear_strength = '//to_text(case%friction%shear_strength)// &
-         ' has no effect: law = ''coulomb'' does not use it')
-      if (case%friction%law == 'constant_shear' .and. group%given('coefficient')) call add_warning(case, &
-         '&friction: coefficient = '//to_text(case%friction%coefficient)// &
-         ' has no effect: law = ''constant_shear'' does not use it')
+      do i = 1, size(law_variables)
+         variable = trim(law_variables(i))
+         if (case%friction%law /= 'none' .and. group%given(variable) .and. &
+            .not. law_uses(case%friction%law, variable)) call add_warning(case, '&friction: '//variable//' = '// &
+            to_text(group%real_value(variable))//' has no effect: law = '''//trim(case%friction%law)// &
+            ''' does not use it')
+      end do
       call pick(groups, 'material', group)
       if (group%given('temperature') .and. .not. group%given('wlf_c1')) then
          if (abs(group%real_value('temperature') - group%real_value('reference_temperature')) > 0.0_dp) &
@@ -269,6 +273,8 @@ contains
       type(group_values_type), intent(in) :: group
       type(case_type), intent(inout) :: case
       type(faults_type), intent(inout) :: faults
+      logical :: given
+      integer :: i
 
       case%friction%law = group%text_value('law')
       case%friction%coefficient = group%real_value('coefficient')
@@ -276,19 +282,13 @@ contains
       case%friction%slope_effect = group%logical_value('slope_effect')
       if (case%friction%law == '') case%friction%law = 'none'
       if (group%bad('law')) return
-      select case (case%friction%law)
-      case ('coulomb')
-         call group%demand('coefficient', faults, 'coulomb')
-      case ('constant_shear')
-         call group%demand('shear_strength', faults, 'constant_shear')
-      case ('coulomb_orowan')
-         call group%demand('coefficient', faults, 'coulomb_orowan')
-         call group%demand('shear_strength', faults, 'coulomb_orowan')
-      case default
-         if (.not. group%given('law') .and. (group%given('coefficient') .or. &
-            group%given('shear_strength') .or. group%given('slope_effect'))) &
-            call group%fault('law', 'is missing', faults)
-      end select
+      given = group%given('slope_effect')
+      do i = 1, size(law_variables)
+         if (law_uses(case%friction%law, law_variables(i))) &
+            call group%demand(trim(law_variables(i)), faults, trim(case%friction%law))
+         given = given .or. group%given(trim(law_variables(i)))
+      end do
+      if (given .and. .not. group%given('law')) call group%fault('law', 'is missing', faults)
    end subroutine resolve_friction
 
    !> `&solver`

@@ -8,6 +8,7 @@ module case_report
    use memory_limits, only : memory_limit, memory_text
    use asperity_precision, only : dp
    use regular_grid, only : boundary_free
+   use shear_laws, only : law_uses
    use surface_settings, only : real_variable, surface_settings_type
    use surface_shapes, only : find_shape, shape_type
    use text_tools, only : exact_text, to_text
@@ -146,9 +147,9 @@ contains
       if (case%adhesion%potential /= 'none') text = text//number('energy', case%adhesion%energy, 'J/m2')// &
          number('range', case%adhesion%range, 'm')//string('start', case%adhesion%start)
       text = text//'/'//nl//'&friction'//nl//string('law', case%friction%law)
-      if (index(case%friction%law, 'coulomb') > 0) &
+      if (law_uses(case%friction%law, 'coefficient')) &
          text = text//number('coefficient', case%friction%coefficient, '')
-      if (any(case%friction%law == [character(14) :: 'constant_shear', 'coulomb_orowan'])) &
+      if (law_uses(case%friction%law, 'shear_strength')) &
          text = text//number('shear_strength', case%friction%shear_strength, 'Pa')
       if (case%friction%law /= 'none') text = text//truth('slope_effect', case%friction%slope_effect)
       text = text//'/'//nl

@@ -2,6 +2,7 @@
 !> values and meaning. The reader checks against it, templates take their comments from it, and the
 !> documentation prints it.
 module input_reference
+   use shear_laws, only : shear_law_words
    use surface_shapes, only : all_shapes, shape_type, shape_words
    implicit none
    private
@@ -191,7 +192,7 @@ contains
          row('adhesion', 'start', kind_word, '''non_adhesive''', '', '''non_adhesive'' | ''full_contact''', &
             'State from which the first solve starts. Adhesion has hysteresis, so it affects the result.'), &
          row('friction', 'law', kind_word, '''none''', '', &
-            '''none'' | ''coulomb'' | ''constant_shear'' | ''coulomb_orowan''', &
+            shear_law_words, &
             'Bound of the tangential traction: coefficient times pressure, shear_strength, or the lower of '// &
             'the two.'), &
          row('friction', 'coefficient', kind_real, '(required)', '', 'not negative', &

@@ -1,7 +1,7 @@
-!> The friction laws: the bound of the tangential traction, at one point.
+!> The bound of the tangential traction at one point: a law of friction on the slope of the road.
 !>
-!> Coulomb, constant shear stress and Coulomb-Orowan (thesis, section 3.1.2), on the true local
-!> slope of the road (thesis, section 3.1.3) and with the pressure that adhesion adds (thesis,
+!> A law (module `shear_law`: Coulomb, constant shear stress, Coulomb-Orowan and others) acts on the true
+!> local slope of the road (thesis, section 3.1.3) and with the pressure that adhesion adds (thesis,
 !> appendix B).
 !>
 !> Rubber lies above, the road H pushes up into it. With the unit normal N = (-H_x, -H_y, 1) N_z and
@@ -27,14 +27,12 @@
 !> r parallel to D.
 module friction_law
    use asperity_precision, only : dp, int8
+   use shear_law, only : shear_law_type
+   use shear_laws, only : choose_shear_law
    implicit none
    private
 
    public :: friction_law_type, new_friction_law
-
-   integer, parameter, public :: law_coulomb = 1            !! |T| <= mu P
-   integer, parameter, public :: law_constant_shear = 2     !! |T| <= sigma_max
-   integer, parameter, public :: law_coulomb_orowan = 3     !! the smaller of the two
 
    integer(int8), parameter, public :: contact_open = 0_int8     !! no contact
    integer(int8), parameter, public :: contact_stick = 1_int8
@@ -42,11 +40,9 @@ module friction_law
 
    real(dp), parameter, public :: unbounded = huge(1.0_dp)       !! s of a ray that meets no bound
 
-   !> A friction law with its constants.
+   !> A friction law on a slope.
    type :: friction_law_type
-      integer :: law = law_coulomb
-      real(dp) :: coefficient = 0.0_dp           !! mu; not used by constant shear
-      real(dp) :: shear_strength = 0.0_dp        !! sigma_max, Pa; not used by Coulomb
+      class(shear_law_type), allocatable :: shear     !! the bound under a pressure
       real(dp) :: adhesive_pressure = 0.0_dp     !! p_a = e'(0), Pa; 0 without adhesion
       logical :: slope = .false.                 !! the slope of the road counts
       logical :: physical_slip = .true.          !! direction of slip: physical, or the thesis's
@@ -57,6 +53,8 @@ module friction_law
       procedure :: bound_row
       procedure :: reach_coefficient
       procedure :: strength_beside
+      procedure :: bare_strength
+      procedure :: jumps_at_edge
       procedure :: return_to_bound
       procedure :: place_on_bound
       procedure :: slip_along_slope
@@ -65,9 +63,9 @@ module friction_law
 contains
 
    !> Make a law from its name and constants.
-   pure function new_friction_law(name, coefficient, shear_strength, adhesive_pressure, slope, &
+   function new_friction_law(name, coefficient, shear_strength, adhesive_pressure, slope, &
       physical_slip) result(self)
-      character(*), intent(in) :: name             !! 'coulomb', 'constant_shear' or 'coulomb_orowan'
+      character(*), intent(in) :: name             !! see module `shear_laws`
       real(dp), intent(in) :: coefficient          !! mu >= 0
       real(dp), intent(in) :: shear_strength       !! sigma_max >= 0, Pa
       real(dp), intent(in) :: adhesive_pressure    !! p_a >= 0, Pa; 0 without adhesion
@@ -75,16 +73,7 @@ contains
       logical, intent(in) :: physical_slip         !! .false.: the thesis's direction of slip
       type(friction_law_type) :: self
 
-      select case (name)
-      case ('constant_shear')
-         self%law = law_constant_shear
-      case ('coulomb_orowan')
-         self%law = law_coulomb_orowan
-      case default
-         self%law = law_coulomb
-      end select
-      self%coefficient = coefficient
-      self%shear_strength = shear_strength
+      call choose_shear_law(name, coefficient, shear_strength, self%shear)
       self%adhesive_pressure = adhesive_pressure
       self%slope = slope
       self%physical_slip = physical_slip
@@ -105,14 +94,17 @@ contains
    end function normal_traction
 
    !> s: T* + s D lies on the bound. Where nothing but T* is allowed, D = 0 has s = 1.
-   pure function bound_ratio(self, p, slope, d) result(s)
+   pure function bound_ratio(self, p, slope, d, share) result(s)
       class(friction_law_type), intent(in) :: self
       real(dp), intent(in) :: p             !! pressure, Pa
       real(dp), intent(in) :: slope(2)      !! H_x, H_y; not looked at without slope
       real(dp), intent(in) :: d(2)          !! D = T - T*, Pa
+      real(dp), intent(in), optional :: share(2)     !! of the bound, see module `shear_law`; 1 if absent
       real(dp) :: s                         !! >= 0; `unbounded` where the ray meets no bound
-      real(dp) :: root, nd, m, reach
+      real(dp) :: root, nd, m, force, part(2)
 
+      part = 1.0_dp
+      if (present(share)) part = share
       if (self%slope) then
          root = sqrt(1.0_dp + slope(1)**2 + slope(2)**2)       ! 1/N_z
          nd = -(slope(1)*d(1) + slope(2)*d(2))/root
@@ -122,12 +114,9 @@ contains
          nd = 0.0_dp
          m = sqrt(d(1)**2 + d(2)**2)
       end if
-      s = unbounded
-      if (self%law /= law_constant_shear) then
-         reach = m - self%coefficient*nd
-         s = ratio(self%coefficient*max(p*root + self%adhesive_pressure/root, 0.0_dp), reach)
-      end if
-      if (self%law /= law_coulomb) s = min(s, ratio(self%shear_strength, m))
+      force = self%shear%force(max(p*root + self%adhesive_pressure/root, 0.0_dp), part)
+      s = ratio(force, m - self%shear%coefficient*part(1)*nd)
+      if (self%shear%strength_beside >= 0.0_dp) s = min(s, ratio(self%shear%strength_beside*part(2), m))
    end function bound_ratio
 
    !> The bound of a row of cells for loops that must not branch: s = F/(m - mu n.D), or the smaller of
@@ -139,16 +128,15 @@ contains
       real(dp), intent(in) :: p(n)             !! pressure, Pa
       real(dp), intent(in) :: hx(n), hy(n)     !! H_x, H_y; 0 without slope
       real(dp), intent(out) :: bound(n, 2)     !! F, Pa, and N_z
-      real(dp) :: root, force
+      real(dp) :: root
       integer :: i
 
       do i = 1, n
          root = sqrt(1.0_dp + hx(i)**2 + hy(i)**2)
          bound(i, 2) = 1.0_dp/root
-         force = self%coefficient*max(p(i)*root + self%adhesive_pressure*bound(i, 2), 0.0_dp)
-         if (self%law == law_constant_shear) force = self%shear_strength
-         bound(i, 1) = force
+         bound(i, 1) = max(p(i)*root + self%adhesive_pressure*bound(i, 2), 0.0_dp)
       end do
+      call self%shear%forces(n, bound(:, 1))
    end subroutine bound_row
 
    !> mu in the reach m - mu n.D of the force F of `bound_row`.
@@ -156,8 +144,7 @@ contains
       class(friction_law_type), intent(in) :: self
       real(dp) :: mu
 
-      mu = self%coefficient
-      if (self%law == law_constant_shear) mu = 0.0_dp
+      mu = self%shear%coefficient
    end function reach_coefficient
 
    !> The strength that counts beside the force F of `bound_row`, Pa; negative: none.
@@ -165,9 +152,24 @@ contains
       class(friction_law_type), intent(in) :: self
       real(dp) :: strength
 
-      strength = -1.0_dp
-      if (self%law == law_coulomb_orowan) strength = self%shear_strength
+      strength = self%shear%strength_beside
    end function strength_beside
+
+   !> The bound without pressure, Pa.
+   pure function bare_strength(self) result(strength)
+      class(friction_law_type), intent(in) :: self
+      real(dp) :: strength
+
+      strength = self%shear%bare_strength
+   end function bare_strength
+
+   !> Does the traction jump where the contact ends, because it needs contact but no pressure?
+   pure function jumps_at_edge(self) result(yes)
+      class(friction_law_type), intent(in) :: self
+      logical :: yes
+
+      yes = self%shear%bare_strength > 0.0_dp
+   end function jumps_at_edge
 
    !> force/reach; 1 where both vanish, unbounded where only the reach does or it is negative.
    pure function ratio(force, reach) result(s)
@@ -213,12 +215,10 @@ contains
       if (m <= 0.0_dp) return
       dm = (dot_product(d, v) - dot_product(n, d)*dot_product(n, v))/m
       ddm = (dot_product(v, v) - dot_product(n, v)**2 - dm**2)/m
-      mu = self%coefficient
-      force = mu*max(p/nz + self%adhesive_pressure*nz, 0.0_dp)
-      if (self%law == law_constant_shear) then
-         mu = 0.0_dp
-      else if (self%law == law_coulomb_orowan) then
-         if (ratio(self%shear_strength, m) < ratio(force, m - mu*dot_product(n, d))) mu = 0.0_dp
+      mu = self%shear%coefficient
+      if (self%shear%strength_beside >= 0.0_dp) then
+         force = self%shear%force(max(p/nz + self%adhesive_pressure*nz, 0.0_dp), [1.0_dp, 1.0_dp])
+         if (ratio(self%shear%strength_beside, m) < ratio(force, m - mu*dot_product(n, d))) mu = 0.0_dp
       end if
       reach = m - mu*dot_product(n, d)
       change = dm - mu*dot_product(n, v)
@@ -241,25 +241,26 @@ contains
    end subroutine return_to_bound
 
    !> Put a traction on the bound along D if its s is below a limit.
-   pure subroutine place_on_bound(self, p, slope, limit, t, s)
+   pure subroutine place_on_bound(self, p, slope, limit, t, s, share)
       class(friction_law_type), intent(in) :: self
       real(dp), intent(in) :: p
       real(dp), intent(in) :: slope(2)
       real(dp), intent(in) :: limit         !! of s; 1: only from outside
       real(dp), intent(inout) :: t(2)       !! Pa
       real(dp), intent(out) :: s            !! before
+      real(dp), intent(in), optional :: share(2)     !! of the bound, see module `shear_law`; 1 if absent
       real(dp) :: d(2)
 
       if (self%slope) then
          d(1) = t(1) + p*slope(1)
          d(2) = t(2) + p*slope(2)
-         s = bound_ratio(self, p, slope, d)
+         s = bound_ratio(self, p, slope, d, share)
          if (s < limit) then
             t(1) = s*d(1) - p*slope(1)
             t(2) = s*d(2) - p*slope(2)
          end if
       else
-         s = bound_ratio(self, p, slope, t)
+         s = bound_ratio(self, p, slope, t, share)
          if (s < limit) then
             t(1) = s*t(1)
             t(2) = s*t(2)

@@ -44,7 +44,6 @@ module coupled_passes
    use contact_model, only : contact_mean, contact_type, solve_normal
    use asperity_interpolation, only : displaced
    use field_sums, only : row_totals
-   use friction_law, only : law_constant_shear
    use joint_step, only : joint_step_type
    use pass_control, only : pass_control_type
    use asperity_precision, only : dp
@@ -117,7 +116,7 @@ contains
       unlike = plan%instantaneous .or. plan%new_speed
       call predict(self, contact, plan%dt, motion, goes_on=.not. unlike)
       call control%start(tolerance, merge(1.0_dp, contact%state%first_mismatch, unlike))
-      control%jumps = contact%tangential%law%law == law_constant_shear
+      control%jumps = contact%tangential%law%jumps_at_edge()
       if (.not. plan%instantaneous) &
          call contact%tangential%extrapolate(contact%state%tangential, .not. plan%new_speed)
 
@@ -282,7 +281,7 @@ contains
       end do
       sums = row_totals(rows)
       edges = 0.0_dp
-      if (contact%tangential%law%law == law_constant_shear) then
+      if (contact%tangential%law%jumps_at_edge()) then
          ! From here on `height` holds the gap over the road at U_T.
          !$omp parallel do default(none) shared(contact, height) private(j)
          do j = 1, contact%grid%rows()

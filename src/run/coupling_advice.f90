@@ -1,7 +1,6 @@
 !> What to do where the passes of a row did not settle.
 module coupling_advice
    use contact_model, only : contact_type
-   use friction_law, only : law_constant_shear
    use field_sums, only : row_totals
    use asperity_precision, only : dp
    use text_tools, only : to_text
@@ -23,7 +22,7 @@ contains
       real(dp) :: jammed
 
       jammed = jammed_part(self)
-      if (self%tangential%law%law == law_constant_shear) then
+      if (self%tangential%law%jumps_at_edge()) then
          advice = 'With constant shear the traction jumps where the contact ends; solving the step all at '// &
             'once did not help, though without adhesion it has a solution; law = ''coulomb_orowan'', whose '// &
             'strength grows from zero with the pressure, usually settles with a coefficient of up to about 1'
@@ -49,7 +48,7 @@ contains
       integer :: j
 
       part = 0.0_dp
-      mu = self%tangential%law%coefficient
+      mu = self%tangential%law%reach_coefficient()
       if (.not. self%tangential%law%slope) return
       allocate (rows(2, self%grid%rows()))
       do j = 1, self%grid%rows()

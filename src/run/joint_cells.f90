@@ -13,7 +13,7 @@
 module joint_cells
    use adhesion_potential, only : adhesion_potential_type, adhesive_slope
    use asperity_precision, only : dp
-   use friction_law, only : friction_law_type, law_constant_shear
+   use friction_law, only : friction_law_type
    implicit none
    private
 
@@ -48,9 +48,9 @@ contains
       real(dp), intent(in) :: slope_x, slope_y
       logical :: yes
 
-      yes = self%law%law == law_constant_shear
+      yes = self%law%jumps_at_edge()
       if (.not. self%law%slope) return
-      yes = yes .or. self%attraction > 0.0_dp .or. self%law%coefficient*hypot(slope_x, slope_y) > 1.0_dp
+      yes = yes .or. self%attraction > 0.0_dp .or. self%law%reach_coefficient()*hypot(slope_x, slope_y) > 1.0_dp
    end function has_jump
 
    !> s of a cell in contact or open.
@@ -104,16 +104,13 @@ contains
       real(dp), intent(in) :: slip(2)               !! m
       real(dp), intent(in) :: t(2)                  !! Pa
       real(dp) :: left(2)
-      type(friction_law_type) :: law
       real(dp) :: wanted(2), s
 
       left = t
       if (.not. share > 0.0_dp) return
       wanted = t + self%law%slip_along_slope(slope, slip)/self%soft_along
-      if (self%law%law == law_constant_shear) then
-         law = self%law
-         law%shear_strength = share*law%shear_strength
-         call law%place_on_bound(share*pressure, slope, 1.0_dp, wanted, s)
+      if (self%law%jumps_at_edge()) then
+         call self%law%place_on_bound(share*pressure, slope, 1.0_dp, wanted, s, [1.0_dp, share])
          left = t - wanted
       else
          call self%law%place_on_bound(pressure, slope, 1.0_dp, wanted, s)
@@ -129,12 +126,11 @@ contains
       real(dp), intent(in) :: slope(2)
       real(dp), intent(in) :: t(2)                  !! Pa
       logical :: yes
-      type(friction_law_type) :: law
       real(dp), parameter :: nearly = 1.0_dp + 1.0e-6_dp
 
-      law = self%law
-      law%shear_strength = share*law%shear_strength
-      yes = law%bound_ratio(share*pressure, slope, t - law%normal_traction(share*pressure, slope)) < nearly
+      associate (p => share*pressure)
+         yes = self%law%bound_ratio(p, slope, t - self%law%normal_traction(p, slope), [1.0_dp, share]) < nearly
+      end associate
    end function slips
 
 end module joint_cells

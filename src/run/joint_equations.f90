@@ -19,7 +19,6 @@ module joint_equations
    use contact_model, only : contact_type
    use fft_conv, only : columns_apply, convolution_type, new_convolution
    use field_sums, only : field_count, field_sum, largest_of_rows, row_totals
-   use friction_law, only : law_constant_shear
    use joint_cells, only : cell_rules_type
    use regular_grid, only : boundary_periodic, grid_type
    use rubber_kernels, only : normal_kernel
@@ -135,10 +134,10 @@ contains
          self%unit_pressure = max(field_sum(abs(state%pressure)), tiny(1.0_dp))/contact%grid%cells()
          self%unit_traction = self%unit_pressure*contact%grid%cells()/self%root**2
          self%unit_length = rules%soft*self%unit_traction
-         if (rules%law%law == law_constant_shear) self%unit_traction = max(self%unit_traction, rules%law%shear_strength)
+         self%unit_traction = max(self%unit_traction, rules%law%bare_strength())
          slope = max(contact%rms_slope, least_slope)
          rules%width = rules%soft_along*slope*self%unit_traction
-         if (rules%law%law == law_constant_shear) rules%width = rules%soft_along*slope*rules%law%shear_strength
+         if (rules%law%jumps_at_edge()) rules%width = rules%soft_along*slope*rules%law%bare_strength()
          self%width(:, :) = merge(rules%width, 0.0_dp, rules%has_jump(contact%slope_x, contact%slope_y))
          begun%s(:, :) = rules%number_of(self%width, touching, state%pressure, state%gap)
          do c = 1, 2

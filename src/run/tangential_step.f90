@@ -19,7 +19,7 @@ module tangential_step
    use fft_conv, only : columns_apply, convolution_type, new_convolution
    use friction_cg, only : friction_fast, friction_fields_type, friction_solver_type, friction_thesis, &
       new_friction_solver
-   use friction_law, only : friction_law_type, law_constant_shear, new_friction_law
+   use friction_law, only : friction_law_type, new_friction_law
    use asperity_precision, only : dp, int8
    use regular_grid, only : boundary_periodic, grid_type
    use road_pull, only : road_pull_type
@@ -261,7 +261,7 @@ contains
          fields%pressure => weighed
          fields%share => self%share
       else
-         call mark_contact(self%adhesive, merge(self%cell_compliance(), 0.0_dp, self%law%law == law_constant_shear), &
+         call mark_contact(self%adhesive, merge(self%cell_compliance(), 0.0_dp, self%law%jumps_at_edge()), &
             pressure, gap, state%contact)
       end if
       call hang_road(self, state, pressure, slope_x, slope_y)

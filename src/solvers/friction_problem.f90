@@ -152,14 +152,11 @@ contains
       real(dp), intent(in) :: limit                !! of s
       real(dp), intent(inout) :: t(2)              !! Pa
       real(dp), intent(out) :: s                   !! s of the traction that was given
-      type(friction_law_type) :: law
+      real(dp) :: share(2)
 
-      law = self%law
-      if (associated(self%share)) then
-         law%coefficient = law%coefficient*self%share(i, j)
-         law%shear_strength = law%shear_strength*self%share(i, j)
-      end if
-      call law%place_on_bound(self%pressure(i, j), self%slope_at(i, j), limit, t, s)
+      share = 1.0_dp
+      if (associated(self%share)) share = self%share(i, j)
+      call self%law%place_on_bound(self%pressure(i, j), self%slope_at(i, j), limit, t, s, share)
    end subroutine place_on_bound
 
    !> grad H at a point, 0 where the slope does not count.

@@ -13,7 +13,7 @@
 !>
 !> With the thesis's direction of slip r is parallel to D, and D is w - T* shortened to the bound.
 module steady_bound
-   use friction_law, only : friction_law_type, law_constant_shear
+   use friction_law, only : friction_law_type
    use asperity_precision, only : dp
    use field_sums, only : threads_for
    implicit none
@@ -31,7 +31,7 @@ contains
       real(dp), intent(in) :: c                        !! c_t, Pa
       real(dp), intent(in) :: pressure(:, :)           !! [nx, rows], Pa
       real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)
-      !> [nx, 2, rows] traction over the pressure; over the strength where the law is a constant shear
+      !> [nx, 2, rows] traction over the pressure; over the strength where the traction jumps at the edge
       real(dp), intent(in) :: start(:, :, :)
       real(dp), intent(in) :: slip(:, :, :)            !! r, [nx, 2, rows]
       real(dp), intent(inout) :: traction(:, :, :)     !! [nx, 2, rows], Pa
@@ -61,7 +61,7 @@ contains
       real(dp) :: unit                                 !! Pa
 
       unit = pressure
-      if (law%law == law_constant_shear) unit = law%shear_strength
+      if (law%jumps_at_edge()) unit = law%bare_strength()
    end function unit_of
 
    !> The ratio T/unit of every cell; where there is no pressure the ratio stays as it is.
@@ -151,8 +151,7 @@ contains
       real(dp), intent(in) :: pressure                 !! in the contact, Pa
       real(dp) :: force
 
-      force = law%coefficient*pressure
-      if (law%law == law_constant_shear) force = law%shear_strength
+      force = law%reach_coefficient()*pressure + law%bare_strength()
    end function largest_force
 
 end module steady_bound

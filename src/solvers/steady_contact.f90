@@ -3,7 +3,7 @@ module steady_contact
    use asperity_interpolation, only : displaced, interpolation_type
    use asperity_precision, only : dp
    use field_sums, only : field_count, row_totals
-   use friction_law, only : friction_law_type, law_constant_shear
+   use friction_law, only : friction_law_type
    use solver_result, only : solver_result_type
    implicit none
    private
@@ -71,10 +71,10 @@ contains
       type(solver_result_type), intent(inout) :: normal, rubbing
 
       if (normal%converged .and. rubbing%converged) return
-      if (law%law == law_constant_shear) then
+      if (law%jumps_at_edge()) then
          normal%reason = 'cells at the rim come and go; law = ''coulomb_orowan'' avoids this'
       else if (law%slope) then
-         if (field_count(contact%pressure > 0.0_dp .and. law%coefficient*hypot(contact%slope_x, &
+         if (field_count(contact%pressure > 0.0_dp .and. law%reach_coefficient()*hypot(contact%slope_x, &
             contact%slope_y) >= 1.0_dp) > 0.0_dp) &
             normal%reason = 'the road wedges: slopes in contact exceed 1/coefficient'
       end if

@@ -23,7 +23,7 @@
 module steady_friction
    use anderson, only : anderson_type, new_anderson
    use field_sums, only : field_count, field_mean, field_sum, row_total, row_totals
-   use friction_law, only : friction_law_type, law_constant_shear
+   use friction_law, only : friction_law_type
    use asperity_interpolation, only : displaced, interpolation_type
    use normal_state, only : gap_measure_type, measure_gap, normal_problem_type, prepare_problem, &
       reason_converged, reason_iterations
@@ -144,7 +144,7 @@ contains
 
       call self%memory%forget()
       do c = 1, 2
-         self%ratio(:, c, :) = merge(1.0_dp, self%law%coefficient, self%law%law == law_constant_shear) &
+         self%ratio(:, c, :) = merge(1.0_dp, self%law%reach_coefficient(), self%law%jumps_at_edge()) &
             *self%direction(c)
       end do
       if (task%warm) then
