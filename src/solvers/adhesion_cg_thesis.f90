@@ -198,49 +198,45 @@ contains
 
    !> r.(Q B + e'') d, the numerator of eq. 2.28.
    function coupling(self, now) result(total)
-      type(adhesion_thesis_type), intent(inout) :: self
+      type(adhesion_thesis_type), intent(in) :: self
       type(adhesion_contact_type), intent(in) :: now
       real(dp) :: total
-      real(dp), allocatable :: rows(:)
-      real(dp) :: s1, e, e1, e2
-      integer :: i, j
+      real(dp) :: rows(self%patch%rows)
+      integer :: j
 
-      allocate (rows(self%patch%rows))
-      !$omp parallel do default(none) shared(self, now, rows) private(i, j, s1, e, e1, e2) &
-      !$omp num_threads(self%patch%threads)
+      !$omp parallel do default(none) shared(self, now, rows) private(j) num_threads(self%patch%threads)
       do j = 1, self%patch%rows
-         s1 = 0.0_dp
-         do i = 1, self%patch%nx
-            call adhesive_terms(now%problem%potential, now%state(i, j), e, e1, e2)
-            s1 = s1 + self%residual(i, j)*(self%product(i, j) + e2*self%direction(i, j))
-         end do
-         rows(j) = s1
+         rows(j) = sum(self%residual(:, j)*(self%product(:, j) + curvatures(now, j)*self%direction(:, j)))
       end do
       total = row_total(rows)
    end function coupling
 
    !> d.e'' d (eq. 2.27).
    function adhesive_part(self, now) result(total)
-      type(adhesion_thesis_type), intent(inout) :: self
+      type(adhesion_thesis_type), intent(in) :: self
       type(adhesion_contact_type), intent(in) :: now
       real(dp) :: total
-      real(dp), allocatable :: rows(:)
-      real(dp) :: s1, e, e1, e2
-      integer :: i, j
+      real(dp) :: rows(self%patch%rows)
+      integer :: j
 
-      allocate (rows(self%patch%rows))
-      !$omp parallel do default(none) shared(self, now, rows) private(i, j, s1, e, e1, e2) &
-      !$omp num_threads(self%patch%threads)
+      !$omp parallel do default(none) shared(self, now, rows) private(j) num_threads(self%patch%threads)
       do j = 1, self%patch%rows
-         s1 = 0.0_dp
-         do i = 1, self%patch%nx
-            call adhesive_terms(now%problem%potential, now%state(i, j), e, e1, e2)
-            s1 = s1 + e2*self%direction(i, j)**2
-         end do
-         rows(j) = s1
+         rows(j) = sum(curvatures(now, j)*self%direction(:, j)**2)
       end do
       total = row_total(rows)
    end function adhesive_part
+
+   !> e'' in a row of cells, Pa/m.
+   pure function curvatures(now, j) result(row)
+      type(adhesion_contact_type), intent(in) :: now
+      integer, intent(in) :: j                         !! the row
+      real(dp) :: row(size(now%state, 1)), e, e1
+      integer :: i
+
+      do i = 1, size(row)
+         call adhesive_terms(now%problem%potential, now%state(i, j), e, e1, row(i))
+      end do
+   end function curvatures
 
    !> d = r + beta d outside the contact, of zero sum where the level is prescribed; r.d.
    subroutine new_direction(self, now, beta, rd)
