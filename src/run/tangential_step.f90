@@ -83,7 +83,6 @@ contains
       self%adhesive = case%adhesion%potential /= 'none'
       call new_adhesion_potential(potential, trim(case%adhesion%potential), case%adhesion%energy, &
          case%adhesion%range, error)
-      if (allocated(error)) return
       self%law = new_friction_law(trim(case%friction%law), case%friction%coefficient, &
          case%friction%shear_strength, adhesive_slope(potential, 0.0_dp), case%friction%slope_effect, &
          case%solver%slip_law == 'physical')

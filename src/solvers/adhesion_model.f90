@@ -96,7 +96,6 @@ contains
       allocate (self%rows(self%mx, self%fine_halo%own + self%fine_halo%foreign), &
          self%field(self%mx, self%coarse_halo%own + self%coarse_halo%foreign))
       call new_symbol_operator(self%inverse, shape_of_rows(self%mx, self%sharing, 1), error)
-      if (allocated(error)) return
       call new_symbol_operator(self%missing, shape_of_rows(self%mx, self%sharing, 1), error)
       if (allocated(error)) return
       call set_low_symbols(self, symbols, error)

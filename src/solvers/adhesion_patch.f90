@@ -110,7 +110,6 @@ contains
       self%my = merge(1, 2, self%periodic)*grid%ny
       call share_unknowns(self, grid)
       if (.not. self%periodic) call new_convolution(self%operator, grid, kernel, error)
-      if (allocated(error)) return
       call new_symbol_operator(self%stiffness, shape_of_rows(self%mx, self%sharing, 1), error)
       if (allocated(error)) return
       call new_adhesion_symbols(symbols, grid, kernel, self%mx, self%my)

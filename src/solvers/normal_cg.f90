@@ -111,7 +111,6 @@ contains
       self%grid = grid
       if (present(mixed)) self%mixed = mixed
       call new_convolution(self%operator, grid, kernel, error, lean=self%mixed)
-      if (allocated(error)) return
       if (self%mixed) call new_convolution(self%quick, grid, kernel, error, single=.true., &
          memory=self%operator%spectrum_memory())
       if (allocated(error)) return

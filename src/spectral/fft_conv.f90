@@ -85,17 +85,15 @@ contains
       type(convolution_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
       type(kernel_type), intent(in) :: kernel      !! what the solid is
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
       logical, intent(in), optional :: single      !! work in single precision
       type(c_ptr), intent(in), optional :: memory  !! of an operator that is never in use meanwhile
       logical, intent(in), optional :: lean        !! no table of the symbol, where that is possible
       type(row_sharing_type), intent(in), optional :: sharing   !! of the rows; absent: that of the grid
       logical :: tabulated
 
-      if (grid%boundary /= boundary_periodic .and. .not. associated(kernel%cell)) then
+      if (.not. allocated(error) .and. grid%boundary /= boundary_periodic .and. .not. associated(kernel%cell)) &
          call fail(error, error_input, 'this solid is for periodic boundaries only')
-         return
-      end if
       call plan(self, shape_on_grid(grid, kernel%components, sharing), error, single, memory)
       if (allocated(error)) return
       self%grid = grid
@@ -116,7 +114,7 @@ contains
       type(convolution_type), intent(out) :: self
       type(grid_type), intent(in) :: grid          !! periodic
       type(kernel_type), intent(in) :: kernel      !! what the solid is
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
 
       call plan(self, shape_on_grid(grid, kernel%components), error)
       if (allocated(error)) return
@@ -135,7 +133,7 @@ contains
       type(convolution_type), intent(out) :: self
       integer, intent(in) :: nx, ny
       real(dp), intent(in) :: symbol(0:, 0:)      !! (0:nx/2, 0:ny/2)
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
       logical, intent(in), optional :: single      !! work in single precision
 
       call new_shared_symbol_operator(self, whole_shape(nx, ny, 1), error, single)
@@ -146,7 +144,7 @@ contains
    subroutine new_shared_symbol_operator(self, shape, error, single)
       type(convolution_type), intent(out) :: self
       type(transform_shape_type), intent(in) :: shape
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
       logical, intent(in), optional :: single      !! work in single precision
 
       call plan(self, shape, error, single)
@@ -174,10 +172,11 @@ contains
    subroutine plan(self, shape, error, single, memory)
       type(convolution_type), intent(inout) :: self
       type(transform_shape_type), intent(in) :: shape
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
       logical, intent(in), optional :: single
       type(c_ptr), intent(in), optional :: memory
 
+      if (allocated(error)) return
       self%nx = shape%nx
       self%ny = shape%ny
       self%rows = shape%rows()
