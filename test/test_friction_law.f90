@@ -18,6 +18,7 @@ contains
       call begin_suite('friction_law')
       if (selected('bounds_without_slope')) call bounds_without_slope()
       if (selected('returned_traction_lies_on_the_cone')) call returned_traction_lies_on_the_cone()
+      if (selected('table_of_bounds')) call table_of_bounds()
       if (selected('friction_uphill_and_downhill')) call friction_uphill_and_downhill()
       if (selected('slip_is_along_the_force_on_the_slope')) &
          call slip_is_along_the_force_on_the_slope()
@@ -107,6 +108,30 @@ contains
       end do
       call check_order(hits, '>', 1000, 'most rays meet the bound')
    end subroutine returned_traction_lies_on_the_cone
+
+   !> A table: on its lines and beyond both kinds of ends, the same for a cell and a row.
+   subroutine table_of_bounds()
+      type(friction_law_type) :: law
+      real(dp), parameter :: pressures(5) = [0.0_dp, 0.5_dp, 1.0_dp, 2.5_dp, 9.0_dp]
+      real(dp), parameter :: rising(5) = [0.2_dp, 1.1_dp, 2.0_dp, 2.75_dp, 6.0_dp]
+      real(dp), parameter :: falling(5) = [0.0_dp, 1.0_dp, 2.0_dp, 1.25_dp, 1.0_dp]
+      real(dp), parameter :: none(2) = 0.0_dp
+      real(dp) :: up(3, 2), down(3, 2)
+      integer :: k
+
+      up = reshape([0.0_dp, 1.0_dp, 4.0_dp, 0.2_dp, 2.0_dp, 3.5_dp], [3, 2])
+      down = reshape([0.0_dp, 1.0_dp, 3.0_dp, 0.0_dp, 2.0_dp, 1.0_dp], [3, 2])
+      do k = 1, 5
+         law = new_friction_law('table', 0.0_dp, 0.0_dp, 0.0_dp, .false., .true., up)
+         call check_close(law%bound_ratio(pressures(k), none, [0.6_dp, 0.8_dp]), rising(k), 1e-14_dp, 'rising table')
+         call check_close(row_ratio(law, pressures(k), none, [0.6_dp, 0.8_dp]), rising(k), 1e-14_dp, 'row')
+         call check_close(law%bound_ratio(pressures(k), none, [0.0_dp, 1.0_dp], [1.0_dp, 0.5_dp]), &
+            0.5_dp*rising(k), 1e-14_dp, 'half a cell')
+         law = new_friction_law('table', 0.0_dp, 0.0_dp, 0.0_dp, .false., .true., down)
+         call check_close(law%bound_ratio(pressures(k), none, [1.0_dp, 0.0_dp]), falling(k), 1e-14_dp, 'falling table')
+      end do
+      call check_order(merge(1, 0, law%jumps_at_edge()), '<', 1, 'no jump without a bare strength')
+   end subroutine table_of_bounds
 
    !> `bound_ratio` from what the loops over rows have: F and N_z of a cell, mu, and a strength beside.
    function row_ratio(law, p, slope, d) result(s)

@@ -42,6 +42,7 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, TypedDict, TypeVar, ove
 from numpy.typing import NDArray
 
 from .groups import Group, Groups
+from .sampled_law import Law
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -85,6 +86,8 @@ def types(variable: namelists.Variable) -> tuple[str, str]:
         given = SETTABLE.get(variable.kind, read)
     if variable.name == "file":
         given = "Path"
+    if variable.name == "law":
+        given += " | Law"
     derived = variable.default.startswith("(") and not variable.is_required
     return f"{read} | None" if derived else read, given
 

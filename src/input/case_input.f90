@@ -1,6 +1,7 @@
 !> Reads a case: a file of namelists becomes checked settings, or one error with all its faults.
 module case_input
    use adhesion_advice, only : adhesion_warning
+   use case_friction, only : resolve_friction, unused_variable
    use case_files, only : default_result, overwritten_file
    use case_material, only : resolve_material
    use case_phases, only : resolve_phases
@@ -15,7 +16,7 @@ module case_input
    use asperity_precision, only : dp
    use process_agreement, only : agree
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
-   use shear_laws, only : law_uses, law_variables
+   use shear_laws, only : law_variables
    use surface_warnings, only : find_warnings, warning_length
    use asperity_text_file, only : read_text_file
    use text_tools, only : to_text
@@ -80,7 +81,7 @@ contains
       call pick(groups, 'adhesion', group)
       call resolve_adhesion(group, case, faults)
       call pick(groups, 'friction', group)
-      call resolve_friction(group, case, faults)
+      call resolve_friction(group, case%friction, faults)
       call pick(groups, 'adhesion', group)
       call resolve_phases(pack_phases(groups), case%grid, case%material, &
          case%adhesion%potential /= 'none' .or. group%bad('potential'), case%phases, faults, case%warnings)
@@ -119,16 +120,11 @@ contains
       type(group_values_type), intent(in) :: groups(:)
       type(case_type), intent(inout) :: case
       type(group_values_type) :: group
-      character(:), allocatable :: variable
       integer :: i
 
       call pick(groups, 'friction', group)
       do i = 1, size(law_variables)
-         variable = trim(law_variables(i))
-         if (case%friction%law /= 'none' .and. group%given(variable) .and. &
-            .not. law_uses(case%friction%law, variable)) call add_warning(case, '&friction: '//variable//' = '// &
-            to_text(group%real_value(variable))//' has no effect: law = '''//trim(case%friction%law)// &
-            ''' does not use it')
+         call add_warning(case, unused_variable(group, trim(case%friction%law), trim(law_variables(i))))
       end do
       call pick(groups, 'material', group)
       if (group%given('temperature') .and. .not. group%given('wlf_c1')) then
@@ -267,29 +263,6 @@ contains
          call group%fault('potential', 'is missing', faults)
       end if
    end subroutine resolve_adhesion
-
-   !> `&friction`
-   subroutine resolve_friction(group, case, faults)
-      type(group_values_type), intent(in) :: group
-      type(case_type), intent(inout) :: case
-      type(faults_type), intent(inout) :: faults
-      logical :: given
-      integer :: i
-
-      case%friction%law = group%text_value('law')
-      case%friction%coefficient = group%real_value('coefficient')
-      case%friction%shear_strength = group%real_value('shear_strength')
-      case%friction%slope_effect = group%logical_value('slope_effect')
-      if (case%friction%law == '') case%friction%law = 'none'
-      if (group%bad('law')) return
-      given = group%given('slope_effect')
-      do i = 1, size(law_variables)
-         if (law_uses(case%friction%law, law_variables(i))) &
-            call group%demand(trim(law_variables(i)), faults, trim(case%friction%law))
-         given = given .or. group%given(trim(law_variables(i)))
-      end do
-      if (given .and. .not. group%given('law')) call group%fault('law', 'is missing', faults)
-   end subroutine resolve_friction
 
    !> `&solver`
    subroutine resolve_solver(group, case, faults)

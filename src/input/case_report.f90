@@ -151,6 +151,9 @@ contains
          text = text//number('coefficient', case%friction%coefficient, '')
       if (law_uses(case%friction%law, 'shear_strength')) &
          text = text//number('shear_strength', case%friction%shear_strength, 'Pa')
+      if (allocated(case%friction%table)) text = text// &
+         list('table_pressure', case%friction%table(:, 1), 'Pa')// &
+         list('table_strength', case%friction%table(:, 2), 'Pa')
       if (case%friction%law /= 'none') text = text//truth('slope_effect', case%friction%slope_effect)
       text = text//'/'//nl
    end function laws_text

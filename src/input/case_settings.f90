@@ -36,10 +36,11 @@ module case_settings
 
    !> `&friction`
    type :: friction_settings_type
-      character(word_length) :: law                 !! 'none' | 'coulomb' | 'constant_shear' | 'coulomb_orowan'
+      character(word_length) :: law                 !! 'none' | 'coulomb' | 'constant_shear' | 'coulomb_orowan' | 'table'
       real(dp) :: coefficient
       real(dp) :: shear_strength                    !! Pa
       logical :: slope_effect
+      real(dp), allocatable :: table(:, :)          !! [n, 2] pressures and bounds, Pa, of law = 'table'
    end type friction_settings_type
 
    !> `&phase`, resolved: nothing is left to be inherited or derived.

@@ -193,12 +193,16 @@ contains
             'State from which the first solve starts. Adhesion has hysteresis, so it affects the result.'), &
          row('friction', 'law', kind_word, '''none''', '', &
             shear_law_words, &
-            'Bound of the tangential traction: coefficient times pressure, shear_strength, or the lower of '// &
-            'the two.'), &
+            'Bound of the tangential traction: coefficient times pressure, shear_strength, the lower of '// &
+            'the two, or a table.'), &
          row('friction', 'coefficient', kind_real, '(required)', '', 'not negative', &
             'Coulomb friction coefficient of the interface.'), &
          row('friction', 'shear_strength', kind_real, '(required)', 'Pa', 'positive', &
             'Shear strength of the interface.'), &
+         row('friction', 'table_pressure', kind_reals, '(required)', 'Pa', 'not negative', &
+            'Pressures of the points of a table, which begin at 0 and rise; straight lines join the points.'), &
+         row('friction', 'table_strength', kind_reals, '(required)', 'Pa', 'not negative', &
+            'Bounds of the traction at these pressures.'), &
          row('friction', 'slope_effect', kind_logical, '.true.', '', 'any', &
             'Apply the friction law on the true local slope of the road.')]
    end function interface_laws

@@ -64,16 +64,17 @@ contains
 
    !> Make a law from its name and constants.
    function new_friction_law(name, coefficient, shear_strength, adhesive_pressure, slope, &
-      physical_slip) result(self)
+      physical_slip, table) result(self)
       character(*), intent(in) :: name             !! see module `shear_laws`
       real(dp), intent(in) :: coefficient          !! mu >= 0
       real(dp), intent(in) :: shear_strength       !! sigma_max >= 0, Pa
       real(dp), intent(in) :: adhesive_pressure    !! p_a >= 0, Pa; 0 without adhesion
       logical, intent(in) :: slope                 !! count the slope of the road
       logical, intent(in) :: physical_slip         !! .false.: the thesis's direction of slip
+      real(dp), intent(in), optional :: table(:, :)     !! [n, 2] pressures and bounds, Pa, of 'table'
       type(friction_law_type) :: self
 
-      call choose_shear_law(name, coefficient, shear_strength, self%shear)
+      call choose_shear_law(name, coefficient, shear_strength, self%shear, table)
       self%adhesive_pressure = adhesive_pressure
       self%slope = slope
       self%physical_slip = physical_slip

@@ -5,6 +5,7 @@ module shear_laws
    use coulomb_law, only : new_coulomb_law
    use coulomb_orowan_law, only : new_coulomb_orowan_law
    use shear_law, only : shear_law_type
+   use table_law, only : new_table_law
    implicit none
    private
 
@@ -12,24 +13,28 @@ module shear_laws
 
    !> The words that the variable `law` may be.
    character(*), parameter, public :: shear_law_words = &
-      '''none'' | ''coulomb'' | ''constant_shear'' | ''coulomb_orowan'''
+      '''none'' | ''coulomb'' | ''constant_shear'' | ''coulomb_orowan'' | ''table'''
    !> The variables of the group &friction that some law needs.
-   character(*), parameter, public :: law_variables(2) = [character(14) :: 'coefficient', 'shear_strength']
+   character(*), parameter, public :: law_variables(4) = [character(14) :: 'coefficient', 'shear_strength', &
+      'table_pressure', 'table_strength']
 
 contains
 
    !> Make a law from its name and constants.
-   subroutine choose_shear_law(name, coefficient, strength, law)
+   subroutine choose_shear_law(name, coefficient, strength, law, table)
       character(*), intent(in) :: name             !! one of the words; without friction that of Coulomb
       real(dp), intent(in) :: coefficient          !! mu >= 0
       real(dp), intent(in) :: strength             !! sigma_max >= 0, Pa
       class(shear_law_type), allocatable, intent(out) :: law
+      real(dp), intent(in), optional :: table(:, :)     !! [n, 2] pressures and bounds, Pa, of 'table'
 
       select case (name)
       case ('constant_shear')
          allocate (law, source=new_constant_shear_law(strength))
       case ('coulomb_orowan')
          allocate (law, source=new_coulomb_orowan_law(coefficient, strength))
+      case ('table')
+         allocate (law, source=new_table_law(table))
       case default
          allocate (law, source=new_coulomb_law(coefficient))
       end select

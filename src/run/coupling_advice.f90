@@ -23,7 +23,7 @@ contains
 
       jammed = jammed_part(self)
       if (self%tangential%law%jumps_at_edge()) then
-         advice = 'With constant shear the traction jumps where the contact ends; solving the step all at '// &
+         advice = 'With this law the traction jumps where the contact ends; solving the step all at '// &
             'once did not help, though without adhesion it has a solution; law = ''coulomb_orowan'', whose '// &
             'strength grows from zero with the pressure, usually settles with a coefficient of up to about 1'
       else if (jammed > much) then

@@ -124,7 +124,7 @@ contains
       if (self%frictional) then
          self%law = new_friction_law(trim(case%friction%law), case%friction%coefficient, &
             case%friction%shear_strength, 0.0_dp, case%friction%slope_effect, &
-            case%solver%slip_law == 'physical')
+            case%solver%slip_law == 'physical', case%friction%table)
          call new_steady_friction(self%coupled, self%grid, self%law)
       else
          call new_steady_normal(self%normal, self%grid)

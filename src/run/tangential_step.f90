@@ -85,7 +85,7 @@ contains
          case%adhesion%range, error)
       self%law = new_friction_law(trim(case%friction%law), case%friction%coefficient, &
          case%friction%shear_strength, adhesive_slope(potential, 0.0_dp), case%friction%slope_effect, &
-         case%solver%slip_law == 'physical')
+         case%solver%slip_law == 'physical', case%friction%table)
       call new_convolution(self%operator, self%grid, tangential_kernel(case%material), error)
       if (allocated(error)) return
       self%compliance = self%operator%symbols%self_compliance(with_mean=self%grid%boundary /= boundary_periodic)

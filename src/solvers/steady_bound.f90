@@ -151,7 +151,7 @@ contains
       real(dp), intent(in) :: pressure                 !! in the contact, Pa
       real(dp) :: force
 
-      force = law%reach_coefficient()*pressure + law%bare_strength()
+      force = law%shear%force(pressure, [1.0_dp, 1.0_dp])
    end function largest_force
 
 end module steady_bound

@@ -49,6 +49,9 @@ class Case(CaseGroups):
         SurfaceTopography; the grid then has its cells, and of a topography its lengths, unless
         it is told others. Maps pass through a temporary file; `write` and `run` copy them beside
         the input or the result.
+        The law of the friction may be a function: it takes an array of pressures, Pa, and returns
+        the largest shear tractions, Pa, in an array of the same shape. It becomes a table, for
+        pressures from 0 to 1e11 Pa.
 
     Attributes
     ----------

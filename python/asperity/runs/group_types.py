@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, TypedDict, Ty
 from numpy.typing import NDArray
 
 from .groups import Group, Groups
+from .sampled_law import Law
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -148,9 +149,11 @@ class AdhesionGroup(Group):
 class FrictionGroup(Group):
     """A group ``&friction``."""
 
-    law: Variable[Literal['none', 'coulomb', 'constant_shear', 'coulomb_orowan'], Literal['none', 'coulomb', 'constant_shear', 'coulomb_orowan'] | None]
+    law: Variable[Literal['none', 'coulomb', 'constant_shear', 'coulomb_orowan', 'table'], Literal['none', 'coulomb', 'constant_shear', 'coulomb_orowan', 'table'] | Law | None]
     coefficient: Variable[float, float | None]
     shear_strength: Variable[float, float | None]
+    table_pressure: Variable[list[float], Reals | None]
+    table_strength: Variable[list[float], Reals | None]
     slope_effect: Variable[bool, bool | None]
 
 

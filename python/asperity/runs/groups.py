@@ -12,6 +12,7 @@ from ..base.check import shown
 from ..base.names import UnknownNameError, unknown_name
 from ..roads.held_maps import held_map, is_map
 from . import namelists
+from .sampled_law import Law, sampled_law
 
 __all__ = ["Group", "Groups", "UnknownVariableError", "entry_of"]
 
@@ -104,11 +105,19 @@ class Group(MutableMapping[str, Any]):
         if value is None:
             self._values.pop(name, None)
             return
+        if callable(value) and (self._entry.name, name) == ("friction", "law"):
+            self._take_law(value)
+            return
         try:
             text = namelists.format_value(value)
         except ValueError as error:
             raise ValueError(f"&{self._entry.name}: {name} = {error}") from None
         self._values[name] = self._read(name, text)
+
+    def _take_law(self, function: Law) -> None:
+        """Take a friction law that is a function: its table."""
+        pressures, strengths = sampled_law(function)
+        self.update(law="table", table_pressure=pressures, table_strength=strengths)
 
     def _read(self, name: str, text: str) -> Any:
         """Return a written value as the program reads it."""
