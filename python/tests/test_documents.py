@@ -157,7 +157,7 @@ def check_driving(folder, out):
     assert (folder / "constant_area.png").stat().st_size > 5000
     # What is printed is what the page shows, and the page shows all that is printed.
     outputs = [block.text for block in blocks("docs/driving.md") if block.mark == "output"]
-    assert len(outputs) == 6 and "".join(outputs) == out
+    assert len(outputs) == 7 and "".join(outputs) == out
 
 
 OUTCOMES = {"docs/driving.md": check_driving,

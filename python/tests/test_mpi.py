@@ -56,6 +56,11 @@ CASES = {
     + VISCOELASTIC.replace(" /", ", thickness = 2e-3, density = 1000. /")
     + "&friction law = 'coulomb', coefficient = 0.3 /\n"
     + SLIDING,
+    "friction by a table": ROUGH.format(boundary="periodic")
+    + VISCOELASTIC
+    + "&friction law = 'table', slope_effect = .false.,\n"
+    "   table_pressure = 0., 1e5, 4e5, table_strength = 0., 4e4, 7e4 /\n"
+    + SLIDING,
     "steady": ROUGH.format(boundary="periodic")
     + VISCOELASTIC.replace(" /", ", thickness = 2e-3 /")
     + "&phase steady = .true., pressure = 3e4, velocity_x = 1e-2 /\n",
