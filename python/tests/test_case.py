@@ -6,13 +6,14 @@ import pickle
 import re
 import struct
 import subprocess
+import sys
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 from conftest import ROOT
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import asperity
@@ -97,6 +98,7 @@ def cases(draw):
 
 @settings(max_examples=40)
 @given(cases())
+@example({"material": {"reference_temperature": sys.float_info.max}})
 def test_what_is_written_reads_back_to_the_same_bits(groups):
     case = asperity.Case(**groups)
     again = asperity.Case.read(str(case) + "\n")

@@ -35,7 +35,8 @@ contains
          read (entry%allowed(2:comma - 1), *) low
          if (index(entry%allowed, 'inf') == 0) read (entry%allowed(comma + 1:last - 1), *) high
          low_open = entry%allowed(1:1) == '('
-         high_open = entry%allowed(last:last) == ')'
+         ! The largest number is below infinity: there the open end excludes nothing.
+         high_open = entry%allowed(last:last) == ')' .and. high < huge(1.0_dp)
       end select
    end subroutine value_range
 

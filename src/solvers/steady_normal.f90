@@ -203,9 +203,7 @@ contains
       if (.not. task%warm) then
          call operator%press(height, pressure)
          pressure = pressure + task%target
-      end if
-      call project_simplex(pressure, task%target*self%grid%cells())
-      if (.not. task%warm) then
+         call project_simplex(pressure, task%target*self%grid%cells())
          call operator%displace(pressure, gap)
          gap = gap - height
       end if
@@ -220,6 +218,11 @@ contains
       else where
          self%z = -self%c*max(gap - level, 0.0_dp)
       end where
+      ! The mean of z is that of P at the solution. The load is adjusted here, where open cells know their gap
+      ! and stay open.
+      self%z = self%z + (task%target - field_mean(self%z))
+      pressure(:, :) = self%z
+      call project_simplex(pressure, task%target*self%grid%cells())
    end subroutine start
 
    !> The scale that fits a state: it makes a typical pressure twice as large as c times a typical gap.
