@@ -46,6 +46,24 @@ def curve_of(plan, folder, jobs=1, **options):
     return run_curve(plan, folder, Means(jobs), quiet=True, **options)
 
 
+# ---- the plan ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ratio", [1.2, 30.0, 1000.0])
+@pytest.mark.parametrize("law", [{}, dict(coefficient=0.5),
+                                 dict(coefficient=0.5, slope_effect=True)])
+def test_the_plan_knows_the_number_of_transforms(ratio, law, tmp_path):
+    """Within a factor of 2.5, for a rubber and a road that its figures were not measured on."""
+    arms = 5
+    series = Prony(1e6, [1e6 * (ratio - 1.0) / arms] * arms, np.geomspace(1e-6, 1e-2, arms))
+    road = "self_affine:hurst=0.7,wavelength_long=5e-4,wavelength_short=1.2e-4,rms_slope=0.2"
+    plan = plan_curve(road_of([road], cells=64), Compound(series, 20.0), patches=1,
+                      speeds=np.geomspace(1e-4, 1e2, 13), pressures=[1e5], **law)
+    patch = plan.road.patch(0)
+    run = asperity.run(plan.case(patch, str(patch.save(tmp_path)), 0, 0))
+    assert 0.4 < np.mean(run.history.ffts) / plan.transforms(20.0) < 2.5
+
+
 # ---- statistics ------------------------------------------------------------------------------
 
 
