@@ -32,10 +32,19 @@ contains
       integer, intent(in) :: component
       type(arm_state_type), intent(inout) :: arms
       real(dp), allocatable :: result(:, :)
-      integer :: k, shape_1d(1)
+      complex(dp), allocatable :: modulus(:, :)        !! G* of the modes, Pa: common to all responses
+      integer :: i, j, k, shape_1d(1)
 
       if (size(medium%g) == 0) return
       allocate (result(size(field, 1), size(field, 2)))
+      allocate (modulus(operator%first:operator%last, 0:operator%ny - 1), source=(0.0_dp, 0.0_dp))
+      !$omp parallel do default(none) shared(modulus, medium, operator) private(i, j)
+      do j = 0, operator%ny - 1
+         do i = operator%first, min(operator%last, operator%nx/2)
+            modulus(i, j) = mode_modulus(medium, i, j)
+         end do
+      end do
+
       shape_1d = size(field)
       call respond(whole)
       arms%s(:, component) = reshape(result, shape_1d)
@@ -55,13 +64,12 @@ contains
       subroutine respond(which)
          integer, intent(in) :: which
          complex(dp), allocatable :: table(:, :)
-         integer :: i, j
 
          allocate (table(operator%first:operator%last, 0:operator%ny - 1), source=(0.0_dp, 0.0_dp))
-         !$omp parallel do default(none) shared(table, medium, dt, which, operator) private(i, j)
+         !$omp parallel do default(none) shared(table, modulus, medium, dt, which, operator) private(i, j)
          do j = 0, operator%ny - 1
             do i = operator%first, min(operator%last, operator%nx/2)
-               table(i, j) = response(medium, dt, which, i, j)
+               table(i, j) = response(medium, dt, which, i, j, modulus(i, j))
             end do
          end do
          call operator%apply_table(table, field, result)
@@ -69,14 +77,27 @@ contains
 
    end subroutine remember_field
 
+   !> G* of a mode, at the first of the wave vectors that it stands for.
+   pure function mode_modulus(medium, i, j) result(modulus)
+      type(medium_type), intent(in) :: medium
+      integer, intent(in) :: i, j
+      complex(dp) :: modulus                           !! Pa
+      real(dp) :: waves(2, 4)
+      integer :: count
+
+      call mode_waves(medium%grid, i, j, waves, count)
+      modulus = steady_modulus(medium, dot_product(waves(:, 1), medium%velocity))
+   end function mode_modulus
+
    !> The response of a mode over its traction: the mean over the wave vectors that it stands for.
-   pure function response(medium, dt, which, i, j) result(ratio)
+   pure function response(medium, dt, which, i, j, first_modulus) result(ratio)
       type(medium_type), intent(in) :: medium
       real(dp), intent(in) :: dt
       integer, intent(in) :: which                     !! whole, increment or the number of an arm
       integer, intent(in) :: i, j
+      complex(dp), intent(in) :: first_modulus         !! `mode_modulus`, which is costly with many arms, Pa
       complex(dp) :: ratio
-      complex(dp) :: part
+      complex(dp) :: modulus, part
       real(dp) :: waves(2, 4), rate
       integer :: count, k
 
@@ -84,7 +105,9 @@ contains
       ratio = (0.0_dp, 0.0_dp)
       do k = 1, count
          rate = dot_product(waves(:, k), medium%velocity)
-         part = 1.0_dp/(count*steady_modulus(medium, rate))
+         modulus = first_modulus
+         if (k > 1) modulus = steady_modulus(medium, rate)
+         part = 1.0_dp/(count*modulus)
          if (which == increment) part = part*(1.0_dp - exp(cmplx(0.0_dp, rate*dt, dp)))
          if (which > whole) part = part*medium%g(which)*arm_ratio(-rate*medium%tau(which))
          ratio = ratio + part
@@ -141,7 +164,7 @@ contains
       real(dp), intent(out) :: sums(:)
       complex(dp), intent(in), optional :: p(0:)
       complex(dp), intent(in), optional :: t(0:, :)
-      complex(dp) :: pressure, traction(2), change, arm
+      complex(dp) :: pressure, traction(2), change, arm, modulus
       real(dp) :: form
       integer :: arms, i, k
 
@@ -153,11 +176,12 @@ contains
          if (present(p)) pressure = p(i)
          if (present(t)) traction = t(i, :)
          form = sum(elastic_forms(medium, i, j, pressure, traction))
-         change = response(medium, dt, increment, i, j)
-         sums(1) = sums(1) + form*abs(response(medium, dt, whole, i, j))**2
+         modulus = mode_modulus(medium, i, j)
+         change = response(medium, dt, increment, i, j, modulus)
+         sums(1) = sums(1) + form*abs(response(medium, dt, whole, i, j, modulus))**2
          sums(2) = sums(2) + form*abs(change)**2
          do k = 1, arms
-            arm = response(medium, dt, k, i, j)
+            arm = response(medium, dt, k, i, j, modulus)
             sums(2 + k) = sums(2 + k) + form*abs(arm)**2
             sums(2 + arms + k) = sums(2 + arms + k) + form*real(conjg(arm)*change, dp)
          end do
