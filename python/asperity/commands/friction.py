@@ -83,7 +83,8 @@ def _add_road(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--patches", type=int, default=8, metavar="N",
                         help="number of patches (default: 8)")
     parser.add_argument("--error", type=float, metavar="MU",
-                        help="take more patches until half of the 95 %% interval is below this")
+                        help="take at least 8 patches, and more until half of the 95 %% interval"
+                             " is below this")
     parser.add_argument("--side", type=float, metavar="M", help="length of drawn patches, m")
     parser.add_argument("--short", type=float, metavar="M", help="shortest wave that is kept, m")
     parser.add_argument("--extend", type=float, metavar="M",

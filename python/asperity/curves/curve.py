@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 __all__ = ["friction_curve", "run_curve"]
 
 MOST_PATCHES = 64       # that are taken for the sake of `error`
+# Patches to begin with for the sake of `error`. An interval that is small enough by chance ends the
+# search. With 2 patches to begin with, clearly fewer than 95 % of such intervals cover the mean.
+FIRST_PATCHES = 8
 
 
 def friction_curve(
@@ -100,8 +103,8 @@ def friction_curve(
     tolerance : float
         Of the solver.
     error : float, optional
-        Take more patches until half of the 95 % interval of friction is below this everywhere, at
-        most 64.
+        Take at least 8 patches, and more until half of the 95 % interval of friction is below this
+        everywhere, at most 64.
     seed : int
         Another seed, other patches; the same seed, the same numbers to the last bit.
     folder : str or path
@@ -171,8 +174,8 @@ def run_curve(
     whole("most_patches", most_patches)
     if error is not None:
         positive("error", error)
-        if plan.patches < 2 and (plan.road.count or 2) > 1:
-            plan = replace(plan, patches=2)
+        first = min(FIRST_PATCHES, most_patches, plan.road.count or FIRST_PATCHES)
+        plan = replace(plan, patches=max(plan.patches, first))
     while True:
         curve = gather(plan, run_pieces(plan, Path(folder), means, quiet), extend)
         found = curve.largest_error

@@ -25,9 +25,13 @@ FloatArray = NDArray[np.float64]
 # without friction, for an elastic rubber and 128 cells per side; and the exponent of the ratio of
 # the glassy to the relaxed modulus that multiplies it. Measured on self-affine roads with 64 to 512
 # cells per side and rubbers of 1 to 12 arms with ratios of 1.1 to 1000.
-_TRANSFORMS = {True: (150.0, 0.2), False: (35.0, 0.1)}
+_TRANSFORMS = {True: (130.0, 0.2), False: (50.0, 0.1)}
 _PER_CELLS = 0.4        # exponent of the number of cells per side over 128
-_OTHER_WORK = 1.8       # time of a solve over the time of its transforms
+# Processor time per transform, with all other work on the cells, over that of a real transform by
+# NumPy; and the time to begin a run and to gather it, s; and to begin the command, s.
+_OTHER_WORK = 6.0
+_RUN, _COMMAND = 0.02, 1.5
+_COMMAND_MEMORY = 130e6  # bytes, for the command itself
 
 
 @dataclass(frozen=True)
@@ -129,16 +133,17 @@ class CurvePlan:
         return elastic * moduli ** exponent * (max(nx, ny) / 128) ** _PER_CELLS
 
     def seconds(self) -> float:
-        """Return the estimated time of all solves one after the other on this machine, s."""
+        """Return the estimated processor time of all solves on this machine, s."""
         ny, nx = self.road.patch(0).height.shape
         field_ = np.random.default_rng(1).standard_normal((ny, nx))
         tries = []
-        for _ in range(3):
-            start = time.perf_counter()
+        for _ in range(9):
+            start = time.process_time()
             np.fft.irfft2(np.fft.rfft2(field_), s=field_.shape)
-            tries.append(time.perf_counter() - start)
+            tries.append(time.process_time() - start)
         transforms = np.mean([self.transforms(float(celsius)) for celsius in self.temperature])
-        return 0.5 * min(tries) * float(transforms) * _OTHER_WORK * self.solves
+        solve = 0.5 * float(np.median(tries)) * float(transforms) * _OTHER_WORK
+        return solve * self.solves + _RUN * self.solves / self.speed.size
 
     def memory(self) -> float:
         """Return the memory of one run as `asperity check` estimates it, bytes; NaN if unknown."""
@@ -170,9 +175,9 @@ class CurvePlan:
             f" {self.temperature.size} temperatures",
             f"solves     {self.solves} steady states in"
             f" {self.solves // self.speed.size} runs, {side_by_side} at a time",
-            f"time       about {_told(self.seconds() / side_by_side)}, by the transforms of this"
-            " machine",
-            f"memory     about {self.memory() * side_by_side / 1e6:.0f} MB",
+            f"time       about {_told(_COMMAND + self.seconds() / side_by_side)}, if the processors"
+            " have nothing else to do",
+            f"memory     about {(_COMMAND_MEMORY + self.memory() * side_by_side) / 1e6:.0f} MB",
         ]
         return "\n".join([*lines, *(f"note       {note}" for note in [
             *self.road.notes, *self.compound.notes, *self.notes])])
@@ -223,6 +228,9 @@ def plan_curve(
     speed = np.sort(array_of("speeds", speeds, low=0.0, low_open=True, ndim=1))
     pressure = np.sort(array_of("pressures", pressures, low=0.0, low_open=True, ndim=1))
     usual = [compound.temperature] if temperatures is None else temperatures
+    if not compound.series.g_inf > 0.0:
+        raise ValueError(f"{compound.name}: shear_modulus = 0: steady sliding needs a long-term"
+                         " modulus above 0: this material flows")
     temperature = (np.asarray(usual, dtype=float) if temperatures is None
                    else np.sort(array_of("temperatures", usual, ndim=1)))
     for name, values in (("speeds", speed), ("pressures", pressure),
@@ -267,7 +275,8 @@ def _band_note(plan: CurvePlan, celsius: float) -> list[str]:
     notes = []
     for some, where, end in ((below, "below", low), (above, "above", high)):
         if some.size:
-            notes.append(f"at {celsius:g} C, {some.size} of {plan.speed.size} speeds ({some[0]:.3g}"
+            at = "" if math.isnan(celsius) else f"at {celsius:g} C, "
+            notes.append(f"{at}{some.size} of {plan.speed.size} speeds ({some[0]:.3g}"
                          f" to {some[-1]:.3g} m/s) load the rubber in part {where} the measured"
                          f" frequencies: the limit is {end:.3g} m/s, beyond it the series is a"
                          " guess")

@@ -210,7 +210,7 @@ def _of_namelist(path: Path) -> Compound:
         series = Prony(spring, group.prony_g or (), group.prony_tau or ())
     reference = float(group.reference_temperature)
     wlf = None
-    if group.wlf_c1 is not None and group.wlf_c2 is not None:
+    if group.wlf_c1 and group.wlf_c2:
         wlf = WLF(float(group.wlf_c1), float(group.wlf_c2), reference)
     given = reference if group.temperature is None else float(group.temperature)
     poisson = positive("poisson", group.poisson) if group.poisson else 0.0

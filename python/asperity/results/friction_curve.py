@@ -146,10 +146,13 @@ class FrictionCurve:
 
     @property
     def largest_error(self) -> float:
-        """Half of the widest 95 % interval of friction; infinite with a single patch."""
+        """Half of the widest 95 % interval of friction; infinite if no point has one.
+
+        Points at which fewer than two patches converged have no interval and do not count.
+        """
         _, low, high, _ = interval(self.values["friction"])
         half = 0.5 * (high - low)
-        return float(half.max()) if np.isfinite(half).all() else math.inf
+        return float(np.nanmax(half)) if np.isfinite(half).any() else math.inf
 
     def rows(self) -> list[tuple[float, ...]]:
         """Return the rows of the table, with the columns of `COLUMNS`."""

@@ -101,7 +101,7 @@ class MeasuredSurface:
         lines = [
             f"source      {self.source['name']} ({self.source['format']}), channel"
             f" {self.source['channel']!r}, in {self.unit}",
-            *(f"step        {_told(step)}" for step in self.steps),
+            *(f"step        {step_in_words(step)}" for step in self.steps),
             f"nx, ny      {nx}, {ny}",
             f"lx          {both(self.lx)}",
             f"ly          {both(self.ly)}",
@@ -150,7 +150,7 @@ class MeasuredSurface:
                                                        " (JSON)")
             file.attrs["source_unit"] = self.unit
             file.attrs["steps"] = json.dumps(self.steps)
-            file.attrs["steps_text"] = "\n".join(map(_told, self.steps))
+            file.attrs["steps_text"] = "\n".join(map(step_in_words, self.steps))
             write_grid(file, self.height.shape, self.lx, self.ly, self.periodic)
             write_height(file, self.height, lx=self.lx, ly=self.ly, rms_height=self.rms_height,
                          rms_slope=self.rms_slope)
@@ -306,7 +306,7 @@ def import_topography(
     return surface
 
 
-def _told(step: dict[str, Any]) -> str:
+def step_in_words(step: dict[str, Any]) -> str:
     """Return a step in words."""
     words: dict[str, Callable[[dict[str, Any]], str]] = {
         "transpose": lambda s: "transposed: the file's first index runs along y",

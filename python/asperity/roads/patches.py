@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..base.check import choice, positive, whole
 from .joins import JOINS, join, margin_of
-from .measured import MeasuredSurface
+from .measured import MeasuredSurface, step_in_words
 from .outliers import find_outliers
 from .spectra import Spectrum, join_spectra, spectrum_of_map
 
@@ -178,9 +178,11 @@ class DrawnRoad:
 
     def patch(self, number: int) -> Patch:
         """Return the patch of a number, from 0."""
+        # Two roads with different seeds have no patch in common, also with seeds 1 and 2.
         height = self.spectrum.draw(self.cells, self.cells, self.side, self.side,
-                                    self.seed + number)
-        return Patch(height, self.side, self.side, f"{self.name}, seed {self.seed + number}")
+                                    (self.seed, number))
+        label = f"{self.name}, seed {self.seed}, number {number}"
+        return Patch(height, self.side, self.side, label)
 
 
 class MeasuredRoad:
@@ -260,6 +262,8 @@ class MeasuredRoad:
         if one.height.shape[0] == 1:
             raise ValueError(f"{name}: is a profile: no patches can be cut from it; it serves as"
                              " the spectrum of an isotropic road")
+        self.notes += [f"{name}: {step_in_words(step)}" for step in one.steps
+                       if step["step"] == "fill"]
         found = find_outliers(one.height)
         if not found.count:
             return one
@@ -277,7 +281,8 @@ class MeasuredRoad:
         found = min(cells, room)
         found -= found % 2
         if found < 16:
-            raise ValueError(f"cells: the maps have {fewest} cells along the shorter side: too few")
+            raise ValueError(f"cells = {cells}: the maps have {fewest} cells along the shorter"
+                             f" side: patches of {max(found, 0)} cells: must be at least 16")
         if found < cells:
             self.notes.append(f"patches of {found} cells: the maps have no room for {cells}")
         return found

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.check import array_of, number, positive
+from ..base.check import array_of, positive
 
 __all__ = ["Spectrum", "isotropic_of_profile", "join_spectra", "spectrum_of_map"]
 
@@ -114,7 +114,8 @@ class Spectrum:
         """Return the spectrum of heights times a factor."""
         return Spectrum(self.wavenumber, self.psd * factor**2, self.name, list(self.notes))
 
-    def draw(self, nx: int, ny: int, lx: float, ly: float, seed: int) -> FloatArray:
+    def draw(self, nx: int, ny: int, lx: float, ly: float, seed: int | Sequence[int]
+             ) -> FloatArray:
         """Return a periodic map with random phases and the amplitudes of the spectrum.
 
         Parameters
@@ -123,7 +124,7 @@ class Spectrum:
             Cells; a profile (ny = 1) is one through a map of the same spectrum's amplitudes.
         lx, ly : float
             Lengths, m.
-        seed : int
+        seed : int or sequence of int
             Another seed, another map; the same seed, the same bits.
 
         Returns
@@ -174,11 +175,11 @@ def spectrum_of_map(height: FloatArray, lx: float, ly: float, *, periodic: bool 
     kx = 2.0 * math.pi * np.fft.rfftfreq(nx, lx / nx)
     if ny == 1:
         # of the profile: mean(h^2) = int Phi1 dk/pi over k > 0
-        k, psd = _banded(kx[1:], power[0, 1:] * lx, lx, lx / nx)
+        k, psd = _banded(kx[1:], power[0, 1:] * lx, lx, lx / nx, name)
         return isotropic_of_profile(k, psd, name=name)
     ky = 2.0 * math.pi * np.fft.fftfreq(ny, ly / ny)
     k = np.hypot(kx, ky[:, None]).ravel()[1:]
-    k, psd = _banded(k, (power * lx * ly).ravel()[1:], min(lx, ly), max(lx / nx, ly / ny))
+    k, psd = _banded(k, (power * lx * ly).ravel()[1:], min(lx, ly), max(lx / nx, ly / ny), name)
     return Spectrum(k, psd, name)
 
 
@@ -294,12 +295,18 @@ def _hann(count: int) -> FloatArray:
     return 0.5 - 0.5 * np.cos(2.0 * math.pi * (np.arange(count) + 0.5) / count)
 
 
-def _banded(k: FloatArray, psd: FloatArray, length: float, cell: float
+def _banded(k: FloatArray, psd: FloatArray, length: float, cell: float, name: str
             ) -> tuple[FloatArray, FloatArray]:
     """Return the means over bands of equal ratio, within the reliable range."""
+    if not np.any(psd > 0.0):
+        raise ValueError(f"{name}: is flat: must have roughness")
     low = 2.0 * math.pi * _WAVES_IN_MAP / length
     high = 2.0 * math.pi / (_CELLS_IN_WAVE * cell)
-    number("cells", high / low, 1.0, low_open=True)
+    small = ValueError(f"{name}: is too small for a spectrum: its shorter side of {length:.4g} m"
+                       f" has {length / cell:.0f} cells, and only waves between six cells and a"
+                       " third of the side are measured reliably")
+    if not low < high:
+        raise small
     count = max(2, math.ceil(_PER_DECADE * math.log10(high / low)))
     edges = np.geomspace(low, high, count + 1)
     band = np.searchsorted(edges, k, side="right") - 1
@@ -311,4 +318,6 @@ def _banded(k: FloatArray, psd: FloatArray, length: float, cell: float
     slope = sums * middle**2
     # numbers far below the rest are the round-off of the Fourier transform
     kept = (modes > 0) & (slope > 1e-16 * slope.max())
+    if np.count_nonzero(kept) < 2:
+        raise small
     return middle[kept], sums[kept] / modes[kept]

@@ -118,7 +118,8 @@ class Compound:
         known = np.array(sorted(shifts))
         if len(known) < 2:
             raise ValueError(f"temperature = {temperature:g}: {self.name} gives no {what}: give WLF"
-                             " constants (wlf, --wlf C1 C2)")
+                             " constants (wlf_c1 and wlf_c2 in &material; wlf, --wlf C1 C2 with a"
+                             " table)")
         if not known[0] <= temperature <= known[-1]:
             raise ValueError(f"temperature = {temperature:g}: {self.name} gives {what} from"
                              f" {known[0]:g} to {known[-1]:g} C only")
