@@ -1,10 +1,9 @@
-"""Measure what mesh, time step, arms, tolerance, passes and mass bring and cost: docs/choosing.md.
+"""Measure the effect and the cost of mesh, time step, arms, tolerance, passes and mass.
 
     python tools/choosing.py [NAME ...]      # mesh, step, arms, tolerance, adhesion, ...
 
-Prints the tables, writes them into the page between its marks, and draws the figures
-docs/figures/choosing_*.png.
-All together take about two minutes on one processor.
+This prints the tables of docs/choosing.md, writes them into the page between their marks, and draws
+the figures docs/figures/choosing_*.png. All parts together take about two minutes on one processor.
 """
 
 import re
@@ -39,7 +38,7 @@ def run(text, name):
     case = FOLDER / f"{name}.nml"
     case.write_text(text)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")              # steps that are too coarse are the point
+        warnings.simplefilter("ignore")              # some cases are too coarse on purpose
         try:
             return asperity.run(case, threads=1).history
         except asperity.NotConverged as error:
@@ -60,7 +59,7 @@ def axes(columns, width=4.2):
 
 
 def mesh():
-    """Contact area and mean gap of one rough surface on finer and finer grids."""
+    """Measure contact area and mean gap of one rough surface on finer and finer grids."""
     counts, rows, contacts, values = (2, 4, 8, 16, 32), [], {}, []
     for cells in counts:
         n = 32 * cells
@@ -115,7 +114,7 @@ def slide(surface, n, ny, pressure, *, steps, interpolation, way=1e-3):
 
 
 def slopes():
-    """Friction on a rough road and on bars with sharp edges, by both interpolations."""
+    """Measure friction on a rough road and on bars with sharp edges, with both interpolations."""
     rough = ("shape = 'self_affine', hurst = 0.8, rms_slope = 0.2, "
              "wavelength_long = 0.25e-3, wavelength_short = 62.5e-6")
     rows = []
@@ -145,13 +144,13 @@ def slopes():
                 lost /= history["force"][-1] * np.ptp(history["road_x"][wave])
                 row += [f"{history['friction'][wave][1:].mean():.4f}", f"{lost:.4f}"]
             rows.append(row)
-    sharp = table(["cells a bar and gap", "steps a cell", "`linear`", "its loss", "`cubic`",
+    sharp = table(["cells per bar and gap", "steps per cell", "`linear`", "its loss", "`cubic`",
                    "its loss"], rows)
     return {"slopes": smooth, "kinks": sharp}, None
 
 
 def step():
-    """Friction of a sliding cylinder against Hunter's solution."""
+    """Compare the friction of a sliding cylinder with Hunter's solution."""
     glassy, ratio, creep, radius, load = 2.75e6, 9.0, 1e-2, 10e-3, 50.0
     rubber = Prony.from_zener(0.0, [glassy], [glassy / ratio], [creep * glassy / ratio])
     speed, nx, lx = 0.02, 1536, 36e-3
@@ -175,18 +174,18 @@ def step():
     for column, (scheme, colour, mark) in enumerate(zip(schemes, (BLUE, GREEN, RED), "osD",
                                                         strict=True)):
         axis.loglog(sizes, np.abs(errors[:, column]), mark + "-", color=colour, label=scheme)
-    axis.set(xlabel="Cells a step", ylabel="Error of the friction, %", xticks=sizes,
+    axis.set(xlabel="Cells per step", ylabel="Error of the friction, %", xticks=sizes,
              title="Sliding cylinder against Hunter's solution")
     axis.set_xticklabels([f"{size:g}" for size in sizes])
     axis.minorticks_off()
     axis.legend()
     rows = [[f"{cells:g}", *(f"{error:+.2f} %" for error in line)]
             for cells, line in zip(sizes, errors, strict=True)]
-    return table(["cells a step", *(f"`{scheme}`" for scheme in schemes)], rows), figure
+    return table(["cells per step", *(f"`{scheme}`" for scheme in schemes)], rows), figure
 
 
 def tolerance():
-    """Friction and contact area of the example speed_jump, coarse, against a tight tolerance."""
+    """Compare friction and area of a coarse `speed_jump` with those at a tight tolerance."""
     text = (ROOT / "examples" / "speed_jump" / "input.nml").read_text()
     text = re.sub(r"n([xy]) = 512", r"n\1 = 128", text).replace("15.625e-6", "62.5e-6")
     values = ("1e-3", "1e-4", "1e-5", "1e-6", "1e-8")
@@ -207,12 +206,12 @@ def tolerance():
     left.set(xlabel="tolerance", ylabel="Largest change, %", title="Against 1e-8")
     left.legend()
     right.semilogx(found[0], found[3], "o-", color=BLUE)
-    right.set(xlabel="tolerance", ylabel="FFTs a step", ylim=(0, None), title="Cost")
-    return table(["`tolerance`", "friction", "contact area", "FFTs a step"], rows), figure
+    right.set(xlabel="tolerance", ylabel="FFTs per step", ylim=(0, None), title="Cost")
+    return table(["`tolerance`", "friction", "contact area", "FFTs per step"], rows), figure
 
 
 def adhesion():
-    """Find the pull-off of an elastic sphere, Tabor parameter 2, on coarser and coarser grids."""
+    """Find the pull-off force of an elastic sphere, Tabor parameter 2, on finer and finer grids."""
     modulus, energy, reach, radius, lx = 4e6, 0.05, 0.27e-6, 1e-3, 0.2e-3
     limit = 0.7 * modulus * reach**2 / energy
     approaches = np.linspace(0.4e-6, -1.4e-6, 37)
@@ -270,10 +269,10 @@ def block(thickness, density, passes, steps, *, cells=48, duration=3e-3):
 
 
 def ripple(cells, thickness):
-    """Return how friction changes along the mesh, max |dT/dx|, over the stiffness of a block."""
+    """Return the largest change of friction with position, max |dT/dx|, over the stiffness."""
     thin, modulus = 2e-5, 1e6
     history = block(thin, 0, 0, 16 * 14, cells=cells, duration=14 * 1e-3 / cells)
-    last = slice(-64, None)                      # four cells, of steady sliding
+    last = slice(-64, None)                      # the last four cells: steady sliding
     traction = history["traction_x"][last]
     place = history["road_x"][last] - traction * thin / modulus
     return np.abs(np.gradient(traction, place)).max() * thickness / modulus
@@ -299,7 +298,7 @@ def friction():
              xlim=(0.9, 3), title="Block 2 mm thick, no mass")
     left.legend()
 
-    rows, dt = [], 3e-3 / 144                        # one cell a step
+    rows, dt = [], 3e-3 / 144                        # one cell per step
     for density in (0, 3, 10, 30, 100, 300):
         history = block(2e-2, density, 0, 144)
         late = history["time"] > 2e-3
@@ -313,7 +312,7 @@ def friction():
     right.set(xlabel="Time, ms", ylabel="Mean slip speed, m/s", xlim=(0.9, 3),
               title="Block 20 mm thick")
     right.legend()
-    thick = table(["`density`, kg/m³", "period, steps", "rms swing of the speed, m/s",
+    thick = table(["`density`, kg/m³", "period, steps", "rms oscillation of the speed, m/s",
                    "highest speed, m/s", "friction"], rows)
 
     rows = []
@@ -324,13 +323,13 @@ def friction():
             speed = history["sliding_speed"][history["time"] > 2e-3]
             row.append(f"{np.abs(np.diff(speed)).mean():.1g}")
         rows.append(row)
-    steps = table(["cells a wave", "h/G max abs(dT/dx)", "2 passes", "4", "settled",
+    steps = table(["cells per wave", "h/G max abs(dT/dx)", "2 passes", "4", "settled",
                    "settled, 30 kg/m³"], rows)
     return {"passes": thin, "mass": thick, "swing": steps}, figure
 
 
 def merge():
-    """Slide on a rough road with arms below the time step, these merged, and without them."""
+    """Slide on a rough road with arms below the time step: kept, merged, and left out."""
     n, side, speed = 128, 1e-3, 0.1
     step = side / n / speed
     tau = step * np.array([10.0, 1.0, 1 / 15, 1 / 150, 1 / 1500])
@@ -358,7 +357,7 @@ def merge():
 
 
 def arms():
-    """Fit a compound with few and many arms, and leave arms out: loss modulus and friction."""
+    """Fit a compound with few and with many arms, leave arms out, and compare loss and friction."""
     curve = runpy.run_path(str(ROOT / "examples/materials/make_sbr.py"))["master_curve"]
     omega, inside = np.geomspace(1e-2, 1e12, 281), np.geomspace(1e1, 1e9, 801)
     longest, shortest, speeds = 1e-3, 8e-6, np.geomspace(1e-3, 10.0, 41)
@@ -378,8 +377,8 @@ def arms():
                        f"{100 * np.abs(loss / exact.imag - 1).max():.2g} %",
                        f"{100 * np.abs(mu / best - 1).max():.2g} %"])
         left.semilogx(inside / (2 * np.pi), loss / exact.imag, line, color=colour,
-                      label=f"{count:g} a decade")
-        right.semilogx(speeds, mu, line, color=colour, label=f"{count:g} a decade")
+                      label=f"{count:g} per decade")
+        right.semilogx(speeds, mu, line, color=colour, label=f"{count:g} per decade")
     left.set(xlabel="Frequency, Hz", ylabel="Loss modulus / that of the compound")
     right.set(xlabel="Speed, m/s", ylabel="Friction, Persson's theory")
     left.legend()
@@ -399,10 +398,10 @@ def arms():
         spring = rubber.g_inf + rubber.g[slow].sum()
         row.append(change(Prony(spring, rubber.g[~slow], rubber.tau[~slow]), 0.01))
         cut.append(row)
-    return {"arms": table(["arms a decade", "arms", "loss modulus, largest error",
+    return {"arms": table(["arms per decade", "arms", "loss modulus, largest error",
                            "friction, largest error"], number),
-            "cut": table(["decades beyond", "fast left out, 0.01 m/s", "0.1 m/s", "1 m/s",
-                          "slow as a spring, 0.01 m/s"], cut)}, figure
+            "cut": table(["decades beyond", "fast arms left out, 0.01 m/s", "0.1 m/s", "1 m/s",
+                          "slow arms as a spring, 0.01 m/s"], cut)}, figure
 
 
 def program():
@@ -412,12 +411,12 @@ def program():
 
 
 def measured(text, name):
-    """Return what `asperity check` says of the memory and what a run takes, MB, and its rows."""
+    """Return predicted and used memory (MB), transforms per row, and seconds per transform."""
     case = FOLDER / f"{name}.nml"
     case.write_text(text)
-    told = subprocess.run([program(), "check", str(case)], check=True, capture_output=True,
+    printed = subprocess.run([program(), "check", str(case)], check=True, capture_output=True,
                           text=True).stdout
-    amount, unit = re.search(r"! memory: about (\S+) (MB|GB)", told).groups()
+    amount, unit = re.search(r"! memory: about (\S+) (MB|GB)", printed).groups()
     child = subprocess.Popen([program(), "run", str(case), "--quiet", "--threads", "1"])
     peak = 0
     while child.poll() is None:
@@ -433,7 +432,7 @@ def measured(text, name):
 
 
 def cost():
-    """Memory that is foretold and taken, transforms a step, time a transform, by kind of case."""
+    """Compare predicted and used memory, and measure the number and time of transforms."""
     n = 512
     rough = ("&surface shape = 'self_affine', hurst = 0.8, rms_slope = 0.2,"
              " wavelength_long = 0.25e-3, wavelength_short = 31.3e-6 /")
@@ -457,7 +456,7 @@ def cost():
     rows = []
     for name, (grid, middle, phases, solver) in cases.items():
         group, rest = (middle, "") if not middle.startswith("&") else ("", middle)
-        told, taken, ffts, seconds = measured(f"""
+        predicted, taken, ffts, seconds = measured(f"""
             &grid nx = {n}, ny = {n}, lx = 1e-3{grid} /
             {rough}
             &material shear_modulus = 1e6{', ' + group if group else ''} /
@@ -465,9 +464,10 @@ def cost():
             {phases}
             &solver tolerance = 1e-5 {', ' + solver if solver else ''} /
             """, f"cost_{len(rows)}")
-        rows.append([name, f"{told:.0f}", f"{taken:.0f}", f"{ffts:.0f}", f"{1e3 * seconds:.1f}"])
-    return table(["case, 512 x 512", "memory by `asperity check`, MB", "taken, MB", "FFTs a row",
-                  "ms for each FFT, everything included"], rows), None
+        rows.append([name, f"{predicted:.0f}", f"{taken:.0f}", f"{ffts:.0f}",
+                     f"{1e3 * seconds:.1f}"])
+    return table(["case, 512 x 512", "memory by `asperity check`, MB", "taken, MB", "FFTs per row",
+                  "ms per FFT, everything included"], rows), None
 
 
 PARTS = {"mesh": mesh, "slopes": slopes, "step": step, "tolerance": tolerance, "adhesion": adhesion,

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 from . import _addresses
 from .base import presenters
 
-# Idle threads sleep: spinning, they slow a run tenfold where others use the machine. OpenMP reads
-# this when its library is loaded, which may be for another package: so it comes first.
+# Idle threads must sleep: if they spin, a run becomes ten times slower on a machine that others
+# use. OpenMP reads the variable when its library is loaded, perhaps by another package, so set it
+# first.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ presenters.register({name: f"{__name__}.{module}"
 
 
 def __getattr__(name: str) -> Any:
-    """Import what is used when it is used first: NumPy, HDF5 and SciPy take their time."""
+    """Import a public name on first use, because NumPy, HDF5 and SciPy take long to load."""
     if name == "__version__":  # of the Fortran library that is loaded, such as "0.1.0"
         from .base.library import version
 

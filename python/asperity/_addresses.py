@@ -1,7 +1,8 @@
 """Where the public names of the package live, and the addresses by which users import them.
 
-Modules stand in rooms, such as ``asperity.roads.surface``; users say ``asperity.surface``. Both
-names give the same module. Nothing is imported before it is used.
+Modules are grouped in rooms, such as ``asperity.roads.surface``, but users write the shorter
+address ``asperity.surface``. Both names give the same module. Nothing is imported before it is
+used.
 """
 
 from __future__ import annotations
@@ -82,19 +83,19 @@ PRESENTERS = {
 
 
 class _Loader(importlib.abc.Loader):
-    """Gives the module of a room under the address that users know."""
+    """Loads the module of a room under the address that users know."""
 
     def __init__(self, place: str) -> None:
         self._place = place
 
     def create_module(self, spec: importlib.machinery.ModuleSpec) -> ModuleType:
-        """Return the module of the room; its own specification is put back when it is executed."""
+        """Return the module of the room; `exec_module` restores its own specification."""
         module = importlib.import_module(self._place)
         self._own = module.__spec__
         return module
 
     def exec_module(self, module: ModuleType) -> None:
-        """Do nothing but undo what the import system wrote into the module."""
+        """Undo what the import system wrote into the module, which has already been executed."""
         module.__spec__ = self._own
         module.__loader__ = self._own.loader if self._own else None
 

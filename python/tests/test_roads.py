@@ -194,7 +194,7 @@ def test_outliers_are_single_cells_and_not_steep_edges():
     assert np.argwhere(found.cells).tolist() == [[5, 6], [5, 7], [100, 31]]
     assert np.abs(found.mended - height)[found.cells].max() < 5 * np.std(height) / 10
     np.testing.assert_array_equal(found.mended[~found.cells], dusty[~found.cells])
-    assert "3 of 65536 cells lie far off" in found.told()
+    assert "3 of 65536 cells lie far off" in found.summary()
     assert find_outliers(np.zeros((8, 8))).count == 0
 
 

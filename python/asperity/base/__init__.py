@@ -1,1 +1,1 @@
-"""What all rooms use: checks of arguments, calls of the Fortran library, names, tables, errors."""
+"""Tools of all rooms: checks of arguments, calls of the Fortran library, names, tables, errors."""

@@ -1,10 +1,11 @@
-"""Checks of arguments: one message says the name, the value found and what is allowed."""
+"""Checks of arguments. Every message contains the name, the value found and what is allowed."""
 
 from __future__ import annotations
 
 import math
 import reprlib
 from collections.abc import Sequence
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,13 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = ["array_of", "choice", "exactly_one", "no_masked", "number", "poisson_ratio",
            "positive", "shown", "whole"]
 
+T = TypeVar("T")
 
 _short = reprlib.Repr()
 _short.maxstring = _short.maxother = 120
 
 
 def shown(value: object) -> str:
-    """Return a value for a message: as Python writes it, but short.
+    """Return a short text of a value for a message; long values are abbreviated.
 
     Examples
     --------
@@ -86,12 +88,23 @@ def number(
 
 
 def positive(name: str, value: float) -> float:
-    """Return `value` as a finite float above zero."""
+    """Return `value` as a finite float above zero.
+
+    Raises
+    ------
+    ValueError
+        If it is not a number, not finite, or not above zero.
+    """
     return number(name, value, 0.0, low_open=True)
 
 
 def whole(name: str, value: float) -> int:
-    """Return `value` as an int above zero that the library can take.
+    """Return `value` as a positive int of at most 31 bits, which is the library's range.
+
+    Raises
+    ------
+    ValueError
+        If it is not such a number.
 
     Examples
     --------
@@ -111,7 +124,13 @@ def whole(name: str, value: float) -> int:
 
 
 def poisson_ratio(value: float) -> float:
-    """Return a Poisson ratio, -1 < nu <= 0.5."""
+    """Return `value` as a Poisson ratio.
+
+    Raises
+    ------
+    ValueError
+        Unless -1 < value <= 0.5.
+    """
     return number("poisson", value, -1.0, 0.5, low_open=True)
 
 
@@ -124,7 +143,20 @@ def array_of(
     ndim: int | None = None,
     increasing: bool = False,
 ) -> NDArray[np.float64]:
-    """Return `values` as a float array, each finite and at least (or above) `low`.
+    """Return `values` as a float array whose elements are finite and within a bound.
+
+    Parameters
+    ----------
+    name : str
+        Name shown in the message.
+    values : array_like
+        Values to check.
+    low : float
+        Lower bound, which is allowed unless `low_open`.
+    ndim : int, optional
+        Required number of dimensions.
+    increasing : bool
+        Whether each value must be larger than the one before.
 
     Raises
     ------
@@ -165,7 +197,7 @@ def array_of(
 
 
 def no_masked(name: str, values: object) -> None:
-    """Refuse an array with masked points: what lies below a mask is no value.
+    """Refuse an array with masked points, because the numbers below a mask are meaningless.
 
     Raises
     ------
@@ -186,17 +218,33 @@ def no_masked(name: str, values: object) -> None:
 
 
 def choice(name: str, value: str, allowed: Sequence[str]) -> str:
-    """Return `value` if it is one of `allowed`."""
+    """Return `value` if it is one of `allowed`.
+
+    Raises
+    ------
+    ValueError
+        If it is not; the message lists the allowed values.
+    """
     if value not in allowed:
         raise ValueError(f"{name} = {shown(value)}: must be one of {', '.join(map(repr, allowed))}")
     return value
 
 
-def exactly_one(**values: object) -> str:
-    """Return the name of the only argument that is not None."""
-    given = [name for name, value in values.items() if value is not None]
+def exactly_one(**values: T | None) -> tuple[str, T]:
+    """Return the name and the value of the only argument that is not None.
+
+    Raises
+    ------
+    ValueError
+        If none or several are given.
+
+    Examples
+    --------
+    >>> exactly_one(force=None, approach=2e-5)
+    ('approach', 2e-05)
+    """
+    given = [(name, value) for name, value in values.items() if value is not None]
     if len(given) != 1:
-        raise ValueError(
-            f"{', '.join(given) or 'none'} given: must be exactly one of {', '.join(values)}"
-        )
+        names = ", ".join(name for name, _ in given)
+        raise ValueError(f"{names or 'none'} given: must be exactly one of {', '.join(values)}")
     return given[0]

@@ -1,4 +1,4 @@
-"""Exceptions of the package, and how a status of the Fortran library becomes one."""
+"""The exceptions of the package, and the conversion of a status of the Fortran library into one."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class NotConverged(RuntimeError):  # noqa: N818 - an outcome that callers look f
     Attributes
     ----------
     result : object
-        The best result so far; of `asperity.run` the opened result file.
+        The best result so far. For `asperity.run` it is the opened result file.
     """
 
     def __init__(self, message: str, result: Any = None) -> None:
@@ -22,7 +22,14 @@ class NotConverged(RuntimeError):  # noqa: N818 - an outcome that callers look f
 
 
 def raise_for_status(status: int, message: bytes | str) -> None:
-    """Raise the exception that belongs to a status of the library; 0 raises none.
+    """Raise the exception that belongs to a status of the library.
+
+    Parameters
+    ----------
+    status : int
+        0 raises nothing; 2 a ValueError, 3 an OSError, 4 `NotConverged`, 5 a MemoryError.
+    message : bytes or str
+        The message of the library.
 
     Examples
     --------

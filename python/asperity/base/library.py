@@ -1,4 +1,4 @@
-"""Calls of the Fortran library: one at a time, a status becomes an exception."""
+"""Calls of the Fortran library. Only one runs at a time, and a status becomes an exception."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-# Idle threads sleep: spinning, they slow a run tenfold where others use the machine. OpenMP reads
-# this when its library is loaded, so it comes first.
+# Idle threads must sleep: if they spin, a run becomes ten times slower on a machine that others
+# use. OpenMP reads this variable when its library is loaded, so it must be set before the import
+# below.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 from asperity import _core
@@ -30,15 +31,15 @@ _modules = (_core.flat_contact, _core.flat_library, _core.flat_roads, _core.flat
 
 
 def _routine(name: str) -> Any:
-    """Return a routine of the library, whichever module holds it."""
+    """Return a routine of the library from the module that contains it."""
     return next(getattr(module, name) for module in _modules if hasattr(module, name))
 
 
 def _before_fork() -> None:
-    """Wait for the call in hand and end idle threads.
+    """Wait for the current call to return, and end idle threads.
 
-    A copy of the process has only the thread that made it. Its calls would wait for ever for the
-    other threads of OpenMP, or for a lock that another thread held.
+    A forked process has only the thread that called fork. Without this, its calls would wait for
+    ever for the other threads of OpenMP, or for a lock that another thread held.
     """
     _lock.acquire()
     _core.flat_library.release_idle_threads()
@@ -50,10 +51,19 @@ if hasattr(os, "register_at_fork"):
 
 
 def call(name: str, *, interruptible: bool = False) -> Callable[..., tuple[Any, ...]]:
-    """Return a routine of the library that raises instead of returning a status.
+    """Return a routine of the library that raises an exception instead of returning a status.
 
-    The routine's last two outputs are its status and message; the others are returned. Ctrl-C
-    ends an interruptible routine at its next iteration, with KeyboardInterrupt.
+    Parameters
+    ----------
+    name : str
+        Name of the routine. Its last two outputs are a status and a message.
+    interruptible : bool
+        Whether Ctrl-C ends the routine at its next iteration, with KeyboardInterrupt.
+
+    Returns
+    -------
+    callable
+        Takes the arguments of the routine, and returns its other outputs.
     """
     routine = _routine(name)
 
@@ -75,7 +85,7 @@ def call(name: str, *, interruptible: bool = False) -> Callable[..., tuple[Any, 
 
 
 def _interrupts() -> NDArray[np.int32] | None:
-    """Return the signal of Ctrl-C, if it raises KeyboardInterrupt in this thread."""
+    """Return the signal of Ctrl-C if it raises KeyboardInterrupt in this thread, otherwise None."""
     if (threading.current_thread() is threading.main_thread()
             and signal.getsignal(signal.SIGINT) is signal.default_int_handler):
         return np.array([signal.SIGINT], dtype=np.int32)
@@ -83,7 +93,7 @@ def _interrupts() -> NDArray[np.int32] | None:
 
 
 def bare(name: str) -> Callable[..., Any]:
-    """Return a routine of the library that has no status."""
+    """Return a routine of the library that has no status, with the lock around its calls."""
     routine = _routine(name)
 
     @functools.wraps(routine)
@@ -100,13 +110,13 @@ def version() -> str:
 
 
 def set_threads(number: int = 0) -> int:
-    """Let the library use a number of threads from here on.
+    """Set the number of threads of all later calls of the library.
 
     Parameters
     ----------
     number : int
-        Number of threads; 0 takes what the environment variables OMP_NUM_THREADS or
-        SLURM_CPUS_PER_TASK say, or else all processors.
+        Number of threads. 0 means the value of the environment variable OMP_NUM_THREADS or
+        SLURM_CPUS_PER_TASK, or all processors if neither is set.
 
     Returns
     -------
@@ -131,7 +141,13 @@ def set_threads(number: int = 0) -> int:
 
 
 def height_map(height: ArrayLike, name: str = "height") -> NDArray[np.float64]:
-    """Return a map as a C-ordered array of doubles of shape (ny, nx); a profile has ny = 1."""
+    """Return a map as a C-ordered array of doubles of shape (ny, nx); a profile has ny = 1.
+
+    Raises
+    ------
+    ValueError
+        If it is not a map of finite real numbers, or has masked points.
+    """
     no_masked(name, height)
     if np.iscomplexobj(height):
         raise ValueError(f"{name}: must be an array of real numbers")
@@ -162,7 +178,13 @@ def flag_of_boundary(boundary: str) -> int:
 
 def contact_map(height: ArrayLike, lx: float, ly: float | None, boundary: str
                 ) -> tuple[NDArray[np.float64], float, float, int]:
-    """Return the map, its lengths and the flag of its boundary, fit for a normal contact."""
+    """Return the map, its lengths (m) and the flag of its boundary, all checked.
+
+    Raises
+    ------
+    ValueError
+        If one of them is not allowed in a normal contact.
+    """
     array = height_map(height)
     lx, ly = lengths(array.shape, lx, ly)
     free = flag_of_boundary(boundary)

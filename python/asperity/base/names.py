@@ -1,4 +1,4 @@
-"""Mappings whose names are also attributes, complete by tab and are suggested when misspelt."""
+"""Mappings whose names are also attributes. Tab completes a name, and errors suggest near names."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["NamedFields", "NamedValues", "OpenValues", "UnknownNameError", "unkn
 
 
 class UnknownNameError(KeyError):
-    """A KeyError whose message is shown as it is, not quoted."""
+    """A KeyError whose message is shown without quotation marks."""
 
     def __str__(self) -> str:
         return str(self.args[0]) if self.args else ""
@@ -38,10 +38,10 @@ def unknown_name(what: str, name: object, names: Iterable[str]) -> str:
 
 
 class NamedValues(Mapping[str, Any]):
-    """Read-only mapping of names to values, which are attributes, too.
+    """Read-only mapping of names to values; each value is also an attribute.
 
-    Type checkers know the names that a class of these declares, and take any other for a mistake;
-    `OpenValues` are for names that nobody can know.
+    For type checkers, only the names that a subclass declares exist. Use `OpenValues` if the names
+    are not known in advance.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ class NamedValues(Mapping[str, Any]):
 
 
 class NamedFields:
-    """Fields by name, which are made when they are asked for: items are attributes, too."""
+    """Fields by name, each read or computed when it is accessed, as an item or as an attribute."""
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         raise NotImplementedError
@@ -117,7 +117,7 @@ class NamedFields:
 
 
 class OpenValues(NamedValues):
-    """Named values of any names, such as the attributes of a file."""
+    """Named values with arbitrary names, such as the attributes of a file."""
 
     if TYPE_CHECKING:
         def __getattr__(self, name: str) -> Any: ...

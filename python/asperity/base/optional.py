@@ -1,4 +1,4 @@
-"""Packages that only some functions need."""
+"""Import of optional packages, which only some functions need."""
 
 from __future__ import annotations
 
@@ -9,12 +9,19 @@ __all__ = ["needed"]
 
 
 def needed(package: str, by: str) -> Any:
-    """Return a package that must be installed for one function.
+    """Return an optional package, imported.
+
+    Parameters
+    ----------
+    package : str
+        Name of the package.
+    by : str
+        What needs it, for the message.
 
     Raises
     ------
     ImportError
-        If it is not installed; the message says who needs it and how to get it.
+        If it is not installed. The message says what needs it and how to install it.
     """
     try:
         return importlib.import_module(package)

@@ -1,8 +1,8 @@
-"""How data show themselves without knowing what draws them.
+"""Calls of drawing code by name, so that modules of data need not import it.
 
-``run.plot("friction")`` draws, yet the modules of results and materials import nothing that draws:
-they call ``present("plot_history", run, ...)``. The package tells, when it is imported, which
-function of which module that is; the module is imported when it is used first.
+``run.plot("friction")`` draws, although the modules of results and materials do not import drawing
+code: they call ``present("plot_history", run, ...)``. When the package is imported, it registers
+which module contains each such function. The module itself is imported on first use.
 """
 
 from __future__ import annotations
@@ -17,25 +17,30 @@ _known: dict[str, str] = {}
 
 
 def register(presenters: Mapping[str, str]) -> None:
-    """Tell which functions present data.
+    """Register functions that draw, write or show data.
 
     Parameters
     ----------
     presenters : mapping
-        Name of each function, and the module that holds it.
+        Name of each function, and the module that contains it.
     """
     _known.update(presenters)
 
 
 def present(name: str, *arguments: Any, **options: Any) -> Any:
-    """Call the presenter of a name; return what it returns.
+    """Call the registered function of a name, and return its result.
 
     Parameters
     ----------
     name : str
         Name of a registered function.
     *arguments, **options
-        Passed on to the function.
+        Arguments of the function.
+
+    Returns
+    -------
+    object
+        The result of the function.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Tables of numbers as instruments and spreadsheets write them: text, separators, decimal signs."""
+"""Text tables from instruments and spreadsheets: encodings, separators and decimal signs."""
 
 from __future__ import annotations
 
@@ -19,16 +19,17 @@ _POINT = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
 
 
 def text_lines(path: Path) -> list[tuple[int, str]]:
-    """Return the lines of a text file with their numbers, from 1, without empty ones and comments.
+    """Return the lines of a text file with their line numbers, from 1.
 
-    UTF-8, UTF-16 with its mark, or Latin-1; comments start with ``#``.
+    Empty lines and comments, which start with ``#``, are left out. The encoding may be UTF-8,
+    UTF-16 with a byte order mark, or Latin-1.
 
     Raises
     ------
     OSError
-        If the file is missing or a folder.
+        If the file is missing or is a folder.
     ValueError
-        If it is no text, or holds nothing.
+        If it is not a text file, or has no lines left.
     """
     if not path.exists():
         raise OSError(f"{path}: there is no such file")
@@ -49,7 +50,7 @@ def text_lines(path: Path) -> list[tuple[int, str]]:
 
 
 def cells_of(lines: Sequence[tuple[int, str]]) -> Rows:
-    """Return the cells of each line; what separates them is seen in the last line."""
+    """Return the cells of each line. The last line with a number decides on the separator."""
     separator = _separator([line for _, line in lines])
     rows = []
     for at, line in lines:
@@ -60,8 +61,8 @@ def cells_of(lines: Sequence[tuple[int, str]]) -> Rows:
 
 
 def _separator(lines: Sequence[str]) -> str | None:
-    """Return what separates columns; None for blanks."""
-    # the header may have commas in its words, and a last line may end the table in words
+    """Return the separator of columns; None for blanks."""
+    # A header may contain commas in its text, and a table may end with a line of text.
     last = next((line for line in reversed(lines) if re.match(r"\W*\d", line)), lines[-1])
     cells = last.split()
     if len(cells) > 1 and ";" not in last and "\t" not in last and all(
@@ -74,7 +75,7 @@ def _separator(lines: Sequence[str]) -> str | None:
 
 
 def is_number(cell: str) -> bool:
-    """Whether a cell is a number, with a decimal point or comma.
+    """Return whether a cell is a number, with a decimal point or comma.
 
     Examples
     --------
@@ -89,9 +90,9 @@ def is_number(cell: str) -> bool:
 
 
 def decimals(rows: Rows) -> Rows:
-    """Return the cells with decimal points, and without signs between thousands.
+    """Return the cells with decimal points, and without separators of thousands.
 
-    A comma is the decimal sign unless other cells have decimal points: then it stands between
+    A comma is the decimal sign, unless other cells have decimal points: then it separates
     thousands.
 
     Examples

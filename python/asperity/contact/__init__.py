@@ -1,4 +1,4 @@
-"""One contact on numpy arrays, without files: normal contact, with and without adhesion."""
+"""A single normal contact on NumPy arrays, without files, with and without adhesion."""
 
 from .adhesive import AdhesiveNormalContact, solve_adhesive
 from .normal import NormalContact, solve_normal

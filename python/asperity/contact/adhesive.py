@@ -18,27 +18,28 @@ __all__ = ["AdhesiveNormalContact", "solve_adhesive"]
 
 POTENTIALS = ("exponential", "gauss", "maugis_dugdale")
 STARTS = ("non_adhesive", "full_contact")
-INTERVALS = 4096  # of the table of an attraction that is a function
+INTERVALS = 4096  # number of intervals of the table of a user's attraction
 
 _solve = library.call("contact_adhesive", interruptible=True)
 
 
 @dataclass(frozen=True)
 class AdhesiveNormalContact(NormalContact):
-    """A solved contact with adhesion; the fields of `NormalContact`, and those below.
+    """A solved contact with adhesion, with the attributes of `NormalContact` and some more.
 
-    The pressure holds the attraction; ``pressure - adhesive_pressure`` is that of the wall, zero
-    where the gap is open. The contact area counts the cells whose gap is zero. The residual is the
-    largest of min(gap/range, G range/energy) in size, where G is the pressure of the wall.
+    `pressure` includes the attraction. ``pressure - adhesive_pressure`` is the pressure of the
+    wall, which is zero where the gap is open. The contact area counts the cells whose gap is zero.
+    The residual is the largest absolute value of min(gap/range, G range/energy), where G is the
+    pressure of the wall.
 
     Attributes
     ----------
     adhesive_pressure : ndarray
-        Attraction -e'(gap), Pa, not positive.
+        Attraction -e'(gap), Pa, <= 0.
     energy_adhesive : float
-        Energy of adhesion of the cell lx by ly, J, not positive.
+        Energy of adhesion in the area lx by ly, J, <= 0.
     energy_elastic : float
-        Elastic energy of the same, J.
+        Elastic energy in this area, J.
     """
 
     adhesive_pressure: FloatArray = field(repr=False)
@@ -64,45 +65,46 @@ def solve_adhesive(
     method: str = "fast",
     start: str | AdhesiveNormalContact = "non_adhesive",
 ) -> AdhesiveNormalContact:
-    """Press or pull an elastic half-space on a rigid rough surface that attracts it.
+    """Press an elastic half-space onto a rigid rough surface that attracts it, or pull it off.
 
-    There is hysteresis: where the attraction is strong, the state depends on where it comes from.
+    The solution minimises the energy of the gap (thesis, section 2.3, eq. 2.20 and 2.21). There may
+    be several minima, so that the state depends on the starting point (hysteresis).
 
     Parameters
     ----------
     height : array_like
-        Height of the surface, m, shape (ny, nx); (nx,) or (1, nx) is a plane-strain line
-        contact. Any memory order and any real type.
+        Height of the surface, m, shape (ny, nx). With the shape (nx,) or (1, nx) it is a line
+        contact in plane strain. Any memory order and any real type are accepted.
     lx, ly : float
-        Lengths, m; ``ly = None`` means square cells.
+        Lengths, m; ``ly = None`` makes the cells square.
     modulus : float
         Contact modulus E* = E/(1 - nu^2) = 2 G/(1 - nu), Pa.
     potential : str or callable
-        'exponential', 'gauss' or 'maugis_dugdale'; or a function of your own, which takes an array
-        of gaps, m, and returns the attraction there, Pa, 0 or more. The function is called once,
-        for 4097 equidistant gaps from 0 to `range`; between them the attraction is interpolated.
+        'exponential', 'gauss' or 'maugis_dugdale', or a function of your own. The function takes an
+        array of gaps, m, and returns the attraction at these gaps, Pa, >= 0. It is called once, for
+        4097 equidistant gaps from 0 to `range`; between them the attraction is interpolated.
     energy : float
-        Work of adhesion, J/m2, >= 0. With a function it is the integral of the attraction, and must
-        be left out.
+        Work of adhesion, J/m2, >= 0. It must be left out if `potential` is a function, because it
+        is then the integral of the attraction.
     range : float
-        Range of the attraction, m. With a function: the gap beyond which there is none.
-        Cells should be smaller than 0.7 modulus range^2/energy (maugis_dugdale: modulus
-        range^2/energy; a function: 0.7 modulus over the steepest fall of the attraction, Pa/m), or
-        the edge of the contact sticks to the grid: a warning says so.
+        Range of the attraction, m. For a function it is the gap beyond which there is no
+        attraction. Cells should be smaller than 0.7 modulus range^2/energy (maugis_dugdale: modulus
+        range^2/energy; a function: 0.7 modulus over the steepest fall of the attraction in Pa/m).
+        Otherwise the edge of the contact sticks to the grid, and a warning says so.
     pressure, force, displacement : float
-        The load, one of: mean pressure, Pa; force, N; approach from the first touch, m. Negative
-        values pull.
+        The load. Give one: mean pressure, Pa; force, N; or approach from the first touch, m.
+        Negative values pull.
     boundary : str
         'periodic' or 'free'.
     tolerance : float
-        Of the residual.
+        Largest allowed residual.
     max_iterations : int
-        Most iterations.
+        Largest number of iterations.
     method : str
-        'fast' or 'thesis' (periodic only).
+        'fast' or 'thesis' ('periodic' only).
     start : str or AdhesiveNormalContact
-        Where from: 'non_adhesive', the contact without adhesion; 'full_contact'; or the solution
-        of a similar load on the same map.
+        Starting point: 'non_adhesive' is the contact without adhesion; 'full_contact'; or the
+        solution for a similar load on the same map.
 
     Returns
     -------
@@ -111,10 +113,19 @@ def solve_adhesive(
     Raises
     ------
     ValueError
-        If an argument is wrong.
+        If an argument is not allowed.
     NotConverged
-        If the tolerance is not reached, or the surfaces part under a pull that no contact holds
-        (then the reason is 'detached'); its ``result`` holds the last state.
+        If the tolerance is not reached, or if the surfaces separate under a pull that no contact
+        can hold (the reason is then 'detached'). Its ``result`` is the last state.
+    KeyboardInterrupt
+        If Ctrl-C ends the solver.
+    MemoryError
+        If there is not enough memory.
+
+    Warns
+    -----
+    UserWarning
+        If the cells are too large for the range of the attraction.
 
     Examples
     --------
@@ -125,7 +136,7 @@ def solve_adhesive(
     >>> contact.force < 0 < contact.contact_area
     True
 
-    An attraction that first stays and then falls linearly to zero:
+    An attraction that is constant up to a gap of 0.3 um, and then falls linearly to zero:
 
     >>> import numpy as np
     >>> contact = asperity.solve_adhesive(
@@ -145,9 +156,8 @@ def solve_adhesive(
     if thesis and free:
         raise ValueError("method = 'thesis': needs boundary = 'periodic'; 'fast' serves both")
     top = float(array.max())
-    control = exactly_one(pressure=pressure, force=force, displacement=displacement)
-    load = number(control, {"pressure": pressure, "force": force,
-                            "displacement": displacement}[control])  # type: ignore[arg-type]
+    control, load = exactly_one(pressure=pressure, force=force, displacement=displacement)
+    load = number(control, load)
     if control == "displacement" and not free:
         library.check_depth(load, array)
     if control == "force":
@@ -177,7 +187,11 @@ def solve_adhesive(
 
 def _attraction(potential: str | Callable[[FloatArray], ArrayLike], energy: float | None,
                 reach: float) -> tuple[str, float, FloatArray]:
-    """Return the name of a potential, its energy and the table of a function; (1, 2) without."""
+    """Return the name of a potential, its energy and the table of a function.
+
+    The table has the shape (gaps, 2), attraction (Pa) and slope (Pa/m); without a function it is a
+    dummy of shape (1, 2).
+    """
     if not callable(potential):
         if energy is None:
             raise ValueError("energy: is missing: the work of adhesion, J/m2")
@@ -202,8 +216,8 @@ def _attraction(potential: str | Callable[[FloatArray], ArrayLike], energy: floa
         first = wrong[0]
         raise ValueError(f"potential: the attraction at the gap {gaps[first]:g} m is"
                          f" {values[first]:g} Pa: must be finite and 0 or more")
-    values[-1] = 0.0  # the attraction ends there, if it has not before
-    # Akima's slopes do not overshoot beside a jump; within these bounds no cubic falls below zero.
+    values[-1] = 0.0  # there is no attraction beyond the range
+    # Akima's slopes do not overshoot beside a jump. The bounds keep every cubic above zero.
     slopes = Akima1DInterpolator(gaps, values).derivative()(gaps)
     steepest = 3.0 * values * INTERVALS / reach
     slopes[:-1] = np.maximum(slopes[:-1], -steepest[:-1])
@@ -235,7 +249,7 @@ def _look_at_cells(shape: tuple[int, int], lx: float, ly: float, modulus: float,
 
 def _start_from(start: str | AdhesiveNormalContact, shape: tuple[int, ...], top: float,
                 traction: FloatArray, gap: FloatArray) -> tuple[float, int]:
-    """Fill pressure and gap of the start; return its level and the library's word for it."""
+    """Fill in the initial pressure and gap; return the level and the library's code for it."""
     if isinstance(start, AdhesiveNormalContact):
         if start.gap.shape != shape:
             raise ValueError(f"start: has shape {start.gap.shape}: must be {shape}")

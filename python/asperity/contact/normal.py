@@ -26,15 +26,15 @@ class NormalContact:
     Attributes
     ----------
     pressure : ndarray
-        Pressure, Pa, 0 out of contact.
+        Pressure, Pa; it is 0 out of contact.
     gap : ndarray
-        Gap between the surfaces, m; 0 in contact within the tolerance.
+        Gap between the surfaces, m; in contact it is 0 to the tolerance.
     displacement_z : ndarray
         Normal displacement of the surface of the solid, m.
     mean_pressure, force : float
         The load, Pa and N.
     displacement : float
-        Approach of the far solid from the first touch, m.
+        Approach of the far solid, counted from the first touch, m.
     contact_area : float
         Fraction of the grid in contact.
     iterations : int
@@ -42,13 +42,13 @@ class NormalContact:
     ffts : int
         Real transforms of the size of the grid.
     residual : float
-        The larger of the duality gap and the load's error, both relative.
+        The larger of the relative duality gap and the relative error of the load.
     seconds : float
         Wall time of the solver, s.
     converged : bool
         Whether the residual is within the tolerance.
     reason : str
-        Why the solver came back.
+        Why the solver stopped.
     """
 
     pressure: FloatArray = field(repr=False)
@@ -84,41 +84,50 @@ def solve_normal(
     method: str = "fast",
     start: ArrayLike | NormalContact | None = None,
 ) -> NormalContact:
-    """Press an elastic half-space on a rigid rough surface, without adhesion and friction.
+    """Press an elastic half-space onto a rigid rough surface, without adhesion and friction.
+
+    The conditions are pressure >= 0, gap >= 0 and pressure gap = 0 (thesis, section 2.1). The
+    solver is a preconditioned conjugate gradient method after Polonsky and Keer (Wear 231 (1999)
+    206).
 
     Parameters
     ----------
     height : array_like
-        Height of the surface, m, shape (ny, nx); (nx,) or (1, nx) is a plane-strain line
-        contact. Any memory order and any real type.
+        Height of the surface, m, shape (ny, nx). With the shape (nx,) or (1, nx) it is a line
+        contact in plane strain. Any memory order and any real type are accepted.
     lx, ly : float
-        Lengths, m; ``ly = None`` means square cells.
+        Lengths, m; ``ly = None`` makes the cells square.
     modulus : float
         Contact modulus E* = E/(1 - nu^2) = 2 G/(1 - nu), Pa.
     pressure, force, displacement : float
-        The load, one of: mean pressure, Pa; force, N; approach from the first touch, m.
+        The load. Give one: mean pressure, Pa; force, N; or approach from the first touch, m.
     boundary : str
         'periodic' or 'free'.
     tolerance : float
-        Of the duality gap over load times rms height, and of the load.
+        Largest allowed duality gap over (load times rms height), and largest relative error of the
+        load.
     max_iterations : int
-        Most iterations.
+        Largest number of iterations.
     method : str
         'fast' or 'thesis'.
     start : array_like or NormalContact, optional
-        A pressure to start from, such as the solution of a similar load.
+        Initial pressure (Pa, >= 0), for example the solution for a similar load.
 
     Returns
     -------
     NormalContact
-        Pressure, gap, displacement, contact area and what the solver did.
+        Pressure, gap, displacement, contact area, and the record of the solver.
 
     Raises
     ------
     ValueError
-        If an argument is wrong.
+        If an argument is not allowed.
     NotConverged
-        If the tolerance is not reached; its ``result`` holds the best state.
+        If the tolerance is not reached. Its ``result`` is the best state.
+    KeyboardInterrupt
+        If Ctrl-C ends the solver.
+    MemoryError
+        If there is not enough memory.
 
     Examples
     --------
@@ -134,16 +143,15 @@ def solve_normal(
     modulus = positive("modulus", modulus)
     tolerance = positive("tolerance", tolerance)
     steps = whole("max_iterations", max_iterations)
-    control = exactly_one(pressure=pressure, force=force, displacement=displacement)
+    control, load = exactly_one(pressure=pressure, force=force, displacement=displacement)
+    target = positive(control, load)
     top = float(array.max())
     if control == "displacement":
-        target = positive("displacement", displacement) - top
+        target -= top
         if not free:
-            library.check_depth(displacement, array)
+            library.check_depth(load, array)
     elif control == "force":
-        target = positive("force", force) / (lx * ly)
-    else:
-        target = positive("pressure", pressure)
+        target /= lx * ly
 
     traction = np.zeros_like(array)
     if start is not None:

@@ -1,19 +1,20 @@
-"""The operators of the solvers: displacements of an elastic half-space from tractions.
+"""The operators of the solvers, for developers of methods: displacements from tractions.
 
-For those who develop methods. Users import this module as ``asperity.operators``. Fields have the
-shape (ny, nx), tangential ones (2, ny, nx) with the parts along x and y first.
+They describe an elastic half-space, or a block (thesis, section 2.1 and chapter 3; Love, Phil.
+Trans. R. Soc. A 228 (1929) 377). Normal fields have the shape (ny, nx). Tangential fields have the
+shape (2, ny, nx), with the components along x and y. Users import this module as
+``asperity.operators``.
 """
 
 from __future__ import annotations
 
 import weakref
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import library
-from ..base.check import positive
+from ..base.check import poisson_ratio, positive
 from ..base.check import whole as whole_number
 from ..base.errors import NotConverged
 
@@ -28,7 +29,7 @@ _close = library.call("operator_close")
 
 
 class _Operator:
-    """What the two kinds share: a handle of the library, and the inverse by conjugate gradients."""
+    """Common base of both operators: a handle of the library, and an iterative inverse."""
 
     nx: int
     ny: int
@@ -69,14 +70,17 @@ class _Operator:
         return np.stack([ux, uy]) if self._components == 2 else ux
 
     def _half(self, part: int) -> FloatArray:
-        """Return a part of the symbol over the first half of the wave numbers."""
+        """Return a part of the symbol for the first half of the wave numbers along both axes."""
         my, mx = self._transform
         values = np.zeros((my // 2 + 1, mx // 2 + 1))
         _symbol(self._handle, part, values.T)
         return values
 
     def _whole(self, part: int, sign: int = 1) -> FloatArray:
-        """Return a part of the symbol in the order of an FFT; `sign` is that for k -> (-kx, ky)."""
+        """Return a part of the symbol in the order of an FFT.
+
+        `sign` is 1 for a part that is even in kx and ky, and -1 for one that is odd in both.
+        """
         my, mx = self._transform
         kx, ky = np.arange(mx), np.arange(my)
         half = self._half(part)
@@ -88,7 +92,7 @@ class _Operator:
         return values
 
     def _solved(self, displacements: FloatArray, tolerance: float, most: int) -> FloatArray:
-        """Return the tractions by conjugate gradients: the operator is symmetric and positive."""
+        """Return the tractions by conjugate gradients; the operator is symmetric and positive."""
         periodic = self.boundary == "periodic"
         mean_axes = (-2, -1)
         target = displacements
@@ -122,42 +126,57 @@ class _Operator:
 
 
 class NormalOperator(_Operator):
-    """Normal displacements of an elastic half-space from normal tractions; made by `normal`.
-
-    Attributes
-    ----------
-    symbol : ndarray
-        Real factors of the modes, m/Pa, in the order of ``numpy.fft.fft2``: of shape (ny, nx) in a
-        periodic cell, where ``apply(p)`` is ``ifft2(symbol * fft2(p)).real``; of the shape of the
-        grid padded with zeros in free space, where the first ny x nx values of that are.
-    """
+    """Normal displacements of an elastic half-space from normal tractions, created by `normal`."""
 
     _components = 1
 
     def apply(self, pressure: ArrayLike) -> FloatArray:
-        """Return the displacements, m, of normal tractions, Pa; shapes (ny, nx)."""
+        """Return the displacements that normal tractions cause.
+
+        Parameters
+        ----------
+        pressure : array_like, shape (ny, nx)
+            Normal tractions, Pa.
+
+        Returns
+        -------
+        ndarray, shape (ny, nx)
+            Normal displacements, m.
+
+        Raises
+        ------
+        ValueError
+            If the shape is wrong.
+        """
         return self._applied(self._field("pressure", pressure))
 
     def inverse(self, displacement: ArrayLike, *, tolerance: float = 1e-12,
                 max_iterations: int = 10000) -> FloatArray:
-        """Return the tractions, Pa, that cause displacements, m.
+        """Return the normal tractions that cause given displacements.
 
-        In a periodic cell the mean of the displacements is left out and that of the tractions is
-        zero. In free space the equations are solved by conjugate gradients.
+        In a periodic cell the mean displacement is ignored, and the mean traction is zero. On a
+        free patch the equations are solved by conjugate gradients.
 
         Parameters
         ----------
-        displacement : array_like
-            Displacements, m, of shape (ny, nx).
+        displacement : array_like, shape (ny, nx)
+            Normal displacements, m.
         tolerance : float
-            Residual over the displacements, in free space.
+            Largest residual relative to the displacements, for a free patch.
         max_iterations : int
-            The most iterations, in free space.
+            Largest number of iterations, for a free patch.
+
+        Returns
+        -------
+        ndarray, shape (ny, nx)
+            Normal tractions, Pa.
 
         Raises
         ------
+        ValueError
+            If the shape is wrong.
         NotConverged
-            If the tolerance is not reached; its ``result`` are the tractions found.
+            If the tolerance is not reached. Its ``result`` are the tractions found so far.
         """
         field = self._field("displacement", displacement)
         if self.boundary != "periodic":
@@ -168,40 +187,75 @@ class NormalOperator(_Operator):
 
     @property
     def symbol(self) -> FloatArray:
-        """Real factors of the modes, m/Pa."""
+        """Real factors of the Fourier modes, m/Pa, in the order of ``numpy.fft.fft2``.
+
+        In a periodic cell the shape is (ny, nx), and ``apply(p)`` is ``ifft2(symbol *
+        fft2(p)).real``. On a free patch the shape is that of the grid padded with zeros, and the
+        first ny x nx values of this product are the displacements.
+        """
         return self._whole(1)
 
 
 class TangentialOperator(_Operator):
-    """Tangential displacements of an elastic half-space from tangential tractions.
-
-    Made by `tangential`.
-
-    Attributes
-    ----------
-    symbol : ndarray
-        Real factors of the modes, m/Pa, of shape (2, 2, ny, nx), in the order of
-        ``numpy.fft.fft2``; in free space on the grid padded with zeros.
-    """
+    """Tangential displacements of an elastic half-space or block, created by `tangential`."""
 
     _components = 2
 
     def apply(self, traction: ArrayLike) -> FloatArray:
-        """Return the displacements, m, of tractions, Pa; shapes (2, ny, nx)."""
+        """Return the displacements that tangential tractions cause.
+
+        Parameters
+        ----------
+        traction : array_like, shape (2, ny, nx)
+            Tangential tractions along x and y, Pa.
+
+        Returns
+        -------
+        ndarray, shape (2, ny, nx)
+            Tangential displacements, m.
+
+        Raises
+        ------
+        ValueError
+            If the shape is wrong.
+        """
         return self._applied(self._field("traction", traction))
 
     def inverse(self, displacement: ArrayLike, *, tolerance: float = 1e-12,
                 max_iterations: int = 10000) -> FloatArray:
-        """Return the tractions, Pa, that cause displacements, m, of shape (2, ny, nx).
+        """Return the tangential tractions that cause given displacements, by conjugate gradients.
 
-        The means are left out as by `NormalOperator.inverse`. The equations are solved by
-        conjugate gradients.
+        In a periodic cell the mean displacement is ignored, and the mean traction is zero.
+
+        Parameters
+        ----------
+        displacement : array_like, shape (2, ny, nx)
+            Tangential displacements, m.
+        tolerance : float
+            Largest residual relative to the displacements.
+        max_iterations : int
+            Largest number of iterations.
+
+        Returns
+        -------
+        ndarray, shape (2, ny, nx)
+            Tangential tractions, Pa.
+
+        Raises
+        ------
+        ValueError
+            If the shape is wrong.
+        NotConverged
+            If the tolerance is not reached. Its ``result`` are the tractions found so far.
         """
         return self._solved(self._field("displacement", displacement), tolerance, max_iterations)
 
     @property
     def symbol(self) -> FloatArray:
-        """Real factors of the modes, m/Pa."""
+        """Real factors of the Fourier modes, m/Pa, of shape (2, 2, ny, nx).
+
+        Their order, and the size on a free patch, are those of `NormalOperator.symbol`.
+        """
         xx, yy, xy = self._whole(1), self._whole(2), self._whole(3, sign=-1)
         return np.stack([np.stack([xx, xy]), np.stack([xy, yy])])
 
@@ -215,15 +269,22 @@ def normal(nx: int, ny: int, lx: float, ly: float | None = None, *, modulus: flo
     nx, ny : int
         Number of cells.
     lx, ly : float
-        Lengths of the cell, m; `ly` defaults to square cells.
+        Lengths of the grid, m; by default `ly` makes the cells square.
     modulus : float
-        Plane-strain modulus E* = 2 G/(1 - nu), Pa.
+        Contact modulus E* = 2 G/(1 - nu), Pa.
     boundary : str
         'periodic' or 'free'.
 
     Returns
     -------
     NormalOperator
+
+    Raises
+    ------
+    ValueError
+        If an argument is not allowed.
+    MemoryError
+        If there is not enough memory.
 
     Examples
     --------
@@ -248,28 +309,27 @@ def tangential(nx: int, ny: int, lx: float, ly: float | None = None, *, modulus:
     nx, ny : int
         Number of cells.
     lx, ly : float
-        Lengths of the cell, m; `ly` defaults to square cells.
+        Lengths of the grid, m; by default `ly` makes the cells square.
     modulus : float
         Shear modulus G, Pa.
     poisson : float
         Poisson ratio.
     thickness : float
-        Thickness of the block, m, which gives the mean traction of a periodic cell a displacement;
-        0 leaves the mean out.
+        Thickness of the block, m. In a periodic cell the mean traction T then causes the mean
+        displacement thickness T/G. With 0 the mean displacement is zero.
     boundary : str
         'periodic' or 'free'.
 
     Returns
     -------
     TangentialOperator
+
+    Raises
+    ------
+    ValueError
+        If an argument is not allowed.
+    MemoryError
+        If there is not enough memory.
     """
-    return TangentialOperator(nx, ny, lx, ly, modulus, boundary, _ratio(poisson),
+    return TangentialOperator(nx, ny, lx, ly, modulus, boundary, poisson_ratio(poisson),
                               float(thickness))
-
-
-def _ratio(poisson: Any) -> float:
-    """Return a Poisson ratio that an elastic body can have."""
-    value = float(poisson)
-    if not -1.0 < value <= 0.5:
-        raise ValueError(f"poisson = {poisson}: must be above -1 and at most 0.5")
-    return value

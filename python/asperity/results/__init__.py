@@ -1,4 +1,4 @@
-"""Results of runs: one HDF5 file each, read while the run goes on or afterwards.
+"""Results of runs. Each is one HDF5 file, which can be read during the run or afterwards.
 
 All quantities are in SI units. Fields have the shape (ny, nx): ``field[j, i]`` belongs to
 ``x[i]``, ``y[j]``.

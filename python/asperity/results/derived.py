@@ -1,4 +1,4 @@
-"""Numbers that follow from a result: friction by its causes, the books of energy, slopes."""
+"""Quantities derived from a result: causes of friction, energy balance, slopes of the road."""
 
 from __future__ import annotations
 
@@ -21,10 +21,19 @@ FloatArray = NDArray[np.float64]
 
 
 def setting(run: Run, group: str, name: str) -> str | None:
-    """Return a setting of the run as text, without quotes; None where the file does not tell.
+    """Return a setting of the run as text, without quotes.
 
-    The first group of that name counts. The resolved settings are read, or the input where an
-    older file has none.
+    Parameters
+    ----------
+    run : Run
+        The result.
+    group, name : str
+        Group and variable of the input. Of several groups of this name the first counts.
+
+    Returns
+    -------
+    str or None
+        The value among the resolved settings (in older files, the input). None if it is missing.
     """
     text = str(run.attributes.get("settings", "") or run.input)
     for body in re.findall(rf"(?is)&{group}\b(.*?)(?:\n\s*/|/\s*(?:\n|$))", text):
@@ -35,7 +44,7 @@ def setting(run: Run, group: str, name: str) -> str | None:
 
 
 def solver_setting(run: Run, name: str) -> float | None:
-    """Return a number of the group `&solver`, such as its tolerance."""
+    """Return a number of the group `&solver`, such as its tolerance, or None if it is missing."""
     text = setting(run, "solver", name)
     try:
         return None if text is None else float(text.lower().replace("d", "e"))
@@ -44,7 +53,7 @@ def solver_setting(run: Run, name: str) -> float | None:
 
 
 def has_friction(run: Run) -> bool:
-    """Whether the interface of the run has friction."""
+    """Return whether the interface of the run has friction."""
     law = setting(run, "friction", "law")
     if law is not None:
         return law.lower() != "none"
@@ -54,7 +63,7 @@ def has_friction(run: Run) -> bool:
 
 
 def has_adhesion(run: Run) -> bool:
-    """Whether the surfaces of the run attract each other."""
+    """Return whether the run has adhesion."""
     potential = setting(run, "adhesion", "potential")
     if potential is not None:
         return potential.lower() != "none"
@@ -62,19 +71,19 @@ def has_adhesion(run: Run) -> bool:
 
 
 def has_rough_road(run: Run) -> bool:
-    """Whether the road is self-affine or measured."""
+    """Return whether the road is self-affine or a height map from a file."""
     return bool(re.search(r"(?i)shape *= *['\"](self_affine|file)['\"]", run.input))
 
 
 def is_elastic(run: Run) -> bool:
-    """Whether the material has no memory."""
+    """Return whether the material is elastic, that is, has no arms."""
     arms = run.material.get("prony_g")
     return ("shear_modulus" in run.material and "poisson" in run.material
             and (arms is None or not np.any(arms)))
 
 
 def rms_slope(grid: Grid, height: FloatArray) -> float:
-    """Root mean square slope of a periodic height map, spectral."""
+    """Return the rms slope of a periodic height map of shape (ny, nx), in m, by Fourier modes."""
     kx = 2.0 * np.pi * np.fft.rfftfreq(grid.nx, grid.dx)
     ky = 2.0 * np.pi * np.fft.fftfreq(grid.ny, grid.dy)
     modes = np.abs(np.fft.rfft2(height) / height.size) ** 2
@@ -83,10 +92,20 @@ def rms_slope(grid: Grid, height: FloatArray) -> float:
 
 
 def travel(run: Run) -> FloatArray | None:
-    """Return the way of the road, m, where its speeds differ so much that time hides the fast part.
+    """Return the travel of the road if it suits an axis better than time; otherwise None.
 
-    A phase that covers a tenth of the way in less than a twentieth of the time would be a vertical
-    line over time.
+    A phase that covers a tenth of the travel in less than a twentieth of the time would be a
+    vertical line in a picture over time.
+
+    Parameters
+    ----------
+    run : Run
+        The result.
+
+    Returns
+    -------
+    ndarray, shape (rows,), or None
+        Travel, m.
     """
     history = run.history
     if "road_x" not in history or "road_y" not in history:
@@ -103,11 +122,19 @@ def travel(run: Run) -> FloatArray | None:
 
 
 def energy_terms(run: Run) -> dict[str, FloatArray]:
-    """Return work put in, energy stored and energies lost, J, one value a row.
+    """Return the work put in, the energy stored and the energies lost, J, one value per row.
 
-    'work' is that of the normal and the tangential tractions, 'stored' the elastic, adhesive and
-    kinetic energy since the first row; 'viscous' and 'friction' are lost. What the history lacks
-    is left out, with nothing but zeros it is kept.
+    Parameters
+    ----------
+    run : Run
+        The result.
+
+    Returns
+    -------
+    dict of ndarray, shape (rows,)
+        'work' of the normal and the tangential tractions; 'stored', the sum of the elastic,
+        adhesive and kinetic energy; 'viscous' and 'friction', the losses. A term whose columns are
+        not in the history is left out.
     """
     history = run.history
 
@@ -125,10 +152,11 @@ def energy_terms(run: Run) -> dict[str, FloatArray]:
 
 
 def missing_work(run: Run) -> float | None:
-    """Return the largest `work_missing` over the largest work of load and drive, a number.
+    """Return the largest `work_missing` over the largest work of load and drive.
 
-    It measures the error of the steps: the work seen from outside and that of the fields agree only
-    as far as the steps resolve the motion. None where the history lacks a column or nothing works.
+    It measures the error of the steps: the work of load and drive agrees with that of the fields
+    only as far as the steps resolve the motion. The result is None if a column of the history is
+    missing or if no work is done.
     """
     names = ("work_missing", "work_load", "work_drive")
     if any(name not in run.history for name in names) or not run.history.rows:
@@ -140,10 +168,10 @@ def missing_work(run: Run) -> float | None:
 
 
 def closure(run: Run) -> FloatArray | None:
-    """Return what the books of energy miss in each row, over the largest energy so far.
+    """Return the error of the energy balance in each row, over the largest energy so far.
 
-    Work less the change of the stored energy less the losses; the first row counts from nothing:
-    the work of a jump is what it stores. None where the history lacks a term.
+    The error is the work minus the stored energy minus the losses. The result is None if a term is
+    missing in the history.
     """
     terms = energy_terms(run)
     if set(terms) != {"work", "stored", "viscous", "friction"} or not run.history.rows:
@@ -154,7 +182,7 @@ def closure(run: Run) -> FloatArray | None:
 
 
 def road_speed(run: Run) -> FloatArray:
-    """Return the speed of the road in each step, m/s; 0 where no time passes."""
+    """Return the speed of the road in each row, m/s; it is 0 in a row in which no time passes."""
     history = run.history
     passed = np.diff(history["time"])
     moved = np.hypot(np.diff(history["road_x"]), np.diff(history["road_y"]))
@@ -163,7 +191,7 @@ def road_speed(run: Run) -> FloatArray:
 
 
 def direction(run: Run, row: int) -> tuple[float, float] | None:
-    """Return the unit vector of the road's way up to a row: of its last move; None before."""
+    """Return the unit vector of the road's last motion up to a row, or None if it has not moved."""
     history = run.history
     for last in range(row, 0, -1):
         moved = [float(history[name][last] - history[name][last - 1])
@@ -177,7 +205,7 @@ def direction(run: Run, row: int) -> tuple[float, float] | None:
 def spline_coefficients(height: FloatArray, axis: int, periodic: bool) -> FloatArray:
     """Return the coefficients of the cubic B-splines through a map, along one axis.
 
-    On a bounded map the second derivatives at the ends come from one-sided differences, as in the
+    On a free map the second derivatives at the ends come from one-sided differences, as in the
     program (Fortran module `cubic_spline`).
 
     Parameters
@@ -185,14 +213,15 @@ def spline_coefficients(height: FloatArray, axis: int, periodic: bool) -> FloatA
     height : ndarray
         The map, or the coefficients along the other axis.
     axis : int
-        Axis along which the coefficients are found.
+        Axis along which the coefficients are computed.
     periodic : bool
-        Whether the map wraps.
+        Whether the map is periodic.
 
     Returns
     -------
     ndarray
-        One coefficient before the first cell and two behind the last one more than the map.
+        Coefficients. Along the axis there is one more before the first cell, and there are two more
+        behind the last cell.
     """
     from scipy.linalg import solve_banded
     from scipy.ndimage import spline_filter1d
@@ -220,7 +249,7 @@ def spline_coefficients(height: FloatArray, axis: int, periodic: bool) -> FloatA
 
 
 class RoadSlopes:
-    """The slopes of the road of a run, as its `interpolation` takes them.
+    """The slopes of the road of a run, computed by the `interpolation` of the run.
 
     Parameters
     ----------
@@ -231,7 +260,7 @@ class RoadSlopes:
     def __init__(self, run: Run) -> None:
         self.grid, self.height = run.grid, run.height
         self.periodic = self.grid.boundary == "periodic"
-        # A file that does not tell comes from before cubic splines became the default.
+        # A file without this setting is older than the default of cubic splines.
         self.cubic = (setting(run, "solver", "interpolation") or "linear") == "cubic"
         if self.cubic:
             along_y = spline_coefficients(self.height, 0, self.periodic)
@@ -240,7 +269,7 @@ class RoadSlopes:
             self.central = [self.differences(1, self.grid.dx), self.differences(0, self.grid.dy)]
 
     def differences(self, axis: int, spacing: float) -> FloatArray:
-        """Return central differences, one-sided ones on the rim of a free map."""
+        """Return central differences of the heights, one-sided ones at the edge of a free map."""
         height = self.height
         if height.shape[axis] < 2:
             return np.zeros_like(height)
@@ -249,7 +278,10 @@ class RoadSlopes:
         return np.gradient(height, spacing, axis=axis)
 
     def at(self, y: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return dH/dx and dH/dy at places in cells; 0 more than one cell outside a free map."""
+        """Return dH/dx and dH/dy at positions that are given in cells.
+
+        More than one cell outside a free map they are 0.
+        """
         from scipy.ndimage import map_coordinates
 
         if not self.cubic:
@@ -280,7 +312,7 @@ class RoadSlopes:
 
 
 def spline_weights(u: FloatArray) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Return the four cubic B-splines about a point at `u`, 0 to 1, of a cell, and their slopes."""
+    """Return the four cubic B-splines and their slopes at a position `u` in a cell, 0 to 1."""
     w = 1.0 - u
     weights = [w**3 / 6, (4 - 6 * u**2 + 3 * u**3) / 6, (4 - 6 * w**2 + 3 * w**3) / 6, u**3 / 6]
     slopes = [-w**2 / 2, 1.5 * u**2 - 2 * u, 2 * w - 1.5 * w**2, u**2 / 2]
@@ -289,19 +321,20 @@ def spline_weights(u: FloatArray) -> tuple[list[FloatArray], list[FloatArray]]:
 
 def moved_slopes(snapshot: Snapshot, road: tuple[float, float],
                  slopes: RoadSlopes | None = None) -> tuple[FloatArray, FloatArray]:
-    """Return the slopes of the road under the points of the rubber, as the program takes them.
+    """Return the slopes of the moved road under the points of the rubber, as the program does.
 
-    They are those of the cubic spline through the map (or bilinear between central differences,
-    with `interpolation = 'linear'`) where the road has moved to, seen from the displaced rubber.
+    They are those of the cubic spline through the map or, with `interpolation = 'linear'`, central
+    differences that are interpolated bilinearly. They are taken at the displaced points of the
+    rubber's surface.
 
     Parameters
     ----------
     snapshot : Snapshot
-        Its displacements along x and y are used where it has them.
+        The snapshot. Its displacements along x and y are used if it has them.
     road : tuple of float
-        How far the road has moved along x and y, m.
+        Displacement of the road along x and y, m.
     slopes : RoadSlopes, optional
-        That of the run, where many snapshots are looked at.
+        The slopes of the run's road; passing them saves time for many snapshots.
 
     Returns
     -------
@@ -320,22 +353,22 @@ def moved_slopes(snapshot: Snapshot, road: tuple[float, float],
 
 
 def friction_outside(run: Run) -> tuple[FloatArray, FloatArray]:
-    """Return how much of the friction coefficient comes from attraction outside the contact.
+    """Return the part of the friction coefficient that is due to attraction outside the contact.
 
-    It is -mean(P dH/ds) over the open cells, over mean(P), a part of the viscous friction, known
-    at the snapshots only.
+    It is -mean(P dH/ds)/mean(P), with the first mean over the open cells only. It is a part of the
+    viscous friction, and known at the snapshots only.
 
     Parameters
     ----------
     run : Run
-        With adhesion and snapshots of pressure and contact.
+        A result with adhesion, and with snapshots of pressure and contact.
 
     Returns
     -------
     rows : ndarray of int
         Rows of the history that have a value.
     values : ndarray
-        The coefficients.
+        The coefficients in these rows.
     """
     rows, values = [], []
     slopes = None

@@ -1,6 +1,6 @@
-"""Friction against speed, pressure and temperature: values of every patch, means, intervals.
+"""Friction against speed, pressure and temperature: values of all patches, means and intervals.
 
-Arrays have the dimensions (pressure, temperature, speed, patch), or these without the patch.
+Arrays have the dimensions (pressure, temperature, speed, patch), or the first three of these.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ MEANINGS = {
     "mean_gap": ("m", "mean gap"),
     "friction_persson": ("1", "friction by Persson's theory for the spectrum of the patches"),
     "area_persson": ("1", "contact area by Persson's theory"),
-    "friction_left_out": ("1", "what the left-out waves of the road would add, by that theory"),
+    "friction_left_out": ("1", "friction that the omitted waves would add by Persson's theory"),
     "loss_octave": ("W/m2", "loss in the rubber by octave of the wavelength, mean over patches"),
     "loss_arm": ("W/m2", "loss in the rubber by arm of the Prony series, mean over patches"),
     "octave": ("m", "longest wavelength of the octave"),
@@ -56,16 +56,16 @@ def interval(values: FloatArray, confidence: float = 0.95) -> tuple[FloatArray, 
     Parameters
     ----------
     values : ndarray, shape (..., n)
-        Values of the patches; those that are NaN are left out.
+        Values of the patches. NaN are left out.
     confidence : float
-        0 to 1.
+        Probability that the interval contains the true mean, 0 to 1.
 
     Returns
     -------
     mean, low, high : ndarray, shape (...)
-        The ends are NaN where fewer than two values are there.
+        Mean, and ends of the interval; the ends are NaN if there are fewer than two values.
     count : ndarray of int, shape (...)
-        Number of values.
+        Number of values that are not NaN.
 
     Examples
     --------
@@ -93,16 +93,16 @@ class FrictionCurve:
     Attributes
     ----------
     pressure, temperature, speed : ndarray
-        Pa, C, m/s; the axes.
+        The axes: Pa, C, m/s.
     patches : list of str
-        Where each patch comes from.
+        Origin of each patch.
     values : dict of ndarray, shape (pressure, temperature, speed, patch)
         'friction', 'friction_viscous', 'friction_interface', 'contact_area', 'mean_gap'; NaN where
         a solver did not converge.
     theory : dict of ndarray, shape (pressure, temperature, speed)
         'friction_persson', 'area_persson', 'friction_left_out'.
     losses : dict of ndarray, shape (pressure, temperature, speed, parts)
-        'loss_octave' and 'loss_arm', W/m2, where the results hold them.
+        'loss_octave' and 'loss_arm', W/m2, if the results contain them.
     octave, relaxation_time : ndarray
         Longest wavelength of each octave, m; relaxation time of each arm, s.
     a_t, b_t : ndarray, shape (temperature,)
@@ -110,9 +110,9 @@ class FrictionCurve:
     sources : dict
         Result file and row of a point of the first patch, by the indices of the point.
     settings : dict
-        How it was made.
+        Settings of the computation.
     notes : list of str
-        What the user should know.
+        Notes for the user.
     """
 
     pressure: FloatArray
@@ -136,11 +136,17 @@ class FrictionCurve:
         Parameters
         ----------
         name : str
-            One of `values`.
+            One of the names in `values`.
 
         Returns
         -------
         mean, low, high : ndarray, shape (pressure, temperature, speed)
+            In the unit of the variable.
+
+        Raises
+        ------
+        KeyError
+            If there is no such variable.
         """
         return interval(self.values[name])[:3]
 
@@ -155,7 +161,7 @@ class FrictionCurve:
         return float(np.nanmax(half)) if np.isfinite(half).any() else math.inf
 
     def rows(self) -> list[tuple[float, ...]]:
-        """Return the rows of the table, with the columns of `COLUMNS`."""
+        """Return the rows of the table: one per point, with the columns of `COLUMNS`."""
         means = {name: self.mean(name) for name in ("friction", "friction_viscous", "contact_area",
                                                     "mean_gap")}
         count = interval(self.values["friction"])[3]
@@ -171,12 +177,22 @@ class FrictionCurve:
         return rows
 
     def to_csv(self, path: str | Path) -> Path:
-        """Write the table; return the file.
+        """Write the table.
 
         Parameters
         ----------
         path : str or Path
-            NAME.csv.
+            The file, NAME.csv.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written.
         """
         lines = [",".join(COLUMNS)]
         lines += [",".join(repr(value) for value in row) for row in self.rows()]
@@ -190,9 +206,9 @@ class FrictionCurve:
         Returns
         -------
         xarray.Dataset
-            Dimensions pressure, temperature, speed, patch, octave and arm; every variable has
-            `units` and `long_name`. Means and ends of the intervals are ``friction_mean``,
-            ``friction_low``, ``friction_high`` and so on.
+            The dimensions are pressure, temperature, speed, patch, octave and arm. Every variable
+            has the attributes `units` and `long_name`. Means and ends of the intervals have names
+            such as ``friction_mean``, ``friction_low`` and ``friction_high``.
 
         Raises
         ------
@@ -202,67 +218,89 @@ class FrictionCurve:
         xarray = needed("xarray", "to_xarray")
         axes = ("pressure", "temperature", "speed")
 
-        def told(name: str, more: str = "") -> dict[str, str]:
+        def described(name: str, more: str = "") -> dict[str, str]:
             return {"units": MEANINGS[name][0], "long_name": MEANINGS[name][1] + more}
 
         variables: dict[str, Any] = {}
         for name, array in self.values.items():
-            variables[name] = ((*axes, "patch"), array, told(name))
+            variables[name] = ((*axes, "patch"), array, described(name))
             ends = zip(("mean", "low", "high"), self.mean(name), strict=True)
             for end, part in ends:
-                variables[f"{name}_{end}"] = (axes, part, told(name, {
+                variables[f"{name}_{end}"] = (axes, part, described(name, {
                     "mean": ", mean over patches", "low": ", lower end of the 95 % interval",
                     "high": ", upper end of the 95 % interval"}[end]))
         for name, array in self.theory.items():
-            variables[name] = (axes, array, told(name))
+            variables[name] = (axes, array, described(name))
         for name, array in self.losses.items():
             part = name.removeprefix("loss_")
-            variables[name] = ((*axes, part), array, told(name))
+            variables[name] = ((*axes, part), array, described(name))
         for name in ("a_t", "b_t"):
-            variables[name] = ("temperature", getattr(self, name), told(name))
-        variables["relaxation_time"] = ("arm", self.relaxation_time, told("relaxation_time"))
-        coordinates: dict[str, Any] = {name: (name, getattr(self, name), told(name))
+            variables[name] = ("temperature", getattr(self, name), described(name))
+        variables["relaxation_time"] = ("arm", self.relaxation_time, described("relaxation_time"))
+        coordinates: dict[str, Any] = {name: (name, getattr(self, name), described(name))
                                        for name in axes}
         coordinates["patch"] = ("patch", np.arange(len(self.patches)))
-        coordinates["octave"] = ("octave", self.octave, told("octave"))
+        coordinates["octave"] = ("octave", self.octave, described("octave"))
         settings = {name: str(value) for name, value in self.settings.items()}
         return xarray.Dataset(variables, coordinates,
                               {**settings, "patches": "\n".join(self.patches),
                                "notes": "\n".join(self.notes)})
 
     def to_netcdf(self, path: str | Path) -> Path:
-        """Write everything as a netCDF file (classic format); return the file.
+        """Write all data as a netCDF file (classic format).
 
         Parameters
         ----------
         path : str or Path
-            NAME.nc.
+            The file, NAME.nc.
+
+        Returns
+        -------
+        Path
+            The file.
 
         Raises
         ------
         ImportError
             If xarray is not installed.
+        OSError
+            If the file cannot be written.
         """
         path = Path(path)
         self.to_xarray().to_netcdf(path, engine="scipy")
         return path
 
     def plot(self) -> Any:
-        """Draw friction and contact area against speed; return the figure of matplotlib."""
+        """Draw friction and contact area against speed.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
         return present("plot_friction_curve", self)
 
     def to_html(self, path: str | Path) -> Path:
-        """Write a page for any browser; return the file.
+        """Write an HTML page for any browser.
 
         Parameters
         ----------
         path : str or Path
-            NAME.html.
+            The file, NAME.html.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written.
         """
         return present("write_curve_page", self, path)
 
     def summary(self) -> str:
-        """Return the table as text, and the notes."""
+        """Return the table and the notes as text."""
         heads = ("p (Pa)", "T (C)", "v (m/s)", "friction", "95 % interval", "viscous", "area",
                  "Persson", "patches")
         lines = ["  ".join(head.rjust(max(9, len(head))) for head in heads)]
@@ -276,5 +314,5 @@ class FrictionCurve:
         return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
 
     def settings_text(self) -> Mapping[str, str]:
-        """Return how it was made, in words."""
+        """Return the settings of the computation as text."""
         return {name: str(value) for name, value in self.settings.items()}

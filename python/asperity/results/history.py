@@ -1,4 +1,4 @@
-"""The grid of a run and its history: one row for the initial state, one for each step."""
+"""The grid of a run, and its history, which has one row per solve."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Grid:
     nx, ny : int
         Number of cells; ``ny == 1`` is a plane-strain line contact.
     lx, ly : float
-        Lengths of the cell, m.
+        Lengths of the grid, m.
     boundary : str
         'periodic' or 'free'.
     x, y : ndarray
@@ -57,11 +57,11 @@ class Grid:
 
 
 class History(NamedValues, HistoryColumns):
-    """The history of a run: a mapping from names to numpy arrays, one value a row.
+    """The history of a run: a mapping from names to NumPy arrays with one value per row.
 
-    The row 0 is the initial state; a step adds a row. Of a run that is being written, the rows
-    that every column has are shown. This version writes the columns of `HistoryColumns`; older
-    files may lack some.
+    Row 0 is the initial state, and every jump or step adds a row. If the run is still writing, only
+    the rows that are complete in all columns are included. This version writes the columns of
+    `HistoryColumns`; older files may have fewer.
     """
 
     def __init__(self, columns: dict[str, NDArray[Any]], units: dict[str, str],
@@ -78,7 +78,7 @@ class History(NamedValues, HistoryColumns):
         return min((len(column) for column in self._values.values()), default=0)
 
     def units(self, name: str) -> str:
-        """Return the units of a column, '1' for a pure number."""
+        """Return the units of a column; they are '1' for a pure number."""
         self[name]
         return self._units.get(name, "1")
 
@@ -93,7 +93,7 @@ class History(NamedValues, HistoryColumns):
         Returns
         -------
         pandas.DataFrame
-            A column a quantity, a line a row of the history, in SI units.
+            One column per quantity, one line per row of the history, in SI units.
 
         Raises
         ------

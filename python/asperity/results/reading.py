@@ -1,4 +1,4 @@
-"""Reading of result files, which the program may be writing at the same time."""
+"""Reading of result files, to which the program may be writing at the same time."""
 
 from __future__ import annotations
 
@@ -18,14 +18,18 @@ _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 class NotAResultError(OSError):
-    """The file lacks what every result holds."""
+    """The file is not a result, because parts that every result has are missing."""
 
 
 def read_file(path: Path, read: Callable[[h5py.File], T]) -> T:
-    """Open the file, read, close it; a file caught in the middle of a write is tried again."""
+    """Open a file, call `read` with it, and close it.
+
+    If this fails, for example because the program is writing at that moment, it is repeated a few
+    times.
+    """
     _check(path)
     reason: OSError
-    options: dict[str, Any] = {"locking": False}  # the program may be writing
+    options: dict[str, Any] = {"locking": False}  # because the program may be writing
     for attempt in range(5):
         try:
             with h5py.File(path, "r", **options) as file:
@@ -34,7 +38,7 @@ def read_file(path: Path, read: Callable[[h5py.File], T]) -> T:
             reason = error
         except (OSError, RuntimeError, KeyError) as error:
             detail = str(error.args[0] if error.args else error)
-            if "locking flag" in detail:  # the caller has it open through h5py's defaults
+            if "locking flag" in detail:  # the caller has the file open with h5py's defaults
                 options = {}
             reason = OSError(f"{path}: cannot be read: {detail}; if its run was killed,"
                              " `asperity run CASE.nml --restart` goes on from the last checkpoint;"
@@ -44,7 +48,7 @@ def read_file(path: Path, read: Callable[[h5py.File], T]) -> T:
 
 
 def _check(path: Path) -> None:
-    """Raise what is wrong with a file before HDF5 looks at it."""
+    """Raise OSError for faults that HDF5 would not explain well."""
     if path.is_dir():
         raise IsADirectoryError(f"{path}: is a folder: name the file RESULT.h5 in it")
     if not path.exists():
@@ -58,20 +62,20 @@ def _check(path: Path) -> None:
 
 
 def text_of(value: Any) -> str:
-    """Return a text attribute, of whatever string type it is."""
+    """Return a text attribute as a string, whatever type of string it has in the file."""
     value = scalar_of(value)
     if isinstance(value, str):
-        value = value.encode("utf-8", errors="surrogateescape")  # h5py's way with other bytes
+        value = value.encode("utf-8", errors="surrogateescape")  # undoes h5py's treatment of bytes
     if isinstance(value, bytes):
         try:
             value = value.decode("utf-8")
         except UnicodeDecodeError:
-            value = value.decode("latin-1")  # of an input that is not UTF-8
+            value = value.decode("latin-1")  # from an input that is not UTF-8
     return str(value).rstrip(" \0")
 
 
 def scalar_of(value: Any) -> Any:
-    """Return the value of an array of one element, anything else as it is."""
+    """Return the element of an array of one element, and anything else unchanged."""
     if isinstance(value, np.ndarray) and value.size == 1:
         return value.reshape(-1)[0]
     return value

@@ -1,4 +1,4 @@
-"""What a result file tells of its run: title, grid, material, history and how it ended."""
+"""A result file without its snapshots: title, grid, material, history, outcome."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ FloatArray = NDArray[np.float64]
 
 
 class Losses(NamedTuple):
-    """Where a row of steady sliding loses its energy.
+    """The losses of a row of steady sliding, by wavelength and by arm.
 
     Attributes
     ----------
-    wavelength : (n,) array
+    wavelength : ndarray, shape (n,)
         Longest wavelength of each octave, m.
-    octave : (n,) array
-        Rate of loss in the rubber of each octave of the wavelength, W.
-    arm : (m,) array
-        Rate of loss of each arm of the Prony series, W.
+    octave : ndarray, shape (n,)
+        Rate of loss in the rubber by each octave of the wavelength, W.
+    arm : ndarray, shape (m,)
+        Rate of loss in the rubber by each arm of the Prony series, W.
     """
 
     wavelength: FloatArray
@@ -52,12 +52,17 @@ class Material(NamedValues):
 
 
 class ResultFile:
-    """The file of a run, without its snapshots; `asperity.Run` has those, too.
+    """The result file of a run without its snapshots, which `asperity.Run` adds.
 
     Parameters
     ----------
-    path : str or path
+    path : str or Path
         The file, RESULT.h5.
+
+    Raises
+    ------
+    OSError
+        If the file is missing, cannot be read, or is not a result.
     """
 
     path: Path
@@ -72,7 +77,7 @@ class ResultFile:
         self._read()
 
     def _read(self) -> None:
-        """Read all but the fields; what is there belongs to one moment."""
+        """Read everything except the fields in one go, so that all parts belong together."""
         def read(file: h5py.File) -> None:
             for group in ("grid", "history"):
                 if group not in file:
@@ -106,9 +111,10 @@ class ResultFile:
         read_file(self.path, read)
 
     def _of_rows(self, file: h5py.File, name: str) -> list[tuple[str, h5py.Group]]:
-        """Return the members of a group that belong to rows, in order of their steps.
+        """Return the members of a group that belong to rows of the history, in their order.
 
-        A run that goes on may have added more of them since its rows were read.
+        Members of later rows, which the run may have added since the history was read, are left
+        out.
         """
         steps = self.history["step"]
         last = int(steps.max()) if steps.size else -1
@@ -116,16 +122,16 @@ class ResultFile:
         return [(key, file[name][key]) for key in sorted(keys, key=int)]
 
     def _compare(self, sums: NDArray[np.float64]) -> None:
-        """Warn of rows of the history that do not agree with their checksums."""
+        """Warn about rows of the history that do not agree with their checksums."""
         names = sorted(name for name in self.history if name != "seconds")
         rows = min(self.history.rows, len(sums))
         table = np.ascontiguousarray(np.stack([self.history[name][:rows].astype("<f8")
                                                for name in names], axis=1))
         wrong = [row for row in range(rows) if zlib.crc32(table[row].data) != sums[row]]
         if wrong:
-            told = ", ".join(map(str, wrong[:5])) + (", ..." if len(wrong) > 5 else "")
+            listed = ", ".join(map(str, wrong[:5])) + (", ..." if len(wrong) > 5 else "")
             warnings.warn(f"{self.path}: the history does not agree with its checksums: the file"
-                          f" is damaged in row{'s' * (len(wrong) > 1)} {told}", UserWarning,
+                          f" is damaged in row{'s' * (len(wrong) > 1)} {listed}", UserWarning,
                           stacklevel=2)
 
     @property
@@ -145,27 +151,27 @@ class ResultFile:
 
     @property
     def created(self) -> str:
-        """When the file was made, ISO 8601, UTC."""
+        """Time at which the file was created, ISO 8601, UTC."""
         return str(self.attributes.get("created", ""))
 
     @property
     def input(self) -> str:
-        """The namelist file of the case, verbatim."""
+        """The text of the input file."""
         return str(self.attributes.get("input", ""))
 
     @property
     def finished(self) -> bool:
-        """Whether the run has come to its end."""
+        """Whether the run is complete."""
         return bool(int(self.attributes.get("finished", 0)))
 
     @property
     def outcome(self) -> str:
-        """How the run ended: 'running' (or killed), 'finished', 'stopped after ...', or why not."""
+        """How the run ended: 'running' (or killed), 'finished', 'stopped after ...', or a fault."""
         return str(self.attributes.get("outcome", "finished" if self.finished else "running"))
 
     @property
     def warnings(self) -> list[str]:
-        """The warnings of the input, then those of the run (once it has ended or stopped)."""
+        """The warnings about the input, then those of the run (once it has ended or stopped)."""
         return [line for name in ("warnings", "run_warnings")
                 for line in str(self.attributes.get(name, "")).splitlines() if line.strip()]
 

@@ -1,4 +1,4 @@
-"""The result of a run: its file, its snapshots, and how it shows itself."""
+"""The result of a run: its file, its snapshots, and calls that draw or export it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Run(ResultFile):
 
     Parameters
     ----------
-    path : str or path
+    path : str or Path
         The file, RESULT.h5.
 
     Attributes
@@ -34,11 +34,11 @@ class Run(ResultFile):
     path : Path
         The file.
     title, program, version, created : str
-        Title of the case; what wrote the file and when.
+        Title of the case; name and version of the program; time of creation.
     input : str
-        The namelist file of the case, verbatim.
+        The text of the input file.
     finished : bool
-        Whether the run has come to its end.
+        Whether the run is complete.
     grid : Grid
         The grid of cells.
     material : Material
@@ -46,11 +46,16 @@ class Run(ResultFile):
     attributes : OpenValues
         All attributes of the file.
     history : History
-        One value a row: ``run.history["friction"]``.
+        Columns with one value per row: ``run.history["friction"]``.
     losses : dict[int, Losses]
-        Where each row of steady sliding loses its energy, by the row's number.
+        Losses of each row of steady sliding, by the number of the row.
     snapshots : Snapshots
         The stored fields: ``run.snapshots[-1].pressure``.
+
+    Raises
+    ------
+    OSError
+        If the file is missing, cannot be read, or is not a result.
     """
 
     snapshots: Snapshots
@@ -60,11 +65,12 @@ class Run(ResultFile):
         self.snapshots = Snapshots(self, self._snapshot_keys)
 
     def refresh(self) -> Run:
-        """Read again what a run that is still going has written since; return the run itself.
+        """Read the file again, for what a run has written since.
 
         Returns
         -------
         Run
+            The same object.
 
         Raises
         ------
@@ -77,17 +83,15 @@ class Run(ResultFile):
 
     @property
     def state(self) -> str:
-        """How the run stands, in words.
+        """The state of the run in words: 'finished', or 'not finished' with more information.
 
-        'finished', or 'not finished' with why it ended, or else with the time since the file was
-        last written: where that is much longer than a row takes, the run was perhaps killed.
+        If the run has ended, the text says why. Otherwise it gives the time since the file was last
+        written, and says if the run seems to have been killed.
         """
         return standing(self)
 
     def steady(self, column: str = "friction") -> SteadyMean:
-        """Return the mean of a column over whole laps at the end of the slide, with its error.
-
-        A mean over part of a lap depends on which part it is: a warning tells.
+        """Return the mean of a column over the last complete laps of the road, with its error.
 
         Parameters
         ----------
@@ -97,7 +101,7 @@ class Run(ResultFile):
         Returns
         -------
         SteadyMean
-            `mean`, `error` (standard error, NaN of fewer than two laps) and `laps`.
+            `mean`, `error` (standard error, NaN for fewer than two laps) and `laps`.
 
         Raises
         ------
@@ -105,6 +109,12 @@ class Run(ResultFile):
             If there is no such column.
         ValueError
             If the history has no rows.
+
+        Warns
+        -----
+        UserWarning
+            If the run slides for less than two laps. The mean over a part of a lap depends on which
+            part it is.
         """
         found = steady_mean(self, column)
         if found.note:
@@ -122,24 +132,32 @@ class Run(ResultFile):
              **style: Any) -> Axes | Figure:
         """Draw a column of the history, or without a name an overview of the run.
 
-        With friction, 'friction' is drawn with its causes, 'contact_area' with the area that
-        sticks and 'sliding_speed' with the road's; 'energy' draws the books of energy.
+        In a run with friction, 'friction' is drawn with its causes, 'contact_area' with the stick
+        area, and 'sliding_speed' with the speed of the road. 'energy' draws the energy balance.
 
         Parameters
         ----------
         name : str, optional
-            Column to draw, or 'energy'; the overview if left out.
+            Column to draw, or 'energy'; by default the overview.
         x : str, optional
-            Column along the axis: time by default; where time stands still, pressure or step.
+            Column along the horizontal axis. The default is time or, if no time passes, pressure or
+            step.
         ax : matplotlib.axes.Axes, optional
-            Where to draw; a new figure, one column wide, if left out.
+            Axes to draw into; by default a new figure that fits one column of a journal.
         **style
-            Passed on to `matplotlib.axes.Axes.plot` for the column itself.
+            Options of `matplotlib.axes.Axes.plot` for the line of the column.
 
         Returns
         -------
         matplotlib.axes.Axes or matplotlib.figure.Figure
             The axes of a column; the figure of the overview.
+
+        Raises
+        ------
+        KeyError
+            If there is no such column.
+        ValueError
+            If `x`, `ax` or a style is given without a name.
         """
         if name is None:
             if x is not None or ax is not None or style:
@@ -149,7 +167,7 @@ class Run(ResultFile):
         return present("plot_history", self, name, x, ax, **style)
 
     def overview(self) -> Figure:
-        """Draw what tells most of the run, as `plot` does without a name.
+        """Draw the most informative quantities of the run, as `plot` does without a name.
 
         Returns
         -------
@@ -158,16 +176,17 @@ class Run(ResultFile):
         return present("plot_overview", self)
 
     def report(self, path: str | os.PathLike[str] | None = None) -> Path:
-        """Write a page about the run, one HTML file for any browser; return its path.
+        """Write a page about the run, one HTML file for any browser.
 
         Parameters
         ----------
-        path : str or path, optional
-            The file to write; RESULT.html beside the result if left out.
+        path : str or Path, optional
+            The file to write; by default RESULT.html beside the result.
 
         Returns
         -------
         Path
+            The file.
 
         Raises
         ------
@@ -184,8 +203,13 @@ class Run(ResultFile):
         Returns
         -------
         xarray.Dataset
-            The columns of the history along `step`; the fields with the dimensions
+            The columns of the history have the dimension `step`, the fields the dimensions
             (snapshot, y, x); see `asperity.export.run_to_xarray`.
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed.
         """
         return present("run_to_xarray", self)
 
@@ -212,11 +236,11 @@ class Run(ResultFile):
 
 
 def open_result(path: str | os.PathLike[str]) -> Run:
-    """Open the result of a run, finished or still going.
+    """Open the result of a run, which may be complete or still running.
 
     Parameters
     ----------
-    path : str or path
+    path : str or Path
         The file, RESULT.h5.
 
     Returns

@@ -1,9 +1,9 @@
-"""How a run stands: finished, stopped, going on, or perhaps killed.
+"""The state of a run: finished, stopped, still running, or perhaps killed.
 
-A killed run leaves its file as one that goes on does. What tells them apart is the lock beside the
-result: the system releases it when the process that holds it dies. Where the lock cannot be seen,
-as for a run on another machine, it is how long nothing has been written, against the time that a
-row takes.
+The file of a killed run looks like that of a run that continues. The lock beside the result tells
+them apart: the system releases it when the process that holds it ends. If the lock cannot be seen,
+because the run is on another machine, the time since the file was last written is compared with the
+time that a row takes.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 __all__ = ["duration", "held", "note_of", "rows_of", "seems_dead", "short_time", "silence",
            "standing", "time_of_row"]
 
-LAST = 20  # rows that tell how long the next one may take
-PATIENCE = 20.0  # times the longest of them
-LEAST = 15.0  # s: what a snapshot or a checkpoint of a large grid may take to be written
+LAST = 20  # number of last rows from which the time of the next one is estimated
+PATIENCE = 20.0  # factor on the longest of them before a run counts as killed
+LEAST = 15.0  # shortest waiting time, s, because writing a large snapshot may take as long
 
 
 def duration(seconds: float) -> str:
@@ -46,7 +46,7 @@ def duration(seconds: float) -> str:
 
 
 def short_time(seconds: float) -> str:
-    """Return a time in words, with two digits where it is short.
+    """Return a time in words, with two digits if it is short.
 
     Examples
     --------
@@ -57,9 +57,10 @@ def short_time(seconds: float) -> str:
 
 
 def rows_of(run: ResultFile) -> str:
-    """Return how many rows there are, such as '220 of 229 rows' of an unfinished run.
+    """Return the number of rows in words.
 
-    Of a finished run, or where the file does not tell how many there will be, '1 row'.
+    For an unfinished run the text contains the expected number, if the file has it: '220 of 229
+    rows'. Otherwise it is, for example, '1 row'.
     """
     rows, expected = run.history.rows, int(run.attributes.get("expected_rows", 0) or 0)
     if expected and not run.finished:
@@ -68,7 +69,7 @@ def rows_of(run: ResultFile) -> str:
 
 
 def silence(run: ResultFile) -> float | None:
-    """Return for how many seconds the file has not been written; None if it is gone."""
+    """Return the time since the file was last written, s, or None if the file is gone."""
     try:
         return max(0.0, time.time() - run.path.stat().st_mtime)
     except OSError:
@@ -76,7 +77,7 @@ def silence(run: ResultFile) -> float | None:
 
 
 def time_of_row(run: ResultFile) -> float | None:
-    """Return how long the slowest of the last rows took, s; None while it is not known."""
+    """Return the time that the slowest of the last rows took, s, or None if it is not known."""
     if "seconds" not in run.history or not run.history.rows:
         return None
     last = np.asarray(run.history["seconds"][-LAST:], dtype=float)
@@ -85,10 +86,10 @@ def time_of_row(run: ResultFile) -> float | None:
 
 
 def held(run: ResultFile) -> bool | None:
-    """Whether a process holds the lock of a result; None where that cannot be seen.
+    """Return whether a process holds the lock of a result; None if this cannot be determined.
 
-    Trying to take the lock would keep a run that starts now from it. The list of all locks, which
-    Linux has, disturbs nobody.
+    An attempt to take the lock could prevent a run from starting at that moment. Linux's list of
+    all locks is read instead.
     """
     path = Path(os.path.realpath(run.path))
     lock = path.with_suffix(".lock") if path.suffix == ".h5" else Path(f"{path}.lock")
@@ -105,7 +106,7 @@ def held(run: ResultFile) -> bool | None:
 
 
 def seems_dead(run: ResultFile) -> bool:
-    """Whether a run that has told no end goes on no longer, as far as can be seen."""
+    """Return whether a run that has not recorded its end seems to have been killed."""
     if run.finished or run.outcome != "running":
         return False
     alive = held(run)
@@ -116,7 +117,7 @@ def seems_dead(run: ResultFile) -> bool:
 
 
 def note_of(run: ResultFile) -> str:
-    """Return what is known of an unfinished run: why it ended, or whether it goes on."""
+    """Return a note on an unfinished run: why it ended, or whether it continues; '' otherwise."""
     if run.finished:
         return ""
     if run.outcome != "running":
@@ -133,6 +134,6 @@ def note_of(run: ResultFile) -> str:
 
 
 def standing(run: ResultFile) -> str:
-    """Return how the run stands, in words."""
+    """Return the state of the run in words."""
     note = note_of(run)
     return "finished" if run.finished else f"not finished{', ' if note else ''}{note}"

@@ -1,7 +1,7 @@
-"""Means of a slide over whole laps: how far a column of the history is from its steady value.
+"""Means of a column of the history over complete laps of a sliding road.
 
-On a periodic road the rubber meets the same road again after a lap. The mean over part of a lap
-depends on which part it is and may even have the wrong sign; that over whole laps does not.
+On a periodic road the rubber meets the same road again after a lap. The mean over complete laps is
+meaningful. The mean over a part of a lap depends on which part it is, and may have the wrong sign.
 """
 
 from __future__ import annotations
@@ -26,14 +26,15 @@ class SteadyMean(NamedTuple):
     Attributes
     ----------
     mean : float
-        Over whole laps at the end of the slide; over what there is where that is less than a lap.
+        Mean over the last complete laps; over the second half of the slide if it is shorter than a
+        lap.
     error : float
-        Standard error of the mean, from the scatter of the laps and their correlation; NaN of
-        fewer than two laps, 0 of a steady phase.
+        Standard error of the mean, from the scatter of the laps and their correlation. It is NaN
+        for fewer than two laps, and 0 for a steady phase.
     laps : float
-        Laps that the mean is over; infinite of a steady phase, which is the state after all laps.
+        Number of laps in the mean. It is infinite for a steady phase.
     note : str
-        What the user should know; '' if nothing.
+        Note for the user; it may be empty.
     """
 
     mean: float
@@ -43,10 +44,10 @@ class SteadyMean(NamedTuple):
 
 
 def steady_mean(run: ResultFile, column: str = "friction") -> SteadyMean:
-    """Return the mean of a column over whole laps at the end of a run.
+    """Return the mean of a column over complete laps at the end of a run.
 
-    The slide is what the run does last at constant velocity. Its first lap is left out if there
-    are two or more: it holds the start.
+    Only the last rows with the same velocity count. If they cover two laps or more, the first lap
+    is left out, because it contains the start.
 
     Parameters
     ----------
@@ -94,7 +95,7 @@ def steady_mean(run: ResultFile, column: str = "friction") -> SteadyMean:
 
 
 def _is_steady(run: ResultFile) -> bool:
-    """Whether the last row is a steady phase without time."""
+    """Return whether the last row is a steady phase without duration."""
     if "phase" not in run.history or run.history.rows == 0:
         return False
     number = int(run.history["phase"][-1])
@@ -126,7 +127,7 @@ def _slide(run: ResultFile) -> tuple[int, FloatArray, float]:
 
 
 def _mean_between(travel: FloatArray, values: FloatArray, low: float, high: float) -> float:
-    """Return the mean over a stretch of the travel, by the trapezoidal rule."""
+    """Return the mean over a section of the travel, by the trapezoidal rule."""
     inner = (travel > low) & (travel < high)
     places = np.concatenate([[low], travel[inner], [high]])
     return float(np.trapezoid(np.interp(places, travel, values), places) / (high - low))

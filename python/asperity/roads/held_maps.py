@@ -1,8 +1,8 @@
-"""Height maps that Python holds, as arrays or SurfaceTopography objects, as files for the program.
+"""Files for height maps that are given as arrays or SurfaceTopography objects.
 
-The program reads heights from HDF5 files. A map that is given as an array is written to a folder of
-this process, under a name made of its content; the folder goes with the process. Where an input or
-a result is kept, the map is copied beside it (`keep_beside`).
+The program reads heights from HDF5 files. A map that is given as an array is therefore written to a
+temporary folder, which is removed when the process ends. The name of the file is a checksum of its
+contents. Where an input or a result is written, the map is copied beside it (`keep_beside`).
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _held: dict[Path, HeldMap] = {}
 
 
 def is_map(value: object) -> bool:
-    """Return whether this is an array or a topography, as opposed to variables of a group."""
+    """Return whether a value is an array or a topography, and not the variables of a group."""
     return isinstance(value, np.ndarray) or _is_topography(value)
 
 
@@ -47,7 +47,7 @@ def _is_topography(value: object) -> bool:
 
 
 def _map_of(value: Any, name: str = "surface") -> HeldMap:
-    """Return an array or a topography as a map in metres, summits largest."""
+    """Return an array or a topography as a map in metres, in which summits are maxima."""
     if not _is_topography(value):
         return HeldMap(library.height_map(value, name), None, None, None)
     unit = getattr(value, "unit", None)
@@ -62,7 +62,7 @@ def _map_of(value: Any, name: str = "surface") -> HeldMap:
 
 
 def held_map(value: Any) -> Path:
-    """Write a map to the folder of this process and return the file."""
+    """Write a map to the temporary folder of this process, and return the file."""
     global _folder
     held = _map_of(value)
     if _folder is None:
@@ -77,7 +77,7 @@ def held_map(value: Any) -> Path:
 
 
 def map_of_file(file: str | None) -> HeldMap | None:
-    """Return the map behind a file of `held_map`, None for any other file."""
+    """Return the map of a file that `held_map` has written, and None for any other file."""
     return _held.get(Path(file)) if file else None
 
 
@@ -103,14 +103,13 @@ def save(path: str | Path, height: ArrayLike, lx: float | None = None, ly: float
     path : str or Path
         The file.
     height : array_like, shape (ny, nx), or a topography of SurfaceTopography
-        Heights, m, summits largest. A topography brings its unit, its lengths and whether it is
-        periodic.
+        Heights, m; summits are maxima. A topography has its own unit, lengths and boundary.
     lx, ly : float, optional
-        Lengths, m; `ly` defaults to square cells. Those of a topography are its own.
+        Lengths of an array, m; by default `ly` makes the cells square. Not for a topography.
     boundary : str, optional
-        'periodic' or 'free'; of an array 'periodic' by default.
+        'periodic' or 'free'. The default is 'periodic' for an array.
     title : str
-        A title, kept in the file.
+        Title, which is stored in the file.
 
     Returns
     -------
@@ -120,7 +119,7 @@ def save(path: str | Path, height: ArrayLike, lx: float | None = None, ly: float
     Raises
     ------
     ValueError
-        If heights or lengths are wrong, or the file is the result of a run.
+        If heights or lengths are not allowed, or the file is the result of a run.
     OSError
         If it cannot be written.
 
@@ -149,7 +148,7 @@ def save(path: str | Path, height: ArrayLike, lx: float | None = None, ly: float
 
 
 def _write(path: Path, held: HeldMap, title: str) -> Path:
-    """Write the file, which appears when it is complete."""
+    """Write the file; it gets its name only when it is complete."""
     with new_map_file(path, title, "asperity") as file:
         lengths = {}
         if held.lx is not None:

@@ -1,4 +1,4 @@
-"""Reading of instruments' files: by SurfaceTopography, or as a table of numbers."""
+"""Reading of files from instruments, by SurfaceTopography or as tables of numbers."""
 
 from __future__ import annotations
 
@@ -29,17 +29,22 @@ _NEEDS = "pip install SurfaceTopography"
 
 
 def channels(path: str | Path) -> list[str]:
-    """Return a line for each channel of a file: its id, kind, size and unit.
+    """Return one line per channel of a file, with its id, kind, size and unit.
 
     Parameters
     ----------
     path : str or Path
-        A file that SurfaceTopography reads.
+        A file in a format that SurfaceTopography knows.
+
+    Returns
+    -------
+    list of str
+        Descriptions of the channels.
 
     Raises
     ------
     OSError
-        If the file is missing, or of no known format.
+        If the file is missing, or its format is not known.
     ImportError
         If SurfaceTopography is not installed.
     """
@@ -95,10 +100,10 @@ def _open(path: Path) -> Any:
 
 
 def _is_doubtful(reader: Any, path: Path) -> bool:
-    """Whether a table is the better reading of a file.
+    """Return whether to try reading a file as a table instead.
 
-    The format HGT has no mark: any file of 2 n^2 bytes passes for it. And points whose grid has
-    holes are taken for a matrix of two or three columns.
+    The format HGT has no signature: any file of 2 n^2 bytes could be one. Furthermore,
+    SurfaceTopography reads points on a grid with holes as a matrix of two or three columns.
     """
     if reader.format() == "hgt":
         return path.suffix.lower() != ".hgt"
@@ -109,7 +114,7 @@ def _is_doubtful(reader: Any, path: Path) -> bool:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep what readers print or warn of while they try a file off the terminal."""
+    """Suppress output and warnings of the readers that try a file."""
     nowhere = io.StringIO()
     with (contextlib.redirect_stdout(nowhere), contextlib.redirect_stderr(nowhere),
           warnings.catch_warnings()):
@@ -123,12 +128,12 @@ def _reason(error: Exception) -> str:
 
 
 def to_metres(value: Any, unit: str) -> Any:
-    """Return lengths in m; 60 um are 6e-5 m, to the last digit."""
+    """Return lengths in m, rounded correctly: 60 um are 6e-5 m to the last digit."""
     return value / _PARTS[unit] if unit in _PARTS else value * UNITS[unit]
 
 
 def _channel_line(channel: Any) -> str:
-    """Return what a channel is, in a line."""
+    """Return a description of a channel in one line."""
     points = " x ".join(map(str, channel.nb_grid_pts or ())) or "?"
     kind = "map" if channel.dim == 2 else "line scan"
     data = "heights" if channel.is_height_channel else str(channel.data_kind.name).lower()
@@ -162,14 +167,25 @@ def _choose(reader: Any, path: Path, wanted: str | int | None) -> Any:
 
 
 def _unit_of(name: str | None) -> str | None:
-    """Return a unit's name in ASCII, None where there is none."""
+    """Return the name of a unit in ASCII, or None if there is no unit."""
     return None if name is None else _MICRO.get(str(name).strip(), str(name).strip()) or None
 
 
 def read_map(
     path: Path, channel: str | int | None, unit: str | None, size: Any, transpose: bool
 ) -> tuple[FloatArray, list[float], bool, str, dict[str, Any]]:
-    """Return heights (ny, nx) with NaN where missing, lengths, periodicity, unit and source."""
+    """Return heights, lengths, periodicity, unit and source of a file.
+
+    The heights have the shape (ny, nx), with NaN at missing points. Heights and lengths are in the
+    unit of the file.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    ValueError
+        If an argument is not allowed, or contradicts the file, or is missing in both.
+    """
     given = _unit_of(unit)
     if given is not None:
         choice("unit", given, tuple(UNITS))
@@ -180,21 +196,21 @@ def read_map(
                 f"{path}: channel {chosen.channel_id!r} is a line scan with points at uneven"
                 " distances: a run needs a regular grid; interpolate it first, as with"
                 " SurfaceTopography's to_uniform")
-        told = _unit_of(chosen.unit)
-        if told is not None and told not in UNITS:
-            raise ValueError(f"{path}: has the unit {told!r}: must be one of {', '.join(UNITS)}")
-        if told is None and given is None:
+        named = _unit_of(chosen.unit)
+        if named is not None and named not in UNITS:
+            raise ValueError(f"{path}: has the unit {named!r}: must be one of {', '.join(UNITS)}")
+        if named is None and given is None:
             raise ValueError(f"{path}: names no unit of length: give one (unit = 'um', --unit um)")
-        if told is not None and given is not None and told != given:
-            raise ValueError(f"unit = {given!r}: {path} has its own unit, {told!r}; `scale` scales"
+        if named is not None and given is not None and named != given:
+            raise ValueError(f"unit = {given!r}: {path} has its own unit, {named!r}; `scale` scales"
                              " the heights")
         arguments: dict[str, Any] = {}
         if chosen.physical_sizes is None:
             arguments["physical_sizes"] = _size_of(path, chosen.dim, size, transpose)
         elif size is not None:
             known = " x ".join(f"{float(length):g}" for length in chosen.physical_sizes)
-            raise ValueError(f"size: {path} has its own, {known} {told or ''}".rstrip())
-        if told is None:
+            raise ValueError(f"size: {path} has its own, {known} {named or ''}".rstrip())
+        if named is None:
             arguments["unit"] = given
         try:
             heights, lengths, periodic, metadata = _heights(path, reader, chosen, arguments)
@@ -212,19 +228,19 @@ def read_map(
     array = np.where(np.isfinite(array), array, np.nan)
     if array.ndim == 1:
         return (array[None, :], [lengths[0], lengths[0] / array.size], periodic,
-                told or str(given), source)
+                named or str(given), source)
     if transpose:
         lengths.reverse()
     else:
         array = array.T
-    return array, lengths, periodic, told or str(given), source
+    return array, lengths, periodic, named or str(given), source
 
 
 def _heights(
     path: Path, reader: Any, channel: Any, arguments: dict[str, Any]
 ) -> tuple[Any, list[float], bool, dict[str, Any]]:
-    """Return a channel's heights with x first, lengths, periodicity and what the file tells."""
-    if reader.format() == "npy":  # NumPy reads at once what takes the reader a minute
+    """Return the heights of a channel with x first, its lengths, periodicity and metadata."""
+    if reader.format() == "npy":  # NumPy is much faster than the reader of SurfaceTopography
         heights = np.load(path, allow_pickle=False)
         return heights, [float(length) for length in arguments["physical_sizes"]], False, {}
     topography = channel.topography(**arguments)
@@ -233,7 +249,7 @@ def _heights(
 
 
 def _size_of(path: Path, dim: int, size: Any, transpose: bool) -> tuple[float, ...]:
-    """Return the lengths in the order of the file's indices."""
+    """Return the given lengths in the order of the file's indices."""
     if size is None:
         raise ValueError(f"{path}: gives no lengths: give them (size = (lx, ly), --size LX LY)")
     values = [positive("size", value) for value in np.atleast_1d(np.asarray(size, dtype=object))]

@@ -1,17 +1,17 @@
-"""Maps whose opposite edges do not fit, made periodic without a frame that brings its own contact.
+"""Methods that make a map periodic although its opposite edges do not match.
 
-A contact with periodic boundaries needs a map that goes on at the opposite edge. Several methods
-make one of a measured part; none may carry more load at the join than elsewhere.
+A contact with periodic boundaries needs a map that continues at the opposite edge. A good join
+carries the load that belongs to its share of the area, not more and not less.
 
 * ``'seam'`` takes a margin of real road beyond two edges and lays it over the opposite edges. Both
-  are cut along the line on which their heights differ least, and change over within some cells.
-  All heights are those of the road: no summit and no valley arises that the road does not have.
-* ``'blend'`` fades such a margin into the opposite edges, with weights whose squares sum to 1, so
-  that the roughness keeps its size. Where both parts are high together, as on a road with flat
-  tops, it makes summits that rise above the road and carry too much load.
-* ``'smooth'`` takes off the smooth part that carries the jumps between opposite edges
+  parts are cut along the line on which their heights differ least, with a transition of some cells.
+  All heights are those of the road, so that no new summit or valley arises.
+* ``'blend'`` fades such a margin into the opposite edges. The squares of the weights add up to 1,
+  so that the roughness keeps its rms height. If both parts are high at the same place, as on a road
+  with flat tops, the sum rises above the road and carries too much load.
+* ``'smooth'`` subtracts the smooth part of the map that contains the jumps between opposite edges
   (periodic-plus-smooth decomposition).
-* ``'mirror'`` puts the map beside its mirror images: twice as long along each axis.
+* ``'mirror'`` places mirror images beside the map, which makes it twice as long along each axis.
 * ``'window'`` brings the edges to the mean height.
 
 References
@@ -35,22 +35,27 @@ __all__ = ["JOINS", "join", "load_at_join", "margin_of", "smooth_part", "strip"]
 FloatArray = NDArray[np.float64]
 
 JOINS = ("seam", "blend", "smooth", "mirror", "window", "none")
-MARGIN = 0.125          # of the length, that 'blend' fades into the opposite edge
-OVERLAP = 0.25          # of the length, in which 'seam' looks for its line
-CHANGE = 3.0            # cells, the standard deviation of the step from one side to the other
-STARTS = 64             # that are tried for a closed line
-TAPER = 0.2             # of the length, that 'window' tapers
+MARGIN = 0.125          # share of the length that 'blend' fades into the opposite edge
+OVERLAP = 0.25          # share of the length in which 'seam' looks for its line
+CHANGE = 3.0            # standard deviation of the transition from one side to the other, cells
+STARTS = 64             # number of starting columns that are tried for a closed line
+TAPER = 0.2             # share of the length that 'window' tapers
 
 
 def margin_of(cells: int, method: str) -> int:
-    """Return how many cells of real road a join needs beyond a patch of so many cells.
+    """Return how many cells of real road a join needs beyond a patch, along one axis.
 
     Parameters
     ----------
     cells : int
-        Of the patch along one axis.
+        Number of cells of the patch along the axis.
     method : str
         One of `JOINS`.
+
+    Returns
+    -------
+    int
+        Number of cells; 0 for methods without a margin.
     """
     share = {"seam": OVERLAP, "blend": MARGIN}.get(method, 0.0)
     return max(1, round(share * cells)) if share > 0.0 and cells > 1 else 0
@@ -62,8 +67,8 @@ def join(height: FloatArray, method: str, shape: tuple[int, int] | None = None) 
     Parameters
     ----------
     height : ndarray, shape (ny, nx)
-        Heights, m. For 'seam' and 'blend' with their margin: the shape is that of the periodic map
-        plus `margin_of` along each axis.
+        Heights, m. For 'seam' and 'blend' they include the margin: the shape is that of the
+        periodic map plus `margin_of` along each axis.
     method : str
         One of `JOINS`; 'none' returns the map as it is.
     shape : (int, int), optional
@@ -72,8 +77,8 @@ def join(height: FloatArray, method: str, shape: tuple[int, int] | None = None) 
     Returns
     -------
     ndarray
-        Heights, m: shape (ny, nx), for 'mirror' (2 ny, 2 nx) (a profile stays one), for 'seam' and
-        'blend' `shape`.
+        Heights, m. The shape is (ny, nx); (2 ny, 2 nx) for 'mirror' (a profile keeps ny = 1);
+        `shape` for 'seam' and 'blend'.
 
     Raises
     ------
@@ -107,10 +112,10 @@ def join(height: FloatArray, method: str, shape: tuple[int, int] | None = None) 
 
 
 def smooth_part(height: FloatArray) -> FloatArray:
-    """Return the smooth part of a map, which carries the jumps between its opposite edges.
+    """Return the smooth part of a map, which contains the jumps between its opposite edges.
 
-    It solves Poisson's equation whose source are the jumps; its mean is zero. What is left when it
-    is taken off has the Laplacian of the map inside and no jumps.
+    It solves Poisson's equation with the jumps as the source, and its mean is zero. The map minus
+    this part has no jumps, and the same Laplacian as the map inside (Moisan 2011).
 
     Parameters
     ----------
@@ -120,7 +125,7 @@ def smooth_part(height: FloatArray) -> FloatArray:
     Returns
     -------
     ndarray, shape (ny, nx)
-        m.
+        Heights, m.
     """
     ny, nx = height.shape
     jumps = np.zeros_like(height)
@@ -139,14 +144,24 @@ def smooth_part(height: FloatArray) -> FloatArray:
 
 
 def strip(shape: tuple[int, int], share: float) -> NDArray[np.bool_]:
-    """Return which cells lie near an edge: within half of a share of the length, at each edge.
+    """Return a mask of the cells near an edge.
 
     Parameters
     ----------
     shape : (int, int)
-        Cells (ny, nx).
+        Number of cells (ny, nx).
     share : float
-        Of each length, 0 to 1.
+        Share of each length that the strips at both edges take together, 0 to 1.
+
+    Returns
+    -------
+    ndarray of bool, shape (ny, nx)
+        True near an edge.
+
+    Raises
+    ------
+    ValueError
+        If the share is not between 0 and 1.
     """
     number("share", share, 0.0, 1.0)
     near = []
@@ -158,20 +173,19 @@ def strip(shape: tuple[int, int], share: float) -> NDArray[np.bool_]:
 
 
 def load_at_join(pressure: FloatArray, method: str) -> tuple[float, float]:
-    """Return which share of the load lies at the join, and which share of the area that is.
+    """Return the share of the load that the join carries, and its share of the area.
 
     Parameters
     ----------
     pressure : ndarray, shape (ny, nx)
         Pressure on the periodic map, Pa.
     method : str
-        How the map was made periodic. For 'mirror' the middle lines count, too.
+        How the map was made periodic. For 'mirror' the middle lines belong to the join, too.
 
     Returns
     -------
     (float, float)
-        Shares of the load and of the area, 0 to 1. A join that brings no contact of its own has
-        nearly equal shares.
+        Shares of the load and of the area, 0 to 1. They are nearly equal for a good join.
     """
     ny, nx = pressure.shape
     if method == "mirror":
@@ -194,7 +208,7 @@ def _taper(count: int) -> FloatArray:
 
 
 def _overlaid(height: FloatArray, method: str, shape: tuple[int, int]) -> FloatArray:
-    """Lay what lies beyond the far edges over the near ones."""
+    """Lay the margin beyond the far edges over the cells at the near edges, axis by axis."""
     wanted = tuple(count + margin_of(count, method) for count in shape)
     if height.shape != wanted:
         raise ValueError(f"height: has the shape {height.shape}: {method!r} needs {wanted} for a"
@@ -211,7 +225,7 @@ def _overlaid(height: FloatArray, method: str, shape: tuple[int, int]) -> FloatA
             angle = 0.5 * math.pi * (np.arange(margin) + 0.5) / margin
             joined = np.sin(angle) * near + np.cos(angle) * beyond
         else:
-            # After the first axis the lines along the other one go on at their ends.
+            # After the first axis has been joined, lines along it are periodic: close the seam.
             weight = _seam(near - beyond, closed=axis == 1)
             joined = beyond + weight * (near - beyond)
         part = np.moveaxis(np.concatenate([joined, along[:, margin:count]], axis=1), 1, axis)
@@ -219,14 +233,19 @@ def _overlaid(height: FloatArray, method: str, shape: tuple[int, int]) -> FloatA
 
 
 def _seam(difference: FloatArray, closed: bool) -> FloatArray:
-    """Return the weight of the second side: 0 before and 1 beyond the line of least difference.
+    """Return the weight of the near part: 0 before and 1 beyond the line of least difference.
 
     Parameters
     ----------
     difference : ndarray, shape (n, margin)
-        Of the heights of both sides, m.
+        Difference of the heights of the two parts, m.
     closed : bool
-        Whether the last row is beside the first one.
+        Whether the last row is next to the first one, so that the line must close.
+
+    Returns
+    -------
+    ndarray, shape (n, margin)
+        Weights, 0 to 1.
     """
     from scipy.ndimage import gaussian_filter
 
@@ -234,7 +253,7 @@ def _seam(difference: FloatArray, closed: bool) -> FloatArray:
     change = min(CHANGE, margin / 12.0)
     mode = ("wrap" if closed else "nearest", "nearest")
     cost = gaussian_filter(difference**2, 0.7 * change, mode=mode)
-    # the change from one side to the other has to end within the margin
+    # The transition from one part to the other has to end within the margin.
     end = min(math.ceil(3.0 * change), (margin - 1) // 2)
     cost[:, :end] = cost[:, margin - end :] = math.inf
     line = _cheapest_line(cost, closed)
@@ -243,21 +262,29 @@ def _seam(difference: FloatArray, closed: bool) -> FloatArray:
 
 
 def _cheapest_line(cost: FloatArray, closed: bool) -> NDArray[np.intp]:
-    """Return the column in each row of the line of least cost, which turns by one column at most.
+    """Return the column in each row of the line of least cost, by dynamic programming.
+
+    From one row to the next the line moves by at most one column.
 
     Parameters
     ----------
     cost : ndarray, shape (n, m)
-        Of each cell; infinite where the line must not go.
+        Cost of each cell; infinite where the line must not go.
     closed : bool
-        Whether the line has to end in the column where it began.
+        Whether the line has to end in the column in which it began.
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+        Columns.
     """
     rows, columns = cost.shape
     allowed = np.flatnonzero(np.isfinite(cost[0]))
     starts = allowed
     if closed and allowed.size > STARTS:
         starts = allowed[np.linspace(0, allowed.size - 1, STARTS).round().astype(int)]
-    # least[s, c]: of the lines from start s to column c of the row; a single open start without s
+    # least[s, c] is the least cost of a line from start s to column c of the current row. An open
+    # line may start in any column and needs a single s.
     least = np.full((starts.size if closed else 1, columns), math.inf)
     if closed:
         least[np.arange(starts.size), starts] = cost[0, starts]

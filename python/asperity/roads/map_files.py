@@ -1,8 +1,9 @@
-"""Height maps that SurfaceTopography does not read, or reads amiss: tables and this package's own.
+"""Readers of text tables and of this package's own files, which SurfaceTopography does not read.
 
-They show themselves as its readers and channels do, so that `asperity.measured` treats all alike.
-Tables are matrices of heights, a row of the file a row along x, or columns of points x, z or
-x, y, z on a regular grid, of which some may be missing.
+They have the same interface as the readers and channels of SurfaceTopography, so that
+`asperity.measured` treats all files alike. A text table is a matrix of heights, in which a row of
+the file runs along x, or has columns of points x, z or x, y, z on a regular grid, of which some may
+be missing.
 """
 
 from __future__ import annotations
@@ -24,14 +25,14 @@ FloatArray = NDArray[np.float64]
 _MISSING = {"", "nan", "bad", "-", "--", "---", "***", "*", "x", "n/a", "na", "#n/a", "null", "inf",
             "-inf", "infinite", "1.#qnan", "-1.#ind", "undefined"}
 _METRES = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9}
-_OFF_GRID = 0.1  # of a cell: more is no regular grid
-_SPARSE = 20.0  # cells a point: more is no grid either
+_OFF_GRID = 0.1  # largest distance of a point from a regular grid, cells
+_SPARSE = 20.0  # most cells per point that still count as a grid
 _NO_GRID = ("lie on no regular grid: interpolate them first, as with scipy.interpolate.griddata,"
             " and write the matrix of heights")
 
 
 class _Kind(NamedTuple):
-    """What a channel holds."""
+    """The kind of data of a channel."""
 
     name: str
 
@@ -41,7 +42,7 @@ _HEIGHTS = _Kind("HEIGHT")
 
 @dataclass
 class PlainMap:
-    """A map as a channel of SurfaceTopography shows itself, and as its topography.
+    """A map with the interface of a channel and of a topography of SurfaceTopography.
 
     Attributes
     ----------
@@ -50,13 +51,13 @@ class PlainMap:
     channel_id : str
         Name.
     physical_sizes : tuple of float, or None
-        Lengths, where the file gives them.
+        Lengths along x and y, if the file gives them.
     unit : str or None
-        Of all lengths, where the file names it.
+        Unit of all lengths and heights, if the file names it.
     is_periodic : bool
-        Whether opposite edges fit.
+        Whether opposite edges match.
     info : dict
-        What else the file says.
+        Further metadata of the file.
     """
 
     array: FloatArray
@@ -76,7 +77,7 @@ class PlainMap:
 
     @property
     def dim(self) -> int:
-        """1 of a line, 2 of a map."""
+        """1 for a line scan, 2 for a map."""
         return self.array.ndim
 
     @property
@@ -86,7 +87,7 @@ class PlainMap:
 
     def topography(self, physical_sizes: tuple[float, ...] | None = None,
                    unit: str | None = None) -> PlainMap:
-        """Return the map with what the file lacks."""
+        """Return the map, completed with lengths and unit that the file does not give."""
         self.physical_sizes = self.physical_sizes or physical_sizes
         self.unit = self.unit or unit
         return self
@@ -97,7 +98,7 @@ class PlainMap:
 
 
 class PlainReader:
-    """A file with one map, in the manner of SurfaceTopography's readers."""
+    """A file with one map, with the interface of the readers of SurfaceTopography."""
 
     def __init__(self, kind: str, channel: PlainMap) -> None:
         self._kind = kind
@@ -116,9 +117,10 @@ class PlainReader:
 
 
 def own_map(path: Path) -> PlainReader | None:
-    """Return the road of a file of `MeasuredSurface.save` or of a result; None if it is neither.
+    """Return the road of a result or of a file that `MeasuredSurface.save` has written.
 
-    Their datasets have the shape (ny, nx), unlike those of other HDF5 files.
+    For any other file, None is returned. In contrast to SurfaceTopography's HDF5 files, the
+    datasets of this package have the shape (ny, nx).
     """
     import h5py
 
@@ -148,7 +150,7 @@ def text_map(path: Path) -> PlainReader:
     Raises
     ------
     ValueError
-        If the file is no text or no such table, or the points lie on no regular grid.
+        If the file is not such a table, or the points are not on a regular grid.
     """
     rows = decimals(cells_of(text_lines(path)))
     first = next((i for i, (_, cells) in enumerate(rows)
@@ -157,7 +159,7 @@ def text_map(path: Path) -> PlainReader:
         raise ValueError(f"{path}: holds no table of numbers")
     body = rows[first:]
     while all(len(cells) > 1 and cells[-1] == "" for _, cells in body):
-        body = [(line, cells[:-1]) for line, cells in body]  # lines that end with a separator
+        body = [(line, cells[:-1]) for line, cells in body]  # all lines end with a separator
     table = _numbers(path, body)
     columns = table.shape[1]
     if columns > 3:
@@ -173,7 +175,7 @@ def text_map(path: Path) -> PlainReader:
 
 
 def _units(head: list[str]) -> list[str]:
-    """Return the units that a header names in parentheses, brackets or behind a stroke.
+    """Return the units that a header names in parentheses, in brackets or behind a slash.
 
     Examples
     --------
@@ -186,7 +188,7 @@ def _units(head: list[str]) -> list[str]:
 
 
 def _is_value(cell: str) -> bool:
-    """Whether a cell is a number or says that there is none."""
+    """Return whether a cell is a number or a word for a missing value."""
     return cell.lower() in _MISSING or is_number(cell)
 
 
@@ -210,7 +212,7 @@ def _numbers(path: Path, rows: Rows) -> FloatArray:
 
 
 def _on_grid(path: Path, table: FloatArray, unit: str | None) -> PlainMap:
-    """Return the map of points with their coordinates."""
+    """Return the map of points that are given by their coordinates."""
     known = np.isfinite(table[:, :-1]).all(axis=1)
     points, heights = table[known, :-1], table[known, -1]
     places, counts, sizes = [], [], []
@@ -238,7 +240,9 @@ def _on_grid(path: Path, table: FloatArray, unit: str | None) -> PlainMap:
 
 
 def _steps(values: FloatArray) -> tuple[NDArray[np.intp] | None, float]:
-    """Return the number of each value on an even scale and its step; None if there is none.
+    """Return the index of each value on an evenly spaced scale, and its step.
+
+    The index is None if no such scale fits.
 
     Examples
     --------
@@ -254,7 +258,8 @@ def _steps(values: FloatArray) -> tuple[NDArray[np.intp] | None, float]:
     if not len(gaps):
         return None, 0.0
     step = float(np.median(gaps))
-    for _ in range(3):  # coordinates are rounded in files: the whole span tells the step better
+    # Coordinates in files are rounded, so that the whole span determines the step more accurately.
+    for _ in range(3):
         number = np.rint((values - first) / step)
         step = float(np.sum(number * (values - first)) / np.sum(number**2))
     offset = float(np.median(values - first - number * step))

@@ -1,4 +1,4 @@
-"""What is done to a measured map, step by step: crop, level, fill, resample, window."""
+"""The processing steps of a measured map: crop, level, fill, resample, window."""
 
 from __future__ import annotations
 
@@ -17,7 +17,19 @@ FloatArray = NDArray[np.float64]
 
 
 class MapWork:
-    """A map in hand, in the file's unit, with the steps done so far."""
+    """A map that is being processed, with a record of the steps so far.
+
+    Attributes
+    ----------
+    height : ndarray, shape (ny, nx)
+        Heights in the unit of the file, NaN at missing points.
+    sizes : list of float
+        Lengths along x and y in the unit of the file.
+    periodic : bool
+        Whether opposite edges match.
+    steps : list of dict
+        The steps: the key 'step' and the numbers of each.
+    """
 
     def __init__(self, height: FloatArray, sizes: list[float], periodic: bool) -> None:
         self.height = height
@@ -26,11 +38,11 @@ class MapWork:
         self.steps: list[dict[str, Any]] = []
 
     def note(self, step: str, **numbers: Any) -> None:
-        """Note a step."""
+        """Record a step with its numbers."""
         self.steps.append({"step": step, **numbers})
 
     def crop(self, wanted: Sequence[float]) -> None:
-        """Keep a part, of whole cells."""
+        """Keep the part between two lengths along each axis, rounded to whole cells."""
         dims = 1 if self.height.shape[0] == 1 else 2
         if len(wanted) != 2 * dims:
             raise ValueError(f"crop: has {len(wanted)} numbers, must have {2 * dims}")
@@ -59,7 +71,7 @@ class MapWork:
         self.note("crop", kept=kept, nx=self.height.shape[1], ny=self.height.shape[0])
 
     def level(self, kind: str) -> None:
-        """Take off the polynomial that fits the points best."""
+        """Subtract the polynomial that fits the points best."""
         if kind == "none":
             return
         valid = np.isfinite(self.height)
@@ -72,7 +84,7 @@ class MapWork:
         self.note("level", kind=kind, coefficients=dict(zip(names, map(float, fit), strict=True)))
 
     def fill(self, most: float, name: str) -> None:
-        """Fill missing points by the smoothest surface through their neighbours."""
+        """Replace missing points by a harmonic surface: each is the mean of its neighbours."""
         missing = ~np.isfinite(self.height)
         count, total = int(missing.sum()), self.height.size
         if count == 0:
@@ -87,7 +99,7 @@ class MapWork:
         self.note("fill", missing=count, points=total, share=count / total)
 
     def resample(self, wanted: Sequence[int]) -> None:
-        """Change the numbers of cells."""
+        """Change the numbers of cells; the lengths stay the same."""
         ny, nx = self.height.shape
         counts = [whole("resample", one)
                   for one in np.atleast_1d(np.asarray(wanted, dtype=object))]
@@ -104,7 +116,7 @@ class MapWork:
         self.note("resample", from_nx=nx, from_ny=ny, nx=counts[0], ny=counts[1])
 
     def window(self, kind: str, taper: float, restore: bool) -> None:
-        """Bring the edges to the mean height."""
+        """Bring the edges to the mean height by a window, which makes the map periodic."""
         ny, nx = self.height.shape
         mean = float(np.mean(self.height))
         before = float(np.std(self.height))
@@ -119,7 +131,7 @@ class MapWork:
 
 
 def polynomial(shape: tuple[int, int], kind: str) -> tuple[list[FloatArray], list[str]]:
-    """Return the terms of a levelling, over coordinates of -1 to 1, and their names."""
+    """Return the terms of a levelling polynomial, in coordinates from -1 to 1, and their names."""
     ny, nx = shape
     x = np.broadcast_to(np.linspace(-1.0, 1.0, nx) if nx > 1 else np.zeros(1), shape)
     y = np.broadcast_to((np.linspace(-1.0, 1.0, ny) if ny > 1 else np.zeros(1))[:, None], shape)
@@ -141,7 +153,7 @@ def fit_terms(height: FloatArray, valid: NDArray[np.bool_], basis: list[FloatArr
     matrix = np.array([[float(np.sum(a * b * valid)) for b in basis] for a in basis])
     total = np.zeros(len(basis))
     rest = values
-    for _ in range(2):  # the second turn takes off the rounding of the first
+    for _ in range(2):  # the second round removes the rounding error of the first
         right = np.array([float(np.sum(a * rest)) for a in basis])
         part = np.linalg.lstsq(matrix, right, rcond=None)[0]
         total += part
@@ -150,7 +162,7 @@ def fit_terms(height: FloatArray, valid: NDArray[np.bool_], basis: list[FloatArr
 
 
 def _harmonic(height: FloatArray, missing: NDArray[np.bool_], periodic: bool) -> FloatArray:
-    """Fill points so that each is the mean of its neighbours."""
+    """Fill missing points so that each is the mean of its neighbours (one sparse linear system)."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.linalg import spsolve
 
@@ -166,7 +178,7 @@ def _harmonic(height: FloatArray, missing: NDArray[np.bool_], periodic: bool) ->
         if periodic:
             j, i = j % ny, i % nx
         inside = (j >= 0) & (j < ny) & (i >= 0) & (i < nx)
-        # a neighbour that is the point itself (one row, periodic) says nothing
+        # In a periodic map of one row a point is its own neighbour, which must not count.
         inside &= (np.where(inside, j, 0) != rows) | (np.where(inside, i, 0) != columns)
         at = np.flatnonzero(inside)
         j, i = j[at], i[at]
@@ -194,7 +206,7 @@ def _along_rows(height: FloatArray, count: int, periodic: bool) -> FloatArray:
         total = np.concatenate([np.zeros((height.shape[0], 1)), np.cumsum(height, axis=1)], axis=1)
         place = np.arange(count + 1) / count * old
         whole = np.minimum(place.astype(int), old - 1)
-        # the integral up to each new edge, linear within a cell
+        # Interpolate the integral up to each new edge; it is linear within a cell.
         part = total[:, whole] + (place - edges[whole] * old) * height[:, whole]
         return np.diff(part, axis=1) * (count / old)
     from scipy.interpolate import CubicSpline
@@ -213,6 +225,6 @@ def _along_rows(height: FloatArray, count: int, periodic: bool) -> FloatArray:
 def _tukey(count: int, taper: float) -> FloatArray:
     """Return a window at the centres of cells: cosine flanks over `taper` of the length."""
     place = (np.arange(count) + 0.5) / count
-    near = np.minimum(place, 1.0 - place)  # from the nearer edge
+    near = np.minimum(place, 1.0 - place)  # distance from the nearer edge
     ramp = np.clip(2.0 * near / taper, 0.0, 1.0)
     return 0.5 * (1.0 - np.cos(math.pi * ramp))

@@ -1,4 +1,4 @@
-"""The HDF5 file of a height map, which ``&surface shape = 'file'`` takes."""
+"""Writing of the HDF5 file of a height map, which ``&surface shape = 'file'`` reads."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["new_map_file", "write_grid", "write_height"]
 
 
 def _is_result(path: Path) -> bool:
-    """Whether a file is the result of a run, which is not to be replaced by a map."""
+    """Return whether a file is the result of a run, which a map must not replace."""
     import h5py
 
     if not path.is_file() or path.stat().st_size < 8 or not h5py.is_hdf5(path):
@@ -31,7 +31,19 @@ def _is_result(path: Path) -> bool:
 
 @contextmanager
 def new_map_file(path: Path, title: str, program: str) -> Iterator[h5py.File]:
-    """Open a new file, which takes its place when it is complete.
+    """Open a new file, which gets its name when it is complete.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    title, program : str
+        Attributes of the file.
+
+    Yields
+    ------
+    h5py.File
+        The open file, under a temporary name.
 
     Raises
     ------
@@ -61,7 +73,7 @@ def new_map_file(path: Path, title: str, program: str) -> Iterator[h5py.File]:
 
 
 def write_height(file: h5py.File, height: NDArray[np.float64], **attributes: Any) -> None:
-    """Write the heights, m."""
+    """Write the heights (m), with attributes."""
     data = file.create_dataset("surface/height", data=height)
     data.attrs.update(units="m", long_name="height of the road", **attributes)
 

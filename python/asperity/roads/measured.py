@@ -1,8 +1,8 @@
-"""Measured topographies: read by SurfaceTopography, made ready for a run, kept with their story.
+"""Measured topographies: reading, processing, and writing with a record of their origin.
 
-What is done to the heights comes in this order: crop, level, fill missing points, invert, scale,
-resample, window. Every step is noted, and written into the file with the source's name, size and
-checksum and what the instrument said.
+The steps are always done in this order: crop, level, fill missing points, invert, scale, resample,
+window. Every step is recorded. The written file contains these records, the name, size and checksum
+of the source, and the metadata of the instrument.
 """
 
 from __future__ import annotations
@@ -38,19 +38,19 @@ class MeasuredSurface:
     Attributes
     ----------
     height : ndarray, shape (ny, nx)
-        Height, m, summits largest; row j lies at y = j ly/ny. A line scan has ny = 1.
+        Height, m; summits are maxima. Row j is at y = j ly/ny. A line scan has ny = 1.
     lx, ly : float
         Lengths, m.
     periodic : bool
-        Whether opposite edges fit: the file says so, or a window made it so.
+        Whether opposite edges match: the file says so, or a window has made the map periodic.
     unit : str
         Unit of the file, such as 'um'.
     steps : list of dict
-        All that was done, in order: the key 'step' and the numbers that belong to it.
+        The processing steps in order: the key 'step' and the numbers of each.
     source : dict
         Name, format, channel, bytes, sha256 and metadata of the file.
     notes : list of str
-        What the user should know, as a tilt that is left.
+        Notes for the user, for example about a tilt that has not been removed.
     """
 
     height: FloatArray
@@ -69,17 +69,22 @@ class MeasuredSurface:
 
     @property
     def rms_slope(self) -> float:
-        """Rms slope from differences of neighbours; across the edges where periodic."""
+        """Rms slope from differences of neighbouring cells; across the edges of a periodic map."""
         boundary = "periodic" if self.periodic else "free"
         return statistics(self.height, self.lx, self.ly, boundary).rms_slope_differences
 
     def to_namelist(self, file: str | Path) -> str:
-        """Return the `&grid` and `&surface` groups that take the map from a file.
+        """Return the `&grid` and `&surface` groups of an input that reads the map from a file.
 
         Parameters
         ----------
         file : str or Path
-            Name of the file that `save` has written, as the input is to name it.
+            Name of the file that `save` has written, as it should appear in the input.
+
+        Returns
+        -------
+        str
+            Two groups.
         """
         ny, nx = self.height.shape
         boundary = "periodic" if self.periodic or ny == 1 else "free"
@@ -89,7 +94,7 @@ class MeasuredSurface:
                 f"&surface shape = 'file', file = '{name}' /")
 
     def summary(self) -> str:
-        """Return a few lines that say what the map is and what was done."""
+        """Return a few lines that describe the map and the processing steps."""
         ny, nx = self.height.shape
         scale = UNITS[self.unit]
 
@@ -134,7 +139,7 @@ class MeasuredSurface:
         OSError
             If it cannot be written.
         ValueError
-            If it is there and the result of a run.
+            If a file of this name is the result of a run.
         """
         import h5py
 
@@ -142,9 +147,9 @@ class MeasuredSurface:
         with new_map_file(path, self.source["name"], "asperity import") as file:
             file.attrs.update({f"source_{name}": value for name, value in self.source.items()
                                if name != "metadata"})
-            # a dataset, for attributes hold 64 kB only
-            told = json.dumps(self.source["metadata"], default=str)
-            metadata = file.create_dataset("source/metadata", data=told,
+            # The metadata are a dataset, because an attribute is limited to 64 kB.
+            text = json.dumps(self.source["metadata"], default=str)
+            metadata = file.create_dataset("source/metadata", data=text,
                                            dtype=h5py.string_dtype())
             metadata.attrs.update(units="1", long_name="what the file says of the measurement"
                                                        " (JSON)")
@@ -179,39 +184,41 @@ def load(
     Parameters
     ----------
     path : str or Path
-        The instrument's file.
+        The file of an instrument.
     channel : str or int, optional
-        Id of the channel (see `channels`) or its number from 0; by default the file's own choice
-        where that holds heights, else the first that does.
+        Id of the channel (see `channels`) or its number from 0. The default is the default channel
+        of the file or, if that has no heights, the first channel with heights.
     unit : str, optional
-        Unit of lengths, 'm', 'mm', 'um', 'nm', 'pm', 'A' or 'inch': for files that name none.
+        Unit of lengths, 'm', 'mm', 'um', 'nm', 'pm', 'A' or 'inch'. Only for files that name none.
     size : (float, float) or float, optional
-        Lengths along x and y in the file's unit: for files that give none. One number for a line.
+        Lengths along x and y in the file's unit, one number for a line scan. Only for files that
+        give none.
     transpose : bool
-        Let the first index of the file's array run along y, as NumPy's images have it;
-        SurfaceTopography's own arrays have the first index along x.
+        The first index of the file's array runs along y, as in NumPy's images. In the arrays of
+        SurfaceTopography it runs along x.
     crop : (x0, x1, y0, y1), optional
-        Part to keep, in the file's unit from the corner of the first cell; (x0, x1) of a line.
+        Part to keep, in the file's unit, measured from the corner of the first cell; (x0, x1) for a
+        line scan.
     level : str
-        'none'; 'mean' takes off the mean, 'tilt' the plane, 'curvature' the paraboloid that fits
-        best (least squares over the points that are not missing).
+        'none', or what is subtracted: 'mean' the mean, 'tilt' the plane, 'curvature' the paraboloid
+        that fits best (least squares over the points that are not missing).
     max_missing : float
-        Largest share of missing points that is filled, 0 to 1.
+        Largest share of missing points that is accepted, 0 to 1.
     invert : bool
-        Turn the map upside down: for replicas, or instruments that count depths.
+        Turn the map upside down, for replicas and for instruments that measure depths.
     scale : float
-        Factor on the heights.
+        Factor by which the heights are multiplied.
     resample : (nx, ny), optional
-        Other numbers of cells over the same lengths: means over the new cells where there are
-        fewer, cubic splines where there are more. nx alone of a line.
+        Number of cells to which the same lengths are divided: means over the new cells if there are
+        fewer, cubic splines if there are more. Only nx for a line scan.
     periodic : str, optional
         Window that brings the edges to the mean height, 'hann' or 'tukey'.
     taper : float, optional
-        Share of each length that a 'tukey' window tapers, half of it at each edge; 0 to 1; 0.2 by
+        Share of each length that a 'tukey' window tapers, half of it at each edge: 0 to 1, 0.2 by
         default.
     restore_rms : bool
-        Scale the windowed heights to the rms height before. Slopes inside grow with it: off by
-        default, as heights inside are then the measured ones.
+        Multiply the windowed heights so that the rms height is the same as before. The slopes
+        inside the map become steeper than measured, so this is off by default.
 
     Returns
     -------
@@ -221,9 +228,9 @@ def load(
     Raises
     ------
     OSError
-        If the file is missing, damaged, or of no known format.
+        If the file is missing or damaged, or its format is not known.
     ValueError
-        If an option is wrong or needed and not given, or the file holds what no run can take.
+        If an option is not allowed, or is needed and not given, or a run cannot use the map.
     ImportError
         If SurfaceTopography is not installed.
 
@@ -247,8 +254,8 @@ def load(
     if taper is not None and periodic != "tukey":
         raise ValueError("taper: goes with periodic = 'tukey'")
     path = Path(path)
-    height, sizes, told_periodic, unit, source = read_map(path, channel, unit, size, transpose)
-    work = MapWork(height, sizes, told_periodic)
+    height, sizes, is_periodic, unit, source = read_map(path, channel, unit, size, transpose)
+    work = MapWork(height, sizes, is_periodic)
     if transpose and height.shape[0] > 1:
         work.note("transpose")
     if crop is not None:
@@ -269,7 +276,7 @@ def load(
     if unit != "m":
         work.note("unit", unit=unit, metres=UNITS[unit])
     height = np.ascontiguousarray(to_metres(work.height, unit))
-    # cell by cell, as some files have them, lengths gather rounding: twelve digits are theirs
+    # Lengths that a file sums over cells contain rounding errors: twelve digits are significant.
     lx, ly = (float(f"{to_metres(length, unit):.12g}") for length in work.sizes)
     return MeasuredSurface(height, lx, ly, work.periodic, unit, work.steps, source,
                            _advice(work, level))
@@ -278,16 +285,16 @@ def load(
 def import_topography(
     path: str | Path, output: str | Path = "surface.h5", **options: Any
 ) -> MeasuredSurface:
-    """Read a measured topography and write the file that a run takes.
+    """Read a measured topography and write the height map for a run.
 
     Parameters
     ----------
     path : str or Path
-        The instrument's file.
+        The file of an instrument.
     output : str or Path
-        HDF5 file to write; one that is there is replaced.
+        HDF5 file to write. An existing map is replaced.
     **options
-        Those of `load`.
+        Options of `load`.
 
     Returns
     -------
@@ -297,7 +304,7 @@ def import_topography(
     Raises
     ------
     OSError, ValueError, ImportError
-        As `load` and `MeasuredSurface.save`.
+        As in `load` and `MeasuredSurface.save`.
     """
     surface = load(path, **options)
     if Path(output).exists() and Path(output).samefile(path):
@@ -307,7 +314,7 @@ def import_topography(
 
 
 def step_in_words(step: dict[str, Any]) -> str:
-    """Return a step in words."""
+    """Return the description of a step."""
     words: dict[str, Callable[[dict[str, Any]], str]] = {
         "transpose": lambda s: "transposed: the file's first index runs along y",
         "crop": lambda s: f"cropped to {s['nx']} x {s['ny']} cells: "
@@ -329,7 +336,7 @@ def step_in_words(step: dict[str, Any]) -> str:
 
 
 def _advice(work: MapWork, level: str) -> list[str]:
-    """Return what the user should know of the map."""
+    """Return notes on the map for the user."""
     notes = []
     variance = float(np.var(work.height))
     if variance > 0.0 and level in ("none", "mean") and not work.periodic:

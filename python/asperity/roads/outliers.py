@@ -1,4 +1,4 @@
-"""Single cells of a measured map that lie far off their neighbours: found, counted, removed."""
+"""Outliers of a measured map: single cells that differ strongly from their neighbours."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ __all__ = ["Outliers", "find_outliers"]
 
 FloatArray = NDArray[np.float64]
 
-_LIMIT = 12.0           # of the usual distance from the neighbours
-_USUAL = 1.4826         # standard deviation of a normal distribution over its median deviation
+_LIMIT = 12.0           # in units of the usual distance of a cell from its neighbours
+_USUAL = 1.4826         # standard deviation over median deviation of a normal distribution
 
 
 class Outliers(NamedTuple):
-    """Cells that lie far off.
+    """The outliers of a map.
 
     Attributes
     ----------
     cells : ndarray of bool, shape (ny, nx)
-        Which cells.
+        True for outliers.
     mended : ndarray, shape (ny, nx)
-        The map with the median of the neighbours in these cells, m.
+        The map, in which the median of the neighbours replaces each outlier, m.
     count : int
-        How many.
+        Number of outliers.
     largest : float
-        The largest distance from the median of the neighbours, m; 0 without outliers.
+        Largest distance of an outlier from the median of its neighbours, m; 0 without outliers.
     usual : float
-        The usual distance, as a standard deviation, m.
+        The usual distance of a cell from this median, as a standard deviation, m.
     """
 
     cells: NDArray[np.bool_]
@@ -40,8 +40,8 @@ class Outliers(NamedTuple):
     largest: float
     usual: float
 
-    def told(self) -> str:
-        """Return what was found, in words."""
+    def summary(self) -> str:
+        """Return a sentence about what was found."""
         if not self.count:
             return "no cell lies far off its neighbours"
         return (f"{self.count} of {self.cells.size} cells lie far off their neighbours, by up to"
@@ -49,19 +49,24 @@ class Outliers(NamedTuple):
 
 
 def find_outliers(height: FloatArray, limit: float = _LIMIT) -> Outliers:
-    """Find cells that lie further beyond their neighbours than is usual between neighbours.
+    """Find cells that are much higher or lower than all their neighbours.
 
     Parameters
     ----------
     height : ndarray, shape (ny, nx)
         Heights, m.
     limit : float
-        A cell lies far off where it lies beyond its neighbours by so many times the usual
-        distance from their median, > 0. Up to two such cells may touch each other.
+        How far an outlier is above or below its neighbours, in units of the usual distance of a
+        cell from their median, > 0. Up to two outliers may be next to each other.
 
     Returns
     -------
     Outliers
+
+    Raises
+    ------
+    ValueError
+        If the limit is not positive.
 
     Examples
     --------
@@ -73,7 +78,7 @@ def find_outliers(height: FloatArray, limit: float = _LIMIT) -> Outliers:
     positive("limit", limit)
     around, low, high = _neighbours(height)
     usual = _USUAL * float(np.median(np.abs(height - around)))
-    # of a map that is mostly flat the median says nothing: then the mean distance counts
+    # If most of the map is flat, the median distance is 0, and the mean distance replaces it.
     scale = usual if usual > 0.0 else float(np.abs(height - around).mean())
     excess = np.maximum(height - high, low - height)
     cells = excess > limit * scale if scale > 0.0 else np.zeros(height.shape, dtype=bool)
@@ -85,8 +90,9 @@ def find_outliers(height: FloatArray, limit: float = _LIMIT) -> Outliers:
 def _neighbours(height: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the median, the third lowest and the third highest of the neighbours of each cell.
 
-    The neighbours lie within two rows and columns. At a steep edge a cell lies far from their
-    median, but not beyond them; and two outliers side by side do not hide each other.
+    The neighbours are the cells within two rows and columns. A cell at a steep edge is far from
+    their median, but not beyond the third highest or lowest of them. With the third, two outliers
+    side by side do not hide each other.
     """
     from scipy.ndimage import rank_filter
 

@@ -1,7 +1,7 @@
-"""Patches of roads: parts of measured maps made periodic, or maps drawn from a spectrum.
+"""Patches of roads: parts of measured maps that are made periodic, or maps drawn from a spectrum.
 
-A patch is what one run slides on. Several patches of a road give the scatter of friction, and so
-its interval. The same settings and the same seed give the same bits.
+A patch is the road of one run. The scatter of the friction between several patches gives its
+confidence interval. The same settings and the same seed give the same bits.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ __all__ = ["DrawnRoad", "MeasuredRoad", "Patch", "low_pass", "rested"]
 
 FloatArray = NDArray[np.float64]
 
-_CELLS_IN_DRAWN_WAVE = 8.0      # of the shortest wave of a drawn map
-_CELLS_IN_MEASURED_WAVE = 6.0   # of the shortest wave of a measured map
+_CELLS_IN_DRAWN_WAVE = 8.0      # in the shortest wave of a drawn map
+_CELLS_IN_MEASURED_WAVE = 6.0   # in the shortest wave of a measured map
 
 
 @dataclass(frozen=True)
 class Patch:
-    """A periodic map that a run slides on.
+    """A periodic map that is the road of a run.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Patch:
     lx, ly : float
         Lengths, m.
     label : str
-        Where it comes from.
+        Origin of the patch, for people.
     """
 
     height: FloatArray = field(repr=False)
@@ -50,18 +50,23 @@ class Patch:
 
     @property
     def code(self) -> str:
-        """A word that changes with the heights and the lengths."""
+        """Checksum of the heights and the lengths, 12 hexadecimal digits."""
         found = hashlib.sha256(np.ascontiguousarray(self.height).tobytes())
         found.update(repr((self.height.shape, self.lx, self.ly)).encode())
         return found.hexdigest()[:12]
 
     def save(self, folder: Path) -> Path:
-        """Write the map to the folder, unless it is there; return the file.
+        """Write the map to a folder, unless it is already there.
 
         Parameters
         ----------
         folder : Path
-            Where to write ``patch-CODE.h5``.
+            Folder of the file ``patch-CODE.h5``.
+
+        Returns
+        -------
+        Path
+            The file.
         """
         path = folder / f"patch-{self.code}.h5"
         if not path.exists():
@@ -83,6 +88,11 @@ def low_pass(height: FloatArray, lx: float, ly: float, short: float) -> FloatArr
         Lengths, m.
     short : float
         Shortest wave that is kept, m.
+
+    Returns
+    -------
+    ndarray, shape (ny, nx)
+        Heights, m.
     """
     ny, nx = height.shape
     kx = np.fft.rfftfreq(nx, lx / nx)
@@ -95,9 +105,9 @@ def low_pass(height: FloatArray, lx: float, ly: float, short: float) -> FloatArr
 def rested(height: FloatArray, weight: float = 0.98) -> FloatArray:
     """Return a map without the tilt of the plane that rests on its tops.
 
-    The plane is fitted by least squares in which heights above it count `weight` and those below it
-    1 - `weight`. A block that is pressed on the road lies on the tops; the mean plane of a patch,
-    in contrast, depends on valleys that nothing touches, and tilts tops that lie level.
+    The plane is a weighted least squares fit. Heights above it have the weight `weight`, those
+    below it 1 - `weight`. A block that is pressed onto the road rests on the tops. The mean plane
+    of a patch, in contrast, depends on valleys that nothing touches, and would tilt level tops.
 
     Parameters
     ----------
@@ -135,27 +145,26 @@ def rested(height: FloatArray, weight: float = 0.98) -> FloatArray:
 
 
 class DrawnRoad:
-    """Maps drawn from a spectrum, one for each number of a patch.
+    """A road whose patches are random maps drawn from a spectrum.
 
     Parameters
     ----------
     spectrum : Spectrum
-        The whole spectrum; waves of fewer than eight cells, and those longer than the side, are
-        left out.
+        The whole spectrum. Waves of fewer than eight cells, and those longer than the side, are
+        left out of the maps.
     cells : int
-        Of each side.
+        Number of cells along each side.
     side : float, optional
-        Length, m. Default: so that the shortest wave has eight cells, but at least twice the
-        longest wave where that many cells resolve less.
+        Length of a side, m; twice the longest wave by default.
     short : float, optional
-        Shortest wave, m; eight cells if left out.
+        Shortest wave, m; eight cells by default.
     seed : int
-        Another seed, other maps.
+        Seed of the patches. Roads with different seeds have no patch in common.
     """
 
     is_measured = False
     join = "none"
-    count: int | None = None    # of patches: as many as are wanted
+    count: int | None = None    # number of patches; None: any number can be drawn
 
     def __init__(self, spectrum: Spectrum, cells: int, side: float | None = None,
                  short: float | None = None, seed: int = 1) -> None:
@@ -177,7 +186,7 @@ class DrawnRoad:
         return self.whole_spectrum.name
 
     def patch(self, number: int) -> Patch:
-        """Return the patch of a number, from 0."""
+        """Return a patch by its number, counted from 0."""
         # Two roads with different seeds have no patch in common, also with seeds 1 and 2.
         height = self.spectrum.draw(self.cells, self.cells, self.side, self.side,
                                     (self.seed, number))
@@ -186,26 +195,32 @@ class DrawnRoad:
 
 
 class MeasuredRoad:
-    """Patches cut from measured maps.
+    """A road whose patches are cut from measured maps.
 
-    Each patch is levelled by the plane that rests on its tops, see `rested`.
+    Each patch is levelled by the plane that rests on its tops (`rested`).
 
     Parameters
     ----------
     maps : sequence of MeasuredSurface
-        At least one, none a profile.
+        At least one map; none may be a profile.
     cells : int
-        Cells of a side of a patch, those of the map; fewer where the map is smaller.
+        Number of cells along a side of a patch, with the cell size of the map. Smaller maps have
+        smaller patches.
     method : str, optional
-        How a patch is made periodic, one of `asperity.roads.joins.JOINS`. Default: 'seam', whose
-        join carries the load that belongs there (``tools/joins.py`` measures it); 'none' for maps
-        that are periodic and no larger than a patch.
+        How a patch is made periodic, one of `asperity.roads.joins.JOINS`. The default is 'none' if
+        the maps are periodic and not larger than a patch, and otherwise 'seam', whose join carries
+        the load that belongs to its share of the area (``tools/joins.py`` measures it).
     short : float, optional
-        Shortest wave that is kept, m; six cells if left out.
+        Shortest wave that is kept, m; six cells by default.
     outliers : str
         'report' or 'remove'.
     seed : int
-        Order in which the patches are taken.
+        Seed of the order of the patches.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not allowed, a map is a profile, or the maps are too small.
     """
 
     is_measured = True
@@ -238,7 +253,7 @@ class MeasuredRoad:
                                           for one in self._maps))
 
     def patch(self, number: int) -> Patch:
-        """Return the patch of a number, from 0 to `count` - 1."""
+        """Return a patch by its number, from 0 to `count` - 1."""
         which, row, column = self._places[number]
         one = self._maps[which]
         ny, nx = one.height.shape
@@ -257,7 +272,7 @@ class MeasuredRoad:
         return Patch(height - height.mean(), lx, ly, label)
 
     def _clean(self, one: MeasuredSurface, outliers: str) -> MeasuredSurface:
-        """Return a map without outliers, if they are to be removed; note them in any case."""
+        """Note the outliers of a map; return the map, without them if they shall be removed."""
         name = one.source.get("name", "map")
         if one.height.shape[0] == 1:
             raise ValueError(f"{name}: is a profile: no patches can be cut from it; it serves as"
@@ -268,15 +283,15 @@ class MeasuredRoad:
         if not found.count:
             return one
         if outliers == "report":
-            self.notes.append(f"{name}: {found.told()}; `outliers = 'remove'` (--outliers remove)"
-                              " puts the median of the neighbours there")
+            self.notes.append(f"{name}: {found.summary()}; `outliers = 'remove'` (--outliers"
+                              " remove) puts the median of the neighbours there")
             return one
-        self.notes.append(f"{name}: {found.told()}: replaced by the median of the neighbours")
+        self.notes.append(f"{name}: {found.summary()}: replaced by the median of the neighbours")
         return MeasuredSurface(found.mended, one.lx, one.ly, one.periodic, one.unit, one.steps,
                                one.source, one.notes)
 
     def _cells(self, fewest: int, cells: int) -> int:
-        """Return the cells of a side that the maps have room for; an even number."""
+        """Return the number of cells along a side for which the maps have room; it is even."""
         room = math.floor(fewest / (margin_of(1000, self.join) / 1000 + 1.0))
         found = min(cells, room)
         found -= found % 2
@@ -288,7 +303,10 @@ class MeasuredRoad:
         return found
 
     def _cut(self, seed: int) -> list[tuple[int, int, int]]:
-        """Return which map and where: parts that do not overlap, in an order of the seed."""
+        """Return the map, first row and first column of each patch.
+
+        Patches do not overlap, apart from their margins. The seed decides their order.
+        """
         need = self.cells + margin_of(self.cells, self.join)
         places = []
         for which, one in enumerate(self._maps):
@@ -303,7 +321,7 @@ class MeasuredRoad:
 
 
 def _starts(count: int, cells: int, need: int) -> list[int]:
-    """Return where patches begin along an axis: spread out, their inner cells apart."""
+    """Return the cells at which patches begin along an axis: spread out, without overlap."""
     fit = max(1, (count - (need - cells)) // cells)
     return [round(place) for place in np.linspace(0, count - need, fit)] if fit > 1 else [
         (count - need) // 2]

@@ -1,7 +1,7 @@
-"""Power spectral densities of roads: measured on maps and profiles, joined, cut, and drawn from.
+"""Power spectral densities of roads: measured, joined and cut; random maps are drawn from them.
 
 The density Phi is that of `asperity.surface.psd` (m4): mean(h^2) = int Phi k dk/(2 pi). Persson's
-C(q) is Phi/(4 pi^2). Between its knots a spectrum is straight in log-log.
+C(q) is Phi/(4 pi^2). Between its knots a spectrum is a power law, a straight line in log-log.
 """
 
 from __future__ import annotations
@@ -19,25 +19,31 @@ __all__ = ["Spectrum", "isotropic_of_profile", "join_spectra", "spectrum_of_map"
 
 FloatArray = NDArray[np.float64]
 
-_PER_DECADE = 20        # bands of a measured spectrum
-_WAVES_IN_MAP = 3.0     # of the longest wave that a scan tells reliably
-_CELLS_IN_WAVE = 6.0    # of the shortest one
+_PER_DECADE = 20        # bands of a measured spectrum per decade
+_WAVES_IN_MAP = 3.0     # periods within the map of the longest wave that a scan measures reliably
+_CELLS_IN_WAVE = 6.0    # cells within the shortest such wave
 
 
 @dataclass(frozen=True)
 class Spectrum:
-    """An isotropic power spectral density by its knots.
+    """An isotropic power spectral density, given at its knots.
 
     Attributes
     ----------
     wavenumber : ndarray, shape (n,)
-        rad/m, ascending.
+        Wave numbers of the knots, rad/m, ascending.
     psd : ndarray, shape (n,)
-        m4, > 0.
+        Densities at the knots, m4, > 0.
     name : str
-        Where it comes from.
+        Origin of the spectrum.
     notes : list of str
-        What the user should know.
+        Notes for the user.
+
+    Raises
+    ------
+    ValueError
+        If the arrays do not have the same length of at least 2, or contain values that are not
+        allowed.
     """
 
     wavenumber: FloatArray
@@ -60,7 +66,7 @@ class Spectrum:
         return 2.0 * math.pi / self.wavenumber[0], 2.0 * math.pi / self.wavenumber[-1]
 
     def at(self, wavenumber: FloatArray) -> FloatArray:
-        """Return the density at wavenumbers (rad/m), m4; zero outside of the band."""
+        """Return the density (m4) at wave numbers (rad/m); it is zero outside the band."""
         wavenumber = np.asarray(wavenumber, dtype=float)
         inside = (wavenumber >= self.wavenumber[0] * (1 - 1e-12)) & (
             wavenumber <= self.wavenumber[-1] * (1 + 1e-12))
@@ -74,12 +80,12 @@ class Spectrum:
         Parameters
         ----------
         long, short : float, optional
-            Longest and shortest wavelength; the spectrum's own if left out.
+            Longest and shortest wavelength, m; by default those of the spectrum.
 
         Raises
         ------
         ValueError
-            If nothing is left.
+            If no part of the spectrum is between them.
         """
         low = self.wavenumber[0] if long is None else max(
             self.wavenumber[0], 2.0 * math.pi / positive("long", long))
@@ -93,7 +99,12 @@ class Spectrum:
         return Spectrum(k, self.at(k), self.name, list(self.notes))
 
     def extended(self, short: float) -> Spectrum:
-        """Return the spectrum with waves down to a length (m), by the power law of its last decade.
+        """Return the spectrum extrapolated to a shorter wavelength, as in its last decade.
+
+        Parameters
+        ----------
+        short : float
+            New shortest wavelength, m.
 
         Examples
         --------
@@ -111,7 +122,7 @@ class Spectrum:
                         self.name, list(self.notes))
 
     def scaled(self, factor: float) -> Spectrum:
-        """Return the spectrum of heights times a factor."""
+        """Return the spectrum of the same road with all heights multiplied by a factor."""
         return Spectrum(self.wavenumber, self.psd * factor**2, self.name, list(self.notes))
 
     def draw(self, nx: int, ny: int, lx: float, ly: float, seed: int | Sequence[int]
@@ -121,11 +132,11 @@ class Spectrum:
         Parameters
         ----------
         nx, ny : int
-            Cells; a profile (ny = 1) is one through a map of the same spectrum's amplitudes.
+            Number of cells.
         lx, ly : float
             Lengths, m.
         seed : int or sequence of int
-            Another seed, another map; the same seed, the same bits.
+            Seed of the random phases. The same seed gives the same bits.
 
         Returns
         -------
@@ -145,21 +156,21 @@ class Spectrum:
 
 def spectrum_of_map(height: FloatArray, lx: float, ly: float, *, periodic: bool = False,
                     name: str = "map") -> Spectrum:
-    """Return the spectrum of a measured map within the range that it tells reliably.
+    """Return the spectrum of a measured map, for the wavelengths that it measures reliably.
 
-    A map that is not periodic is levelled and weighted by Hann's window first. The range goes from
-    a third of the shorter length to six cells.
+    These are from a third of the shorter length down to six cells. A map that is not periodic is
+    first levelled and weighted by Hann's window.
 
     Parameters
     ----------
     height : ndarray, shape (ny, nx)
-        Heights, m; with ny = 1 a profile, taken as a cut through an isotropic road.
+        Heights, m. A map with ny = 1 counts as a profile of an isotropic road.
     lx, ly : float
         Lengths, m.
     periodic : bool
-        Whether opposite edges fit.
+        Whether opposite edges match.
     name : str
-        Of the spectrum.
+        Name of the spectrum.
 
     Returns
     -------
@@ -174,7 +185,7 @@ def spectrum_of_map(height: FloatArray, lx: float, ly: float, *, periodic: bool 
     power = np.abs(modes)**2 / (nx * ny * float(np.sum(weights**2)))
     kx = 2.0 * math.pi * np.fft.rfftfreq(nx, lx / nx)
     if ny == 1:
-        # of the profile: mean(h^2) = int Phi1 dk/pi over k > 0
+        # The density Phi1 of the profile satisfies mean(h^2) = int Phi1 dk/pi over k > 0.
         k, psd = _banded(kx[1:], power[0, 1:] * lx, lx, lx / nx, name)
         return isotropic_of_profile(k, psd, name=name)
     ky = 2.0 * math.pi * np.fft.fftfreq(ny, ly / ny)
@@ -185,19 +196,19 @@ def spectrum_of_map(height: FloatArray, lx: float, ly: float, *, periodic: bool 
 
 def isotropic_of_profile(wavenumber: FloatArray, psd: FloatArray, *, name: str = "profile"
                          ) -> Spectrum:
-    """Return the spectrum of the isotropic road of whose profiles this is the spectrum.
+    """Return the spectrum of the isotropic road whose profiles have a given spectrum.
 
-    Phi(k) = -2 int_k^inf Phi1'(y)/sqrt(y^2 - k^2) dy, Abel's transform, where the profile's
-    density Phi1 (m3) is straight in log-log between the knots and goes on beyond the last one.
+    This is Abel's transform, Phi(k) = -2 int_k^inf Phi1'(y)/sqrt(y^2 - k^2) dy. The density Phi1 of
+    the profile is a power law between the knots, and the last one continues beyond the last knot.
 
     Parameters
     ----------
     wavenumber : ndarray, shape (n,)
-        rad/m, ascending.
+        Wave numbers, rad/m, ascending.
     psd : ndarray, shape (n,)
         Density of the profile, m3: mean(h^2) = int Phi1 dk/pi.
     name : str
-        Of the spectrum.
+        Name of the spectrum.
 
     Returns
     -------
@@ -208,7 +219,7 @@ def isotropic_of_profile(wavenumber: FloatArray, psd: FloatArray, *, name: str =
     logs = np.log(k)
     slopes = np.diff(level) / np.diff(logs)
     tail = min(float(np.polyfit(logs[-6:], level[-6:], 1)[0]), -1.0)
-    # y = k cosh(t): the root is gone, and the integrand falls as exp((tail) t)
+    # With y = k cosh(t) the root cancels, and the integrand falls like exp(tail t).
     t = np.linspace(0.0, 40.0 / abs(tail), 4001)
     found = np.empty(k.size)
     for i, one in enumerate(logs):
@@ -226,17 +237,17 @@ def isotropic_of_profile(wavenumber: FloatArray, psd: FloatArray, *, name: str =
 
 
 def join_spectra(spectra: Sequence[Spectrum], name: str | None = None) -> Spectrum:
-    """Return one spectrum of several scans, each within the range that it tells reliably.
+    """Return one spectrum that combines several scans, each within its own band.
 
-    Where ranges overlap, logarithms are averaged with weights that fade towards the ends of each
-    range, so that no step is left. Gaps are bridged by a straight line in log-log, and noted.
+    Where bands overlap, the logarithms are averaged with weights that fade towards the ends of each
+    band, so that no step remains. Gaps are bridged by a power law, and noted.
 
     Parameters
     ----------
     spectra : sequence of Spectrum
-        At least one.
+        At least one spectrum.
     name : str, optional
-        Of the result.
+        Name of the result.
 
     Returns
     -------
@@ -297,7 +308,7 @@ def _hann(count: int) -> FloatArray:
 
 def _banded(k: FloatArray, psd: FloatArray, length: float, cell: float, name: str
             ) -> tuple[FloatArray, FloatArray]:
-    """Return the means over bands of equal ratio, within the reliable range."""
+    """Return the means over bands of equal ratio, within the reliable range of wavelengths."""
     if not np.any(psd > 0.0):
         raise ValueError(f"{name}: is flat: must have roughness")
     low = 2.0 * math.pi * _WAVES_IN_MAP / length
@@ -316,7 +327,7 @@ def _banded(k: FloatArray, psd: FloatArray, length: float, cell: float, name: st
     sums = np.bincount(band[inside], psd[inside], count)
     middle = np.exp(waves / np.maximum(modes, 1))
     slope = sums * middle**2
-    # numbers far below the rest are the round-off of the Fourier transform
+    # Values far below all others are round-off of the Fourier transform.
     kept = (modes > 0) & (slope > 1e-16 * slope.max())
     if np.count_nonzero(kept) < 2:
         raise small

@@ -24,11 +24,11 @@ class RadialPsd(NamedTuple):
     Attributes
     ----------
     wavenumber : ndarray
-        Mean wave number of each ring, rad/m, rising.
+        Mean wave number of each ring in the plane of wave vectors, rad/m, ascending.
     psd : ndarray
-        Mean density of each ring, m4; m3 of a profile.
+        Mean density of each ring, m4; m3 for a profile.
     modes : ndarray
-        Number of modes of each ring.
+        Number of Fourier modes in each ring.
     """
 
     wavenumber: FloatArray
@@ -44,15 +44,15 @@ class Statistics(NamedTuple):
     mean, lowest, highest, rms_height : float
         Heights, m.
     skewness, kurtosis : float
-        0 and 3 of a Gaussian surface; both 0 of a flat one.
+        0 and 3 for a Gaussian surface; both are 0 for a flat one.
     rms_slope : float
-        Root mean square of the gradient, spectral: the map is taken as periodic.
+        Root mean square of the gradient, computed in Fourier space as if the map were periodic.
     rms_slope_differences : float
-        The same from differences of neighbours.
+        The same, computed from differences of neighbouring cells.
     rms_curvature : float
-        Root mean square of the mean curvature, 1/m, spectral.
+        Root mean square of the mean curvature, computed in Fourier space, 1/m.
     nayak : float
-        Nayak's parameter of the isotropic surface.
+        Nayak's parameter m0 m4/m2^2, from the spectral moments of the surface if it is isotropic.
     """
 
     mean: float
@@ -70,7 +70,7 @@ class Statistics(NamedTuple):
 def psd(height: ArrayLike, lx: float, ly: float | None = None) -> RadialPsd:
     """Return the radially averaged power spectral density of a map, without its mean.
 
-    The density is that of Phi(k) = abs(h_hat)^2/(lx ly), so that the sum of
+    The density is Phi(k) = abs(h_hat)^2/(lx ly) (thesis, eq. 1.5), so that the sum of
     ``psd * modes / (lx ly)`` is the variance of the height.
 
     Parameters
@@ -147,7 +147,7 @@ def statistics(
     lx, ly : float
         Lengths, m; `ly` defaults to square cells.
     boundary : str
-        'periodic' or 'free': whether differences reach across the edges.
+        'periodic' or 'free'. Only in a periodic map differences extend across the edges.
 
     Returns
     -------

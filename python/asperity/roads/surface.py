@@ -1,7 +1,7 @@
 """Height maps: generators, measurements, power spectral densities and statistics.
 
-Maps have the shape (ny, nx), heights are in m, summits are the largest values. Users import this
-module as ``asperity.surface``.
+Maps have the shape (ny, nx). Heights are in m, and summits are maxima. Users import this module as
+``asperity.surface``.
 """
 
 from __future__ import annotations

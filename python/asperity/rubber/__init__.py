@@ -1,1 +1,1 @@
-"""Rubber: relaxation functions, and how measurements become one."""
+"""Rubber: relaxation functions, and their fit to measurements."""

@@ -1,4 +1,4 @@
-"""A rubber at any temperature: its series, how the temperature shifts it, and where it is known."""
+"""A rubber at any temperature: its Prony series, its temperature shift, and its measured range."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ class Compound:
     Attributes
     ----------
     series : Prony
-        At the reference temperature.
+        Prony series at the reference temperature.
     reference : float or None
-        Reference temperature, C; None if it is known at one, unnamed temperature only.
+        Reference temperature, C; None if the rubber is known at a single, unnamed temperature.
     wlf : WLF or None
         Law of the shift.
     shifts : dict
-        log10 a_T by measured temperature, for a rubber without such a law.
+        log10 a_T by measured temperature (C), for a rubber without such a law.
     vertical_shifts : dict
-        log10 b_T by measured temperature; empty: b_T = 1.
+        log10 b_T by measured temperature (C); if it is empty, b_T = 1.
     valid_range : (float, float) or None
-        Angular frequencies at the reference temperature between which it was measured, rad/s.
+        Lowest and highest measured angular frequency at the reference temperature, rad/s.
     name : str
-        Where it comes from.
+        Origin of the data.
     notes : list of str
-        What the user should know.
+        Notes for the user.
     poisson : float
         Poisson ratio.
     usual : float or None
-        The temperature to take if none is asked for, C; the reference if left out.
+        Default temperature, C; None means the reference temperature.
     """
 
     series: Prony
@@ -55,12 +55,22 @@ class Compound:
 
     @property
     def temperature(self) -> float:
-        """The temperature to take if none is asked for, C; NaN if no temperature is known."""
+        """The default temperature, C; NaN if no temperature is known."""
         found = self.reference if self.usual is None else self.usual
         return math.nan if found is None else found
 
     def a_t(self, temperature: float) -> float:
-        """Return a_T: relaxation times at a temperature (C) over those at the reference.
+        """Return a_T, the ratio of the relaxation times to those at the reference temperature.
+
+        Parameters
+        ----------
+        temperature : float
+            Temperature, C; NaN means the reference temperature.
+
+        Returns
+        -------
+        float
+            a_T, dimensionless.
 
         Raises
         ------
@@ -81,32 +91,65 @@ class Compound:
         return 10.0 ** self._interpolated(temperature, self.shifts, "a_T")
 
     def b_t(self, temperature: float) -> float:
-        """Return b_T: moduli at a temperature (C) over those at the reference; 1 if not known."""
+        """Return b_T, the ratio of the moduli to those at the reference temperature.
+
+        Parameters
+        ----------
+        temperature : float
+            Temperature, C.
+
+        Returns
+        -------
+        float
+            b_T, dimensionless; 1 without vertical shifts.
+
+        Raises
+        ------
+        ValueError
+            If the temperature is outside the measured ones.
+        """
         if not self.vertical_shifts or math.isnan(temperature) or temperature == self.reference:
             return 1.0
         return 10.0 ** self._interpolated(temperature, self.vertical_shifts, "b_T")
 
     def at(self, temperature: float) -> Prony:
-        """Return the series at a temperature, C: every tau times a_T, every modulus times b_T."""
+        """Return the Prony series at another temperature.
+
+        Parameters
+        ----------
+        temperature : float
+            Temperature, C.
+
+        Returns
+        -------
+        Prony
+            Every relaxation time multiplied by a_T, every modulus by b_T.
+
+        Raises
+        ------
+        ValueError
+            If the shift at that temperature is not known.
+        """
         along, upward = self.a_t(temperature), self.b_t(temperature)
         return Prony(upward * self.series.g_inf, upward * self.series.g, along * self.series.tau)
 
     def speeds_within(self, temperature: float, short: float, long: float
                       ) -> tuple[float, float] | None:
-        """Return between which speeds all waves of a road load it within the measured band.
+        """Return the speeds at which all waves of a road excite measured frequencies only.
 
         Parameters
         ----------
         temperature : float
-            C.
+            Temperature, C.
         short, long : float
             Shortest and longest wavelength, m.
 
         Returns
         -------
         (float, float) or None
-            Lowest and highest speed, m/s, with the longest wave at the lower and the shortest at
-            the upper end; the lowest may be above the highest. None if no band is known.
+            Lowest and highest speed, m/s. At the lowest speed the longest wave has the lowest
+            measured frequency, at the highest speed the shortest wave the highest one; the first
+            may exceed the second. None if the measured range is not known.
         """
         if self.valid_range is None:
             return None
@@ -114,7 +157,7 @@ class Compound:
         return low * long / (2.0 * math.pi), high * short / (2.0 * math.pi)
 
     def _interpolated(self, temperature: float, shifts: dict[float, float], what: str) -> float:
-        """Return a shift between measured temperatures."""
+        """Return a shift that is interpolated between measured temperatures."""
         known = np.array(sorted(shifts))
         if len(known) < 2:
             raise ValueError(f"temperature = {temperature:g}: {self.name} gives no {what}: give WLF"

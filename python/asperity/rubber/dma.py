@@ -1,9 +1,9 @@
-"""Dynamic mechanical analysis: tables of storage and loss moduli, brought to a Prony series.
+"""Dynamic mechanical analysis: tables of storage and loss moduli, and the fit of a Prony series.
 
-A table is a CSV file with a header that names its columns and their units; what the header leaves
-open can be said in the call. Several temperatures become one master curve by time-temperature
-superposition: with WLF constants that are given, or with shifts found from the overlap. Users
-import this module as ``asperity.dma``.
+A table is a CSV file with a header that names its columns and their units; arguments of the call
+supply what the header does not name. Sweeps at several temperatures are combined into one master
+curve by time-temperature superposition, with given WLF constants or with shifts found from the
+overlap. Users import this module as ``asperity.dma``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the header of a DMA table says: its columns, their units, and the kind of the moduli."""
+"""The header of a DMA table: its columns, their units, and the kind of the moduli."""
 
 from __future__ import annotations
 
@@ -55,10 +55,15 @@ _MOST_PREAMBLE = 200  # lines above the header
 def split_header(
     path: Path, lines: Rows, given: Mapping[str, str | int]
 ) -> tuple[tuple[int, list[str]], list[str], Rows]:
-    """Return the header with its line, the units' line, and the rows of numbers.
+    """Return the header with its line number, the line of units, and the rows of numbers.
 
-    What an instrument says of the sample may stand above the header; where several sweeps follow
-    each other, the header may be repeated.
+    Metadata of the sample may precede the header. If several sweeps follow each other, the header
+    may be repeated.
+
+    Raises
+    ------
+    ValueError
+        If there are no numbers below the header.
     """
     at = next((i for i, (_, cells) in enumerate(lines[:_MOST_PREAMBLE])
                if _is_header(cells, given)), None)
@@ -81,7 +86,7 @@ def split_header(
 
 
 def _without_headings(body: Rows, header: list[str], units: list[str]) -> Rows:
-    """Return the rows without repeated headers and what stands above those."""
+    """Return the rows without repeated headers and the text lines directly above them."""
     kept: Rows = []
     for row in body:
         if row[1] == header:
@@ -93,7 +98,7 @@ def _without_headings(body: Rows, header: list[str], units: list[str]) -> Rows:
 
 
 def _is_header(cells: list[str], given: Mapping[str, str | int]) -> bool:
-    """Whether a line names the frequency and a modulus, or the columns that were asked for."""
+    """Return whether a line names the frequency and a modulus, or the requested columns."""
     if any(is_number(cell) for cell in cells):
         return False
     names = [_name_and_unit(cell)[0] for cell in cells]
@@ -105,10 +110,10 @@ def _is_header(cells: list[str], given: Mapping[str, str | int]) -> bool:
 
 
 def _unit(text: str) -> str | None:
-    """Return the unit that a text names, '' for a pure number, None if it names none."""
+    """Return the unit that a text names: '' for a pure number, None if the text is not a unit."""
     plain = re.sub(r"[\s\[\]()*]", "", text).replace("_", "/")
     if plain == "mPa":
-        return "mPa"  # no modulus of a rubber: refused later
+        return "mPa"  # much too small for the modulus of a rubber: the caller refuses it
     if plain in ("MHz", "MHZ"):
         return "MHz"
     return _UNIT_SPELLINGS.get(plain.lower())
@@ -130,7 +135,7 @@ def _name_and_unit(text: str) -> tuple[str, str | None]:
     if found and found.start() > 0 and found.group(1).strip().lower() not in ("δ", "delta"):
         unit = _unit(found.group(1))
         if unit is None and found.group(1).strip():
-            # letters of the quantity, as in "storage modulus (G')"
+            # The parentheses may contain a symbol instead of a unit: "storage modulus (G')".
             inner = _plain(found.group(1))
             unit = None if any(inner in names for names in _NAMES.values()) else found.group(1)
         text = text[: found.start()].strip()
@@ -169,7 +174,7 @@ def find_columns(
     path: Path, header: tuple[int, list[str]], units: list[str],
     given: Mapping[str, str | int],
 ) -> tuple[dict[str, int], dict[str, str | None], str | None]:
-    """Return the place of each column, the units found, and whether the moduli are tensile."""
+    """Return the index and the unit of each column by role, and 'tension' for tensile moduli."""
     heads = header[1]
     parts = [_name_and_unit(head) for head in heads]
     places = _places(path, header, parts, given)
@@ -182,7 +187,7 @@ def find_columns(
                 unit = units[at]
         found[role] = unit or None
     at = places["frequency"]
-    if found["frequency"] == "1/s":  # of an angular frequency radians, else turns
+    if found["frequency"] == "1/s":  # means rad/s for an angular frequency, otherwise Hz
         found["frequency"] = "rad/s" if at < len(parts) and parts[at][0] in _ANGULAR else "Hz"
     found["angular"] = "yes" if at < len(parts) and parts[at][0] in _ANGULAR else None
     kind = None
@@ -197,7 +202,7 @@ def find_columns(
 
 def _places(path: Path, header: tuple[int, list[str]], parts: list[tuple[str, str | None]],
             given: Mapping[str, str | int]) -> dict[str, int]:
-    """Return the place of each column: those that were asked for, then those of known names."""
+    """Return the index of each column by role: first the requested columns, then known names."""
     line, heads = header
     places = _asked(path, heads, parts, given)
     for role, names in _NAMES.items():
@@ -226,7 +231,7 @@ def _places(path: Path, header: tuple[int, list[str]], parts: list[tuple[str, st
 
 def _asked(path: Path, heads: list[str], parts: list[tuple[str, str | None]],
            given: Mapping[str, str | int]) -> dict[str, int]:
-    """Return the places of the columns that were asked for by name or number."""
+    """Return the index of each column that was requested by name or number."""
     for role in given:
         choice("columns", role, ROLES)
     places: dict[str, int] = {}

@@ -1,4 +1,4 @@
-"""A Prony series fitted to a DMA table, several temperatures brought to one."""
+"""Fit of a Prony series to a DMA table, with a shift to one reference temperature."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ Rows = tuple[float, NDArray[np.intp]]  # a temperature, C, and the points measur
 
 @dataclass(frozen=True)
 class DmaFit:
-    """A Prony series fitted to measurements, with what it was fitted to.
+    """A Prony series fitted to measurements, with the shifted data and the errors of the fit.
 
     Attributes
     ----------
     material : Prony
         The series at the reference temperature.
     omega, storage, loss : ndarray, shape (n,)
-        The data, rad/s and Pa, at the reference temperature, ascending.
+        The data shifted to the reference temperature, by ascending frequency, rad/s and Pa.
     temperature : ndarray, shape (n,), or None
         Temperature at which each point was measured, C.
     reference : float or None
@@ -46,17 +46,17 @@ class DmaFit:
     shifts : list of (float, float)
         Temperature and log10 of its shift factor.
     overlap_error : float or None
-        Rms distance of neighbouring sweeps, log10, where shifts were found from them.
+        Rms of log10 of the ratio of neighbouring sweeps, if the shifts were found from the overlap.
     error_storage, error_loss, error_tan_delta : float
         Rms of log10(fit/data).
     largest_error : float
-        Largest absolute of log10(fit/data) in storage and loss.
+        Largest absolute value of log10(fit/data) in storage and loss.
     plateau_bounded : bool
-        Whether the data leave the plateau open and `least_plateau` holds it.
+        Whether the plateau is at its lower bound `least_plateau`, because the data do not show it.
     name : str
         Name of the data.
     notes : list of str
-        What was taken for granted, or looks doubtful.
+        Assumptions that were made, and doubts.
     vertical_shifts : list of (float, float)
         Temperature and log10 of its vertical factor b_T; empty unless asked for.
     """
@@ -88,7 +88,7 @@ class DmaFit:
         return present("fit_html", self)
 
     def summary(self) -> str:
-        """Return a few lines on the fit, its error and its range."""
+        """Return a few lines about the fit, its error and its range of frequencies."""
         low, high = self.valid_range
         at = "" if self.reference is None else f" at {self.reference:g} C"
         lines = [
@@ -122,13 +122,18 @@ class DmaFit:
         poisson : float
             Poisson ratio.
         temperature : float, optional
-            Temperature of the simulation, C; the reference temperature if left out. Another one
-            needs WLF constants.
+            Temperature of the simulation, C; by default the reference temperature. Any other needs
+            WLF constants.
+
+        Returns
+        -------
+        str
+            The group.
 
         Raises
         ------
         ValueError
-            If a temperature is asked for and the shift is not known.
+            If the shift to the temperature is not known.
         """
         comment = "".join(f"! {line}\n" for line in self.summary().splitlines())
         if self.wlf is None:
@@ -142,17 +147,22 @@ class DmaFit:
             temperature=self.wlf.t_ref if temperature is None else temperature)
 
     def write_shifts(self, path: str | Path) -> Path:
-        """Write the shifts as a table: temperature, log10_a_t, a_t, b_t; return its path.
+        """Write the shifts as a table with the columns temperature (C), log10_a_t, a_t, b_t.
 
         Parameters
         ----------
         path : str or Path
-            The file, NAME.csv; temperatures in C.
+            The file, NAME.csv.
+
+        Returns
+        -------
+        Path
+            The file.
 
         Raises
         ------
         ValueError
-            If the table has one temperature only.
+            If the data have a single temperature.
         OSError
             If the file cannot be written.
         """
@@ -167,7 +177,7 @@ class DmaFit:
         return path
 
     def plot(self) -> Figure:
-        """Draw data and fit, tan delta, and the error of both.
+        """Draw the data and the fit, tan delta, and the errors of the fit.
 
         Returns
         -------
@@ -192,24 +202,25 @@ def fit_dma(
     Parameters
     ----------
     table : DmaTable
-        The measurements; rows in any order.
+        The measurements, in any order.
     arms_per_decade : float
-        Density of the relaxation times.
+        Number of relaxation times per decade.
     reference : float, optional
-        Reference temperature, C. With `wlf` any, by default its own; without `wlf` the nearest one
-        of the table, by default the middle one.
+        Reference temperature, C. With `wlf` it can be any temperature, by default that of the
+        constants. Without `wlf` it is the nearest temperature of the table, by default the middle
+        one.
     wlf : (c1, c2) or (c1, c2, t_ref), optional
-        Constants of the shift, -, K, C; t_ref is `reference` if left out. Without them several
-        temperatures are shifted by `asperity.material.master_curve`.
+        Constants of the shift: dimensionless, K, C. `t_ref` is `reference` by default. Without
+        them, several temperatures are shifted by `asperity.material.master_curve`.
     temperature_tolerance : float
-        Temperatures closer than this (K) belong to one sweep.
+        Points whose temperatures differ by less than this (K) belong to one sweep.
     least_plateau : float
-        The plateau g_inf is at least this share of the lowest storage modulus: positive also where
-        the data do not reach it. 0 to 1.
+        Lower bound of the plateau g_inf as a fraction of the lowest storage modulus, 0 to 1. It
+        keeps the plateau positive if the data do not reach it.
     slack : float
         Relative increase of the misfit allowed for smoothness; see `asperity.material.Prony.fit`.
     vertical : bool
-        Where shifts are found from the overlap, shift moduli, too: G(omega, T) = b_T G(omega a_T).
+        If shifts are found from the overlap, also shift the moduli: G(omega, T) = b_T G(omega a_T).
 
     Returns
     -------
@@ -218,7 +229,9 @@ def fit_dma(
     Raises
     ------
     ValueError
-        If an option is wrong, or the temperatures cannot be brought to one.
+        If an option is not allowed, or the temperatures cannot be combined.
+    NotConverged
+        If the fit finds no solution.
     """
     number("least_plateau", least_plateau, 0.0, 1.0)
     positive("temperature_tolerance", temperature_tolerance)
@@ -259,7 +272,7 @@ def fit_dma(
 
 
 class _Shifted(NamedTuple):
-    """How the points of a table come to the reference temperature."""
+    """The shifts of the points of a table to the reference temperature."""
 
     log_shift: FloatArray  # log10 a_T of each point
     log_vertical: FloatArray  # log10 b_T of each point
@@ -271,7 +284,7 @@ class _Shifted(NamedTuple):
 
 def _shifted(table: DmaTable, sweeps: list[Rows], constants: WLF | None, reference: float | None,
              tolerance: float, vertical: bool) -> _Shifted:
-    """Return the shifts: those of the constants, or those that lay the sweeps on one curve."""
+    """Return the shifts, by the given constants or from the overlap of the sweeps."""
     shift, level = np.zeros(table.omega.size), np.zeros(table.omega.size)
     if constants is not None:
         for t, rows in sweeps:
@@ -290,7 +303,7 @@ def _shifted(table: DmaTable, sweeps: list[Rows], constants: WLF | None, referen
 
 def _overlaid(table: DmaTable, sweeps: list[Rows], reference: float | None, tolerance: float,
               vertical: bool) -> _Shifted:
-    """Return the shifts that lay each sweep over its neighbour."""
+    """Return the shifts that make each sweep overlap its neighbour."""
     temperatures = [t for t, _ in sweeps]
     place = len(sweeps) // 2 if reference is None else int(
         np.argmin([abs(t - reference) for t in temperatures]))
@@ -316,7 +329,7 @@ def _overlaid(table: DmaTable, sweeps: list[Rows], reference: float | None, tole
 
 
 def _range_notes(table: DmaTable, omega: FloatArray) -> list[str]:
-    """Say whether the range of frequencies is short; a single frequency raises."""
+    """Return a note if the range of frequencies is short; raise ValueError for one frequency."""
     decades = math.log10(float(omega[-1] / omega[0]))
     if decades < 1e-3:
         raise ValueError(f"{table.name}: all {omega.size} points are at one frequency,"
@@ -329,7 +342,25 @@ def _range_notes(table: DmaTable, omega: FloatArray) -> list[str]:
 
 
 def wlf_constants(wlf: Sequence[float] | None, reference: float | None) -> WLF | None:
-    """Return the constants, at the reference temperature that was asked for."""
+    """Return the WLF constants, converted to a reference temperature.
+
+    Parameters
+    ----------
+    wlf : (c1, c2) or (c1, c2, t_ref), optional
+        Constants: dimensionless, K, C.
+    reference : float, optional
+        Reference temperature of the result, C.
+
+    Returns
+    -------
+    WLF or None
+        None without constants.
+
+    Raises
+    ------
+    ValueError
+        If a number is missing or not allowed.
+    """
     if reference is not None:
         number("reference", reference)
     if wlf is None:
@@ -346,7 +377,8 @@ def wlf_constants(wlf: Sequence[float] | None, reference: float | None) -> WLF |
     positive("wlf c2", c2)
     if reference is None or reference == t_ref:
         return WLF(c1, c2, t_ref)
-    # The same shifts seen from another temperature (Williams, Landel and Ferry 1955).
+    # Convert the constants to the other reference temperature; the shifts stay the same (Williams,
+    # Landel and Ferry 1955).
     moved = c2 + reference - t_ref
     if moved <= 0.0:
         raise ValueError(f"reference = {reference:g}: must be > t_ref - c2 = {t_ref - c2:g}")
@@ -354,7 +386,7 @@ def wlf_constants(wlf: Sequence[float] | None, reference: float | None) -> WLF |
 
 
 def _sweeps(temperature: FloatArray, tolerance: float) -> list[Rows]:
-    """Return the temperatures, ascending, with their rows."""
+    """Return the temperatures, ascending, each with its rows of the table."""
     order = np.argsort(temperature, kind="stable")
     cuts = np.flatnonzero(np.diff(temperature[order]) > tolerance) + 1
     sweeps = []
@@ -372,7 +404,7 @@ def _sweeps(temperature: FloatArray, tolerance: float) -> list[Rows]:
 
 
 def _enough(table: DmaTable, sweeps: list[Rows]) -> None:
-    """See that every sweep can be laid over its neighbour."""
+    """Raise ValueError if a sweep has too few frequencies to be shifted."""
     for t, rows in sweeps:
         if np.unique(table.omega[rows]).size < 3:
             count = int(np.unique(table.omega[rows]).size)
@@ -384,7 +416,7 @@ def _enough(table: DmaTable, sweeps: list[Rows]) -> None:
 def _doubts(
     table: DmaTable, sweeps: list[Rows], curve: MasterCurve
 ) -> list[str]:
-    """Say which sweeps hardly reach each other, or do not lie on one curve."""
+    """Return notes about sweeps that hardly overlap or do not lie on one curve."""
     doubts = []
     ends = []
     for (t, rows), shift in zip(sweeps, curve.log_shift, strict=True):

@@ -1,4 +1,4 @@
-"""Tables of storage and loss moduli, as instruments write them."""
+"""Reading of tables of storage and loss moduli that instruments write."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _MOST_FAULTS = 10
 
 @dataclass(frozen=True)
 class DmaTable:
-    """Moduli at frequencies, and temperatures where the table has them.
+    """Moduli at frequencies, and temperatures if the table has them.
 
     Attributes
     ----------
@@ -41,11 +41,11 @@ class DmaTable:
     storage, loss : ndarray, shape (n,)
         Shear moduli G' and G'', Pa.
     temperature : ndarray, shape (n,), or None
-        C.
+        Temperature, C.
     name : str
         Name of the file.
     notes : list of str
-        What was taken for granted, such as a unit that the header does not name.
+        Assumptions that were made, for example about a unit that the header does not name.
     """
 
     omega: FloatArray
@@ -68,13 +68,15 @@ def read_dma(
 ) -> DmaTable:
     r"""Read a table of storage and loss moduli.
 
-    Columns are separated by commas, semicolons, tabs or blanks; decimal commas are read where
-    commas do not separate (with decimal points elsewhere they stand between thousands). Lines that
-    start with ``#``, empty ones and those above the header are skipped. Points whose cells are
-    empty or hold a word such as OVL are left out. A wide table has columns for each temperature,
-    which the heads name, as ``G' (MPa) at -20 C``, or a line above them. Units stand in the
-    header, such as ``f (Hz)``, ``G' [MPa]``, ``T_C``, or in a line of their own below it.
-    Without any, frequencies are in Hz (in rad/s where the column is named omega), moduli in Pa and
+    Columns are separated by commas, semicolons, tabs or blanks. Decimal commas are understood
+    unless commas separate the columns; in a table that also has decimal points, commas separate
+    thousands. Empty lines, lines that start with ``#`` and those above the header are skipped.
+    Points whose cells are empty or contain a word such as OVL are left out. A wide table has
+    columns for each temperature, which are named in the header, as in ``G' (MPa) at -20 C``, or in
+    a line above it.
+
+    Units are given in the header, as in ``f (Hz)``, ``G' [MPa]`` or ``T_C``, or in a line below it.
+    Otherwise frequencies are taken in Hz (in rad/s if the column is named omega), moduli in Pa and
     temperatures in C, and `notes` says so.
 
     Parameters
@@ -83,17 +85,16 @@ def read_dma(
         The file.
     columns : mapping, optional
         Name or number (from 1) of the column of 'frequency', 'storage', 'loss', 'temperature' or
-        'tan_delta', for those that the header's words do not give. A file without a header needs
-        the numbers.
+        'tan_delta', if the header does not identify it. A file without a header needs numbers.
     frequency_unit : str, optional
-        'Hz', 'kHz', 'mHz', 'rad/s' or 'krad/s'; goes before the header's.
+        'Hz', 'kHz', 'mHz', 'rad/s' or 'krad/s'; overrides the header.
     modulus_unit : str, optional
-        'Pa', 'kPa', 'MPa' or 'GPa'; goes before the header's.
+        'Pa', 'kPa', 'MPa' or 'GPa'; overrides the header.
     temperature_unit : str, optional
-        'C' or 'K'; goes before the header's.
+        'C' or 'K'; overrides the header.
     kind : str, optional
-        'shear', or 'tension' for moduli E: G = E/(2 (1 + poisson)). By default what the names of
-        the columns say (E' and E'' or 'tensile': tension), else 'shear'.
+        'shear', or 'tension' for moduli E with G = E/(2 (1 + poisson)). The default is 'tension' if
+        the names of the columns say so (E', E'' or 'tensile'), otherwise 'shear'.
     poisson : float
         Poisson ratio, for moduli in tension.
 
@@ -106,7 +107,7 @@ def read_dma(
     OSError
         If the file is missing or cannot be read.
     ValueError
-        With the number of the line of each fault, or what the header lacks.
+        If a value is not allowed (with the line number of each fault), or a column is missing.
 
     Examples
     --------
@@ -131,13 +132,13 @@ def read_dma(
     body, notes = _measured(body, places)
 
     def unit(role: str, given: str | None, allowed: Mapping[str, float], default: str) -> float:
-        told = found_units.get(role)
-        if given is None and told is not None and told not in allowed:
-            raise ValueError(f"{path}: line {header[0]}: column {role}: has the unit {told!r}: must"
-                             f" be one of {', '.join(allowed)}")
-        if given is None and told is None:
+        named = found_units.get(role)
+        if given is None and named is not None and named not in allowed:
+            raise ValueError(f"{path}: line {header[0]}: column {role}: has the unit {named!r}:"
+                             f" must be one of {', '.join(allowed)}")
+        if given is None and named is None:
             notes.append(f"{role}: the header names no unit: taken as {default}")
-        return allowed[given or told or default]
+        return allowed[given or named or default]
 
     angular = found_units.get("angular") == "yes"
     to_omega = unit("frequency", frequency_unit, FREQUENCY_UNITS, "rad/s" if angular else "Hz")
@@ -168,7 +169,7 @@ def read_dma(
 
 
 def _measured(body: Rows, places: Mapping[str, int]) -> tuple[Rows, list[str]]:
-    """Return the rows without those that lack a value, as where the instrument overloads."""
+    """Return the rows that have all values, and a note on the others (overload, for example)."""
     most = max(places.values()) + 1
     kept = [(line, cells) for line, cells in body
             if len(cells) < most
@@ -183,7 +184,7 @@ def _measured(body: Rows, places: Mapping[str, int]) -> tuple[Rows, list[str]]:
 def _numbers(
     path: Path, body: list[tuple[int, list[str]]], places: Mapping[str, int]
 ) -> dict[str, FloatArray]:
-    """Return the columns as numbers; all faults are told with their lines."""
+    """Return the columns as numbers, or raise a ValueError that lists all faults by line."""
     faults: list[str] = []
     values: dict[str, list[float]] = {role: [] for role in places}
     most = max(places.values()) + 1

@@ -1,4 +1,4 @@
-"""Time-temperature superposition: sweeps at several temperatures brought onto one curve."""
+"""Time-temperature superposition: sweeps at several temperatures are combined into one curve."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FloatArray = NDArray[np.float64]
 
 
 class MasterCurve(NamedTuple):
-    """Measurements at several temperatures, brought to one reference temperature.
+    """Measurements at several temperatures, shifted to one reference temperature.
 
     Attributes
     ----------
@@ -31,13 +31,13 @@ class MasterCurve(NamedTuple):
     log_shift : ndarray, shape (m,)
         log10 a_T of each temperature.
     wlf : WLF or None
-        Law fitted to the shifts; None with fewer than three temperatures or where no law with
+        Law fitted to the shifts; None with fewer than three temperatures, or if no law with
         c1, c2 > 0 fits.
     overlap_error : float
-        Rms distance of neighbouring curves in log10 of the modulus, where they overlap.
+        Rms distance of neighbouring curves in log10 of the modulus, within their overlap.
     log_vertical : ndarray, shape (m,)
-        log10 b_T of each temperature: G(omega, T) = b_T G(omega a_T, reference); zeros unless
-        vertical shifts were asked for.
+        log10 b_T of each temperature, G(omega, T) = b_T G(omega a_T, reference); zeros without
+        vertical shifts.
     """
 
     omega: FloatArray
@@ -61,29 +61,29 @@ def master_curve(
 ) -> MasterCurve:
     """Shift DMA sweeps at several temperatures along the frequency axis onto one curve.
 
-    Each sweep is shifted onto its neighbour nearer to the reference: the shift minimises the
-    mean squared distance of log G' and log G'' over the overlap.
+    Each sweep is shifted onto the neighbour that is closer to the reference. The shift minimises
+    the mean squared distance of log G' and log G'' within the overlap.
 
     Parameters
     ----------
     temperatures : array_like, shape (m,)
-        One a sweep, different from each other.
+        Temperature of each sweep, C or K; all must differ.
     omega, storage, loss : sequence of m array_like
         Angular frequencies (rad/s), G' and G'' (Pa) of each sweep; all > 0, at least three points.
     reference : float
-        Reference temperature: one of `temperatures`.
+        Reference temperature, one of `temperatures`.
     vertical : bool
-        Shift along the axis of the modulus, too, storage and loss alike.
+        Also shift storage and loss by a common factor along the axis of the modulus.
 
     Returns
     -------
     MasterCurve
-        `Prony.fit(curve.omega, curve.storage, curve.loss)` makes a material of it.
+        `Prony.fit(curve.omega, curve.storage, curve.loss)` fits a material to it.
 
     Raises
     ------
     ValueError
-        If shapes differ, values are out of range or `reference` is not among the temperatures.
+        If shapes differ, values are out of range, or `reference` is not one of the temperatures.
 
     Examples
     --------
@@ -151,9 +151,9 @@ def _logarithms(place: int, *sweep: ArrayLike) -> tuple[FloatArray, FloatArray]:
 def _overlay(
     fixed: tuple[FloatArray, FloatArray], moving: tuple[FloatArray, FloatArray], vertical: bool
 ) -> tuple[float, float, float]:
-    """Return how `moving` comes to lie over `fixed`, and the mean square that is left.
+    """Return the shifts that make `moving` overlap `fixed`, and the mean square that remains.
 
-    That is the shift in log10 frequency, and by how much log10 of the modulus lies higher.
+    The shifts are those of log10 of the frequency and of log10 of the modulus.
     """
     x_fixed, y_fixed = fixed
     x_moving, y_moving = moving
@@ -171,7 +171,7 @@ def _overlay(
             found = found - found.mean()
         return 0.5 * float(np.sum(np.mean(found**2, axis=1)))
 
-    # at least a tenth of the shorter sweep overlaps
+    # Consider only shifts with an overlap of at least a tenth of the shorter sweep.
     margin = 0.1 * min(np.ptp(x_fixed), np.ptp(x_moving))
     lowest = x_fixed[0] - x_moving[-1] + margin
     highest = x_fixed[-1] - x_moving[0] - margin
@@ -184,7 +184,7 @@ def _overlay(
 
 
 def _fit_wlf(temperatures: FloatArray, log_shift: FloatArray, reference: float) -> WLF | None:
-    """Return the WLF constants nearest to the shifts, or None."""
+    """Return the WLF constants that fit the shifts best, or None."""
     difference = temperatures - reference
     if difference.size < 3:
         return None

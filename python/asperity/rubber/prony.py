@@ -53,7 +53,7 @@ class Prony:
     Parameters
     ----------
     g_inf : float
-        Long-term (equilibrium) modulus, Pa, >= 0; may be 0 where arms exist.
+        Long-term (equilibrium) modulus, Pa, >= 0; it may be 0 if there are arms.
     g : array_like, shape (n,)
         Moduli of the arms, Pa, >= 0; n may be 0 (elastic).
     tau : array_like, shape (n,)
@@ -90,10 +90,10 @@ class Prony:
         self._g.setflags(write=False)
         self._tau.setflags(write=False)
         self._spectrum: tuple[FloatArray, FloatArray, float] | None = None
-        #: FitErrors of a series made by `fit`, else None.
+        #: The `FitErrors` of a series that was fitted by `fit`, otherwise None.
         self.fit_errors: FitErrors | None = None
 
-    # ---- what it is ------------------------------------------------------------------------
+    # ---- parameters ------------------------------------------------------------------------
 
     @property
     def g_inf(self) -> float:
@@ -225,7 +225,7 @@ class Prony:
         Raises
         ------
         ValueError
-            If a time is negative or no finite number.
+            If a time is negative or not a finite number.
         """
         times = array_of("t", t, low=0.0)
         return self._g_inf + np.sum(self._g * np.exp(-times[..., None] / self._tau), axis=-1)
@@ -233,9 +233,9 @@ class Prony:
     def creep_compliance(self, t: ArrayLike) -> FloatArray:
         """Return the creep compliance J(t), the strain under a unit step of stress.
 
-        J(t) = 1/G(0) + sum_j J_j (1 - exp(-t/theta_j)) + t/eta with the retardation spectrum
-        of `retardation_times` and `retardation_compliances`; the last term exists for g_inf = 0
-        only, eta = sum g tau. No approximation is made.
+        J(t) = 1/G(0) + sum_j J_j (1 - exp(-t/theta_j)) + t/eta, with the retardation spectrum of
+        `retardation_times` and `retardation_compliances`. The last term, with eta = sum g tau,
+        exists for g_inf = 0 only. The formula is exact.
 
         Parameters
         ----------
@@ -246,6 +246,11 @@ class Prony:
         -------
         ndarray
             J, 1/Pa, shape of `t`.
+
+        Raises
+        ------
+        ValueError
+            If a time is negative or not a finite number.
 
         Examples
         --------
@@ -260,17 +265,17 @@ class Prony:
 
     @property
     def retardation_times(self) -> FloatArray:
-        """Retardation (creep) times theta_j, s, descending; one an arm (one fewer if g_inf = 0)."""
+        """Retardation (creep) times theta_j, s, descending: one per arm, one fewer if g_inf = 0."""
         return self._retardation()[0].copy()
 
     @property
     def retardation_compliances(self) -> FloatArray:
-        """Compliances J_j, 1/Pa, that belong to `retardation_times`."""
+        """Compliances J_j of the `retardation_times`, 1/Pa."""
         return self._retardation()[1].copy()
 
     @property
     def fluidity(self) -> float:
-        """1/eta in 1/(Pa s), the rate of steady flow: 0 for a solid (g_inf > 0)."""
+        """Rate of steady flow 1/eta, 1/(Pa s); it is 0 for a solid (g_inf > 0)."""
         return self._retardation()[2]
 
     def _retardation(self) -> tuple[FloatArray, FloatArray, float]:
@@ -278,17 +283,17 @@ class Prony:
             self._spectrum = retardation_spectrum(self._g_inf, self._g, self._tau)
         return self._spectrum
 
-    # ---- other materials made from it --------------------------------------------------------
+    # ---- conversion and fit --------------------------------------------------------------------
 
     @classmethod
     def from_zener(
         cls, g_inf: float, g0: ArrayLike = (), g1: ArrayLike = (), eta: ArrayLike = ()
     ) -> Prony:
-        """Make the Prony series equal to Zener branches.
+        """Return the Prony series that is equivalent to Zener branches.
 
-        A branch is a spring G0 in series with (a spring G1 parallel to a dashpot eta); all
-        branches and the spring `g_inf` are parallel. Each is exactly a spring
-        G0 G1/(G0 + G1) and a Maxwell arm g = G0^2/(G0 + G1), tau = eta/(G0 + G1).
+        A branch is a spring G0 in series with (a spring G1 parallel to a damper eta). All branches
+        and the spring `g_inf` are parallel. Each branch is exactly equivalent to a spring
+        G0 G1/(G0 + G1) and an arm with g = G0^2/(G0 + G1) and tau = eta/(G0 + G1).
 
         Parameters
         ----------
@@ -328,14 +333,14 @@ class Prony:
         )
 
     def shifted(self, temperature: float, wlf: Sequence[float]) -> Prony:
-        """Return the material at another temperature: every tau times a_T.
+        """Return the material at another temperature, with every tau multiplied by a_T.
 
         Parameters
         ----------
         temperature : float
-            Temperature, in the scale of the reference temperature.
+            Temperature, in the scale of the reference temperature (C or K).
         wlf : WLF or (c1, c2, t_ref)
-            Constants; c2 in K.
+            Constants of the shift: c1 dimensionless, c2 in K.
 
         Returns
         -------
@@ -372,10 +377,10 @@ class Prony:
     ) -> Prony:
         """Fit a series to measured storage and loss moduli.
 
-        Relaxation times are spaced evenly on a log scale; moduli >= 0 minimise the relative
-        misfit of G' and G'' (non-negative least squares). Among the series whose rms misfit is
-        within `slack` of the smallest possible, the smoothest is returned: the second
-        differences of g/G''(1/tau) are penalised as strongly as that allows.
+        The relaxation times are spaced evenly on a log scale. The moduli, which are not negative,
+        minimise the relative misfit of G' and G'' (non-negative least squares). Of all series whose
+        rms misfit is within `slack` of the smallest one, the smoothest is returned: the second
+        differences of g/G''(1/tau) are penalised as strongly as this condition allows.
 
         Parameters
         ----------
@@ -384,26 +389,29 @@ class Prony:
         storage, loss : array_like, shape (n,)
             G' and G'', Pa, > 0.
         arms_per_decade : float
-            Density of the relaxation times, > 0.
+            Number of relaxation times per decade, > 0.
         tau_range : (float, float), optional
-            Shortest and longest relaxation time, s. Default: the reciprocals of the largest and
-            smallest frequency and a decade beyond, where spectra have their tails.
+            Shortest and longest relaxation time, s. By default they are a decade beyond the
+            reciprocals of the largest and the smallest frequency, where spectra have their tails.
         slack : float
-            Allowed relative increase of the rms misfit, plus 1e-4, in exchange for smoothness;
-            >= 0, and 0 asks for the smallest misfit alone.
+            Relative increase of the rms misfit, in addition to 1e-4, that is allowed in exchange
+            for smoothness, >= 0. With 0 the misfit is minimised without regard to smoothness.
         least_plateau : float
-            g_inf is at least this share of the smallest storage modulus, 0 to 1: a solid also
-            where the data do not reach the plateau.
+            Lower bound of g_inf as a fraction of the smallest storage modulus, 0 to 1. It makes the
+            material a solid even if the data do not reach the plateau.
 
         Returns
         -------
         Prony
-            With the attribute `fit_errors` (a FitErrors). Arms of zero modulus are left out.
+            The series, with the attribute `fit_errors` (`FitErrors`). Arms with zero modulus are
+            left out.
 
         Raises
         ------
         ValueError
             If values are out of range or shapes differ.
+        NotConverged
+            If the least squares find no solution.
 
         Examples
         --------
@@ -428,7 +436,7 @@ class Prony:
         )
         return result
 
-    # ---- out ---------------------------------------------------------------------------------
+    # ---- output ------------------------------------------------------------------------------
 
     def to_namelist(
         self,
@@ -444,20 +452,19 @@ class Prony:
         poisson : float
             Poisson ratio.
         temperature : float, optional
-            Temperature of the simulation; needs `wlf`.
+            Temperature of the simulation, C; needs `wlf`.
         wlf : WLF or (c1, c2, t_ref), optional
-            Constants the program shifts the times with; needs `temperature`.
+            Constants with which the program shifts the relaxation times; needs `temperature`.
 
         Returns
         -------
         str
-            Numbers are written so that they are read back exactly.
+            The group. The numbers have as many digits as needed to read back the same bits.
 
         Raises
         ------
         ValueError
-            If the temperature is given without `wlf` or the other way round, or a value is out of
-            range.
+            If only one of `temperature` and `wlf` is given, or a value is out of range.
 
         Examples
         --------
@@ -492,20 +499,20 @@ class Prony:
         Parameters
         ----------
         ax : matplotlib Axes, optional
-            Where to draw; a new figure by default.
+            Axes to draw into; a new figure by default.
         omega : array_like, optional
-            Frequencies, rad/s; by default two decades beyond the arms.
+            Angular frequencies, rad/s; by default they extend two decades beyond the arms.
 
         Returns
         -------
         matplotlib Axes
-            The axes of the moduli; tan delta has a twin axis on the right.
+            The axes of the moduli. The axis of tan delta is on the right.
         """
         return present("plot_prony", self, ax, omega)
 
 
 def _wrapped(name: str, values: FloatArray) -> str:
-    """Return `name = v1, v2, ...`, three values a line."""
+    """Return `name = v1, v2, ...` with three values per line."""
     texts = [repr(float(value)) for value in values]
     rows = [", ".join(texts[i : i + 3]) for i in range(0, len(texts), 3)]
     return f"{name} = " + (",\n" + " " * (6 + len(name))).join(rows)

@@ -1,7 +1,7 @@
-"""Moduli of a Prony series from measured storage and loss moduli.
+"""Fit of the moduli of a Prony series to measured storage and loss moduli.
 
-The relaxation times are given, evenly spaced on a log scale. The moduli follow from non-negative
-least squares of the relative misfit, with as much smoothness as a small increase of it allows.
+The relaxation times are given and evenly spaced on a log scale. The moduli minimise the relative
+misfit (non-negative least squares); of all series that fit nearly as well, the smoothest is chosen.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ __all__ = ["MOST_ARMS", "FittedModuli", "fit_moduli"]
 
 FloatArray = NDArray[np.float64]
 
-MOST_ARMS = 200  # of a fit: two a decade leave a ripple of 0.1 %, more than ten tell nothing new
+MOST_ARMS = 200  # limit for a fit; two per decade leave a ripple of 0.1 %, so more are not useful
 
 
 class FittedModuli(NamedTuple):
-    """A fitted series and the data it was fitted to.
+    """A fitted series and its data.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ def fit_moduli(
     slack: float,
     least_plateau: float,
 ) -> FittedModuli:
-    """Fit a series; `asperity.material.Prony.fit` tells what the arguments are.
+    """Fit a series; `asperity.material.Prony.fit` documents the arguments.
 
     Returns
     -------
@@ -64,6 +64,8 @@ def fit_moduli(
     ------
     ValueError
         If values are out of range or shapes differ.
+    NotConverged
+        If the least squares find no solution.
     """
     frequency = array_of("omega", omega, low=0.0, low_open=True, ndim=1)
     real = array_of("storage", storage, low=0.0, low_open=True, ndim=1)
@@ -104,7 +106,7 @@ def _relaxation_times(
 
 def _system(frequency: FloatArray, real: FloatArray, imaginary: FloatArray, tau: FloatArray,
             scale: FloatArray) -> FloatArray:
-    """Return the matrix that takes scaled moduli to fit/data, storage above loss."""
+    """Return the matrix that maps scaled moduli to fit/data, with storage above loss."""
     x = frequency[:, None] * tau
     blocks = scale * x / (1.0 + x * x)
     return np.vstack([
@@ -114,7 +116,7 @@ def _system(frequency: FloatArray, real: FloatArray, imaginary: FloatArray, tau:
 
 
 def _smoothest(columns: FloatArray, floor: float, slack: float) -> FloatArray:
-    """Return the smoothest unknowns >= 0 whose misfit is nearly the least."""
+    """Return the smoothest unknowns >= 0 whose misfit is nearly the smallest one."""
     count = columns.shape[1] - 1
     target = np.ones(len(columns)) - floor * columns[:, 0]
     penalty = np.zeros((max(count - 2, 0), count + 1))

@@ -1,4 +1,4 @@
-"""The shift of relaxation times with the temperature, after Williams, Landel and Ferry."""
+"""The law of Williams, Landel and Ferry for the shift of relaxation times with the temperature."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class WLF(NamedTuple):
         Raises
         ------
         ValueError
-            If a temperature lies at or below t_ref - c2, where the law diverges.
+            If a temperature is at or below t_ref - c2, where the law diverges.
         """
         c2 = positive("wlf c2", self.c2)
         c1 = number("wlf c1", self.c1, 0.0)

@@ -1,7 +1,7 @@
-"""Known solutions of contact mechanics, to compare a computed contact with.
+"""Known solutions of contact mechanics, for comparison with computed contacts.
 
-Conventions are those of the program: SI units, E* = E/(1 - nu^2) = 2 G/(1 - nu), the rigid body
-presses on the half-space, displacements are positive into the half-space, pressures are
+The conventions are those of the program: SI units, E* = E/(1 - nu^2) = 2 G/(1 - nu). A rigid body
+is pressed onto a half-space. Displacements are positive into the half-space, and pressures are
 positive in compression.
 
 Elastic: `hertz`, `hertz_line`, `westergaard`, `persson_area`, `bush_gibson_thomas`.

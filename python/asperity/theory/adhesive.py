@@ -1,7 +1,7 @@
 """Adhesive contact of a sphere: JKR, DMT and Maugis-Dugdale.
 
-A rigid sphere of radius R on an elastic half-space of modulus E* = 2 G/(1 - nu), work of
-adhesion w. K = 4 E*/3. Forces are positive in compression; stresses are positive in pressure.
+A rigid sphere of radius R is in contact with an elastic half-space of modulus E* = 2 G/(1 - nu).
+The work of adhesion is w, and K = 4 E*/3. Forces and pressures are positive in compression.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .hertzian import _dome, hertz_displacement
 
 FloatArray = NDArray[np.float64]
 
-#: lambda/Tabor when the Dugdale stress is the peak stress of the Lennard-Jones law,
+#: lambda over Tabor's parameter if the Dugdale stress is the peak stress of the Lennard-Jones law,
 #: 16 w/(9 sqrt(3) z0): 1.1570 (Maugis 1992; Johnson and Greenwood 1997).
 LENNARD_JONES_FACTOR = 2.0 * 16.0 / (9.0 * math.sqrt(3.0)) * (9.0 / (16.0 * math.pi)) ** (1 / 3)
 
@@ -40,7 +40,7 @@ def tabor_parameter(radius: float, modulus: float, energy: float, length: float)
     Returns
     -------
     float
-        Dimensionless: JKR holds above about 5, DMT below about 0.1.
+        Tabor's parameter, dimensionless. JKR holds above about 5, DMT below about 0.1.
 
     Raises
     ------
@@ -78,7 +78,7 @@ class AdhesiveContact:
     contact_radius : float
         Radius of the contact with zero gap, m.
     approach : float
-        Distance the sphere has come down from first touch, m; may be negative.
+        Distance by which the sphere has moved down from first touch, m; may be negative.
     pull_off_force : float
         Smallest (most negative) force of the curve, N: pull-off under a dead load.
     adhesion_radius : float
@@ -101,9 +101,10 @@ class AdhesiveContact:
     maugis_parameter: float
 
     def pressure(self, r: ArrayLike) -> FloatArray:
-        """Return the normal stress at distances r >= 0 (m), Pa, pressure positive.
+        """Return the normal stress, which is positive in compression.
 
-        JKR is infinite (minus) at the edge. DMT's stress outside the contact is not resolved: 0.
+        With JKR it tends to minus infinity at the edge. With DMT the stress outside the contact is
+        not resolved and 0.
 
         Parameters
         ----------
@@ -118,7 +119,7 @@ class AdhesiveContact:
         Raises
         ------
         ValueError
-            If a distance is negative or no finite number.
+            If a distance is negative or not a finite number.
         """
         distance = array_of("r", r, low=0.0)
         a, e = self.contact_radius, self.modulus
@@ -137,12 +138,23 @@ class AdhesiveContact:
         return np.where(inside, core, np.where(distance <= c, -self.adhesive_stress, 0.0))
 
     def displacement(self, r: ArrayLike) -> FloatArray:
-        """Return u_z(r), m, positive into the half-space (JKR and DMT).
+        """Return the normal displacement u_z(r), positive into the half-space (JKR and DMT only).
+
+        Parameters
+        ----------
+        r : array_like
+            Distances from the axis, m, >= 0, any shape.
+
+        Returns
+        -------
+        ndarray
+            Displacement, m, shape of `r`.
 
         Raises
         ------
         ValueError
-            For a Maugis contact, whose displacement is not in closed form.
+            For a Maugis contact, whose displacement has no closed form, or if a distance is
+            negative or not a finite number.
         """
         if 0.0 < self.maugis_parameter < math.inf:
             raise ValueError("displacement: known for JKR and DMT only")
@@ -171,8 +183,8 @@ def jkr(
     radius, modulus, energy : float
         R (m), E* (Pa) and work of adhesion w (J/m2), > 0.
     force, contact_radius : float
-        Exactly one: force (N, >= -3 pi w R/2; the stable contact is returned) or contact
-        radius (m, > 0; any state of the curve, also the unstable ones).
+        Give exactly one: the force (N, >= -3 pi w R/2), for which the stable contact is returned,
+        or the contact radius (m, > 0), which may be that of any state of the curve, stable or not.
 
     Returns
     -------
@@ -199,13 +211,14 @@ def jkr(
     w = positive("energy", energy)
     k = 4.0 * e / 3.0
     pull_off = -1.5 * math.pi * w * r
-    if exactly_one(force=force, contact_radius=contact_radius) == "force":
-        f = number("force", force, pull_off)  # type: ignore[arg-type]
+    name, given = exactly_one(force=force, contact_radius=contact_radius)
+    if name == "force":
+        f = number("force", given, pull_off)
         # F = x^2 - 2 b x with x^2 = K a^3/R, b^2 = 3 pi w R/2: x = b + sqrt(b^2 + F)
         root = math.sqrt(-pull_off) + math.sqrt(f - pull_off)
         a = (r * root**2 / k) ** (1.0 / 3.0)
     else:
-        a = positive("contact_radius", contact_radius)  # type: ignore[arg-type]
+        a = positive("contact_radius", given)
         f = k * a**3 / r - math.sqrt(6.0 * math.pi * w * k * a**3)
     approach = a * a / r - math.sqrt(2.0 * math.pi * w * a / e)
     return AdhesiveContact(r, e, w, f, a, approach, pull_off, a, 0.0, math.inf)
@@ -221,14 +234,14 @@ def dmt(
 ) -> AdhesiveContact:
     """Return the contact of Derjaguin, Muller and Toporov: long-range adhesion, hard solids.
 
-    Hertz under the force F + 2 pi w R (in the form of Maugis).
+    This is Hertz's contact under the force F + 2 pi w R (in the form of Maugis).
 
     Parameters
     ----------
     radius, modulus, energy : float
         R (m), E* (Pa) and work of adhesion w (J/m2), > 0.
     force, contact_radius : float
-        Exactly one: force (N, >= -2 pi w R) or contact radius (m, >= 0).
+        Give exactly one: the force (N, >= -2 pi w R) or the contact radius (m, >= 0).
 
     Returns
     -------
@@ -253,20 +266,21 @@ def dmt(
     r, e = positive("radius", radius), positive("modulus", modulus)
     w = positive("energy", energy)
     pull_off = -2.0 * math.pi * w * r
-    if exactly_one(force=force, contact_radius=contact_radius) == "force":
-        f = number("force", force, pull_off)  # type: ignore[arg-type]
+    name, given = exactly_one(force=force, contact_radius=contact_radius)
+    if name == "force":
+        f = number("force", given, pull_off)
         a = (0.75 * r * (f - pull_off) / e) ** (1.0 / 3.0)
     else:
-        a = number("contact_radius", contact_radius, 0.0)  # type: ignore[arg-type]
+        a = number("contact_radius", given, 0.0)
         f = 4.0 * e * a**3 / (3.0 * r) + pull_off
     return AdhesiveContact(r, e, w, f, a, a * a / r, pull_off, math.inf, 0.0, 0.0)
 
 
 def _maugis_state(y: float, lam: float) -> tuple[float, float, float]:
-    """Return Maugis's dimensionless a, F, approach where the adhesive ring has c/a = sec(theta).
+    """Return Maugis's dimensionless a, F and approach for an adhesive ring with c/a = sec(theta).
 
-    `y` = log(tan theta). The energy balance is quadratic in a, so the ring is the best
-    parameter of the curve: a falls from infinity to 0 as theta goes from 0 to pi/2.
+    `y` = log(tan theta) is the parameter of the curve. The energy balance is quadratic in a, so
+    that every state has one theta: a falls from infinity to 0 as theta goes from 0 to pi/2.
     """
     tangent = math.exp(y)
     theta = math.atan(tangent)
@@ -297,9 +311,9 @@ def maugis(
     tabor: float | None = None,
     maugis_parameter: float | None = None,
 ) -> AdhesiveContact:
-    """Return Maugis's contact with a constant adhesive stress (Dugdale): any Tabor parameter.
+    """Return Maugis's contact with a constant adhesive stress (Dugdale), for any Tabor parameter.
 
-    The stress sigma_0 acts where the gap is smaller than h_0, w = sigma_0 h_0, and
+    The stress sigma_0 acts where the gap is smaller than h_0. Then w = sigma_0 h_0 and
     lambda = 2 sigma_0 (9 R/(16 pi w E*^2))^(1/3).
 
     Parameters
@@ -307,10 +321,12 @@ def maugis(
     radius, modulus, energy : float
         R (m), E* (Pa) and work of adhesion w (J/m2), > 0.
     force, contact_radius : float
-        Exactly one: force (N; the stable contact is returned) or contact radius (m, > 0).
+        Give exactly one: the force (N), for which the stable contact is returned, or the contact
+        radius (m, > 0).
     range, tabor, maugis_parameter : float
-        Exactly one: the range h_0 (m) of the potential 'maugis_dugdale'; Tabor's parameter of a
-        Lennard-Jones law with the same peak stress, lambda = 1.157 tabor; or lambda; > 0.
+        Give exactly one, > 0: the range h_0 (m) of the potential 'maugis_dugdale'; Tabor's
+        parameter of a Lennard-Jones law with the same peak stress, for which lambda = 1.157 tabor;
+        or lambda.
 
     Returns
     -------
@@ -319,7 +335,7 @@ def maugis(
     Raises
     ------
     ValueError
-        If a value is out of range, not exactly one of each group is given, or the force is
+        If a value is out of range, not exactly one value of each group is given, or the force is
         beyond pull-off.
 
     References
@@ -335,14 +351,13 @@ def maugis(
     """
     r, e = positive("radius", radius), positive("modulus", modulus)
     w = positive("energy", energy)
-    kind = exactly_one(range=range, tabor=tabor, maugis_parameter=maugis_parameter)
+    kind, lam = exactly_one(range=range, tabor=tabor, maugis_parameter=maugis_parameter)
+    lam = positive(kind, lam)
     per_stress = 2.0 * (9.0 * r / (16.0 * math.pi * w * e * e)) ** (1.0 / 3.0)
     if kind == "range":
-        lam = per_stress * w / positive("range", range)  # type: ignore[arg-type]
+        lam = per_stress * w / lam
     elif kind == "tabor":
-        lam = LENNARD_JONES_FACTOR * positive("tabor", tabor)  # type: ignore[arg-type]
-    else:
-        lam = positive("maugis_parameter", maugis_parameter)  # type: ignore[arg-type]
+        lam *= LENNARD_JONES_FACTOR
     stress = lam / per_stress
     k = 4.0 * e / 3.0
     unit_a = (math.pi * w * r * r / k) ** (1.0 / 3.0)
@@ -351,12 +366,12 @@ def maugis(
 
     turn, least = _maugis_turn(lam)
     pull_off = least * unit_f
-    if exactly_one(force=force, contact_radius=contact_radius) == "force":
-        f = number("force", force, pull_off * (1.0 + 1e-12))  # type: ignore[arg-type]
+    name, given = exactly_one(force=force, contact_radius=contact_radius)
+    if name == "force":
+        f = number("force", given, pull_off * (1.0 + 1e-12))
         y = _maugis_of_force(max(f / unit_f, least), turn, lam)
     else:
-        a = positive("contact_radius", contact_radius)  # type: ignore[arg-type]
-        y = _maugis_of_radius(a / unit_a, turn, lam)
+        y = _maugis_of_radius(positive("contact_radius", given) / unit_a, turn, lam)
     a_bar, f_bar, d_bar = _maugis_state(y, lam)
     a = a_bar * unit_a
     return AdhesiveContact(
@@ -366,8 +381,9 @@ def maugis(
 
 
 def _maugis_turn(lam: float) -> tuple[float, float]:
-    """Return the parameter of the state of the least force, and that force, over pi w R."""
-    # the ring narrows as 1/lambda in the JKR limit and widens as lambda^(-1/2) in the DMT limit
+    """Return the parameter of the state with the smallest force, and this force over pi w R."""
+    # The ring narrows like 1/lambda in the JKR limit and widens like lambda^(-1/2) in the DMT
+    # limit.
     low, high = -math.log(1.0 + lam) - 25.0, 0.5 * math.log1p(1.0 / lam) + 25.0
     grid = np.linspace(low, high, 400)
     forces = [_maugis_state(y, lam)[1] for y in grid]
@@ -384,7 +400,7 @@ def _maugis_turn(lam: float) -> tuple[float, float]:
 
 
 def _maugis_of_force(target: float, turn: float, lam: float) -> float:
-    """Return the parameter of the stable state of a force, over pi w R."""
+    """Return the parameter of the stable state for a force, which is given over pi w R."""
     bottom = turn
     while _maugis_state(bottom, lam)[1] <= target:
         bottom -= 1.0
@@ -392,7 +408,7 @@ def _maugis_of_force(target: float, turn: float, lam: float) -> float:
 
 
 def _maugis_of_radius(target: float, turn: float, lam: float) -> float:
-    """Return the parameter of the state of a contact radius, over its unit."""
+    """Return the parameter of the state for a contact radius, which is given over its unit."""
     bottom, top = turn, turn
     while _maugis_state(bottom, lam)[0] < target:
         bottom -= 1.0

@@ -1,7 +1,8 @@
 """Elastic contact of smooth bodies: Hertz's sphere and line contact.
 
-The rigid body is pressed on an elastic half-space of modulus E* = E/(1 - nu^2) = 2 G/(1 - nu).
-Displacements are positive into the half-space. Frictionless, small slopes (parabolic bodies).
+A rigid body is pressed onto an elastic half-space of modulus E* = E/(1 - nu^2) = 2 G/(1 - nu),
+without friction. Displacements are positive into the half-space. Slopes are small, so that the
+bodies are parabolic.
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ class HertzContact:
     force : float
         Normal force, N.
     contact_radius : float
-        m.
+        Radius of the contact, m.
     approach : float
-        Distance the sphere has come down from first touch, m.
+        Distance by which the sphere has moved down from first touch, m.
     peak_pressure : float
         Pressure at the centre, Pa.
     """
@@ -60,14 +61,14 @@ class HertzContact:
         Raises
         ------
         ValueError
-            If a distance is negative or no finite number.
+            If a distance is negative or not a finite number.
         """
         return self.peak_pressure * _dome(array_of("r", r, low=0.0), self.contact_radius)
 
     def displacement(self, r: ArrayLike) -> FloatArray:
         """Return the normal displacement u_z(r), m, inside and outside the contact.
 
-        Johnson (1985), eq. 3.41a and 3.42a.
+        The equations are 3.41a and 3.42a of Johnson (1985).
 
         Parameters
         ----------
@@ -82,7 +83,7 @@ class HertzContact:
         Raises
         ------
         ValueError
-            If a distance is negative or no finite number.
+            If a distance is negative or not a finite number.
         """
         return hertz_displacement(array_of("r", r, low=0.0), self.contact_radius, self.radius)
 
@@ -100,7 +101,7 @@ def hertz_displacement(r: FloatArray, a: float, radius: float) -> FloatArray:
     with np.errstate(invalid="ignore", divide="ignore"):
         t = np.where(outer > 0.0, a / np.where(outer > 0.0, outer, 1.0), 1.0)
     outside = (2.0 * a * a - outer**2) * np.arcsin(t) + outer * a * np.sqrt((1 - t) * (1 + t))
-    # far away the two terms cancel: this is what is left of them
+    # Far away the two terms nearly cancel, and a series replaces their sum.
     far = a * a * t * (4.0 / 3.0 + t * t * (2.0 / 15.0 + t * t * (3.0 / 70.0)))
     outside = np.where(t < 1e-2, far, outside)
     return np.where(r <= a, a * a - 0.5 * r * r, outside / math.pi) / radius
@@ -125,7 +126,7 @@ def hertz(
     modulus : float
         E*, Pa, > 0.
     force, contact_radius, approach : float
-        Exactly one of them: normal force (N), contact radius (m) or approach (m), >= 0.
+        Give exactly one, >= 0: normal force (N), contact radius (m) or approach (m).
 
     Returns
     -------
@@ -149,15 +150,13 @@ def hertz(
     True
     """
     r, e = positive("radius", radius), positive("modulus", modulus)
-    name = exactly_one(force=force, contact_radius=contact_radius, approach=approach)
+    name, given = exactly_one(force=force, contact_radius=contact_radius, approach=approach)
+    given = number(name, given, 0.0)
     if name == "force":
-        load = number("force", force, 0.0)  # type: ignore[arg-type]
-        a = (0.75 * load * r / e) ** (1.0 / 3.0)
-    elif name == "contact_radius":
-        a = number("contact_radius", contact_radius, 0.0)  # type: ignore[arg-type]
+        a = (0.75 * given * r / e) ** (1.0 / 3.0)
     else:
-        a = math.sqrt(r * number("approach", approach, 0.0))  # type: ignore[arg-type]
-    load = load if name == "force" else 4.0 * e * a**3 / (3.0 * r)
+        a = given if name == "contact_radius" else math.sqrt(r * given)
+    load = given if name == "force" else 4.0 * e * a**3 / (3.0 * r)
     return HertzContact(r, e, load, a, a * a / r, 2.0 * e * a / (math.pi * r))
 
 
@@ -176,7 +175,7 @@ class HertzLine:
     half_width : float
         Half the width of the contact, m.
     peak_pressure : float
-        Pa.
+        Pressure in the middle, Pa.
     """
 
     radius: float
@@ -201,12 +200,12 @@ class HertzLine:
         Raises
         ------
         ValueError
-            If a position is no finite number.
+            If a position is not a finite number.
         """
         return self.peak_pressure * _dome(np.abs(array_of("x", x)), self.half_width)
 
     def displacement(self, x: ArrayLike) -> FloatArray:
-        """Return u_z(x) - u_z(0), m (a line load has no absolute displacement).
+        """Return u_z(x) - u_z(0), m. The absolute displacement under a line load is infinite.
 
         Parameters
         ----------
@@ -221,12 +220,12 @@ class HertzLine:
         Raises
         ------
         ValueError
-            If a position is no finite number.
+            If a position is not a finite number.
         """
         return self.gap(x) - 0.5 * array_of("x", x) ** 2 / self.radius
 
     def gap(self, x: ArrayLike) -> FloatArray:
-        """Return the gap between cylinder and half-space, m; 0 within the contact.
+        """Return the gap between cylinder and half-space, m; it is 0 within the contact.
 
         Parameters
         ----------
@@ -241,7 +240,7 @@ class HertzLine:
         Raises
         ------
         ValueError
-            If a position is no finite number.
+            If a position is not a finite number.
         """
         t = np.maximum(np.abs(array_of("x", x)) / self.half_width, 1.0)
         root = np.sqrt((t - 1.0) * (t + 1.0))
@@ -266,7 +265,7 @@ def hertz_line(
     modulus : float
         E*, Pa, > 0.
     load, half_width : float
-        Exactly one: the normal force per length (N/m) or half the contact width (m), > 0.
+        Give exactly one, > 0: normal force per length (N/m) or half the contact width (m).
 
     Returns
     -------
@@ -288,10 +287,8 @@ def hertz_line(
     (1.128379, 56419)
     """
     r, e = positive("radius", radius), positive("modulus", modulus)
-    if exactly_one(load=load, half_width=half_width) == "load":
-        w = positive("load", load)  # type: ignore[arg-type]
-        a = math.sqrt(4.0 * w * r / (math.pi * e))
-    else:
-        a = positive("half_width", half_width)  # type: ignore[arg-type]
-        w = math.pi * e * a * a / (4.0 * r)
+    name, given = exactly_one(load=load, half_width=half_width)
+    given = positive(name, given)
+    a = math.sqrt(4.0 * given * r / (math.pi * e)) if name == "load" else given
+    w = given if name == "load" else math.pi * e * a * a / (4.0 * r)
     return HertzLine(r, e, w, a, 2.0 * w / (math.pi * a))

@@ -1,9 +1,10 @@
-"""Randomly rough surfaces: Persson's theory; Bush, Gibson and Thomas at low load.
+"""Randomly rough surfaces: Persson's theory, and the theory of Bush, Gibson and Thomas at low load.
 
 The power spectral density Phi(k) = |h_hat(k)|^2/A (thesis, eq. 1.5; m^4) is that of an isotropic
 surface: mean(h^2) = int Phi k dk/(2 pi), mean(|grad h|^2) = int Phi k^3 dk/(2 pi). Persson's
-C(q) is Phi/(4 pi^2). It is given by knots: straight in log-log between them; where it is zero at
-one end of a stretch, the value of the other end holds for half of it.
+C(q) is Phi/(4 pi^2). It is given at knots and is a power law between them, a straight line in
+log-log. If it is zero at one of two neighbouring knots, it has the value of the other knot in the
+half of the interval next to that knot, and is zero in the other half.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ _RUNNING = _running_weights()
 
 @dataclass(frozen=True)
 class _Spectrum:
-    """Gauss panels in log k: a PSD linear in log-log between its knots is integrated panelwise."""
+    """A power spectral density at the Gauss points of panels in log k, for integrals over k."""
 
     k: FloatArray          # (panels, order) wavenumbers, rad/m
     psd: FloatArray        # (panels, order) m^4
@@ -71,7 +72,7 @@ def _spectrum(wavenumber: ArrayLike, psd: ArrayLike) -> _Spectrum:
             f"wavenumber, psd: have {k.size} and {phi.size} values:"
             " must have the same number, at least 2"
         )
-    # numbers far below the rest are the round-off of a Fourier transform
+    # Values far below all others are round-off of a Fourier transform.
     moment = phi * k**3
     present = moment > 1e-20 * moment.max()
     if not np.any(present):
@@ -95,7 +96,7 @@ def _spectrum(wavenumber: ArrayLike, psd: ArrayLike) -> _Spectrum:
         base = level[i] if present[i] else level[i + 1]
         start.extend(base + slope * (edge[:-1] - a))
         rise.extend([slope] * pieces)
-    # where E* is far above p, the area falls from 1 close to the first wavenumber
+    # If E* is far above p, the area falls from 1 close to the first wave number: refine there.
     width = high[0] - low[0]
     parts = width * np.append(0.0, 0.5 ** np.arange(40, -1, -1))
     first = low[0] + parts
@@ -125,18 +126,19 @@ def self_affine_psd(
     Parameters
     ----------
     hurst : float
-        0 < H <= 1.
+        Hurst exponent, 0 < H <= 1.
     wavelength_long, wavelength_rolloff, wavelength_short : float
-        m, long >= roll-off > short > 0; equal long and roll-off: no plateau.
+        Wavelengths, m, with long >= roll-off > short > 0. If the first two are equal, there is no
+        plateau.
     rms_height, rms_slope : float
-        Exactly one, > 0: root mean square height (m) or slope.
+        Give exactly one, > 0: root mean square height (m) or slope.
 
     Returns
     -------
     wavenumber : ndarray, shape (2,) or (3,)
-        rad/m.
+        Wave numbers of the knots, rad/m.
     psd : ndarray of the same shape
-        m^4; a straight line in log-log between the knots, zero outside.
+        Density at the knots, m^4. It is a power law between the knots, and zero outside.
 
     Raises
     ------
@@ -157,20 +159,18 @@ def self_affine_psd(
     psd = np.ones(k.size)
     psd[-1] = (k[-1] / k[-2]) ** (-2.0 * (1.0 + h))
     height, slope = psd_moments(k, psd)
-    if exactly_one(rms_height=rms_height, rms_slope=rms_slope) == "rms_height":
-        factor = positive("rms_height", rms_height) / height  # type: ignore[arg-type]
-    else:
-        factor = positive("rms_slope", rms_slope) / slope  # type: ignore[arg-type]
+    name, wanted = exactly_one(rms_height=rms_height, rms_slope=rms_slope)
+    factor = positive(name, wanted) / (height if name == "rms_height" else slope)
     return k, psd * factor**2
 
 
 def psd_moments(wavenumber: ArrayLike, psd: ArrayLike) -> tuple[float, float]:
-    """Return rms height (m) and rms slope of an isotropic PSD (m^4) at wavenumbers (rad/m).
+    """Return the rms height (m) and the rms slope of an isotropic power spectral density.
 
     Parameters
     ----------
     wavenumber, psd : array_like, shape (m,)
-        Knots, rad/m, ascending, and the density there, m^4; see `persson`.
+        Knots, rad/m, ascending, and the density at the knots, m^4; see `persson`.
 
     Returns
     -------
@@ -194,25 +194,25 @@ def surface_psd(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the knots of the PSD of a given map, for `persson` and `persson_speed_step`.
 
-    The modes of `asperity.surface.psd_map` are gathered in bands of wavenumber. In each band
-    the PSD is a power law that holds its share of the mean square height and slope, so that
-    `psd_moments` gives the rms height and slope of the map. Directions are averaged.
+    The modes of `asperity.surface.psd_map` are sorted into bands of the wave number, regardless of
+    their direction. In each band the PSD is a power law with the same mean square height and slope
+    as the modes, so that `psd_moments` gives the rms height and slope of the map.
 
     Parameters
     ----------
     height : array_like, shape (ny, nx)
-        Heights, m, taken as periodic; ny >= 2 and not flat.
+        Heights of a periodic map, m, with ny >= 2; the map must not be flat.
     lx, ly : float
-        Lengths of the map, m; `ly` defaults to square cells.
+        Lengths of the map, m; by default `ly` makes the cells square.
     bands_per_decade : int
-        1..200. Bands with fewer than 16 modes are joined to the next.
+        Number of bands per decade, 1 to 200. Bands with fewer than 16 modes are joined to the next.
 
     Returns
     -------
     wavenumber : ndarray, shape (m,)
-        rad/m, ascending; inner edges of bands twice, 1e-9 apart.
+        Wave numbers of the knots, rad/m, ascending. Inner edges of bands occur twice, 1e-9 apart.
     psd : ndarray, shape (m,)
-        m^4.
+        Density at the knots, m^4.
 
     Raises
     ------
@@ -238,7 +238,7 @@ def surface_psd(
     k = np.hypot(wave_x, wave_y[:, None]).ravel()[1:]
     share = surface.psd_map(map_, across, along).ravel()[1:] / (across * along)
     slope = share * k**2
-    # numbers far below the rest are the round-off of the Fourier transform
+    # Values far below all others are round-off of the Fourier transform.
     present = slope > 1e-20 * slope.max()
     if not np.any(present):
         raise ValueError("height: the map is flat: must have roughness")
@@ -284,7 +284,7 @@ def _band_exponent(ratio: float, width: float) -> float:
 
 
 def persson_area(pressure: ArrayLike, modulus: float, rms_slope: float) -> FloatArray:
-    """Return Persson's contact area fraction of an elastic contact, erf(sqrt2 p/(E* h'rms)).
+    """Return Persson's contact area fraction of an elastic contact, erf(sqrt(2) p/(E* h'rms)).
 
     Parameters
     ----------
@@ -322,8 +322,8 @@ def persson_area(pressure: ArrayLike, modulus: float, rms_slope: float) -> Float
 def bush_gibson_thomas(pressure: ArrayLike, modulus: float, rms_slope: float) -> FloatArray:
     """Return the low-load area fraction of Bush, Gibson and Thomas, sqrt(2 pi) p/(E* h'rms).
 
-    Asperities that do not interact: an asymptote, not bounded by 1. Persson's slope is
-    sqrt(8/pi); arguments, errors as for `persson_area`.
+    It holds for asperities that do not interact, and is an asymptote that may exceed 1. The slope
+    of Persson's theory is smaller, sqrt(8/pi).
 
     Parameters
     ----------
@@ -365,11 +365,11 @@ class PerssonContact:
     Attributes
     ----------
     wavenumber : ndarray, shape (n,)
-        rad/m, ascending, up to the end of the spectrum.
+        Wave numbers q, rad/m, ascending, up to the end of the spectrum.
     area : ndarray, shape (..., n)
-        P(q): contact area fraction when roughness up to q is seen.
+        P(q), the contact area fraction of a road with waves up to q.
     friction_up_to : ndarray, shape (..., n)
-        Friction coefficient by the roughness up to q.
+        Friction coefficient due to the waves up to q.
     contact_area : ndarray, shape (...)
         Area fraction with the whole roughness.
     friction : ndarray, shape (...)
@@ -446,7 +446,7 @@ def persson(
     poisson: float = 0.5,
     gamma: float = 1.0,
 ) -> PerssonContact:
-    """Return area and viscoelastic friction of a rubber block sliding steadily on a rough road.
+    """Return contact area and viscoelastic friction of rubber that slides steadily on a rough road.
 
     With E*(w) = 2 G*(w)/(1 - nu) and C = Phi/(4 pi^2) ::
 
@@ -455,27 +455,28 @@ def persson(
         friction = (1/2) int dq q^3 C S P int_0^{2 pi} dphi cos(phi) Im E*(q V cos phi)/p
         S = gamma + (1 - gamma) P^2
 
-    The angular integrals are done in closed form for a Prony series, those over q by Gauss
-    panels (1e-9 relative).
+    For a Prony series the integrals over phi have a closed form. Those over q are computed by Gauss
+    panels, to a relative accuracy of 1e-9.
 
     Parameters
     ----------
     wavenumber : array_like, shape (m,)
         Knots of the PSD, rad/m, > 0, ascending, m >= 2.
     psd : array_like, shape (m,)
-        Phi at the knots, m^4, >= 0: straight in log-log between the knots, zero outside. From
-        `self_affine_psd`, or from a given surface by `surface_psd` (or, unbanded,
+        Phi at the knots, m^4, >= 0; a power law between the knots, zero outside. It comes from
+        `self_affine_psd`, or for a given map from `surface_psd` (or, without bands,
         `asperity.surface.psd`).
     material : Prony
         Shear relaxation modulus.
     pressure : array_like
         Nominal pressure p, Pa, > 0.
     velocity : array_like
-        Sliding speed V, m/s, >= 0; broadcast with `pressure`.
+        Sliding speed V, m/s, >= 0; it is broadcast with `pressure`.
     poisson : float
-        Constant in time.
+        Poisson ratio, constant in time.
     gamma : float
-        0..1; 1 leaves out the correction for partial contact; 0.45 in the thesis (section 4.3).
+        Correction for partial contact, 0 to 1. It is 0.45 in the thesis (section 4.3); 1 leaves out
+        the correction.
 
     Returns
     -------
@@ -507,7 +508,7 @@ def persson(
     weight = number("gamma", gamma, 0.0, 1.0)
     a = s.k[..., None] * v[..., None, None, None] * material.tau
     root = np.sqrt(1.0 + a * a)
-    # mean over phi of cos(phi) G''(w cos phi)
+    # the mean over phi of cos(phi) G''(w cos phi)
     loss = np.sum(material.g * a / (root * (root + 1.0)), axis=-1)
     factor = 2.0 / (1.0 - nu)
     return _finish(s, factor**2 * _squared_modulus(material, a), factor * loss, p, weight)
@@ -526,29 +527,31 @@ def persson_speed_step(
     gamma: float = 1.0,
     angles: int | None = None,
 ) -> PerssonContact:
-    """Return area and viscoelastic friction after a sudden change of the sliding speed.
+    """Return contact area and viscoelastic friction after a sudden change of the sliding speed.
 
-    The theory of `persson` with E*(w) replaced by the ratio of the stress to the height of each
-    wave in full contact, which is known in closed form: after the change each arm passes from
-    its old steady value to the new one as exp(-t/tau), turning with the wave. Same direction of
-    sliding before and after.
+    This is the theory of `persson`, in which the ratio of stress to height of each wave in full
+    contact replaces E*(w). This ratio has a closed form: after the change each arm goes from its
+    old steady value to the new one as exp(-t/tau), while its phase rotates with the wave. The
+    direction of sliding does not change.
 
     Parameters
     ----------
     wavenumber, psd, material, pressure, poisson, gamma
-        As for `persson`.
+        As in `persson`; `pressure` is a single number.
     velocity_before, velocity_after : float
-        Speeds before and after t = 0, m/s, >= 0. 0 before: the road had rested for ever.
+        Speeds before and after t = 0, m/s, >= 0. With `velocity_before` = 0 the road rested for an
+        infinite time.
     times : array_like, shape (n,)
         Times since the change, s, >= 0.
     angles : int, optional
-        Points of the angular integrals over a quarter turn; by default enough for the shortest
-        wave while its arms still remember, at most 4096 (1e-5 relative).
+        Number of points of the angular integrals over a quarter turn, at least 8. The default
+        resolves the shortest wave until its arms have relaxed (at most 4096 points, relative
+        accuracy 1e-5).
 
     Returns
     -------
     PerssonContact
-        Leading axis: the times.
+        The leading axis is that of the times.
 
     Raises
     ------
@@ -557,7 +560,7 @@ def persson_speed_step(
 
     References
     ----------
-    Thesis, section 4.3, and there [28].
+    R. Bugnicourt, thesis, INSA Lyon, 2017, section 4.3 and its reference 28.
 
     Examples
     --------
@@ -594,10 +597,10 @@ def persson_speed_step(
 def _speed_step_means(
     k: FloatArray, material: Prony, before: float, after: float, t: float, angles: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the means over phi of |M|^2 and -cos(phi) Im M, M the apparent modulus at time t.
+    """Return the means over phi of |M|^2 and -cos(phi) Im M, with the apparent modulus M at time t.
 
-    The steady parts are in closed form; the fading part f is integrated by Gauss's rule:
-    |M|^2 = |M_s|^2 + 2 Re(f conj(M_s)) + |f|^2.
+    M = M_s + f has a steady part M_s, whose means have a closed form, and a fading part f, whose
+    means are computed by Gauss's rule: |M|^2 = |M_s|^2 + 2 Re(f conj(M_s)) + |f|^2.
     """
     tau, g = material.tau, material.g
     a = k[:, None] * after * tau
@@ -607,12 +610,13 @@ def _speed_step_means(
     alive = g * np.exp(-t / tau)
     if not np.any(alive > 1e-18 * material.instantaneous_modulus):
         return squared, loss
-    # Gauss panels; the rule's own nodes cost too much beyond a few hundred
+    # Use panels of 16 points, because a Gauss rule of many hundred nodes takes long to compute.
     panels = math.ceil(angles / 16)
     few, weights = np.polynomial.legendre.leggauss(16)
     nodes = ((2.0 * np.arange(panels)[:, None] + 1.0 + few) / panels - 1.0).ravel()
     weights = np.tile(weights / panels, panels)
-    # phi = pi/2 - psi, psi = (pi/2) z^3: crowded towards psi = 0, where the slow arms change
+    # With phi = pi/2 - psi and psi = (pi/2) z^3 the points are dense near psi = 0, where the
+    # response of slow arms changes quickly.
     z = 0.5 * (nodes + 1.0)
     psi = 0.5 * math.pi * z**3
     weights = 1.5 * z**2 * weights

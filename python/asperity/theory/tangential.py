@@ -17,7 +17,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class MindlinContact:
-    """A rigid sphere, pressed by a constant force and moved sideways by Coulomb friction.
+    """A rigid sphere under a constant normal force, moved sideways against Coulomb friction.
 
     Attributes
     ----------
@@ -26,11 +26,11 @@ class MindlinContact:
     coefficient : float
         Coefficient of friction.
     tangential : ndarray
-        Tangential force at each state of the path, N; a scalar array for one state.
+        Tangential force in each state of the path, N; an array without axes for a single state.
     shift : ndarray
-        Tangential displacement of the sphere against the far half-space, m.
+        Tangential displacement of the sphere relative to the far half-space, m.
     stick_radius : ndarray
-        Radius within which nothing has slipped since the last reversal, m; 0 in full sliding.
+        Radius within which no point has slipped since the last reversal, m; 0 in full sliding.
     slide_shift : float
         Shift at which a first loading begins to slide as a whole, m.
     """
@@ -44,10 +44,10 @@ class MindlinContact:
     _levels: tuple[float, ...] = field(repr=False)
 
     def traction(self, r: ArrayLike) -> FloatArray:
-        """Return the shear traction at the last state, Pa, at distances r >= 0 (m).
+        """Return the tangential traction in the last state.
 
-        Positive along the positive tangential force. A sum of Coulomb-Hertz tractions, one for
-        each reversal that is still remembered.
+        It is positive along the positive tangential force. It is a sum of Cattaneo's tractions, one
+        for each reversal that still has an effect.
 
         Parameters
         ----------
@@ -62,7 +62,7 @@ class MindlinContact:
         Raises
         ------
         ValueError
-            If a distance is negative or no finite number.
+            If a distance is negative or not a finite number.
         """
         distance = array_of("r", r, low=0.0)
         a, p0 = self.normal.contact_radius, self.normal.peak_pressure
@@ -75,14 +75,14 @@ class MindlinContact:
 
 
 def _segments(levels: tuple[float, ...] | list[float]) -> list[tuple[float, float]]:
-    """Return (step, Masing factor) of the branches through the remembered turning points."""
+    """Return (step, Masing factor) of the segments between the turning points."""
     steps = [(levels[0], 1.0)]
     steps += [(b - a, 2.0) for a, b in pairwise(levels)]
     return steps
 
 
 def _respond(levels: list[float], exponent: float) -> float:
-    """Return the conjugate of the last level: 1 - (1 - x)^exponent on the first loading."""
+    """Return the response to the last level; on the first loading it is 1 - (1 - x)^exponent."""
     total = 0.0
     for step, factor in _segments(levels):
         x = min(1.0, abs(step) / factor)
@@ -93,7 +93,7 @@ def _respond(levels: list[float], exponent: float) -> float:
 
 
 def _advance(levels: list[float], x: float) -> None:
-    """Move to level `x`; turning points of closed loops are forgotten (return-point memory)."""
+    """Move to level `x`, and remove the turning points of closed loops (return-point memory)."""
     while True:
         if len(levels) == 1:
             if abs(x) >= abs(levels[0]):
@@ -130,10 +130,11 @@ def mindlin(
 ) -> MindlinContact:
     """Return the contact of a rigid sphere under constant normal and varying tangential load.
 
-    First loading: c/a = (1 - Q/(mu F))^(1/3),
-    shift = 3 mu F (2 - nu)/(16 a G) (1 - (1 - Q/(mu F))^(2/3)). Unloading and reloading follow
-    from it with doubled scales; closed loops are forgotten. Exact for nu = 0, within about
-    1e-3 at nu = 0.42 (slip is taken parallel to the force, and normal and shear as uncoupled).
+    On the first loading c/a = (1 - Q/(mu F))^(1/3) and
+    shift = 3 mu F (2 - nu)/(16 a G) (1 - (1 - Q/(mu F))^(2/3)). Unloading and reloading follow from
+    these equations with doubled scales (Masing's rule), and closed loops leave no trace. The theory
+    assumes that slip is parallel to the force and that normal and tangential displacements are not
+    coupled. It is exact for nu = 0, and accurate to about 1e-3 for nu = 0.42.
 
     Parameters
     ----------
@@ -148,15 +149,15 @@ def mindlin(
     force : float
         Normal force F, N, > 0.
     tangential, shift : array_like, shape () or (n,)
-        Exactly one: the path, in time order from the unloaded state, of the tangential force
-        (N, |Q| <= mu F) or of the sphere's displacement (m). The path is followed from value to
-        value, so its turning points are enough.
+        Give exactly one: the path, in time order from the unloaded state, of the tangential force
+        (N, |Q| <= mu F) or of the sphere's displacement (m). Between two values the path is
+        monotonic, so that its turning points are enough.
 
     Returns
     -------
     MindlinContact
-        Arrays have the shape of the path. Under a prescribed force mu F the shift is that of
-        incipient sliding.
+        Arrays have the shape of the path. Under a prescribed force of mu F the shift is that at
+        which sliding begins.
 
     Raises
     ------
@@ -182,8 +183,8 @@ def mindlin(
     normal = hertz(radius, 2.0 * g / (1.0 - nu), force=positive("force", force))
     a, bound = normal.contact_radius, mu * normal.force
     slide = 3.0 * bound * (2.0 - nu) / (16.0 * a * g)
-    by_force = exactly_one(tangential=tangential, shift=shift) == "tangential"
-    path = array_of("tangential" if by_force else "shift", tangential if by_force else shift)
+    name, given = exactly_one(tangential=tangential, shift=shift)
+    by_force, path = name == "tangential", array_of(name, given)
     if path.ndim > 1 or path.size == 0:
         raise ValueError(f"path: has shape {path.shape}, must be one value or (n,) with n > 0")
     if by_force:

@@ -21,9 +21,10 @@ _MANY_NODES, _MANY_WEIGHTS = np.polynomial.legendre.leggauss(96)
 
 
 def _graded(length: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return Gauss points of [0, length] graded to both ends.
+    """Return Gauss points of [0, length] that are dense near both ends.
 
-    Two arrays give the distance from either end, without cancellation; the third the weights.
+    Two arrays contain the distances from either end, without cancellation; the third has the
+    weights.
     """
     edges = np.concatenate([[0.0], 0.5 * length * 0.5 ** np.arange(56.0, -1.0, -1.0)])
     half = 0.5 * np.diff(edges)
@@ -38,7 +39,7 @@ def _graded(length: float) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 @dataclass(frozen=True)
 class LeeRadokContact:
-    """A rigid sphere pressed on a viscoelastic half-space, the contact never shrinking.
+    """A rigid sphere that is pressed onto a viscoelastic half-space; its contact never shrinks.
 
     Attributes
     ----------
@@ -49,7 +50,7 @@ class LeeRadokContact:
     poisson : float
         Poisson ratio.
     times : ndarray, shape (n,)
-        s.
+        Times, s.
     force, contact_radius, approach : ndarray, shape (n,)
         Normal force (N), contact radius (m), approach (m) at the times.
     """
@@ -64,10 +65,10 @@ class LeeRadokContact:
     _radius_at: Callable[[FloatArray], FloatArray] = field(repr=False)
 
     def pressure(self, r: ArrayLike, t: float) -> FloatArray:
-        """Return p(r, t), Pa, at distances r >= 0 (m) and one time t (s) up to the last of `times`.
+        """Return the pressure p(r, t) at one time t, which is at most the last of `times`.
 
-        p = 4/(pi R (1 - nu)) int G(t - s) d/ds sqrt(a(s)^2 - r^2) ds, by Gauss quadrature graded
-        to both ends (1e-9 of the peak).
+        p = 4/(pi R (1 - nu)) int G(t - s) d/ds sqrt(a(s)^2 - r^2) ds is computed by Gauss
+        quadrature, to 1e-9 of the peak.
 
         Parameters
         ----------
@@ -113,7 +114,7 @@ class LeeRadokContact:
 def _force_history(
     force: float | ArrayLike | Callable[[FloatArray], ArrayLike], times: FloatArray
 ) -> tuple[Callable[[FloatArray], FloatArray], FloatArray | None]:
-    """Return F(t) and, where it is piecewise linear, its values at `times`."""
+    """Return the function F(t) and, if it is piecewise linear, its values at `times`."""
     if callable(force):
         function = force
 
@@ -152,15 +153,16 @@ def lee_radok(
     radius : float
         Radius of the sphere, m, > 0.
     force : float, array_like of shape (n,), or callable
-        Normal force, N, >= 0, from t = 0 on: a step held constant; or values at `times`, linear
-        between them, with a jump to the first at times[0] = 0 (both exact); or a smooth function
-        of an array of times (Gauss quadrature, about 1e-12 for a smooth force).
+        Normal force from t = 0 on, N, >= 0. A number is a constant force. An array has the values
+        at `times`, with a jump to the first at times[0] = 0 and straight lines between them. Both
+        are exact. A function takes an array of times; it should be smooth, and the solution is then
+        accurate to about 1e-12 (Gauss quadrature).
     material : Prony
-        Any number of arms.
+        The material, with any number of arms.
     times : array_like, shape (n,)
-        s, >= 0, ascending.
+        Times, s, >= 0, ascending.
     poisson : float
-        Constant in time.
+        Poisson ratio, constant in time.
 
     Returns
     -------
@@ -169,8 +171,8 @@ def lee_radok(
     Raises
     ------
     ValueError
-        If a value is out of range, or if the contact would shrink (another solution holds then:
-        T. C. T. Ting, J. Appl. Mech. 33 (1966) 845).
+        If a value is out of range, or if the contact would shrink (for which T. C. T. Ting, J.
+        Appl. Mech. 33 (1966) 845, has another solution).
 
     References
     ----------
@@ -223,7 +225,7 @@ def lee_radok(
 
 
 def _refuse_shrinking(t: FloatArray, radius_at: Callable[[FloatArray], FloatArray]) -> None:
-    """Raise ValueError where the contact radius falls, looking between the times, too."""
+    """Raise ValueError if the contact radius falls at the given times or between them."""
     start = np.append(0.0, t) if t[0] > 0.0 else t
     parts = np.concatenate([10.0 ** np.arange(-8.0, -1.0), np.arange(1, 16) / 16.0])
     inner = start[:-1, None] + np.diff(start)[:, None] * parts
@@ -240,28 +242,28 @@ def _refuse_shrinking(t: FloatArray, radius_at: Callable[[FloatArray], FloatArra
 
 @dataclass(frozen=True)
 class HunterContact:
-    """A rigid cylinder sliding or rolling steadily, without friction, over a viscoelastic solid.
+    """A rigid cylinder that slides or rolls steadily over a viscoelastic solid, without friction.
 
-    The cylinder moves to +x over the solid; x is measured from its axis.
+    The cylinder moves along +x over the solid, and x is measured from its axis.
 
     Attributes
     ----------
     radius : float
-        m.
+        Radius of the cylinder, m.
     velocity : float
-        m/s.
+        Speed, m/s.
     load : float
         Normal force per length, N/m.
     half_width : float
         Half the width of the contact, m.
     centre : float
-        Middle of the contact, m, > 0: ahead of the axis.
+        Middle of the contact, m, which is ahead of the axis: > 0.
     leading_edge, trailing_edge : float
         Ends of the contact, m.
     friction : float
         Viscoelastic friction coefficient.
     friction_force : float
-        friction times load, N/m.
+        Friction coefficient times load, N/m.
     """
 
     radius: float
@@ -279,8 +281,8 @@ class HunterContact:
     def pressure(self, x: ArrayLike) -> FloatArray:
         """Return p(x), Pa, at positions x (m); 0 outside the contact.
 
-        p = (1/l) int_x^end exp((x - s)/l) P(s) ds with l = V tau and the closed form of
-        P = p - l dp/dx; Gauss quadrature, about 1e-12 of the peak.
+        p = (1/l) int_x^end exp((x - s)/l) P(s) ds, with l = V tau and the closed form of
+        P = p - l dp/dx, is computed by Gauss quadrature, to about 1e-12 of the peak.
 
         Parameters
         ----------
@@ -295,14 +297,14 @@ class HunterContact:
         Raises
         ------
         ValueError
-            If a position is no finite number.
+            If a position is not a finite number.
         """
         position = array_of("x", x)
         xi = (position - self.centre) / self.half_width
         inside = np.abs(xi) < 1.0
         alpha = self.half_width / self._length
         end = np.arccos(np.where(inside, xi, 1.0))
-        # exp(-40) and less does not count
+        # parts of the integrand below exp(-40) are negligible
         start = np.arccos(np.clip(np.cos(end) + 40.0 / alpha, -1.0, 1.0))
         half = 0.5 * (end - start)
         phi = (start + half)[..., None] + half[..., None] * _MANY_NODES
@@ -317,16 +319,22 @@ class HunterContact:
     def total_friction_force(self, coefficient: float, *, slope_effect: bool = True) -> float:
         """Return the horizontal force per length with Coulomb friction in full sliding, N/m.
 
-        With the slope the local traction lies on the friction cone about the surface's normal,
-        T = P (mu - H')/(1 + mu H'), H' = -x/R; without, T = mu P beside the viscoelastic force.
-        Holds for nu = 1/2 (no coupling of shear and normal displacement).
+        With the slope effect the local traction is on the friction cone around the normal of the
+        surface, T = P (mu - H')/(1 + mu H') with H' = -x/R. Without it, T = mu P is added to the
+        viscoelastic force. Both hold for nu = 1/2, for which tangential and normal displacements
+        are not coupled (thesis, section 3.5.1).
 
         Parameters
         ----------
         coefficient : float
             Local coefficient of friction mu, >= 0, with mu times the slope below 1.
         slope_effect : bool
-            Whether the surface's slope turns the cone.
+            Whether the friction cone turns with the slope of the surface.
+
+        Returns
+        -------
+        float
+            Horizontal force per length, N/m.
 
         Raises
         ------
@@ -348,7 +356,8 @@ class HunterContact:
 def _scaled_bessel(x: float) -> tuple[FloatArray, FloatArray]:
     """Return exp(-x) I_n(x) and exp(x) K_n(x), n = 0, 1, 2.
 
-    Beyond 1e6 by three terms of the asymptotic series; SciPy gives up at about 1e9.
+    Beyond 1e6 the first three terms of the asymptotic series are used, because SciPy's functions
+    fail at about 1e9.
     """
     order = np.arange(3)
     if x < 1e6:
@@ -369,20 +378,21 @@ def hunter(
     *,
     poisson: float = 0.5,
 ) -> HunterContact:
-    """Return Hunter's exact solution: a rigid cylinder in steady motion on a standard linear solid.
+    """Return Hunter's exact solution for a rigid cylinder in steady motion on a standard solid.
 
-    With l_r = V tau (relaxation), l_c = l_r G(0)/G_e (creep), alpha = h/l_r, beta = h/l_c and
-    the modified Bessel functions I_n(alpha), K_n(beta), D = I0 K1 + I1 K0 ::
+    The solid has one arm. With l_r = V tau (relaxation), l_c = l_r G(0)/G_e (creep), alpha = h/l_r,
+    beta = h/l_c, the modified Bessel functions I_n(alpha), K_n(beta), and D = I0 K1 + I1 K0 ::
 
         load = pi G_e h^2/(2 R (1 - nu)) (I2 K1 + I1 K2)/D
         centre = (l_c - l_r) I1 K0/D
         R friction = [centre (rho - 1) + (l_c - l_r) (I2 K1 + I1 K0)/D]/rho,
         rho = (I2 K1 + I1 K2)/D
 
-    Derivation: the operator 1 - l_c d/dx takes the exponential wake out of the elastic relation;
-    what is left is a Cauchy equation on the contact for P = p - l_r dp/dx, solved by
-    (c0 + c1 T1 + c2 T2)/sqrt(1 - xi^2). The load gives c0, the shape c1 and c2, the end of the
-    contact (p = 0) and the undisturbed solid ahead one Bessel equation each.
+    Derivation: the operator 1 - l_c d/dx removes the exponential wake from the elastic relation.
+    The result is a Cauchy equation on the contact for P = p - l_r dp/dx, with the solution (c0 + c1
+    T1 + c2 T2)/sqrt(1 - xi^2). The load determines c0, and the shape of the cylinder c1 and c2. The
+    end of the contact (p = 0) and the undisturbed solid ahead give one equation with Bessel
+    functions each.
 
     Parameters
     ----------
@@ -391,11 +401,11 @@ def hunter(
     load : float
         Normal force per length, N/m, > 0.
     velocity : float
-        m/s, > 0.
+        Speed, m/s, > 0.
     material : Prony
-        One arm, and g_inf > 0.
+        A material with one arm and g_inf > 0.
     poisson : float
-        Constant in time.
+        Poisson ratio, constant in time.
 
     Returns
     -------
@@ -432,7 +442,7 @@ def hunter(
         d = i[0] * k[1] + i[1] * k[0]
         return i, k, d, (i[2] * k[1] + i[1] * k[2]) / d
 
-    # rho lies between 1 (slow) and G(0)/G_e (fast)
+    # rho is between 1 (slow) and G(0)/G_e (fast)
     relaxed_width = math.sqrt(w / stiffness)
 
     def excess(h: float) -> float:

@@ -25,15 +25,15 @@ class WestergaardContact:
     modulus : float
         E*, Pa.
     mean_pressure : float
-        Pa.
+        Mean pressure, Pa.
     full_pressure : float
-        p* = pi E* D/L, the mean pressure that closes the contact, Pa.
+        p* = pi E* D/L, the mean pressure that closes the gap everywhere, Pa.
     half_width : float
         Half the width of a contact strip, m; L/2 in full contact.
     area_fraction : float
-        2 half_width/L.
+        Contact area fraction, 2 half_width/L.
     mean_gap : float
-        m.
+        Mean gap, m.
     """
 
     amplitude: float
@@ -50,12 +50,12 @@ class WestergaardContact:
         return np.sin(psi), min(1.0, math.sqrt(self.mean_pressure / self.full_pressure))
 
     def pressure(self, x: ArrayLike) -> FloatArray:
-        """Return p(x), Pa; x in m from a summit.
+        """Return the pressure p(x), Pa.
 
         Parameters
         ----------
         x : array_like
-            Positions, m, any shape.
+            Positions, counted from a summit, m, any shape.
 
         Returns
         -------
@@ -65,7 +65,7 @@ class WestergaardContact:
         Raises
         ------
         ValueError
-            If a position is no finite number.
+            If a position is not a finite number.
         """
         s, s_a = self._sines(x)
         if s_a >= 1.0:
@@ -74,12 +74,12 @@ class WestergaardContact:
         return 2.0 * self.full_pressure * np.sqrt(1.0 - s * s) * root
 
     def gap(self, x: ArrayLike) -> FloatArray:
-        """Return the gap, m; x in m from a summit.
+        """Return the gap, m.
 
         Parameters
         ----------
         x : array_like
-            Positions, m, any shape.
+            Positions, counted from a summit, m, any shape.
 
         Returns
         -------
@@ -89,7 +89,7 @@ class WestergaardContact:
         Raises
         ------
         ValueError
-            If a position is no finite number.
+            If a position is not a finite number.
         """
         s, s_a = self._sines(x)
         s = np.maximum(np.abs(s), s_a)
@@ -102,20 +102,20 @@ class WestergaardContact:
 def westergaard(
     amplitude: float, wavelength: float, modulus: float, pressure: float
 ) -> WestergaardContact:
-    """Return the elastic contact of the rigid wave D cos(2 pi x/L), plane strain.
+    """Return the elastic contact of the rigid wave D cos(2 pi x/L) in plane strain.
 
-    mean p = p* sin^2(pi a/L), p* = pi E* D/L.
+    The mean pressure is p* sin^2(pi a/L), with half the contact width a and p* = pi E* D/L.
 
     Parameters
     ----------
     amplitude : float
-        D, m, > 0 (half of peak to valley).
+        D, m, > 0: half of the height from valley to summit.
     wavelength : float
         L, m, > 0.
     modulus : float
         E*, Pa, > 0.
     pressure : float
-        Mean pressure, Pa, >= 0; p* and more is full contact.
+        Mean pressure, Pa, >= 0. From p* on the contact is full.
 
     Returns
     -------
@@ -148,20 +148,20 @@ def westergaard(
 
 @dataclass(frozen=True)
 class FullContactWaves:
-    """Waves in full contact with a viscoelastic half-space, sliding.
+    """Sliding waves in full contact with a viscoelastic half-space.
 
     Attributes
     ----------
     wavevectors : ndarray, shape (n, 2)
-        rad/m.
+        Wave vectors, rad/m.
     heights : ndarray of complex, shape (..., n)
-        Amplitudes of the road's height: h = Re sum heights exp(i q.x), m; the leading axes are
+        Amplitudes of the height of the road, m: h = Re sum heights exp(i q.x). The leading axes are
         those of the times.
     pressures : ndarray of complex, shape (..., n)
-        Amplitudes of the pressure beside its mean, Pa.
+        Amplitudes of the deviation of the pressure from its mean, Pa.
     friction_stress : ndarray, shape (..., 2)
-        Mean horizontal traction on the rubber, -mean(p grad h), Pa: along the road's velocity
-        in steady sliding.
+        Mean horizontal traction on the rubber, -mean(p grad h), Pa. In steady sliding it acts along
+        the velocity of the road.
     """
 
     wavevectors: FloatArray
@@ -175,19 +175,50 @@ class FullContactWaves:
         return np.tensordot(amplitudes, waves, axes=(-1, -1)).real
 
     def pressure(self, x: ArrayLike, y: ArrayLike = 0.0) -> FloatArray:
-        """Return the pressure beside its mean, Pa, at points x, y (m); shape times + points.
+        """Return the deviation of the pressure from its mean.
 
-        Contact stays full only where the mean pressure exceeds the largest suction found here.
+        The contact is full only if the mean pressure exceeds the largest negative value.
+
+        Parameters
+        ----------
+        x, y : array_like
+            Positions, m; the arrays are broadcast.
+
+        Returns
+        -------
+        ndarray
+            Pa; the axes of the times, followed by those of the positions.
+
+        Raises
+        ------
+        ValueError
+            If a position is not a finite number.
         """
         return self._sum(self.pressures, x, y)
 
     def height(self, x: ArrayLike, y: ArrayLike = 0.0) -> FloatArray:
-        """Return the height of the road, m, at points x, y (m); shape times + points."""
+        """Return the height of the road.
+
+        Parameters
+        ----------
+        x, y : array_like
+            Positions, m; the arrays are broadcast.
+
+        Returns
+        -------
+        ndarray
+            Heights, m; the axes of the times, followed by those of the positions.
+
+        Raises
+        ------
+        ValueError
+            If a position is not a finite number.
+        """
         return self._sum(self.heights, x, y)
 
     @property
     def full_pressure_bound(self) -> FloatArray:
-        """Mean pressure that surely keeps the contact full, Pa: the sum of the amplitudes."""
+        """Sum of the amplitudes, Pa; a mean pressure above it keeps the contact full."""
         return np.sum(np.abs(self.pressures), axis=-1)
 
 
@@ -206,27 +237,29 @@ def full_contact_waves(
 
     The road is h(x, t) = sum D cos(q.(x - V t) + phase). In steady sliding each wave adds the
     friction stress q |q| D^2 G''(q.V)/(2 (1 - nu)), that is q |q| D^2 E''/4. After a start from
-    rest each arm relaxes from its value at rest to the steady one. Exact, for any series.
+    rest each arm relaxes from its value at rest to the steady one. The solution is exact for any
+    Prony series.
 
     Parameters
     ----------
     amplitude : array_like, shape () or (n,)
         D of each wave, m.
     wavevector : array_like, shape (2,) or (n, 2)
-        q of each wave, rad/m, not zero; all different, also from each other's opposite.
+        q of each wave, rad/m, not zero. No two may be equal or opposite.
     velocity : array_like, shape (2,)
-        V of the road over the rubber, m/s.
+        Velocity V of the road over the rubber, m/s.
     material : Prony
         Shear relaxation modulus.
     poisson : float
         Poisson ratio, constant in time.
     phase : array_like, shape () or (n,)
-        rad.
+        Phase of each wave at t = 0, rad.
     times : array_like, optional
-        Times since the start, s, >= 0, any shape. None: steady sliding, the road at h(x, 0).
+        Times since the start, s, >= 0, any shape. None means steady sliding, at the moment when the
+        road is at h(x, 0).
     start : {'relaxed', 'glassy'}
-        Before the start the road rested for ever ('relaxed'), or was pressed on at that moment
-        ('glassy').
+        The rubber has rested on the road for an infinite time before the start ('relaxed'), or
+        touches it at the moment of the start ('glassy').
 
     Returns
     -------
@@ -277,7 +310,7 @@ def full_contact_waves(
     else:
         t = array_of("times", times, low=0.0)[..., None]
         heights = at_rest * np.exp(-1j * omega * t)
-        # each arm: dm/dt + m/tau = g du/dt, u = exp(-i omega t)
+        # Each arm satisfies dm/dt + m/tau = g du/dt with u = exp(-i omega t).
         turn = np.exp(-1j * omega * t)
         moduli = material.g_inf * np.ones_like(turn)
         for g, tau in zip(material.g, material.tau, strict=True):
