@@ -1,4 +1,4 @@
-"""``python -m asperity VERB``: results looked at, measurements made into inputs."""
+"""The command ``python -m asperity VERB``, for results and measured data."""
 
 from __future__ import annotations
 
@@ -15,17 +15,23 @@ __all__ = ["main"]
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command; return its exit status: 0 done, 2 wrong arguments, 3 a file.
+    """Run the command and return its exit status.
 
     Parameters
     ----------
     arguments : list of str, optional
-        The words after ``python -m asperity``; those of the process if left out.
+        The words after ``python -m asperity``; by default those of the process.
+
+    Returns
+    -------
+    int
+        0 done; 2 wrong arguments; 3 a file cannot be read or written; 4 a computation failed.
     """
     parser = argparse.ArgumentParser(
         prog=os.environ.get("ASPERITY_COMMAND", "python -m asperity"),
-        description="Measured roads and rubbers into inputs, results into pictures and pages."
-                    " Runs are made by the command `asperity`.")
+        description="Turns measured roads and rubbers into inputs, computes friction curves, and"
+                    " turns results into pictures and pages. The command `asperity run` computes"
+                    " a case.")
     parser.add_argument("--version", action="version", version=f"asperity {version()}")
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
     for add in (add_plot, add_import, add_fit, add_friction, add_report, add_watch):

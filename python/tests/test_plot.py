@@ -186,7 +186,7 @@ def test_energy_tells_how_well_the_books_close(frictional):
     total = lines["stored"] + lines["lost in the rubber"] + lines["lost by friction"]
     np.testing.assert_allclose(lines["work put in"][:-1], total[:-1], rtol=1e-12)
     # The sample's last row misses a thousandth of the largest term.
-    assert "books close to 0.001" in [text.get_text() for text in axes.texts]
+    assert "balance closes to 0.001" in [text.get_text() for text in axes.texts]
     assert axes.get_ylabel() == "energy (nJ)"
 
 

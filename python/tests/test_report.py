@@ -480,7 +480,7 @@ def test_zoom_slider_and_switch_work(browser, tmp_path, sliding):
             " return s; })")
     last = browser.run(maps)
     assert len(last) == 4          # the road, and the three maps of the slider
-    told = "return document.getElementById('step-told').textContent"
+    told = "return document.getElementById('step-shown').textContent"
     assert browser.run(told).startswith(f"step {run.snapshots.steps[-1]},")
     browser.run("document.getElementById('step').focus()")
     browser.press("\ue011")  # Home

@@ -277,5 +277,5 @@ def test_small_maps_and_periodic_maps_are_taken_as_they_are():
     assert any("no room for 512" in note for note in few.notes)
     whole = MeasuredRoad([measured(64, periodic=True), measured(64, periodic=True, seed=2)], 64)
     assert whole.join == "none" and whole.count == 2
-    with pytest.raises(ValueError, match="too few"):
+    with pytest.raises(ValueError, match="at least 16"):
         MeasuredRoad([measured(16)], 512)

@@ -14,45 +14,47 @@ __all__ = ["add_fit", "add_import"]
 def add_import(verbs: Any) -> None:
     """Add the verb ``import`` to the subparsers."""
     parser = verbs.add_parser(
-        "import", help="make a measured topography ready for a run",
-        description="Read a measured topography of any format that SurfaceTopography knows and"
-                    " write the HDF5 file that `&surface shape = 'file'` takes. What is done comes"
-                    " in this order: crop, level, fill, invert, scale, resample, window; the file"
-                    " keeps the record. Lengths are in the file's own unit.")
-    parser.add_argument("topography", metavar="TOPOGRAPHY", type=Path, help="the instrument's file")
+        "import", help="turn a measured topography into the road of a case",
+        description="Reads a measured topography in any format that SurfaceTopography knows, and"
+                    " writes the HDF5 file for `&surface shape = 'file'`. The steps are always done"
+                    " in this order: crop, level, fill, invert, scale, resample, window. The file"
+                    " records them. Lengths are in the unit of the file.")
+    parser.add_argument("topography", metavar="TOPOGRAPHY", type=Path,
+                        help="file of an instrument")
     parser.add_argument("-o", "--output", metavar="FILE.h5", type=Path, default=Path("surface.h5"),
                         help="file to write (default: surface.h5)")
-    parser.add_argument("--list", action="store_true", help="list the channels and do nothing")
+    parser.add_argument("--list", action="store_true",
+                        help="list the channels of the file and write nothing")
     parser.add_argument("--channel", metavar="NAME|N",
                         help="channel by its name, or its number from 0; default: the heights")
     parser.add_argument("--unit", metavar="UNIT",
-                        help="unit of length (m, mm, um, nm, pm, A, inch) where the file has none")
+                        help="unit of length (m, mm, um, nm, pm, A, inch) if the file has none")
     parser.add_argument("--size", nargs="+", type=float, metavar=("LX", "LY"),
-                        help="lengths where the file has none; a line scan has LX only")
+                        help="lengths if the file has none; only LX for a line scan")
     parser.add_argument("--transpose", action="store_true",
                         help="the first index of the file's array runs along y, as in images")
     parser.add_argument("--crop", nargs="+", type=float, metavar=("X0", "X1"),
-                        help="keep X0 to X1 and Y0 to Y1 (four numbers; two of a line scan)")
+                        help="keep X0 to X1 and Y0 to Y1 (four numbers; two for a line scan)")
     parser.add_argument("--level", choices=("none", "mean", "tilt", "curvature"), default="mean",
-                        help="what is taken off by least squares (default: mean)")
+                        help="subtract the mean, or the best plane or paraboloid (default: mean)")
     parser.add_argument("--max-missing", type=float, default=0.1, metavar="SHARE",
-                        help="largest share of missing points to fill (default: 0.1)")
+                        help="largest accepted share of missing points (default: 0.1)")
     parser.add_argument("--invert", action="store_true", help="turn the map upside down")
     parser.add_argument("--scale", type=float, default=1.0, metavar="FACTOR",
-                        help="factor on the heights")
+                        help="multiply the heights by this factor")
     parser.add_argument("--resample", nargs="+", type=int, metavar=("NX", "NY"),
-                        help="other numbers of cells; a line scan has NX only")
+                        help="divide the same lengths into other cells; only NX for a line scan")
     parser.add_argument("--periodic", nargs="?", const="tukey", choices=("tukey", "hann"),
                         help="bring the edges to the mean height by a window (default: tukey)")
     parser.add_argument("--taper", type=float, metavar="SHARE",
                         help="share of each length that the Tukey window tapers (default: 0.2)")
     parser.add_argument("--restore-rms", action="store_true",
-                        help="scale the windowed heights to the rms height before")
+                        help="scale the windowed heights to the rms height before the window")
     parser.set_defaults(call=_import)
 
 
 def _import(chosen: argparse.Namespace) -> int:
-    """Read, write, tell."""
+    """Import a topography and print what was done."""
     from ..roads.measured import channels, import_topography
 
     if chosen.list:
@@ -74,47 +76,48 @@ def _import(chosen: argparse.Namespace) -> int:
 def add_fit(verbs: Any) -> None:
     """Add the verb ``fit`` to the subparsers."""
     parser = verbs.add_parser(
-        "fit", help="fit a material to DMA data",
-        description="Fit a Prony series to a table of storage and loss moduli and print the"
+        "fit", help="fit a Prony series to DMA data",
+        description="Fits a Prony series to a table of storage and loss moduli, and prints the"
                     " `&material` group. Columns and units are read from the header, such as"
                     " \"f (Hz), G' (MPa), G'' (MPa), T (C)\".")
     parser.add_argument("table", metavar="DMA.csv", type=Path, help="the table")
     parser.add_argument("-o", "--output", metavar="FILE.nml", type=Path,
-                        help="write the group there instead of to the standard output")
+                        help="write the group to this file instead of the standard output")
     parser.add_argument("--plot", metavar="PNG", type=Path,
-                        help="draw data, fit and error (.png, .pdf, .svg)")
+                        help="draw the data, the fit and its error (.png, .pdf, .svg)")
     parser.add_argument("--arms-per-decade", type=float, default=1.0, metavar="N",
-                        help="relaxation times a decade (default: 1)")
+                        help="number of relaxation times per decade (default: 1)")
     parser.add_argument("--least-plateau", type=float, default=0.01, metavar="SHARE",
-                        help="the plateau is at least this share of the lowest storage modulus"
+                        help="smallest plateau modulus as a share of the lowest storage modulus"
                              " (default: 0.01)")
     parser.add_argument("--column", action="append", default=[], metavar="ROLE=NAME|N",
-                        help="column, by name or number from 1, of the frequency, storage, loss,"
-                             " temperature or tan_delta; may be repeated")
+                        help="name or number (from 1) of the column of a role: frequency, storage,"
+                             " loss, temperature or tan_delta; may be repeated")
     parser.add_argument("--frequency-unit", metavar="UNIT", help="Hz, kHz, mHz, rad/s or krad/s")
     parser.add_argument("--modulus-unit", metavar="UNIT", help="Pa, kPa, MPa or GPa")
     parser.add_argument("--temperature-unit", metavar="UNIT", help="C or K")
     parser.add_argument("--kind", choices=("shear", "tension"),
-                        help="what the moduli are; default: what the header says, else shear")
+                        help="kind of the moduli; default: by the header, otherwise shear")
     parser.add_argument("--poisson", type=float, default=0.5, metavar="NU",
                         help="Poisson ratio (default: 0.5)")
     parser.add_argument("--wlf", nargs="+", type=float, metavar=("C1", "C2"),
                         help="constants C1, C2 (K) and, unless --reference gives it, their"
-                             " reference temperature (C); default: found from the overlap")
+                             " reference temperature (C); default: shifts from the overlap")
     parser.add_argument("--reference", type=float, metavar="T", help="reference temperature, C")
     parser.add_argument("--temperature", type=float, metavar="T",
                         help="temperature of the simulation, C (default: the reference)")
     parser.add_argument("--temperature-tolerance", type=float, default=0.5, metavar="K",
-                        help="temperatures closer than this belong together (default: 0.5)")
+                        help="points whose temperatures differ by less than this belong to one"
+                             " sweep (default: 0.5)")
     parser.add_argument("--vertical", action="store_true",
-                        help="shift moduli, too, where shifts are found from the overlap")
+                        help="if shifts are found from the overlap, also shift the moduli")
     parser.add_argument("--shifts", metavar="FILE.csv", type=Path,
-                        help="write the shifts a_T and b_T of each temperature there")
+                        help="write the shifts a_T and b_T of each temperature to this file")
     parser.set_defaults(call=_fit)
 
 
 def _other_groups(path: Path) -> str:
-    """Return the groups of an input that are no materials, '' where there are none."""
+    """Return the groups of an input other than `&material`, or '' if there are none."""
     if not path.is_file():
         return ""
     text = path.read_text(encoding="utf-8", errors="replace")
@@ -123,7 +126,7 @@ def _other_groups(path: Path) -> str:
 
 
 def _fit(chosen: argparse.Namespace) -> int:
-    """Read, fit, write, tell."""
+    """Fit a table, write the files, and print a summary."""
     from ..rubber.dma import fit_dma, read_dma
     from ..views.style import check_picture
 
@@ -157,16 +160,16 @@ def _fit(chosen: argparse.Namespace) -> int:
         wlf=chosen.wlf, temperature_tolerance=chosen.temperature_tolerance,
         least_plateau=chosen.least_plateau, vertical=chosen.vertical)
     group = fit.to_namelist(poisson=chosen.poisson, temperature=chosen.temperature)
-    told = sys.stdout
+    messages = sys.stdout
     if output is None:
         print(group)
-        told = sys.stderr  # the group alone, its comments say all, can be redirected
+        messages = sys.stderr  # the standard output then has nothing but the group
     else:
         output.write_text(group + "\n", encoding="utf-8")
         print(fit.summary())
         print(f"wrote {output}")
     if chosen.shifts is not None:
-        print(f"wrote {fit.write_shifts(chosen.shifts)}", file=told)
+        print(f"wrote {fit.write_shifts(chosen.shifts)}", file=messages)
     if chosen.plot is not None:
         import matplotlib
 
@@ -176,5 +179,5 @@ def _fit(chosen: argparse.Namespace) -> int:
         figure = fit.plot()
         figure.savefig(chosen.plot, dpi=150)
         matplotlib.pyplot.close(figure)
-        print(f"wrote {chosen.plot}", file=told)
+        print(f"wrote {chosen.plot}", file=messages)
     return 0

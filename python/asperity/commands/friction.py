@@ -1,4 +1,4 @@
-"""The verb ``friction``: from a road and a rubber to friction, steady sliding."""
+"""The verb ``friction`` of ``python -m asperity``: friction curves of steady sliding."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _KINDS = (".html", ".csv", ".nc", ".png", ".pdf", ".svg")
 
 
 def numbers(text: str) -> list[float]:
-    """Return the numbers of ``1e-4:10:25`` (first, last, how many, on a log scale) or of a list.
+    """Return the numbers of a list, or of ``FIRST:LAST:COUNT``, evenly spaced on a log scale.
 
     Examples
     --------
@@ -43,10 +43,11 @@ def numbers(text: str) -> list[float]:
 def add_friction(verbs: Any) -> None:
     """Add the verb `friction`."""
     parser = verbs.add_parser(
-        "friction", help="friction curves from roads and a rubber",
-        description="Friction against speed, pressure and temperature, of steady sliding, on"
-                    " patches of measured roads or on drawn ones. The runs lie beside the output;"
-                    " stopped, the same command goes on. Persson's theory stands beside.")
+        "friction", help="compute friction curves of a rubber on a road",
+        description="Computes the friction of steady sliding against speed, pressure and"
+                    " temperature, on patches of measured roads or on random ones, and compares it"
+                    " with Persson's theory. The runs are in a folder next to the output. After an"
+                    " interruption the same command resumes where it stopped.")
     parser.add_argument("roads", metavar="ROAD", nargs="+",
                         help="a height map in any format that `import` reads; spectrum:FILE;"
                              " self_affine:hurst=0.8,wavelength_long=1e-3,wavelength_short=1e-5,"
@@ -61,78 +62,84 @@ def add_friction(verbs: Any) -> None:
 
 
 def _add_points(parser: argparse.ArgumentParser) -> None:
-    """Add what spans the curve."""
+    """Add the options for the points of the curve and for the interface."""
     parser.add_argument("--speeds", type=numbers, default=numbers("1e-4:10:25"), metavar="V",
-                        help="m/s: FIRST:LAST:COUNT or a list (default: 1e-4:10:25)")
+                        help="speeds, m/s: FIRST:LAST:COUNT or a list (default: 1e-4:10:25)")
     parser.add_argument("--pressures", type=numbers, default=[2e5], metavar="P",
-                        help="Pa (default: 2e5)")
+                        help="pressures, Pa (default: 2e5)")
     parser.add_argument("--temperatures", type=numbers, metavar="T",
-                        help="C (default: that of the rubber)")
+                        help="temperatures, C (default: that of the rubber)")
     parser.add_argument("--coefficient", type=float, default=0.0, metavar="MU",
-                        help="Coulomb's coefficient in the interface (default: 0, frictionless)")
+                        help="Coulomb's coefficient in the interface (default: 0, no friction)")
     parser.add_argument("--slope", action="store_true",
                         help="let Coulomb's law act on the true slope of the road")
     parser.add_argument("--tolerance", type=float, default=1e-5, metavar="E",
-                        help="of the solver (default: 1e-5)")
+                        help="tolerance of the solver (default: 1e-5)")
 
 
 def _add_road(parser: argparse.ArgumentParser) -> None:
-    """Add how patches are made."""
+    """Add the options for the patches of the road."""
     parser.add_argument("--cells", type=int, default=512, metavar="N",
-                        help="cells of a side of a patch (default: 512)")
+                        help="cells along a side of a patch (default: 512)")
     parser.add_argument("--patches", type=int, default=8, metavar="N",
                         help="number of patches (default: 8)")
     parser.add_argument("--error", type=float, metavar="MU",
-                        help="take at least 8 patches, and more until half of the 95 %% interval"
-                             " is below this")
-    parser.add_argument("--side", type=float, metavar="M", help="length of drawn patches, m")
+                        help="use at least 8 patches, and add more until half of the 95 %%"
+                             " interval is below this")
+    parser.add_argument("--side", type=float, metavar="M",
+                        help="length of a side of drawn patches, m")
     parser.add_argument("--short", type=float, metavar="M", help="shortest wave that is kept, m")
     parser.add_argument("--extend", type=float, metavar="M",
-                        help="shortest wave to which the spectrum is thought to go on, m, for what"
-                             " the left-out waves would add")
+                        help="shortest wavelength, m, to which the spectrum is extrapolated to"
+                             " estimate the friction of the omitted waves")
     parser.add_argument("--angle", type=float, metavar="DEGREES",
-                        help="between the velocity and x (default: 0 on maps, 31.7 on drawn roads)")
+                        help="angle between the velocity and x (default: 0 on maps, 31.7 on drawn"
+                             " roads)")
     parser.add_argument("--join", choices=("seam", "blend", "smooth", "mirror", "window"),
                         help="how patches are made periodic (default: seam)")
     parser.add_argument("--outliers", choices=("report", "remove"), default="report",
-                        help="single cells far off their neighbours (default: report)")
+                        help="what to do about single cells that differ strongly from their"
+                             " neighbours (default: report)")
     parser.add_argument("--draw", action="store_true",
-                        help="draw maps of the joined spectrum instead of cutting patches")
-    parser.add_argument("--seed", type=int, default=1, help="other patches (default: 1)")
-    parser.add_argument("--unit", help="unit of lengths of maps that name none")
+                        help="draw random maps from the combined spectrum instead of cutting"
+                             " patches")
+    parser.add_argument("--seed", type=int, default=1,
+                        help="seed that selects the patches (default: 1)")
+    parser.add_argument("--unit", help="unit of length of maps that name none")
     parser.add_argument("--size", nargs="+", type=float, metavar=("LX", "LY"),
                         help="lengths of maps that give none, in their unit")
 
 
 def _add_rubber(parser: argparse.ArgumentParser) -> None:
-    """Add how a DMA table is fitted."""
+    """Add the options for the fit of a DMA table."""
     parser.add_argument("--wlf", nargs="+", type=float, metavar=("C1", "C2"),
                         help="constants of the shift of a DMA table, see `fit`")
     parser.add_argument("--reference", type=float, metavar="T",
                         help="reference temperature of a DMA table, C")
     parser.add_argument("--vertical", action="store_true",
-                        help="shift the moduli of a DMA table, too")
+                        help="also shift the moduli of a DMA table")
 
 
 def _add_runs(parser: argparse.ArgumentParser) -> None:
-    """Add how the runs are made, and what is written."""
+    """Add the options for the runs and for the output."""
     parser.add_argument("--jobs", type=int, metavar="N",
-                        help="runs at a time (default: one for each processor)")
+                        help="runs at a time (default: one per processor)")
     parser.add_argument("--slurm", metavar="OPTIONS",
                         help="submit the runs as a job array with these options of sbatch; the same"
                              " command gathers them later")
     parser.add_argument("--plan", action="store_true", help="print the plan and run nothing")
     parser.add_argument("--folder", type=Path, metavar="FOLDER",
-                        help="of the runs (default: OUTPUT_runs beside the first output)")
-    parser.add_argument("--no-resume", action="store_true", help="run all anew")
-    parser.add_argument("--quiet", action="store_true", help="tell no progress")
+                        help="folder of the runs (default: OUTPUT_runs beside the first output)")
+    parser.add_argument("--no-resume", action="store_true",
+                        help="run all cases again instead of reusing complete results")
+    parser.add_argument("--quiet", action="store_true", help="show no progress")
     parser.add_argument("-o", "--output", metavar="FILE", type=Path, action="append",
                         help=".html, .csv, .nc or .png; may be repeated (default: friction.html and"
                              " friction.csv)")
 
 
 def _friction(chosen: argparse.Namespace) -> int:
-    """Plan, run, write."""
+    """Print the plan, run it, and write the output."""
     outputs = chosen.output or [Path("friction.html"), Path("friction.csv")]
     for output in outputs:
         if output.suffix.lower() not in _KINDS:
@@ -157,15 +164,15 @@ def _friction(chosen: argparse.Namespace) -> int:
                       coefficient=chosen.coefficient, slope_effect=chosen.slope,
                       angle=chosen.angle, tolerance=chosen.tolerance)
     means = Means(*share_of_processors(chosen.jobs, 1), not chosen.no_resume, None, chosen.slurm)
-    print(plan.told(means.side_by_side), flush=True)
+    print(plan.summary(means.side_by_side), flush=True)
     if chosen.plan:
         return 0
     folder = chosen.folder or outputs[0].with_name(f"{outputs[0].stem}_runs")
     try:
         curve = run_curve(plan, folder, means, error=chosen.error, extend=chosen.extend,
                           quiet=chosen.quiet)
-    except SubmittedError as told:
-        print(told)
+    except SubmittedError as message:
+        print(message)
         return 0
     print(curve.summary())
     for output in outputs:
@@ -174,7 +181,7 @@ def _friction(chosen: argparse.Namespace) -> int:
 
 
 def _write(curve: FrictionCurve, output: Path) -> Path:
-    """Write a file of the kind that its name tells."""
+    """Write a file, whose ending determines its kind."""
     kind = output.suffix.lower()
     if kind == ".csv":
         return curve.to_csv(output)

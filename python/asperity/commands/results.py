@@ -1,4 +1,4 @@
-"""The verbs ``plot``, ``report`` and ``watch`` of ``python -m asperity``: results looked at."""
+"""The verbs ``plot``, ``report`` and ``watch`` of ``python -m asperity``, which show results."""
 
 from __future__ import annotations
 
@@ -12,32 +12,36 @@ __all__ = ["add_plot", "add_report", "add_watch"]
 def add_plot(verbs: Any) -> None:
     """Add the verb `plot`."""
     plot = verbs.add_parser(
-        "plot", help="draw a result",
-        description="Draw a result: by default an overview, into RESULT.png. With friction it shows"
-                    " friction, contact and stick area and sliding speed in time, with the last"
-                    " pressure and what sticks and slips; without, the last pressure and gap with"
-                    " the contact area.")
+        "plot", help="draw a picture or a film of a result",
+        description="Draws a result, by default an overview, into RESULT.png. In a case with"
+                    " friction it shows friction, contact area, stick area and sliding speed over"
+                    " time, and the last maps of pressure and of stick and slip. Otherwise it shows"
+                    " the contact area, and the last maps of pressure and gap.")
     plot.add_argument("result", metavar="RESULT.h5", help="result of `asperity run`")
     plot.add_argument("-o", "--output", metavar="PNG", type=Path,
                       help="picture to write (.png, .pdf, .svg; a film .gif, .mp4);"
                            " default: RESULT.png beside the result")
-    plot.add_argument("--show", action="store_true", help="open a window instead of writing")
+    plot.add_argument("--show", action="store_true",
+                      help="open a window instead of writing a file")
     what = plot.add_mutually_exclusive_group()
     what.add_argument("--field", metavar="NAME",
-                      help="draw a field of a snapshot, as pressure; contact shows what sticks"
-                           " and slips, with the tractions")
+                      help="draw a field of a snapshot, for example pressure; contact shows which"
+                           " cells stick and slip, with the tractions")
     what.add_argument("--film", metavar="NAME", nargs="?", const="",
                       help="make a film of a field over all snapshots (.gif, or .mp4 with ffmpeg);"
-                           " without a name of what sticks and slips, or of the pressure")
+                           " the default is stick and slip, or without friction the pressure")
     what.add_argument("--history", metavar="NAME",
-                      help="draw a column of the history, as friction (with its causes), or energy")
-    plot.add_argument("--step", type=int, help="the snapshot's step; default: the last one")
-    plot.add_argument("--x", metavar="NAME", help="column to draw --history against")
+                      help="draw a column of the history, for example friction (with its causes),"
+                           " or energy")
+    plot.add_argument("--step", type=int,
+                      help="number of the snapshot's row; default: the last snapshot")
+    plot.add_argument("--x", metavar="NAME",
+                      help="column along the horizontal axis of --history")
     plot.set_defaults(call=_plot, error=plot.error)
 
 
 def _plot(chosen: argparse.Namespace) -> int:
-    """Draw what was chosen."""
+    """Draw the picture or film that was chosen."""
     if chosen.step is not None and not chosen.field:
         chosen.error("--step goes with --field")
     if chosen.x is not None and not chosen.history:
@@ -92,11 +96,11 @@ def _film(run: Any, chosen: argparse.Namespace) -> int:
 def add_report(verbs: Any) -> None:
     """Add the verb `report`."""
     report = verbs.add_parser(
-        "report", help="write a page about a result",
-        description="Write one HTML file about a result, for any browser, with nothing to fetch:"
-                    " friction and contact area in time, maps with a slider, spectra, energies,"
-                    " convergence, the case and how it was made. Of a run that is still going it"
-                    " shows what there is.")
+        "report", help="write an HTML page about a result",
+        description="Writes one HTML file about a result, which any browser shows without a"
+                    " network: friction and contact area over time, maps with a slider, spectra,"
+                    " energies, convergence, and the settings of the case. The run may be"
+                    " unfinished.")
     report.add_argument("result", metavar="RESULT.h5", help="result of `asperity run`")
     report.add_argument("-o", "--output", metavar="HTML", type=Path,
                         help="page to write; default: RESULT.html beside the result")
@@ -117,13 +121,13 @@ def add_watch(verbs: Any) -> None:
     """Add the verb `watch`."""
     watch = verbs.add_parser(
         "watch", help="follow a run in the terminal",
-        description="Follow a run until it is finished: friction and contact area as lines of"
-                    " text, the last row, the time left. Ctrl-C ends the view, not the run. Where"
-                    " the output is no terminal, a plain line tells each change.")
+        description="Follows a run until it is finished, with bars of text for friction and contact"
+                    " area, the last row and the time left. Ctrl-C ends the view, not the run. If"
+                    " the output is not a terminal, a plain line is printed at each change.")
     watch.add_argument("result", metavar="RESULT.h5", help="result of `asperity run`")
     watch.add_argument("--every", metavar="SECONDS", type=float, default=1.0,
-                       help="look so often; default: 1")
-    watch.add_argument("--once", action="store_true", help="show what there is and end")
+                       help="time between two updates (default: 1)")
+    watch.add_argument("--once", action="store_true", help="show the present state and exit")
     watch.set_defaults(call=_watch)
 
 

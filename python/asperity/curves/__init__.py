@@ -1,4 +1,4 @@
-"""From a road and a rubber to friction: curves over speed, pressure and temperature."""
+"""Friction curves: friction of a rubber on a road over speed, pressure and temperature."""
 
 from .curve import friction_curve, run_curve
 from .plan import CurvePlan, plan_curve

@@ -1,4 +1,4 @@
-"""Friction of a rubber on a road, from files to a data set in one call."""
+"""Friction curves in one call, from files to a data set."""
 
 from __future__ import annotations
 
@@ -61,10 +61,11 @@ def friction_curve(
     quiet: bool = False,
     **options: Any,
 ) -> xarray.Dataset:
-    """Return friction against speed, pressure and temperature, of steady sliding.
+    """Return the friction of steady sliding against speed, pressure and temperature.
 
-    Every point is a steady state on a patch of the road. The runs lie in `folder`; after a stop the
-    same call goes on where it was, and other speeds or patches can be asked for later.
+    Every point is a state of steady sliding on a patch of the road. The results of the runs are in
+    `folder`. After an interruption the same call resumes where it stopped, and you can add patches
+    or pressures later.
 
     Parameters
     ----------
@@ -72,52 +73,54 @@ def friction_curve(
         Measured maps in any format that `asperity.surface.load` reads; ``"spectrum:FILE"``;
         ``"self_affine:hurst=0.8,wavelength_long=1e-3,wavelength_short=1e-5,rms_slope=0.2"``;
         profiles, which stand for isotropic roads.
-    material : str, path or Prony
-        A namelist with ``&material``, a DMA table, or a series.
+    material : str, Path or Prony
+        A namelist with ``&material``, a DMA table, or a Prony series.
     speeds, pressures : array_like
-        m/s and Pa.
+        Speeds, m/s, and pressures, Pa.
     temperatures : array_like, optional
-        C; the rubber's own if left out.
+        Temperatures, C; by default that of the rubber.
     coefficient : float
-        Of Coulomb's law in the interface; 0: the viscous friction alone.
+        Coefficient of Coulomb's law in the interface. With 0 the result is the viscous friction
+        alone.
     slope_effect : bool
         Let that law act on the true slope of the road.
     cells, patches : int
-        Of a side of a patch, and how many patches.
+        Number of cells along a side of a patch, and number of patches.
     side, short : float, optional
-        Length of drawn patches, and the shortest wave that is kept, m.
+        Length of a side of drawn patches, and shortest wave that is kept, m.
     angle : float, optional
-        Between the road's velocity and x, degrees; 0 on measured maps, 31.7 on drawn ones.
+        Angle between the velocity of the road and x, degrees; by default 0 on measured maps and
+        31.7 on drawn ones.
     join : str, optional
         How patches of measured maps are made periodic: 'seam', 'blend', 'smooth', 'mirror',
         'window'.
     outliers : {'report', 'remove'}
-        What to do about single cells that lie far off their neighbours.
+        What to do about single cells that differ strongly from their neighbours.
     draw : bool
-        Draw maps of the joined spectrum of the roads instead of cutting patches from them.
+        Draw random maps from the combined spectrum of the roads instead of cutting patches.
     extend : float, optional
-        Shortest wave (m) to which the road's spectrum is thought to go on: what the left-out waves
-        would add is ``friction_left_out``.
+        Shortest wavelength (m) to which the spectrum of the road is extrapolated.
+        ``friction_left_out`` is the friction that the omitted waves would add.
     wlf, reference, vertical
-        Of the fit of a DMA table, see `asperity.dma.fit_dma`.
+        Options of the fit of a DMA table, see `asperity.dma.fit_dma`.
     tolerance : float
-        Of the solver.
+        Tolerance of the solver.
     error : float, optional
-        Take at least 8 patches, and more until half of the 95 % interval of friction is below this
-        everywhere, at most 64.
+        Use at least 8 patches, and add more, up to 64, until half of the 95 % interval of the
+        friction is below this value everywhere.
     seed : int
-        Another seed, other patches; the same seed, the same numbers to the last bit.
+        Seed that selects the patches. The same seed gives the same numbers to the last bit.
     folder : str or path
-        Where maps, inputs and results lie.
+        Folder of maps, inputs and results.
     jobs, threads, resume, executor, slurm, quiet
-        See `asperity.sweep`; by default as many runs at a time as there are processors.
+        See `asperity.sweep`. By default there are as many runs at a time as processors.
     **options
-        For `asperity.surface.load`, such as `unit` and `size`.
+        Options of `asperity.surface.load`, such as `unit` and `size`.
 
     Returns
     -------
     xarray.Dataset
-        Dimensions pressure, temperature, speed, patch; see
+        The dimensions are pressure, temperature, speed and patch; see
         `asperity.results.friction_curve.FrictionCurve.to_xarray`.
 
     Raises
@@ -157,19 +160,27 @@ def run_curve(
     folder : str or path
         Where maps, inputs and results lie.
     means : Means
-        How the runs are made.
+        The way in which jobs are run.
     error : float, optional
-        Half of the 95 % interval of friction that is wanted; more patches are taken for it.
+        Largest allowed half of the 95 % interval of the friction; patches are added until it is
+        met.
     most_patches : int
-        At most so many.
+        Largest number of patches.
     extend : float, optional
         See `friction_curve`.
     quiet : bool
-        Tell no progress.
+        Show no progress.
 
     Returns
     -------
     FrictionCurve
+
+    Raises
+    ------
+    ValueError
+        If an argument is not allowed.
+    RuntimeError
+        If runs fail, or were submitted to Slurm and are not complete.
     """
     whole("most_patches", most_patches)
     if error is not None:

@@ -1,4 +1,4 @@
-"""A friction curve from the results of its runs."""
+"""Gathering of the results of runs into a friction curve."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = ["GAMMA", "gather"]
 
 FloatArray = NDArray[np.float64]
 
-#: Factor of Yang and Persson in the theory beside the runs, as the thesis takes it.
+#: Factor of Yang and Persson in the theory that is compared with the runs; the thesis uses 0.45.
 GAMMA = 0.45
 
 _NAMES = ("friction", "friction_viscous", "contact_area", "mean_gap")
@@ -40,8 +40,12 @@ def gather(plan: CurvePlan, pieces: list[tuple[Piece, Patch]], extend: float | N
     pieces : list of (Piece, Patch)
         The runs.
     extend : float, optional
-        Shortest wave (m) to which the spectrum of the road is thought to go on, for what the
-        left-out waves would add.
+        Shortest wavelength (m) to which the spectrum of the road is extrapolated in order to
+        estimate the friction of the omitted waves.
+
+    Returns
+    -------
+    FrictionCurve
     """
     axes = (plan.pressure.size, plan.temperature.size, plan.speed.size)
     values = {name: np.full((*axes, plan.patches), math.nan) for name in _NAMES}
@@ -75,12 +79,12 @@ def gather(plan: CurvePlan, pieces: list[tuple[Piece, Patch]], extend: float | N
 
 
 def _labels(pieces: list[tuple[Piece, Patch]]) -> list[str]:
-    """Return where each patch comes from."""
+    """Return the origin of each patch."""
     return list({piece.patch: patch.label for piece, patch in pieces}.values())
 
 
 def _settings(plan: CurvePlan, extend: float | None) -> dict[str, Any]:
-    """Return how the curve was made."""
+    """Return the settings of the curve."""
     patch = plan.road.patch(0)
     ny, nx = patch.height.shape
     return {
@@ -93,7 +97,7 @@ def _settings(plan: CurvePlan, extend: float | None) -> dict[str, Any]:
 
 
 def _mean_spectrum(patches: list[Patch]) -> tuple[FloatArray, FloatArray]:
-    """Return the mean spectrum of patches of one size."""
+    """Return the mean spectrum of patches of the same size."""
     found = [theory.surface_psd(patch.height, patch.lx, patch.ly) for patch in patches]
     wave = found[0][0]
     same = [psd for k, psd in found if k.shape == wave.shape and np.allclose(k, wave, rtol=1e-6)]
@@ -102,7 +106,7 @@ def _mean_spectrum(patches: list[Patch]) -> tuple[FloatArray, FloatArray]:
 
 def _theory(plan: CurvePlan, pieces: list[tuple[Piece, Patch]], extend: float | None
             ) -> dict[str, FloatArray]:
-    """Return Persson's theory for the patches, and what it adds for the whole road."""
+    """Return Persson's theory for the patches, and its estimate for the omitted waves."""
     patches = list({piece.patch: patch for piece, patch in pieces}.values())
     spectrum = _mean_spectrum(patches)
     whole = plan.road.whole_spectrum
@@ -131,13 +135,13 @@ def _theory(plan: CurvePlan, pieces: list[tuple[Piece, Patch]], extend: float | 
 
 
 def _is_wider(whole: Spectrum, kept: Spectrum) -> bool:
-    """Whether a spectrum has waves that another one lacks."""
+    """Return whether a spectrum has waves that another one does not contain."""
     return (whole.wavenumber[0] < 0.999 * kept.wavenumber[0]
             or whole.wavenumber[-1] > 1.001 * kept.wavenumber[-1])
 
 
 def _join_note(plan: CurvePlan, lost: list[tuple[Piece, int, Run]]) -> list[str]:
-    """Say how much of the load the join of the patches carries."""
+    """Return a note on the share of the load that the joins of the patches carry."""
     if plan.road.join == "none":
         return []
     shares = [load_at_join(run.snapshots[-1].pressure, plan.road.join)
@@ -151,7 +155,7 @@ def _join_note(plan: CurvePlan, lost: list[tuple[Piece, int, Run]]) -> list[str]
 
 def _losses(plan: CurvePlan, lost: list[tuple[Piece, int, Run]]
             ) -> tuple[dict[str, FloatArray], FloatArray]:
-    """Return the losses by octave and arm, means over the patches, and the octaves."""
+    """Return the losses by octave and by arm, as means over the patches, and the octaves."""
     axes = (plan.pressure.size, plan.temperature.size, plan.speed.size)
     sums: dict[str, FloatArray] = {}
     count = np.zeros(axes)

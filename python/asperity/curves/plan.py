@@ -41,21 +41,21 @@ class CurvePlan:
     Attributes
     ----------
     road : DrawnRoad or MeasuredRoad
-        What the rubber slides on.
+        The road.
     compound : Compound
         The rubber.
     speed, pressure, temperature : ndarray
-        m/s, Pa, C.
+        Axes of the curve: m/s, Pa, C.
     patches : int
         Number of patches to begin with.
     coefficient : float
-        Of Coulomb's law in the interface; 0 is a frictionless interface.
+        Coefficient of Coulomb's law in the interface; with 0 there is no friction in it.
     slope_effect : bool
         Whether the law acts on the true slope.
     angle : float
-        Between the road's velocity and x, degrees.
+        Angle between the velocity of the road and x, degrees.
     tolerance : float
-        Of the solver.
+        Tolerance of the solver.
     notes : list of str
         Remarks for the user.
     """
@@ -85,11 +85,15 @@ class CurvePlan:
         patch : Patch
             The map.
         file : str
-            Its file, as the input names it.
+            Name of its file in the input.
         i, j : int
             Indices of the pressure and the temperature.
         first : int
             Index of the first speed.
+
+        Returns
+        -------
+        Case
         """
         ny, nx = patch.height.shape
         series = self.compound.at(float(self.temperature[j]))
@@ -119,7 +123,7 @@ class CurvePlan:
         """Return the estimated mean number of real transforms of a steady state.
 
         The estimate follows from the cells, the law and the ratio of the glassy modulus to the
-        relaxed one. It is right within a factor of 2.5 where several speeds follow each other.
+        relaxed one. For several speeds in a row it is right within a factor of 2.5.
 
         Parameters
         ----------
@@ -153,7 +157,7 @@ class CurvePlan:
         units = {"B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12}
         return float(found[1]) * units[found[2]] if found else math.nan
 
-    def told(self, side_by_side: int = 1) -> str:
+    def summary(self, side_by_side: int = 1) -> str:
         """Return a summary of the plan, one line per subject.
 
         Parameters
@@ -175,8 +179,8 @@ class CurvePlan:
             f" {self.temperature.size} temperatures",
             f"solves     {self.solves} steady states in"
             f" {self.solves // self.speed.size} runs, {side_by_side} at a time",
-            f"time       about {_told(_COMMAND + self.seconds() / side_by_side)}, if the processors"
-            " have nothing else to do",
+            f"time       about {_duration(_COMMAND + self.seconds() / side_by_side)}, if the"
+            " processors have nothing else to do",
             f"memory     about {(_COMMAND_MEMORY + self.memory() * side_by_side) / 1e6:.0f} MB",
         ]
         return "\n".join([*lines, *(f"note       {note}" for note in [
@@ -205,20 +209,25 @@ def plan_curve(
     compound : Compound
         See `asperity.curves.sources.compound_of`.
     speeds, pressures : array_like
-        m/s and Pa, > 0, no value twice.
+        Speeds, m/s, and pressures, Pa; > 0 and different from each other.
     temperatures : array_like, optional
-        C; the rubber's own if left out.
+        Temperatures, C; by default that of the rubber.
     patches : int
         Number of patches; at most those that the road has.
     coefficient : float
-        Of Coulomb's law, >= 0.
+        Coefficient of Coulomb's law in the interface, >= 0.
     slope_effect : bool
         Let the law act on the true slope.
     angle : float, optional
-        Between the road's velocity and x, degrees. Default: 0 on measured maps, 31.7 on drawn ones:
-        sliding along an axis the rubber meets its own footprint after one side.
+        Angle between the velocity of the road and x, degrees. The default is 0 on measured maps and
+        31.7 on drawn ones. Along an axis the rubber meets its own footprint after a travel of one
+        side.
     tolerance : float
-        Of the solver.
+        Tolerance of the solver.
+
+    Returns
+    -------
+    CurvePlan
 
     Raises
     ------
@@ -266,7 +275,7 @@ def _longest(plan: CurvePlan) -> float:
 
 
 def _band_note(plan: CurvePlan, celsius: float) -> list[str]:
-    """Return a note for the speeds at which V/wavelength leaves the measured band of the rubber."""
+    """Return notes on speeds at which V/wavelength is outside the measured range of the rubber."""
     within = plan.compound.speeds_within(celsius, plan.road.short, _longest(plan))
     if within is None:
         return []
@@ -283,12 +292,12 @@ def _band_note(plan: CurvePlan, celsius: float) -> list[str]:
     return notes
 
 
-def _told(seconds: float) -> str:
+def _duration(seconds: float) -> str:
     """Return a duration as text.
 
     Examples
     --------
-    >>> _told(30.0), _told(4000.0)
+    >>> _duration(30.0), _duration(4000.0)
     ('30 s', '1 h 7 min')
     """
     if seconds < 90.0:

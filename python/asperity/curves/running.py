@@ -1,7 +1,7 @@
-"""The runs of a friction curve: one for each patch, pressure and temperature, all speeds in it.
+"""The runs of a friction curve: one per patch, pressure and temperature, with all speeds.
 
-Each speed starts from the state of the one before. Where a solver does not converge, the point is
-left out, and another run goes on with the next speed.
+Each speed starts from the state of the one before. If the solver does not converge, the point is
+left out, and another run continues with the next speed.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ class CurveError(RuntimeError):
 
 
 class SubmittedError(RuntimeError):
-    """The runs were submitted and are not there yet; the same call later gathers them."""
+    """The runs were submitted to Slurm and are not complete; the same call later gathers them."""
 
 
 @dataclass
 class Piece:
-    """A run of a curve, and which points it gives.
+    """A run of a curve, and the indices of its points.
 
     Attributes
     ----------
@@ -48,9 +48,10 @@ class Piece:
     job: Job
 
     def rows(self) -> tuple[Run, int, bool]:
-        """Return the result, how many of its rows hold steady states, and whether it went through.
+        """Return the result, the number of its rows that are steady states, and if it is complete.
 
-        The last row of a run that did not converge is its best state, which is none.
+        The last row of a run that did not converge is the best state that was found. It does not
+        count as a steady state.
         """
         run = open_result(self.job.path)
         return run, run.history.rows - (0 if run.finished else 1), run.finished
@@ -58,25 +59,29 @@ class Piece:
 
 def run_pieces(plan: CurvePlan, folder: Path, means: Means, quiet: bool = False
                ) -> list[tuple[Piece, Patch]]:
-    """Run what is not there yet; return all pieces with their patches.
+    """Run the pieces that are not complete yet, and return all pieces with their patches.
 
     Parameters
     ----------
     plan : CurvePlan
-        What to run.
+        The plan.
     folder : Path
-        Where maps, inputs and results lie.
+        Folder of maps, inputs and results.
     means : Means
-        How the runs are made.
+        The way in which jobs are run.
     quiet : bool
-        Tell no progress.
+        Show no progress.
+
+    Returns
+    -------
+    list of (Piece, Patch)
 
     Raises
     ------
     CurveError
-        If a run fails otherwise than by a solver that does not converge.
+        If a run fails for another reason than a solver that does not converge.
     SubmittedError
-        If the runs were given to Slurm.
+        If the runs were submitted to Slurm.
     """
     folder.mkdir(parents=True, exist_ok=True)
     patches = [plan.road.patch(number) for number in range(plan.patches)]
@@ -106,9 +111,9 @@ def _piece(plan: CurvePlan, patch: Patch, file: str, folder: Path,
     n, i, j, first = place
     case = plan.case(patch, file, i, j, first)
     if n == 0:
-        case.output.snapshot_every = 1  # the maps that the page shows
+        case.output.snapshot_every = 1  # for the maps of the HTML page
     case.path = folder / "case.nml"
-    # Other settings have other names: the results of several curves may lie in one folder.
+    # The name depends on the settings, so that several curves can share a folder.
     code = hashlib.sha256(str(case).encode()).hexdigest()[:8]
     name = f"{patch.code}-p{plan.pressure[i]:.6g}-T{plan.temperature[j]:.6g}-{code}"
     if first:
@@ -118,9 +123,9 @@ def _piece(plan: CurvePlan, patch: Patch, file: str, folder: Path,
 
 
 def _is_there(job: Job) -> bool:
-    """Whether a result of this very input is there, through to its end or to a lack of convergence.
+    """Return whether there is a result of the same input that need not be run again.
 
-    The status of the job is set.
+    It is complete, or it has ended because a solver did not converge. The status of the job is set.
     """
     if is_done(job):
         job.status = 0
@@ -133,15 +138,15 @@ def _is_there(job: Job) -> bool:
 
 
 def _look_for_failures(pieces: list[Piece]) -> None:
-    """Raise what made runs fail."""
+    """Raise CurveError with the messages of runs that have failed."""
     failed = [piece.job for piece in pieces if piece.job.status not in (0, 4)]
     if failed:
-        told = "\n".join(f"  {job.name}: {job.message or 'was not run'}" for job in failed[:10])
-        raise CurveError(f"{len(failed)} of {len(pieces)} runs failed:\n{told}")
+        listed = "\n".join(f"  {job.name}: {job.message or 'was not run'}" for job in failed[:10])
+        raise CurveError(f"{len(failed)} of {len(pieces)} runs failed:\n{listed}")
 
 
 def _broken_off(pieces: list[Piece], plan: CurvePlan) -> Iterator[tuple[Piece, int]]:
-    """Return the pieces that ended at a speed, and the index of the next speed, if there is one."""
+    """Return the pieces that ended early, each with the index of the speed to continue with."""
     for piece in pieces:
         if piece.job.status == 4:
             _, rows, _ = piece.rows()

@@ -1,4 +1,4 @@
-"""What a road or a rubber is made from: files of several kinds, or words."""
+"""The sources of roads and rubbers: files of several kinds, or specifications in words."""
 
 from __future__ import annotations
 
@@ -43,25 +43,26 @@ def road_of(
     seed: int = 1,
     **options: Any,
 ) -> Road:
-    """Return the road of files or words.
+    """Return the road that files or words describe.
 
     Parameters
     ----------
-    sources : sequence of str, path, MeasuredSurface or Spectrum
-        Measured maps of any format that `asperity.surface.load` reads: patches are cut from them.
-        ``"spectrum:FILE"``: a table of wave numbers (rad/m) and densities. A profile stands for the
-        isotropic road that has such profiles. ``"self_affine:hurst=0.8,wavelength_long=1e-3,
-        wavelength_short=1e-5,rms_slope=0.2"``. Spectra and profiles are joined into one.
+    sources : sequence of str, Path, MeasuredSurface or Spectrum
+        Each source is one of these. A measured map in any format that `asperity.surface.load`
+        reads: patches are cut from it. A profile: it stands for the isotropic road with such
+        profiles. ``"spectrum:FILE"``: a table of wave numbers (rad/m) and densities.
+        ``"self_affine:hurst=0.8,wavelength_long=1e-3,wavelength_short=1e-5,rms_slope=0.2"``.
+        Spectra and profiles are combined into one spectrum.
     cells : int
-        Of a side of each patch.
+        Number of cells along a side of each patch.
     side : float, optional
-        Length of drawn patches, m.
+        Length of a side of drawn patches, m.
     join, short, outliers, seed
         As in `asperity.roads.patches.MeasuredRoad`.
     draw : bool
-        Draw random maps of the joined spectrum of the maps, instead of cutting patches.
+        Draw random maps from the combined spectrum of the maps, instead of cutting patches.
     **options
-        For `asperity.surface.load`.
+        Options of `asperity.surface.load`.
 
     Returns
     -------
@@ -70,7 +71,7 @@ def road_of(
     Raises
     ------
     OSError, ValueError
-        If a file cannot be read, or what it holds is no road.
+        If a file cannot be read, or does not describe a road.
     """
     maps: list[MeasuredSurface] = []
     spectra: list[Spectrum] = []
@@ -98,7 +99,7 @@ def road_of(
 
 def _road_source(source: str | Path | MeasuredSurface | Spectrum, options: dict[str, Any]
                  ) -> MeasuredSurface | Spectrum:
-    """Return what one source is."""
+    """Return the map or the spectrum of one source."""
     if isinstance(source, MeasuredSurface | Spectrum):
         return source
     words = str(source)
@@ -132,8 +133,8 @@ def _self_affine(words: str) -> Spectrum:
 def _spectrum_file(path: Path) -> Spectrum:
     """Return the spectrum of a table: wave numbers (rad/m) and densities.
 
-    The second column is Phi (m4), or Persson's C = Phi/(4 pi^2) where its head says C, or m3 for
-    the density of a profile.
+    The second column is Phi (m4). If its heading begins with C, it is Persson's C = Phi/(4 pi^2);
+    if it contains m3, it is the density of a profile.
     """
     rows = cells_of(text_lines(path))
     heads = [] if is_number(rows[0][1][0]) else rows[0][1]
@@ -164,13 +165,13 @@ def compound_of(
     vertical: bool = False,
     arms_per_decade: float = 1.0,
 ) -> Compound:
-    """Return the rubber of a namelist with ``&material``, a DMA table, or a series.
+    """Return the rubber of a namelist with ``&material``, of a DMA table, or of a Prony series.
 
     Parameters
     ----------
-    source : str, path, Prony or Compound
-        A file whose first word is a group, such as ``&material``, is a namelist; any other one a
-        table that `asperity.dma.read_dma` reads.
+    source : str, Path, Prony or Compound
+        A file whose first word is a group, such as ``&material``, is a namelist. Any other file is
+        a table for `asperity.dma.read_dma`.
     wlf, reference, vertical, arms_per_decade
         As in `asperity.dma.fit_dma`, for tables.
 
@@ -181,7 +182,7 @@ def compound_of(
     Raises
     ------
     OSError, ValueError
-        If the file cannot be read, or what it holds is no rubber.
+        If the file cannot be read, or does not describe a rubber.
     """
     if isinstance(source, Compound):
         return source
@@ -201,7 +202,7 @@ def compound_of(
 
 
 def _of_namelist(path: Path) -> Compound:
-    """Return the rubber of the group `material` of an input."""
+    """Return the rubber of the group `&material` of an input."""
     group = Case.read(path).material
     spring = float(group.shear_modulus or 0.0)
     if group.zener_g0:

@@ -1,4 +1,4 @@
-"""The stored fields of a run, read from its file when they are asked for."""
+"""The stored fields of a run, which are read from its file on access."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ _TANGENTIAL = ("traction_x", "traction_y", "displacement_x", "displacement_y", "
 
 
 class Snapshot(NamedFields):
-    """The fields of one row of the history, read from the file when they are asked for.
+    """The fields of one row of the history, which are read from the file on access.
 
     ``snapshot.pressure`` and ``snapshot["pressure"]`` are the same array of shape (ny, nx).
 
     Attributes
     ----------
     step : int
-        The row of the history it belongs to.
+        Number of the row of the history.
     time : float
         Time, s.
     phase : int
@@ -65,7 +65,7 @@ class Snapshot(NamedFields):
 
     @property
     def run(self) -> ResultFile:
-        """The run it belongs to."""
+        """The result that contains the snapshot."""
         return self._run
 
     def __getitem__(self, name: str) -> NDArray[Any]:
@@ -73,7 +73,7 @@ class Snapshot(NamedFields):
         return read_file(self._run.path, lambda file: file["snapshots"][self._key][name][()])
 
     def _check(self, name: str) -> None:
-        """Raise a message that helps on if there is no such field."""
+        """Raise `UnknownNameError` with advice if there is no such field."""
         if name in self._meanings:
             return
         text = unknown_name("field of the snapshot", name, self._meanings)
@@ -93,7 +93,7 @@ class Snapshot(NamedFields):
         return iter(self._meanings)
 
     def units(self, name: str) -> str:
-        """Return the units of a field, '1' for a pure number."""
+        """Return the units of a field; they are '1' for a pure number."""
         self._check(name)
         return self._meanings[name][0]
 
@@ -109,11 +109,11 @@ class Snapshot(NamedFields):
         Parameters
         ----------
         name : str
-            Name of the field; 'contact' shows what is open, sticks and slips.
+            Name of the field. 'contact' shows which cells are open, stick or slip.
         ax : matplotlib.axes.Axes, optional
-            Where to draw; a new figure, one column wide, if left out.
+            Axes to draw into; by default a new figure that fits one column of a journal.
         arrows : bool, optional
-            Whether to draw the tractions as arrows; by default on 'contact' only.
+            Whether to draw the tractions as arrows; by default only on 'contact'.
 
         Returns
         -------
@@ -122,7 +122,7 @@ class Snapshot(NamedFields):
         Raises
         ------
         KeyError
-            If the snapshot holds no such field; the message names the nearest.
+            If the snapshot has no such field. The message suggests the nearest name.
         """
         return present("plot_field", self, name, ax, arrows)
 
@@ -132,7 +132,7 @@ class Snapshot(NamedFields):
         Returns
         -------
         xarray.Dataset
-            Dimensions (y, x) with coordinates in m; units and meanings are attributes.
+            The dimensions are (y, x), with coordinates in m. Units and meanings are attributes.
 
         Raises
         ------
@@ -142,16 +142,17 @@ class Snapshot(NamedFields):
         return present("to_xarray", self)
 
     def to_vtk(self, path: str | os.PathLike[str]) -> Path:
-        """Write the fields as VTK image data, which ParaView opens; return the path.
+        """Write the fields as VTK image data, which ParaView opens.
 
         Parameters
         ----------
-        path : str or path
+        path : str or Path
             The file, NAME.vti.
 
         Returns
         -------
         Path
+            The file.
 
         Raises
         ------
@@ -169,7 +170,7 @@ class Snapshot(NamedFields):
 
 
 class Snapshots(Sequence[Snapshot]):
-    """The stored snapshots in the order of the steps; the last is ``snapshots[-1]``."""
+    """The stored snapshots in the order of their rows; the last one is ``snapshots[-1]``."""
 
     def __init__(self, run: ResultFile, keys: list[str]) -> None:
         self._run = run
@@ -177,16 +178,16 @@ class Snapshots(Sequence[Snapshot]):
 
     @property
     def steps(self) -> tuple[int, ...]:
-        """The steps of the snapshots."""
+        """Numbers of the rows of the snapshots."""
         return tuple(int(key) for key in self._keys)
 
     def at_step(self, step: int) -> Snapshot:
-        """Return the snapshot of a step.
+        """Return the snapshot of a row.
 
         Parameters
         ----------
         step : int
-            A step that has a snapshot, one of `steps`.
+            Number of a row that has a snapshot, one of `steps`.
 
         Returns
         -------
@@ -195,7 +196,7 @@ class Snapshots(Sequence[Snapshot]):
         Raises
         ------
         KeyError
-            If there is none of that step; the message names those there are.
+            If there is none. The message lists the rows that have snapshots.
         """
         if step not in self.steps:
             raise UnknownNameError(f"no snapshot of step {step}: there are those of"

@@ -1,4 +1,4 @@
-"""The retardation spectrum of a Prony series: how it creeps under a constant stress."""
+"""The retardation spectrum of a Prony series, which describes its creep under a constant stress."""
 
 from __future__ import annotations
 
@@ -18,10 +18,24 @@ def retardation_spectrum(
 ) -> tuple[FloatArray, FloatArray, float]:
     """Return retardation times, compliances and fluidity of a Prony series.
 
-    With s J~(s) s G~(s) = 1, the retardation rates x are the roots of
-    g_inf + sum g x/(x - 1/tau) = 0, one below each relaxation rate and above the one before.
-    Each root is sought as its distance from the nearer relaxation rate, on a log scale, so that
-    nothing cancels however far apart or close together the times are.
+    From the relation s J~(s) s G~(s) = 1 of the Laplace transforms, the retardation rates x are the
+    roots of g_inf + sum g x/(x - 1/tau) = 0. There is one root below each relaxation rate and above
+    the next smaller one. The unknown of the search is the logarithm of its distance from the nearer
+    relaxation rate, which avoids cancellation for times that are far apart or close together.
+
+    Parameters
+    ----------
+    g_inf : float
+        Long-term modulus, Pa.
+    g, tau : ndarray, shape (n,)
+        Moduli, Pa, and relaxation times, s.
+
+    Returns
+    -------
+    theta, compliance : ndarray
+        Retardation times, s, descending, and their compliances, 1/Pa.
+    fluidity : float
+        Rate of steady flow, 1/(Pa s); 0 for a solid.
     """
     used = g > 0.0
     rates, inverse = np.unique(1.0 / tau[used], return_inverse=True)

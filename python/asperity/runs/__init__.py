@@ -1,1 +1,1 @@
-"""Runs: cases built, run in this process, and swept side by side."""
+"""Runs: cases as objects, runs in this process, and sweeps of many runs side by side."""

@@ -1,6 +1,6 @@
-"""Cases built in Python: the namelists of an input as an object.
+"""Cases built in Python: the input of the program as an object.
 
-Names, types, defaults and checks are those of the program: they come from the Fortran library.
+The names, types, defaults and checks come from the Fortran library.
 """
 
 from __future__ import annotations
@@ -24,45 +24,48 @@ __all__ = ["Case", "Group", "Groups", "UnknownVariableError"]
 
 
 class _Text(str):
-    """A text that is shown as it is."""
+    """A text that is displayed without quotation marks."""
 
     def __repr__(self) -> str:
         return str(self)
 
 
 class Case(CaseGroups):
-    """An input of the program, built, changed, checked, written and run from Python.
+    """An input of the program, which can be built, changed, checked, written and run from Python.
 
     The groups of the input are attributes and items: ``case.grid.nx = 128``,
     ``case["grid"]["nx"]``. ``case.surface`` and ``case.phase``, which may be repeated, are lists of
-    groups. A name or a value that the program would refuse is refused at once; `check` tells how
-    they fit together. ``str(case)`` is the text of the input.
+    groups. A name or a value that the program would refuse raises an error at once. `check` also
+    checks whether the values fit together. ``str(case)`` is the text of the input.
 
     Parameters
     ----------
     title : str, optional
-        The title, the variable of the group ``case``.
+        Title of the case.
     **groups
         Values of the groups, by name: dicts of variables, or lists of dicts for ``surface`` and
-        ``phase``. Numbers may be those of numpy, lists of numbers its arrays. A surface may be a
-        height map, too: an array of shape (ny, nx) in m, summits largest, or a topography of
-        SurfaceTopography; the grid then has its cells, and of a topography its lengths, unless
-        it is told others. Maps pass through a temporary file; `write` and `run` copy them beside
-        the input or the result.
-        The law of the friction may be a function: it takes an array of pressures, Pa, and returns
-        the largest shear tractions, Pa, in an array of the same shape. It becomes a table, for
+        ``phase``. Values may be NumPy numbers and arrays.
+
+        A surface may also be a height map: an array of shape (ny, nx) in m, in which summits are
+        maxima, or a topography of SurfaceTopography. The grid then gets its numbers of cells, and
+        the lengths of a topography, unless the grid has values of its own. The map is stored in a
+        temporary file; `write` and `run` copy it beside the input or the result.
+
+        The friction law may be a function that takes an array of pressures, Pa, and returns the
+        largest tangential tractions, Pa, in an array of the same shape. It becomes a table for
         pressures from 0 to 1e11 Pa.
 
     Attributes
     ----------
     path : Path or None
-        The file it was read from or written to. Paths within the case start from its folder;
-        without a file from the current folder.
+        The file from which the case was read or to which it was written. Relative paths in the case
+        start from its folder or, without a file, from the current folder.
 
     Raises
     ------
     ValueError
-        If there is no such group or variable, with the nearest name, or a value is not allowed.
+        If a group or a variable does not exist (the message suggests the nearest name), or if a
+        value is not allowed.
 
     Examples
     --------
@@ -99,20 +102,22 @@ class Case(CaseGroups):
 
     @classmethod
     def read(cls, source: str | os.PathLike[str]) -> Case:
-        """Return the case of an input, a file or its text.
-
-        Comments are not kept.
+        """Return the case of an input file, or of the text of an input. Comments are not kept.
 
         Parameters
         ----------
-        source : str or path
-            A path, or the namelists themselves: a text that starts with ``&`` or ``!`` or has
-            several lines.
+        source : str or Path
+            The path of a file, or the text itself, which starts with ``&`` or ``!`` or has several
+            lines.
+
+        Returns
+        -------
+        Case
 
         Raises
         ------
         ValueError
-            If names, types or ranges are wrong; all faults are named.
+            If names, types or ranges are wrong. The message lists all faults.
         OSError
             If the file cannot be read.
         """
@@ -133,12 +138,23 @@ class Case(CaseGroups):
 
     @staticmethod
     def help(name: str | None = None) -> str:
-        """Return what is known of a group or a variable: type, default, units, meaning.
+        """Return the description of a group or a variable: type, default, units, meaning.
 
         Parameters
         ----------
         name : str, optional
-            Such as ``"grid"`` or ``"phase.velocity_x"``; the names of all groups if left out.
+            Name of a group or a variable, such as ``"grid"`` or ``"phase.velocity_x"``. By default
+            all groups are listed.
+
+        Returns
+        -------
+        str
+            The description.
+
+        Raises
+        ------
+        ValueError
+            If there is no such name.
 
         Examples
         --------
@@ -156,37 +172,47 @@ class Case(CaseGroups):
         return _Text(Group(group)._variable(variable))
 
     def check(self, *, files: bool = True) -> str:
-        """Validate the whole, as ``asperity check`` does.
+        """Check the case, as ``asperity check`` does.
 
         Parameters
         ----------
         files : bool
-            Look into the height maps, too.
+            Whether to check the height maps, too.
 
         Returns
         -------
         str
-            What the command prints: every resolved setting, the time steps, the memory needed,
+            The output of the command: every resolved setting, the time steps, the memory needed,
             and warnings.
 
         Raises
         ------
         ValueError
-            With the messages of the command, one a line; the lines are those of ``str(case)``.
+            With the messages of the command, one per line. Line numbers are those of ``str(case)``.
         OSError
             If a height map cannot be read.
         """
         return _Text(namelists.check_text(str(self), self._name, files))
 
     def write(self, path: str | os.PathLike[str]) -> Path:
-        """Write the input to a file, which becomes the case's `path`.
+        """Write the input to a file, which becomes the `path` of the case.
 
-        Relative paths of height maps are changed so that they mean the same files from there.
+        Relative paths of height maps are changed so that they still lead to the same files.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file, NAME.nml.
 
         Returns
         -------
         Path
             The file.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written.
         """
         path = Path(path)
         new = self.kept_in(path.parent)
@@ -200,12 +226,16 @@ class Case(CaseGroups):
         return path
 
     def kept_in(self, folder: str | os.PathLike[str]) -> Case:
-        """Return a case whose height maps, where they are arrays, lie in a folder as files.
+        """Return a case whose arrays of heights are stored as files in a folder.
 
         Parameters
         ----------
-        folder : str or path
-            Where the maps are copied to.
+        folder : str or Path
+            Folder to which the maps are copied.
+
+        Returns
+        -------
+        Case
         """
         new = self.copy()
         for surface in new["surface"]:
@@ -214,7 +244,7 @@ class Case(CaseGroups):
         return new
 
     def _take_grid(self) -> None:
-        """Give the grid what the first height map knows and nobody has said."""
+        """Complete the grid with values of the first height map that is held in memory."""
         held = next((held for held in (map_of_file(one.file) for one in self["surface"])
                      if held is not None), None)
         if held is None:
@@ -228,7 +258,7 @@ class Case(CaseGroups):
                 self["grid"][name] = value
 
     def _follow(self, folder: Path) -> None:
-        """Change the relative paths of height maps to those seen from another folder."""
+        """Change the relative paths of height maps so that they start from another folder."""
         old = self._name.parent
         if folder.resolve() == old.resolve():
             return
@@ -238,10 +268,15 @@ class Case(CaseGroups):
                 surface.file = os.path.relpath((old / file).resolve(), folder.resolve())
 
     def run(self, **options: Any) -> Run:
-        """Run the case in this process; `asperity.run` tells the options.
+        """Run the case in this process.
 
-        The result lies where ``case.output.file`` says, by default beside the input's file with
-        the ending .h5; a case without a file counts as ``case.nml`` in the current folder.
+        The result is the file ``case.output.file``, by default the input's name with the ending
+        .h5. A case without a file counts as ``case.nml`` in the current folder.
+
+        Parameters
+        ----------
+        **options
+            Options of `asperity.run`.
 
         Returns
         -------
@@ -250,15 +285,15 @@ class Case(CaseGroups):
 
         Raises
         ------
-        ValueError, OSError, NotConverged
-            As `asperity.run`.
+        ValueError, OSError, MemoryError, NotConverged
+            As in `asperity.run`.
         """
         from .runner import run
 
         return run(self, **options)
 
     def copy(self) -> Case:
-        """Return a case of its own with the same values."""
+        """Return an independent copy of the case."""
         new = Case()
         for name, group in self._groups.items():
             new[name] = group
@@ -280,13 +315,13 @@ class Case(CaseGroups):
 
     @property
     def result(self) -> Path:
-        """The result that a run writes unless it is told another."""
+        """The file to which a run writes its result by default."""
         file = self["output"].file
         return self._name.parent / file if file else self._name.with_suffix(".h5")
 
     @property
     def _name(self) -> Path:
-        """The file's name, for messages and results."""
+        """Name of the file, for messages and results."""
         return Path("case.nml") if self.path is None else self.path
 
     def __getitem__(self, name: str) -> Any:

@@ -1,6 +1,6 @@
-"""The groups of an input as objects: their variables are items and attributes.
+"""The groups of an input as objects, whose variables are items and attributes.
 
-Names, types, defaults and checks are those of the program: they come from the Fortran library.
+The names, types, defaults and checks come from the Fortran library.
 """
 
 from __future__ import annotations
@@ -16,15 +16,21 @@ from .sampled_law import Law, sampled_law
 
 __all__ = ["Group", "Groups", "UnknownVariableError", "entry_of"]
 
-_WIDTH = 96  # columns of a written list
+_WIDTH = 96  # longest line of a written list
 
 
 class UnknownVariableError(UnknownNameError, AttributeError, ValueError):
-    """The input has no such group or variable; the message names the nearest one."""
+    """The input has no such group or variable. The message suggests the nearest name."""
 
 
 def entry_of(group: str) -> namelists.GroupEntry:
-    """Return the entry of a group in the table of the input."""
+    """Return the entry of a group in the table of the input.
+
+    Raises
+    ------
+    UnknownVariableError
+        If there is no such group.
+    """
     try:
         return namelists.table()[group]
     except (KeyError, TypeError):
@@ -33,12 +39,12 @@ def entry_of(group: str) -> namelists.GroupEntry:
 
 
 class Group(MutableMapping[str, Any]):
-    """One group of an input: its variables are items and attributes.
+    """One group of an input, whose variables are items and attributes.
 
-    A variable that is not given has its default, or None where that is derived; iteration (in the
-    order of the reference), ``in`` and ``len`` look at the given ones only. ``del`` takes a
-    variable out again, and so does None. Each value is checked when it is set: its name, its type
-    and its range.
+    A variable that is not given returns its default, or None if the default is derived from other
+    values. Iteration (in the order of the reference), ``in`` and ``len`` cover only the variables
+    that are given. ``del``, or the value None, removes a variable. When a value is set, its name,
+    type and range are checked.
 
     Parameters
     ----------
@@ -85,7 +91,7 @@ class Group(MutableMapping[str, Any]):
             self.update(values or {})
 
     def _variable(self, name: object) -> namelists.Variable:
-        """Return what is known of a variable."""
+        """Return the description of a variable."""
         variable = self._entry.variables.get(name) if isinstance(name, str) else None
         if variable is None:
             raise UnknownVariableError(f"&{self._entry.name}: " + unknown_name(
@@ -115,7 +121,7 @@ class Group(MutableMapping[str, Any]):
         self._values[name] = self._read(name, text)
 
     def _take_law(self, function: Law) -> None:
-        """Take a friction law that is a function: its table."""
+        """Set the friction law to the table of a function."""
         pressures, strengths = sampled_law(function)
         self.update(law="table", table_pressure=pressures, table_strength=strengths)
 
@@ -142,8 +148,8 @@ class Group(MutableMapping[str, Any]):
     def __len__(self) -> int:
         return len(self._values)
 
-    # Type checkers know the variables of each group by name (module group_types); they would take
-    # any other name for good if they saw these.
+    # Type checkers know the variables of each group by name (module group_types). With the methods
+    # below they would accept any other name, too.
     if not TYPE_CHECKING:
         def __getattr__(self, name):
             if name.startswith("_"):
@@ -187,7 +193,7 @@ class Group(MutableMapping[str, Any]):
 
 
 def _wrapped(head: str, text: str, is_list: bool) -> list[str]:
-    """Return an assignment as lines; a list is broken between its values."""
+    """Return an assignment as lines; a long list is broken between its values."""
     if not is_list or len(head) + len(text) <= _WIDTH:
         return [head + text]
     lines, line = [], head
@@ -200,7 +206,7 @@ def _wrapped(head: str, text: str, is_list: bool) -> list[str]:
 
 
 class Groups(MutableSequence[Group]):
-    """The groups of a kind that may be repeated: a list, counted from 0.
+    """The groups of a kind that may be repeated, as a list that is counted from 0.
 
     Examples
     --------
@@ -217,7 +223,7 @@ class Groups(MutableSequence[Group]):
         self._groups = [self._group(values) for values in groups]
 
     def _group(self, values: Mapping[str, Any]) -> Group:
-        """Return a new group with these values; a height map becomes the file that holds it."""
+        """Return a new group with these values; a height map is replaced by its temporary file."""
         if self._name == "surface" and is_map(values):
             values = {"shape": "file", "file": str(held_map(values))}
         return Group(self._name, values)
@@ -239,7 +245,7 @@ class Groups(MutableSequence[Group]):
         if isinstance(index, slice):
             self._groups[index] = [self._group(one) for one in values]
         else:
-            self[index]  # an index that is out of range has its message
+            self[index]  # raises IndexError with a message if the index is out of range
             self._groups[index] = self._group(values)
 
     def __delitem__(self, index: int | slice) -> None:
@@ -254,7 +260,7 @@ class Groups(MutableSequence[Group]):
         self._groups.insert(index, self._group(values))
 
     def append(self, values: Mapping[str, Any] | None = None, **more: Any) -> None:
-        """Append a group; its variables come as a mapping, as keywords, or both."""
+        """Append a group, whose variables are given as a mapping, as keywords, or both."""
         self.insert(len(self), {**(values or {}), **more})
 
     def __eq__(self, other: object) -> bool:

@@ -1,7 +1,7 @@
-"""Cases on their way: each a process of the program, side by side on this machine.
+"""Runs of many cases on this machine, each in a process of the program.
 
-A job is a case with the name of its files. What ends the loop, a signal too, ends the processes,
-each with a checkpoint.
+A job is a case with the names of its files. If the loop over the jobs ends early, for example by a
+signal, all processes are stopped and write a checkpoint.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ __all__ = ["Job", "Stops", "found_result", "is_done", "run_here", "text_of", "wr
 
 _map_checksum = call("map_checksum")
 
-_POLL = 0.02            # s between two looks at the processes
-_ECHO = 0.3             # s within which a signal to us and to our group is one
-_PATIENCE = 60.0        # s that a stopped process may take for its checkpoint
+_POLL = 0.02            # time between two checks of the processes, s
+_ECHO = 0.3             # two signals within this time, s, count as one (to us and to our group)
+_PATIENCE = 60.0        # time that a stopped process has for its checkpoint, s
 
 
 @dataclass
 class Job:
-    """One case on its way."""
+    """One case of a sweep or a curve, and the state of its run."""
 
     values: dict[str, Any]
     case: Case | None = None
     name: str = ""
-    path: Path = field(default_factory=Path)        # of the result
-    status: int | None = None                       # None: not run to an end
+    path: Path = field(default_factory=Path)        # the result
+    status: int | None = None                       # exit status; None: the run has not ended
     message: str = ""
     process: subprocess.Popen[bytes] | None = None
     output: IO[bytes] | None = None
@@ -49,13 +49,13 @@ class Job:
 
 
 def is_done(job: Job) -> bool:
-    """Return whether a finished result of this very input and version is there."""
+    """Return whether there is a complete result of the same input and version."""
     run = found_result(job)
     return run is not None and run.finished and run.version == version()
 
 
 def found_result(job: Job) -> Run | None:
-    """Return a result of this very input, None where there is none."""
+    """Return the result if its input and height maps are those of the job, otherwise None."""
     if not job.path.exists():
         return None
     try:
@@ -66,7 +66,7 @@ def found_result(job: Job) -> Run | None:
 
 
 def _has_the_same_maps(run: Run, job: Job) -> bool:
-    """Return whether the height maps that are files hold what the result was computed with."""
+    """Return whether the files of height maps are still those of the result (by checksums)."""
     assert job.case is not None
     case = job.case.copy()
     case._follow(job.path.parent)
@@ -85,7 +85,7 @@ def _has_the_same_maps(run: Run, job: Job) -> bool:
 
 
 def text_of(job: Job) -> str:
-    """Return the input of a case as it is written beside its result."""
+    """Return the text of the input that is written beside the result."""
     assert job.case is not None
     case = job.case.copy()
     case.output.file = None
@@ -94,7 +94,7 @@ def text_of(job: Job) -> str:
 
 
 def write_input(job: Job) -> Path:
-    """Write the input of a job beside its result; return its path."""
+    """Write the input of a job beside its result, and return its path."""
     path = job.path.with_suffix(".nml")
     path.write_bytes(namelists.encode(text_of(job)))
     return path
@@ -102,20 +102,20 @@ def write_input(job: Job) -> Path:
 
 def run_here(waiting: list[Job], command: str, side_by_side: int, threads: int, resume: bool,
              progress: Progress) -> None:
-    """Run jobs, some at a time; whatever ends this ends them.
+    """Run jobs, several at a time. If this function ends early, it stops the running processes.
 
     Parameters
     ----------
     waiting : list of Job
-        What is to be run, in this order; their status and message are set.
+        The jobs, in this order. Their status and message are set.
     command : str
-        The program.
+        Path of the program.
     side_by_side, threads : int
-        Processes at a time, and the threads of each.
+        Number of processes at a time, and number of threads of each.
     resume : bool
-        Whether to go on from a checkpoint that is there.
+        Whether to continue from checkpoints.
     progress : Progress
-        What tells how far it is.
+        The display of the progress.
     """
     queue = list(reversed(waiting))
     running: list[Job] = []
@@ -144,12 +144,13 @@ def run_here(waiting: list[Job], command: str, side_by_side: int, threads: int, 
 
 
 class Stops:
-    """SIGINT and SIGTERM as a number to look at, so that none of them cuts a call in two.
+    """Collects SIGINT and SIGTERM, so that they cannot interrupt a call halfway.
 
-    An exception out of a handler may come between any two instructions: within the start of a
-    process, which then goes on unknown to us, or while subprocess holds its lock, which then stays
-    held. So the signals are counted here; at the end they are what they were before: SIGINT
-    KeyboardInterrupt, or what another handler makes of it, SIGTERM the end with status 143.
+    A signal handler that raises an exception may do so between any two instructions. If this
+    happens while a process is being started, the process continues without our knowledge; if it
+    happens while subprocess holds its lock, the lock is never released. Here the signals are only
+    recorded. At the end they have their usual effect: SIGINT raises KeyboardInterrupt or calls the
+    handler that was set before, and SIGTERM ends the process with status 143.
     """
 
     def __init__(self) -> None:
@@ -160,7 +161,8 @@ class Stops:
     def __enter__(self) -> Stops:
         if threading.current_thread() is threading.main_thread():
             for number in (signal.SIGINT, signal.SIGTERM):
-                # Who started us with a signal ignored, as a shell does in the background, keeps it.
+                # A signal that was ignored when we started, as in the background of a shell, stays
+                # ignored.
                 if signal.getsignal(number) != signal.SIG_IGN:
                     self._before[number] = signal.signal(number, self._note)
         return self
@@ -173,7 +175,7 @@ class Stops:
 
     def __exit__(self, *error: object) -> None:
         for number, handler in self._before.items():
-            # None: not set by Python, and not to be set by it.
+            # None means that the handler was not set by Python, which therefore cannot restore it.
             signal.signal(number, signal.SIG_DFL if handler is None else handler)
         if not self.asked:
             return
@@ -183,12 +185,12 @@ class Stops:
 
 
 def _start(job: Job, command: str, threads: int, restart: bool) -> None:
-    """Write the input and start the program, in a session of its own: Ctrl-C is passed on by us."""
+    """Write the input and start the program in a new session, so that only we pass on Ctrl-C."""
     path = write_input(job)
     job.restarted = restart
     job.started = time.monotonic()
     job.process = None
-    job.output = tempfile.TemporaryFile()  # noqa: SIM115 - closed where the process ends
+    job.output = tempfile.TemporaryFile()  # noqa: SIM115 - closed after the process has ended
     words = [command, "run", path.name, "--output", job.path.name, "--threads", str(threads),
              "--quiet", "--restart" if restart else "--overwrite"]
     job.process = subprocess.Popen(words, cwd=path.parent, stdin=subprocess.DEVNULL,
@@ -197,25 +199,25 @@ def _start(job: Job, command: str, threads: int, restart: bool) -> None:
 
 
 def _finish(job: Job) -> bool:
-    """Take what an ended process leaves; return whether it has to be run anew."""
+    """Record status and messages of a process that has ended; return whether to run it again."""
     assert job.process is not None and job.output is not None
     job.output.seek(0)
-    told = job.output.read().decode(errors="replace").strip()
+    printed = job.output.read().decode(errors="replace").strip()
     job.output.close()
     status = job.process.returncode
     if job.restarted and status in (2, 3):
-        return True  # no checkpoint that fits
+        return True  # there is no suitable checkpoint: start from the beginning
     job.status = status
     if status:
-        reason = told or f"the program ended with status {status}"
+        reason = printed or f"the program ended with status {status}"
         job.message = f"killed by signal {-status}" if status < 0 else reason
-    elif told:
-        job.message = told
+    elif printed:
+        job.message = printed
     return False
 
 
 def _stop(running: list[Job], stops: Stops) -> None:
-    """Let processes finish the step in hand and write a checkpoint; at a second Ctrl-C, kill."""
+    """Stop processes after the current step, with a checkpoint; a second Ctrl-C kills them."""
     processes = [job.process for job in running if job.process is not None]
     for process in processes:
         process.send_signal(signal.SIGINT)

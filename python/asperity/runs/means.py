@@ -1,4 +1,4 @@
-"""Where jobs are run: on this machine, by an executor, or by Slurm."""
+"""The ways to run jobs: on this machine, by an executor, or by Slurm."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from .progress import Progress
 
 __all__ = ["Means", "run_file", "run_jobs", "share_of_processors", "submit"]
 
-_POLL = 0.2             # s between two looks at an executor
-_QUEUE = "slurm.json"   # what was submitted from a folder
+_POLL = 0.2             # time between two checks of an executor, s
+_QUEUE = "slurm.json"   # record of the job that was submitted from a folder
 
 
 class Means(NamedTuple):
-    """How jobs are run.
+    """The way in which jobs are run.
 
     Attributes
     ----------
     side_by_side, threads : int
-        Processes at a time on this machine, and the threads of each.
+        Number of processes at a time on this machine, and number of threads of each.
     resume : bool
-        Whether to go on from checkpoints.
+        Whether to continue from checkpoints.
     executor : concurrent.futures.Executor or None
-        What runs the jobs instead.
+        Executor that runs the jobs instead.
     slurm : str or None
-        Options of ``sbatch``, which is to run them instead.
+        Options of ``sbatch``, if Slurm runs the jobs instead.
     """
 
     side_by_side: int
@@ -47,19 +47,24 @@ class Means(NamedTuple):
 
 
 def share_of_processors(jobs: int | None, threads: int) -> tuple[int, int]:
-    """Return how many runs go side by side, and the threads of each.
+    """Return the number of runs at a time and the number of threads of each.
 
     Parameters
     ----------
     jobs : int or None
-        Runs that are wanted; None: as many as the processors allow.
+        Largest number of runs at a time; None means as many as the processors allow.
     threads : int
-        Threads of each run.
+        Number of threads of each run.
+
+    Returns
+    -------
+    (int, int)
+        Runs at a time, and threads of each.
 
     Raises
     ------
     ValueError
-        If a number is wrong, or there are not so many processors.
+        If a number is not positive, or there are fewer processors than `threads`.
     """
     cores = (len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity")
              else os.cpu_count() or 1)
@@ -72,18 +77,18 @@ def share_of_processors(jobs: int | None, threads: int) -> tuple[int, int]:
 
 
 def run_jobs(waiting: list[Job], folder: Path, progress: Progress, means: Means) -> None:
-    """Run jobs by the means that were chosen; their status and message are set.
+    """Run jobs in the chosen way.
 
     Parameters
     ----------
     waiting : list of Job
-        What is to be run.
+        The jobs. Their status and message are set.
     folder : Path
-        Where their files lie.
+        Folder of their files.
     progress : Progress
-        What tells how far it is.
+        The display of the progress.
     means : Means
-        How they are run.
+        The way in which they are run.
     """
     if not waiting:
         progress.end()
@@ -101,21 +106,22 @@ def run_jobs(waiting: list[Job], folder: Path, progress: Progress, means: Means)
 
 
 def run_file(path: str, threads: int, restart: bool) -> tuple[int, str]:
-    """Run an input that is written; this is what a worker of an executor calls.
+    """Run an input file. The workers of an executor call this function.
 
     Parameters
     ----------
     path : str
         The input, NAME.nml; the result is NAME.h5 beside it.
     threads : int
-        Threads of the run.
+        Number of threads.
     restart : bool
-        Whether to go on from a checkpoint; without a fitting one the case is run anew.
+        Whether to continue from a checkpoint. If there is no suitable one, the case is run from its
+        beginning.
 
     Returns
     -------
     (int, str)
-        Exit status of the program, and what it printed on stderr.
+        Exit status of the program, and its output on stderr.
     """
     file = Path(path)
     result = file.with_suffix(".h5")
@@ -130,7 +136,7 @@ def run_file(path: str, threads: int, restart: bool) -> tuple[int, str]:
 
 
 def _run_by_executor(waiting: list[Job], means: Means, progress: Progress) -> None:
-    """Hand each job to the executor and wait for all."""
+    """Submit each job to the executor, and wait for all of them."""
     assert means.executor is not None
     asked: dict[Future[tuple[int, str]], Job] = {}
     for job in waiting:
@@ -156,7 +162,7 @@ def _run_by_executor(waiting: list[Job], means: Means, progress: Progress) -> No
 
 
 def _take(job: Job, future: Future[tuple[int, str]]) -> None:
-    """Take what a worker returns, or the exception that ended it."""
+    """Record what a worker returned, or the exception that ended it."""
     error = future.exception()
     if error is not None:
         job.status, job.message = 1, f"the worker failed: {type(error).__name__}: {error}"
@@ -169,13 +175,13 @@ def _take(job: Job, future: Future[tuple[int, str]]) -> None:
 # ---- Slurm -----------------------------------------------------------------------------------
 
 _SCRIPT = """#!/bin/sh
-# One case of the list in {names}: the number of the task is its line, from 0.
+# This task runs one case of the list in {names}: the number of the task is its line, from 0.
 cd {folder} || exit 1
 name=$(sed -n "$((SLURM_ARRAY_TASK_ID + 1))p" {names})
 if [ -f "$name.h5" ]; then
   {program} run "$name.nml" --output "$name.h5" --threads {threads} --quiet --restart
   status=$?
-  # 2 and 3: there is no checkpoint that fits; the case is run from its start.
+  # With status 2 or 3 there is no suitable checkpoint, and the case is run from its beginning.
   [ $status = 2 ] || [ $status = 3 ] || exit $status
 fi
 {program} run "$name.nml" --output "$name.h5" --threads {threads} --quiet --overwrite
@@ -183,23 +189,28 @@ fi
 
 
 def submit(waiting: list[Job], folder: Path, options: str, threads: int) -> str:
-    """Submit jobs as one array to Slurm, unless earlier ones are in the queue; say what was done.
+    """Submit jobs to Slurm as one job array, unless earlier ones are still in the queue.
 
     Parameters
     ----------
     waiting : list of Job
-        What is to be run.
+        The jobs.
     folder : Path
-        Where their files lie; the nodes must see it.
+        Folder of their files, which the nodes must see.
     options : str
         Further options of ``sbatch``.
     threads : int
-        Threads of each run.
+        Number of threads of each run.
+
+    Returns
+    -------
+    str
+        A sentence about what was done.
 
     Raises
     ------
     OSError
-        If ``sbatch`` is not there or refuses.
+        If ``sbatch`` is not found or fails.
     """
     known = _queued(folder)
     if known is not None:

@@ -1,4 +1,4 @@
-"""The input as the Fortran library knows it: its table, the reading of namelists, the checks."""
+"""Access to the input language of the Fortran library: its table, reading of namelists, checks."""
 
 from __future__ import annotations
 
@@ -30,8 +30,9 @@ _check = library.call("input_check")
 class Variable:
     """A variable of the input: type, default, units, allowed values and meaning.
 
-    A default in parentheses is none or derived. The kind is 'integer', 'real', 'logical', 'text',
-    'word' (one of several strings), or a list, 'reals' or 'words'.
+    If the default is in parentheses, there is none, or it is derived from other values. The kind is
+    'integer', 'real', 'logical', 'text', 'word' (one of several strings), or a list: 'reals' or
+    'words'.
     """
 
     group: str
@@ -44,12 +45,12 @@ class Variable:
 
     @property
     def is_list(self) -> bool:
-        """Whether it takes several values."""
+        """Whether the variable takes several values."""
         return self.kind in ("reals", "words")
 
     @property
     def is_required(self) -> bool:
-        """Whether it must be given where it applies."""
+        """Whether the variable must be given if it applies."""
         return self.default.startswith("(required")
 
     def __str__(self) -> str:
@@ -81,12 +82,12 @@ def encode(text: str) -> bytes:
 
 
 def decode(data: bytes) -> str:
-    """Return the text of bytes; bytes that are no UTF-8 are kept."""
+    """Return the text of bytes; bytes that are not UTF-8 are kept as surrogates."""
     return data.decode("utf-8", "surrogateescape")
 
 
 def is_text(source: object) -> bool:
-    """Return whether this is a text of namelists; else it is a path.
+    """Return whether a string is the text of an input, and not a path.
 
     Examples
     --------
@@ -97,9 +98,9 @@ def is_text(source: object) -> bool:
 
 
 def source(case: Any) -> tuple[str, str]:
-    """Return the name of a case's file and its text, which is empty if the file holds it.
+    """Return the name of a case's file, and its text, which is empty if it must be read from there.
 
-    A case is a path, a text of namelists, or an object with a ``path`` whose text is ``str(case)``.
+    A case is a path, the text of an input, or an object with a ``path`` and the text ``str(case)``.
     """
     if is_text(case):
         return "case.nml", str(case)
@@ -124,21 +125,26 @@ def table() -> dict[str, GroupEntry]:
 
 
 def listed(text: str, path: str | os.PathLike[str] = "") -> list[tuple[str, dict[str, Any]]]:
-    """Return what a text of namelists gives: names of groups with their values, in its order.
+    """Return the groups of an input in their order, with the values that it gives.
 
-    Names, types and ranges are checked, not how the values fit together.
+    Names, types and ranges are checked, but not whether the values fit together.
 
     Parameters
     ----------
     text : str
-        The namelists.
-    path : str or path
+        The text of the input.
+    path : str or Path
         Name of the file, for messages.
+
+    Returns
+    -------
+    list of (str, dict)
+        Name and values of each group.
 
     Raises
     ------
     ValueError
-        If the text is wrong; all faults are named.
+        If the text is wrong. The message lists all faults.
     """
     found: list[tuple[str, dict[str, Any]]] = []
     listing = _text_of(functools.partial(_listed, encode(text), os.fsencode(path)), len(text))
@@ -155,15 +161,34 @@ def listed(text: str, path: str | os.PathLike[str] = "") -> list[tuple[str, dict
 
 
 def check_text(text: str, path: str | os.PathLike[str], files: bool) -> str:
-    """Return what `asperity check` prints about a text; raise what it reports.
+    """Return the output of `asperity check` for a text.
 
-    Without `files` the height maps are not looked into.
+    Parameters
+    ----------
+    text : str
+        The text of the input.
+    path : str or Path
+        Name of the file, for messages and relative paths.
+    files : bool
+        Whether to check the height maps, too.
+
+    Returns
+    -------
+    str
+        The output of the command.
+
+    Raises
+    ------
+    ValueError
+        If the input is wrong. The message lists all faults.
+    OSError
+        If a height map cannot be read.
     """
     return _text_of(functools.partial(_check, encode(text), os.fsencode(path), int(files)))
 
 
 def _value(kind: str, item: str) -> Any:
-    """Return a listed value as one of Python."""
+    """Return a value of the library's listing as a Python value."""
     if kind == "integer":
         return int(item)
     if kind in ("real", "reals"):
@@ -172,7 +197,7 @@ def _value(kind: str, item: str) -> Any:
 
 
 def _text_of(routine: Any, size: int = 0) -> str:
-    """Return the text that a routine writes into a buffer, made larger if need be."""
+    """Return the text that a routine writes into a buffer, which is enlarged if necessary."""
     most = max(30000, 30 * size)
     while True:
         buffer = np.empty(most, np.intc)
@@ -183,7 +208,7 @@ def _text_of(routine: Any, size: int = 0) -> str:
 
 
 def fault_of(error: ValueError) -> str:
-    """Return the message of a fault in a text that is no file: without path and line.
+    """Return the message of a fault without path and line number, which a text in memory lacks.
 
     Examples
     --------
@@ -195,9 +220,14 @@ def fault_of(error: ValueError) -> str:
 
 
 def format_value(value: object) -> str:
-    """Return a value, or an array of them, as a namelist holds it.
+    """Return a value, or an array of values, in the syntax of namelists.
 
-    Reals have the digits that give the same bits again; quotes in strings are doubled.
+    Reals have as many digits as needed to read back the same bits. Quotes in strings are doubled.
+
+    Raises
+    ------
+    ValueError
+        If the value has no such form.
 
     Examples
     --------

@@ -21,13 +21,18 @@ __all__ = ["program"]
 def program() -> str:
     """Return the path of the program of this package's version.
 
-    It lies beside the compiled library of an editable installation, or among the scripts of the
-    environment; the environment variable ``ASPERITY_PROGRAM`` names another one.
+    It is beside the compiled library of an editable installation, or among the scripts of the
+    environment. The environment variable ``ASPERITY_PROGRAM`` selects another one.
+
+    Returns
+    -------
+    str
+        Absolute path.
 
     Raises
     ------
     OSError
-        If there is none.
+        If it is not found.
     """
     named = os.environ.get("ASPERITY_PROGRAM")
     if named:
@@ -40,10 +45,10 @@ def program() -> str:
     for candidate in found:
         if candidate is None or not Path(candidate).is_file():
             continue
-        told = subprocess.run([candidate, "--version"], capture_output=True, text=True, check=False)
-        if told.stdout.split()[1:2] == [own]:
+        done = subprocess.run([candidate, "--version"], capture_output=True, text=True, check=False)
+        if done.stdout.split()[1:2] == [own]:
             return str(Path(candidate).absolute())
-        tried.append(f"{candidate} is {''.join(told.stdout.splitlines()[:1]) or 'no such program'}")
+        tried.append(f"{candidate} is {''.join(done.stdout.splitlines()[:1]) or 'no such program'}")
     raise FileNotFoundError(
         f"the program asperity {own} is not found{': ' if tried else ''}{', '.join(tried)}:"
         " install the package with its program, `python -m pip install .`, or name it in the"

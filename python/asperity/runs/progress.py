@@ -1,4 +1,4 @@
-"""What many runs tell on stderr while they go on."""
+"""The display of the progress of many runs on stderr."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["Progress"]
 
 
 class Progress:
-    """What is told on stderr: a line that is rewritten in a terminal, else one line a case."""
+    """The progress of many cases: one line that is rewritten in a terminal, else one per case."""
 
     def __init__(self, what: str, total: int, waiting: int, quiet: bool,
                  stream: TextIO | None = None) -> None:
@@ -28,7 +28,7 @@ class Progress:
             self._line(f"{self._what}: {self._kept} of {total} results are there already")
 
     def _line(self, text: str) -> None:
-        """Write a line of its own."""
+        """Write a line that stays."""
         if self._width:
             self._stream.write("\r" + " " * self._width + "\r")
             self._width = 0
@@ -45,12 +45,12 @@ class Progress:
         self._width = len(text)
 
     def _state(self) -> str:
-        """Return how far it is."""
+        """Return how many cases are done."""
         failed = f", {self._failed} failed" if self._failed else ""
         return f"{self._kept + self._done} of {self._total} done{failed}"
 
     def _left(self) -> str:
-        """Return the time left, by the mean of the cases that are done."""
+        """Return the time left, estimated from the mean time of the cases that are done."""
         left = self._waiting - self._done
         if not self._done or not left:
             return ""
@@ -69,7 +69,7 @@ class Progress:
         self.show(running)
 
     def end(self) -> None:
-        """Leave the line of a terminal."""
+        """End the line in a terminal."""
         if self._width:
             self._stream.write("\n")
             self._stream.flush()

@@ -1,4 +1,4 @@
-"""One row of the history as an object, with the columns that the library knows."""
+"""One row of the history as an object, with the columns of the Fortran library."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _columns = library.bare("row_columns")
 
 
 class Column(NamedTuple):
-    """What a column of the history holds."""
+    """Description of a column of the history."""
 
     name: str
     units: str
@@ -39,7 +39,7 @@ def columns() -> tuple[Column, ...]:
 
 
 class Row(NamedValues, RowColumns):
-    """A row of the history: its columns are items and attributes, in SI units.
+    """A row of the history, whose columns are items and attributes, in SI units.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""How a run in this process shows its progress: a bar in a notebook, else a line now and then."""
+"""The display of the progress of a run: a bar in a notebook, elsewhere a line every two seconds."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any, TextIO
 
 __all__ = ["Progress"]
 
-_EVERY = 2.0           # seconds between two lines
-_EVERY_IN_NOTEBOOK = 0.2
+_EVERY = 2.0           # time between two lines, s
+_EVERY_IN_NOTEBOOK = 0.2   # time between two updates of the bar, s
 
 
 def _notebook_display() -> Any:
@@ -31,7 +31,7 @@ class Progress:
     rows : int
         Number of rows of the whole run.
     stream : text file, optional
-        Where lines go; stderr if left out.
+        Stream to which the lines are written; stderr by default.
     """
 
     def __init__(self, rows: int, stream: TextIO | None = None) -> None:
@@ -43,7 +43,7 @@ class Progress:
         self._first_step: int | None = None
 
     def show(self, step: int, time: float, contact_area: float, friction: float) -> None:
-        """Show a row, if it is the first or the last one, or the last shown is some time ago."""
+        """Show a row if it is the first or the last one, or if enough time has passed."""
         now = clock.monotonic()
         every = _EVERY if self._display is None else _EVERY_IN_NOTEBOOK
         is_first = self._first_step is None
@@ -70,7 +70,7 @@ class Progress:
 
 
 class _Bar:
-    """A bar with its text, as a notebook shows it."""
+    """A bar with its text, for a notebook."""
 
     def __init__(self, done: int, rows: int, text: str) -> None:
         self._done, self._rows, self._text = done, rows, text

@@ -1,11 +1,10 @@
-"""Runs in process: the loop over the steps is Python's, so that Ctrl-C stops between two steps."""
+"""Runs in this process. The loop over the steps is in Python, so that Ctrl-C can end it."""
 
 from __future__ import annotations
 
 import os
 import signal
 import threading
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
@@ -20,7 +19,7 @@ from ..results import Run
 from . import namelists
 from .row import Row
 from .run_progress import Progress
-from .simulation import RunView
+from .simulation import RunView, warn_of
 
 __all__ = ["run"]
 
@@ -31,13 +30,13 @@ _close = library.call("run_close")
 
 
 class _CaseLike(Protocol):
-    """What is needed of an `asperity.Case`: its text is ``str(case)``."""
+    """The part of `asperity.Case` that is needed here; its text is ``str(case)``."""
 
     path: Path | None
     result: Path
 
     def kept_in(self, folder: Path) -> _CaseLike:
-        """Return the case with its height maps kept in files of a folder."""
+        """Return the case with its height maps in files of a folder."""
         ...
 
 
@@ -53,34 +52,33 @@ def run(
 ) -> Run:
     """Run a case in this process, as the command ``asperity run`` does, and open its result.
 
-    Ctrl-C finishes the step in hand, writes a checkpoint and raises KeyboardInterrupt;
-    ``restart=True`` goes on from there to the same numbers. A step with friction that takes much
-    longer than two seconds is given up instead. SIGTERM, SIGHUP and SIGXCPU do the same
-    in the main thread, unless the script handles them itself, and then end the process as they
-    would have without the run.
+    Ctrl-C finishes the current step, writes a checkpoint and raises KeyboardInterrupt;
+    ``restart=True`` continues from there with the same numbers. A step that takes much longer than
+    two seconds is given up instead. SIGTERM, SIGHUP and SIGXCPU do the same in the main thread,
+    unless the script handles them itself, and then have their usual effect on the process.
 
     Parameters
     ----------
-    case : str, path or Case
-        The input, CASE.nml; or its text, or an `asperity.Case`.
-    output : str or path, optional
-        The result; what the case says if left out, which is the input's name with .h5 unless
-        ``output.file`` names another. A case without a file counts as ``case.nml`` in the
+    case : str, Path or Case
+        The input file, CASE.nml, the text of an input, or an `asperity.Case`.
+    output : str or Path, optional
+        The file of the result. The default is ``output.file`` of the case or, if that is not set,
+        the input's name with the ending .h5. A case without a file counts as ``case.nml`` in the
         current folder.
     threads : int, optional
-        Number of threads; what the case says if left out.
+        Number of threads; by default that of the case.
     restart : bool
-        Go on from the checkpoint of an interrupted run.
+        Continue from the checkpoint of an interrupted run.
     overwrite : bool
-        Replace an unfinished run and its checkpoint, which is refused otherwise.
+        Replace an unfinished result and its checkpoint. Otherwise this is refused.
     quiet : bool
-        Do not show the progress: a bar in a notebook, elsewhere a line on stderr every two
-        seconds.
+        Do not show the progress. With False there is a bar in a notebook, and elsewhere a line on
+        stderr every two seconds.
     callback : callable, optional
-        Called after each row as ``callback(row, sim)``, with the row (its columns are attributes)
-        and a view of the run with ``row``, ``rows`` and ``fields``. Where it returns False, the run
-        ends cleanly with a checkpoint, from which ``restart=True`` goes on. To change the load
-        between rows use `asperity.Simulation`.
+        Function ``callback(row, sim)`` that is called after each row. The columns of `row` are
+        attributes, and `sim` is a view of the run with ``row``, ``rows`` and ``fields``. If the
+        function returns False, the run ends with a checkpoint, from which ``restart=True``
+        continues. To change the load between rows use `asperity.Simulation`.
 
     Returns
     -------
@@ -90,14 +88,17 @@ def run(
     Raises
     ------
     ValueError
-        If the input is wrong; all faults are named.
+        If the input is wrong. The message lists all faults.
     OSError
         If a file cannot be read or written, if another run is writing the result, or if the result
-        holds an unfinished run and neither `restart` nor `overwrite` is given.
+        is unfinished and neither `restart` nor `overwrite` is given.
     MemoryError
-        If the case needs more memory than there is.
+        If the case needs more memory than is available.
     NotConverged
-        If a solver fails; its ``result`` is the opened result, with all steps up to that one.
+        If a solver does not converge. Its ``result`` is the opened result with all rows up to that
+        step.
+    KeyboardInterrupt
+        If Ctrl-C stops the run.
 
     Examples
     --------
@@ -113,22 +114,22 @@ def run(
     if output is not None and not 0 < len(target) <= 1024:
         raise ValueError(f"output: has {len(target)} characters: must have 1 to 1024")
     if not isinstance(case, str | os.PathLike):
-        # A result outlives this process: height maps that are arrays are kept beside it.
+        # A result outlives this process, so height maps that are arrays are copied beside it.
         case = case.kept_in((Path(output) if output else case.result).parent)
     path, text = namelists.source(case)
-    handle, rows, first, result, told = _open(os.fsencode(path), namelists.encode(text), target,
-                                              threads or 0, int(restart), int(overwrite))
+    handle, rows, first, result, notes = _open(os.fsencode(path), namelists.encode(text), target,
+                                               threads or 0, int(restart), int(overwrite))
     failure: NotConverged | None = None
     view: RunView | None = None
     stops = _Stops()
     progress = None if quiet else Progress(rows)
     try:
-        _warn(told)
+        warn_of(notes)
         finished = first >= rows
         while not finished and not stops.asked:
-            finished, step, time, area, friction, told = _step(handle, stops.numbers)
-            _warn(told)
-            if step < 0:  # given up
+            finished, step, time, area, friction, notes = _step(handle, stops.numbers)
+            warn_of(notes)
+            if step < 0:  # the step was given up
                 break
             if callback is not None:
                 view = view or RunView(handle, rows, _shape(result))
@@ -159,11 +160,11 @@ def _shape(result: bytes) -> tuple[int, int]:
 
 
 class _Stops:
-    """Signals that ask to stop, as a number to look at between two steps.
+    """Records signals that ask a run to stop, to be checked between two steps.
 
-    Only those whose action is still that of the system are taken: a script that handles them itself
-    keeps its handlers. `end` puts the system's action back and lets a signal that came take it.
-    `numbers` are the signals, with that of Ctrl-C, that a step in hand may be given up for.
+    Signals that the script handles itself are left alone. `end` restores the action of the system,
+    and raises a signal that has arrived again. `numbers` are the signals, including that of Ctrl-C,
+    for which a step may be given up.
     """
 
     def __init__(self) -> None:
@@ -188,9 +189,3 @@ class _Stops:
             signal.signal(number, signal.SIG_DFL)
         if self.asked:
             signal.raise_signal(self.asked)
-
-
-def _warn(told: bytes) -> None:
-    """Raise the warnings of the library as those of Python."""
-    for line in told.decode(errors="replace").strip().splitlines():
-        warnings.warn(line, UserWarning, stacklevel=3)

@@ -1,8 +1,8 @@
-"""A friction law that is given as a Python function, as the table that the program reads.
+"""Conversion of a friction law that is a Python function into a table for the program.
 
-The solvers ask for the bound of the traction in parallel loops, where Python could not be called.
-So the function is called here, once, and the points of ``law = 'table'`` take its place: the input,
-checkpoints, sweeps and runs in several processes then hold the law like any other.
+The solvers need the bound of the traction in parallel loops, in which Python cannot be called. The
+function is therefore sampled here, and the points of ``law = 'table'`` replace it. The law is then
+part of the input, of checkpoints, of sweeps and of runs in several processes like any other law.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["sampled_law"]
 
-LOWEST, HIGHEST = 1e-3, 1e11  # Pa; straight lines below and above
-PER_DECADE = 8                # points that are looked at, at least
-ERROR = 5e-5                  # of the straight lines, relative
-NARROWEST = 1e-4              # relative width of an interval that is not divided further: a jump
-MOST = 4000                   # points
+LOWEST, HIGHEST = 1e-3, 1e11  # range of pressures, Pa, in which the lines follow the function
+PER_DECADE = 8                # smallest number of samples per decade
+ERROR = 5e-5                  # relative error of the straight lines
+NARROWEST = 1e-4              # relative width of intervals that are not divided further (jumps)
+MOST = 4000                   # largest number of points
 
 Law = Callable[[NDArray[np.float64]], ArrayLike]
 
 
 def sampled_law(function: Law) -> tuple[list[float], list[float]]:
-    """Return pressures and bounds between which straight lines follow a function.
+    """Return the points of a table whose straight lines follow a function.
 
     Parameters
     ----------
@@ -36,12 +36,13 @@ def sampled_law(function: Law) -> tuple[list[float], list[float]]:
     -------
     pressures, strengths : list of float
         Points, Pa. Between 1e-3 Pa and 1e11 Pa the lines differ from the function by less than
-        1e-4 of its value, a function of straight lines by round-off; jumps become steep ramps.
+        1e-4 of its value. A function of straight lines is exact to round-off, and jumps become
+        steep ramps.
 
     Raises
     ------
     ValueError
-        If the function returns something else, or changes too often.
+        If the function returns anything else, or changes too often.
 
     Examples
     --------
@@ -79,7 +80,7 @@ def _rounded(pressures: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _called(function: Law, pressures: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the bounds at some pressures, after a look at them."""
+    """Return the bounds at some pressures, and check them."""
     found = function(pressures.copy())
     try:
         bounds = np.array(found, dtype=np.float64)
@@ -99,7 +100,7 @@ def _called(function: Law, pressures: NDArray[np.float64]) -> NDArray[np.float64
 
 def _thinned(points: NDArray[np.float64], bounds: NDArray[np.float64]
              ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the points without those that lie on the line between their neighbours."""
+    """Return the points without those that are on the line between their neighbours."""
     first = 1
     while True:
         inner = np.arange(first, points.size - 1, 2)  # no two neighbours at once

@@ -1,4 +1,4 @@
-"""Simulations that Python drives: one row after another, steered between them, without files."""
+"""Simulations that Python drives row by row, with changes of the load in between, without files."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _close = library.call("simulation_close")
 _row = library.call("run_row")
 _field = library.call("run_field")
 
-#: The fields of a simulation: those of a snapshot; `height` is short for `road_height`.
+#: The fields of a simulation are those of a snapshot, and `height`, which is `road_height`.
 FIELDS = ("pressure", "gap", "displacement_z", "traction_x", "traction_y", "displacement_x",
           "displacement_y", "slip_x", "slip_y", "contact", "road_height", "height")
 
@@ -41,13 +41,13 @@ _LOADS = ("pressure", "force", "displacement")
 
 
 class _CaseLike(Protocol):
-    """What is needed of an `asperity.Case`: its text is ``str(case)``."""
+    """The part of `asperity.Case` that is needed here; its text is ``str(case)``."""
 
     path: Path | None
 
 
 class _Fields(NamedFields, Mapping[str, NDArray[Any]]):
-    """The fields as they are now: arrays of shape (ny, nx) of their own."""
+    """The present fields. Each access returns a new array of shape (ny, nx)."""
 
     def __init__(self, handle: int, shape: tuple[int, int]) -> None:
         self._handle, self._shape = handle, shape
@@ -71,15 +71,15 @@ class _Fields(NamedFields, Mapping[str, NDArray[Any]]):
 
 
 class RunView:
-    """What a callback of `asperity.run` sees of the run: its last row and its fields.
+    """The view of a run that a callback of `asperity.run` receives: the last row and the fields.
 
     Attributes
     ----------
     row : Row
         The last row, with the columns of the history as attributes and items.
     fields : Mapping
-        The fields as they are now, by the names of a snapshot (``height`` is short for
-        ``road_height``): arrays of shape (ny, nx).
+        The present fields by their names in a snapshot (``height`` is the same as ``road_height``),
+        arrays of shape (ny, nx).
     rows : int
         Number of rows of the whole run.
     """
@@ -105,39 +105,41 @@ class RunView:
 
 
 class Simulation:
-    """A run that Python drives row by row and may steer; it writes no files.
+    """A run that Python advances row by row, with changes of load and velocity in between.
 
-    A simulation that nobody steers gives the numbers of ``asperity run`` to the last bit. A height
-    map that the case holds as an array passes through a temporary file.
+    It writes no result. If nothing is changed, the numbers are those of ``asperity run`` to the
+    last bit. A height map that is given as an array is stored in a temporary file.
 
     Parameters
     ----------
-    case : str, path or Case
-        The input, CASE.nml; or its text, or an `asperity.Case`.
+    case : str, Path or Case
+        The input file, CASE.nml, the text of an input, or an `asperity.Case`.
     threads : int, optional
-        Number of threads; what the case says if left out.
+        Number of threads; by default that of the case.
 
     Attributes
     ----------
     finished : bool
-        No row is left.
+        Whether all rows have been computed.
     row : Row or None
-        The last row, with the columns of the history as attributes and items; None before the
-        first one.
+        The last row, with the columns of the history as attributes and items; None before the first
+        row.
     fields : Mapping
-        The fields as they are now, by the names of a snapshot (``height`` is short for
-        ``road_height``): arrays of shape (ny, nx).
+        The present fields by their names in a snapshot (``height`` is the same as ``road_height``),
+        arrays of shape (ny, nx).
     rows : int
-        Number of rows that the case has if nobody steers.
+        Number of rows of the case if nothing is changed.
     shape : tuple of int
         Shape of the fields, (ny, nx).
 
     Raises
     ------
     ValueError
-        If the input is wrong; all faults are named.
+        If the input is wrong. The message lists all faults.
     OSError
         If a height map cannot be read.
+    MemoryError
+        If there is not enough memory.
 
     Examples
     --------
@@ -166,8 +168,8 @@ class Simulation:
         if threads is not None:
             threads = whole("threads", threads)
         path, text = namelists.source(case)
-        handle, rows, nx, ny, lx, ly, told = _open(os.fsencode(path), namelists.encode(text),
-                                                   threads or 0)
+        handle, rows, nx, ny, lx, ly, notes = _open(os.fsencode(path), namelists.encode(text),
+                                                    threads or 0)
         self._path, self._text = path, text or namelists.decode(Path(path).read_bytes())
         self._handle = int(handle)
         self._release = weakref.finalize(self, _close, self._handle)
@@ -176,41 +178,42 @@ class Simulation:
         self._lengths = float(lx), float(ly)
         self._started = False
         self.fields = _Fields(self._handle, self.shape)
-        _warn(told)
+        warn_of(notes)
 
     # --- rows -------------------------------------------------------------------------------
 
     def advance(self) -> Row:
-        """Do the next row.
+        """Compute the next row.
 
         Returns
         -------
         Row
-            The row that was done, also `row`.
+            The new row, which is also the attribute `row`.
 
         Raises
         ------
         ValueError
             If the simulation is finished or closed.
         NotConverged
-            If a solver fails; its ``result`` is this simulation, with the state reached.
+            If a solver does not converge. Its ``result`` is this simulation in the state that was
+            reached.
         KeyboardInterrupt
-            At Ctrl-C. The row is given up; the simulation is where it was before.
+            If Ctrl-C interrupts the row. The simulation is then where it was before the row.
         """
         if self.finished:
             raise ValueError("the simulation is finished: no row is left")
         try:
-            finished, told = _step(self._handle)
+            finished, notes = _step(self._handle)
         except NotConverged as error:
             self._started = self.finished = True
             raise NotConverged(str(error), self) from None
         self._started = True
         self.finished = bool(finished)
-        _warn(told)
+        warn_of(notes)
         return self._last()
 
     def _last(self) -> Row:
-        """Return the last row of the library."""
+        """Return the last row, as the library has it."""
         values = np.zeros(len(columns()))
         _row(self._handle, values)
         return Row(values)
@@ -221,14 +224,14 @@ class Simulation:
         return self._last() if self._started else None
 
     def __iter__(self) -> Iterator[Row]:
-        """Do the rows that are left, one after another."""
+        """Compute the remaining rows one after another."""
         while not self.finished:
             yield self.advance()
 
     # --- steering ---------------------------------------------------------------------------
 
     def _set(self, what: str, first: float, second: float = 0.0) -> None:
-        """Change what the next rows are done with, and keep it for a saved state."""
+        """Change a value for the next rows, and record it for a saved state."""
         _steer(self._handle, what, float(first), float(second))
         if what in _LOADS:
             for other in _LOADS:
@@ -237,7 +240,7 @@ class Simulation:
 
     @property
     def pressure(self) -> float:
-        """Mean normal pressure, Pa: of the last row; set it for the rows to come."""
+        """Mean normal pressure of the last row, Pa. Setting it applies to all later rows."""
         return self._last().pressure
 
     @pressure.setter
@@ -246,7 +249,7 @@ class Simulation:
 
     @property
     def force(self) -> float:
-        """Normal force, N: of the last row; set it for the rows to come."""
+        """Normal force of the last row, N. Setting it applies to all later rows."""
         return self._last().force
 
     @force.setter
@@ -255,7 +258,7 @@ class Simulation:
 
     @property
     def displacement(self) -> float:
-        """Approach of the far rubber, m: of the last row; set it for the rows to come."""
+        """Approach in the last row, m. Setting it applies to all later rows."""
         return self._last().displacement
 
     @displacement.setter
@@ -264,7 +267,7 @@ class Simulation:
 
     @property
     def velocity(self) -> tuple[float, float] | None:
-        """Velocity of the road that was set, m/s, along x and y; None where the phases hold."""
+        """Velocity of the road along x and y that was set, m/s; None if the phases decide."""
         found = self._steered.get("velocity")
         return None if found is None else (found[0], found[1])
 
@@ -277,7 +280,7 @@ class Simulation:
 
     @property
     def temperature(self) -> float | None:
-        """Temperature that was set, C; None where that of the case holds."""
+        """Temperature that was set, C; None if that of the case applies."""
         found = self._steered.get("temperature")
         return None if found is None else found[0]
 
@@ -288,14 +291,14 @@ class Simulation:
     # --- saved states -----------------------------------------------------------------------
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the state to an HDF5 file from which `resume` goes on to the same numbers.
+        """Write the state to an HDF5 file, from which `resume` continues with the same numbers.
 
-        The file holds the input, the road and what was set, too: nothing else is needed. It
-        takes the place of an older one when it is complete.
+        The file also contains the input, the road and the values that were set. An older file is
+        replaced when the new one is complete.
 
         Parameters
         ----------
-        path : str or path
+        path : str or Path
             The file.
 
         Returns
@@ -306,7 +309,7 @@ class Simulation:
         Raises
         ------
         ValueError
-            Before the first row.
+            If no row has been computed yet.
         OSError
             If the file cannot be written.
         """
@@ -335,21 +338,25 @@ class Simulation:
 
     @classmethod
     def resume(cls, path: str | os.PathLike[str], *, threads: int | None = None) -> Simulation:
-        """Return the simulation of a saved state, ready for its next row.
+        """Return a simulation that continues from a saved state.
 
         Parameters
         ----------
-        path : str or path
+        path : str or Path
             A file that `save` has written.
         threads : int, optional
-            Number of threads; what the case says if left out.
+            Number of threads; by default that of the case.
+
+        Returns
+        -------
+        Simulation
 
         Raises
         ------
         OSError
-            If the file is missing, damaged or no saved state, or a height map is missing.
+            If the file is missing, damaged or not a saved state, or if a height map is missing.
         ValueError
-            If a height map is not the one that it was.
+            If a height map has changed.
         """
         path = Path(path)
         if not path.exists():
@@ -364,7 +371,8 @@ class Simulation:
         self = cls._of_text(text, source, threads)
         with tempfile.TemporaryDirectory(prefix="asperity-") as folder:
             state.tofile(Path(folder) / "state.checkpoint.h5")
-            # First what was set, which changes the phases; the state then says where they stand.
+            # The values that were set change the phases, so they come before the state, which
+            # contains the position within the phases.
             for what, (first, second) in steered.items():
                 self._set(what, first, second)
             try:
@@ -377,11 +385,11 @@ class Simulation:
 
     @classmethod
     def _of_text(cls, text: str, source: str, threads: int | None) -> Simulation:
-        """Return a new simulation of a text whose paths start where a file lies."""
+        """Return a new simulation of a text, whose paths are relative to the folder of a file."""
         return cls(_Input(text, Path(source)), threads=threads)
 
     def close(self) -> None:
-        """Free the memory now; later calls say that the simulation is closed."""
+        """Free the memory. Later calls raise ValueError, because the simulation is closed."""
         self.finished = True
         self._release()
 
@@ -403,7 +411,7 @@ class Simulation:
 
 
 class _Input:
-    """An input of which the text and the name are known."""
+    """An input with its text and the name of its file."""
 
     def __init__(self, text: str, path: Path) -> None:
         self._text, self.path = text, path
@@ -412,7 +420,7 @@ class _Input:
         return self._text
 
 
-def _warn(told: bytes) -> None:
-    """Raise the warnings of the library as those of Python."""
-    for line in told.decode(errors="replace").strip().splitlines():
+def warn_of(notes: bytes) -> None:
+    """Issue the warnings of the library, one per line, as warnings of Python."""
+    for line in notes.decode(errors="replace").strip().splitlines():
         warnings.warn(line, UserWarning, stacklevel=3)

@@ -1,4 +1,4 @@
-"""The table of a sweep: a row for each case, a column for each parameter and each result."""
+"""The table of a sweep: one row per case, one column per parameter and per result."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ if TYPE_CHECKING:
 
 __all__ = ["Failure", "Sweep", "SweepError", "column"]
 
-_ROWS, _CELL = 30, 26   # that are shown: rows, characters of a cell
+_ROWS, _CELL = 30, 26   # largest numbers of rows and of characters per cell that are displayed
 
 
 class SweepError(RuntimeError):
-    """Some cases of a sweep failed; the others are done.
+    """Some cases of a sweep failed; the others are complete.
 
     Attributes
     ----------
     result : Sweep
-        The table, in which `Sweep.failed` names the failed ones.
+        The table. `Sweep.failed` lists the failed cases.
     """
 
     def __init__(self, message: str, result: Sweep) -> None:
@@ -40,7 +40,7 @@ class SweepError(RuntimeError):
 
 @dataclass(frozen=True)
 class Failure:
-    """A case that failed: its row in the table, its parameters, and why."""
+    """A case that failed: its row in the table, its parameters, the message and the exit status."""
 
     index: int
     parameters: dict[str, Any]
@@ -53,23 +53,23 @@ class Failure:
 
 
 class Sweep(Mapping[str, NDArray[Any]]):
-    """The table of a sweep: one row a case, one column a parameter or a result.
+    """The table of a sweep, with one row per case and one column per parameter or result.
 
-    ``table["friction"]`` and ``table.friction`` are the same numpy array; a failed case has NaN (or
-    None where the column holds no numbers).
+    ``table["friction"]`` and ``table.friction`` are the same NumPy array. A failed case has NaN, or
+    None in a column that does not contain numbers.
 
     Attributes
     ----------
     parameters : tuple of str
-        Names of the columns that were set.
+        Names of the columns with parameters.
     results : tuple of str
-        Names of the columns that came out.
+        Names of the columns with results.
     shape : tuple of int
-        Numbers of values: ``table["friction"].reshape(table.shape)`` has an axis a parameter.
+        Numbers of values: ``table["friction"].reshape(table.shape)`` has one axis per parameter.
     paths : list of Path
         The result files.
     runs : sequence of Run
-        The results, opened when they are asked for; those of failed cases hold what was reached.
+        The results, which are opened on access. Those of failed cases end where the run ended.
     failed : list of Failure
         The cases that failed.
     """
@@ -90,12 +90,12 @@ class Sweep(Mapping[str, NDArray[Any]]):
         return len(self.paths)
 
     def row(self, index: int) -> dict[str, Any]:
-        """Return a row: parameters and results of one case.
+        """Return the parameters and results of one case.
 
         Parameters
         ----------
         index : int
-            Number of the case, from 0; negative from the end.
+            Number of the case, from 0; negative numbers count from the end.
 
         Returns
         -------
@@ -110,11 +110,12 @@ class Sweep(Mapping[str, NDArray[Any]]):
         return {name: column[index] for name, column in self._columns.items()}
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return the table as one of pandas, which must be installed.
+        """Return the table as a data frame of pandas, which must be installed.
 
         Returns
         -------
         pandas.DataFrame
+            One line per case.
 
         Raises
         ------
@@ -154,7 +155,7 @@ class Sweep(Mapping[str, NDArray[Any]]):
         return list(self._columns)
 
     def _cells(self) -> tuple[str, list[list[str]], str]:
-        """Return a head, the cells of a short table, and what it leaves out."""
+        """Return a heading, the cells of a short table, and a remark on what it leaves out."""
         shown = [*self.parameters, *(name for name in ("contact_area", "friction", "mean_gap")
                                      if name in self.results)]
         if len(shown) == len(self.parameters):
@@ -183,7 +184,7 @@ class Sweep(Mapping[str, NDArray[Any]]):
 
 
 class _Runs(Sequence[Run]):
-    """The results of a sweep, each opened when it is asked for."""
+    """The results of a sweep, each of which is opened on access."""
 
     def __init__(self, paths: list[Path]) -> None:
         self._paths = paths
@@ -201,7 +202,7 @@ class _Runs(Sequence[Run]):
 
 
 def _short(value: Any) -> str:
-    """Return a value for a table.
+    """Return a value as a short text for a table.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Sweeps: the same case with other values, many runs side by side, one table of results."""
+"""Sweeps: many runs of a case with different values, side by side, and one table of results."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from .sweep_table import Failure, Sweep, SweepError, column
 
 __all__ = ["sweep"]
 
-_LONGEST_NAME = 120     # characters of a file's name
+_LONGEST_NAME = 120     # largest number of characters of a file's name
 
 
 def sweep(
@@ -48,73 +48,73 @@ def sweep(
 ) -> Sweep:
     """Run a case with every combination of some values, side by side, and return a table.
 
-    Each case is a process of the program. Its input and its result lie in `folder` under a name
-    made of the values: ``velocity_x=0.1.nml`` and ``velocity_x=0.1.h5``; ``sweep.json`` lists them.
-    A sweep that was stopped goes on where it was: finished results of the same input and version
-    are kept, unless the contents of a height map have changed; others are taken up from their
-    checkpoint or run again. More values can be added later.
+    Each case is run in a process of the program. Its input and its result are in `folder`, under a
+    name made of the values, such as ``velocity_x=0.1.nml`` and ``velocity_x=0.1.h5``;
+    ``sweep.json`` lists them. An interrupted sweep resumes where it stopped: complete results of
+    the same input, version and height maps are reused, and other cases continue from their
+    checkpoint or are run again. You can add values later.
 
     Parameters
     ----------
-    base : str, path or Case
-        The case: an input file, its text, or an `asperity.Case`.
+    base : str, Path or Case
+        The case: an input file, the text of an input, or an `asperity.Case`.
     parameters : dict
-        Values by the name ``"group.variable"``. Where a group is repeated,
-        ``"phase[2].velocity_x"`` is the second one (counted from 1, as in the program's messages);
-        without a number there must be one such group, or, for ``phase``, all phases that name the
-        variable are set. Values that belong together have a tuple of names:
-        ``{("grid.nx", "grid.ny"): [(64, 32), (128, 64)]}``.
-        A value None takes the variable out.
+        Lists of values by names of the form ``"group.variable"``. If a group is repeated,
+        ``"phase[2].velocity_x"`` is that of the second one (counted from 1, as in the program's
+        messages). Without a number there must be just one such group, or, for ``phase``, all phases
+        that give the variable are changed. Variables that change together have a tuple of names:
+        ``{("grid.nx", "grid.ny"): [(64, 32), (128, 64)]}``. The value None removes the variable.
     zip : bool
-        Take the lists in parallel, not all combinations; they must be of one length.
-    folder : str or path, optional
-        Where the results lie; by default ``NAME_sweep`` beside the input NAME.nml, and ``sweep`` in
-        the current folder for a case without a file.
+        Go through the lists in parallel instead of forming all combinations. They must have the
+        same length.
+    folder : str or Path, optional
+        Folder of the results. The default is ``NAME_sweep`` beside the input NAME.nml, or ``sweep``
+        in the current folder for a case without a file.
     jobs : int or None
-        Runs at a time; no more than the processors allow with `threads` each. None takes as many as
-        they allow.
+        Number of runs at a time, but never more than the processors allow with `threads` each. None
+        means as many as they allow.
     threads : int
-        Threads of each run, at most the number of processors.
+        Number of threads of each run, at most the number of processors.
     resume : bool
-        Keep finished results of the same input; False runs all anew.
-    measure : callable, optional
-        Takes an opened result and returns a dict of what is wanted from it, the same names for each
-        case. By default the last row of every column of the history. It is called at the end, so
-        that an error in it loses no run: the next call finds the results. The word 'steady' stands
-        for the means of `asperity.Run.steady` of all columns that it makes sense for, with
-        ``friction_error`` and ``laps``.
+        Reuse complete results of the same input. With False all cases are run again.
+    measure : callable or 'steady', optional
+        Function that takes an opened result and returns a dict of values, with the same names for
+        each case. By default these are all columns of the history in the last row. The function is
+        called at the end, so that an error in it loses no run: the next call reuses the results.
+        The word 'steady' stands for the means of `asperity.Run.steady` of the columns for which
+        they make sense, with ``friction_error`` and ``laps``.
     errors : {'raise', 'keep'}
-        What to do if cases fail: raise `SweepError`, with the table, once all others are done; or
-        return the table, which names them in ``failed``. With 'raise', inputs that are wrong raise
-        ValueError before anything is run.
+        If cases fail, 'raise' raises `SweepError` with the table once all others are done, and
+        'keep' returns the table, which lists them in ``failed``. With 'raise', faults in the inputs
+        raise ValueError before anything is run.
     quiet : bool
-        Tell no progress on stderr: in a terminal a line that is rewritten, elsewhere one line a
-        case.
+        Show no progress. Otherwise stderr shows one line that is rewritten (in a terminal) or one
+        line per case.
     executor : concurrent.futures.Executor, optional
-        Runs the cases in place of processes of this machine, each by one call: Dask's
-        ``client.get_executor()``, mpi4py's ``MPICommExecutor`` or any other one. Its workers must
-        see `folder`; `jobs` does not count then. At Ctrl-C cases that wait are cancelled, those
-        that run come to their end.
+        Executor that runs the cases instead of processes of this machine, with one call each:
+        Dask's ``client.get_executor()``, mpi4py's ``MPICommExecutor`` or any other. Its workers
+        must have access to `folder`; `jobs` has no effect. After Ctrl-C waiting cases are
+        cancelled, and running ones are completed.
     slurm : str, optional
-        Options of ``sbatch``, such as "--time=1:00:00 --partition=short": the cases are submitted
-        as one job array that fills `folder`. The table then names them as failed until they are
-        there: the same call later gathers them, and submits nothing while they are in the queue.
+        Options of ``sbatch``, such as "--time=1:00:00 --partition=short". The cases are submitted
+        as one job array that fills `folder`. Until they are complete, the table lists them as
+        failed. The same call later gathers them; while they are in the queue it submits nothing.
 
     Returns
     -------
     Sweep
-        One row a case, the last parameter running fastest.
+        One row per case; the last parameter varies fastest.
 
     Raises
     ------
     ValueError
-        If a name or a list of values is wrong, or an input.
+        If a name, a list of values or an input is wrong.
     OSError
         If a file cannot be read or written, or the program is not found.
     SweepError
         If cases fail.
     KeyboardInterrupt
-        At Ctrl-C, when all runs have finished the step in hand and written their checkpoints; a
+        After Ctrl-C, when all runs have finished the current step and written their checkpoints. A
         second Ctrl-C ends them at once.
 
     Examples
@@ -160,18 +160,18 @@ def sweep(
 
 
 def _folder(case: Case) -> Path:
-    """Return where the results lie by default."""
+    """Return the default folder of the results."""
     return Path("sweep") if case.path is None else case.path.with_name(f"{case.path.stem}_sweep")
 
 
 def _names(names: str | tuple[str, ...]) -> tuple[str, ...]:
-    """Return the names that a key stands for."""
+    """Return the names of a key as a tuple."""
     return names if isinstance(names, tuple) else (names,)
 
 
 def _points(parameters: Mapping[str | tuple[str, ...], Sequence[Any]], parallel: bool,
             ) -> tuple[list[dict[str, Any]], tuple[int, ...]]:
-    """Return the values of each case, and the numbers of values."""
+    """Return the values of each case, and the number of values along each axis."""
     if not isinstance(parameters, Mapping) or not parameters:
         raise ValueError(f"parameters = {parameters!r}: must be a dict with a list of values for"
                          " each name")
@@ -209,7 +209,7 @@ def _points(parameters: Mapping[str | tuple[str, ...], Sequence[Any]], parallel:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value with Python's numbers and lists in place of numpy's."""
+    """Return a value with NumPy's numbers and arrays converted to those of Python."""
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     if isinstance(value, list | tuple):
@@ -238,7 +238,7 @@ Say phase[1].velocity_y to phase[2].velocity_y
         raise ValueError(f"{name!r}: must be a name such as 'solver.tolerance' or"
                          " 'phase[2].velocity_x'")
     group, number, variable = found.groups()
-    groups = case[group]  # an unknown name is told with the nearest one
+    groups = case[group]  # the error for an unknown name suggests the nearest one
     entry = namelists.table()[group]
     Case.help(f"{group}.{variable}")
     if not entry.is_repeatable:
@@ -263,19 +263,19 @@ Say phase[1].velocity_y to phase[2].velocity_y
 
 
 def _jobs(base: Case, points: list[dict[str, Any]], folder: Path, keep: bool) -> list[Job]:
-    """Return the cases of a sweep with their names; inputs that are wrong raise, or are kept."""
+    """Return the jobs of a sweep. A wrong input raises, or with `keep` becomes a failed job."""
     work = []
     names: dict[str, dict[str, Any]] = {}
     for values in points:
         job = Job(values, name=_file_name(values))
         if job.name in names:
-            raise ValueError(f"parameters: {_told(values)} stands twice")
+            raise ValueError(f"parameters: {_described(values)} stands twice")
         names[job.name] = values
         job.path = folder / f"{job.name}.h5"
         work.append(job)
         case = base.copy()
         try:
-            # The groups are found before any is set: a value does not change where the next goes.
+            # Find all groups before setting any, because a value may affect which groups match.
             places = {name: _targets(case, name) for name in values}
             for name, value in values.items():
                 groups, variable = places[name]
@@ -284,20 +284,20 @@ def _jobs(base: Case, points: list[dict[str, Any]], folder: Path, keep: bool) ->
             case.check(files=False)
         except (ValueError, OSError) as error:
             if not keep:
-                raise type(error)(f"{_told(values)}: {error}") from None
+                raise type(error)(f"{_described(values)}: {error}") from None
             job.status, job.message = 2, str(error)
         else:
             job.case = case
     return work
 
 
-def _told(values: dict[str, Any]) -> str:
+def _described(values: dict[str, Any]) -> str:
     """Return the values of a case for a message."""
     return ", ".join(f"{name} = {value}" for name, value in values.items())
 
 
 def _file_name(values: dict[str, Any]) -> str:
-    """Return the name of a case's files: the same for the same values, whatever else is swept.
+    """Return the name of a case's files, which depends only on the values of the case.
 
     Examples
     --------
@@ -317,7 +317,7 @@ def _file_name(values: dict[str, Any]) -> str:
 
 
 def _write_index(folder: Path, work: list[Job]) -> None:
-    """Write which values belong to which file, with what earlier sweeps have there."""
+    """Write the values of each file to sweep.json, and keep the entries of earlier sweeps."""
     path = folder / "sweep.json"
     index: dict[str, Any] = {}
     if path.exists():
@@ -333,18 +333,18 @@ def _table(work: list[Job], shape: tuple[int, ...],
     """Return the table of all cases."""
     failed = []
     found: list[dict[str, Any] | None] = []
-    told: dict[str, str] = {}
+    warned: dict[str, str] = {}
     for index, job in enumerate(work):
         if job.status != 0:
             failed.append(Failure(index, job.values, job.message, job.status))
             found.append(None)
             continue
         for line in job.message.splitlines():
-            told.setdefault(line.removeprefix(f"{job.path.stem}.nml: "), job.name)
+            warned.setdefault(line.removeprefix(f"{job.path.stem}.nml: "), job.name)
         run = open_result(job.path)
         found.append({name: column[-1] for name, column in run.history.items()}
                      if measure is None else _measured(measure, run))
-    for line, name in told.items():
+    for line, name in warned.items():
         warnings.warn(f"{name}: {line}", UserWarning, stacklevel=3)
     parameters = list(work[0].values)
     columns = {name: column([job.values[name] for job in work]) for name in parameters}
@@ -360,15 +360,15 @@ _MEANS = ("friction", "friction_viscous", "contact_area", "mean_gap", "displacem
 
 
 def _steady(run: Run) -> dict[str, Any]:
-    """Return the means over whole laps, with the error of friction and the laps."""
+    """Return the means over complete laps, the error of the friction, and the number of laps."""
     values: dict[str, Any] = {name: steady_mean(run, name).mean for name in _MEANS
                               if name in run.history}
-    found = run.steady("friction")  # this one warns of part laps
+    found = run.steady("friction")  # warns if there is no complete lap
     return values | {"friction_error": found.error, "laps": found.laps}
 
 
 def _measured(measure: Callable[[Run], Mapping[str, Any]] | str, run: Run) -> dict[str, Any]:
-    """Return what is asked of a run, by names."""
+    """Return the values that a measure gives for a run, by name."""
     if isinstance(measure, str):
         choice("measure", measure, ("steady",))
         return _steady(run)

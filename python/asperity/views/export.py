@@ -1,4 +1,4 @@
-"""Snapshots for other programs: xarray data sets and VTK image data, as ParaView reads it."""
+"""Export of results to other programs: xarray data sets, and VTK image data for ParaView."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ def to_xarray(snapshot: Snapshot) -> xarray.Dataset:
     Parameters
     ----------
     snapshot : Snapshot
-        All its fields are read.
+        The snapshot, of which all fields are read.
 
     Returns
     -------
     xarray.Dataset
-        Fields with the dimensions (y, x), coordinates `x` and `y` in m, scalar coordinates `time`
-        and `step`; `units` and `long_name` are attributes, as plots of xarray use them.
+        Fields with the dimensions (y, x), coordinates `x` and `y` in m, and scalar coordinates
+        `time` and `step`. The attributes `units` and `long_name` are those that xarray's plots use.
 
     Raises
     ------
@@ -69,15 +69,15 @@ def run_to_xarray(run: Run) -> xarray.Dataset:
     Parameters
     ----------
     run : Run
-        All its fields are read into memory.
+        The result, of which all fields are read into memory.
 
     Returns
     -------
     xarray.Dataset
-        The columns of the history along `step`, with the coordinates `time` and `phase`; the fields
-        with the dimensions (snapshot, y, x), where `snapshot` is the step they belong to and
-        `snapshot_time` its time; the road before any sliding as `height` (y, x). Columns that have
-        the name of a field are means: `mean_pressure`, `mean_traction_x`, `mean_traction_y`.
+        The columns of the history have the dimension `step` and the coordinates `time` and `phase`.
+        The fields have the dimensions (snapshot, y, x), where `snapshot` is the number of the row
+        and `snapshot_time` its time. The road before any sliding is `height` (y, x). Columns with
+        the name of a field are called `mean_pressure`, `mean_traction_x` and `mean_traction_y`.
 
     Raises
     ------
@@ -116,16 +116,16 @@ def run_to_xarray(run: Run) -> xarray.Dataset:
 def to_vtk(snapshot: Snapshot, path: str | os.PathLike[str]) -> Path:
     """Write a snapshot as VTK image data (.vti), which ParaView and VisIt open.
 
-    One value a cell; displacements, tractions and slips are vectors, too, of the names
-    `displacement`, `traction` and `slip`, so that glyphs and warps can use them. The time of the
-    snapshot goes with it. All values are in SI units.
+    There is one value per cell. Displacements, tractions and slips are also stored as the vectors
+    `displacement`, `traction` and `slip`, which glyphs and warps can use. The file includes the
+    time of the snapshot. All values are in SI units.
 
     Parameters
     ----------
     snapshot : Snapshot
-        All its fields are read.
-    path : str or path
-        The file to write; '.vti' is added where there is no ending.
+        The snapshot, of which all fields are read.
+    path : str or Path
+        The file to write; '.vti' is added if the name has no ending.
 
     Returns
     -------
@@ -135,7 +135,7 @@ def to_vtk(snapshot: Snapshot, path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     ValueError
-        If the name ends otherwise.
+        If the name has another ending.
     OSError
         If the file cannot be written.
     """
@@ -153,7 +153,7 @@ def to_vtk(snapshot: Snapshot, path: str | os.PathLike[str]) -> Path:
                      snapshot[last] if last in snapshot else np.zeros((grid.ny, grid.nx))]
             arrays.append(_array(name, np.stack(parts, axis=-1)))
     extent = f"0 {grid.nx} 0 {grid.ny} 0 0"
-    # (i, j) is the centre of a cell: the image begins half a cell before.
+    # The coordinates are those of the centres of cells, so the image begins half a cell earlier.
     origin = f"{-0.5 * grid.dx!r} {-0.5 * grid.dy!r} 0"
     field = [_array("TimeValue", np.array([snapshot.time]), tuples=1),
              _array("step", np.array([snapshot.step], dtype=np.int64), tuples=1)]

@@ -1,4 +1,4 @@
-"""Films of a run: a field of all its snapshots on one scale, beside a curve of the history."""
+"""Films of a run: a field in all snapshots with one colour scale, and a curve of the history."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ def film(run: Run, path: Path, field: str | None = None, *, frames_per_second: f
     Parameters
     ----------
     run : Run
-        With two or more snapshots (``&output snapshot_every``), and ny above 1.
+        A result with two or more snapshots (``&output snapshot_every``), and ny above 1.
     path : Path
-        The film: .gif, or .mp4 where ffmpeg is installed.
+        The film: .gif, or .mp4 if ffmpeg is installed.
     field : str, optional
-        The field; with friction what sticks and slips, else the pressure.
+        The field. The default is 'contact' with friction, and 'pressure' without.
     frames_per_second : float
-        Frames in a second.
+        Number of frames per second.
 
     Returns
     -------
@@ -57,7 +57,7 @@ def film(run: Run, path: Path, field: str | None = None, *, frames_per_second: f
     Raises
     ------
     ValueError
-        If the ending is another, or there are too few snapshots.
+        If the file has another ending, or there are too few snapshots.
     OSError
         If ffmpeg is missing for an .mp4.
     """
@@ -121,7 +121,7 @@ def _animation(run: Run, field: str) -> tuple[FuncAnimation, Any]:
     curve.set_ylabel(axis_text(LABELS[column], ""))
     curve.grid(alpha=0.3)
     title = panel.set_title(when(snapshots[0]))
-    # The layout is found once: for every frame it would take most of the time.
+    # The layout is computed once, because in every frame it would take most of the time.
     figure.canvas.draw()
     figure.set_layout_engine("none")
 

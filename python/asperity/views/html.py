@@ -1,4 +1,4 @@
-"""How results show themselves in a notebook: small tables of HTML."""
+"""Small HTML tables with which notebooks display results, cases and fits."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ __all__ = ["case_html", "contact_html", "fit_html", "history_html", "road_html",
            "snapshot_html", "table_html"]
 
 CELL = "text-align:left;padding:0.1em 0.8em 0.1em 0"
-POINTS = 120  # of a small curve
+POINTS = 120  # largest number of points of a small curve
 
 
 def table_html(head: tuple[str, ...], rows: list[tuple[str, ...]], caption: str) -> str:
-    """Return a table; the cells are HTML already."""
+    """Return a table, whose cells are already HTML."""
     top = "".join(f'<th style="{CELL}">{name}</th>' for name in head)
     lines = "".join("<tr>" + "".join(f'<td style="{CELL}">{cell}</td>' for cell in row) + "</tr>"
                     for row in rows)
@@ -39,7 +39,7 @@ def shown(value: Any, units: str) -> str:
 
 
 def curve(values: NDArray[Any]) -> str:
-    """Return a small curve of values over their number, as SVG; nothing of fewer than two.
+    """Return a small curve of values over their index as SVG, or '' for fewer than two values.
 
     Examples
     --------
@@ -92,12 +92,12 @@ def run_html(run: Run) -> str:
     """Return the run as a table: state, grid, snapshots and the last row."""
     grid, history = run.grid, run.history
     steps = run.snapshots.steps
-    told = ", ".join(map(str, steps if len(steps) <= 12 else (*steps[:5], "…", *steps[-3:])))
+    listed = ", ".join(map(str, steps if len(steps) <= 12 else (*steps[:5], "…", *steps[-3:])))
     state = "finished" if run.finished else "not finished"
     rows = [("state", f"{state}, {rows_of(run)}"),
             ("grid", f"{grid.nx} × {grid.ny} cells, {shown(grid.lx, 'm')} ×"
                      f" {shown(grid.ly, 'm')}, {escape(grid.boundary)}"),
-            ("snapshots", f"{len(steps)}{f' (steps {told})' if steps else ''}")]
+            ("snapshots", f"{len(steps)}{f' (steps {listed})' if steps else ''}")]
     if note_of(run):
         rows.insert(1, ("", escape(note_of(run))))
     rows += [(escape(name.replace("_", " ")),
@@ -125,19 +125,19 @@ def contact_html(contact: Any) -> str:
 
 
 def road_html(road: Any) -> str:
-    """Return a measured road as a table: what it is and what was done."""
+    """Return a measured road as a table of its properties and processing steps."""
     lines = [line.partition("  ") for line in road.summary().splitlines()]
     rows = [(escape(name), escape(rest.strip())) for name, _, rest in lines]
     return table_html((), rows, "<b>Road</b>")
 
 
 def fit_html(fit: Any) -> str:
-    """Return a fit of a Prony series as a table of its arms under its errors."""
+    """Return a fit of a Prony series as its errors and a table of its arms."""
     material = fit.material
     rows = [(str(number), shown(g, "Pa"), escape(f"{tau:.4g} s"))
             for number, (g, tau) in enumerate(zip(material.g, material.tau, strict=True), 1)]
-    told = "<br>".join(map(escape, fit.summary().splitlines()))
-    return table_html(("arm", "modulus", "relaxation time"), rows, f"<b>Fit</b><br>{told}")
+    summary = "<br>".join(map(escape, fit.summary().splitlines()))
+    return table_html(("arm", "modulus", "relaxation time"), rows, f"<b>Fit</b><br>{summary}")
 
 
 def case_html(case: Any) -> str:

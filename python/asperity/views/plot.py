@@ -1,7 +1,7 @@
 """Pictures of results, with matplotlib: histories, energies, an overview; fields of snapshots.
 
-Colours are told apart by colour-blind readers; axes carry units with SI prefixes (mm, MPa); new
-figures have the widths and letters of a journal's columns.
+Colour-blind readers can distinguish the colours. Axes have units with SI prefixes (mm, MPa). The
+sizes of new figures and of their text suit the columns of a journal.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 __all__ = ["plot_field", "plot_history", "plot_overview", "plot_section", "si_scale"]
 
-# Of the parts of friction and of energy.
+# Colours and line styles of the parts of friction and of energy.
 PARTS = {"viscous": (COLOURS[1], "--"), "interface": (COLOURS[2], "-."),
          "stored": (COLOURS[0], "-"), "friction": (COLOURS[2], "-."), "work": (COLOURS[6], "-")}
 
@@ -57,27 +57,34 @@ def plot_history(run: Run, name: str = "contact_area", x: str | None = None,
                  ax: Axes | None = None, **style: Any) -> Axes:
     """Draw a column of the history against another one.
 
-    With friction, 'friction' is drawn with its causes (loss in the rubber, interface, and with
-    adhesion the attraction outside the contact), 'contact_area' with what of it sticks, and
-    'sliding_speed' with the road's. 'energy' draws the work put in, and what is stored and lost.
+    In a run with friction, 'friction' is drawn with its causes (loss in the rubber, interface, and
+    with adhesion the attraction outside the contact), 'contact_area' with the stick area, and
+    'sliding_speed' with the speed of the road. 'energy' draws the work put in and the energies that
+    are stored and lost.
 
     Parameters
     ----------
     run : Run
-        Whose history.
+        The result.
     name : str
         Column to draw, or 'energy'.
     x : str, optional
-        Column along the axis: time by default; where time stands still, pressure or step.
+        Column along the horizontal axis. The default is time or, if no time passes, pressure or
+        step.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure of one column's width if left out.
+        Axes to draw into; by default a new figure that fits one column of a journal.
     **style
-        Passed on to `matplotlib.axes.Axes.plot` for the column itself.
+        Options of `matplotlib.axes.Axes.plot` for the line of the column.
 
     Returns
     -------
     matplotlib.axes.Axes
         The axes; the figure is ``axes.figure``.
+
+    Raises
+    ------
+    KeyError
+        If there is no such column.
     """
     history = run.history
     if name != "energy" and name not in history:
@@ -101,18 +108,24 @@ def plot_history(run: Run, name: str = "contact_area", x: str | None = None,
 
 
 def plot_overview(run: Run) -> Figure:
-    """Draw what tells most of a run.
+    """Draw the most informative quantities of a run.
 
-    With friction these are friction with its causes, contact and stick area, and sliding speed in
-    time, with maps of the last pressure and of what sticks and slips. Without, the last pressure
-    and gap with contact area (and friction of the moved road) in time; the contact area against
-    the load, beside Persson's theory where the road is rough and the material elastic; or, of a
-    single solve, a section through the contact. A run without snapshots shows its history.
+    With friction these are friction with its causes, contact area, stick area and sliding speed
+    over time, and the last maps of pressure and of stick and slip. Without friction they are the
+    last maps of pressure and gap, and one of these: contact area (and viscous friction) over time;
+    for a growing load, the contact area against the load, with Persson's theory if the road is
+    rough and the material elastic; for a single solve, a section through the contact. A run without
+    snapshots shows its history.
+
+    Parameters
+    ----------
+    run : Run
+        The result.
 
     Returns
     -------
     matplotlib.figure.Figure
-        A figure of two columns' width.
+        A figure that fits two columns of a journal.
     """
     with print_style():
         snapshot = run.snapshots[-1] if len(run.snapshots) else None
@@ -145,10 +158,10 @@ def plot_overview(run: Run) -> Figure:
 
 
 def shown_once(figure: Figure) -> Figure:
-    """Return a figure that a notebook shows once.
+    """Return a figure so that a notebook displays it only once.
 
-    The inline backend shows all open figures at the end of a cell, and a figure that is the value
-    of the cell a second time: closed, it is shown as the value only.
+    The inline backend displays all open figures at the end of a cell, and the value of the cell in
+    addition. A closed figure is displayed as the value only.
     """
     if "inline" in plt.get_backend().lower():
         plt.close(figure)
@@ -156,7 +169,7 @@ def shown_once(figure: Figure) -> Figure:
 
 
 def _frictional_overview(run: Run) -> Figure:
-    """Friction, areas and speed over time at the left, the last maps at the right."""
+    """Draw friction, areas and speed over time on the left, and the last maps on the right."""
     snapshot = run.snapshots[-1] if len(run.snapshots) else None
     maps = [name for name in ("pressure", "contact") if snapshot is not None and name in snapshot]
     columns = [name for name in ("friction", "contact_area", "sliding_speed")
@@ -183,7 +196,7 @@ def _frictional_overview(run: Run) -> Figure:
 
 
 def _draw(run: Run, name: str, along: NDArray[Any], axes: Axes, style: dict[str, Any]) -> None:
-    """Draw a column, and what belongs to it, over values that stand ready."""
+    """Draw a column, with related columns, over given values of the horizontal axis."""
     history = run.history
     marked = {"marker": "o" if len(along) <= 40 else ""}
     axes.grid(alpha=0.3)
@@ -228,7 +241,7 @@ def _draw(run: Run, name: str, along: NDArray[Any], axes: Axes, style: dict[str,
 
 
 def _draw_mean(run: Run, axes: Axes) -> None:
-    """Draw the mean of friction over whole laps; of part of a lap, say so."""
+    """Draw the mean friction over complete laps; the label says if there is no complete lap."""
     if run.history.rows < 2 or not np.any(run.history["friction"]):
         return
     found = steady_mean(run, "friction")
@@ -242,7 +255,7 @@ def _draw_mean(run: Run, axes: Axes) -> None:
 
 
 def _draw_energy(run: Run, along: NDArray[Any], axes: Axes, style: dict[str, Any]) -> None:
-    """Draw work, stored and lost energies, with the error of the books."""
+    """Draw work, stored and lost energies, with the error of the balance."""
     terms = energy_terms(run)
     if not terms:
         raise ValueError(f"{run.path}: its history holds no energies")
@@ -256,7 +269,7 @@ def _draw_energy(run: Run, along: NDArray[Any], axes: Axes, style: dict[str, Any
                                                  "label": names[part], **style})
     axes.set_ylabel(axis_text("Energy", unit))
     missing = closure(run)
-    note = None if missing is None else f"books close to {missing.max(initial=0.0):.1g}"
+    note = None if missing is None else f"balance closes to {missing.max(initial=0.0):.1g}"
     _legend_above(axes)
     if note:
         axes.text(0.99, 0.02, note, transform=axes.transAxes, ha="right", va="bottom",
@@ -265,7 +278,7 @@ def _draw_energy(run: Run, along: NDArray[Any], axes: Axes, style: dict[str, Any
 
 
 def _legend_above(axes: Axes) -> None:
-    """Draw the legend above the axes, where it hides no data."""
+    """Draw the legend above the axes, so that it hides no data."""
     count = len(axes.get_legend_handles_labels()[1])
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False,
                 ncols=count if count <= 3 else 2, columnspacing=1.2, handlelength=1.8,
@@ -273,7 +286,7 @@ def _legend_above(axes: Axes) -> None:
 
 
 def _sane_limits(axes: Axes, values: NDArray[Any]) -> None:
-    """Let a column that stays as it is, up to round-off, be a level line over zero."""
+    """Set limits with which a column that is constant up to round-off is a level line."""
     values = values[np.isfinite(values)]
     largest = float(np.abs(values).max(initial=0.0))
     if not len(values) or float(np.ptp(values)) > 1e-6 * largest:
@@ -285,15 +298,15 @@ def _sane_limits(axes: Axes, values: NDArray[Any]) -> None:
 
 def _headline(run: Run, figure: Figure) -> None:
     """Write title and time of the last snapshot, and whether the run is finished."""
-    told = [f"{run.title or run.path.name}"]
+    words = [f"{run.title or run.path.name}"]
     if len(run.snapshots):
-        told.append(when(run.snapshots[-1]))
-    figure.suptitle(": ".join(told) + ("" if run.finished else " (run not finished)"),
+        words.append(when(run.snapshots[-1]))
+    figure.suptitle(": ".join(words) + ("" if run.finished else " (run not finished)"),
                     parse_math=False)
 
 
 def _load_panel(run: Run, axes: Axes) -> None:
-    """Contact area against pressure, with Persson's theory where it holds."""
+    """Draw contact area against pressure, with Persson's theory if it applies."""
     history = run.history
     pressure = history["pressure"]
     factor, unit = si_scale(pressure, "Pa")
@@ -302,7 +315,7 @@ def _load_panel(run: Run, axes: Axes) -> None:
         modulus = 2.0 * float(run.material.shear_modulus) / (1.0 - float(run.material.poisson))
         slope = rms_slope(run.grid, run.height)
         if slope > 0.0 and pressure.max(initial=0.0) > 0.0:
-            from ..theory import persson_area  # SciPy takes its time to load
+            from ..theory import persson_area  # SciPy takes long to load
 
             loads = np.linspace(0.0, 1.05 * pressure.max(), 200)
             areas = persson_area(loads, modulus, slope)
@@ -321,7 +334,7 @@ def _load_panel(run: Run, axes: Axes) -> None:
 
 
 def _time_or_travel(run: Run) -> tuple[np.ndarray, str]:
-    """Return the travel of the road, or the time where it rests, scaled, and the axis's text."""
+    """Return the travel of the road or, if that suits better, the time, and the axis label."""
     way = travel(run)
     values, what, unit = ((run.history["time"], "Time", "s") if way is None
                           else (way, "Travel of the road", "m"))
@@ -330,7 +343,7 @@ def _time_or_travel(run: Run) -> tuple[np.ndarray, str]:
 
 
 def _time_panel(run: Run, axes: Axes) -> None:
-    """Contact area, and friction where the road moves, against time or the road's travel."""
+    """Draw contact area, and friction of a moving road, against time or travel."""
     names = ["contact_area", *(["friction"] if np.any(run.history["friction"]) else [])]
     along, head = _time_or_travel(run)
     for number, (name, panel) in enumerate(zip(names, (axes, None), strict=False)):
@@ -346,5 +359,5 @@ def _time_panel(run: Run, axes: Axes) -> None:
 
 
 def _new_axes() -> Axes:
-    """Make a figure of one panel, one column wide."""
+    """Return the axes of a new figure that fits one column."""
     return plt.subplots(figsize=(SINGLE_COLUMN, 2.5), layout="constrained")[1]

@@ -18,15 +18,15 @@ __all__ = ["plot_friction_curve"]
 
 
 def plot_friction_curve(curve: FrictionCurve) -> Figure:
-    """Draw friction and contact area with their 95 % intervals, Persson's theory broken.
+    """Draw friction and contact area with their 95 % intervals; Persson's theory is dashed.
 
-    They are drawn against the speed, or, of a single speed, against the pressure or the
-    temperature; each combination of the other two has a colour.
+    They are drawn against the speed or, for a single speed, against the pressure or the
+    temperature. Each combination of the other two has its own colour.
 
     Parameters
     ----------
     curve : FrictionCurve
-        What to draw.
+        The curve.
 
     Returns
     -------
@@ -41,7 +41,7 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
                   ("friction_viscous", "friction_persson", "Viscous friction coefficient"),
                   ("contact_area", "area_persson", "Contact area fraction")]
         if not float(curve.settings.get("coefficient", 0.0)):
-            panels = panels[1:]  # the whole friction is viscous
+            panels = panels[1:]  # without friction in the interface all of it is viscous
         figure, places = plt.subplots(1, len(panels), figsize=(DOUBLE_COLUMN, 2.8),
                                       layout="constrained")
         others = [name for name in order if name != along]

@@ -1,4 +1,4 @@
-"""Pictures of a snapshot: maps, stick-slip maps with traction arrows, profiles, sections."""
+"""Pictures of a snapshot: maps, maps of stick and slip with traction arrows, profiles, sections."""
 
 from __future__ import annotations
 
@@ -45,19 +45,19 @@ def plot_field(snapshot: Snapshot, name: str = "pressure", ax: Axes | None = Non
                arrows: bool | None = None) -> Axes:
     """Draw a field of a snapshot: a map with a colour bar, or a profile if ny is 1.
 
-    ``contact`` is a map of what is open, sticks and slips, with a legend and, where there is
+    ``contact`` shows which cells are open, stick or slip, with a legend and, in a case with
     friction, with arrows of the traction on the rubber.
 
     Parameters
     ----------
     snapshot : Snapshot
-        Whose field.
+        The snapshot.
     name : str
         Name of the field.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure of one column's width if left out.
+        Axes to draw into; by default a new figure that fits one column of a journal.
     arrows : bool, optional
-        Whether to draw the tractions; by default on the map of ``contact`` only.
+        Whether to draw the tractions; by default only on the map of ``contact``.
 
     Returns
     -------
@@ -97,9 +97,14 @@ def plot_section(snapshot: Snapshot, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     snapshot : Snapshot
-        With pressure and gap.
+        A snapshot with pressure and gap.
     ax : matplotlib.axes.Axes, optional
-        Where to draw the pressure; the gap gets an axis at the right.
+        Axes for the pressure; the gap has an axis on the right.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes of the pressure.
     """
     grid = snapshot.run.grid
     pressure, gap = snapshot["pressure"], snapshot["gap"]
@@ -127,9 +132,9 @@ def frame_of(grid: Grid) -> tuple[float, str, tuple[float, float, float, float]]
 
 
 def field_style(field: NDArray[Any], name: str, units: str) -> tuple[float, str, dict[str, Any]]:
-    """Return how a field is coloured: factor and unit of the scale, and arguments of imshow.
+    """Return factor and unit of the colour scale of a field, and arguments of imshow.
 
-    Fields of both signs have a scale that is white at zero; those of one sign begin at zero.
+    The scale of a field with both signs is white at zero. The scale of one sign begins at zero.
     """
     factor, unit = si_scale(typical_value(field), units)
     low, high = float(field.min()) * factor, float(field.max()) * factor
@@ -144,21 +149,21 @@ def field_style(field: NDArray[Any], name: str, units: str) -> tuple[float, str,
         cmap = plt.get_cmap("viridis").with_extremes(bad=NO_CONTACT)
         return factor, unit, {"cmap": cmap, "vmin": 0.0,
                               "vmax": scale_limit(field[field > 0.0]) * factor}
-    if low == high:  # as the gap of full contact
+    if low == high:  # for example the gap in full contact
         return factor, unit, {"cmap": "cividis", "vmin": min(0.0, low),
                               "vmax": max(0.0, low) or 1.0}
     return factor, unit, {"cmap": "cividis", "vmin": low, "vmax": high}
 
 
 def without_open_cells(field: NDArray[Any], name: str) -> NDArray[Any]:
-    """Return a field to be drawn; cells of no pressure are masked, they are out of contact."""
+    """Return a field to be drawn, in which cells without pressure (out of contact) are masked."""
     if name == "pressure" and field.min(initial=0.0) >= 0.0:
         return np.ma.masked_less_equal(field, 0.0)
     return field
 
 
 def _bar_lies(text: str, ratio: float, width: float) -> bool:
-    """Return whether the colour bar lies below a map of this width, in inches."""
+    """Return whether the colour bar should be below a map of this width, in inches."""
     needed = 0.6 * len(text) * plt.rcParams["axes.labelsize"] / 72.0
     return ratio < 0.45 or needed > 0.85 * width * ratio
 
@@ -177,7 +182,7 @@ def _map(grid: Grid, field: NDArray[Any], name: str, label: str, units: str, axe
     image = axes.imshow(shown, origin="lower", extent=edges, aspect="equal", **style)
     ratio = float(np.clip(grid.ly / grid.lx, 0.25, 2.5))
     text = axis_text(label, unit)
-    # A bar beside the map is as tall as the map, and its label must not be longer.
+    # A bar beside the map is as tall as the map, which limits the length of its label.
     width = axes.get_position().width * axes.figure.bbox.width / axes.figure.dpi
     lies = _bar_lies(text, ratio, width)
     bar = axes.figure.colorbar(image, ax=axes, extend=extend,
@@ -189,7 +194,7 @@ def _map(grid: Grid, field: NDArray[Any], name: str, label: str, units: str, axe
 
 
 def state_style(run: ResultFile) -> dict[str, Any]:
-    """Return arguments of imshow for what is open, sticks and slips."""
+    """Return arguments of imshow for the map of open, sticking and slipping cells."""
     colours = [NO_CONTACT, STICK, SLIP] if has_friction(run) else [NO_CONTACT, STICK, STICK]
     return {"cmap": ListedColormap(colours), "norm": BoundaryNorm([-0.5, 0.5, 1.5, 2.5], 3)}
 
@@ -207,7 +212,7 @@ def _states(snapshot: Snapshot, contact: NDArray[Any]) -> tuple[list[str], list[
 
 
 def _contact_map(snapshot: Snapshot, contact: NDArray[Any], axes: Axes) -> None:
-    """Draw what is open, sticks and slips."""
+    """Draw the map of open, sticking and slipping cells."""
     colours, names = _states(snapshot, contact)
     _, unit, edges = frame_of(snapshot.run.grid)
     axes.imshow(contact, origin="lower", extent=edges, aspect="equal",
@@ -225,7 +230,7 @@ def _state_legend(axes: Axes, colours: list[str], names: list[str]) -> None:
     """Draw the legend of the states under the axes."""
     patches = [Patch(facecolor=colour, edgecolor="#888888", linewidth=0.5, label=name)
                for colour, name in zip(colours, names, strict=True)]
-    # Below the numbers and the name of the axis, however tall the axes are.
+    # The legend is below the tick labels and the axis label, whatever the height of the axes.
     drop = 2.2 * (plt.rcParams["font.size"] + 5.0) / 72.0
     under = axes.transAxes + ScaledTranslation(0.0, -drop, axes.figure.dpi_scale_trans)
     axes.legend(handles=patches, loc="upper center", bbox_to_anchor=(0.5, 0.0),
@@ -234,10 +239,10 @@ def _state_legend(axes: Axes, colours: list[str], names: list[str]) -> None:
 
 
 def window(snapshot: Snapshot) -> tuple[float, float, float, float]:
-    """Return the part of the map that is worth to be shown: left, right, lower and upper edge, m.
+    """Return the part of the map to show: left, right, lower and upper edge, m.
 
-    It is the whole, but of a contact that takes less than half of a free map, as of a sphere,
-    what lies about it.
+    It is the whole map or, if the contact takes less than half of a free map (a sphere, for
+    example), the surroundings of the contact.
     """
     grid = snapshot.run.grid
     whole = (-0.5 * grid.dx, grid.lx - 0.5 * grid.dx, -0.5 * grid.dy, grid.ly - 0.5 * grid.dy)
@@ -256,16 +261,17 @@ def window(snapshot: Snapshot) -> tuple[float, float, float, float]:
 
 
 def traction_samples(snapshot: Snapshot, side: float | None = None) -> tuple[NDArray[Any], ...]:
-    """Return cells in contact spread over the map and the tractions there.
+    """Return cells in contact that are spread over the map, and their tractions.
 
-    The map is cut into squares; each gives its cell in contact that lies nearest to the middle.
+    The map is divided into squares. Each square contributes the cell in contact that is nearest to
+    its middle.
 
     Parameters
     ----------
     snapshot : Snapshot
-        With tractions.
+        A snapshot with tractions.
     side : float, optional
-        Side of the squares, m; the longer side of the map over `ARROWS` if left out.
+        Side of the squares, m; by default the longer side of the map over `ARROWS`.
 
     Returns
     -------
@@ -320,7 +326,7 @@ def _arrows(snapshot: Snapshot, axes: Axes) -> bool:
 
 def _profile(grid: Grid, field: NDArray[Any], label: str, units: str, axes: Axes,
              colour: str = COLOURS[0], dashes: str = "-") -> None:
-    """Draw values over x."""
+    """Draw values over x for a line contact."""
     length, length_unit = si_scale(grid.lx, "m")
     factor, unit = si_scale(typical_value(field), units)
     axes.plot(grid.x * length, field * factor, color=colour, linestyle=dashes)
@@ -331,7 +337,7 @@ def _profile(grid: Grid, field: NDArray[Any], label: str, units: str, axes: Axes
 
 
 def _contact_profile(snapshot: Snapshot, axes: Axes) -> None:
-    """Draw the tractions of a line contact over shades of what is open, sticks and slips."""
+    """Draw the tractions of a line contact over shades for open, sticking and slipping cells."""
     grid, contact = snapshot.run.grid, snapshot["contact"][0]
     colours, names = _states(snapshot, contact[None])
     length, length_unit = si_scale(grid.lx, "m")

@@ -1,4 +1,4 @@
-"""Pictures of materials: moduli against the frequency, and fits beside their data."""
+"""Pictures of materials: moduli against the frequency, and fits with their data."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ def plot_prony(material: Prony, ax: Axes | None = None, omega: ArrayLike | None 
     Parameters
     ----------
     material : Prony
-        What to draw.
+        The material.
     ax : matplotlib Axes, optional
-        Where to draw; a new figure by default.
+        Axes to draw into; a new figure by default.
     omega : array_like, optional
-        Frequencies, rad/s; by default two decades beyond the arms.
+        Angular frequencies, rad/s; by default they extend two decades beyond the arms.
 
     Returns
     -------
     matplotlib Axes
-        The axes of the moduli; tan delta has a twin axis on the right.
+        The axes of the moduli. The axis of tan delta is on the right.
     """
     if omega is None:
         ends = (1.0, 1.0) if not material.tau.size else (material.tau.max(), material.tau.min())
@@ -73,12 +73,12 @@ def plot_prony(material: Prony, ax: Axes | None = None, omega: ArrayLike | None 
 
 
 def plot_dma_fit(fit: DmaFit) -> Figure:
-    """Draw a fit: data and series, tan delta, and the error of both.
+    """Draw the data and the fit, tan delta, and the errors of the fit.
 
     Parameters
     ----------
     fit : DmaFit
-        What to draw.
+        The fit.
 
     Returns
     -------

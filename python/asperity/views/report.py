@@ -1,6 +1,6 @@
-"""A page about a result: one HTML file that needs nothing else, for any browser.
+"""The HTML page about a run: one file for any browser, which loads nothing else.
 
-`write_report` is what ``python -m asperity report`` calls; `Run.report` calls it, too.
+``python -m asperity report`` and `Run.report` call `write_report`.
 """
 
 from __future__ import annotations
@@ -38,14 +38,19 @@ SCRIPTS = ("save.js", "chart.js", "map.js", "page.js")
 
 
 def write_report(run: Run, path: str | os.PathLike[str] | None = None) -> Path:
-    """Write the page of a run; return its path.
+    """Write the page of a run.
 
     Parameters
     ----------
     run : Run
-        Finished or still going: the page tells what there is.
-    path : str or path, optional
-        The file to write; the result's with ``.html`` if left out.
+        The result, which may be unfinished.
+    path : str or Path, optional
+        The file to write; by default RESULT.html beside the result.
+
+    Returns
+    -------
+    Path
+        The file.
 
     Raises
     ------
@@ -70,7 +75,12 @@ def report_page(run: Run) -> str:
     Parameters
     ----------
     run : Run
-        Finished or still going.
+        The result, which may be unfinished.
+
+    Returns
+    -------
+    str
+        The HTML text.
     """
     data = page_data(run)
     data["colours"] = colour_scales()
@@ -112,13 +122,13 @@ def _subtitle(run: Run) -> str:
 
 
 def _notes(run: Run) -> str:
-    """Return the warnings: of the run's state, of the input, of the solvers."""
+    """Return the notes: state of an unfinished run, and all warnings."""
     parts = []
     rows = run.history.rows
     if not run.finished:
         parts.append(f"<p><strong>This run is not finished.</strong> {escape(rows_of(run))} were"
                      f" written when this page was made. {_unfinished(run)}</p>")
-    told = run.warnings + faulty(run)
+    notes = run.warnings + faulty(run)
     tolerance = solver_setting(run, "tolerance")
     if tolerance is not None:
         for name in ("normal", "tangential"):
@@ -126,22 +136,22 @@ def _notes(run: Run) -> str:
             if column in run.history and rows:
                 above = int(np.sum(run.history[column] > tolerance * (1.0 + 1e-9)))
                 if above:
-                    told.append(f"the {name} residual of {above} of {rows} rows is above the"
+                    notes.append(f"the {name} residual of {above} of {rows} rows is above the"
                                 f" tolerance of {tolerance:g}; the largest is"
                                 f" {np.nanmax(run.history[column]):.3g}")
     if not len(run.snapshots):
-        told.append("the result holds no snapshots: there are no maps")
-    if told:
-        lines = "".join(f"<li>{escape(line)}</li>" for line in told)
+        notes.append("the result holds no snapshots: there are no maps")
+    if notes:
+        lines = "".join(f"<li>{escape(line)}</li>" for line in notes)
         parts.append(f"<p><strong>Warnings</strong></p><ul>{lines}</ul>")
     return "\n".join(f'<div class="note">{part}</div>' for part in parts)
 
 
 def _unfinished(run: Run) -> str:
-    """Return why a run is not finished, as far as the file tells, and what to do."""
-    again = ("<code>asperity run CASE.nml --restart</code> goes on from the last checkpoint.")
+    """Return why a run is not finished, if the file contains that, and what to do."""
+    again = ("<code>asperity run CASE.nml --restart</code> continues from the last checkpoint.")
     if run.outcome != "running":
-        return f"It ended so: {escape(run.outcome)}; {again}"
+        return f"It ended with: {escape(run.outcome)}; {again}"
     quiet = silence(run)
     last = "" if quiet is None else f"The file was last written {short_time(quiet)} before"
     if held(run) is False:
@@ -175,7 +185,7 @@ def _tiles(run: Run) -> str:
 
 
 def _mean_friction(run: Run) -> str:
-    """Return the mean of friction over whole laps, or that there are none."""
+    """Return the mean friction over complete laps, or a remark if there are none."""
     found = steady_mean(run, "friction")
     if not found.laps:
         return ""
@@ -216,7 +226,7 @@ def _sections(run: Run, data: dict[str, Any]) -> list[tuple[str, str, str]]:
 
 
 def _table(caption: str, rows: list[tuple[str, str]]) -> str:
-    """Return a table of names and values, which are HTML already."""
+    """Return a table of names and values, which are already HTML."""
     lines = "\n".join(f'<tr><th scope="row">{name}</th><td>{value}</td></tr>'
                       for name, value in rows)
     return f"<table><caption>{caption}</caption><tbody>\n{lines}\n</tbody></table>"
@@ -247,7 +257,7 @@ def _case(run: Run, data: dict[str, Any]) -> str:
     tables = [_table(name.capitalize(), [(escape(key.replace("_", " ")), escape(value))
                                          for key, value in variables])
               for name, variables in groups if name != "phase"]
-    if not tables:  # an older file
+    if not tables:  # an older file has no settings
         grid = run.grid
         tables.append(_table("Grid", [
             ("cells", f"{grid.nx} × {grid.ny}"),
@@ -263,7 +273,7 @@ def _case(run: Run, data: dict[str, Any]) -> str:
 
 
 def _phases(phases: list[dict[str, str]]) -> str:
-    """Return the table of the phases: what any of them sets."""
+    """Return the table of the phases, with all variables that any of them sets."""
     if not phases:
         return ""
     nothing = ("0", ".false.", "0 s", "0 m/s", "")
@@ -280,7 +290,7 @@ def _phases(phases: list[dict[str, str]]) -> str:
 
 
 def _history(run: Run, data: dict[str, Any]) -> str:
-    """Return the place of the charts of the history."""
+    """Return the section with the charts of the history."""
     rows = data["rows"]
     thinned = "" if rows["shown"] == rows["all"] else (
         f" {rows['shown']} of {rows['all']} rows are drawn, with the extremes of friction and"
@@ -296,19 +306,19 @@ def _history(run: Run, data: dict[str, Any]) -> str:
 
 
 def _maps(run: Run, data: dict[str, Any]) -> str:
-    """Return the slider and the place of the maps."""
+    """Return the section with the maps and their slider."""
     grid, shown = data["grid"], len(data["snapshots"])
-    told = []
+    notes = []
     if grid["block"] > 1:
-        told.append(f"Downsampled for this page: means over blocks of {grid['block']}"
+        notes.append(f"Downsampled for this page: means over blocks of {grid['block']}"
                     f"{'' if run.grid.ny == 1 else ' × ' + str(grid['block'])} cells (of contact"
                     f" the most frequent state), {grid['mx']} × {grid['my']} of"
                     f" {grid['nx']} × {grid['ny']} cells.")
     if shown < data["stored"]:
-        told.append(f"{shown} of {data['stored']} snapshots are on this page.")
+        notes.append(f"{shown} of {data['stored']} snapshots are on this page.")
     if not run.finished:
-        told.append("The run is not finished: these are the snapshots so far.")
-    note = f'<p class="soft">{" ".join(told)}</p>\n' if told else ""
+        notes.append("The run is not finished: these are the snapshots so far.")
+    note = f'<p class="soft">{" ".join(notes)}</p>\n' if notes else ""
     same = "" if run.grid.ny == 1 or shown < 2 else (
         '<label><input type="checkbox" id="same" checked> one colour scale for all steps</label>')
     hidden = " hidden" if shown < 2 else ""
@@ -318,16 +328,16 @@ def _maps(run: Run, data: dict[str, Any]) -> str:
             f'<input type="range" id="step" min="0" max="{shown - 1}" value="{shown - 1}" step="1"'
             f'{hidden}>\n'
             f'<button type="button" id="step-on" aria-label="Step after"{hidden}>▶</button>\n'
-            f'<output id="step-told" for="step"></output>\n{same}\n</div>\n'
+            f'<output id="step-shown" for="step"></output>\n{same}\n</div>\n'
             f'<div class="{kind}" id="maps-place"></div>')
 
 
 def _energies(run: Run) -> str:
-    """Return the books of energy."""
+    """Return the section on the energy balance."""
     missing = closure(run)
     text = ""
     if missing is not None:
-        text = ('<p class="soft">Work put in less stored less lost: at most'
+        text = ('<p class="soft">Work minus stored minus lost energy: at most'
                 f" <strong>{missing.max(initial=0.0):.2g}</strong> of the largest energy so far."
                 "</p>\n")
     error = missing_work(run)
@@ -343,7 +353,7 @@ def _energies(run: Run) -> str:
 
 
 def _convergence(run: Run) -> str:
-    """Return iterations and residuals in words, and the place of their charts."""
+    """Return the section on iterations and residuals."""
     history = run.history
     tolerance = solver_setting(run, "tolerance")
     rows = []
@@ -368,7 +378,7 @@ def _convergence(run: Run) -> str:
 
 
 def _made(run: Run) -> str:
-    """Return program, times, input and settings."""
+    """Return the section on program, times, input and settings."""
     try:
         written = np.datetime64(int(run.path.stat().st_mtime), "s").astype(str) + "Z"
     except OSError:
@@ -378,7 +388,7 @@ def _made(run: Run) -> str:
             ("file", f"<code>{escape(str(run.path))}</code>"),
             ("snapshots", str(len(run.snapshots))), ("rows", str(run.history.rows))]
     settings = str(run.attributes.get("settings", ""))
-    resolved = ("<details><summary>Every setting as it was understood</summary>"
+    resolved = ("<details><summary>All settings, including defaults</summary>"
                 f"<pre>{escape(settings)}</pre></details>" if settings else "")
-    return (f"{_table('Result', rows)}\n<h3>Input, word for word</h3>\n"
+    return (f"{_table('Result', rows)}\n<h3>Input file</h3>\n"
             f"<pre>{escape(run.input)}</pre>\n{resolved}")

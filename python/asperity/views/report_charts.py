@@ -1,4 +1,4 @@
-"""The charts of the report page: which columns they show, with derived ones."""
+"""The charts of the HTML page of a run, and the columns that they show."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ MOST_SNAPSHOTS = 40
 
 
 def charts_of(run: Run) -> tuple[dict[str, FloatArray], list[dict[str, Any]]]:
-    """Return the columns that charts need, derived ones included, and the charts.
+    """Return the columns that the charts need, including derived ones, and the charts.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def charts_of(run: Run) -> tuple[dict[str, FloatArray], list[dict[str, Any]]]:
         Columns by name, shape (rows,), in SI units; each chart with the names of its columns.
     """
     charts = _Charts(run)
-    if run.history.rows >= 2:  # the tables tell a single row
+    if run.history.rows >= 2:  # a single row appears in the tables only
         charts.add_friction()
         charts.add_contact()
         charts.add_energy()
@@ -51,7 +51,7 @@ def charts_of(run: Run) -> tuple[dict[str, FloatArray], list[dict[str, Any]]]:
 
 
 class _Charts:
-    """Charts in the making."""
+    """Collects the charts of a run and their columns."""
 
     def __init__(self, run: Run) -> None:
         self.run = run
@@ -67,7 +67,7 @@ class _Charts:
 
     def series(self, name: str, label: str, colour: int, dash: str = "",
                values: NDArray[Any] | None = None) -> list[dict[str, Any]]:
-        """Return a line of a chart, of a column or of values that become one; nothing else."""
+        """Return a list with the line of a column or of given values; it may be empty."""
         if values is None and name not in self.history:
             return []
         self.columns[name] = np.asarray(self.history[name] if values is None else values)
@@ -75,7 +75,7 @@ class _Charts:
 
     def chart(self, section: str, key: str, title: str, label: str, unit: str,
               lines: list[dict[str, Any]], **more: Any) -> None:
-        """Add a chart, if it has lines."""
+        """Add a chart if it has lines."""
         if lines:
             self.charts.append({"section": section, "id": key, "title": title, "label": label,
                                 "unit": unit, "series": lines, **more})
@@ -119,7 +119,7 @@ class _Charts:
                     *self.series("mean_gap", "mean gap", 1, "6 3")])
 
     def add_energy(self) -> None:
-        """Add work, what is stored and lost, and what the books miss."""
+        """Add work, energies stored and lost, and the error of the balance."""
         terms = energy_terms(self.run)
         names = {"work": ("work put in", 6, ""), "stored": ("stored", 0, ""),
                  "viscous": ("lost in the rubber", 1, "6 3"),
@@ -133,7 +133,7 @@ class _Charts:
         missing = closure(self.run)
         if missing is not None and np.any(missing > 0.0):
             self.chart("energy", "closure", "What the books miss", "Over the largest energy", "1",
-                       self.series("closure", "work less stored less lost", 0, "", missing),
+                       self.series("closure", "work minus stored minus lost", 0, "", missing),
                        log=True)
 
     def add_convergence(self) -> None:

@@ -1,6 +1,6 @@
-"""What the report page shows of a result: columns, charts, downsampled maps, spectra.
+"""The data of the HTML page of a run: columns, charts, downsampled maps, spectra.
 
-All values stay in SI units; the page gives them their prefixes.
+All values are in SI units; the page adds the prefixes.
 """
 
 from __future__ import annotations
@@ -37,17 +37,17 @@ FloatArray = NDArray[np.float64]
 
 
 def page_data(run: Run) -> dict[str, Any]:
-    """Return all that the page's script draws, ready for JSON.
+    """Return all data that the script of the page draws, ready for JSON.
 
     Parameters
     ----------
     run : Run
-        Finished or not, with or without snapshots.
+        The result, which may be unfinished and may have no snapshots.
 
     Returns
     -------
     dict
-        'columns' (the rows kept of the history), 'axes' (what charts may be drawn against),
+        'columns' (the rows of the history that are kept), 'axes' (choices of the horizontal axis),
         'charts', 'grid', 'snapshots', 'spectrum' (of the road), 'maps' (names of the fields).
     """
     rows = kept_rows(run)
@@ -71,11 +71,11 @@ def page_data(run: Run) -> dict[str, Any]:
 
 
 def kept_rows(run: Run) -> NDArray[np.intp]:
-    """Return the rows of the history that the page holds.
+    """Return the rows of the history that the page contains.
 
-    All of them up to `MOST_ROWS`. Of more, of each stretch the rows of the smallest and largest
-    friction and contact area, so that no peak is lost, with the first and the last row and those
-    of snapshots.
+    Up to `MOST_ROWS` these are all rows. A longer history is divided into intervals, and the rows
+    with the smallest and the largest friction and contact area of each interval are kept, so that
+    no peak is lost. The first and the last row, and those of snapshots, are also kept.
     """
     rows = run.history.rows
     if rows <= MOST_ROWS:
@@ -90,14 +90,14 @@ def kept_rows(run: Run) -> NDArray[np.intp]:
 
 
 def _numbers(values: NDArray[Any]) -> list[float | int | None]:
-    """Return values for JSON, which knows neither nan nor infinity, to ten digits."""
+    """Return values for JSON with ten digits; NaN and infinity become None, as JSON has neither."""
     if np.issubdtype(values.dtype, np.integer):
         return [int(value) for value in values]
     return [float(f"{value:.10g}") if np.isfinite(value) else None for value in values.tolist()]
 
 
 def _axes(run: Run, columns: dict[str, FloatArray]) -> list[dict[str, str]]:
-    """Return what the charts may be drawn against, the default first."""
+    """Return the choices of the horizontal axis of the charts; the default is first."""
     named = {"time": ("Time", "s"), "travel": ("Travel of the road", "m"),
              "pressure": ("Mean pressure", "Pa"), "displacement": ("Approach", "m"),
              "step": ("Step", "1")}
@@ -113,7 +113,7 @@ def _axes(run: Run, columns: dict[str, FloatArray]) -> list[dict[str, str]]:
 
 
 def _has_height(run: Run) -> bool:
-    """Whether the file holds the road."""
+    """Return whether the file contains the road."""
     try:
         return run.height.size > 0
     except OSError:
@@ -134,7 +134,7 @@ def _snapshots(run: Run) -> tuple[list[dict[str, Any]], tuple[int, int], int]:
         if len(chosen) * shape[0] * shape[1] * 7 * 4 / 3 <= BUDGET:
             break
     found = [_snapshot(run.snapshots[int(at)], block) for at in chosen]
-    for each in found[1:]:  # a road that rests is on the page once
+    for each in found[1:]:  # a road that does not move is stored once
         if each["fields"].get("road_height") == found[0]["fields"].get("road_height", {}):
             del each["fields"]["road_height"]
     return found, shape, block
@@ -183,18 +183,18 @@ def _snapshot(snapshot: Snapshot, block: int) -> dict[str, Any]:
 
 
 def extremes(field: NDArray[Any]) -> list[float]:
-    """Return the least and the largest of the values that are finite; 0 where none is."""
+    """Return the smallest and the largest finite value, or zeros if there is none."""
     good = field[np.isfinite(field)]
     return [float(good.min()), float(good.max())] if good.size else [0.0, 0.0]
 
 
 def faulty(run: Run) -> list[str]:
-    """Return which columns of the history and which fields hold what is no number."""
-    told = []
+    """Return messages about columns of the history and fields that contain NaN or infinity."""
+    notes = []
     for name, column in run.history.items():
         count = int(np.sum(~np.isfinite(column)))
         if count:
-            told.append(f"{name} is not finite in {count} of {len(column)} rows")
+            notes.append(f"{name} is not finite in {count} of {len(column)} rows")
     if len(run.snapshots):
         snapshot = run.snapshots[-1]
         for name in ("pressure", "gap"):
@@ -202,12 +202,12 @@ def faulty(run: Run) -> list[str]:
                 continue
             count = int(np.sum(~np.isfinite(snapshot[name])))
             if count:
-                told.append(f"{name} of the last snapshot is not finite in {count} cells")
-    return told
+                notes.append(f"{name} of the last snapshot is not finite in {count} cells")
+    return notes
 
 
 def blocks(field: NDArray[Any], block: int) -> FloatArray:
-    """Return the means over square blocks of cells; those at the upper edges may be cut.
+    """Return the means over square blocks of cells; blocks at the upper edges may be smaller.
 
     Examples
     --------
@@ -222,7 +222,7 @@ def blocks(field: NDArray[Any], block: int) -> FloatArray:
 
 
 def states(contact: NDArray[Any], block: int) -> NDArray[np.uint8]:
-    """Return the most frequent state of each block of cells; of equals the higher one."""
+    """Return the most frequent state of each block of cells; the higher one in a tie."""
     if block == 1:
         return np.asarray(contact, dtype=np.uint8)
     counts = np.array([_sums((contact == state).astype(float), block) for state in range(3)])
@@ -239,7 +239,7 @@ def _sums(field: FloatArray, block: int) -> FloatArray:
 def packed(field: FloatArray) -> dict[str, Any]:
     """Return a field as 16-bit integers between its extremes, in base 64.
 
-    Cells that are not finite are given the least value; `faulty` tells of them.
+    Cells that are not finite get the smallest value; `faulty` reports them.
     """
     finite = np.isfinite(field)
     if not finite.all():
@@ -272,14 +272,14 @@ def _spectrum(run: Run, field: FloatArray) -> dict[str, Any] | None:
     kept = total > 0
     means = [np.bincount(number, modes * values, SPECTRUM_POINTS)[kept] / total[kept]
              for values in (wave, density)]
-    # What round-off leaves where there are no waves would stretch the axis over twenty decades.
+    # Round-off at wave numbers without waves would stretch the axis over twenty decades.
     floor = 1e-16 * means[1].max()
     shown = means[1] > floor
     return {"k": _numbers(means[0][shown]), "psd": _numbers(means[1][shown])}
 
 
 def _modulus(run: Run) -> dict[str, Any] | None:
-    """Return storage and loss modulus against frequency, where the material has arms."""
+    """Return storage and loss modulus against frequency, or None if the material has no arms."""
     arms = np.atleast_1d(run.material.get("prony_g", np.zeros(0)))
     times = np.atleast_1d(run.material.get("prony_tau", np.zeros(0)))
     if not len(arms) or len(arms) != len(times) or not np.any(arms):
@@ -293,7 +293,7 @@ def _modulus(run: Run) -> dict[str, Any] | None:
 
 
 def phase_names(run: Run) -> list[str]:
-    """Return the names of the phases as the resolved settings tell them."""
+    """Return the names of the phases in the resolved settings."""
     text = str(run.attributes.get("settings", ""))
     return [(re.search(r"(?m)^\s*name = '(.*)'", body) or ["", ""])[1]
             for body in re.findall(r"(?ms)^&phase\b(.*?)^/", text)]

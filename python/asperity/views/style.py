@@ -1,4 +1,4 @@
-"""What all pictures share: colours, short names, units with SI prefixes, sizes for print."""
+"""The common style of all pictures: colours, short names, SI prefixes, sizes for print."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NO_CONTACT, STICK, SLIP = "#e8e8e8", "#0072B2", "#E69F00"
 PREFIXES = {-18: "a", -15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M",
             9: "G", 12: "T"}
 
-# Widths of the columns of a journal, inches (89 and 183 mm), and the letters that go with them.
+# Widths of the columns of a journal, inches (89 and 183 mm), and suitable sizes of text and lines.
 SINGLE_COLUMN, DOUBLE_COLUMN = 3.5, 7.2
 PRINT: dict[str, Any] = {
     "font.size": 8.0, "axes.titlesize": 8.0, "axes.labelsize": 8.0, "legend.fontsize": 7.0,
@@ -31,7 +31,7 @@ PRINT: dict[str, Any] = {
     "xtick.major.width": 0.6, "ytick.major.width": 0.6, "figure.dpi": 150, "savefig.dpi": 300,
 }
 
-# Short names for the axes; other columns and fields show their long name.
+# Short names for the axes. Other columns and fields appear with their long name.
 LABELS = {
     "time": "Time",
     "pressure": "Pressure",
@@ -85,7 +85,7 @@ LABELS = {
 
 
 def check_picture(path: Path | None) -> None:
-    """Raise ValueError unless matplotlib can write a picture of this ending; None is fine."""
+    """Raise ValueError if matplotlib cannot write a file with this ending; None is accepted."""
     from matplotlib.backend_bases import FigureCanvasBase
 
     if path and path.suffix[1:].lower() not in FigureCanvasBase.get_supported_filetypes():
@@ -94,19 +94,19 @@ def check_picture(path: Path | None) -> None:
 
 
 def si_scale(values: ArrayLike, units: str) -> tuple[float, str]:
-    """Return the factor and the prefixed unit that show values with up to three digits.
+    """Return the factor and the prefixed unit with which values have up to three digits.
 
     Parameters
     ----------
     values : array_like
         Values in SI units, of any shape.
     units : str
-        Their unit; '1' for pure numbers, which get no prefix.
+        Their unit, or '1' for pure numbers, which get no prefix.
 
     Returns
     -------
     factor : float
-        Multiply the values by it.
+        Factor by which the values are to be multiplied.
     unit : str
         The prefixed unit.
 
@@ -130,10 +130,10 @@ def si_scale(values: ArrayLike, units: str) -> tuple[float, str]:
     largest = float(finite.max(initial=0.0))
     if largest == 0.0:
         return 1.0, units
-    # A value that rounds up to 1000 of a prefix takes the next one.
+    # A value that would be rounded to 1000 uses the next prefix.
     exponent = 3 * int(np.floor(np.log10(largest * (1.0 + 1e-9)) / 3.0))
     exponent = min(exponent, 0 if units == "s" else max(PREFIXES))
-    # What is smaller than all prefixes is round-off mostly.
+    # Values below all prefixes are mostly round-off.
     if (not re.fullmatch(r"[A-Za-z]+(/s)?", units) or units == "kg"
             or exponent < min(PREFIXES)):
         return 1.0, units
@@ -141,7 +141,7 @@ def si_scale(values: ArrayLike, units: str) -> tuple[float, str]:
 
 
 def label_of(name: str, names: Any) -> str:
-    """Return the short name of a column or field; `names.long_name` tells those without one."""
+    """Return the short name of a column or field, or else its long name, `names.long_name`."""
     return LABELS.get(name) or sentence(names.long_name(name))
 
 
@@ -171,7 +171,7 @@ def when(snapshot: Snapshot) -> str:
 
 
 def scale_limit(values: NDArray[Any]) -> float:
-    """Return the end of a colour scale: the largest value unless a few cells stand far out."""
+    """Return the end of a colour scale: the largest value, but without a few extreme cells."""
     if values.size == 0:
         return 1.0
     largest, most = float(values.max()), float(np.percentile(values, 99.5))
@@ -181,7 +181,7 @@ def scale_limit(values: NDArray[Any]) -> float:
 
 
 def typical_value(field: NDArray[Any]) -> float:
-    """Return the value that sets the prefix of a colour bar."""
+    """Return the value that determines the prefix of a colour bar."""
     positive = np.abs(field[np.nonzero(field)])
     return scale_limit(positive) if positive.size else 0.0
 

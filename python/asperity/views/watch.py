@@ -114,27 +114,27 @@ def state_of(run: Run, pace: Pace) -> str:
     """Return how far a run is, in words."""
     rows, expected = run.history.rows, int(run.attributes.get("expected_rows", 0) or 0)
     of = f" of {expected}" if expected else ""
-    told = [f"finished, {rows}{of} rows" if run.finished else rows_of(run)]
+    words = [f"finished, {rows}{of} rows" if run.finished else rows_of(run)]
     if run.finished:
-        return told[0]
+        return words[0]
     if expected:
-        told[0] += f" ({100 * rows // expected} %)"
+        words[0] += f" ({100 * rows // expected} %)"
     if run.outcome != "running":
-        return f"{told[0]}, {run.outcome}"
+        return f"{words[0]}, {run.outcome}"
     rate = pace.rate
     if rate:
-        told.append(f"{rate:.3g} rows/s")
+        words.append(f"{rate:.3g} rows/s")
         if expected > rows:
-            told.append(f"{duration((expected - rows) / rate)} left")
+            words.append(f"{duration((expected - rows) / rate)} left")
     quiet = max(pace.still, silence(run) or 0.0)
     if quiet >= 10.0:
-        told.append(f"no new row for {duration(quiet)}")
+        words.append(f"no new row for {duration(quiet)}")
     if held(run) is False:
-        told.append("its process has ended (--restart goes on from the last checkpoint)")
+        words.append("its process has ended (--restart continues from the last checkpoint)")
     elif seems_dead(run):
-        told[-1] += (f" where a row takes up to {short_time(time_of_row(run) or 0.0)}: perhaps no"
-                     " longer running (--restart goes on from the last checkpoint)")
-    return ", ".join(told)
+        words[-1] += (f" where a row takes up to {short_time(time_of_row(run) or 0.0)}: perhaps no"
+                     " longer running (--restart continues from the last checkpoint)")
+    return ", ".join(words)
 
 
 def last_row(run: Run) -> str:
@@ -142,15 +142,15 @@ def last_row(run: Run) -> str:
     history = run.history
     if not history.rows:
         return "no row yet"
-    told = []
+    words = []
     for name, short in (("step", "step"), ("time", "t ="), ("contact_area", "contact area"),
                         ("stick_area", "stick area"), ("friction", "friction"),
                         ("iterations_normal", "iterations"), ("residual_normal", "residual")):
         if name not in history or (name == "stick_area" and not np.any(history[name])):
             continue
         factor, unit = si_scale(history[name][-1], history.units(name))
-        told.append(f"{short} {history[name][-1] * factor:.4g}{' ' + unit if unit else ''}")
-    return ", ".join(told)
+        words.append(f"{short} {history[name][-1] * factor:.4g}{' ' + unit if unit else ''}")
+    return ", ".join(words)
 
 
 def picture(run: Run, pace: Pace, width: int, unicode: bool = True) -> list[str]:
@@ -208,7 +208,7 @@ def watch(path: str | os.PathLike[str], *, every: float = 1.0, once: bool = Fals
     unicode = encoding.startswith("utf") and not _posix_locale()
     pace = Pace()
     drawn: list[str] = []
-    told: Any = None
+    words: Any = None
     try:
         run = Run(Path(path))
         while True:
@@ -223,10 +223,10 @@ def watch(path: str | os.PathLike[str], *, every: float = 1.0, once: bool = Fals
                 else:
                     out.write("\n".join(lines) + "\n")
                 drawn = lines
-            elif (now := _news(run)) != told:
+            elif (now := _news(run)) != words:
                 line = f"{state_of(run, pace)}: {last_row(run)}\n"
                 out.write(line if unicode else _ascii(line))
-                told = now
+                words = now
             out.flush()
             if run.finished or once or run.outcome != "running":
                 return 0

@@ -211,7 +211,7 @@ function modulus() {
 function snapshots(show) {
   const slider = document.getElementById("step");
   if (!slider) return;
-  const told = document.getElementById("step-told");
+  const label = document.getElementById("step-shown");
   slider.max = data.snapshots.length - 1;
   slider.value = slider.max;
   const set = () => {
@@ -221,8 +221,8 @@ function snapshots(show) {
       words.push(`pressure ${shown(snapshot.pressure, "Pa")}`);
     }
     if (snapshot.friction) words.push(`friction ${digits(snapshot.friction)}`);
-    told.textContent = words.join(", ");
-    slider.setAttribute("aria-valuetext", told.textContent);
+    label.textContent = words.join(", ");
+    slider.setAttribute("aria-valuetext", label.textContent);
     for (const act of show) act(snapshot);
   };
   slider.addEventListener("input", set);
