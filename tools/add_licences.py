@@ -31,7 +31,7 @@ BUILT = {"libhdf5": ("hdf5", "hdf5"), "libfftw3": ("fftw3", "fftw3")}  # licence
 
 
 def output_of(*words):
-    """Return what a command prints; None where it fails or is not there."""
+    """Return the output of a command, or None if it fails or does not exist."""
     try:
         done = subprocess.run(words, capture_output=True, text=True)
     except FileNotFoundError:
@@ -40,7 +40,7 @@ def output_of(*words):
 
 
 def package_of(library):
-    """Return name, version and licence texts of what holds a library, named as auditwheel does."""
+    """Return name, version and licence texts of a library that auditwheel has renamed."""
     original = re.sub(r"-[0-9a-f]{8}(?=\.)", "", library)
     prefix = Path(os.environ.get("ASPERITY_LIBRARIES") or "/nowhere")
     if (prefix / "lib" / original).exists():

@@ -1,18 +1,18 @@
-"""Try the program with what nobody thought of: random problems, broken inputs, flips, kills.
+"""Try the program on random problems, damaged inputs and files, and killed processes.
 
     python tools/campaign.py --minutes 60 [--seed 1] [--keep FOLDER] [KIND ...]
     python tools/campaign.py --seed 17 --trials 1 flips
 
 Kinds: problems, runs, inputs, flips, kills, twins, memory; without a name all of them in turn.
-Every trial has its own seed, which is printed where something is wrong; `--seed N --trials 1 KIND`
-repeats it. A trial that fails keeps its files in a folder that is named. At the end a table says
-how many trials of each kind there were and how they came out, and the exit status is 1 if any
-failed. The trials are not part of the tests: these hold what the campaigns have found.
+Every trial has its own seed, which is printed if the trial fails; `--seed N --trials 1 KIND`
+repeats it. The files of a failed trial are kept, and their folder is printed. At the end a table
+shows the number of trials of each kind and their outcomes, and the exit status is 1 if any failed.
+The trials are not part of the tests, but the tests contain the failures that they have found.
 
-What must hold:
+These conditions must hold:
 
 problems  pressures of `solve_normal` satisfy the contact conditions, with displacements by NumPy
-runs      random cases end with status 0 or 4; the books of energy close; numbers are finite
+runs      random cases end with status 0 or 4; the energy balance closes; numbers are finite
 inputs    damaged inputs end with status 0, 2, 3 or 4 and a message
 flips     no damaged checkpoint is continued; damaged results and maps never crash the program
 kills     a run that is killed or stopped again and again gives the numbers of one that was not
@@ -43,11 +43,11 @@ import asperity
 TIMES = {"seconds"}
 CRASHES = ("Backtrace", "Fortran runtime", "SIGSEGV", "HDF5-DIAG", "libgomp:", "terminate called")
 PATIENCE = 300.0
-ANSWER = 30.0  # most seconds from SIGTERM to the end of a run
+ANSWER = 30.0  # longest time from SIGTERM to the end of a run, s
 
 
 class Wrong(Exception):  # noqa: N818 - an outcome, not an error of the script
-    """A trial that did not come out as it must."""
+    """A trial that violated a condition."""
 
 
 def program():
@@ -58,7 +58,7 @@ def program():
 
 
 def run_or_stop(command, stop_after, **options):
-    """Run a command; where it takes longer than some seconds, send SIGTERM and wait for the end."""
+    """Run a command; send SIGTERM after some seconds, and wait for the end."""
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **options)
     try:
         outputs = process.communicate(timeout=stop_after)
@@ -104,7 +104,7 @@ def contents(path):
 
 
 def same(path, reference):
-    """Both results hold the same bits."""
+    """Raise Wrong if two results differ in any bit."""
     found, wanted = contents(path), contents(reference)
     if found.keys() != wanted.keys():
         raise Wrong(f"{path.name} holds other things than a run without a stop")
@@ -231,7 +231,7 @@ def try_problem(chance, folder):
 
 
 def try_run(chance, folder):
-    """Run a random case: numbers must be finite and the books of energy closed."""
+    """Run a random case: numbers must be finite, and the energy balance closed."""
     (folder / "case.nml").write_text(random_case(chance))
     done = call("run", "case.nml", "--quiet", cwd=folder, statuses=(0, 4))
     with h5py.File(folder / "case.h5") as file:
@@ -248,7 +248,7 @@ def try_run(chance, folder):
     work = history["work_normal"] + history["work_tangential"]
     kept = (history["energy_elastic"] + history["energy_adhesive"] + history["energy_kinetic"]
             + history["dissipated_viscous"] + history["dissipated_friction"])
-    # What the first state costs with adhesion is a constant of the books.
+    # With adhesion, the energy of the first state is a constant in the balance.
     miss = np.abs((work - kept) - (work - kept)[0]).max()
     scale = max(np.abs(work).max(), np.abs(history["energy_elastic"]).max(), 1e-300)
     if miss > 1e-3 * scale:
@@ -257,7 +257,7 @@ def try_run(chance, folder):
 
 
 def try_input(chance, folder):
-    """Try an input with letters, words or lines changed, lost or doubled."""
+    """Try an input in which letters, words or lines are changed, lost or doubled."""
     text = bytearray(random_case(chance).encode())
     words = [b"NaN", b"-1", b"1e999", b"0", b"''", b"&", b"/", b"=", b"2147483648", b"1e-320",
              b"'", b"\n", b"\x00", b"\xff", b"*", b"9" * 400, b"&phase", b"!"]
@@ -365,7 +365,7 @@ def try_flip(chance, folder):
 
 
 def try_kill(chance, folder):
-    """Kill and stop a run again and again, and compare with one that went through."""
+    """Kill and stop a run again and again, and compare it with an uninterrupted run."""
     text = random_case(chance, rows=30, largest=28)
     for name in ("case", "whole"):
         (folder / f"{name}.nml").write_text(text)
@@ -387,7 +387,7 @@ def try_kill(chance, folder):
         message = process.communicate(timeout=PATIENCE)[1].decode(errors="replace")
         if process.returncode == 0:
             break
-        # Before the handlers are in place the system itself ends the run.
+        # Before the handlers are installed, the system ends the run.
         if number is None or process.returncode not in (-number, 128 + number):
             raise Wrong(f"{restart}: status {process.returncode}: {message[-300:]}")
     same(result, folder / "whole.h5")

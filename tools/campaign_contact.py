@@ -1,4 +1,4 @@
-"""Random contact problems, to be run by hand: what does not converge, and what small contacts cost.
+"""Solve random contact problems: find those that do not converge, and errors of small contacts.
 
 python tools/campaign_contact.py normal 200000      grids of up to 256 cells, all controls
 python tools/campaign_contact.py extreme 2000       tiny loads, displacements beyond full contact
@@ -88,7 +88,7 @@ def extreme_problem(rng, adhesive):
 
 
 def campaign(problems, solve):
-    """Solve all; print what did not converge."""
+    """Solve all problems, and print those that did not converge."""
     failures, iterations = Counter(), []
     for problem in problems:
         try:
@@ -129,7 +129,7 @@ def sizes():
 
 
 def main():
-    """Run the campaign that was asked for."""
+    """Run the chosen campaign."""
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("what", choices=["normal", "extreme", "sizes"])

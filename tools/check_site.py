@@ -2,9 +2,9 @@
 
     python tools/check_site.py build/site
 
-Exit status 1 and one line a fault where something is missing, or a page fetches a script, a style
-or a picture from elsewhere. Links to elsewhere are not followed.
-FORD misses anchors of its own for generic interfaces: of its pages only the files are checked.
+The exit status is 1, with one line per fault, if something is missing or if a page loads a script,
+a style or a picture from the network. Links to other sites are not followed. Only the files of
+FORD's pages are checked, because FORD lacks some anchors for generic interfaces.
 """
 
 import sys

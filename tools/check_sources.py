@@ -1,9 +1,9 @@
 """Check that meson.build names every source that fpm finds, and every file of the package.
 
-Neither build sees that a file which a source includes has changed. So the line of the include holds
-the state of that file, a check sum, and changes with it.
+Neither build notices a change of a file that a source includes. The line of the include therefore
+contains a checksum of that file, and changes with it.
 
-With --update, write the lists of meson.build and the states anew.
+With --update, the lists of meson.build and the checksums are corrected.
 """
 
 import hashlib
@@ -48,7 +48,7 @@ if "--update" in sys.argv[1:]:
     build.write_text(text)
     faults = []
 
-# One module a file, of the same name: that is how readers find it.
+# Each file has one module of the same name, so that readers find it.
 for name in lists["sources = files"]:
     modules = re.findall(r"(?mi)^ *module +(?!procedure\b)(\w+) *$", (root / name).read_text())
     if modules != [Path(name).stem]:

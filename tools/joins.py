@@ -1,4 +1,4 @@
-"""Compare methods that make a patch of a road periodic: what load the join carries.
+"""Compare methods that make a patch of a road periodic, by the load that the join carries.
 
 Patches are cut from larger random roads as `asperity.roads.patches.MeasuredRoad` does it, and
 made periodic by each method; `blend_mean` is `blend` with each patch levelled by its mean plane
@@ -25,7 +25,7 @@ from asperity.roads.patches import MeasuredRoad, low_pass
 from asperity.roads.spectra import Spectrum
 
 METHODS = ("seam", "mirror", "blend", "blend_mean", "smooth", "window")
-TIMES = 4               # sides of a patch in the side of a road
+TIMES = 4               # side of a road over the side of a patch
 
 
 def self_affine(cells: int, longest: float, seed: int) -> np.ndarray:
@@ -75,7 +75,7 @@ def solve(height: np.ndarray, lx: float, ly: float, pressure: float) -> asperity
 
 
 def main() -> None:
-    """Solve and print."""
+    """Solve the contacts and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--cells", type=int, default=128, help="of a side of a patch")
     parser.add_argument("--patches", type=int, default=24, help="of each kind of road")

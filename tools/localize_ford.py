@@ -1,10 +1,10 @@
-"""Let FORD's pages stand alone: what they fetch from the network is taken from here.
+"""Make FORD's pages independent of the network by adding the files that they load from it.
 
     python tools/localize_ford.py build/fortran/fortran
 
 Bootstrap, with which the pages are laid out, is that of the Python package mkdocs (MIT licence).
-MathJax is left out: the comments of the sources hold no TeX. Wide tables scroll on small screens.
-tools/check_site.py sees whether a page still fetches something.
+MathJax is left out, because the comments of the sources contain no TeX. Wide tables scroll on small
+screens. tools/check_site.py finds pages that still load something from the network.
 """
 
 import re

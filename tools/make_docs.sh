@@ -19,7 +19,7 @@ if grep -i warning build/ford.log; then
 fi
 python tools/localize_ford.py build/fortran/fortran
 python -m sphinx -q -W --keep-going -j auto -c docs -d build/doctrees . build/site
-# Who opens the folder itself is led to the first page.
+# Redirect from the folder itself to the first page.
 cat >build/site/index.html <<'EOF'
 <!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>Asperity</title>

@@ -1,4 +1,4 @@
-"""Write what type checkers, editors and a page know of the input and of the history.
+"""Write the types of the input and of the history for type checkers, and a table for the docs.
 
     python tools/make_types.py            writes the files
     python tools/make_types.py --check    ends with status 1 if they are not what they should be

@@ -1,6 +1,6 @@
-"""For FORD: stars in comments are stars, as in E* and T*, not emphasis (a Markdown extension).
+"""Markdown extension for FORD, with which stars in comments, as in E* and T*, are not emphasis.
 
-The names of its method and function are those that Markdown calls.
+Markdown calls the method and the function by their names.
 """
 
 from markdown.extensions import Extension
@@ -10,10 +10,10 @@ class PlainStars(Extension):
     """Markdown without emphasis by stars."""
 
     def extendMarkdown(self, md):  # noqa: N802
-        """Take the pattern out."""
+        """Remove the pattern of emphasis."""
         md.inlinePatterns.deregister("em_strong")
 
 
 def makeExtension(**options):  # noqa: N802
-    """Return the extension, as Markdown asks for it."""
+    """Return the extension for Markdown."""
     return PlainStars(**options)

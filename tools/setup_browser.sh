@@ -1,5 +1,5 @@
-# Sourced by test.sh after tools/setup.sh: installs Debian's Chromium, in which the pages of
-# `python -m asperity report` are tried. Where it can't be had those tests are left out.
+# Sourced by test.sh after tools/setup.sh. Installs Debian's Chromium, in which tests open the pages
+# of `python -m asperity report`. If it cannot be installed, these tests are left out.
 if ! command -v chromedriver >/dev/null 2>&1 && command -v apt-get >/dev/null 2>&1; then
   sudo=
   [ "$(id -u)" = 0 ] || sudo=sudo

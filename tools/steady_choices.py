@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Print what mesh and patches do to a curve of steady friction, for docs/choosing.md.
+"""Print how mesh and patches affect a curve of steady friction, for docs/choosing.md.
 
     . tools/setup.sh && . tools/install_editable.sh
     python tools/steady_choices.py [--time]
@@ -85,7 +85,7 @@ def compare_in_time(folder: Path) -> None:
 
 
 def main() -> None:
-    """Run and print."""
+    """Run the cases and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--time", action="store_true", help="compare with a run in time")
     chosen = parser.parse_args()

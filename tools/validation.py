@@ -3,7 +3,8 @@
     python tools/validation.py [NAME ...]
 
 Each case runs the program and is compared with a known solution of `asperity.theory` or with a
-figure of the literature. With names, only those chapters are run and drawn; the page needs all.
+value of the literature. If names are given, only those chapters are run and drawn, and the page is
+not written.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass
 class Row:
-    """One comparison: what, our value, the reference, and what the error is measured against."""
+    """One comparison: the quantity, our value, the reference and the units."""
 
     what: str
     value: float
@@ -79,7 +80,7 @@ class Chapter:
 
 
 def run(text: str) -> asperity.result.Run:
-    """Run a case given as text; the result stays open in a folder that is removed at the end."""
+    """Run a case given as text, in a temporary folder that is removed at the end."""
     folder = Path(tempfile.mkdtemp(dir=run.folder))
     case = folder / "case.nml"
     case.write_text(text)
@@ -129,9 +130,10 @@ def hertz() -> Chapter:
     right.legend()
     return Chapter(
         "Hertz: a sphere on an elastic half-space",
-        "E\\* = 344.828 MPa, R = 50 mm, F = 9.19540 N: a contact radius of 1 mm. Free boundary,"
-        f" 256 x 256 cells, {cells[-1]:.0f} over the contact; a paraboloid, as in the theory."
-        " The contact radius is that of the cells in contact, sqrt(area/pi).",
+        "E\\* = 344.828 MPa, R = 50 mm and F = 9.19540 N give a contact radius of 1 mm. The"
+        f" boundary is free, on a mesh of 256 x 256 cells with {cells[-1]:.0f} over the contact."
+        " The surface is a paraboloid, as in the theory. The contact radius is that of the cells"
+        " in contact, sqrt(area/pi).",
         [Row("approach", result.history["displacement"][-1] * 1e3, known.approach * 1e3, "mm"),
          Row("peak pressure", snapshot.pressure.max() / 1e6, known.peak_pressure / 1e6, "MPa"),
          Row("contact radius", math.sqrt(area / math.pi) * 1e3, known.contact_radius * 1e3, "mm")],
@@ -176,13 +178,14 @@ def westergaard() -> Chapter:
     right.legend(title="lines: theory")
     return Chapter(
         "Westergaard: a wave on an elastic half-space",
-        "Plane strain, 1024 cells a wave, E\\* = 1 MPa, amplitude 1 µm, wavelength 1 mm;"
-        " p\\* = pi E\\* D/L closes the gap. The contact fraction counts cells: one is 0.001.",
+        "Plane strain, 1024 cells per wave, E\\* = 1 MPa, amplitude 1 µm, wavelength 1 mm. The gap"
+        " closes at p\\* = pi E\\* D/L. The contact fraction is obtained by counting cells; one"
+        " cell is 0.001.",
         rows, finish(figure, "westergaard.png"), "Contact fraction against load; pressure.")
 
 
 def lee_radok() -> Chapter:
-    """Hold a sphere under a step of load on a viscoelastic half-space."""
+    """Compare creep under a sphere after a step of the load."""
     radius, force = 1e-3, 0.02e-3
     solids = {
         "one branch": (Prony.from_zener(0.0, [1e6], [1e5], [1e5]),
@@ -224,10 +227,11 @@ def lee_radok() -> Chapter:
     right.legend()
     return Chapter(
         "Lee and Radok: creep under a sphere",
-        "Bugnicourt (thesis, INSA Lyon 2017, section 2.2.1): R = 1 mm, F = 0.02 mN, G0 = 1 MPa,"
-        " G1 = 0.1 MPa, creep time 1 s; and a Prony series of four arms from 1 ms to 1 s."
-        " 128 x 128 cells, free boundary, `exponential2`, steps that grow from phase to phase: the"
-        " first ones of a phase are the coarsest beside the relaxation in hand.",
+        "The case is that of Bugnicourt (thesis, INSA Lyon 2017, section 2.2.1): R = 1 mm, F ="
+        " 0.02 mN, G0 = 1 MPa, G1 = 0.1 MPa, creep time 1 s. A second material is a Prony series"
+        " of four arms from 1 ms to 1 s. The mesh has 128 x 128 cells and a free boundary; the"
+        " scheme is `exponential2`. The steps grow from phase to phase, so that the first steps of"
+        " a phase are the coarsest compared with the relaxation that goes on at that time.",
         rows, finish(figure, "lee_radok.png"), "Contact radius and error of the approach in time.")
 
 
@@ -256,8 +260,8 @@ def lee_radok_order() -> Chapter:
     axes.legend()
     return Chapter(
         "Orders in time",
-        "The sphere of Lee and Radok at 0.4 s on one mesh, against 512 steps of `exponential2`, so"
-        " that the error of the mesh cancels.\n\n"
+        "The sphere of Lee and Radok at 0.4 s, compared with 512 steps of `exponential2` on the"
+        " same mesh, so that the error of the mesh cancels.\n\n"
         "| scheme | order | error at 16 steps |\n| --- | --- | --- |\n" + "\n".join(lines),
         [], finish(figure, "orders.png"), "Error in time of the three schemes.")
 
@@ -307,9 +311,10 @@ def hunter() -> Chapter:
     right.legend(title="lines: theory")
     return Chapter(
         "Hunter: a cylinder sliding on a viscoelastic half-space",
-        "R = 10 mm, 50 N/m, G0 = 2.75 MPa, G0/G1 = 9, creep time 10 ms. One cell a step, 100 cells"
-        " over the contact, `exponential2`, plane strain in a periodic cell of 41 contact widths:"
-        " its images take part as 1/L^2: that is left at 100 mm/s.",
+        "R = 10 mm, 50 N/m, G0 = 2.75 MPa, G0/G1 = 9, creep time 10 ms. The road moves by one"
+        " cell per step, with 100 cells over the contact; the scheme is `exponential2`. The case"
+        " is in plane strain in a periodic cell of 41 contact widths. The periodic images cause an"
+        " error of the order 1/L^2, which explains the difference at 100 mm/s.",
         rows, finish(figure, "hunter.png"), "Friction against speed; pressure.")
 
 
@@ -357,14 +362,14 @@ def waves() -> Chapter:
     axes.legend(title="circles: Asperity")
     return Chapter(
         "Waves in full contact: start-up and steady sliding",
-        "Three waves of different directions on a grid of oblong cells, two arms, from rest; the"
-        " road moves obliquely at 30 and -24 mm/s or along y at 24 mm/s, in whole cells a step. In"
-        " steady sliding each wave adds the stress q^2 D^2 E''(q.V)/4 along q.",
+        "Three waves of different directions on a grid of oblong cells, with two arms, start from"
+        " rest. The road moves obliquely at 30 and -24 mm/s, or along y at 24 mm/s, by whole cells"
+        " per step. In steady sliding each wave adds the stress q^2 D^2 E''(q.V)/4 along q.",
         rows, finish(figure, "waves.png"), "Friction stress after the start.")
 
 
 def adhesion() -> Chapter:
-    """Hold adhesive spheres against Maugis and JKR."""
+    """Compare adhesive spheres with Maugis and JKR."""
     radius, force, energy, modulus, cells = 1.0, 1e-5, 3.2e-5, 1.48, 256
     reach = (radius * (energy / modulus) ** 2) ** (1 / 3)        # range for a Tabor parameter of 1
     tabor = np.array([0.1, 0.3, 0.6, 1.0, 3.0, 5.0])
@@ -421,16 +426,17 @@ def adhesion() -> Chapter:
     axes.legend()
     return Chapter(
         "Maugis and JKR: adhesive spheres",
-        "The sphere of the thesis's figure 1.7: R = 1 m, F = 10 µN, work of adhesion 32 µJ/m²,"
-        f" E\\* = 1.48 Pa. Free boundary, {cells} x {cells} cells. The contact radius is that of"
-        " the cells in contact. Maugis's theory is that of the Maugis-Dugdale potential; the"
-        " exponential one must meet JKR at large Tabor parameters. Then the same sphere is drawn"
-        " off by its displacement, on coarse grids: the largest pull is not held by the cells.",
+        "The sphere is that of the thesis, figure 1.7: R = 1 m, F = 10 µN, work of adhesion 32"
+        f" µJ/m², E\\* = 1.48 Pa, with a free boundary and {cells} x {cells} cells. The contact"
+        " radius is that of the cells in contact. Maugis's theory describes the Maugis-Dugdale"
+        " potential; the exponential potential must approach JKR at large Tabor parameters. The"
+        " last rows are the largest pull when the same sphere is pulled off by its displacement on"
+        " coarse grids, which must not depend on the cells.",
         rows, finish(figure, "maugis.png"), "Contact radius against the Tabor parameter.")
 
 
 def mindlin() -> Chapter:
-    """Hold a sphere moved sideways, there and back, against Cattaneo and Mindlin."""
+    """Compare a sphere that is moved there and back with Cattaneo and Mindlin."""
     case = asperity.Case.read(EXAMPLES / "mindlin" / "input.nml")
     result = run(str(case))
     history, load = result.history, case.phase[0].force
@@ -457,15 +463,16 @@ def mindlin() -> Chapter:
     axes.legend()
     return Chapter(
         "Cattaneo and Mindlin: a sphere moved sideways",
-        "Pressed, moved to nine tenths of the way to full sliding, back as far on the other side,"
-        " and there again: R = 50 mm, G = 200 MPa, ν = 0, where the theory is exact, µ = 0.4."
-        " Free boundary, 128 x 128 cells, 107 over the contact. The stick radius counts cells."
-        " [Other Poisson ratios](../examples/mindlin/README.md).",
+        "A sphere is pressed, moved to nine tenths of the displacement at full sliding, moved"
+        " back as far to the other side, and moved forward again: R = 50 mm, G = 200 MPa, ν = 0,"
+        " for which the theory is exact, µ = 0.4. The boundary is free, with 128 x 128 cells, 107"
+        " of them over the contact. The stick radius is obtained by counting cells. A study has"
+        " [other Poisson ratios](../examples/mindlin/README.md).",
         rows, finish(figure, "mindlin.png"), "Tangential force against the shift.")
 
 
 def cylinder() -> Chapter:
-    """Hold a cylinder that slides with friction and slope against Hunter's pressure."""
+    """Compare a cylinder that slides with friction on the slope with Hunter's pressure."""
     rows = []
     steady = theory.hunter(10e-3, 100.0, 0.11, Prony(0.333e6, [3e6], [1.11e-3]))
     for name, slope in (("no friction", None), ("µ = 1.5, without slope", False),
@@ -481,15 +488,16 @@ def cylinder() -> Chapter:
                         100.0 * run(str(case)).history["friction"][-1], known, "N/m"))
     return Chapter(
         "A cylinder with friction, on the true slope",
-        "The case of the thesis's section 3.5.1: R = 10 mm, 100 N/m, 110 mm/s, a spring of 0.333"
-        " MPa and an arm of 3 MPa and 1.11 ms. The reference is the bound of the friction law on"
-        " the arc under Hunter's pressure. The thesis has 4.5, 154 and 165 N/m, its finite"
-        " elements 168 for the last. Plane strain, 2048 cells over 24 mm, whose images leave 0.6"
-        " % of the viscous part. [The study](../examples/cylinder_friction/README.md).", rows)
+        "The case is that of the thesis, section 3.5.1: R = 10 mm, 100 N/m, 110 mm/s, a spring of"
+        " 0.333 MPa and an arm of 3 MPa and 1.11 ms. The reference is the bound of the friction"
+        " law on the arc under Hunter's pressure. The thesis has 4.5, 154 and 165 N/m, and its"
+        " finite elements 168 N/m for the last. The case is in plane strain, with 2048 cells over"
+        " 24 mm; the periodic images change the viscous part by 0.6 %. See also [the"
+        " study](../examples/cylinder_friction/README.md).", rows)
 
 
 def books() -> Chapter:
-    """Close the books of energy of a run with all that there is."""
+    """Check the energy balance of a run with all parts of the physics."""
     result = run("""&grid nx = 96, ny = 64, lx = 0.3e-3 /
 &surface shape = 'self_affine', hurst = 0.8, rms_slope = 0.2, wavelength_long = 75e-6,
          wavelength_short = 25e-6 /
@@ -509,17 +517,17 @@ def books() -> Chapter:
     left = np.abs(put_in - (stored - stored[0]) - lost
                   - (put_in[0] - lost[0])).max() / np.abs(put_in).max()
     return Chapter(
-        "The books of energy",
+        "The energy balance",
         "A rough road under a viscoelastic block with inertia, adhesion and friction on the true"
-        " slope: loaded by a ramp, driven obliquely, then under half the load and in another"
-        f" direction, {len(put_in)} rows. Of the work put in, {put_in[-1] * 1e9:.3g} nJ,"
-        f" {h['dissipated_friction'][-1] * 1e9:.3g} nJ are lost by friction,"
-        f" {h['dissipated_viscous'][-1] * 1e9:.3g} nJ in the rubber;"
-        f" what is not accounted for is at most {left:.0e} of it, in any row.")
+        " slope is loaded by a ramp, driven obliquely, and then driven under half of the load in"
+        f" another direction, in {len(put_in)} rows. Of the work put in, {put_in[-1] * 1e9:.3g} nJ,"
+        f" {h['dissipated_friction'][-1] * 1e9:.3g} nJ are lost by friction and"
+        f" {h['dissipated_viscous'][-1] * 1e9:.3g} nJ in the rubber. In every row the balance"
+        f" closes within {left:.0e} of the work.")
 
 
 def kink() -> Chapter:
-    """Ramp a load up and down over a flat punch: exact creep, coarse steps, many arms."""
+    """Ramp the load of a flat punch up and down, and compare with exact creep."""
     cells = 24
     i = np.arange(cells) - (cells - 1) / 2
     punch = np.where(np.hypot(*np.meshgrid(i, i)) < 7, 0.0, -1e-2)
@@ -532,7 +540,7 @@ def kink() -> Chapter:
                                "&solver tolerance = 1e-10 /\n").history["displacement"][0])
 
     def ramp(solid: Prony, t: FloatArray) -> FloatArray:
-        """Integrate the creep compliance from 0 by the rule of Gauss, 0 before."""
+        """Integrate the creep compliance from 0 by Gauss's rule; 0 for negative times."""
         nodes, weights = np.polynomial.legendre.leggauss(40)
         edges = np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 25)])
         out = np.zeros_like(t)
@@ -562,18 +570,18 @@ def kink() -> Chapter:
                          + " | ".join(f"{error:.1e}" for error in errors) + " |")
     return Chapter(
         "A ramp that turns",
-        "A flat punch under a force that grows for a second and then falls to"
-        " 0.3 of it in another. The contact"
-        " never changes, so that the approach is exactly the creep of the material times an elastic"
-        " constant of the mesh. Arms of 1 MPa a decade apart beside 0.1 MPa; the"
-        " worst row after the turn,"
-        " relative to the largest approach, by the steps of a ramp.\n\n"
+        "A flat punch is loaded by a force that grows for one second and then falls to 0.3 of its"
+        " maximum in another second. The contact never changes, so that the approach is exactly"
+        " the creep of the material times an elastic constant of the mesh. The arms have 1 MPa"
+        " each and are a decade apart, in parallel with a spring of 0.1 MPa. The table shows the"
+        " error of the worst row after the turn, relative to the largest approach, for different"
+        " numbers of steps per ramp.\n\n"
         "| arms | scheme | 8 | 16 | 32 | 64 |\n| --- | --- | --- | --- | --- | --- |\n"
         + "\n".join(lines))
 
 
 def block() -> Chapter:
-    """Swing a block with mass and arms against friction: stick, slip, a drop and a rise."""
+    """Compare the motion of a block with mass under friction and changing loads."""
     height, density, road, modulus = 1e-3, 2000.0, 0.3, 1e6
     mass = density * height / 2
     period = 2 * np.pi * math.sqrt(height * mass / modulus)
@@ -581,7 +589,7 @@ def block() -> Chapter:
     frictions = (4e4, 1.2e4, 3e4)
 
     def exact(times: FloatArray) -> FloatArray:
-        """Integrate the motion in short steps: stick and slip found by halving."""
+        """Integrate the motion in short steps; changes of stick and slip are found by bisection."""
         y, sticks, sign, t, rows = np.zeros(4), True, 1.0, 0.0, []
 
         def stress(y: FloatArray) -> float:
@@ -636,7 +644,7 @@ def block() -> Chapter:
 {phases}""")
         h = result.history
         timed = np.flatnonzero(np.diff(h["time"], prepend=-1.0) > 0)[1:]
-        # the whole block slides as one: what the road has moved less what it has slid
+        # displacement of the interface: that of the road minus the distance it has slid
         slid = np.cumsum(h["sliding_speed"][timed] * np.diff(h["time"][timed], prepend=0.0))
         found = h["road_x"][timed] - slid
         known = exact(h["time"][timed])
@@ -649,16 +657,13 @@ def block() -> Chapter:
                      f"| {missing:.1e} |")
     return Chapter(
         "A block with mass",
-        "A flat block with two arms and a mass on a flat road, drawn along by"
-        " friction: it sticks, slips and"
-        " swings; after four periods the load drops, after eight it rises. The"
-        " exact motion is that of one mass"
-        " on a spring with arms under Coulomb's friction. Errors rms over all"
-        " rows, relative to the rms of"
-        " displacement and of speed; the loss of the rule over that in the"
-        " rubber; the work that is missing over"
-        " that of load and drive.\n\n"
-        "| steps a period | displacement | speed | numerical over viscous loss | missing work |\n"
+        "A flat block with two arms and a mass on a flat road is dragged by friction: it sticks,"
+        " slips and oscillates. After four periods the load drops, after eight it rises. The exact"
+        " motion is that of one mass on a spring with arms under Coulomb friction. The columns are"
+        " the rms errors over all rows, relative to the rms of the displacement and of the speed;"
+        " the numerical loss over the loss in the rubber; and the missing work over the work of"
+        " load and drive.\n\n"
+        "| steps per period | displacement | speed | numerical over viscous loss | missing work |\n"
         "| --- | --- | --- | --- | --- |\n" + "\n".join(lines))
 
 
@@ -675,7 +680,7 @@ def steep_map(slope: float, nx: int = 9, ny: int = 6, length: float = 1e-3) -> F
 
 
 def steep() -> Chapter:
-    """Drive a block over steep roads: whole steps against a dense Newton method."""
+    """Drive a block over steep roads, and compare whole steps with a dense Newton method."""
     nx, ny, length, mu, dt = 9, 6, 1e-3, 0.8, 5e-4
     arms = [(2e6, 2e-4), (1e6, 3e-3)]
     rows, lines = [], []
@@ -722,20 +727,20 @@ def steep() -> Chapter:
     return Chapter(
         "A steep road",
         "Three waves under a viscoelastic block (ν = 0.4, two arms, half a wavelength thick, µ ="
-        " 0.8): pressed, driven obliquely for six steps of a third of a cell, then half the load is"
-        " taken away at once. The reference knows nothing of the program: Newton's method on the"
-        " pressures and tractions of all cells together, with dense matrices, for each whole step"
-        " (python/tests/coupled_reference.py). The table has the most passes that a row took, the"
-        " largest difference of pressure and traction of any cell in any row, relative to the"
-        " largest pressure, the residual of the reference, and the error of the mean traction,"
-        " after six steps and under half the load, where only two passes are allowed"
-        " (`passes = 2`).\n\n"
+        " 0.8) are pressed and driven obliquely for six steps of a third of a cell; then half of"
+        " the load is removed at once. The reference shares no part with the program: it solves"
+        " each whole step by Newton's method for the pressures and tractions of all cells, with"
+        " dense matrices (python/tests/coupled_reference.py). The first columns are the largest"
+        " number of passes of a row, the largest difference of pressure and traction in any cell"
+        " and row relative to the largest pressure, and the residual of the reference. The last"
+        " two columns are the errors of the mean traction if only two passes are allowed (`passes"
+        " = 2`), after six steps and under half of the load.\n\n"
         "| rms slope | passes | all cells, all rows | reference | two passes | two passes, half the"
         " load |\n| --- | --- | --- | --- | --- | --- |\n" + "\n".join(lines), rows)
 
 
 def drop() -> Chapter:
-    """Take away a part of the load of a sphere in partial slip: Cattaneo and Mindlin."""
+    """Reduce the load of a sphere in partial slip, and compare with Cattaneo and Mindlin."""
     radius, modulus, mu, side = 10e-3, 1e6, 0.01, 2.7e-3
     load = 8 * modulus * 1e-9 / (3 * radius)
     shift = 0.4 * mu * 1e-6 / radius
@@ -756,7 +761,7 @@ def drop() -> Chapter:
         found, way = history["traction_x"] * side**2, history["road_x"]
 
         def known(force: float, way: FloatArray) -> tuple[FloatArray, FloatArray]:
-            """Return force and stick radius, from the depths: d(c) = d(a) - shift/mu."""
+            """Return force and stick radius, which follow from d(c) = d(a) - shift/mu."""
             depth = 1e-4 * (force / load) ** (2 / 3)
             return (theory.mindlin(radius, modulus, 0.0, mu, force, shift=way).tangential,
                     np.sqrt(radius * np.maximum(depth - way / mu, 0.0)))
@@ -790,13 +795,13 @@ def drop() -> Chapter:
     right.legend(title="dotted: bound")
     return Chapter(
         "A drop of the load in partial slip",
-        "A sphere (R = 10 mm, G = 1 MPa, ν = 0, µ = 0.01, contact radius 1 mm) is moved sideways by"
-        f" {shift * 1e9:.3g} nm, four tenths of the way to full sliding; then a tenth or half of"
-        " the load is taken away at once, and the sphere is moved on. No time passes in the drop"
-        " and the sphere does not move, yet the points whose traction exceeds the bound slip back,"
-        " and they load their neighbours. With proportional slip the state is that of Cattaneo and"
-        " Mindlin under the new load. Free boundary, 192 x 192 cells, 142 over the contact at"
-        " first. The stick radius counts cells.",
+        "A sphere (R = 10 mm, G = 1 MPa, ν = 0, µ = 0.01, contact radius 1 mm) is moved sideways"
+        f" by {shift * 1e9:.3g} nm, which is four tenths of the displacement at full sliding. Then"
+        " a tenth or half of the load is removed at once, and the sphere is moved on. No time"
+        " passes in the drop and the sphere does not move, but points whose traction exceeds the"
+        " bound slip back and load their neighbours. With proportional slip the state is that of"
+        " Cattaneo and Mindlin under the new load. The boundary is free, with 192 x 192 cells, 142"
+        " of them over the contact at first. The stick radius is obtained by counting cells.",
         rows, finish(figure, "drop.png"),
         "Tangential force against the shift; tractions on the middle line right after the drop.")
 
@@ -820,17 +825,17 @@ CHAPTERS: dict[str, Callable[[], Chapter]] = {
 
 HEAD = """# Validation
 
-Runs of the program beside known solutions. `python tools/validation.py` makes this page and its
-figures; the tests hold the same cases, and many more, within stated tolerances: translations of the
-road, mirrors, quarter turns, scaling, threads and restarts that must not change a result; orders of
-convergence; limits. The references are those of `asperity.theory`, which cites the papers. What has
-no exact solution, rough roads first, stands beside Persson's theory and the thesis in the
-[gallery](gallery.md).
+This page compares runs of the program with known solutions. `python tools/validation.py` writes the
+page and its figures. The tests contain the same cases with stated tolerances, and many more:
+translations of the road, mirror images, quarter turns, scaling, threads and restarts, none of which
+may change a result, orders of convergence, and limits. The references are those of
+`asperity.theory`, which cites the papers. The [gallery](gallery.md) compares cases without an exact
+solution, rough roads above all, with Persson's theory and with the thesis.
 """
 
 
 def main() -> None:
-    """Run the chapters; write the page if all were asked for."""
+    """Run the chapters, and write the page if all are run."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("names", nargs="*", metavar="NAME", choices=[[], *CHAPTERS],
                         help=f"only these chapters, without the page: {', '.join(CHAPTERS)}")

@@ -204,16 +204,16 @@ def test_a_killed_run_and_one_without_rows(tmp_path):
 def test_the_page_says_whether_a_run_seems_dead(tmp_path):
     path = frictional_result(tmp_path / "killed.h5", finished=0)
     text = report_page(asperity.open(path))
-    assert "Make the page again to see more; if it was killed" in text
+    assert "Write the page again to update it. If the run was killed" in text
     os.utime(path, (time.time() - 60.0,) * 2)
     text = report_page(asperity.open(path))
     check_page(text)
-    assert ("The file was last written 1 min 0 s before, where a row takes up to 0.25 s: the run"
+    assert ("The file was last written 1 min 0 s before, and a row takes up to 0.25 s: the run"
             " was perhaps killed." in text)
     with h5py.File(path, "a") as file:
         file.attrs["outcome"] = "stopped after step 5"
     text = report_page(asperity.open(path))
-    assert "It ended so: stopped after step 5;" in text and "perhaps killed" not in text
+    assert "Outcome: stopped after step 5;" in text and "perhaps killed" not in text
 
 
 def test_what_is_no_number_is_told(tmp_path):

@@ -1,9 +1,10 @@
-"""Compare the memory that `asperity check` foretells with the peak of the run.
+"""Compare the memory that `asperity check` predicts with the peak of the run.
 
     python tools/bench/memory.py [-n 256 512] [--only adhesive friction] [--threads 1]
 
 Every case is run by the program in a process of its own, whose largest resident set the system
-reports. A ratio (foretold over taken) off by over a tenth is marked; the exit status is then 1.
+reports. A ratio (predicted over taken) that differs from 1 by more than a tenth is marked, and the
+exit status is then 1.
 """
 
 import argparse
@@ -79,11 +80,11 @@ def text_of(name, n):
     return "\n".join(lines) + "\n"
 
 
-def foretold(program, path):
-    """Return what `asperity check` says, in MB."""
-    said = subprocess.run([*program, "check", path], capture_output=True, text=True,
+def predicted(program, path):
+    """Return the memory that `asperity check` predicts, MB."""
+    printed = subprocess.run([*program, "check", path], capture_output=True, text=True,
                           check=True).stdout
-    number, unit = re.search(r"memory: about ([\d.]+) (MB|GB)", said).groups()
+    number, unit = re.search(r"memory: about ([\d.]+) (MB|GB)", printed).groups()
     return float(number) * (1000 if unit == "GB" else 1)
 
 
@@ -105,22 +106,22 @@ def main():
     parser.add_argument("--program", default="asperity")
     options = parser.parse_args()
     worst = 0.0
-    print("| case | cells | foretold, MB | taken, MB | fields | ratio |")
+    print("| case | cells | predicted, MB | taken, MB | fields | ratio |")
     print("| --- | --- | --- | --- | --- | --- |")
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         for n in options.n:
             for name in options.only:
                 Path("case.nml").write_text(text_of(name, n))
-                said = foretold([options.program], "case.nml")
+                forecast = predicted([options.program], "case.nml")
                 peak, status = taken([options.program], "case.nml", options.threads)
                 for left in Path().glob("case*"):
                     left.unlink()
-                ratio = said / peak
+                ratio = forecast / peak
                 worst = max(worst, abs(ratio - 1.0))
                 notes = " off" * (abs(ratio - 1.0) > 0.1) + f" status {status}" * (status != 0)
                 fields = (peak - 26) * 1e6 / (8 * n * n)
-                print(f"| {name} | {n} x {n} | {said:.0f} | {peak:.0f} | {fields:.1f} "
+                print(f"| {name} | {n} x {n} | {forecast:.0f} | {peak:.0f} | {fields:.1f} "
                       f"| {ratio:.2f}{notes} |", flush=True)
     return int(worst > 0.1)
 

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Compare the memory of steady rows with what `asperity check` foretells.
+"""Compare the memory of steady rows with the prediction of `asperity check`.
 
     . tools/setup.sh && . tools/install_editable.sh
     python tools/bench/steady_memory.py [--cells 128 256 512] [--laws none flat slope]
 
-Each line is a run of its own: the forecast, the largest memory of its process, and their ratio. The
-last cases have few cells in contact, whose dense system is not foretold.
+Each line is a run of its own: the prediction, the largest memory of its process, and their ratio.
+The last cases have few cells in contact, whose dense system is not predicted.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ CASES = ((1, 100, 1, (1e-4, 1e-3)), (12, 100, 1, (1e-4, 1e-3)), (12, 100, 0.1, (
 
 
 def main() -> None:
-    """Run and print."""
+    """Run the cases and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--cells", type=int, nargs="+", default=[128, 256, 512])
     parser.add_argument("--laws", nargs="+", default=["none", "flat", "slope"], choices=LAWS)
     chosen = parser.parse_args()
-    print("law, cells, arms, ratio, p/G: foretold MB, largest MB, ratio")
+    print("law, cells, arms, ratio, p/G: predicted MB, largest MB, ratio")
     with tempfile.TemporaryDirectory() as name:
         path = Path(name, "case.nml")
         for law in chosen.laws:
@@ -42,17 +42,17 @@ def main() -> None:
                         case(cells, arms, ratio, pressure * 1e6, LAWS[law].format(mu=0.3),
                              np.array(speeds)).replace("short = 4e-3", "short = 16e-3")
                         + "\n&solver tolerance = 1e-5 /\n")
-                    told = subprocess.run([program(), "check", path.name], cwd=name, check=True,
+                    printed = subprocess.run([program(), "check", path.name], cwd=name, check=True,
                                           capture_output=True, text=True).stdout
-                    found = re.search(r"memory: about ([\d.]+) MB", told)
+                    found = re.search(r"memory: about ([\d.]+) MB", printed)
                     run = subprocess.Popen(
                         [program(), "run", path.name, "--overwrite", "--quiet", "--threads", "1"],
                         cwd=name, stderr=subprocess.DEVNULL)
                     _, _, used = os.wait4(run.pid, 0)
                     largest = used.ru_maxrss * 1024e-6
-                    foretold = float(found[1]) if found else float("nan")
-                    print(f"{law}, {cells}, {arms}, {ratio}, {pressure}: {foretold:.1f},"
-                          f" {largest:.1f}, {foretold / largest:.3f}", flush=True)
+                    predicted = float(found[1]) if found else float("nan")
+                    print(f"{law}, {cells}, {arms}, {ratio}, {pressure}: {predicted:.1f},"
+                          f" {largest:.1f}, {predicted / largest:.3f}", flush=True)
 
 
 if __name__ == "__main__":

@@ -52,7 +52,7 @@ class Case(CaseGroups):
         temporary file; `write` and `run` copy it beside the input or the result.
 
         The friction law may be a function that takes an array of pressures, Pa, and returns the
-        largest tangential tractions, Pa, in an array of the same shape. It becomes a table for
+        largest tractions, Pa, in an array of the same shape. It becomes a table for
         pressures from 0 to 1e11 Pa.
 
     Attributes

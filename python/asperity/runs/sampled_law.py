@@ -29,7 +29,7 @@ def sampled_law(function: Law) -> tuple[list[float], list[float]]:
     Parameters
     ----------
     function : callable
-        Takes an array of pressures, Pa, from 0 to 1e11, and returns the largest shear tractions,
+        Takes an array of pressures, Pa, from 0 to 1e11, and returns the largest tractions,
         Pa, as an array of the same shape: finite and 0 or more.
 
     Returns

@@ -151,15 +151,16 @@ def _unfinished(run: Run) -> str:
     """Return why a run is not finished, if the file contains that, and what to do."""
     again = ("<code>asperity run CASE.nml --restart</code> continues from the last checkpoint.")
     if run.outcome != "running":
-        return f"It ended with: {escape(run.outcome)}; {again}"
+        return f"Outcome: {escape(run.outcome)}; {again}"
     quiet = silence(run)
     last = "" if quiet is None else f"The file was last written {short_time(quiet)} before"
     if held(run) is False:
         return f"Its process has ended before the run did: {again}"
     if seems_dead(run):
-        return (f"{last}, where a row takes up to {short_time(time_of_row(run) or 0.0)}: the run"
+        return (f"{last}, and a row takes up to {short_time(time_of_row(run) or 0.0)}: the run"
                 f" was perhaps killed. If so, {again}")
-    return f"{last}{'. ' if last else ''}Make the page again to see more; if it was killed, {again}"
+    return (f"{last}{'. ' if last else ''}Write the page again to update it. If the run was killed,"
+            f" {again}")
 
 
 def _tiles(run: Run) -> str:
