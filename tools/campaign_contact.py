@@ -2,10 +2,12 @@
 
 python tools/campaign_contact.py normal 200000      grids of up to 256 cells, all controls
 python tools/campaign_contact.py extreme 2000       tiny loads, displacements beyond full contact
-python tools/campaign_contact.py sizes              errors of contacts of few cells
+python tools/campaign_contact.py sizes              errors of rough contacts of few cells
+python tools/campaign_contact.py hertz              errors of single contacts of few cells
 """
 
 import argparse
+import itertools
 import math
 import warnings
 from collections import Counter
@@ -103,16 +105,68 @@ def campaign(problems, solve):
         print(f"   {times} x {reason}")
 
 
+def single_sphere(width, place):
+    """Return cells across and the error of the approach of a sphere, free; `width` in cells."""
+    n = max(16, int(2 * width))
+    x, y = (np.arange(n) - n // 2 - part for part in place)
+    height = -(x**2 + y[:, None] ** 2) / 2
+    contact = asperity.solve_normal(height, float(n), None, 1.0, force=(width / 2) ** 3 * 4 / 3,
+                                    boundary="free", tolerance=1e-9)
+    # The displacement counts from the highest cell, the approach from the summit beside it.
+    return patch_size(contact.pressure > 0)[0], (contact.displacement - height.max()) / (
+        width / 2) ** 2 - 1
+
+
+def single_summit(width, place, cells=32, finer=6):
+    """Return the same of the summit of a periodic wave; the reference is a finer grid."""
+    depths, pressure = [], (width / 2 / cells) ** 3 * 4 / 3 * (2 * np.pi) ** 2
+    for n, shift in ((cells * finer, (0.0, 0.0)), (cells, place)):
+        x, y = (np.cos(2 * np.pi * (np.arange(n) - part) / n) for part in shift)
+        height = x + y[:, None]
+        contact = asperity.solve_normal(height, 1.0, 1.0, 1.0, pressure=pressure, tolerance=1e-9)
+        depths.append(contact.displacement - height.max())
+    return patch_size(contact.pressure > 0)[0], (depths[1] + 2) / (depths[0] + 2) - 1
+
+
+def single_line(width, place, cells=256):
+    """Return the same of the summit of a periodic profile; Westergaard's solution."""
+    pressure = np.pi / cells * np.sin(np.pi * width / 2 / cells) ** 2
+    height = np.cos(2 * np.pi * (np.arange(cells) - place[0]) / cells)[None, :]
+    contact = asperity.solve_normal(height, float(cells), None, 1.0, pressure=pressure,
+                                    tolerance=1e-10)
+    known = asperity.theory.westergaard(1.0, float(cells), 1.0, pressure)
+    return patch_size(contact.pressure > 0)[0], (contact.displacement + 1 - height.max()) / (
+        1 - known.mean_gap) - 1
+
+
+def patch_size(touching):
+    """Return cells across a patch and the number of patches, both as a run estimates them."""
+    runs = [(touching & ~np.roll(touching, 1, axis)).sum() for axis in (1, 0)]
+    if touching.shape[0] == 1:
+        return touching.sum() / runs[0], runs[0]
+    return (4 / np.pi * touching.sum() / max(runs), np.pi / 4 * np.prod(runs) / touching.sum())
+
+
+def hertz(rng, count):
+    """Print the worst error of the approach by cells across, over summits in all places."""
+    limits = (1, 2, 3, 4, 4.5, 5, 5.5, 6, 7, 8, 9)
+    for solve in (single_sphere, single_summit, single_line):
+        found = []
+        for _ in range(count):
+            # Extremes occur where the summit is at the centre, the edge or the corner of a cell.
+            place = rng.choice([0.0, 0.5], 2) if rng.random() < 0.3 else rng.uniform(-0.5, 0.5, 2)
+            found.append(solve(rng.uniform(1, 9), place))
+        across, error = np.array(found).T
+        for low, high in itertools.pairwise(limits):
+            inside = 100 * error[(across >= low) & (across < high)]
+            if inside.size:
+                print(f"{solve.__name__}, {low:g} to {high:g} cells across: approach"
+                      f" {inside.mean():+.1f} % in the mean, at most {abs(inside).max():.1f} %"
+                      f" wrong ({inside.size} places)")
+
+
 def sizes():
-    """Print the errors of a sphere of few cells, and of rough maps by cells across a patch."""
-    for across in (0.6, 1.0, 2.0, 3.0, 4.0, 6.0):
-        x = (np.arange(64) - 32) / 64
-        radius = across / 128
-        contact = asperity.solve_normal(
-            -(x**2 + x[:, None] ** 2) / 2, 1.0, None, 1.0, force=4 / 3 * radius**3,
-            boundary="free", tolerance=1e-9)
-        print(f"sphere, {across:g} cells across: approach"
-              f" {100 * (contact.displacement / radius**2 - 1):+.1f} %")
+    """Print the errors of the area of rough maps by cells across a patch."""
     for pressure in (0.002, 0.01, 0.05, 0.2):
         areas = {}
         for n in (512, 256, 128, 64):
@@ -120,11 +174,9 @@ def sizes():
                 n, n, 1.0, 1.0, wavelength_long=0.25, wavelength_short=1 / 16, rms_slope=1.0,
                 seed=3)
             touching = asperity.solve_normal(height, 1.0, 1.0, 1.0, pressure=pressure).pressure > 0
-            chord = min(touching.sum() / (touching & ~np.roll(touching, 1, axis)).sum()
-                        for axis in (0, 1))
             areas[n] = touching.mean()
             print(f"rough, p = {pressure:g} E* h'rms, {n // 16} cells in the shortest wave:"
-                  f" {4 / np.pi * chord:.1f} cells across a patch, area"
+                  f" {patch_size(touching)[0]:.1f} cells across a patch, area"
                   f" {100 * (areas[n] / areas[512] - 1):+.1f} % of that of 512 x 512 cells")
 
 
@@ -132,7 +184,7 @@ def main():
     """Run the chosen campaign."""
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["normal", "extreme", "sizes"])
+    parser.add_argument("what", choices=["normal", "extreme", "sizes", "hertz"])
     parser.add_argument("count", nargs="?", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
@@ -140,6 +192,8 @@ def main():
     rng = np.random.default_rng(given.seed)
     if given.what == "sizes":
         sizes()
+    elif given.what == "hertz":
+        hertz(rng, given.count)
     elif given.what == "normal":
         campaign((normal_problem(rng) for _ in range(given.count)), asperity.solve_normal)
     else:

@@ -29,9 +29,43 @@ def warned(case):
     return sum(WORDS in line for line in asperity.run(case, output="case.h5").warnings)
 
 
-@pytest.mark.parametrize(("across", "times"), [(0.6, 1), (2.0, 1), (4.0, 0), (8.0, 0)])
+@pytest.mark.parametrize(("across", "times"), [(0.6, 1), (2.0, 1), (3.0, 1), (8.0, 0)])
 def test_single_contact(across, times):
     assert warned(sphere(across)) == times
+
+
+@pytest.mark.parametrize("part", [(0.0, 0.0), (0.5, 0.5), (0.2, 0.35)])
+def test_approach_that_is_not_warned_of_is_right(part):
+    """Hertz's approach within about 1 % wherever the summit lies, or a warning with its remedy."""
+    silent = 0
+    for across in np.arange(2.0, 8.0, 0.5):
+        radius = 0.5 * across / 32
+        place = [(16 + shift) / 32 for shift in part]
+        case = sphere(across).replace("radius = 1.", "radius = 1., centre_x = {}, centre_y = {}"
+                                      .format(*place))
+        run = asperity.run(case, output=f"case{across}.h5")
+        # The displacement counts from the highest cell, which lies below the summit.
+        below = sum((shift / 32) ** 2 for shift in part) / 2
+        error = (run.history["displacement"][-1] + below) / radius**2 - 1
+        told = [line for line in run.warnings if WORDS in line]
+        assert abs(error) < 0.011 or told, (across, error)
+        assert all("use cells at most 1/" in line for line in told)
+        silent += not told
+    assert silent >= 4
+
+
+def test_single_lines():
+    """A single line of contact needs five cells."""
+    told = []
+    for across in (2.5, 4.0, 5.0, 7.0):
+        pressure = np.pi / 64 * np.sin(np.pi * across / 128) ** 2
+        told.append(warned(f"""
+&grid nx = 64, ny = 1, lx = 64. /
+&surface shape = 'sine', amplitude = 1., wavelength = 64. /
+&material shear_modulus = 0.25, poisson = 0.5 /
+&phase pressure = {pressure} /
+"""))
+    assert told == [1, 1, 0, 0]
 
 
 def test_small_on_the_way_to_large_is_no_fault():

@@ -50,8 +50,26 @@ contains
       if (present(rows)) cells = real(case%grid%nx, dp)*real(rows, dp)
       ! Chunks that are gathered, twice as many that are stored, and one in work for each thread (module
       ! hdf5_chunk_writer).
-      bytes = 8.0_dp*(fields*cells + 3.0_dp*min(cells, chunks*chunk) + 2.0_dp*min(cells, chunk)) + program_itself
+      bytes = 8.0_dp*(fields*cells + 3.0_dp*min(cells, chunks*chunk) + 2.0_dp*min(cells, chunk)) + program_itself &
+         + kept_arms(case, cells)
    end function memory_needed
+
+   !> The arms before a row without friction that is taken in parts, bytes. They are kept where they take
+   !> no more than 64 MB (module row_stop). Friction counts its own.
+   pure function kept_arms(case, cells) result(bytes)
+      type(case_type), intent(in) :: case
+      real(dp), intent(in) :: cells
+      real(dp) :: bytes
+      logical :: in_time
+      integer :: arms
+
+      arms = size(case%material%prony_g)
+      in_time = any(.not. case%phases%static .and. case%phases%steps > 0)
+      bytes = 0.0_dp
+      if (arms == 0 .or. .not. in_time .or. case%solver%time_scheme /= 'exponential2') return
+      if (road_moves(case%phases) .and. case%friction%law /= 'none') return
+      if (8.0_dp*(2.0_dp + arms)*cells <= 64.0e6_dp) bytes = 8.0_dp*(2.0_dp + arms)*cells
+   end function kept_arms
 
    !> Fields of the normal solver and of the state it works on (module normal_cg).
    pure function normal_fields(case) result(fields)

@@ -1,12 +1,17 @@
 !> Are the patches of contact large enough for the cells?
 !>
-!> Below three cells across a contact is not resolved: the approach of a sphere is wrong by 3 % at three
-!> cells, 25 % at one and 55 % at 0.6, and on a rough road the contact area is then 10 % or more above
-!> that of a fine grid; at six cells across it is 3 to 8 % above it (tools/campaign_contact.py).
+!> How far the approach of a contact of few cells is from Hertz's depends on where its summit lies among
+!> the cells (`tools/campaign_contact.py hertz`). A single round patch errs by up to 9 % where it is two to
+!> three cells across, by up to 1.5 % at four to five and a half, and by less than 1 % beyond; a line by up to
+!> 2 % at four cells and by up to 1.2 % at five. A road has patches in all places among the cells,
+!> and their errors average out. The error of a patch falls about as the square of the cells across it, that
+!> of the mean of n patches as the root of n, so that n patches need fewer cells by the fourth root of n.
+!> Three cells are the least: the contact area of a road is then still 10 % or more above that of a fine
+!> grid (`tools/campaign_contact.py sizes`).
 !>
 !> The size of the patches follows from the runs of neighbouring cells that touch: a round patch of the
 !> diameter d has a mean chord of pi/4 d. The direction in which the patches are fewer cells across
-!> counts.
+!> counts. A patch that begins nowhere along one of the directions goes through the whole map: a line.
 module contact_size
    use contact_rule, only : touches
    use asperity_precision, only : dp, pi
@@ -17,40 +22,62 @@ module contact_size
    implicit none
    private
 
-   public :: cells_across, watch_contact_size
+   public :: measured_patches, watch_contact_size
 
-   real(dp), parameter :: fewest = 3.0_dp            !! cells across a patch that are enough
+   !> Mean size of the patches of a contact.
+   type, public :: patch_size_type
+      real(dp) :: across = 0.0_dp                    !! cells across a patch; 0: nothing touches
+      real(dp) :: needed = 1.0_dp                    !! cells across that such patches need
+   end type patch_size_type
+
+   real(dp), parameter :: needed_by_many = 3.0_dp    !! cells across a patch
+   real(dp), parameter :: needed_by_line = 5.0_dp    !! a single line
+   real(dp), parameter :: needed_by_one = 5.5_dp     !! a single round patch
 
 contains
 
-   !> At the end of a phase: keep the widest patches so far. At the end of the run: warn if not even
-   !> those are wide enough. Earlier in the run the contact may be small: it has to grow from nothing.
-   subroutine watch_contact_size(grid, across, ends, widest, message)
+   !> At the end of a phase: keep the best resolved patches so far. At the end of the run: warn if not
+   !> even those are wide enough. Earlier in the run the contact may be small: it has to grow from nothing.
+   subroutine watch_contact_size(grid, patches, ends, widest, message)
       type(grid_type), intent(in) :: grid
-      real(dp), intent(in) :: across                 !! `cells_across` now
+      type(patch_size_type), intent(in) :: patches   !! of the contact now
       logical, intent(in) :: ends                    !! the run ends here
-      real(dp), intent(inout) :: widest              !! cells across so far; 0: no contact yet
+      type(patch_size_type), intent(inout) :: widest !! the best resolved ones so far
       character(:), allocatable, intent(out) :: message
+      character(:), allocatable :: consequence
 
       message = ''
-      widest = max(widest, across)
-      if (.not. ends .or. widest >= fewest .or. .not. widest > 0.0_dp) return
+      if (patches%across/patches%needed > widest%across/widest%needed) widest = patches
+      if (.not. ends .or. widest%across >= widest%needed .or. .not. widest%across > 0.0_dp) return
       if (nint(min(grid%cells(), 2.0_dp)) == 1) return
-      message = 'patches of contact are only '//to_text(nint(10.0_dp*widest)/10.0_dp)// &
-         ' cells across on average: below 3 the contact area, the approach and the pressures depend '// &
-         'on the cells; a finer grid is needed'
+
+      consequence = 'the approach can be more than 1 % wrong, and area and pressures depend on the cells'
+      if (.not. widest%needed > needed_by_many) &
+         consequence = 'the contact area is more than 10 % too large, and approach and pressures depend on the cells'
+      ! The cells are counted in tenths, the factor is rounded up.
+      message = 'patches of contact are only '//tenths(widest%across)//' cells across on average: below '// &
+         tenths(widest%needed)//' '//consequence//'; use cells at most 1/'// &
+         tenths(widest%needed/widest%across + 0.05_dp)// &
+         ' as wide for the same road, if need be on a smaller map around the contact'
    end subroutine watch_contact_size
 
-   !> Mean number of cells across a patch of contact, in the direction where they are fewer; 0 where
-   !> nothing touches, a huge number where all does. Collective.
-   function cells_across(grid, adhesive, pressure, gap) result(across)
+   !> A number with one decimal place.
+   pure function tenths(number) result(text)
+      real(dp), intent(in) :: number
+      character(:), allocatable :: text
+
+      text = to_text(nint(10.0_dp*number)/10.0_dp)
+   end function tenths
+
+   !> Mean number of cells across a patch of contact, in the direction where they are fewer, and how many
+   !> such patches need. A huge number where all cells touch. Collective.
+   function measured_patches(grid, adhesive, pressure, gap) result(patches)
       type(grid_type), intent(in) :: grid
       logical, intent(in) :: adhesive
       real(dp), intent(in) :: pressure(:, :), gap(:, :)
-      real(dp) :: across
+      type(patch_size_type) :: patches
       logical, allocatable :: row(:), below(:)
       real(dp), allocatable :: rows(:, :), pressure_beside(:, :), gap_beside(:, :)
-      real(dp) :: sums(3)
       integer :: j
 
       allocate (row(grid%nx), rows(3, grid%rows()), below(grid%nx))
@@ -67,12 +94,30 @@ contains
             rows(2, j) = rows(2, j) + 1.0_dp
          below(:) = row
       end do
-      sums = row_totals(rows)
-      ! sums: cells in contact, and patches that start along x and along y.
-      across = merge(huge(1.0_dp), 0.0_dp, sums(1) > 0.0_dp)
-      if (sums(2) > 0.0_dp) across = sums(1)/sums(2)
-      if (sums(3) > 0.0_dp .and. grid%ny > 1) across = min(across, sums(1)/sums(3))
-      if (grid%ny > 1 .and. across < huge(1.0_dp)) across = 4.0_dp/pi*across
-   end function cells_across
+      patches = size_from_runs(row_totals(rows), grid%ny == 1)
+   end function measured_patches
+
+   !> Size of patches from the cells in contact and the runs of such cells along x and along y.
+   pure function size_from_runs(sums, profile) result(patches)
+      real(dp), intent(in) :: sums(3)                !! cells, runs along x, runs along y
+      logical, intent(in) :: profile                 !! the grid has a single row
+      type(patch_size_type) :: patches
+      real(dp) :: runs, number
+
+      if (.not. sums(1) > 0.0_dp) return
+
+      runs = merge(sums(2), maxval(sums(2:)), profile)
+      if (.not. runs > 0.0_dp) then
+         patches%across = huge(1.0_dp)
+      else if (profile .or. .not. minval(sums(2:)) > 0.0_dp) then
+         patches%across = sums(1)/runs
+         patches%needed = max(needed_by_many, needed_by_line/merge(runs, 1.0_dp, profile)**0.25_dp)
+      else
+         patches%across = 4.0_dp/pi*sums(1)/runs
+         ! Round patches of d cells across have d runs each way and pi/4 d^2 cells.
+         number = pi/4.0_dp*sums(2)*sums(3)/sums(1)
+         patches%needed = max(needed_by_many, needed_by_one/max(anint(number), 1.0_dp)**0.25_dp)
+      end if
+   end function size_from_runs
 
 end module contact_size

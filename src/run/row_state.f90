@@ -11,6 +11,7 @@ module row_state
    use asperity_precision, only : dp
    use asperity_schedule, only : schedule_type
    use history_row, only : history_row_type, list_columns
+   use contact_size, only : patch_size_type
    use state_table, only : state_table_type
    use steady_step, only : steady_start_type
    use stick_slip_watch, only : stick_slip_watch_type
@@ -48,7 +49,7 @@ module row_state
       logical :: passes_reported = .false.              !! passes that did not settle have been warned of
       logical :: way_reported = .false.                 !! a pull that moves the road far has been warned of
       type(stick_slip_watch_type) :: watch          !! what has been seen of the mean slip
-      real(dp) :: widest = 0.0_dp                   !! cells across a patch of contact, at the end of a phase
+      type(patch_size_type) :: widest               !! best resolved patches of contact at the end of a phase
       integer :: edge = edge_clear                  !! worst found at the edge of a free map
       real(dp) :: dt_old = 0.0_dp                   !! length of the last step, s; 0 after a jump
       real(dp), allocatable :: pressure(:, :)       !! P, Pa
@@ -76,7 +77,8 @@ contains
       call table%add('velocity', state%velocity, 'm/s', 'velocity of the road in the last step')
       call table%add('drifted', state%drifted, 'm', 'sum of the expected motions of the surface')
       call table%add('moved_cells', state%moved_cells, 'cells by which the pressure has been shifted')
-      call table%add('widest', state%widest, '1', 'most cells across a patch of contact where a phase ended')
+      call table%add('widest/across', state%widest%across, '1', 'most cells across a patch of contact where a phase ended')
+      call table%add('widest/needed', state%widest%needed, '1', 'cells across that such patches need')
       call table%add('edge', state%edge, 'worst that was found at the edge of a free map')
       call table%add('stick_slip/reported', state%watch%reported, 'stick-slip has been warned of')
       call table%add('stick_slip/speed', state%watch%speed, 'm/s', 'mean slip speed')

@@ -3,7 +3,7 @@ module step_watches
    use asperity_precision, only : dp
    use asperity_schedule, only : planned_row_type
    use contact_model, only : contact_type
-   use contact_size, only : cells_across, watch_contact_size
+   use contact_size, only : measured_patches, watch_contact_size
    use map_edge, only : look_at_edge
    use stick_slip_watch, only : watch_slip
    use text_tools, only : add_line, to_text
@@ -37,7 +37,7 @@ contains
 
       associate (state => contact%state)
          if (state%schedule%phase == plan%phase) return
-         call watch_contact_size(contact%grid, cells_across(contact%grid, contact%side%adhesive, &
+         call watch_contact_size(contact%grid, measured_patches(contact%grid, contact%side%adhesive, &
             state%pressure, state%gap), state%schedule%phase > size(contact%case%phases), &
             state%widest, message)
          call add_warning(warnings, state%schedule%row, plan%time, message)
