@@ -1,4 +1,4 @@
-"""What the studies share: paths, the model compound, short forms, a style of pictures."""
+"""Common parts of the studies: paths, the model compound, short forms, the style of pictures."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ EXAMPLES = Path(__file__).resolve().parent
 #: `asperity.run(..., threads=common.jobs)`.
 jobs = 1
 
-#: Colours that stay apart for the colour-blind (Okabe and Ito), in the order of use.
+#: Colours that colour-blind readers can distinguish (Okabe and Ito), in the order of use.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MARKERS = "osD^v<>"
 
 
-#: Warnings of the program that a study may have reason to expect, by what they say.
-#: Steps longer than the relaxation of the fastest arm: it has relaxed within the step.
+#: Parts of warnings of the program that a study may expect.
+#: Steps longer than the shortest relaxation time, whose arm relaxes within the step.
 LONG_STEPS = "longer than the shortest active relaxation time"
 #: Steps of more than a cell, which do not matter while a block sticks.
 LONG_WAYS = "a step moves the road by"
-#: Waves of few cells, in short forms.
+#: Waves of few cells, in quick forms.
 FEW_CELLS = "the shortest wave has"
 #: Contacts of few cells.
 SMALL_CONTACTS = "cells across on average"
@@ -37,7 +37,7 @@ SMALL_CONTACTS = "cells across on average"
 LONG_WAVES = "is not below the side of"
 #: Cells too wide for the range of adhesion.
 WIDE_CELLS = "the edge of the contact sticks to the grid"
-#: Passes of a coupled step that swing between two states.
+#: Passes of a step that alternate between two states.
 UNSETTLED = "the passes of the step did not settle"
 #: Numerical stick-slip.
 STICK_SLIP = "the mean slip rises and falls from step to step"
@@ -45,7 +45,7 @@ STICK_SLIP = "the mean slip rises and falls from step to step"
 
 @contextmanager
 def expected(*said: str) -> Iterator[None]:
-    """Silence the warnings that say this; make.py takes all others for errors."""
+    """Ignore warnings that contain one of these texts; make.py treats all others as errors."""
     with warnings.catch_warnings():
         for text in said:
             warnings.filterwarnings("ignore", f"(?s).*{re.escape(text)}", UserWarning)
@@ -54,7 +54,7 @@ def expected(*said: str) -> Iterator[None]:
 
 def subplots(columns: int = 1, rows: int = 1, *, width: float = 4.6, height: float = 3.7,
              **options: Any) -> tuple[Any, Any]:
-    """Return a figure and its axes, each so many inches, in the colours above."""
+    """Return a figure and its axes in the colours above; width and height of each are in inches."""
     from cycler import cycler
     from matplotlib import pyplot
 
@@ -77,7 +77,7 @@ def material_group(rubber: asperity.material.Prony | None = None, **more: Any) -
 
 
 def run(case: asperity.Case, path: Path) -> asperity.Run:
-    """Return the result of a case; a finished one of the same input is taken as it is."""
+    """Return the result of a case; a complete result of the same input is reused."""
     if path.exists():
         found = asperity.open(path)
         if found.finished and found.input == str(case):
@@ -86,7 +86,7 @@ def run(case: asperity.Case, path: Path) -> asperity.Run:
 
 
 def shortened(case: asperity.Case, cells: int = 64, steps: int = 20) -> asperity.Case:
-    """Return a case with at most so many cells along x, cut-offs that they hold, and few steps."""
+    """Return a case with fewer cells and steps, and with waves that the cells resolve."""
     short = case.copy()
     factor = max(1, case.grid.nx // cells)
     short.grid.nx = max(2, case.grid.nx // factor)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Make the studies of this folder: run them, check what they claim, draw their pictures.
+"""Run the studies of this folder, check their claims and draw their pictures.
 
     python examples/make.py --list
     python examples/make.py tabor            # one of them, in full
@@ -7,9 +7,9 @@
     python examples/make.py --gallery        # docs/gallery.md from the README files
 
 A study is a folder with a README.md and either study.py, with `compute`, `check` and `picture`, or
-only input.nml, which is run and drawn. The full form rewrites the study's picture.png and
-numbers.json, that of all studies docs/gallery.md, too. Results lie in build/examples/NAME; a study
-that was stopped takes up what is there.
+only input.nml, which is run and drawn. The full form rewrites picture.png and numbers.json of the
+study and, if all studies are run, docs/gallery.md. Results are in build/examples/NAME; an
+interrupted study reuses them.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ import numpy as np
 
 EXAMPLES = Path(__file__).resolve().parent
 ROOT = EXAMPLES.parent
-sys.path.insert(0, str(EXAMPLES))  # for studies: import common
+sys.path.insert(0, str(EXAMPLES))  # so that studies can import common
 
 import common  # noqa: E402 - found by the line above
 
@@ -44,15 +44,15 @@ import asperity  # noqa: E402
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-LONGEST = 40  # values of an array that numbers.json keeps
-#: What the chapters of the thesis are about, for the gallery.
-CHAPTERS = {1: "What is known (chapter 1)", 2: "Pressing, sinking in, pulling off (chapter 2)",
+LONGEST = 40  # longest array that numbers.json keeps
+#: Headings of the gallery, by chapter of the thesis.
+CHAPTERS = {1: "Known solutions (chapter 1)", 2: "Pressing, creep and pull-off (chapter 2)",
             3: "Friction in the interface (chapter 3)", 4: "Rough roads (chapter 4)",
-            9: "Beside the thesis"}
+            9: "Beyond the thesis"}
 
 
 class Study:
-    """A folder that can be made."""
+    """A study: a folder with a README.md, and study.py or input.nml."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -61,14 +61,14 @@ class Study:
 
     @functools.cached_property
     def module(self) -> ModuleType | None:
-        """The loaded study.py; None where there is only an input."""
+        """The module study.py; None if there is only an input."""
         path = self.folder / "study.py"
         if not path.exists():
             return None
         spec = importlib.util.spec_from_file_location(f"study_{self.name}", path)
         assert spec is not None and spec.loader is not None
         module = importlib.util.module_from_spec(spec)
-        sys.modules[spec.name] = module  # dataclasses and pickle look there
+        sys.modules[spec.name] = module  # where dataclasses and pickle look for it
         spec.loader.exec_module(module)
         return module
 
@@ -81,7 +81,7 @@ class Study:
 
     @property
     def minutes(self) -> float | None:
-        """How long the full form takes on two cores, if it is said."""
+        """Time that the full form takes on two cores, min; None if it is not known."""
         return None if self.module is None else float(self.module.MINUTES)
 
     def compute(self, folder: Path, quick: bool) -> dict[str, Any]:
@@ -96,7 +96,7 @@ class Study:
                 ("time", "contact_area", "friction", "residual_normal")}}
 
     def check(self, data: dict[str, Any], quick: bool) -> None:
-        """Hold the numbers against what is claimed."""
+        """Check the numbers against the claims of the study."""
         if self.module is not None:
             self.module.check(data, quick)
             return
@@ -118,7 +118,7 @@ class Study:
 
 
 def studies(names: list[str] | None = None) -> list[Study]:
-    """Return the studies, all or those that are named."""
+    """Return all studies, or those that are named."""
     known = {folder.name: folder for folder in sorted(EXAMPLES.iterdir())
              if (folder / "README.md").is_file()
              and ((folder / "study.py").is_file() or (folder / "input.nml").is_file())}
@@ -129,11 +129,11 @@ def studies(names: list[str] | None = None) -> list[Study]:
 
 
 def make(study: Study, folder: Path, quick: bool) -> tuple[dict[str, Any], Figure]:
-    """Compute, check and draw a study; a warning that it does not expect is an error."""
+    """Compute, check and draw a study; an unexpected warning is an error."""
     folder.mkdir(parents=True, exist_ok=True)
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)
-        # The coarse grids of the quick form have small contacts, which its checks allow for.
+        # The coarse grids of the quick form have small contacts; its checks take this into account.
         with common.expected(*((common.SMALL_CONTACTS,) if quick else ())):
             data = study.compute(folder, quick)
         study.check(data, quick)
@@ -144,7 +144,7 @@ def make(study: Study, folder: Path, quick: bool) -> tuple[dict[str, Any], Figur
 
 
 def numbers(data: dict[str, Any]) -> dict[str, Any]:
-    """Return what is short enough to be kept, with six digits."""
+    """Return the values that are short enough for numbers.json, with six digits."""
     kept = {}
     for name, value in data.items():
         plain = _plain(value)
@@ -175,24 +175,24 @@ def _plain(value: Any) -> Any:
 
 
 def part(readme: str, heading: str) -> str:
-    """Return the text under a heading of a README, '' where there is none."""
+    """Return the text under a heading of a README, or '' if there is no such heading."""
     found = re.search(rf"^## {re.escape(heading)}\s*\n(.*?)(?=^## |\Z)", readme,
                       flags=re.DOTALL | re.MULTILINE)
     return found[1].strip() if found else ""
 
 
 def gallery() -> str:
-    """Return docs/gallery.md: each study's picture, what it is, and what the thesis says."""
+    """Return docs/gallery.md: picture, summary and comparison with the thesis of each study."""
     lines = ["# Gallery", "",
-             "The studies of R. Bugnicourt's thesis (INSA Lyon, 2017), and some beside it, in its"
-             " order: what is", "computed, what the thesis says of it, and where we differ and"
-             " why. Each has a page with its numbers and the", "commands that make it;"
-             " `python examples/make.py --list` lists them all. This page is made by",
-             "`python examples/make.py --gallery`.", "",
+             "These studies repeat those of R. Bugnicourt's thesis (INSA Lyon, 2017), in its order;"
+             " some go beyond it. Each entry says what is computed, what the thesis found, and"
+             " where and why we differ. The page of each study has its numbers and the commands"
+             " that reproduce it. `python examples/make.py --list` lists the studies, and"
+             " `python examples/make.py --gallery` writes this page.", "",
              "![A film of a sliding contact: the parts that stick and slip, and the friction]"
              "(figures/sliding.gif)", "",
              "*The contact of the [case in ten lines](../README.md#a-case-in-ten-lines) while its"
-             " road starts to move: what sticks", "(blue) and what slips (orange). `asperity plot"
+             " road starts to move. Blue cells stick, orange cells slip. `asperity plot"
              " road.h5 --film` makes such a film of any result with snapshots.*", ""]
     chapter = 0
     for study in sorted(studies(), key=lambda one: (one.section(), one.name)):
@@ -211,7 +211,7 @@ def gallery() -> str:
 
 
 def _relinked(text: str, name: str) -> str:
-    """Return a text whose links, made for the study's folder, are those of docs/."""
+    """Return a text of a study with its links changed so that they work in docs/."""
     def moved(found: re.Match[str]) -> str:
         target = found[1]
         if re.match(r"https?:|#", target):
@@ -231,7 +231,7 @@ def main(arguments: list[str] | None = None) -> int:
                         help="coarse grids, few steps: computes and checks, rewrites nothing")
     parser.add_argument("--jobs", type=int, metavar="N", default=len(os.sched_getaffinity(0)),
                         help="processors to use; default: all")
-    parser.add_argument("--fresh", action="store_true", help="keep no results of an earlier call")
+    parser.add_argument("--fresh", action="store_true", help="remove results of earlier calls")
     parser.add_argument("--list", action="store_true", help="list the studies")
     parser.add_argument("--gallery", action="store_true", help="write docs/gallery.md only")
     chosen = parser.parse_args(arguments)
@@ -257,7 +257,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _make_one(study: Study, chosen: argparse.Namespace) -> bool:
-    """Make a study and tell of it; return whether it holds."""
+    """Make a study and print the outcome; return whether its checks hold."""
     from matplotlib import pyplot
 
     start = time.monotonic()

@@ -24,8 +24,8 @@ SHORT = LONG / 16
 STEEPNESS = 0.01
 #: Speed of the drive, m/s, mean pressure, Pa, loading time, s, and the block's height, m.
 SPEED, PRESSURE, LOADING, THICKNESS = 1.0, 0.4e6, 1e-3, 4e-3
-#: Cells along x of quick and full forms; the shorter wave is longer than the thesis's where it is
-#: needed for at least eight of them, sixteen in the full forms.
+#: Cells along x of quick and full forms, and the shorter wave, which is longer than that of the
+#: thesis, so that it has at least eight cells, and sixteen in the full form.
 QUICK, FULL, WIDER = 64, 128, LONG / 8
 BLUE, RED, GREEN, PURPLE, ORANGE = common.COLOURS[:5]
 
@@ -33,9 +33,9 @@ BLUE, RED, GREEN, PURPLE, ORANGE = common.COLOURS[:5]
 def compound(duration: float = 2e-3) -> Prony:
     """Return the compound `tread` of examples/materials at 25 C for cases of a duration (s).
 
-    Arms slower than ten to a hundred times the duration do not relax in it: they join the spring.
-    Those faster than 0.1 ns have relaxed before any step is over: they are left out. For the
-    duration of table 4.1 ten arms are left.
+    Arms slower than ten to a hundred times the duration do not relax in it, and are added to the
+    spring. Arms faster than 0.1 ns relax within any step, and are left out. For the duration of
+    table 4.1 ten arms remain.
     """
     g, tau = np.loadtxt(common.EXAMPLES / "materials" / "tread.txt", unpack=True)
     slow = tau > 1.5 * 10.0 ** math.ceil(math.log10(10.0 * max(duration, 2e-3)))
@@ -44,7 +44,7 @@ def compound(duration: float = 2e-3) -> Prony:
 
 
 def drive_to_slip(pressure: float, speed: float) -> float:
-    """Return the travel of the drive, m, at which a sticking block bears mu = 1 times pressure."""
+    """Return the travel of the drive, m, at which a sticking block has a traction of `pressure`."""
     rubber = compound()
 
     def traction(time):
@@ -56,7 +56,7 @@ def drive_to_slip(pressure: float, speed: float) -> float:
 
 
 def waves(short: float | None = SHORT, steepness: float = STEEPNESS) -> str:
-    """Return the &surface groups of the road with a shorter wave of that length, m, or without."""
+    """Return the &surface groups of the road, with or without a shorter wave of this length, m."""
     return "".join(
         f"&surface shape = 'hexagonal_wave', amplitude = {steepness * length!r},"
         f" wavelength = {length!r} /\n" for length in (LONG, short) if length)
@@ -68,8 +68,8 @@ def case(nx: int, road: str, *, speed: float = SPEED, pressure: float = PRESSURE
          rubber: Prony | None = None) -> asperity.Case:
     """Return the case of a block that is pressed for a time and then driven over a road.
 
-    The drive first shears the sticking block in `shear_steps` steps; then come steps of half a
-    cell about the first full slip, and steps of `fine` cells.
+    The drive first shears the sticking block in `shear_steps` steps. Around the first full slip the
+    steps are half a cell, and afterwards `fine` cells.
 
     Parameters
     ----------
@@ -86,11 +86,11 @@ def case(nx: int, road: str, *, speed: float = SPEED, pressure: float = PRESSURE
     fine : float
         Cells that the drive moves in a step after the first full slip.
     density : float
-        Density of the block, kg/m3; it only damps. By default that of the thesis, 20, and below
-        1 m/s more: 20 times 1 over the speed squared, which has the same share in the forces.
-        Without it a slow drive comes loose in stick-slip from step to step.
+        Density of the block, kg/m3, which only damps. The default is that of the thesis, 20, and
+        below 1 m/s 20 divided by the square of the speed, which has the same share in the forces.
+        With less, a slow block would stick and slip from step to step.
     grip : float
-        Traction over pressure at which all is expected to slip.
+        Traction over pressure at which the whole contact is expected to slip.
     rubber : Prony, optional
         The compound; that of table 4.1 by default.
     """
@@ -114,9 +114,9 @@ def case(nx: int, road: str, *, speed: float = SPEED, pressure: float = PRESSURE
 
 def histories(folder: Path, cases: Sequence[asperity.Case],
               *said: str) -> list[dict[str, np.ndarray]]:
-    """Run cases that differ in values, side by side, and return what each did in time.
+    """Run cases with different values side by side, and return the columns of each.
 
-    `said` are warnings that are expected beside those of all these cases.
+    `said` are parts of warnings that are expected in addition to those of all these cases.
     """
     def values(one: asperity.Case) -> dict[str, Any]:
         flat = {f"{group}.{name}": value for group in ("grid", "material")
@@ -129,7 +129,7 @@ def histories(folder: Path, cases: Sequence[asperity.Case],
 
     flat = [values(one) for one in cases]
     names = tuple(name for name in flat[0] if any(one[name] != flat[0][name] for one in flat))
-    # Long steps are meant while the rubber creeps (phase 1) and sticks (phase 2).
+    # Long steps are intended while the rubber creeps (phase 1) and sticks (phase 2).
     with common.expected(common.FEW_CELLS, common.LONG_STEPS, f"&phase 2: {common.LONG_WAYS}",
                          *said):
         table = asperity.sweep(cases[0], {names: [[one[name] for name in names] for one in flat]},
@@ -138,7 +138,7 @@ def histories(folder: Path, cases: Sequence[asperity.Case],
 
 
 def columns(run: asperity.Run) -> dict[str, np.ndarray]:
-    """Return the columns of a run that the studies use, and `slid`, the way of the interface, m."""
+    """Return the columns that the studies use, and `slid`, the sliding distance, m."""
     data = {name: np.array(run.history[name]) for name in (
         "phase", "time", "contact_area", "stick_area", "mean_gap", "friction", "friction_viscous",
         "sliding_speed", "road_x", "seconds")}
@@ -148,10 +148,10 @@ def columns(run: asperity.Run) -> dict[str, np.ndarray]:
 
 
 def measures(data: dict[str, np.ndarray]) -> dict[str, float]:
-    """Return maximum and plateau of the friction, and what belongs to the plateau.
+    """Return maximum and plateau of the friction, and other means over the plateau.
 
-    The plateau is the mean over the last period of the longer wave that the interface slid, or
-    over what follows the first full slip where that is less.
+    The plateau is the last period of the longer wave over which the interface slid, or the time
+    since the first full slip if that is shorter.
     """
     slid, driven = data["slid"], data["road_x"] > 0.0
     slipping = driven & (data["stick_area"] < 1e-3)
@@ -172,9 +172,9 @@ def measures(data: dict[str, np.ndarray]) -> dict[str, float]:
 
 
 def oscillation(data: dict[str, np.ndarray], periods: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return wavelengths, m, and amplitudes of the friction over the way of the interface.
+    """Return wavelengths, m, and amplitudes of the friction over the sliding distance.
 
-    Of the last `periods` periods of the longer wave, without their straight trend.
+    They belong to the last `periods` periods of the longer wave, after a straight trend is removed.
     """
     start = data["slid"][-1] - periods * LONG
     x = start + periods * LONG * np.arange(2048 * periods) / (2048 * periods)
@@ -185,13 +185,13 @@ def oscillation(data: dict[str, np.ndarray], periods: int) -> tuple[np.ndarray, 
 
 
 def viscous_in_full_contact(speed: float, pressure: float, waves: Sequence[float]) -> float:
-    """Return -mean(P dH/dx)/mean(P) in steady sliding where contact is full (coefficient 1).
+    """Return -mean(P dH/dx)/mean(P) in steady sliding with full contact (coefficient 1).
 
-    A wave is three plane waves of a quarter of its amplitude D, of wave number q, twice its own,
-    one along x, two at 60 degrees to it. Each loses q_x q D^2 G''(q_x V), a stress. And each point
-    is dragged along x by its traction, P: against the mean by A_xx/A_zz = 2 - (q_x/q)^2 times what
-    it is pressed in, D, so that the pressure p meets more of the leading flanks: of
-    p q_x^2 D^2 (2 - (q_x/q)^2)/2.
+    A hexagonal wave consists of three plane waves with a quarter of its amplitude, D, and twice its
+    wave number, q: one along x, and two at 60 degrees to it. Each loses the stress
+    q_x q D^2 G''(q_x V). In addition, the traction, which is equal to P, drags each point along x,
+    relative to the mean by A_xx/A_zz = 2 - (q_x/q)^2 times its normal displacement. The pressure p
+    therefore acts more on the leading flanks, which adds p q_x^2 D^2 (2 - (q_x/q)^2)/2.
     """
     stress = 0.0
     for wave in waves:
@@ -204,14 +204,14 @@ def viscous_in_full_contact(speed: float, pressure: float, waves: Sequence[float
 
 
 def check_slope(found: dict[str, np.ndarray | float], scales: int = 2) -> None:
-    """Hold that friction is 1 plus what the slopes do to it (coefficient 1, slip along x).
+    """Check the effect of the slopes on the friction (coefficient 1, slip along x).
 
-    Where the road's slope is (-a, -b), a slipping point bears, to second order in the slopes,
-    1 + 2 a + 2 a^2 + b^2/2 times its pressure. Weighted with the pressure the mean of a is the
-    viscous part; the squares add 5/4 of the mean square slope where the pressure is uniform, less
-    for contacts about the summits, more for those on the leading flanks.
+    To second order in the slopes, the traction of a slipping point on a slope (-a, -b) is
+    1 + 2 a + 2 a^2 + b^2/2 times its pressure. The mean of a, weighted by the pressure, is the
+    viscous part. The squares add 5/4 of the mean square slope for a uniform pressure, less for
+    contacts around the summits, and more for contacts on the leading flanks.
     """
-    # Three waves a scale, of a quarter of its amplitude and twice its wave number.
+    # Each scale has three waves with a quarter of its amplitude and twice its wave number.
     squares = scales * 3.0 * (math.pi * STEEPNESS) ** 2 / 2.0
     rest = np.asarray(found["plateau"]) - 1.0 - 2.0 * np.asarray(found["viscous"])
     assert (rest > 0.0).all() and (rest < 2.0 * squares).all(), f"slopes leave {rest}"

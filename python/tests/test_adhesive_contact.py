@@ -137,7 +137,7 @@ def test_jump_of_a_function_is_the_jump_of_maugis():
 
 
 @pytest.mark.parametrize(("potential", "more", "said"), [
-    (lambda gap: -gap, {}, "attraction at the gap .* must be finite and 0 or more"),
+    (lambda gap: -gap, {}, "attraction is .* at the gap .* must be finite and 0 or more"),
     (lambda gap: np.full_like(gap, np.nan), {}, "must be finite"),
     (lambda gap: 1.0, {}, r"returns shape \(\) for gaps of shape"),
     (lambda gap: "no", {}, "could not convert"),

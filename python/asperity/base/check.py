@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import reprlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["array_of", "choice", "exactly_one", "no_masked", "number", "poisson_ratio",
-           "positive", "shown", "whole"]
+           "positive", "shown", "stresses_of", "whole"]
 
 T = TypeVar("T")
 
@@ -248,3 +248,56 @@ def exactly_one(**values: T | None) -> tuple[str, T]:
         names = ", ".join(name for name, _ in given)
         raise ValueError(f"{names or 'none'} given: must be exactly one of {', '.join(values)}")
     return given[0]
+
+
+def stresses_of(
+    name: str,
+    function: Callable[[NDArray[np.float64]], ArrayLike],
+    points: NDArray[np.float64],
+    argument: str,
+    unit: str,
+) -> NDArray[np.float64]:
+    """Return the stresses that a function of the user gives at some points.
+
+    Parameters
+    ----------
+    name : str
+        What the function describes, for messages.
+    function : callable
+        Takes the array of points and returns an array of stresses, Pa.
+    points : ndarray
+        The points. The function gets a copy.
+    argument, unit : str
+        Name and unit of a point, for messages.
+
+    Returns
+    -------
+    ndarray
+        Stresses, Pa, shape of `points`.
+
+    Raises
+    ------
+    ValueError
+        If the function returns anything but finite numbers >= 0 in an array of this shape.
+
+    Examples
+    --------
+    >>> stresses_of("the law", lambda p: p - 2.0, np.array([3.0, 1.0]), "pressure", "Pa")
+    Traceback (most recent call last):
+    ...
+    ValueError: the law is -1 Pa at the pressure 1 Pa: must be finite and 0 or more
+    """
+    found = function(points.copy())
+    try:
+        values = np.array(found, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name} must return an array of real numbers: {error}") from error
+    if values.shape != points.shape:
+        raise ValueError(f"{name} returns shape {values.shape} for {argument}s of shape"
+                         f" {points.shape}: must be the same")
+    wrong = np.flatnonzero(~((values >= 0.0) & np.isfinite(values)))
+    if wrong.size:
+        first = wrong[0]
+        raise ValueError(f"{name} is {values[first]:g} Pa at the {argument} {points[first]:g}"
+                         f" {unit}: must be finite and 0 or more")
+    return values

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base import library
-from ..base.check import choice, exactly_one, number, positive, whole
+from ..base.check import choice, exactly_one, number, positive, stresses_of, whole
 from ..base.errors import NotConverged
 from .normal import FloatArray, NormalContact
 
@@ -75,8 +75,10 @@ def solve_adhesive(
     height : array_like
         Height of the surface, m, shape (ny, nx). With the shape (nx,) or (1, nx) it is a line
         contact in plane strain. Any memory order and any real type are accepted.
-    lx, ly : float
-        Lengths, m; ``ly = None`` makes the cells square.
+    lx : float
+        Length along x, m.
+    ly : float or None
+        Length along y, m; None makes the cells square.
     modulus : float
         Contact modulus E* = E/(1 - nu^2) = 2 G/(1 - nu), Pa.
     potential : str or callable
@@ -91,9 +93,13 @@ def solve_adhesive(
         attraction. Cells should be smaller than 0.7 modulus range^2/energy (maugis_dugdale: modulus
         range^2/energy; a function: 0.7 modulus over the steepest fall of the attraction in Pa/m).
         Otherwise the edge of the contact sticks to the grid, and a warning says so.
-    pressure, force, displacement : float
-        The load. Give one: mean pressure, Pa; force, N; or approach from the first touch, m.
-        Negative values pull.
+    pressure : float, optional
+        Mean pressure, Pa. Give exactly one of `pressure`, `force` and `displacement`.
+        A negative pressure or force pulls.
+    force : float, optional
+        Normal force, N.
+    displacement : float, optional
+        Approach, counted from the first touch, m.
     boundary : str
         'periodic' or 'free'.
     tolerance : float
@@ -204,18 +210,10 @@ def _attraction(potential: str | Callable[[FloatArray], ArrayLike], energy: floa
 
     gaps = np.linspace(0.0, reach, INTERVALS + 1)
     try:
-        values = np.array(potential(gaps), dtype=np.float64)
+        values = stresses_of("potential: the attraction", potential, gaps, "gap", "m")
     except TypeError as error:
-        raise ValueError(f"potential: the function must take an array of gaps and return an array"
+        raise ValueError("potential: the function must take an array of gaps and return an array"
                          f" of real numbers: {error}") from error
-    if values.shape != gaps.shape:
-        raise ValueError(f"potential: the function returns shape {values.shape} for gaps of shape"
-                         f" {gaps.shape}: must be the same")
-    wrong = np.flatnonzero(~((values >= 0.0) & np.isfinite(values)))
-    if wrong.size:
-        first = wrong[0]
-        raise ValueError(f"potential: the attraction at the gap {gaps[first]:g} m is"
-                         f" {values[first]:g} Pa: must be finite and 0 or more")
     values[-1] = 0.0  # there is no attraction beyond the range
     # Akima's slopes do not overshoot beside a jump. The bounds keep every cubic above zero.
     slopes = Akima1DInterpolator(gaps, values).derivative()(gaps)

@@ -95,12 +95,18 @@ def solve_normal(
     height : array_like
         Height of the surface, m, shape (ny, nx). With the shape (nx,) or (1, nx) it is a line
         contact in plane strain. Any memory order and any real type are accepted.
-    lx, ly : float
-        Lengths, m; ``ly = None`` makes the cells square.
+    lx : float
+        Length along x, m.
+    ly : float or None
+        Length along y, m; None makes the cells square.
     modulus : float
         Contact modulus E* = E/(1 - nu^2) = 2 G/(1 - nu), Pa.
-    pressure, force, displacement : float
-        The load. Give one: mean pressure, Pa; force, N; or approach from the first touch, m.
+    pressure : float, optional
+        Mean pressure, Pa. Give exactly one of `pressure`, `force` and `displacement`.
+    force : float, optional
+        Normal force, N.
+    displacement : float, optional
+        Approach, counted from the first touch, m.
     boundary : str
         'periodic' or 'free'.
     tolerance : float

@@ -129,6 +129,10 @@ class CurvePlan:
         ----------
         celsius : float
             Temperature, C.
+
+        Returns
+        -------
+        float
         """
         ny, nx = self.road.patch(0).height.shape
         series = self.compound.at(celsius)
@@ -164,6 +168,10 @@ class CurvePlan:
         ----------
         side_by_side : int
             Number of runs at a time.
+
+        Returns
+        -------
+        str
         """
         road, patch = self.road, self.road.patch(0)
         ny, nx = patch.height.shape

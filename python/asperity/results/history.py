@@ -78,12 +78,44 @@ class History(NamedValues, HistoryColumns):
         return min((len(column) for column in self._values.values()), default=0)
 
     def units(self, name: str) -> str:
-        """Return the units of a column; they are '1' for a pure number."""
+        """Return the units of a column.
+
+        Parameters
+        ----------
+        name : str
+            Name of the column.
+
+        Returns
+        -------
+        str
+            The units, such as 'Pa', or '1' for a pure number.
+
+        Raises
+        ------
+        KeyError
+            If there is no such column.
+        """
         self[name]
         return self._units.get(name, "1")
 
     def long_name(self, name: str) -> str:
-        """Return the meaning of a column."""
+        """Return the meaning of a column.
+
+        Parameters
+        ----------
+        name : str
+            Name of the column.
+
+        Returns
+        -------
+        str
+            The meaning in words.
+
+        Raises
+        ------
+        KeyError
+            If there is no such column.
+        """
         self[name]
         return self._long_names.get(name, name.replace("_", " "))
 

@@ -93,12 +93,44 @@ class Snapshot(NamedFields):
         return iter(self._meanings)
 
     def units(self, name: str) -> str:
-        """Return the units of a field; they are '1' for a pure number."""
+        """Return the units of a field.
+
+        Parameters
+        ----------
+        name : str
+            Name of the field.
+
+        Returns
+        -------
+        str
+            The units, such as 'Pa', or '1' for a pure number.
+
+        Raises
+        ------
+        KeyError
+            If there is no such field.
+        """
         self._check(name)
         return self._meanings[name][0]
 
     def long_name(self, name: str) -> str:
-        """Return the meaning of a field."""
+        """Return the meaning of a field.
+
+        Parameters
+        ----------
+        name : str
+            Name of the field.
+
+        Returns
+        -------
+        str
+            The meaning in words.
+
+        Raises
+        ------
+        KeyError
+            If there is no such field.
+        """
         self._check(name)
         return self._meanings[name][1]
 

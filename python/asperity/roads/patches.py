@@ -186,7 +186,17 @@ class DrawnRoad:
         return self.whole_spectrum.name
 
     def patch(self, number: int) -> Patch:
-        """Return a patch by its number, counted from 0."""
+        """Return a patch.
+
+        Parameters
+        ----------
+        number : int
+            Number of the patch, from 0.
+
+        Returns
+        -------
+        Patch
+        """
         # Two roads with different seeds have no patch in common, also with seeds 1 and 2.
         height = self.spectrum.draw(self.cells, self.cells, self.side, self.side,
                                     (self.seed, number))
@@ -253,7 +263,17 @@ class MeasuredRoad:
                                           for one in self._maps))
 
     def patch(self, number: int) -> Patch:
-        """Return a patch by its number, from 0 to `count` - 1."""
+        """Return a patch.
+
+        Parameters
+        ----------
+        number : int
+            Number of the patch, from 0 to `count` - 1.
+
+        Returns
+        -------
+        Patch
+        """
         which, row, column = self._places[number]
         one = self._maps[which]
         ny, nx = one.height.shape

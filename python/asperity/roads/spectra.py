@@ -66,7 +66,18 @@ class Spectrum:
         return 2.0 * math.pi / self.wavenumber[0], 2.0 * math.pi / self.wavenumber[-1]
 
     def at(self, wavenumber: FloatArray) -> FloatArray:
-        """Return the density (m4) at wave numbers (rad/m); it is zero outside the band."""
+        """Return the density at wave numbers.
+
+        Parameters
+        ----------
+        wavenumber : ndarray
+            Wave numbers, rad/m, any shape.
+
+        Returns
+        -------
+        ndarray
+            Density, m4, shape of `wavenumber`; it is zero outside the band.
+        """
         wavenumber = np.asarray(wavenumber, dtype=float)
         inside = (wavenumber >= self.wavenumber[0] * (1 - 1e-12)) & (
             wavenumber <= self.wavenumber[-1] * (1 + 1e-12))
@@ -81,6 +92,10 @@ class Spectrum:
         ----------
         long, short : float, optional
             Longest and shortest wavelength, m; by default those of the spectrum.
+
+        Returns
+        -------
+        Spectrum
 
         Raises
         ------
@@ -106,6 +121,10 @@ class Spectrum:
         short : float
             New shortest wavelength, m.
 
+        Returns
+        -------
+        Spectrum
+
         Examples
         --------
         >>> line = Spectrum(np.array([1e2, 1e4]), np.array([1e-10, 1e-16]))
@@ -122,7 +141,17 @@ class Spectrum:
                         self.name, list(self.notes))
 
     def scaled(self, factor: float) -> Spectrum:
-        """Return the spectrum of the same road with all heights multiplied by a factor."""
+        """Return the spectrum of the same road with all heights multiplied by a factor.
+
+        Parameters
+        ----------
+        factor : float
+            Factor of the heights; the density is multiplied by its square.
+
+        Returns
+        -------
+        Spectrum
+        """
         return Spectrum(self.wavenumber, self.psd * factor**2, self.name, list(self.notes))
 
     def draw(self, nx: int, ny: int, lx: float, ly: float, seed: int | Sequence[int]
@@ -252,6 +281,11 @@ def join_spectra(spectra: Sequence[Spectrum], name: str | None = None) -> Spectr
     Returns
     -------
     Spectrum
+
+    Raises
+    ------
+    ValueError
+        If no spectrum is given.
 
     Examples
     --------

@@ -256,11 +256,37 @@ class Groups(MutableSequence[Group]):
         return len(self._groups)
 
     def insert(self, index: int, values: Mapping[str, Any]) -> None:
-        """Insert a group before an index."""
+        """Insert a group before an index.
+
+        Parameters
+        ----------
+        index : int
+            Index in the list.
+        values : Mapping
+            Variables of the group; for ``surface`` also a height map.
+
+        Raises
+        ------
+        ValueError
+            If a variable does not exist or a value is not allowed.
+        """
         self._groups.insert(index, self._group(values))
 
     def append(self, values: Mapping[str, Any] | None = None, **more: Any) -> None:
-        """Append a group, whose variables are given as a mapping, as keywords, or both."""
+        """Append a group.
+
+        Parameters
+        ----------
+        values : Mapping, optional
+            Variables of the group.
+        **more
+            Further variables as keywords.
+
+        Raises
+        ------
+        ValueError
+            If a variable does not exist or a value is not allowed.
+        """
         self.insert(len(self), {**(values or {}), **more})
 
     def __eq__(self, other: object) -> bool:

@@ -12,6 +12,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..base.check import stresses_of
+
 __all__ = ["sampled_law"]
 
 LOWEST, HIGHEST = 1e-3, 1e11  # range of pressures, Pa, in which the lines follow the function
@@ -81,21 +83,7 @@ def _rounded(pressures: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _called(function: Law, pressures: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the bounds at some pressures, and check them."""
-    found = function(pressures.copy())
-    try:
-        bounds = np.array(found, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ValueError("the friction law must return an array of real numbers:"
-                         f" {error}") from error
-    if bounds.shape != pressures.shape:
-        raise ValueError(f"the friction law returns shape {bounds.shape} for pressures of shape"
-                         f" {pressures.shape}: must be the same")
-    wrong = np.flatnonzero(~((bounds >= 0.0) & np.isfinite(bounds)))
-    if wrong.size:
-        first = wrong[0]
-        raise ValueError(f"the friction law is {bounds[first]:g} Pa at the pressure"
-                         f" {pressures[first]:g} Pa: must be finite and 0 or more")
-    return bounds
+    return stresses_of("the friction law", function, pressures, "pressure", "Pa")
 
 
 def _thinned(points: NDArray[np.float64], bounds: NDArray[np.float64]

@@ -214,7 +214,17 @@ def _short(value: Any) -> str:
 
 
 def column(values: list[Any]) -> NDArray[Any]:
-    """Return values as an array; None among numbers becomes NaN.
+    """Return the values of a column as an array.
+
+    Parameters
+    ----------
+    values : list
+        One value per case; None for a case that failed.
+
+    Returns
+    -------
+    ndarray
+        Among numbers None becomes NaN. Values of different shapes become an array of objects.
 
     Examples
     --------

@@ -294,10 +294,10 @@ def traction_samples(snapshot: Snapshot, side: float | None = None) -> tuple[NDA
 
 
 def _arrows(snapshot: Snapshot, axes: Axes) -> bool:
-    """Draw arrows of the traction on the rubber, with a key; whether there were any."""
+    """Draw arrows of the traction on the rubber with a key; return whether there are any."""
     grid = snapshot.run.grid
     length, _, _ = frame_of(grid)
-    # What is seen: all of the map, or the part about a small contact.
+    # The visible part is the whole map, or the surroundings of a small contact.
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     seen = max(right - left, high - low) / length
     i, j, along_x, along_y = traction_samples(snapshot, seen / ARROWS)
