@@ -62,8 +62,8 @@ contains
       if (status /= 0) call fail(error, error_file, path//': cannot be read')
    end subroutine checksum_of_file
 
-   !> Checksum of a field. It is the checksum of the checksums of the rows, so that threads can work
-   !> on different rows.
+   !> Checksum of a field. It is computed from the checksums of the rows, so that threads can work on
+   !> different rows.
    function checksum_of_field(field) result(sum)
       real(dp), intent(in) :: field(:, :)           !! [nx, ny]
       integer(int64) :: sum

@@ -1,8 +1,8 @@
 !> Errors as values: every procedure that can fail has a last argument
 !> `type(error_type), allocatable, intent(out) :: error`, left unallocated on success. Procedures that are
 !> called in sequence may declare it `intent(inout)`: they do nothing if it is already set, so that the
-!> caller looks at it once at the end. The two kinds do not mix in one sequence, because `intent(out)`
-!> clears an earlier error.
+!> caller checks it once, after the last call. Do not mix the two kinds in one sequence, because
+!> `intent(out)` clears an earlier error.
 module asperity_errors
    implicit none
    private
@@ -13,7 +13,7 @@ module asperity_errors
    integer, parameter, public :: error_input = 2          !! the user's input is wrong
    integer, parameter, public :: error_file = 3           !! a file cannot be read or written
    integer, parameter, public :: error_convergence = 4    !! a solver did not converge
-   !> There is not enough memory. The program ends with the status of `error_file`, Python raises
+   !> There is not enough memory. The program ends with the status of `error_file`, and Python raises
    !> MemoryError.
    integer, parameter, public :: error_memory = 5
 

@@ -33,12 +33,12 @@ module asperity_parallel
       module procedure :: global_sum_vector, global_sum_integer
    end interface global_sum
 
-   !> Give all processes what the first one has.
+   !> Give all processes the value of the first one.
    interface share
       module procedure :: share_integer, share_long, share_real, share_reals, share_logical, share_text
    end interface share
 
-   logical :: joined = .false.           !! between the start and the end of the processes
+   logical :: joined = .false.           !! true from `start_processes` to `end_processes`
    integer :: processes = 1              !! number of processes
    integer :: number = 0                 !! of this process, from 0
    integer :: neighbours = 1             !! processes on this machine
@@ -48,7 +48,7 @@ contains
 
    ! Processes.
 
-   !> Join the other processes of this run. To be called once, first of all.
+   !> Join the other processes of this run. Call this once, before anything else.
    subroutine start_processes()
 #ifdef ASPERITY_MPI
       integer :: provided
@@ -64,7 +64,7 @@ contains
 #endif
    end subroutine start_processes
 
-   !> Leave the other processes. To be called by every process; what is called after it exchanges nothing.
+   !> Leave the other processes. Every process must call this; later calls exchange nothing.
    subroutine end_processes()
 #ifdef ASPERITY_MPI
       if (joined) call mpi_finalize()
@@ -109,8 +109,8 @@ contains
 #endif
    end function parallel_library
 
-   !> What all processes have sent to each other so far, bytes: parts of fields and numbers of rows.
-   !> Collective.
+   !> Number of bytes that all processes have sent to each other so far: parts of fields and numbers for
+   !> rows. Collective.
    function exchanged_bytes() result(bytes)
       real(dp) :: bytes
 
@@ -121,7 +121,7 @@ contains
 #endif
    end function exchanged_bytes
 
-   !> Add to what this process has sent to others.
+   !> Add to the number of bytes that this process has sent to others.
    subroutine count_sent(bytes)
       real(dp), intent(in) :: bytes
 
@@ -200,7 +200,7 @@ contains
 #endif
    end function on_any_process
 
-   !> Numbers for each row, of all rows in the order of the grid.
+   !> Collect the numbers of each row from all processes, in the order of the rows.
    function gather_rows(local) result(whole)
       real(dp), intent(in) :: local(:, :)          !! [numbers, rows of this process]
       real(dp), allocatable :: whole(:, :)         !! [numbers, all rows]

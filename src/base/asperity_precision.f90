@@ -1,4 +1,4 @@
-!> Kinds of the numbers used throughout.
+!> The kinds of numbers that all modules use.
 module asperity_precision
    use, intrinsic :: iso_fortran_env, only : int8, int64, real32, real64
    implicit none
@@ -13,7 +13,7 @@ module asperity_precision
 
 contains
 
-   !> The power of two above a positive number, 1 for others.
+   !> The next power of two above a positive number, and 1 for all other numbers.
    elemental function power_of_two(x)
       real(dp), intent(in) :: x
       real(dp) :: power_of_two

@@ -25,7 +25,7 @@ module asperity_signals
    !> Longer than C's `struct sigaction`, which has 152 bytes on Linux, in units of 8 bytes.
    integer, parameter :: action_length = 64
 
-   integer(c_int64_t), target :: actions(action_length, most_stops) = 0   !! of others, while a call lasts
+   integer(c_int64_t), target :: actions(action_length, most_stops) = 0   !! the host's own actions, during a call
    integer(c_int), volatile :: caught = 0
    logical, volatile :: asked = .false.
 
@@ -45,8 +45,8 @@ module asperity_signals
       function c_sigaction(number, action, before) bind(c, name='sigaction') result(status)
          import :: c_int, c_ptr
          integer(c_int), value :: number
-         type(c_ptr), value :: action            !! null: the action stays
-         type(c_ptr), value :: before            !! null: not asked for
+         type(c_ptr), value :: action            !! null: the action is not changed
+         type(c_ptr), value :: before            !! null: the former action is not needed
          integer(c_int) :: status
       end function c_sigaction
    end interface
@@ -68,8 +68,8 @@ contains
       before = c_signal(signal_file_size, ignore)
    end subroutine catch_signals
 
-   !> Let signals ask for a stop for the time of one call in a process that is not ours. What others
-   !> want done with these signals is kept, and `give_back_stops` restores it.
+   !> Let signals ask for a stop during one call of a host program, such as Python. The host's own
+   !> actions for these signals are saved, and `give_back_stops` restores them.
    subroutine catch_stops(numbers)
       integer(c_int), intent(in) :: numbers(:)
       type(c_funptr) :: before
@@ -83,7 +83,8 @@ contains
       end do
    end subroutine catch_stops
 
-   !> End what `catch_stops` began. A signal that came meanwhile is sent again.
+   !> Restore the actions that `catch_stops` replaced. A signal that arrived in between is sent again, so
+   !> that the host receives it.
    subroutine give_back_stops(numbers)
       integer(c_int), intent(in) :: numbers(:)   !! the same as those of `catch_stops`
       integer(c_int) :: status

@@ -1,4 +1,4 @@
-!> Threads: how many there are, and how many are in use.
+!> The number of threads: how many the environment allows, and how many are in use.
 module asperity_threads
    use omp_lib, only : omp_get_max_threads, omp_get_num_procs, omp_pause_hard, &
       omp_pause_resource_all, omp_set_num_threads
@@ -10,9 +10,9 @@ module asperity_threads
 
 contains
 
-   !> Use `n` threads from here on. 0 takes what the environment asks for: OMP_NUM_THREADS, or what
-   !> Slurm grants a task, SLURM_CPUS_PER_TASK; without them all processors, shared with the other processes
-   !> of this machine.
+   !> Use `n` threads from now on. With 0 the environment decides: OMP_NUM_THREADS, or else
+   !> SLURM_CPUS_PER_TASK, which Slurm sets for a task. If neither is set, all processors are used, shared
+   !> equally with the other processes of this run on this machine.
    subroutine set_threads(n)
       integer, intent(in) :: n
 
@@ -23,8 +23,8 @@ contains
       end if
    end subroutine set_threads
 
-   !> Number of threads that the environment asks for. A launcher may bind each process to processors of
-   !> its own; then it has fewer than the machine.
+   !> Number of threads that the environment asks for. If a launcher binds each process to certain
+   !> processors, these count and not those of the whole machine.
    function threads_of_environment() result(n)
       integer :: n
 
@@ -33,8 +33,8 @@ contains
       if (n == 0) n = max(1, omp_get_num_procs()/processes_of_machine())
    end function threads_of_environment
 
-   !> The number that a variable of the environment starts with (a list of OpenMP has one for each
-   !> level); 0 where it has none.
+   !> The number with which a variable of the environment begins (OMP_NUM_THREADS may be a list with a
+   !> number for each level); 0 if there is none.
    function number_in_environment(name) result(n)
       character(*), intent(in) :: name
       integer :: n
@@ -51,8 +51,8 @@ contains
       if (status /= 0) n = 0
    end function number_in_environment
 
-   !> End the idle threads; the next parallel region starts new ones. A copy of a process (fork) has
-   !> only the thread that made it: with the others it would wait for ever.
+   !> End the idle threads; the next parallel region starts new ones. This is necessary before a fork:
+   !> the copy has only the thread that made it, and would wait for the others for ever.
    subroutine release_threads()
       integer :: status
 

@@ -1,17 +1,18 @@
-!> The filters of HDF5 on the bytes of a chunk: shuffle, deflate, and the checksum of Fletcher.
+!> The filters of HDF5 for the bytes of a chunk: shuffle, deflate, and the checksum of Fletcher.
 !>
-!> HDF5 applies its filters one chunk after the other. These procedures make the same format, so that
-!> threads can work on different chunks, and every reader of HDF5 reads what they made.
+!> HDF5 itself filters one chunk after the other. These procedures produce the same format, which every
+!> reader of HDF5 understands, but several threads can call them for different chunks.
 !>
-!> * Shuffle: the first bytes of all values come first, then all second bytes, and so on. The bytes at one
-!>   place in all values of a chunk are called a plane here.
-!> * Deflate: a stream of zlib. The lower planes of a field of reals are as good as random: deflate would
-!>   work on them for most of its time and gain nothing. Planes that promise less than `worthwhile` are
-!>   therefore stored in the stream as they are (level 0 of zlib), which is 10 times as fast.
-!> * Fletcher: a checksum of 32 bits behind the bytes, as the manual of HDF5 defines it: two sums modulo
+!> * Shuffle: the first bytes of all values come first, then all second bytes, and so on. A plane, in this
+!>   module, consists of the bytes at one position in all values of a chunk.
+!> * Deflate: a stream of zlib. The lower planes of a field of reals are nearly random: deflate would spend
+!>   most of its time on them and save nothing. A plane of which deflate is expected to save less than the
+!>   fraction `worthwhile` is therefore stored without compression (level 0 of zlib), which is 10 times as
+!>   fast.
+!> * Fletcher: a checksum of 32 bits after the bytes, as the manual of HDF5 defines it: two sums modulo
 !>   65535 over words of 16 bits with the high byte first.
 !>
-!> The bytes depend on the values and the level alone.
+!> The resulting bytes depend only on the values and the level, and not on the number of threads.
 module chunk_filters
    use, intrinsic :: iso_c_binding, only : c_int, c_loc
    use asperity_precision, only : dp, int64, int8
@@ -22,20 +23,20 @@ module chunk_filters
 
    public :: expected_gain, filter_chunk, fletcher32
 
-   real(dp), parameter :: worthwhile = 1.0_dp/16.0_dp  !! part of a plane that deflate should save
-   integer, parameter :: samples = 16384               !! bytes of a plane that are looked at
+   real(dp), parameter :: worthwhile = 1.0_dp/16.0_dp  !! fraction of a plane that deflate must save
+   integer, parameter :: samples = 16384               !! bytes of a plane that are examined
    integer, parameter :: window = 32768                !! bytes back to which deflate can refer
-   integer, parameter :: slots = 4096                  !! of the table of places
+   integer, parameter :: slots = 4096                  !! size of the table of positions
 
 contains
 
-   !> Bytes of a chunk as they are stored.
+   !> Apply all filters to the values of a chunk.
    subroutine filter_chunk(values, level, stored, length, success)
       integer(int8), intent(in), contiguous :: values(:, :)   !! [bytes of a value, values]
-      integer, intent(in) :: level                 !! of deflate, 1 to 9; 0: no shuffle and no deflate
+      integer, intent(in) :: level                 !! level of deflate, 1 to 9; 0: neither shuffle nor deflate
       integer(int8), allocatable, intent(inout) :: stored(:)
-      integer, intent(out) :: length               !! of what is stored, bytes
-      logical, intent(out) :: success              !! no: memory is short
+      integer, intent(out) :: length               !! length of the stored bytes
+      logical, intent(out) :: success              !! false if there was not enough memory
       integer(int8), allocatable :: planes(:, :)
       integer :: status
 
@@ -56,7 +57,7 @@ contains
       call append_sum(stored, length)
    end subroutine filter_chunk
 
-   !> Let an array take what any chunk of a number of bytes may become.
+   !> Make an array large enough for the filtered form of any chunk of the given length.
    subroutine make_room(stored, bytes, success)
       integer(int8), allocatable, intent(inout) :: stored(:)
       integer, intent(in) :: bytes
@@ -74,11 +75,11 @@ contains
       success = status == 0
    end subroutine make_room
 
-   !> Collect the bytes of the values by their place in the value.
+   !> Sort the bytes of the values into planes.
    pure subroutine shuffle(values, planes)
       integer(int8), intent(in), contiguous :: values(:, :)     !! [bytes of a value, values]
       integer(int8), intent(out), contiguous :: planes(:, :)    !! [values, bytes of a value]
-      integer, parameter :: some = 512                 !! values whose bytes stay in the cache meanwhile
+      integer, parameter :: some = 512                 !! values whose bytes fit into the cache
       integer :: b, i, start
 
       do start = 1, size(values, 2), some
@@ -95,7 +96,7 @@ contains
       integer(int8), intent(in), contiguous, target :: planes(:, :)    !! [values, bytes of a value]
       integer, intent(in) :: level
       integer(int8), intent(inout), contiguous, target :: stored(:)
-      integer, intent(out) :: length               !! of the stream, bytes
+      integer, intent(out) :: length               !! length of the stream in bytes
       logical, intent(out) :: success
       type(stream_type), target :: stream
       integer(c_int) :: status, ignored, wanted
@@ -110,7 +111,7 @@ contains
       do b = 1, last
          wanted = 0
          if (expected_gain(planes(:, b)) >= worthwhile) wanted = int(level, c_int)
-         ! This first completes what is in the stream at the level before.
+         ! deflateParams first completes what was added to the stream at the previous level.
          status = deflate_params(stream, wanted, z_default_strategy)
          stream%next_in = c_loc(planes(1, b))
          stream%avail_in = int(size(planes, 1), c_int)
@@ -122,15 +123,15 @@ contains
       ignored = deflate_end(stream)
    end subroutine deflate_planes
 
-   !> The part of a plane that deflate is likely to save, from a sample: by shorter codes for frequent
-   !> bytes (entropy), by runs of one byte, or by references to what has occurred before.
+   !> Estimate from a sample the fraction of a plane that deflate would save: by shorter codes for frequent
+   !> bytes (entropy), by runs of one byte, or by references to earlier bytes.
    pure function expected_gain(plane) result(gain)
       integer(int8), intent(in), contiguous :: plane(:)
       real(dp) :: gain
       integer :: counts(-128:127), i, n, rarest, runs, step
       real(dp) :: entropy
 
-      ! An odd step, because even ones would meet the same bytes of small patterns again and again.
+      ! The step is odd, because an even step would always hit the same bytes of a short pattern.
       step = max(1, size(plane)/samples)
       if (mod(step, 2) == 0) step = step + 1
       counts = 0
@@ -154,8 +155,8 @@ contains
       gain = max(gain, repeated_part(plane, int(rarest, int8)))
    end function expected_gain
 
-   !> The part of a plane that has occurred before within the window, from the places where a given byte
-   !> is: those are the same in whatever is repeated.
+   !> Estimate the fraction of a plane that repeats earlier bytes within the window. Only the positions of
+   !> one given byte are examined: in a repeated sequence they recur at the same distances.
    pure function repeated_part(plane, mark) result(part)
       integer(int8), intent(in), contiguous :: plane(:)
       integer(int8), intent(in) :: mark
@@ -178,7 +179,7 @@ contains
       if (marks > 0) part = real(repeated, dp)/marks
    end function repeated_part
 
-   !> Add the checksum of what is stored behind it, the lowest byte first.
+   !> Append the checksum to the stored bytes, the lowest byte first.
    subroutine append_sum(stored, length)
       integer(int8), intent(inout), contiguous :: stored(:)
       integer, intent(inout) :: length
@@ -192,7 +193,7 @@ contains
       length = length + 4
    end subroutine append_sum
 
-   !> A number from 0 to 255 as a byte with these bits.
+   !> Convert a number from 0 to 255 to the byte with the same bits.
    pure function as_byte(number) result(byte)
       integer(int64), intent(in) :: number
       integer(int8) :: byte
@@ -204,7 +205,7 @@ contains
    pure function fletcher32(bytes) result(sum)
       integer(int8), intent(in), contiguous :: bytes(:)
       integer(int64) :: sum
-      integer, parameter :: some = 65536              !! words after which the sums are reduced
+      integer, parameter :: some = 65536              !! number of words after which the sums are reduced
       integer(int64) :: first, second, word
       integer :: i, start, words
 
@@ -228,7 +229,7 @@ contains
       sum = ior(shiftl(second, 16), first)
    end function fletcher32
 
-   !> A sum modulo 65535, with 65535 for 0 unless all that was added is 0.
+   !> A sum modulo 65535. Zero is represented by 65535, unless all terms are zero.
    pure function reduced(sum) result(rest)
       integer(int64), intent(in) :: sum
       integer(int64) :: rest

@@ -1,4 +1,5 @@
-!> The kind of thing that has a name in the file system, and the identity of a file.
+!> What a name in the file system stands for (a file, a folder, a device, a link), and whether two names
+!> stand for the same file.
 module file_kind
    use asperity_precision, only : int64
    implicit none
@@ -12,8 +13,8 @@ module file_kind
 
 contains
 
-   !> Is there something of this name that is not a regular file, such as a folder, a device or a
-   !> pipe? A link counts as the thing that it leads to.
+   !> Does this name stand for something other than a regular file, such as a folder, a device or a
+   !> pipe? A link stands for its target.
    function is_other_than_file(path) result(yes)
       character(*), intent(in) :: path
       logical :: yes
@@ -24,7 +25,7 @@ contains
       if (status == 0) yes = iand(values(3), kind_bits) /= regular
    end function is_other_than_file
 
-   !> Is this a link that leads to nothing?
+   !> Is this a link without a target?
    function is_dangling_link(path) result(yes)
       character(*), intent(in) :: path
       logical :: yes

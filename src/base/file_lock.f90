@@ -1,9 +1,9 @@
-!> A lock that one process at a time can hold, and that a process which dies does not keep.
+!> A lock that one process at a time can hold. It ends with the process, even if the process is killed.
 !>
 !> The lock is flock(2) on a small file beside the files that it protects. The system releases it
 !> when the process ends, for whatever reason. The file contains a line about the process that holds
-!> the lock, which appears in the message that other processes print. It is removed when the lock is
-!> released; a file that a dead process left behind does no harm. On a file system without locks
+!> the lock; other processes quote this line in their error messages. The file is removed when the lock
+!> is released; a file that a dead process left behind does no harm. On a file system without locks
 !> there is no protection.
 module file_lock
    use, intrinsic :: iso_c_binding, only : c_int
@@ -19,7 +19,7 @@ module file_lock
    integer(c_int), parameter :: exclusive_at_once = 6      !! LOCK_EX + LOCK_NB of every Unix
    integer(c_int), parameter :: unlock = 8                 !! LOCK_UN
    integer, parameter :: would_block(2) = [11, 35]         !! EWOULDBLOCK of Linux and of macOS
-   integer, parameter :: attempts = 20                     !! to lock a file that stays in place
+   integer, parameter :: attempts = 20                     !! number of attempts to lock a file that others may remove
    character(*), parameter :: mark = 'asperity process '   !! the first words of a lock file
 
    !> A lock. A variable of this type must not be copied.

@@ -119,7 +119,8 @@ contains
       end if
    end subroutine lengthen_file
 
-   !> Let a write beyond the limit on the size of files fail. By default it would end the program.
+   !> Make a write beyond the limit on the size of files fail with an error. By default the system would
+   !> end the program.
    subroutine let_size_limit_be_an_error()
       integer(c_intptr_t) :: old
 

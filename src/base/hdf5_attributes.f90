@@ -21,7 +21,7 @@ module hdf5_attributes
    contains
       procedure :: has_attribute
       procedure, private :: write_text, write_integer, write_real, read_text, read_integer, read_real
-      !> Write an attribute, or a new value into one.
+      !> Write an attribute. An existing attribute gets the new value.
       generic :: write_attribute => write_text, write_integer, write_real
       !> Read an attribute.
       generic :: read_attribute => read_text, read_integer, read_real
@@ -51,7 +51,7 @@ contains
 
    ! --- writing ------------------------------------------------------------------------------
 
-   !> Write an attribute from memory, or a new value into one.
+   !> Write an attribute from memory. An existing attribute gets the new value.
    subroutine store(self, path, name, kind, buffer, error)
       class(hdf5_attributes_type), intent(inout) :: self
       character(*), intent(in) :: path

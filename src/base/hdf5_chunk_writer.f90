@@ -1,9 +1,10 @@
-!> Fields that are written chunk by chunk, each a slab of rows (`slab_rows`), and filtered by all threads.
+!> Writes compressed fields chunk by chunk and filters the chunks on all threads. A chunk is a slab of rows
+!> (`slab_rows`).
 !>
-!> HDF5 itself filters with one thread, which takes longer than many a solver. Here some chunks are gathered,
-!> the threads filter them (module `chunk_filters`), and the chunks then go to the file as they are, in
-!> their order. This takes the memory of at most `most_chunks` chunks as they are, and of twice as many as
-!> they are stored. The bytes are the same for any number of threads.
+!> HDF5 itself filters with one thread, which often takes longer than solving the step. Here some chunks are
+!> gathered, the threads filter them (module `chunk_filters`), and the filtered chunks are then written to
+!> the file in their order. The memory needed is that of at most `most_chunks` unfiltered and twice as many
+!> filtered chunks. The bytes in the file are the same for any number of threads.
 !>
 !> The file remembers the first fault (see `hdf5_handle`).
 module hdf5_chunk_writer
@@ -22,17 +23,17 @@ module hdf5_chunk_writer
 
    public :: chunk_writer_type
 
-   integer, parameter :: most_chunks = 16          !! that are gathered
+   integer, parameter :: most_chunks = 16          !! largest number of gathered chunks
 
-   !> A chunk as it is stored.
+   !> A filtered chunk.
    type :: stored_type
       integer(int8), allocatable :: bytes(:)
-      integer :: length = 0                        !! of the bytes that count
+      integer :: length = 0                        !! number of bytes in use
       integer :: first = 0                         !! its first row, from 1
-      logical :: success = .true.                  !! no: there was not enough memory
+      logical :: success = .true.                  !! false if there was not enough memory
    end type stored_type
 
-   !> A field that is being written. Not to be copied.
+   !> A field that is being written. A variable of this type must not be copied.
    type :: chunk_writer_type
       private
       character(:), allocatable :: path            !! of the dataset
@@ -42,7 +43,7 @@ module hdf5_chunk_writer
       integer :: chunk_values = 0                  !! values of a chunk
       integer :: gathered = 0                      !! chunks that wait to be filtered
       integer :: ready = 0                         !! chunks that wait to be written
-      integer :: turn = 1                          !! which column of `stored` the gathered ones will take
+      integer :: turn = 1                          !! column of `stored` for the gathered chunks
       integer(int8), allocatable :: values(:, :, :)   !! [bytes of a value, values, gathered chunks]
       type(stored_type), allocatable :: stored(:, :)  !! [chunks, 2]
    contains
@@ -55,14 +56,14 @@ module hdf5_chunk_writer
 
 contains
 
-   !> Begin to write a field that `create_field` has made. The one before must be finished: otherwise the
-   !> places of both in the file depend on the number of threads.
+   !> Begin to write a field that `create_field` has created. The previous field must be finished:
+   !> otherwise the positions of both in the file would depend on the number of threads.
    subroutine start_field(self, file, path, extent, bytes, level)
       class(chunk_writer_type), intent(inout) :: self
       class(hdf5_file_type), intent(inout) :: file
       character(*), intent(in) :: path
       integer, intent(in) :: extent(2)             !! nx, ny
-      logical, intent(in) :: bytes                 !! of bytes, else of reals
+      logical, intent(in) :: bytes                 !! true for a field of bytes, false for reals
       integer, intent(in) :: level                 !! of compression, 0 none to 9 smallest
       type(error_type), allocatable :: fault
       character(:), allocatable :: name
@@ -88,7 +89,7 @@ contains
       call file%settle(fault)
    end subroutine start_field
 
-   !> Reals.
+   !> Add a chunk of reals.
    subroutine add_reals(self, file, first, slab)
       class(chunk_writer_type), intent(inout) :: self
       class(hdf5_file_type), intent(inout) :: file
@@ -98,7 +99,7 @@ contains
       call add_chunk(self, file, first, c_loc(slab), size(slab))
    end subroutine add_reals
 
-   !> Bytes.
+   !> Add a chunk of bytes.
    subroutine add_bytes(self, file, first, slab)
       class(chunk_writer_type), intent(inout) :: self
       class(hdf5_file_type), intent(inout) :: file
@@ -108,12 +109,12 @@ contains
       call add_chunk(self, file, first, c_loc(slab), size(slab))
    end subroutine add_bytes
 
-   !> Gather a chunk. Where the last one has fewer rows, zeros complete it.
+   !> Gather a chunk. If the last chunk has fewer rows, it is completed with zeros.
    subroutine add_chunk(self, file, first, address, count)
       type(chunk_writer_type), intent(inout) :: self
       class(hdf5_file_type), intent(inout) :: file
       integer, intent(in) :: first
-      type(c_ptr), intent(in) :: address           !! of its values
+      type(c_ptr), intent(in) :: address           !! address of the values
       integer, intent(in) :: count                 !! of its values
       integer(int8), pointer, contiguous :: bytes(:, :)
 
@@ -126,7 +127,7 @@ contains
       if (self%gathered == size(self%values, 3)) call work_off(self, file)
    end subroutine add_chunk
 
-   !> Write the chunks that are ready, while threads filter those that were gathered.
+   !> Write the chunks that are already filtered, while other threads filter the gathered ones.
    subroutine work_off(self, file)
       type(chunk_writer_type), intent(inout) :: self
       class(hdf5_file_type), intent(inout) :: file
@@ -136,7 +137,7 @@ contains
       !$omp parallel default(none) shared(self, status) private(k) &
       !$omp num_threads(max(1, min(thread_count(), self%gathered)))
       !$omp master
-      ! HDF5 belongs to the first thread. It reports faults to the thread where they occurred.
+      ! Only the first thread calls HDF5, which reports a fault to the thread where it occurred.
       call write_ready(self, status)
       !$omp end master
       !$omp do schedule(dynamic, 1)
@@ -155,7 +156,7 @@ contains
       call file%settle(fault)
    end subroutine work_off
 
-   !> Write the chunks that are ready.
+   !> Write the chunks that are already filtered.
    subroutine write_ready(self, status)
       type(chunk_writer_type), intent(inout) :: self
       integer, intent(out) :: status
@@ -173,8 +174,8 @@ contains
       self%ready = 0
    end subroutine write_ready
 
-   !> Write what is left of the field, if there is one. After a fault nothing is written, but the dataset is
-   !> closed all the same: HDF5 keeps a file open as long as one of its datasets is.
+   !> Write the rest of the field, if one has been started. After a fault nothing is written, but the dataset
+   !> is still closed, because HDF5 keeps a file open as long as one of its datasets is open.
    subroutine finish_field(self, file)
       class(chunk_writer_type), intent(inout) :: self
       class(hdf5_file_type), intent(inout) :: file
@@ -183,7 +184,7 @@ contains
 
       if (self%dataset >= 0) then
          if (.not. file%has_failed()) call work_off(self, file)
-         if (.not. file%has_failed()) call work_off(self, file)      ! for what is now ready
+         if (.not. file%has_failed()) call work_off(self, file)      ! for the chunks that have just been filtered
          status = int(h5dclose(self%dataset))
          if (.not. file%has_failed()) call file%checked(status, 'the dataset cannot be written', self%path, fault)
          call file%settle(fault)

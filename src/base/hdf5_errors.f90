@@ -60,7 +60,7 @@ contains
       if (.not. started) call fail(error, error_file, 'HDF5 cannot be initialised')
    end subroutine start_hdf5
 
-   !> The reason of HDF5's last failure. If a call of the system failed, it is the system's message.
+   !> The reason for HDF5's last failure. If a system call failed, it is the message of the system.
    function last_reason() result(text)
       character(:), allocatable :: text
       character(*), parameter :: mark = 'error message = '''
@@ -93,7 +93,7 @@ contains
       if (c_associated(entry%description)) reason = text_of(entry%description)
    end function keep_description
 
-   !> A text of C as a text of Fortran.
+   !> Convert a text of C to a text of Fortran.
    function text_of(address) result(text)
       type(c_ptr), intent(in) :: address
       character(:), allocatable :: text

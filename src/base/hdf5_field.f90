@@ -1,4 +1,4 @@
-!> Fields of HDF5 files that anyone may have written, such as height maps. They are read in slabs of rows.
+!> Reads fields from HDF5 files of any origin, such as height maps, in slabs of rows.
 module hdf5_field
    use asperity_errors, only : error_type
    use asperity_precision, only : dp
@@ -24,8 +24,8 @@ module hdf5_field
 
 contains
 
-   !> Open a field. HDF5 may crash or hang on a damaged file, so that a separate process first tries to
-   !> read all of it, if it has the shape that is wanted.
+   !> Open a field. HDF5 may crash or hang on a damaged file. Therefore a separate process first tries to
+   !> read the whole field, provided that it has the expected shape.
    subroutine open_field(self, path, dataset, wanted, error)
       class(field_reader_type), intent(inout) :: self
       character(*), intent(in) :: path       !! name of the file
@@ -44,7 +44,7 @@ contains
       if (.not. allocated(error)) call open_dataset(self, path, dataset, error)
    end subroutine open_field
 
-   !> Open a field, and read all of it if it has the shape that is wanted.
+   !> Open a field, and read all of it if it has the expected shape.
    subroutine try_field(self, path, dataset, wanted)
       class(field_reader_type), intent(inout) :: self
       character(*), intent(in) :: path
@@ -89,7 +89,7 @@ contains
          self%extent = found
          call self%slabs%open(self%file, name)
       else
-         call self%file%read(name, field)    ! this reports that the number of dimensions is wrong
+         call self%file%read(name, field)    ! this fails and reports the wrong number of dimensions
       end if
       call self%file%report(error)
       if (allocated(error)) call self%close()
@@ -111,7 +111,7 @@ contains
       type(error_type), allocatable :: error
 
       call self%slabs%close()
-      call self%file%close(error)            ! everything has been read: a fault means nothing any more
+      call self%file%close(error)            ! everything has been read, so a fault has no consequences
    end subroutine close_field
 
 end module hdf5_field

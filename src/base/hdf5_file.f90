@@ -1,13 +1,13 @@
-!> HDF5 files: what the groups of a file hold, with messages about failures.
+!> HDF5 files: the interface that the rest of the program uses, with messages about failures.
 !>
-!> `hdf5_file_type` has all that the rest of the program needs of an HDF5 file. Its parts are
-!> `hdf5_handle` (opening, closing, faults), `hdf5_tree` (groups), `hdf5_attributes`, `hdf5_reader`
-!> (values of datasets), and the new datasets and columns of this module. Below them lie `hdf5_values`
-!> and `hdf5_errors`. Only modules hdf5_* call HDF5.
+!> `hdf5_file_type` extends, one after the other, the types of `hdf5_handle` (opening, closing, faults),
+!> `hdf5_tree` (groups), `hdf5_attributes` and `hdf5_reader` (values of datasets). This module adds the
+!> writing of datasets and columns. They all use `hdf5_values` and `hdf5_errors`. Only modules hdf5_*
+!> call HDF5.
 !>
-!> A column that grows by a row (`create_column`, `append`) has the space for all its rows from the
-!> first row on. A row changes values, which go straight to the file, and the length of the column,
-!> a single small block that the next `flush` writes.
+!> A column grows row by row (`create_column`, `append`). The space for all its rows is set aside with the
+!> first row. A new row changes the values, which are written to the file at once, and the length of
+!> the column, a single small block that the next `flush` writes.
 module hdf5_file
    use, intrinsic :: iso_c_binding, only : c_loc, c_null_ptr, c_ptr
    use asperity_errors, only : error_type
@@ -44,9 +44,9 @@ contains
 
    ! --- writing ------------------------------------------------------------------------------
 
-   !> Write a new dataset from memory. With `compression` it is stored in chunks with checksums: 0
-   !> without compression, 9 as small as possible. By default it is stored in one piece without
-   !> them.
+   !> Write a new dataset from memory. If `compression` is given, the dataset is stored in chunks with
+   !> checksums: 0 means no compression, 9 the smallest file. By default the dataset is stored in one
+   !> piece without checksums.
    subroutine store(self, path, values, units, long_name, error, compression)
       class(hdf5_file_type), intent(inout) :: self
       character(*), intent(in) :: path
@@ -70,7 +70,7 @@ contains
       call self%settle(fault, error)
    end subroutine store
 
-   !> Add to a dataset what its values are.
+   !> Store the units and the description of a dataset as its attributes.
    subroutine describe(self, path, units, long_name, fault)
       class(hdf5_file_type), intent(inout) :: self
       character(*), intent(in) :: path
@@ -87,8 +87,8 @@ contains
       class(hdf5_file_type), intent(inout) :: self
       character(*), intent(in) :: group
       character(*), intent(in) :: scales(:)   !! names of the vectors in Fortran's order of the axes
-      !> Names of the datasets, each of which has all these axes; none: the vectors are scales
-      !> anyway
+      !> Names of the datasets, each of which has all these axes. Without datasets the vectors are only
+      !> marked as scales.
       character(*), intent(in) :: datasets(:)
       type(error_type), allocatable, intent(out), optional :: error
       type(error_type), allocatable :: fault

@@ -17,9 +17,9 @@
 !>   nothing, and reads return 0, '' or nothing. A chain of calls therefore needs no line after each
 !>   of them. At the end of the chain `report` or `close` returns the first fault.
 !>
-!> A write that failed is always remembered. A fault that is remembered is also the error of all
-!> later procedures that have the argument, until the file is opened again. If a fault must prevent
-!> a step that the file does not know of, such as removing another file, ask before that step.
+!> A write that failed is always remembered. A later procedure that has the argument returns the
+!> remembered fault, until the file is opened again. If a fault must prevent a step that does not
+!> concern this file, such as removing another file, call `report` before that step.
 module hdf5_handle
    use, intrinsic :: iso_c_binding, only : c_bool, c_int
    use asperity_errors, only : error_file, error_type, fail
@@ -47,7 +47,7 @@ module hdf5_handle
       character(:), allocatable :: staged_path
       character(:), allocatable :: path               !! name of the file
       type(error_type), allocatable :: fault          !! the first fault that is remembered
-      logical :: unreported = .false.                 !! no caller has got this fault yet
+      logical :: unreported = .false.                 !! the fault has not been returned to a caller
    contains
       procedure :: open => open_file
       procedure :: close => close_file
@@ -76,7 +76,7 @@ contains
       character(*), intent(in) :: path
       character(*), intent(in) :: mode      !! 'read', 'create' (replaces a file) or 'append'
       type(error_type), allocatable, intent(out), optional :: error
-      integer, intent(in), optional :: alignment  !! of what is added, bytes; default 512
+      integer, intent(in), optional :: alignment  !! alignment of new objects, bytes; default 512
       !> Bytes at the start of a new file that HDF5 does not use
       integer, intent(in), optional :: user_block
       type(error_type), allocatable :: fault
@@ -202,7 +202,7 @@ contains
    end subroutine explain_opening
 
    !> Close a file. After a failed write it stays as the last flush left it. The error is a fault
-   !> that no caller has got yet, or one of closing.
+   !> that has not been returned to a caller before, or the failure to close.
    subroutine close_file(self, error)
       class(hdf5_handle_type), intent(inout) :: self
       type(error_type), allocatable, intent(out), optional :: error
@@ -225,7 +225,7 @@ contains
       self%staged = -1
    end subroutine close_file
 
-   !> Hand everything to the operating system, so that nothing is lost if the program is killed later.
+   !> Pass all data to the operating system, so that nothing is lost if the program is killed later.
    subroutine flush_file(self, error)
       class(hdf5_handle_type), intent(inout) :: self
       type(error_type), allocatable, intent(out), optional :: error
@@ -258,7 +258,7 @@ contains
       failed = self%has_failed(error)
    end subroutine report
 
-   !> Does the file remember a fault? If so, it is the error.
+   !> Does the file remember a fault? If so, it is returned as the error.
    function has_failed(self, error) result(failed)
       class(hdf5_handle_type), intent(inout) :: self
       type(error_type), allocatable, intent(out), optional :: error

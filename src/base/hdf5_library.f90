@@ -69,7 +69,7 @@ contains
       status = h5tset_size(h5t_string, -1_size_t)      ! H5T_VARIABLE
    end subroutine open_library
 
-   !> A text as C takes it. Trailing blanks do not belong to it.
+   !> A text in the form that C expects, without trailing blanks.
    pure function c_text(text) result(letters)
       character(*), intent(in) :: text
       character(len_trim(text) + 1, kind=c_char) :: letters

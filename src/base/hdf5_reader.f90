@@ -1,6 +1,6 @@
-!> What the datasets of an HDF5 file hold: their shapes and values, with messages about faults.
+!> Reads the datasets of an HDF5 file: their shapes and values, with messages about faults.
 !>
-!> Values of any kind of number are converted. How faults are reported: module `hdf5_handle`.
+!> HDF5 converts numbers of any kind to reals. Module `hdf5_handle` explains how faults are reported.
 module hdf5_reader
    use, intrinsic :: iso_c_binding, only : c_loc, c_ptr
    use asperity_errors, only : error_file, error_input, error_type, fail
@@ -86,11 +86,11 @@ contains
       end if
    end subroutine get_shape
 
-   !> Open a dataset whose values are to be read: none may be missing.
+   !> Open a dataset for reading. It is a fault if some of its values are missing.
    subroutine open_values(self, path, dataset, fault)
       class(hdf5_reader_type), intent(inout) :: self
       character(*), intent(in) :: path
-      integer(hid_t), intent(out) :: dataset      !! to be closed where there is no fault
+      integer(hid_t), intent(out) :: dataset      !! the caller closes it if there is no fault
       type(error_type), allocatable, intent(out) :: fault
       character(:), allocatable :: reason
       integer :: ignored

@@ -1,7 +1,7 @@
-!> Fields that are read in slabs of rows, from files that anyone may have written.
+!> Reads fields in slabs of rows, from files of any origin.
 !>
-!> The dataset stays open from slab to slab. (`read_part` of module `hdf5_slabs` opens it for every part, which is
-!> good for datasets in slabs of our own.)
+!> The dataset stays open from slab to slab. (`read_part` of module `hdf5_slabs` opens it for every part, which
+!> is sufficient for datasets that this program wrote in slabs.)
 module hdf5_slab_reader
    use, intrinsic :: iso_c_binding, only : c_double, c_int, c_loc, c_null_ptr
    use asperity_errors, only : error_type
@@ -20,7 +20,7 @@ module hdf5_slab_reader
 
    public :: slab_reader_type
 
-   !> A field that is read in slabs; those that follow each other are read fastest.
+   !> A field that is read in slabs. Reading is fastest if each slab follows the one before.
    type :: slab_reader_type
       character(:), allocatable, private :: path
       integer(hid_t), private :: dataset = -1
@@ -57,8 +57,8 @@ contains
       call file%settle(fault, error)
    end subroutine open_slabs
 
-   !> Properties with which a dataset is opened: HDF5 keeps a whole row of chunks in its cache, because a
-   !> chunk that belongs to several slabs would otherwise be read and decompressed for each of them.
+   !> The properties with which a dataset is opened. They let HDF5 keep a whole row of chunks in its cache,
+   !> because a chunk that belongs to several slabs would otherwise be read and decompressed for each.
    function cache_for(dataset) result(access_list)
       integer(hid_t), intent(in) :: dataset
       integer(hid_t) :: access_list
@@ -107,7 +107,7 @@ contains
       call file%settle(fault, error)
    end subroutine read_slab
 
-   !> Read no more of a field.
+   !> Close the dataset.
    subroutine close_slabs(self)
       class(slab_reader_type), intent(inout) :: self
       integer :: ignored

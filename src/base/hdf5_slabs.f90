@@ -1,4 +1,4 @@
-!> Fields that are written in slabs of rows, so that nobody needs a copy of a whole field.
+!> Writes fields in slabs of rows, so that no copy of a whole field is needed.
 !>
 !> A slab holds the rows of one chunk of the dataset (`slab_rows`); the last one of a field may have fewer.
 !> `hdf5_chunk_writer` writes fields that are compressed.
@@ -18,7 +18,7 @@ module hdf5_slabs
 
 contains
 
-   !> Rows of a slab.
+   !> Number of rows of a slab.
    pure function slab_rows(nx) result(rows)
       integer, intent(in) :: nx             !! values of a row
       integer :: rows
@@ -26,8 +26,8 @@ contains
       rows = max(1, chunk_values/nx)
    end function slab_rows
 
-   !> Create a field without values; in the file its shape is (ny, nx). Without `compression` it is stored in
-   !> one piece without checksums.
+   !> Create a dataset without values; in the file its shape is (ny, nx). Without `compression` it is stored
+   !> in one piece without checksums.
    subroutine create_field(file, path, extent, bytes, units, long_name, compression, error)
       class(hdf5_file_type), intent(inout) :: file
       character(*), intent(in) :: path

@@ -5,8 +5,8 @@
 !> linked (`stage_group`, `publish_group`). The groups that receive such links keep them in one
 !> block that is large enough from the start (`create_group` with `expected`), so that the link
 !> appears with one write. In a file that is opened with an alignment of 4096, a group has about 150
-!> names in its first page of memory. The block of a larger group is left half written if the program is killed
-!> within the microsecond or so that the write takes.
+!> names in its first page of memory. A larger group has a larger block, which remains half written if the
+!> program is killed within the microsecond or so that the write takes.
 !>
 !> Paths within a file start with '/'. The optional argument `error` is explained in `hdf5_handle`.
 module hdf5_tree
@@ -120,7 +120,7 @@ contains
       call self%settle(fault, error)
    end subroutine stage_group
 
-   !> Let the group under construction appear. It replaces a group of the same name.
+   !> Link the group under construction, which makes it visible. It replaces a group of the same name.
    subroutine publish_group(self, error)
       class(hdf5_tree_type), intent(inout) :: self
       type(error_type), allocatable, intent(out), optional :: error

@@ -1,4 +1,4 @@
-!> The files that the values of a virtual dataset come from.
+!> The source files of a virtual dataset.
 !>
 !> A virtual dataset is a view of datasets in other files. If one of these is missing, or if the
 !> view has a gap, HDF5 returns the fill value, usually zero, without an error.
@@ -75,7 +75,7 @@ module hdf5_virtual
 
 contains
 
-   !> Check that nothing is missing of the sources of a virtual dataset.
+   !> Check that all sources of a virtual dataset exist.
    subroutine check_sources(path, dataset, fault)
       character(*), intent(in) :: path                       !! of the file with the dataset
       integer(hid_t), intent(in) :: dataset

@@ -1,6 +1,6 @@
-!> What this program was built with: the compiler and the versions of the libraries that are linked.
-!> Reports of faults and results from clusters need it. With the macro ASPERITY_MKL the transforms are those
-!> of Intel's MKL, which has the interface of FFTW.
+!> The compiler and the versions of the libraries with which this program was built. They are needed to
+!> understand a report of a fault, or a result from a cluster. With the macro ASPERITY_MKL the transforms
+!> are those of Intel's MKL, which has the interface of FFTW.
 module linked_libraries
    use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_f_pointer, c_int, c_ptr
    use, intrinsic :: iso_fortran_env, only : compiler_version

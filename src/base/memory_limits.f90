@@ -19,7 +19,7 @@ module memory_limits
 
 contains
 
-   !> An error if memory for values could not be allocated.
+   !> Return an error if memory for values could not be allocated.
    subroutine check_allocation(place, extent, status, error)
       character(*), intent(in) :: place             !! where the values come from, for the message
       integer, intent(in) :: extent(:)              !! of the array of doubles
@@ -30,7 +30,7 @@ contains
          memory_text(8.0_dp*product(real(extent, dp))))
    end subroutine check_allocation
 
-   !> An error if a task needs more memory than this process can get.
+   !> Return an error if a task needs more memory than this process can get.
    subroutine need_memory(bytes, task, error, processes)
       real(dp), intent(in) :: bytes
       character(*), intent(in) :: task              !! such as 'the run'

@@ -1,7 +1,7 @@
 !> Exchange of fields between processes: parts of arrays, and values for the files.
 !>
-!> This module and `asperity_parallel` are the only ones that call MPI; what is said there about collective
-!> procedures holds here, too. Without MPI every exchange is a copy or nothing.
+!> This module and `asperity_parallel` are the only ones that call MPI. The rules of `asperity_parallel` for
+!> collective procedures hold here, too. Without MPI an exchange copies the values or does nothing.
 module process_exchange
    use asperity_parallel, only : count_sent, is_first_process, process_number
    use asperity_precision, only : dp, int8, sp
@@ -112,7 +112,7 @@ contains
 #endif
    end subroutine hand_reals
 
-   !> The same for small integers.
+   !> Bring small integers from a process to the first one: only these two take part.
    subroutine hand_bytes(from, values)
       integer, intent(in) :: from
       integer(int8), intent(inout), contiguous :: values(:, :)

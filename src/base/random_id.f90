@@ -1,4 +1,4 @@
-!> An identity for a file: digits that no other file has, for all practical purposes.
+!> An identifier for a file: random digits that, for all practical purposes, no other file has.
 module random_id
    use, intrinsic :: iso_c_binding, only : c_int
    use asperity_checksum, only : checksum_of_text, hexadecimal
@@ -18,8 +18,8 @@ module random_id
 
 contains
 
-   !> 32 hexadecimal digits from the system's source of random numbers, the clock and the number of
-   !> the process. The last two tell files apart on a system that lacks the first.
+   !> Make 32 hexadecimal digits from the system's source of random numbers, the clock and the number of
+   !> the process. The last two distinguish files on a system without such a source.
    function new_id() result(id)
       character(32) :: id
       character(120) :: text

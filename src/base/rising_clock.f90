@@ -1,4 +1,4 @@
-!> A clock that never runs backwards, unlike that of the day.
+!> A clock that never runs backwards, unlike the time of day.
 module rising_clock
    use asperity_precision, only : dp, int64
    implicit none

@@ -1,11 +1,11 @@
-!> Whether the computation in hand is to be given up, because a stop was asked for.
+!> Decides whether the present computation must be abandoned because the user asked for a stop.
 !>
-!> A solve may take minutes. A caller that can go back to where it was begins a watch, and solvers ask
-!> `stop_is_due` once in each iteration; without a watch the answer is no. A solver that is told to stop
-!> comes back at once with `stopped` in its outcome, and its fields have no meaning.
+!> A solve may take minutes. A caller that can return to the state before the solve begins a watch, and
+!> solvers call `stop_is_due` once in each iteration; without a watch the answer is no. If a stop is due, the
+!> solver returns at once with `stopped` in its outcome, and its fields have no meaning.
 !>
-!> There is one watch for the process, because signals come to processes. Several processes decide
-!> together: a stop that any of them was asked for counts for all. All of them must watch alike.
+!> There is one watch per process, because signals are sent to processes. Several processes of a run decide
+!> together: a request that any of them received counts for all. All of them must watch or none.
 module stop_watch
    use, intrinsic :: iso_c_binding, only : c_int
    use asperity_parallel, only : any_process
@@ -25,27 +25,27 @@ module stop_watch
    end interface
 
    ! gfortran gives this pointer its name in C, which must be found nowhere else.
-   procedure(stop_question), pointer :: asperity_stop_question => null()   !! null: there is no watch
-   real(dp) :: patience = 0.0_dp               !! with a computation in hand after a stop was asked for, s
-   real(dp) :: since = -1.0_dp                 !! clock, s, at which the answer was first yes
+   procedure(stop_question), pointer :: asperity_stop_question => null()   !! null if there is no watch
+   real(dp) :: patience = 0.0_dp               !! how long a computation may continue after the request, s
+   real(dp) :: since = -1.0_dp                 !! time when a request was first seen, s
 
 contains
 
-   !> Watch from here on.
+   !> Begin a watch.
    subroutine begin_watch(question, seconds)
       procedure(stop_question) :: question
-      real(dp), intent(in) :: seconds          !! that the computation may still take once a stop was asked for
+      real(dp), intent(in) :: seconds          !! how long a computation may continue after the request
 
       asperity_stop_question => question
       patience = seconds
    end subroutine begin_watch
 
-   !> Watch no longer.
+   !> End the watch.
    subroutine end_watch()
       asperity_stop_question => null()
    end subroutine end_watch
 
-   !> Is the computation in hand to be given up? Collective.
+   !> Must the present computation be abandoned? Collective.
    function stop_is_due() result(due)
       logical :: due
 

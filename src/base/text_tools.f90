@@ -1,4 +1,4 @@
-!> Small helpers for words and numbers in messages.
+!> Converts words and numbers to text for messages.
 module text_tools
    use asperity_precision, only : dp, int64
    implicit none
@@ -6,7 +6,7 @@ module text_tools
 
    public :: add_line, exact_text, lower, nearest_name, ordinary, to_text
 
-   !> A number as short text.
+   !> Convert a number to a short text.
    interface to_text
       module procedure :: text_of_integer, text_of_long, text_of_real
    end interface to_text
