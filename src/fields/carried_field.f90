@@ -73,8 +73,8 @@ contains
       end associate
    end subroutine blend_rows
 
-   !> Which of n cells a cell number stands for: the cell itself or, beyond the grid, the cell that it repeats
-   !> (periodic) or the nearest one at the rim (free).
+   !> The cell of the grid, 1 to n, for a cell number that may lie beyond the grid. There it is the cell that
+   !> repeats (periodic) or the nearest cell at the rim (free).
    elemental function within(grid, i, n) result(k)
       type(grid_type), intent(in) :: grid
       integer, intent(in) :: i
@@ -90,7 +90,7 @@ contains
       end if
    end function within
 
-   !> Shift a field by whole cells; what enters a free grid is zero. Collective.
+   !> Shift a field by whole cells. Zeros enter at the rim of a free grid. Collective.
    subroutine shift_field(grid, cells, field, moved)
       type(grid_type), intent(in) :: grid
       integer, intent(in) :: cells(2)            !! along x and y
@@ -112,7 +112,7 @@ contains
       end do
    end subroutine shift_field
 
-   !> Shift the states of contact by whole cells, as `shift_field` for real fields.
+   !> Shift the contact record by whole cells, as `shift_field` does for real fields. Collective.
    subroutine shift_states(grid, cells, states)
       type(grid_type), intent(in) :: grid
       integer, intent(in) :: cells(2)

@@ -1,9 +1,10 @@
 !> Work on whole columns of a field whose rows the processes share.
 !>
-!> Blocks of columns are copied to a buffer, worked on there, and copied back. Where processes share the rows,
-!> they exchange the blocks before and after, each working on some of them. This is done in rounds, so that
-!> the parcels take little memory. Each block is worked on by one thread, and all blocks have the same
-!> width, so that the result does not depend on the number of threads or processes.
+!> Blocks of columns are copied to a buffer, processed there, and copied back. If processes share the rows,
+!> each of them processes some of the blocks, which are exchanged before and afterwards. The exchange is done
+!> in rounds, so that the parcels (the numbers that are sent at once) take little memory. One thread processes
+!> a block, and all blocks have the same width, so that the result does not depend on the number of threads
+!> or processes.
 module field_columns
    use asperity_parallel, only : process_count, process_number
    use process_exchange, only : exchange
@@ -14,33 +15,33 @@ module field_columns
 
    public :: column_work_type, work_on_columns
 
-   integer, parameter, public :: block = 16     !! columns that are worked on at the same time
+   integer, parameter, public :: block = 16     !! columns that are processed together
    integer, parameter :: most_rounds = 16       !! of an exchange
-   integer, parameter :: least_parcel = 65536   !! numbers that are sent at once in any case
+   integer, parameter :: least_parcel = 65536   !! numbers below which a parcel is not divided
 
    !> The work on the columns, which an extension of this type defines.
    type, abstract :: column_work_type
-      integer :: before = 0                     !! room in front of a column, for the work
-      integer :: behind = 0                     !! room behind it
+      integer :: before = 0                     !! extra elements before a column, for the work
+      integer :: behind = 0                     !! extra elements behind it
    contains
       procedure(work_on_block), deferred :: work
    end type column_work_type
 
    abstract interface
-      !> Work on a block of columns. Several threads call this at once, for other blocks.
+      !> Process a block of columns. Several threads call this at the same time, for different blocks.
       subroutine work_on_block(self, first, columns)
          import :: column_work_type, dp
          class(column_work_type), intent(in) :: self
          integer, intent(in) :: first                   !! number of the first column, from 1
-         !> [block, before + ny + behind]: a column is columns(k, before + 1:before + ny). Those beyond the
-         !> last column of the field hold anything.
+         !> [block, before + ny + behind]: a column is columns(k, before + 1:before + ny). Columns
+         !> beyond the last one of the field have arbitrary values.
          real(dp), intent(inout) :: columns(:, :)
       end subroutine work_on_block
    end interface
 
 contains
 
-   !> Work on all columns of a field. Collective.
+   !> Process all columns of a field. Collective.
    subroutine work_on_columns(grid, field, worker)
       type(grid_type), intent(in) :: grid
       real(dp), intent(inout) :: field(:, :)            !! [n, rows of this process]; n is the same for all
@@ -68,7 +69,7 @@ contains
       end do
    end subroutine work_on_columns
 
-   !> Work on blocks of a field that is whole.
+   !> Process blocks of a field of which this process holds all rows.
    subroutine work_on_blocks(grid, worker, range, field)
       type(grid_type), intent(in) :: grid
       class(column_work_type), intent(in) :: worker
@@ -95,7 +96,7 @@ contains
       !$omp end parallel
    end subroutine work_on_blocks
 
-   !> Work on blocks whose columns have come from all processes.
+   !> Process blocks whose columns have been received from all processes.
    subroutine work_on_parcels(grid, worker, range, parcels)
       type(grid_type), intent(in) :: grid
       class(column_work_type), intent(in) :: worker
@@ -134,7 +135,7 @@ contains
       end do
    end function rows_of_all
 
-   !> Rounds of the exchange, the same for all processes.
+   !> Number of rounds of the exchange, the same for all processes.
    pure function round_count(blocks, rows) result(rounds)
       integer, intent(in) :: blocks
       integer, intent(in) :: rows(:)                    !! of each process
@@ -144,7 +145,7 @@ contains
       rounds = max(1, min(most_rounds, rounds))
    end function round_count
 
-   !> First and last block of columns that a process works on in a round.
+   !> First and last block of columns that a process handles in a round.
    pure function blocks_of(process, round, rounds, blocks) result(range)
       integer, intent(in) :: process                    !! from 0
       integer, intent(in) :: round, rounds, blocks

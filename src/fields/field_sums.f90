@@ -3,12 +3,12 @@
 !> A field is summed in two stages. Each row is summed first, in parallel. The sums of the rows are then
 !> added one after the other in the order of the rows of the whole grid, so that a result does not
 !> depend, to the last bit, on how threads or processes share the rows. Every process gets the result, and
-!> every process must ask for it. A loop that needs several sums
-!> at once forms the sums of its rows itself, in an array with one column per row, and hands that array
-!> to `row_total`, `row_totals`, `largest_of_rows` or `least_of_rows`.
+!> every process must call the procedure. A loop that needs several sums at once forms the sums of its rows
+!> itself, in an array with one column per row, and passes that array to `row_total`, `row_totals`,
+!> `largest_of_rows` or `least_of_rows`.
 !>
 !> A process holds only its own rows of a field, so that `size(field)` is not the number of cells:
-!> `cell_count` and the means of this module are over the whole grid.
+!> `cell_count` and the means of this module refer to the whole grid.
 module field_sums
    use asperity_parallel, only : gather_rows, global_max, global_min, global_sum, process_count
    use asperity_threads, only : thread_count
@@ -29,8 +29,8 @@ module field_sums
 
 contains
 
-   !> Sum of the products of two rows. The four parts of the sum do not wait for each other, as the additions of
-   !> a plain loop do, in which the processor spends most of its time waiting.
+   !> Sum of the products of two rows. It is formed in four independent parts, because in a plain loop each
+   !> addition would have to wait for the one before.
    pure function row_product(one, other) result(total)
       real(dp), intent(in), contiguous :: one(:), other(:)
       real(dp) :: total
@@ -112,7 +112,7 @@ contains
 
    contains
 
-      !> The same where all rows are at hand.
+      !> Form the totals and the largest number from the rows of the whole grid.
       subroutine reduce(all_rows)
          real(dp), intent(in) :: all_rows(:, :)
 
@@ -122,7 +122,7 @@ contains
 
    end subroutine sum_rows
 
-   !> Sums added one after the other.
+   !> Add the sums one after the other.
    pure function added(rows) result(totals)
       real(dp), intent(in) :: rows(:, :)
       real(dp) :: totals(size(rows, 1))
@@ -249,7 +249,7 @@ contains
       largest = largest_of_rows(rows(2, :))
    end function field_maximum
 
-   !> Largest magnitude of a field; not quite zero where the field is zero.
+   !> Largest magnitude of a field. It is slightly above zero if the field is zero, so that one may divide by it.
    function field_magnitude(field) result(largest)
       real(dp), intent(in) :: field(:, :)
       real(dp) :: largest

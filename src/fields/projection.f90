@@ -8,7 +8,7 @@ module projection
 
    public :: project_simplex
 
-   integer, parameter :: sample = 16        !! one row in so many is used to compute the first level
+   integer, parameter :: sample = 16        !! the first level is computed from one row in 16
 
 contains
 
@@ -17,7 +17,7 @@ contains
    !> it is nearly lost in the round-off of x, the values that remain are scaled to meet it.
    subroutine project_simplex(x, total)
       real(dp), intent(inout) :: x(:, :)       !! [nx, ny]
-      real(dp), intent(in) :: total            !! x becomes 0 where this is 0 or less
+      real(dp), intent(in) :: total            !! if it is 0 or less, x becomes 0
       real(dp), allocatable :: rows(:, :)
       real(dp) :: cells, all_rows, level, next, above, negative, kept
       integer :: count, next_count, threads, first, stride
@@ -58,7 +58,7 @@ contains
 
    contains
 
-      !> Raise the level by Newton's method on a sample of the rows, and a step of it on all.
+      !> Raise the level by Newton's method on a sample of the rows, followed by one step on all rows.
       subroutine guess()
          real(dp) :: trial, raised, part
          integer :: cells

@@ -6,15 +6,15 @@
 !> are put behind the rows of this process in the same field, or into an array of their own. The component
 !> `place` then gives the position of each row.
 !>
-!> Which rows a process needs either follows from the grid, so that all processes know it (`new_row_halo`, and
-!> for stencils `new_rim_halo` and `fetch_beside`), or each process says it for itself (`new_range_halo`,
-!> `fetch_rows`).
+!> The rows that a process needs either follow from the grid, so that all processes know them (`new_row_halo`,
+!> and for stencils `new_rim_halo` and `fetch_beside`), or each process states them as a range
+!> (`new_range_halo`, `fetch_rows`).
 !>
 !> A range counts rows from 1 and may leave the grid: on a periodic grid the rows then repeat, and beyond a free
 !> grid they are zero. It may be empty, or longer than what the process holds. If a grid is not
 !> shared, every process holds all rows and nothing is fetched.
 !>
-!> Fetching is collective, and so is asking for a range: every process calls it, even one that needs nothing.
+!> Fetching rows and stating a range are collective: every process must call them, even one that needs no rows.
 module row_halo
    use asperity_parallel, only : gather_rows, process_count, process_number
    use process_exchange, only : exchange
@@ -57,8 +57,8 @@ contains
 
    ! --- which rows are needed ----------------------------------------------------------------
 
-   !> Prepare for rows that processes need: process users(k) needs row rows(k). Pairs may be repeated, and a
-   !> process may be said to need its own rows. All processes must give the same pairs.
+   !> Prepare to fetch given rows: process users(k) needs row rows(k). Pairs may be repeated, and may name rows
+   !> that the process holds itself. All processes must give the same pairs.
    pure subroutine new_row_halo(self, sharing, rows, users)
       type(row_halo_type), intent(out) :: self
       type(row_sharing_type), intent(in) :: sharing
@@ -105,7 +105,7 @@ contains
       end do
    end subroutine new_row_halo
 
-   !> Prepare for rows of a grid, of which each process names a range. Collective.
+   !> Prepare to fetch rows of a grid, where each process states the range that it needs. Collective.
    subroutine new_range_halo(self, grid, range)
       type(row_halo_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
@@ -132,7 +132,7 @@ contains
       allocate (rows(0), users(0))
       do p = 0, process_count() - 1
          own = grid%rows_of(p)
-         if (own(2) < own(1)) cycle                ! without rows it needs none
+         if (own(2) < own(1)) cycle                ! a process without rows needs none
          rows = [rows, own + [-1, 1]]
          users = [users, p, p]
       end do
@@ -195,7 +195,7 @@ contains
    end subroutine fetch_apart
 
    !> Set the rim of a field in single precision, one more row on either side of those of this process, after
-   !> `new_rim_halo`. Beyond a free grid it is left as it is. Within a parallel region one thread calls this.
+   !> `new_rim_halo`. Beyond a free grid it is not changed. Within a parallel region only one thread may call this.
    subroutine close_rim(self, field)
       class(row_halo_type), intent(in) :: self
       real(sp), intent(inout) :: field(:, 0:)      !! [n, 0:own + 1]

@@ -1,9 +1,9 @@
-!> Which process holds which rows of a field, where these are not consecutive.
+!> Says which process holds which rows of a field if these are not consecutive.
 !>
-!> The rows of the road's grid are shared in consecutive parts (module `regular_grid`). Fields that go with
-!> them, such as padded or coarser ones, are shared so that rows that are used together are on one process:
-!> row j of the padding with row j of the road, a coarse row with the rows around its centre. A process keeps its
-!> rows in ascending order.
+!> The rows of the road's grid are shared in consecutive parts (module `regular_grid`). Related fields, such
+!> as padded or coarser ones, are shared in such a way that one process holds the rows that are used together:
+!> row j of the padding with row j of the road, and a coarse row with the rows around its centre. A process
+!> keeps its rows in ascending order.
 module row_sharing
    use asperity_parallel, only : gather_rows, process_count, process_number
    use asperity_precision, only : dp

@@ -1,7 +1,7 @@
 !> Transfer of rows of a shared grid between their owners and the first process, which alone opens files.
 !>
-!> A field goes to a file, and comes from it, in slabs of rows. A slab may hold rows of several processes,
-!> so that the largest array besides the parts of the owners is one slab.
+!> Fields are written and read in slabs of rows, and a slab may hold rows of several processes. In addition to
+!> the parts of their owners, only one slab is therefore in memory.
 module row_slabs
    use asperity_parallel, only : process_count, process_number
    use process_exchange, only : hand_to_first, take_from_first
@@ -61,8 +61,8 @@ contains
       end do
    end subroutine collect_bytes
 
-   !> Give every process its own rows of a slab that the first one has. The other rows of the slab keep
-   !> their values there. Collective.
+   !> Send every process its own rows of a slab that the first process has. The other rows of a process's slab
+   !> are not changed. Collective.
    subroutine deal_rows(grid, first, slab)
       type(grid_type), intent(in) :: grid
       integer, intent(in) :: first

@@ -1,9 +1,9 @@
 !> Scratch memory with an owner: fields that a procedure borrows under a name and gives back.
 !>
-!> The owner of a workspace hands it to the stages of its work. A stage borrows a field for as long as it needs
-!> one, under the name of what the field will hold, and gives it back before it ends. Fields that are given
-!> back serve the next stage, so that the memory is that of the stage that needs most. No stage therefore has
-!> to use a field of another one, or to keep a field that it needs for a moment only.
+!> The owner of a workspace passes it to the stages of its work. A stage borrows a field for as long as it needs
+!> one, under the name of what the field will hold, and gives it back before it ends. The next stage uses
+!> the same fields again, so that the memory is that of the stage that needs most. Therefore no stage has to use
+!> a field of another one, or to own a field that it needs only for a moment.
 !>
 !> The values of a borrowed field are undefined until the borrower sets them. A workspace must not be copied or
 !> used by several threads at once. Several threads may use a field that it has lent.
@@ -14,9 +14,9 @@ module workspace
 
    public :: workspace_type, new_workspace
 
-   !> A field that is lent, or waits for the next borrower.
+   !> A field that is lent at present, or free.
    type :: field_type
-      character(:), allocatable :: name                !! what it holds; '' while nobody has it
+      character(:), allocatable :: name                !! what it holds; '' while it is free
       real(dp), pointer, contiguous :: values(:, :) => null()
    end type field_type
 
@@ -35,7 +35,7 @@ module workspace
 
 contains
 
-   !> A workspace without fields. Each is made when it is first needed.
+   !> Make a workspace. Its fields are allocated when they are first needed.
    subroutine new_workspace(self, nx, ny)
       type(workspace_type), intent(out) :: self
       integer, intent(in) :: nx, ny                    !! shape of the fields
@@ -100,7 +100,7 @@ contains
       if (allocated(self%fields)) number = size(self%fields)
    end function most_lent
 
-   !> Free the fields; nobody may use them any more.
+   !> Free the fields, which must not be used any more.
    subroutine destroy(self)
       class(workspace_type), intent(inout) :: self
       integer :: k

@@ -1,7 +1,7 @@
 !> Interfaces to the part of FFTW 3 that is used here, in double and single precision.
 !>
-!> Written from the FFTW manual. Plans are executed only by the new-array routines, on buffers of
-!> `fftw_alloc_*`, so that their alignment is that of the planning.
+!> They are written from the FFTW manual. Plans are executed only by the new-array routines, and all buffers
+!> come from `fftw_alloc_*`, because a plan needs arrays of the alignment for which it was made.
 module asperity_fftw
    use, intrinsic :: iso_c_binding, only : c_char, c_int, c_ptr, c_size_t
    implicit none
@@ -9,7 +9,7 @@ module asperity_fftw
 
    integer(c_int), parameter :: fftw_measure = 0
    integer(c_int), parameter :: fftw_estimate = 64
-   integer(c_int), parameter :: fftw_wisdom_only = 2097152   !! a plan that is known already, or none
+   integer(c_int), parameter :: fftw_wisdom_only = 2097152   !! return only a plan that is already known
    integer(c_int), parameter :: fftw_forward = -1
    integer(c_int), parameter :: fftw_backward = 1
    integer(c_int), parameter :: fftw_redft00 = 3

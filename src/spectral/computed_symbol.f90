@@ -1,7 +1,8 @@
-!> Products with the symbol of a solid that is computed where it is needed, without a table.
+!> Products with a symbol that is computed for each mode when it is needed, instead of read from a table.
 !>
-!> For a scalar solid on a periodic grid. The numbers are those of the table of module `fft_conv`, to the
-!> last bit. A product takes longer, so that this is for operators that are seldom used.
+!> This works for a scalar solid on a periodic grid. The results equal those with the table of module
+!> `fft_conv` to the last bit. It saves memory but takes longer, and is meant for operators that are seldom
+!> used.
 module computed_symbol
    use asperity_parallel, only : global_sum
    use asperity_precision, only : dp, pi
@@ -13,7 +14,7 @@ module computed_symbol
 
    public :: columns_computed
 
-   !> What multiplies the modes.
+   !> The multiplier that a transform applies to the modes.
    type, extends(multiplier_type) :: computed_symbol_type
       type(grid_type) :: grid
       type(kernel_type) :: kernel
@@ -31,7 +32,7 @@ contains
       type(row_column_type), intent(inout) :: transform
       type(grid_type), intent(in) :: grid            !! periodic
       type(kernel_type), intent(in) :: kernel        !! of one component
-      logical, intent(in) :: inverse                 !! by 1/symbol
+      logical, intent(in) :: inverse                 !! multiply by 1/symbol
       real(dp), intent(out), optional :: form        !! p.(symbol p) over the cells
       type(computed_symbol_type) :: symbol
       real(dp), allocatable, target :: sums(:, :)

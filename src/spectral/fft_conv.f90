@@ -1,16 +1,17 @@
 !> The convolution operator: displacements of the half-space from tractions, by FFT.
 !>
-!> u = A p with the response A of a solid (module `kernels`; thesis, eq. 2.4), G = 1. Scalar (normal) or
-!> 2 x 2 (tangential); periodic, or free on a zero-padded grid.
+!> The operator computes u = A p, where A is the response of a solid with the shear modulus 1 (module `kernels`;
+!> thesis, eq. 2.4). It is scalar (normal) or 2 x 2 (tangential), and either periodic or free on a zero-padded
+!> grid.
 !>
-!> The two-dimensional transform is done by rows and columns of our own (`row_column.inc`), so that a
-!> solver hands in its rows as it forms them and takes the results as the inverse makes them
-!> (`forward_row`, `columns`, `backward_row`), and the padded half of a free problem costs nothing along
-!> x. The quadratic form comes with it (Parseval; thesis, eq. 2.8).
+!> The two-dimensional transform consists of our own passes over rows and columns (`row_column.inc`). A
+!> solver can thus pass each row as soon as it is formed, and use each row of the result as soon as it is
+!> transformed back (`forward_row`, `columns`, `backward_row`). The padded half of a free problem costs nothing
+!> along x. The quadratic form p.A p is obtained in the same pass (Parseval; thesis, eq. 2.8).
 !>
 !> Memory: one field (two for a vector operator), doubled along x in free mode, and a quarter of a
 !> field (a whole one in free mode) for each symbol. An operator made with `single` takes half of that,
-!> works in single precision, and is used in the same way. Operators that are never in use at once can
+!> works in single precision, and is used in the same way. Operators that are never in use at the same time can
 !> share the memory of their spectra (`spectrum_memory`). A periodic operator of a solid made with
 !> `lean` has no table of its symbol: it computes the symbol in every product, which takes longer.
 module fft_conv
@@ -44,7 +45,7 @@ module fft_conv
       module procedure :: new_whole_symbol_operator, new_shared_symbol_operator
    end interface new_symbol_operator
 
-   !> A convolution operator with its plans and its work space. Not to be copied.
+   !> A convolution operator with its plans and its work space. A variable of this type must not be copied.
    type :: convolution_type
       integer :: nx = 0                     !! cells along x
       integer :: ny = 0                     !! cells along y
@@ -87,7 +88,7 @@ contains
       type(kernel_type), intent(in) :: kernel      !! what the solid is
       type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
       logical, intent(in), optional :: single      !! work in single precision
-      type(c_ptr), intent(in), optional :: memory  !! of an operator that is never in use meanwhile
+      type(c_ptr), intent(in), optional :: memory  !! of another operator, never in use at the same time
       logical, intent(in), optional :: lean        !! no table of the symbol, where that is possible
       type(row_sharing_type), intent(in), optional :: sharing   !! of the rows; absent: that of the grid
       logical :: tabulated
@@ -168,7 +169,7 @@ contains
       call self%symbols%finish()
    end subroutine set_symbol
 
-   !> Sizes, buffers and plans.
+   !> Set the sizes, and make the buffers and plans.
    subroutine plan(self, shape, error, single, memory)
       type(convolution_type), intent(inout) :: self
       type(transform_shape_type), intent(in) :: shape
@@ -196,7 +197,7 @@ contains
    end subroutine plan
 
    !> The memory of the spectrum, aligned for FFTW, of at least a field of doubles (half of that if
-   !> single). Others may use it while the operator is not at work.
+   !> single). Another operator may use it while this one is not computing a product.
    pure function spectrum_memory(self) result(memory)
       class(convolution_type), intent(in) :: self
       type(c_ptr) :: memory
@@ -224,7 +225,7 @@ contains
       end do
    end subroutine apply
 
-   !> p = A^-1 u for a periodic operator; modes that the operator does not move are left out.
+   !> p = A^-1 u for a periodic operator. Modes whose symbol is zero are left out.
    subroutine apply_inverse(self, u, p)
       class(convolution_type), intent(inout) :: self
       real(dp), intent(in) :: u(:, :)                 !! [nx, rows], m
@@ -277,7 +278,7 @@ contains
       call self%columns(columns_form, form)
    end subroutine quadratic_form
 
-   !> Transform row j of a component; to be called for every row, by up to `threads` threads.
+   !> Transform row j of a component. This must be called for every row; up to `threads` threads may do so.
    subroutine forward_row(self, component, j, row)
       class(convolution_type), intent(inout) :: self
       integer, intent(in) :: component             !! 1, or 2 of a vector operator
@@ -291,7 +292,7 @@ contains
       end if
    end subroutine forward_row
 
-   !> The same as `forward_row` for a row of zeros.
+   !> Do the same as `forward_row` for a row of zeros.
    subroutine forward_zero_row(self, component, j)
       class(convolution_type), intent(inout) :: self
       integer, intent(in) :: component
@@ -333,11 +334,12 @@ contains
       end if
    end subroutine add_backward_row
 
-   !> Tell a single operator how large values are, about, that it gets from the next `forward_row` on, so
-   !> that their squares are in its range: 1 at first. A double one needs no such help.
+   !> Set the unit in which an operator in single precision takes values from the next `forward_row` on, so that
+   !> their squares stay within its range: about the magnitude of the values, 1 at first. In double precision
+   !> this has no effect.
    subroutine set_unit(self, size)
       class(convolution_type), intent(inout) :: self
-      real(dp), intent(in) :: size                 !! 1 is taken where it is not positive
+      real(dp), intent(in) :: size                 !! 1 is used if it is not positive
 
       if (self%single) call self%low%set_unit(power_of_two(size))
    end subroutine set_unit

@@ -2,8 +2,8 @@
 !> of cell centres under a uniform traction on one cell (Love 1929; Kalker 1990).
 !>
 !> In free mode these coefficients are transformed on a doubled, wrapped grid. A table (0:mx/2, 0:my/2)
-!> holds a quarter of the plane: all coefficients are even in x and y, but that of the coupling xy, which
-!> is odd in both.
+!> of a quarter of the plane is sufficient, because all coefficients are even in x and y, except that of the
+!> coupling xy, which is odd in both.
 module influence
    use, intrinsic :: iso_c_binding, only : c_associated, c_f_pointer, c_int, c_null_ptr, c_ptr, c_size_t
    use asperity_fftw, only : fftw_alloc_real, fftw_destroy_plan, fftw_estimate, fftw_execute_r2r, &
@@ -16,11 +16,11 @@ module influence
 
    public :: line_transform_type, love_normal, love_tangential, new_line_transform, transform_length
 
-   !> Transforms of coefficients along a direction. Not to be copied.
+   !> Transforms of coefficients along a direction. A variable of this type must not be copied.
    type :: line_transform_type
       integer, private :: m = 0            !! length of the circle
       integer, private :: points = 0       !! coefficients that are transformed
-      logical, private :: odd = .false.    !! else even
+      logical, private :: odd = .false.    !! the coefficients are odd, otherwise even
       type(c_ptr), private :: plan = c_null_ptr
    contains
       procedure :: transform_lines
@@ -77,8 +77,8 @@ contains
       end do
    end subroutine corner_sums
 
-   !> Length of the transforms along a direction of n cells: n itself where periodic; in free mode at
-   !> least 2n, even, with small prime factors.
+   !> Length of the transforms along a direction of n cells: n itself on a periodic grid; on a free grid an
+   !> even number of at least 2n with small prime factors.
    pure function transform_length(n, boundary) result(m)
       integer, intent(in) :: n
       integer, intent(in) :: boundary

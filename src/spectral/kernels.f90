@@ -1,9 +1,9 @@
-!> What the solid is: the response of its surface to tractions, for a shear modulus of 1.
+!> Kernels: the response of a solid's surface to tractions, for a shear modulus of 1.
 !>
-!> On a periodic grid a kernel answers a wave exp(i q.x) of traction with A(q) times that wave of
-!> displacement: a number for the normal direction, a symmetric 2 x 2 matrix (xx, yy, xy) for the
-!> tangential ones. On a free grid it answers a uniform traction on one cell with the displacement at a
-!> distance from that cell. A kernel also knows the mean mode of a periodic grid, the inverse (the
+!> On a periodic grid a wave exp(i q.x) of traction causes A(q) times the same wave of displacement. A is a
+!> number for the normal direction, and a symmetric 2 x 2 matrix (xx, yy, xy) for the tangential ones. On a free
+!> grid the kernel gives the displacement at any distance from one cell under a uniform traction on
+!> that cell. A kernel also knows the mean mode of a periodic grid, the inverse (the
 !> stiffness), and the least and largest stiffness on a grid. In steady sliding, module `steady_symbols`
 !> divides A(q) by the complex modulus at the frequency of the wave.
 !>
@@ -28,7 +28,7 @@ module kernels
       real(dp) :: poisson = 0.5_dp          !! -1 < nu <= 0.5
       real(dp) :: mean_mode = 0.0_dp        !! A at zero wave number on a periodic grid, m/Pa
       procedure(wave_response), pointer :: wave => null()   !! A at a wave vector that is not zero
-      procedure(cell_response), pointer :: cell => null()   !! null: for periodic grids only
+      procedure(cell_response), pointer :: cell => null()   !! null if only for periodic grids
    contains
       procedure :: tensor
       procedure :: compliance
@@ -61,8 +61,8 @@ module kernels
 
 contains
 
-   !> The half-space in the normal direction. On a periodic grid the mean normal displacement belongs to
-   !> the approach of the bodies: the mean mode is 0.
+   !> The half-space in the normal direction. On a periodic grid the mean mode is 0, because the mean normal
+   !> displacement is part of the approach of the bodies.
    function normal_half_space(poisson) result(self)
       real(dp), intent(in) :: poisson
       type(kernel_type) :: self
@@ -72,7 +72,7 @@ contains
       self%cell => half_space_normal_cell
    end function normal_half_space
 
-   !> The half-space in both tangential directions, or a block of some thickness whose mean shear counts.
+   !> The half-space in both tangential directions, or a block of some thickness, which has a mean shear.
    function tangential_half_space(poisson, thickness) result(self)
       real(dp), intent(in) :: poisson
       real(dp), intent(in), optional :: thickness   !! of the block, m; 0 or absent: half-space
@@ -137,7 +137,7 @@ contains
       end if
    end function tensor
 
-   !> The first element of A for a wave number along x: of a normal kernel, its compliance.
+   !> The first element of A for a wave along x. For a normal kernel this is its compliance.
    pure function compliance(self, q) result(a)
       class(kernel_type), intent(in) :: self
       real(dp), intent(in) :: q             !! rad/m, > 0
@@ -196,8 +196,8 @@ contains
       end do
    end subroutine symbols
 
-   !> The same on a free grid, from the responses to a traction on one cell. Rows are transformed as they are
-   !> formed, and only the part that is wanted is kept.
+   !> The symbols on a free grid, computed from the responses to a traction on one cell. Each row is transformed
+   !> as soon as it is formed, and only the wave numbers of the table are kept.
    subroutine cell_symbols(self, grid, mx, my, start, table)
       class(kernel_type), intent(in) :: self
       type(grid_type), intent(in) :: grid

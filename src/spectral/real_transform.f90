@@ -1,8 +1,7 @@
-!> A two-dimensional real FFT in place, for work done once a run: surfaces, spectra, derivatives.
+!> A two-dimensional real FFT in place, for work that is done once per run: surfaces, spectra, derivatives.
 !>
-!> It runs on one thread (FFTW's default), so that its result is the same bit for bit on any number
-!> of threads.
-!> Memory: one field of doubles (nx padded by one or two).
+!> It runs on one thread (FFTW's default), so that its result is the same to the last bit for any number of
+!> threads. Memory: one field of doubles (nx padded by one or two).
 module real_transform
    use, intrinsic :: iso_c_binding, only : c_associated, c_f_pointer, c_int, c_null_ptr, c_ptr, &
       c_size_t

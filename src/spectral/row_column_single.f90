@@ -1,9 +1,9 @@
-!> Transforms by rows and columns in single precision, for module `fft_conv`: half the memory, about
-!> half the time.
+!> Transforms by rows and columns in single precision, for module `fft_conv`. They take half the memory and
+!> about half the time.
 !>
-!> Results are good to about 1e-7 of the largest value. Values and symbols are taken in units about as
-!> large as they are, so that their squares stay in the range of single precision whatever the units of
-!> the caller.
+!> The error of the results is about 1e-7 of the largest value. Values and symbols are expressed in units of
+!> about their own magnitude, so that their squares stay in the range of single precision whatever units
+!> the caller uses.
 module row_column_single
    use, intrinsic :: iso_c_binding, only : c_associated, c_f_pointer, c_int, c_loc, c_null_ptr, c_ptr, &
       c_size_t
@@ -26,6 +26,6 @@ module row_column_single
 
    public :: block, new_row_column, row_column_type
 
-   include 'row_column.inc'      ! state 71de052b, written by tools/check_sources.py --update
+   include 'row_column.inc'      ! state f4d1b348, written by tools/check_sources.py --update
 
 end module row_column_single

@@ -1,12 +1,12 @@
-!> Transforms for steady sliding: fields through the complex symbols of `steady_symbols`.
+!> Operators of steady sliding: they multiply the modes of fields by the complex symbols of `steady_symbols`.
 !>
 !> * `displace`: U_z = K P.
 !> * `resolve`: the resolvent (1 + c K)^-1 of the normal solver (module steady_normal).
-!> * `press`: K^-1 of a displacement, for the start.
+!> * `press`: K^-1 of a displacement, with which the normal solver starts.
 !> * `shear`: U_T and dU_T/ds from T, six transforms.
 !> * `spectrum`: the transform of a field, for losses; `apply_table`: any other symbol.
 !>
-!> Where processes share the rows, each has the symbols only of the columns that it transforms.
+!> If processes share the rows, each has only the symbols of the columns that it transforms.
 !>
 !> Memory: one field for the spectrum of the normal side and four for that of the tangential one; the
 !> symbols take one field, and six more with friction; the resolvent one.
@@ -32,14 +32,15 @@ module steady_operator
       procedure :: multiply => multiply_scalar
    end type scalar_type
 
-   !> A symmetric tensor and another: two inputs, four results.
+   !> Two symmetric tensors, which make four results from two inputs.
    type, extends(multiplier_type) :: pair_type
       complex(dp), allocatable :: first(:, :, :), second(:, :, :)
    contains
       procedure :: multiply => multiply_pair
    end type pair_type
 
-   !> The operators of one grid; the symbols change with the velocity. Not to be copied.
+   !> The operators of one grid. Their symbols change with the velocity. A variable of this type must not be
+   !> copied.
    type :: steady_operator_type
       type(grid_type) :: grid
       integer :: nx = 0, ny = 0                        !! cells of the whole grid
@@ -96,7 +97,7 @@ contains
       call new_row_column(self%vector, vector, self%threads, error)
    end subroutine new_steady_operator
 
-   !> Take the symbols of a velocity.
+   !> Set the symbols for a velocity.
    subroutine set_symbols(self, symbols)
       class(steady_operator_type), intent(inout) :: self
       type(steady_symbols_type), intent(in) :: symbols
@@ -172,7 +173,7 @@ contains
       call pass_through(self, self%resolvent, x, y)
    end subroutine resolve
 
-   !> y of x by any symbol, given without the factor of the transform.
+   !> Apply any symbol, given without the factor of the transform, to x.
    subroutine apply_table(self, table, x, y)
       class(steady_operator_type), intent(inout) :: self
       complex(dp), intent(in) :: table(self%first:, 0:)   !! (first:last, 0:ny-1)
@@ -205,7 +206,7 @@ contains
       self%ffts = self%ffts + 1
    end subroutine spectrum
 
-   !> One field through a multiplier.
+   !> Transform a field, multiply its modes, and transform back.
    subroutine pass_through(self, multiplier, x, y)
       class(steady_operator_type), intent(inout) :: self
       class(multiplier_type), intent(in) :: multiplier

@@ -1,4 +1,4 @@
-!> A solid in steady sliding: complex compliances of the modes that travel with the road.
+!> The complex compliances of a solid in steady sliding, for modes that move with the road.
 !>
 !> In steady sliding every field keeps its shape and moves with the road's velocity V over the rubber,
 !> f(X, t) = f(X - V t). A mode exp(i q.X) therefore oscillates at omega = -q.V, and the elastic
@@ -12,14 +12,15 @@
 !> mean normal displacement belongs to the approach, and the mean tangential one only says where the
 !> road stands. A Nyquist mode stands for both signs of its wave number and takes the mean of both.
 !>
-!> A time scheme moves by steps. With `dt` the symbols are those of the scheme exponential2 in steps
-!> of dt, so that a steady state equals the end of a long run in time: with rho = exp(i q.V dt),
+!> With `dt` > 0 the symbols are those of the time scheme exponential2 with steps of dt. The steady state then
+!> equals the end of a long run in time with these steps. With rho = exp(i q.V dt),
 !>
 !>     G = G_e + sum g [(phi + chi)(1 - rho) - chi (rho - rho^2)]/(1 - exp(-x) rho),   x = dt/tau
 !>     d/ds = (rho - 1)/(|V| dt)
 !>
-!> Tables run over (first:last, 0:ny-1), negative wave numbers along y behind the positive ones, and are
-!> zero beyond nx/2. One process has all columns, from 0 on; of several each has those that it transforms.
+!> The tables have the bounds (first:last, 0:ny-1), with negative wave numbers along y behind the positive ones,
+!> and are zero beyond nx/2. A single process has all columns, from 0 on; several processes have only the
+!> columns that each of them transforms.
 module steady_symbols
    use asperity_parallel, only : global_max, global_min
    use asperity_precision, only : dp, pi
@@ -32,11 +33,11 @@ module steady_symbols
 
    public :: medium_type, mode_compliance, mode_waves, new_steady_symbols, steady_modulus, steady_symbols_type
 
-   !> What the symbols depend on.
+   !> The quantities on which the symbols depend.
    type :: medium_type
       type(grid_type) :: grid
-      type(kernel_type) :: normal                      !! what the solid is, for the pressure
-      type(kernel_type) :: tangential                  !! and for the traction; with friction
+      type(kernel_type) :: normal                      !! response to the pressure
+      type(kernel_type) :: tangential                  !! response to the traction; only with friction
       real(dp) :: modulus = 0.0_dp                     !! long-term shear modulus, Pa, > 0
       real(dp), allocatable :: g(:), tau(:)            !! arms, Pa and s
       real(dp) :: velocity(2) = 0.0_dp                 !! V, m/s; not zero

@@ -1,12 +1,12 @@
-!> The table of an operator's symbols: what each wave of the traction is multiplied by.
+!> The table of an operator's symbols, the factors by which the operator multiplies each wave.
 !>
-!> The transforms there and back multiply a field by the number of their points. The table holds the
-!> symbols divided by it, so that no product needs another pass. A process has the wave numbers along x
-!> that its columns have. In single precision the symbols are stored over a power of two, the `unit`,
-!> because their own values might be out of range.
+!> A forward and an inverse transform together multiply a field by the number of points. The table holds the
+!> symbols divided by this number, so that no extra pass is needed. A process has the wave numbers along x
+!> of the columns that it transforms. In single precision the symbols are stored divided by a power of two,
+!> the `unit`, because their own values might be out of range.
 !>
-!> Only the mean mode changes after the table is complete: it says what a uniform traction does, which
-!> depends on the thickness of the block and not on the waves.
+!> After the table is complete, only the mean mode may change. It is the response to a uniform traction, which
+!> depends on the thickness of the block.
 module symbol_table
    use asperity_parallel, only : global_max, global_sum
    use asperity_precision, only : dp, power_of_two, sp
@@ -20,8 +20,8 @@ module symbol_table
    type :: symbol_table_type
       integer :: first = 0                  !! first wave number along x of this process ...
       integer :: last = -1                  !! ... and the last with a symbol; none if it is less
-      !> (first:, 0:my/2, 1) or xx, yy, xy; zero beyond mx/2. Not there before `make_room`, and in single
-      !> precision.
+      !> (first:, 0:my/2, 1) or xx, yy, xy; zero beyond mx/2. It is not allocated before `make_room`,
+      !> nor in single precision.
       real(dp), allocatable :: values(:, :, :)
       real(sp), allocatable :: low_values(:, :, :)   !! the same over `unit`, in single precision
       real(dp) :: unit = 1.0_dp
@@ -43,7 +43,7 @@ module symbol_table
 
 contains
 
-   !> Note the sizes of a table; it has no values yet.
+   !> Set the sizes of a table, without values.
    subroutine new_symbol_table(self, shape, columns, single)
       type(symbol_table_type), intent(out) :: self
       type(transform_shape_type), intent(in) :: shape
@@ -84,7 +84,7 @@ contains
    end subroutine finish
 
    !> One part of the symbols without the factor of the transforms, in the first quarter of the plane of
-   !> wave numbers. Not where processes share the columns.
+   !> wave numbers. This is not available if processes share the columns.
    pure function part(self, number) result(table)
       class(symbol_table_type), intent(in) :: self
       integer, intent(in) :: number                !! 1; of a vector operator 1: xx, 2: yy, 3: xy

@@ -1,9 +1,9 @@
 !> Lengths that are cheap to transform.
 !>
-!> FFTW transforms a length whose only prime factors are 2, 3 and 5 in the fewest operations. A factor of 7,
-!> 11 or 13 still has code of its own but moves more data; larger primes go through general algorithms
+!> FFTW needs the fewest operations for lengths whose only prime factors are 2, 3 and 5. It has special code
+!> for the factors 7, 11 and 13, too, but that moves more data. Larger primes need general algorithms
 !> (Rader, Bluestein) that take several times as long. A user who is free to choose the number of cells
-!> should therefore know the good lengths next to the one that he chose.
+!> should therefore know the good lengths next to the chosen one.
 module transform_lengths
    use asperity_precision, only : dp
    implicit none
@@ -11,9 +11,9 @@ module transform_lengths
 
    public :: good_length, length_warning
 
-   !> Time of a transform per cell, divided by that of lengths with the factors 2, 3 and 5 only, by the
-   !> largest prime factor: up to 5, 7, up to 13, more. Means of 60 lengths from 64 to 4099 with FFTW 3.3.10,
-   !> complex, one thread; single lengths differ by up to a half of it.
+   !> Time of a transform per cell, relative to lengths with the factors 2, 3 and 5 only, for a largest prime
+   !> factor of up to 5, 7, up to 13, and more. These are means over 60 lengths from 64 to 4099 with FFTW 3.3.10
+   !> (complex, one thread); single lengths differ from them by up to one half.
    real(dp), parameter :: cost_of_factor(4) = [1.0_dp, 2.0_dp, 2.2_dp, 6.0_dp]
 
    !> Shorter lengths are not worth a warning: such runs are short.

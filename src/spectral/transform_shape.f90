@@ -1,4 +1,4 @@
-!> What a transform needs to know of the grid that it is for.
+!> The sizes of a transform, and how processes share its rows.
 module transform_shape
    use asperity_parallel, only : process_number
    use influence, only : transform_length
@@ -13,8 +13,8 @@ module transform_shape
    type :: transform_shape_type
       integer :: nx = 0, ny = 0            !! cells of the whole field
       integer :: mx = 0, my = 0            !! lengths of the transforms, more than the cells where padded
-      integer :: components = 1            !! fields that come out: 1 scalar, 2 vector
-      integer :: inputs = 1                !! fields that go in; 0: the modes come from a multiplier
+      integer :: components = 1            !! number of results: 1 scalar, 2 vector
+      integer :: inputs = 1                !! number of inputs; 0: a multiplier makes the modes
       logical :: shared = .false.          !! processes share the rows
       integer, allocatable :: rows_of(:)   !! rows of each process; of all where they are not shared
       integer, allocatable :: order(:)     !! rows of the whole field, in the order of the processes

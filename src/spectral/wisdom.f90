@@ -1,10 +1,10 @@
-!> What FFTW learnt by measuring, kept in the user's cache folder between runs.
+!> Keeps FFTW's wisdom, the plans that it has found by measuring, in the user's cache folder between runs.
 !>
-!> Measured plans are faster, but two measurements may choose differently and then differ in the last
-!> bits. So plans are measured only where their wisdom can be kept: a run, its restart and its
-!> repetition use the same plans. Elsewhere the planner's estimate is used, which never varies.
-!> The files are written only where something was learnt, with what other processes have learnt since.
-!> Where several processes run a case, the first one measures and keeps, and the others use what it knows.
+!> Measured plans are faster, but two measurements may choose different plans, whose results differ in the last
+!> bits. Therefore plans are measured only if their wisdom can be kept, so that a run, its restart and its
+!> repetition use the same plans. Otherwise the planner's estimate is used, which never varies.
+!> The files are written only if there are new plans; plans that other programs have added since are kept.
+!> If several processes run a case, the first one measures and writes, and the others receive its plans.
 !> The folder is $XDG_CACHE_HOME/asperity or $HOME/.cache/asperity.
 module wisdom
    use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_f_pointer, c_int, c_null_char, c_ptr, c_size_t
@@ -18,8 +18,8 @@ module wisdom
 
    public :: planning_flag, save_wisdom, share_wisdom
 
-   integer, parameter, public :: from_memory = 1     !! plans that are known already, or none
-   integer, parameter, public :: from_measuring = 2  !! any plan
+   integer, parameter, public :: from_memory = 1     !! only plans that are already known
+   integer, parameter, public :: from_measuring = 2  !! measure if no plan is known
 
    logical :: started = .false.
    logical :: kept = .false.
@@ -60,10 +60,10 @@ module wisdom
 
 contains
 
-   !> The flag for FFTW's planner; reads the kept wisdom at the first call.
-   !> To be called inside the critical section `fftw_planner`.
+   !> The flag for FFTW's planner. The first call also reads the kept wisdom. This must be called inside the
+   !> critical section `fftw_planner`.
    integer(c_int) function planning_flag(attempt) result(flag)
-      integer, intent(in) :: attempt           !! `from_memory` first, `from_measuring` where that fails
+      integer, intent(in) :: attempt           !! `from_memory` first; if that fails, `from_measuring`
       integer(c_int), parameter :: writable = 2
 
       if (.not. started .and. is_first_process()) then
@@ -77,7 +77,7 @@ contains
       if (kept) flag = merge(ior(fftw_measure, fftw_wisdom_only), fftw_measure, attempt == from_memory)
    end function planning_flag
 
-   !> Add what the files hold to what is known.
+   !> Add the wisdom of the files to that of this process.
    subroutine read_wisdom()
       integer(c_int) :: status
 
@@ -85,8 +85,8 @@ contains
       status = fftwf_import_wisdom_from_filename(folder//'/fftwf'//c_null_char)
    end subroutine read_wisdom
 
-   !> Keep what the planner has learnt; failing to do so harms nobody.
-   !> To be called inside the critical section `fftw_planner`, after plans from measuring.
+   !> Write the wisdom to the files. A failure is ignored, because only time is lost. This must be called inside
+   !> the critical section `fftw_planner`, after plans from measuring.
    subroutine save_wisdom()
       integer(c_int) :: status
       character(16) :: process
@@ -104,7 +104,7 @@ contains
       end if
    end subroutine save_wisdom
 
-   !> Let all processes know what the first one knows, and use it in the same way. Collective.
+   !> Give all processes the wisdom of the first one, so that they use the same plans. Collective.
    subroutine share_wisdom()
       character(:), allocatable :: text
       integer(c_int) :: status
@@ -136,7 +136,7 @@ contains
       call c_free(memory)
    end function taken_text
 
-   !> Name the cache folder and make it where it is missing.
+   !> Find the name of the cache folder, and create the folder if it is missing.
    subroutine find_folder()
       integer(c_int) :: status
       character(:), allocatable :: parent
@@ -155,7 +155,7 @@ contains
       status = c_mkdir(folder//c_null_char, int(o'755', c_int))
    end subroutine find_folder
 
-   !> The value of an environment variable, '' where it is not set.
+   !> The value of an environment variable, or '' if it is not set.
    function environment(name) result(value)
       character(*), intent(in) :: name
       character(:), allocatable :: value
