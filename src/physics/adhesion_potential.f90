@@ -10,18 +10,18 @@
 !>
 !> The attraction of maugis_dugdale jumps at g = z_0 (its value there is 0). On a grid such a jump pins
 !> the contact: when one cell leaves the range, it springs back by about 1.1 gamma_0/z_0 dx/E*, and if
-!> that is more than the change of the gap from cell to cell, the edge of the range cannot move on. With
+!> that is more than the change of the gap from cell to cell, the edge of the range cannot advance. With
 !> `edge` > 0 the attraction falls linearly from z_0 - edge to z_0 + edge instead, as the mean over a
 !> cell does while the edge of the range passes through that cell:
 !>     e = -gamma_0/z_0 (z_0 + edge - g)^2/(4 edge)        for |g - z_0| < edge.
-!> The work of separation, and all else, stays what it is. `edge_of_cells` is the least width that frees
-!> the contact.
+!> The work of separation and all other properties remain the same. `edge_of_cells` is the least width that
+!> prevents the pinning.
 !>
-!> Any other potential is given by a table of its attraction, `new_tabulated_potential`: cubic Hermite
-!> interpolation between equidistant gaps, and nothing beyond the last. The energy is the exact integral of
-!> the interpolated attraction and the curvature its derivative, so the solvers meet one consistent
-!> potential. The kernels call these functions in parallel loops, where a procedure of the user, or of
-!> Python, could not be called.
+!> Any other potential is given by a table of its attraction (`new_tabulated_potential`): cubic Hermite
+!> interpolation between equidistant gaps, and zero beyond the last one. The energy is the exact integral of
+!> the interpolated attraction, and the curvature is its derivative, so that the three are consistent. A table is
+!> necessary because the solvers call these functions in parallel loops, where a procedure of the user, or a
+!> Python function, could not be called.
 module adhesion_potential
    use asperity_errors, only : add_fault, error_input, error_type
    use asperity_precision, only : dp, int64
@@ -39,7 +39,7 @@ module adhesion_potential
    integer, parameter, public :: potential_table = 4
 
    real(dp), parameter :: edge_width = 1.0_dp  !! half width of the edge in gamma_0/z_0 dx/E*
-   real(dp), parameter :: far = 40.0_dp        !! exp(-far) is nothing beside 1
+   real(dp), parameter :: far = 40.0_dp        !! exp(-far) is negligible compared with 1
 
    type :: adhesion_potential_type
       integer :: kind = potential_none
@@ -61,7 +61,7 @@ contains
       real(dp), intent(in) :: energy           !! gamma_0, J/m2, >= 0; ignored for 'none'
       real(dp), intent(in) :: range            !! z_0, m, > 0; ignored for 'none'
       type(error_type), allocatable, intent(out) :: error
-      real(dp), intent(in), optional :: edge   !! m; 0 if absent; no more than the range is taken
+      real(dp), intent(in), optional :: edge   !! m; 0 if absent; limited to the range
       character(120) :: text
 
       select case (name)
@@ -245,14 +245,14 @@ contains
       end select
    end subroutine adhesive_terms
 
-   !> e' and e'' of a row of cells at once, and e.
+   !> e' and e'' of a row of cells, and e if it is needed.
    pure subroutine adhesive_slopes(self, gap, slope, curvature, energy)
       type(adhesion_potential_type), intent(in) :: self
       real(dp), intent(in), contiguous :: gap(:)         !! m, >= 0
       real(dp), intent(out), contiguous :: slope(:)      !! e', Pa
       real(dp), intent(out), contiguous :: curvature(:)  !! e'', Pa/m
       real(dp), intent(out), contiguous, optional :: energy(:)   !! e, J/m2
-      integer, parameter :: block = 64         !! cells that may be far off together
+      integer, parameter :: block = 64         !! cells that are skipped together if all are far
       real(dp) :: value, scale
       integer :: i, first, last
 
@@ -273,10 +273,10 @@ contains
       if (present(energy)) energy(:) = -self%range*slope
    end subroutine adhesive_slopes
 
-   !> exp(-rate gap) of some cells, to round-off; beyond `far` it is nothing beside 1. The last loop has no call and
-   !> no branch, so that the compiler can treat several cells at once, which the library's exponential does not
+   !> exp(-rate gap) of some cells, accurate to round-off; beyond `far` it is negligible. The last loop has no
+   !> call and no branch, so that the compiler can vectorise it, which the library's exponential does not
    !> allow: exp(-x) = 2^-k exp(r) with the integer k next to x/ln 2, and |r| <= ln(2)/2 in Taylor's series. Its
-   !> odd and even terms are summed apart, so that the processor need not wait for one sum to begin the other.
+   !> odd and even terms are summed separately, so that the processor can compute both sums at the same time.
    pure subroutine decay(rate, gap, values)
       real(dp), intent(in) :: rate
       real(dp), intent(in), contiguous :: gap(:)
@@ -342,7 +342,8 @@ contains
       c = self%table(1:4, k)
       slope = c(1) + t*(c(2) + t*(c(3) + t*c(4)))
       curvature = (c(2) + t*(2.0_dp*c(3) + t*3.0_dp*c(4)))/self%spacing
-      ! table(0, k) is the energy at the end of the interval: the attraction from here to there is missing.
+      ! table(0, k) is the energy at the end of the interval. The integral of the attraction from this gap to the
+      ! end of the interval must still be subtracted.
       energy = self%table(0, k) - self%spacing*(c(1) + c(2)/2.0_dp + c(3)/3.0_dp + c(4)/4.0_dp &
          - t*(c(1) + t*(c(2)/2.0_dp + t*(c(3)/3.0_dp + t*c(4)/4.0_dp))))
    end subroutine table_terms

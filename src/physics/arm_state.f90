@@ -1,4 +1,4 @@
-!> The state of the arms: what a viscoelastic solid remembers, as fields of tractions.
+!> The state of the arms: the memory of a viscoelastic solid, stored as fields of tractions.
 !>
 !> Module `zener` has the equations. S is the traction that would hold the displacement in an elastic solid of
 !> unit modulus, p_k the traction of arm k. `past_traction` computes from them the traction of the past P_h, which
@@ -19,8 +19,8 @@ module arm_state
    public :: add_rows, arm_state_type, commit_arm_row, commit_arms, new_arm_state, &
       new_products, new_row_sums, past_traction, products_type
 
-   integer, parameter :: piece = 1024               !! most cells of a row that are swept at once
-   integer, parameter :: fixed_sums = 4             !! sums of a pass beside those of the arms
+   integer, parameter :: piece = 1024               !! largest number of cells of a row that a sweep handles together
+   integer, parameter :: fixed_sums = 4             !! sums of a pass in addition to those of the arms
 
    !> The state of the arms behind a field of tractions with one or more components.
    type :: arm_state_type
@@ -43,7 +43,7 @@ module arm_state
 
 contains
 
-   !> Arms at rest.
+   !> Make the state of arms at rest.
    subroutine new_arm_state(self, material, nx, rows, components, error)
       type(arm_state_type), intent(out) :: self
       type(zener_type), intent(in) :: material
@@ -72,7 +72,7 @@ contains
       self%arm = 0.0_dp
    end subroutine new_arm_state
 
-   !> Sums of zero.
+   !> Sums that are all zero.
    pure function new_products(material) result(products)
       type(zener_type), intent(in) :: material
       type(products_type) :: products
@@ -103,7 +103,7 @@ contains
       self%arm_du = self%arm_du + total(fixed_sums + 1:)
    end subroutine add_rows
 
-   !> The traction of the past P_h for the step in hand: S' = (P' + P_h)/Q.
+   !> The traction of the past P_h for the present step: S' = (P' + P_h)/Q.
    subroutine past_traction(self, material, past)
       type(arm_state_type), intent(in) :: self
       type(zener_type), intent(in) :: material        !! after start_step, _jump or _relaxed
@@ -146,9 +146,9 @@ contains
       end do
    end subroutine past_of_cells
 
-   !> End the step in hand for one field: new S and p_k, and the sums of the books, in one pass.
+   !> End the present step for one field. One pass computes the new S and p_k and the sums for the books.
    !>
-   !> Sums are added to `products`, so that the fields of several calls share one set of books.
+   !> The sums are added to `products`, so that the fields of several calls share one set of books.
    subroutine commit_arms(self, material, p, u_old, u_new, products, carried)
       type(arm_state_type), intent(inout) :: self
       type(zener_type), intent(in) :: material        !! after start_step, _jump or _relaxed
@@ -178,7 +178,7 @@ contains
       end do
    end subroutine commit_arms
 
-   !> End the step in hand for row j of a component. Several threads may call this for different rows.
+   !> End the present step for row j of a component. Several threads may call this for different rows.
    pure subroutine commit_arm_row(self, material, c, j, p, u_old, u_new, sums)
       type(arm_state_type), intent(inout) :: self
       type(zener_type), intent(in) :: material        !! after start_step, _jump or _relaxed

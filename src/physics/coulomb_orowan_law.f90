@@ -26,7 +26,7 @@ contains
       self%variables = [character(16) :: 'coefficient', 'shear_strength']
    end function new_coulomb_orowan_law
 
-   !> mu N of a row; sigma_max limits it as `strength_beside`.
+   !> mu N of a row. The limit sigma_max is the `strength_beside` of the law.
    pure subroutine forces(self, n, force)
       class(coulomb_orowan_law_type), intent(in) :: self
       integer, intent(in) :: n
@@ -38,7 +38,7 @@ contains
       end do
    end subroutine forces
 
-   !> mu N; sigma_max limits it as `strength_beside`.
+   !> mu N. The limit sigma_max is the `strength_beside` of the law.
    pure function force(self, pressure, share)
       class(coulomb_orowan_law_type), intent(in) :: self
       real(dp), intent(in) :: pressure         !! N, Pa

@@ -4,7 +4,7 @@
 !> local slope of the road (thesis, section 3.1.3) and with the pressure that adhesion adds (thesis,
 !> appendix B).
 !>
-!> Rubber lies above, the road H pushes up into it. With the unit normal N = (-H_x, -H_y, 1) N_z and
+!> The rubber lies above, and the road H pushes up into it. With the unit normal N = (-H_x, -H_y, 1) N_z and
 !> n = (N_x, N_y) a purely normal reaction has the tangential traction T* = P n/N_z = -P grad H.
 !> For D = T - T* the force normal to the slope is P/N_z + n.D, the force along it
 !> m = sqrt(|D|^2 - (n.D)^2). From T* along D the bound is met at T* + s D:
@@ -45,7 +45,7 @@ module friction_law
       class(shear_law_type), allocatable :: shear     !! the bound under a pressure
       real(dp) :: adhesive_pressure = 0.0_dp     !! p_a = e'(0), Pa; 0 without adhesion
       logical :: slope = .false.                 !! the slope of the road counts
-      logical :: physical_slip = .true.          !! direction of slip: physical, or the thesis's
+      logical :: physical_slip = .true.          !! direction of slip: physical, or that of the thesis
    contains
       procedure :: normal_traction
       procedure :: bound_ratio
@@ -70,7 +70,7 @@ contains
       real(dp), intent(in) :: shear_strength       !! sigma_max >= 0, Pa
       real(dp), intent(in) :: adhesive_pressure    !! p_a >= 0, Pa; 0 without adhesion
       logical, intent(in) :: slope                 !! count the slope of the road
-      logical, intent(in) :: physical_slip         !! .false.: the thesis's direction of slip
+      logical, intent(in) :: physical_slip         !! .false.: the direction of slip of the thesis
       real(dp), intent(in), optional :: table(:, :)     !! [n, 2] pressures and bounds, Pa, of 'table'
       type(friction_law_type) :: self
 
@@ -94,7 +94,7 @@ contains
       end if
    end function normal_traction
 
-   !> s: T* + s D lies on the bound. Where nothing but T* is allowed, D = 0 has s = 1.
+   !> The s for which T* + s D lies on the bound. If only T* is allowed and D = 0, s is 1.
    pure function bound_ratio(self, p, slope, d, share) result(s)
       class(friction_law_type), intent(in) :: self
       real(dp), intent(in) :: p             !! pressure, Pa
@@ -148,7 +148,7 @@ contains
       mu = self%shear%coefficient
    end function reach_coefficient
 
-   !> The strength that counts beside the force F of `bound_row`, Pa; negative: none.
+   !> The strength that limits the traction in addition to the force F of `bound_row`, Pa; negative if none does.
    pure function strength_beside(self) result(strength)
       class(friction_law_type), intent(in) :: self
       real(dp) :: strength
@@ -241,7 +241,7 @@ contains
       returned = s < 1.0_dp
    end subroutine return_to_bound
 
-   !> Put a traction on the bound along D if its s is below a limit.
+   !> Scale D so that the traction lies on the bound, if its s is below a limit.
    pure subroutine place_on_bound(self, p, slope, limit, t, s, share)
       class(friction_law_type), intent(in) :: self
       real(dp), intent(in) :: p

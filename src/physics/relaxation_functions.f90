@@ -33,7 +33,7 @@ contains
       end if
    end function mean_decay
 
-   !> psi = (1 - phi)/x: the mean over the step of what a steady rate has built up.
+   !> psi = (1 - phi)/x: the mean over the step of the traction that a constant rate builds up.
    elemental function mean_rise(x) result(psi)
       real(dp), intent(in) :: x             !! >= 0
       real(dp) :: psi                       !! 1/2 at x = 0, 1/x for large x
@@ -92,7 +92,7 @@ contains
       end if
    end function parabola_work
 
-   !> psi - phi^2/2: what a steady rate loses, over g dU.dU; x/3 for small x, 1/x for large x.
+   !> psi - phi^2/2: the loss at a constant rate, divided by g dU.dU; x/3 for small x, 1/x for large x.
    elemental function steady_loss(x) result(loss)
       real(dp), intent(in) :: x             !! >= 0
       real(dp) :: loss

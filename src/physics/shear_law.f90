@@ -1,4 +1,4 @@
-!> What every friction law is: the largest shear stress that an interface bears under a pressure.
+!> The interface of all friction laws: the largest shear stress that the contact bears under a pressure.
 !>
 !> The law bounds the force along the surface, per area, at one point:
 !>
@@ -7,11 +7,11 @@
 !> with N the pressure on the surface, Pa, not negative. Module `friction_law` puts this bound on the slope of
 !> the road, where the friction force itself changes N.
 !>
-!> A law is one file with an extension of this type, and one line in module `shear_laws`. Solvers never ask
-!> which law they have. They ask what it does, and the constants below answer.
+!> A law is one file with an extension of this type, and one line in module `shear_laws`. Solvers never check
+!> which law they have. They only use its procedures and the constants below.
 !>
-!> A cell may bear only a part of its bound: share(1) is the part of what grows with the pressure, share(2)
-!> that of the strengths. Both are 1 in a whole cell.
+!> A cell may bear only a part of its bound: share(1) is the fraction of the part that grows with the pressure,
+!> and share(2) the fraction of the strengths. Both are 1 in a whole cell.
 module shear_law
    use asperity_precision, only : dp
    implicit none
@@ -25,7 +25,7 @@ module shear_law
       real(dp) :: coefficient = 0.0_dp
       !> The bound without pressure, Pa. Where it is positive, the traction jumps at the edge of the contact.
       real(dp) :: bare_strength = 0.0_dp
-      !> Limits the force besides `force`, at every pressure, Pa; negative: there is none.
+      !> A limit of the force in addition to `force`, at every pressure, Pa; negative if there is none.
       real(dp) :: strength_beside = -1.0_dp
       !> Variables of the group &friction that the law needs.
       character(16) :: variables(2) = ''

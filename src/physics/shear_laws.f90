@@ -11,7 +11,7 @@ module shear_laws
 
    public :: choose_shear_law, law_uses
 
-   !> The words that the variable `law` may be.
+   !> The values that the variable `law` may have.
    character(*), parameter, public :: shear_law_words = &
       '''none'' | ''coulomb'' | ''constant_shear'' | ''coulomb_orowan'' | ''table'''
    !> The variables of the group &friction that some law needs.

@@ -1,11 +1,11 @@
 !> A friction law given by points: the bound at some pressures, with straight lines between them.
 !>
-!> The table begins at the pressure 0. Beyond its last point the last line goes on, or the bound stays as it is
-!> where that line falls. The bound is not linear in the pressure, so that this law acts without the slope of
-!> the road (module `shear_law`).
+!> The table begins at the pressure 0. Beyond its last point the last line is continued if it rises, and the
+!> bound is constant if that line falls. The bound is not linear in the pressure; therefore this law cannot be
+!> used with the slope effect (module `shear_law`).
 !>
-!> Functions of Python come as such tables, too: the solvers ask for the bound in parallel loops, where Python
-!> could not be called.
+!> Python functions are also converted to such tables, because the solvers need the bound in parallel loops,
+!> where Python could not be called.
 module table_law
    use asperity_precision, only : dp
    use shear_law, only : shear_law_type
@@ -25,7 +25,7 @@ module table_law
 
 contains
 
-   !> Make the law. A table that is not there makes a law without friction, which knows its variables.
+   !> Make the law. Without a table the law has no friction, but still names the variables that it needs.
    function new_table_law(table) result(self)
       !> [n, 2] Pressures, Pa, that begin at 0 and rise, and the bounds there, Pa, >= 0; two points or more.
       real(dp), intent(in), optional :: table(:, :)

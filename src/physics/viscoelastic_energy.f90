@@ -2,18 +2,19 @@
 !>
 !> With the scalar product a.b = sum over the cells times the cell area, and the notation of `zener`
 !> (m_k = A p_k), the stored energy is W = 1/2 G_e U.S + sum E_k/(2 g_k), E_k = m_k.p_k (thesis,
-!> eq. 4.1 to 4.3), and E_k follows its own scalar recurrence: products of tractions and
-!> displacements are enough, A is never inverted. What work and loss are depends on the scheme:
+!> eq. 4.1 to 4.3), and E_k follows its own scalar recurrence. Products of tractions and displacements are
+!> sufficient; A is never inverted. The formulas of work and loss depend on the scheme:
 !>
 !> * exponential, exponential2 and jumps: the exact integrals of P dU and of the dashpots' power
 !>   along the path that the scheme assumes within the step, U(t) linear or parabolic; the loss is
 !>   never negative.
 !> * backward Euler: work P'.dU with the traction of the end of the step; the loss is that of the
-!>   dashpots at their mean speed, plus what the scheme itself loses, booked apart as numerical.
-!> * an elastic body, a body relaxed for ever: work = change of the stored energy.
+!>   dashpots at their mean speed, plus the loss of the scheme itself, which is also booked separately as
+!>   numerical.
+!> * an elastic body, or a body that has relaxed completely: work = change of the stored energy.
 !>
-!> The work holds the product P'.dU of the fields, the stored energy the product U.S, the loss
-!> the products with the arms: that the three agree is a check of the fields, not an identity.
+!> The work is computed from the product P'.dU of the fields, the stored energy from U.S, and the loss from
+!> the products with the arms. That the three agree is therefore a check of the fields and not an identity.
 module viscoelastic_energy
    use asperity_precision, only : dp
    use relaxation_functions, only : mean_decay, mean_rise, parabola_work, slope_response, &
@@ -30,8 +31,8 @@ module viscoelastic_energy
       real(dp) :: cell_area = 0.0_dp        !! m2
       real(dp) :: stored = 0.0_dp           !! elastic energy W now, J
       real(dp) :: work = 0.0_dp             !! done by the traction on the rubber, J
-      real(dp) :: dissipated = 0.0_dp       !! lost in the rubber, the scheme's own loss included, J
-      real(dp) :: numerical = 0.0_dp        !! the part of it that is the scheme's own, J
+      real(dp) :: dissipated = 0.0_dp       !! lost in the rubber, including the loss of the scheme, J
+      real(dp) :: numerical = 0.0_dp        !! the part of it that the scheme itself lost, J
       real(dp) :: du_ds = 0.0_dp            !! dU.dS of the last step, m3
       real(dp), allocatable :: arm(:)       !! E_k, Pa2 m3
       real(dp), allocatable :: arm_du(:)    !! p_k.dU of the last step with p_k from its end, J
@@ -49,7 +50,7 @@ contains
       allocate (self%arm(size(material%g)), self%arm_du(size(material%g)), source=0.0_dp)
    end subroutine new_books
 
-   !> Book a step: after all fields are committed and before `finish_step`.
+   !> Book a step. This must be called after all fields are committed and before `finish_step`.
    pure subroutine book_step(self, material, products)
       type(energy_books_type), intent(inout) :: self
       type(zener_type), intent(in) :: material
@@ -105,7 +106,7 @@ contains
       type(products_type), intent(in) :: products
       real(dp), intent(out) :: work         !! J
       real(dp), intent(out) :: loss         !! all of it, J
-      real(dp), intent(out) :: numerical    !! the scheme's own part, J
+      real(dp), intent(out) :: numerical    !! the part that the scheme itself lost, J
       real(dp) :: a, d, e, g, r, x
       integer :: k
 
@@ -150,7 +151,7 @@ contains
          omega = parabola_work(x)
          r = products%arm_du(k)*self%cell_area
          r_k = w*(r - material%ratio*self%arm_du(k))
-         ! the mean traction along the path instead of the one at its end
+         ! Replace the traction at the end by the mean traction along the path.
          work = work + (phi - material%alpha(k))*r - chi*r_k &
             + (g*mean_rise(x) - material%b1(k))*d - material%b2(k)*c + g*omega*k_k
          loss = loss + x*mean_decay(2.0_dp*x)/g*self%arm(k) + x*phi**2*r &

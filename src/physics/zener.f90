@@ -7,18 +7,19 @@
 !>    p_k' = alpha p_k + b1 (S' - S) + b2 (S - S_old)                one step; a prime: its end
 !>    P'   = Q S' - P_h,   Q = G_e + sum b1,   P_h = sum(b1 S - alpha p_k - b2 (S - S_old))
 !>
-!> P_h is the traction of the past. So S' = (P' + P_h)/Q point by point, and a contact solver meets an
-!> elastic body with the displacement U' = A (P' + P_h)/Q. The fields S and p_k are in module `arm_state`.
-!> This is thesis eq. 2.13/2.14 with all displacement-like terms written as tractions. x = dt/tau:
+!> P_h is the traction of the past. Thus S' = (P' + P_h)/Q holds at each point, and for a contact solver the
+!> body is elastic, with the displacement U' = A (P' + P_h)/Q. The fields S and p_k are in module `arm_state`.
+!> These are eq. 2.13 and 2.14 of the thesis with all displacement-like terms written as tractions. With
+!> x = dt/tau, the schemes are
 !>
 !>    backward_euler   alpha = 1/(1+x)   b1 = g/(1+x)           b2 = 0
 !>    exponential      alpha = exp(-x)   b1 = g phi             b2 = 0, exact for a linear U(t)
 !>    exponential2     alpha = exp(-x)   b1 = g (phi + w chi)   b2 = -g w chi dt/dt_old, a parabola
 !>
-!> with phi, chi from `relaxation_functions` and w = 2 dt/(dt + dt_old), damped by (2 dt_old/dt)^2
-!> where a step is more than twice the last: plain extrapolation would overshoot there. w = 0 in the
-!> first step and after a jump of the load or of a rate: module starting_steps then takes the step in three
-!> parts. A jump is a step of no duration: alpha = 1, b1 = g.
+!> with phi and chi of module `relaxation_functions`, and w = 2 dt/(dt + dt_old). If a step is more than twice
+!> as long as the one before, w is damped by (2 dt_old/dt)^2, because plain extrapolation would overshoot. In
+!> the first step, and after a jump of the load or of a rate, w is 0; module `starting_steps` then divides the
+!> step into three parts. A jump is a step without duration: alpha = 1, b1 = g.
 module zener
    use asperity_errors, only : add_fault, error_input, error_type, fail
    use asperity_precision, only : dp
@@ -36,22 +37,22 @@ module zener
 
    integer, parameter, public :: step_regular = 1   !! a step of some duration
    integer, parameter, public :: step_jump = 2      !! instantaneous
-   integer, parameter, public :: step_relaxed = 3   !! the load has rested for ever
+   integer, parameter, public :: step_relaxed = 3   !! after an infinite time under the load
 
-   !> The material, its time scheme and the coefficients of the step in hand. No fields.
+   !> The material, its time scheme and the coefficients of the present step, without fields.
    type :: zener_type
       real(dp) :: g_e = 0.0_dp               !! long-term modulus, Pa
       real(dp), allocatable :: g(:)          !! moduli of the arms, Pa
       real(dp), allocatable :: tau(:)        !! relaxation times, s
       integer :: scheme = scheme_exponential2
-      integer :: kind = step_jump            !! of the step in hand
+      integer :: kind = step_jump            !! of the present step
       real(dp) :: dt = 0.0_dp                !! its duration, s
       real(dp) :: dt_old = 0.0_dp           !! of the step before, s; 0: b2 = 0 (for checkpoints)
       real(dp) :: q = 0.0_dp                 !! modulus of the step, Pa
       real(dp) :: weight = 0.0_dp            !! w
       real(dp) :: ratio = 0.0_dp             !! dt/dt_old; 0 without a step before
       real(dp), allocatable :: x(:)          !! dt/tau
-      real(dp), allocatable :: alpha(:)      !! what is left of an arm's traction
+      real(dp), allocatable :: alpha(:)      !! part of an arm's traction that remains
       real(dp), allocatable :: b1(:)         !! Pa
       real(dp), allocatable :: b2(:)         !! Pa
    end type zener_type
@@ -98,7 +99,7 @@ contains
       call start_jump(self)
    end subroutine new_zener
 
-   !> No arms: the response has no history.
+   !> Is the material elastic, that is, without arms?
    pure function is_elastic(self) result(elastic)
       type(zener_type), intent(in) :: self
       logical :: elastic
@@ -114,7 +115,7 @@ contains
       yes = self%scheme == scheme_exponential2 .and. .not. is_elastic(self)
    end function extrapolates
 
-   !> Is there no step before to look back to?
+   !> Is there no earlier step from which to extrapolate?
    pure function needs_start(self) result(yes)
       type(zener_type), intent(in) :: self
       logical :: yes
@@ -122,7 +123,7 @@ contains
       yes = .not. self%dt_old > 0.0_dp
    end function needs_start
 
-   !> Coefficients of a step of duration dt. May be called again before `finish_step`.
+   !> Set the coefficients of a step of duration dt. This may be called again before `finish_step`.
    pure subroutine start_step(self, dt)
       type(zener_type), intent(inout) :: self
       real(dp), intent(in) :: dt             !! s, > 0
@@ -153,7 +154,7 @@ contains
       self%q = self%g_e + sum(self%b1)
    end subroutine start_step
 
-   !> Coefficients of a jump: the material answers with G(0).
+   !> Set the coefficients of a jump, to which the material responds with G(0).
    pure subroutine start_jump(self)
       type(zener_type), intent(inout) :: self
 
@@ -168,7 +169,7 @@ contains
       self%q = self%g_e + sum(self%b1)
    end subroutine start_jump
 
-   !> Coefficients of a state that has rested for ever: the material answers with G_e.
+   !> Set the coefficients of the state after an infinite time, when the material responds with G_e.
    subroutine start_relaxed(self, error)
       type(zener_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
@@ -185,7 +186,7 @@ contains
       self%q = self%g_e
    end subroutine start_relaxed
 
-   !> Finish the step in hand, after the arms have been committed and the energies booked.
+   !> Finish the present step, after the arms have been committed and the energies booked.
    pure subroutine finish_step(self)
       type(zener_type), intent(inout) :: self
 

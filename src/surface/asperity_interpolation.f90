@@ -139,7 +139,7 @@ contains
       end do
    end subroutine shifted_height
 
-   !> The heights themselves, moved by whole cells; the lowest height of the map outside a free map.
+   !> The heights of the map, moved by whole cells. Outside a free map the height is its lowest one.
    subroutine moved_height(self, map, whole, height)
       type(interpolation_type), intent(in) :: self
       real(dp), intent(in) :: map(:, :)            !! H_0, m [nx, rows of this process, or more]
@@ -249,7 +249,7 @@ contains
       end do
    end subroutine displaced_map
 
-   !> Have the rows that are read at places shifted alike. Collective.
+   !> Make the rows available that are needed for a uniform shift. Collective.
    subroutine have_shifted_rows(self, shift)
       type(interpolation_type), intent(inout) :: self
       type(shift_type), intent(in) :: shift
@@ -259,7 +259,7 @@ contains
       call self%rows%have(first, first + self%grid%rows() - 1)
    end subroutine have_shifted_rows
 
-   !> Have the rows that are read at displaced places. Collective.
+   !> Make the rows available that are needed at displaced places. Collective.
    subroutine have_displaced_rows(self, shift, displacement_y)
       type(interpolation_type), intent(inout) :: self
       type(shift_type), intent(in) :: shift
@@ -318,7 +318,7 @@ contains
       end if
    end subroutine locate
 
-   !> The whole number below; of a place far away, one that is far away, too.
+   !> The largest whole number not above q. Very large values are limited to the range of integers.
    elemental function whole_below(q) result(below)
       real(dp), intent(in) :: q                 !! cells
       integer :: below

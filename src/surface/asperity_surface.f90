@@ -91,7 +91,7 @@ contains
       case ('file')
          if (term%file == '') call add_fault(error, error_input, &
             '&surface: file is missing: shape = ''file'' needs the name of an HDF5 file')
-      case default                                ! those of a rough surface depend on each other
+      case default                                ! the variables of a rough surface depend on each other: see `check_self_affine`
          continue
       end select
    end subroutine check_variable
@@ -147,7 +147,7 @@ contains
          //': must be finite')
    end subroutine must_be_finite
 
-   !> A number as a short word.
+   !> Convert a number to a short text.
    pure function number(value) result(word)
       real(dp), intent(in) :: value
       character(:), allocatable :: word

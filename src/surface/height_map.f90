@@ -1,7 +1,7 @@
 !> Height maps from files.
 !>
 !> A map is read in slabs of rows. Where processes share the rows of the grid, the first one reads the slabs
-!> and hands them to those that hold their rows, so that no process ever holds a whole map.
+!> and sends the rows to the processes that hold them, so that no process ever holds a whole map.
 !>
 !> Memory: about 1 MiB for a slab, and for HDF5 a row of chunks of the file.
 module height_map
@@ -21,7 +21,7 @@ module height_map
 
    public :: add_map, check_map, checksum_of_map
 
-   !> A map while it is read.
+   !> A map that is being read.
    type :: map_reader_type
       type(field_reader_type) :: field
       real(dp) :: scale = 1.0_dp
@@ -42,7 +42,7 @@ contains
       type(grid_type), intent(in) :: grid
       type(surface_settings_type), intent(in) :: term    !! checked
       real(dp), intent(inout) :: height(:, :)            !! m, shape [nx, rows]
-      integer(int64), intent(out) :: map_checksum        !! of the map as it is in the file
+      integer(int64), intent(out) :: map_checksum        !! of the map in the file, before scaling
       type(error_type), allocatable, intent(out) :: error
       type(map_reader_type) :: map
       real(dp), allocatable :: slab(:, :)
@@ -70,7 +70,7 @@ contains
       call share(map_checksum)
    end subroutine add_map
 
-   !> Add rows.
+   !> Add rows of the map, times the scale, to the height.
    subroutine add_rows(scale, rows, height)
       real(dp), intent(in) :: scale
       real(dp), intent(in) :: rows(:, :)
@@ -97,10 +97,10 @@ contains
       call map%finish(term, ignored, error)
    end subroutine check_map
 
-   !> Checksum of a map, whatever its values are.
+   !> Checksum of a map, even if some of its values are not finite.
    subroutine checksum_of_map(path, dataset, extent, checksum, error)
       character(*), intent(in) :: path
-      character(*), intent(in) :: dataset                !! '': the usual names
+      character(*), intent(in) :: dataset                !! '': 'surface/height' or 'surface'
       integer, intent(in) :: extent(2)                   !! nx, ny that the map must have
       integer(int64), intent(out) :: checksum
       type(error_type), allocatable, intent(out) :: error
@@ -160,7 +160,7 @@ contains
       self%rows(first:first + size(values, 2) - 1) = checksums_of_rows(values)
    end subroutine read_rows
 
-   !> Read all rows for their checksums, and to find what is not finite.
+   !> Read all rows, to compute their checksums and to count the values that are not finite.
    subroutine read_all(self)
       class(map_reader_type), intent(inout) :: self
       real(dp), allocatable :: slab(:, :)
@@ -175,7 +175,7 @@ contains
       end associate
    end subroutine read_all
 
-   !> Close the file, and report what was wrong.
+   !> Close the file, and report the faults that were found.
    subroutine finish(self, term, checksum, error)
       class(map_reader_type), intent(inout) :: self
       type(surface_settings_type), intent(in) :: term

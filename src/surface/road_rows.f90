@@ -1,8 +1,8 @@
-!> The rows of the road under the rubber of this process.
+!> The rows of the road that are under the rubber of this process.
 !>
-!> Where processes share the rows of the map, each holds its own, and those under which its rubber is at
-!> present. These are fetched from their owners when the road has moved on, with some more on either side, so that
-!> most steps find what they need. The map does not change, so that what has been fetched remains right.
+!> If processes share the rows of the map, each holds its own rows and those that are now under its part of
+!> the rubber. The latter are fetched from their owners when the road has moved, with some spare rows on either
+!> side, so that most steps need no exchange. The map does not change, so that fetched rows remain valid.
 !>
 !> Rows are numbered from 0 in this module. The values of a row may be heights or
 !> coefficients of a spline; this module does not use them.
@@ -16,19 +16,19 @@ module road_rows
 
    public :: new_road_rows, road_rows_type
 
-   integer, parameter :: spare = 4                    !! rows that are fetched beyond those needed
-   integer, parameter :: reach(2) = [-1, 2]           !! rows read about the place of a cell
+   integer, parameter :: spare = 4                    !! extra rows that are fetched on either side
+   integer, parameter :: reach(2) = [-1, 2]           !! rows that are read around a place, relative to its row
 
    !> Rows that can be read.
    type :: road_rows_type
       type(grid_type) :: grid
       !> The rows of this process, the rim of the map, and rows of others [values of a row, rows].
       real(dp), allocatable :: values(:, :)
-      !> Where each row is in `values`, from row -1, in front of the map, to ny + 1. Rows that are not there
-      !> have a place that may be read all the same.
+      !> Position in `values` of each row from -1, in front of the map, to ny + 1. A row that is not available has
+      !> a valid position, too, so that reading it does no harm.
       integer, allocatable :: place(:)
       integer, private :: rim = 0                     !! rows of the rim: 2 or none
-      logical, allocatable, private :: there(:)       !! of each row from 0 to ny - 1
+      logical, allocatable, private :: there(:)       !! is the row available? From 0 to ny - 1
    contains
       procedure :: have
    end type road_rows_type
@@ -45,8 +45,8 @@ contains
 
       self%grid = grid
       if (with_rim) self%rim = 2
-      ! There is room for rows of others from the start, so that the road needs no larger copy when it moves
-      ! on. It takes no memory before rows are put there.
+      ! Space for the rows of others is allocated at once, so that the array need not be copied when the road
+      ! moves. The system provides the memory only when rows are stored there.
       room = 0
       if (grid%shared) room = min(grid%rows() + reach(2) - reach(1) + 2*spare, grid%ny)
       allocate (self%values(n, grid%rows() + self%rim + room))
@@ -54,7 +54,7 @@ contains
       call place_own_rows(self)
    end subroutine new_road_rows
 
-   !> Fetch the rows that are needed to read the map at these places along y, unless they are here already.
+   !> Fetch the rows that are needed to read the map at these places along y, unless they are already available.
    !> Collective.
    subroutine have(self, least, largest)
       class(road_rows_type), intent(inout) :: self
@@ -74,7 +74,7 @@ contains
       call fetch_range(self, range)
    end subroutine have
 
-   !> A range of rows, within a free map, and not longer than a period.
+   !> Limit a range of rows to a free map, or to one period of a periodic one.
    pure function clipped(grid, wanted) result(range)
       type(grid_type), intent(in) :: grid
       integer, intent(in) :: wanted(2)

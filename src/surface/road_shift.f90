@@ -15,14 +15,14 @@ module road_shift
    type :: shift_type
       integer :: whole(2) = 0                         !! whole cells along x and y; modulo a period
       real(dp) :: part(2) = 0.0_dp                    !! the rest, -1/2 to 1/2
-      integer :: first = 0                            !! where the first row of this process is, from 0
+      integer :: first = 0                            !! number of the first row of this process, from 0
    contains
       procedure :: is_whole
    end type shift_type
 
 contains
 
-   !> A displacement in metres as one in cells.
+   !> Convert a displacement in metres to cells.
    pure function shift_in_cells(grid, displacement) result(shift)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: displacement(2)         !! m

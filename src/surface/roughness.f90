@@ -42,7 +42,7 @@ module roughness
 
 contains
 
-   !> Statistics of a map.
+   !> Compute the statistics of a map.
    !>
    !> Nayak's parameter is m0 m4/m2^2. For a map, m0, m2 and m4 are the moments of a profile that is
    !> cut through an isotropic surface: m0 = <h^2>, m2 = <|grad h|^2>/2, m4 = 3/8 <(h_xx + h_yy)^2>.
@@ -145,7 +145,7 @@ contains
       psd = psd_factor(grid)*pack(power_sum, counted > 0)/modes
    end subroutine radial_psd
 
-   !> An error if the map does not have the shape of its grid.
+   !> Return an error if the map does not have the shape of its grid.
    subroutine check_shape(grid, height, error)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: height(:, :)

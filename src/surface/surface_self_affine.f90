@@ -3,7 +3,7 @@
 !> The power spectral density is constant for k_l <= |k| <= k_r, falls as (|k|/k_r)^(-2 (1 + H)) up
 !> to k_s, and is 0 elsewhere. k_l, k_r and k_s are 2 pi over the long, the roll-off and the short
 !> wavelength. A profile (ny = 1) has the exponent -(1 + 2 H), which is that of a line cut through
-!> such a surface. The ends of the band belong to it. The mean mode and the Nyquist modes are left
+!> such a surface. The ends of the band are included. The mean mode and the Nyquist modes are left
 !> out.
 !>
 !> 'random_phase' gives every mode exactly the amplitude of the spectrum and a random phase, which

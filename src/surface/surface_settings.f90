@@ -8,8 +8,8 @@ module surface_settings
 
    public :: default_surface, real_variable, surface_settings_type
 
-   integer, parameter, public :: word_length = 32       !! of a choice
-   integer, parameter, public :: path_length = 1024     !! of a file's path
+   integer, parameter, public :: word_length = 32       !! longest word among several choices
+   integer, parameter, public :: path_length = 1024     !! longest path of a file
 
    !> `&surface`: one term of the sum of heights.
    type :: surface_settings_type

@@ -41,7 +41,7 @@ module surface_shapes
       character(40) :: meaning = ''             !! for the reference page
       !> Variables of `&surface` that belong to the shape, in the order of a listing; then blanks
       character(word_length) :: variables(most_variables) = ''
-      !> Those of them that must be given; then blanks
+      !> Variables among them that must be given; then blanks
       character(word_length) :: required(most_variables) = ''
       !> Height as a function of the place; not associated for random surfaces, files and planes
       procedure(height_formula), pointer, nopass :: formula => null()
