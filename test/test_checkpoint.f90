@@ -131,7 +131,7 @@ contains
       call check_that(checkpoint_path('a/b.h5') == 'a/b.checkpoint.h5', 'name')
       call check_that(checkpoint_path('a/b.out') == 'a/b.out.checkpoint.h5', 'another name')
       call reader%open(path, error)
-      call check_error(error, 'has no checkpoint to go on from', 'none')
+      call check_error(error, 'has no checkpoint from which to continue', 'none')
       call check_that(error%status == error_file, 'status of none')
       call write_state(state, error)
       call check_no_error(error, 'written')

@@ -140,7 +140,7 @@ contains
       call output%reopen(path, 'another', 13, 0, error)
       call check_error(error, 'is not the result that test_result_file.checkpoint.h5 belongs to', 'other id')
       call output%reopen(path, id_of(path), 14, 0, error)
-      call check_error(error, 'the history has 14 rows, the run would go on after row 14', 'far')
+      call check_error(error, 'the history has 14 rows, the run would continue after row 14', 'far')
       call check_that(error%status == error_file, 'status')
    end subroutine run_goes_on
 

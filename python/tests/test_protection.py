@@ -43,7 +43,7 @@ def test_unfinished_run_is_kept(program: str, case: Path) -> None:
     before = result.read_bytes()
     done = vc.run(program, case)
     assert done.returncode == 3
-    assert "y.h5: holds an unfinished run: --restart goes on" in done.stderr
+    assert "y.h5: holds an unfinished run: --restart continues it" in done.stderr
     assert result.read_bytes() == before
     with pytest.raises(OSError, match="unfinished run"):
         asperity.run(case)

@@ -1,15 +1,15 @@
-!> What is worth knowing about the adhesion of a case before it runs: is the grid fine enough, and does
-!> adhesion matter.
+!> Advice on the adhesion of a case before it runs: is the grid fine enough, and does adhesion matter?
 !>
-!> * Resolution. The zone where surfaces part is about E* z_0^2/gamma_0 wide. On cells of more than 0.7
-!>   of it the contact edge sticks to the grid, and different ways lead to different states. With
-!>   maugis_dugdale it may be the whole of it, as its edge is widened to what the cells need (module
-!>   adhesion_potential): the pull-off force of a sphere is then good to 2 %, and to 4 % at 1.6 times it.
+!> * Resolution. The zone where the surfaces separate is about E* z_0^2/gamma_0 wide. If the cells are larger
+!>   than 0.7 times this width, the contact edge sticks to the grid, and the state depends on the path. With
+!>   maugis_dugdale the cells may be as large as the zone, because the edge of its range is widened to suit the
+!>   cells (module `adhesion_potential`). The pull-off force of a sphere then has an error of 2 %, and of 4 % on
+!>   cells of 1.6 times the width.
 !> * Tabor's parameter of a sphere, (R gamma_0^2/(E*^2 z_0^3))^(1/3) (thesis, eq. 1.2).
-!> * The criteria of (thesis, eq. 4.7-4.9) for each wave or random term; where one of them is small
+!> * The criteria of the thesis (eq. 4.7-4.9) for each wave or random term. If one of them is small
 !>   compared with 1, adhesion may be neglected:
-!>       C1 = 3 pi gamma_0 R_c N/p     adhesive over applied force of N summits an area, of radius R_c
-!>       C2 = gamma_0/W                adhesive over elastic energy an area, in full contact
+!>       C1 = 3 pi gamma_0 R_c N/p     adhesive over applied force of N summits per area, of radius R_c
+!>       C2 = gamma_0/W                adhesive over elastic energy per area, in full contact
 !>   Hexagonal wave: R_c = wavelength^2/(3 sqrt(3) pi^2 amplitude) (the thesis has 6 in place of
 !>   3 sqrt(3), which makes C1 smaller by 13 %), N = 2 sqrt(3)/wavelength^2,
 !>   W = 3 pi E* amplitude^2/(32 wavelength). Sine: W = pi E* amplitude^2/(4 wavelength); it has no
@@ -17,8 +17,9 @@
 !>   3 sqrt(pi/m4)/8, N = m4/(6 sqrt(3) pi m2) (P. R. Nayak, J. Lubr. Technol. 93 (1971) 398; J. A.
 !>   Greenwood, Proc. R. Soc. A 393 (1984) 133), from the continuous spectrum.
 !>
-!> Modulus of a viscoelastic material: that to which it relaxes in the time of the run (at once: static
-!> solves only), long-term with a relaxed phase. That is the softest state, with the narrowest zone.
+!> For a viscoelastic material the softest modulus of the run is used, because it gives the narrowest zone: the
+!> modulus after relaxation over the time of the run, the instantaneous one if there are only static solves, or
+!> the long-term one if there is a relaxed phase.
 module adhesion_advice
    use adhesion_potential, only : edge_of_cells
    use case_settings, only : case_type, surface_settings_type
@@ -32,8 +33,8 @@ module adhesion_advice
       softest_modulus
 
    character(*), parameter :: nl = new_line('a')
-   real(dp), parameter :: smooth_limit = 0.7_dp    !! largest cell over the zone, smooth potentials
-   real(dp), parameter :: square_limit = 1.0_dp    !! the same of maugis_dugdale
+   real(dp), parameter :: smooth_limit = 0.7_dp    !! largest cell over the width of the zone
+   real(dp), parameter :: square_limit = 1.0_dp    !! the same for maugis_dugdale
 
 contains
 
@@ -52,7 +53,8 @@ contains
          to_text(limit)//' m'//with_modulus(case)//': the edge of the contact sticks to the grid'
    end function adhesion_warning
 
-   !> Numbers that show what adhesion will do, a line each without its end mark; empty without adhesion.
+   !> Numbers that show the effect of adhesion, one per line, without a line end after the last; empty without
+   !> adhesion.
    function adhesion_notes(case) result(text)
       type(case_type), intent(in) :: case
       character(:), allocatable :: text
@@ -84,13 +86,13 @@ contains
                if (c2 > 0.0_dp) text = text//' C2 = '//to_text(rounded(c2))// &
                   ': adhesion may be neglected if one of them is much less than 1'
             case default
-               continue                        ! nothing to say of a plane, a ridge or a file
+               continue                        ! there are no criteria for a plane, a ridge or a file
             end select
          end associate
       end do
    end function adhesion_notes
 
-   !> The criteria C1 and C2 of one term; 0 for what cannot be said.
+   !> The criteria C1 and C2 of one term; 0 if a criterion is not defined.
    pure subroutine adhesion_criteria(term, energy, modulus, pressure, c1, c2)
       type(surface_settings_type), intent(in) :: term
       real(dp), intent(in) :: energy               !! gamma_0, J/m2
@@ -133,7 +135,7 @@ contains
       real(dp) :: total
       real(dp) :: low, bend, high
 
-      low = term%wavelength_short/term%wavelength_long       ! wave numbers over the highest
+      low = term%wavelength_short/term%wavelength_long       ! wave numbers relative to the highest
       bend = term%wavelength_short/term%wavelength_rolloff
       high = 1.0_dp
       total = power_integral(low, bend, n + 1.0_dp) + bend**(2.0_dp + 2.0_dp*term%hurst) &
@@ -153,8 +155,7 @@ contains
       end if
    end function power_integral
 
-   !> Half width of the edge of the range of maugis_dugdale, m: what the cells need with the softest
-   !> modulus.
+   !> Half width of the edge of the range of maugis_dugdale that the cells need with the softest modulus, m.
    pure function adhesion_edge(case) result(edge)
       type(case_type), intent(in) :: case
       real(dp) :: edge
@@ -172,7 +173,7 @@ contains
       if (case%grid%ny > 1) cell = max(cell, case%grid%dy)
    end function longer_side
 
-   !> The largest cell over E* z_0^2/gamma_0.
+   !> The largest permissible cell, relative to E* z_0^2/gamma_0.
    pure function cells_a_zone(case) result(limit)
       type(case_type), intent(in) :: case
       real(dp) :: limit
@@ -181,7 +182,7 @@ contains
       if (case%adhesion%potential == 'maugis_dugdale') limit = square_limit
    end function cells_a_zone
 
-   !> The largest cell as a formula.
+   !> The formula for the largest permissible cell.
    pure function zone_in_words(case) result(text)
       type(case_type), intent(in) :: case
       character(:), allocatable :: text
@@ -241,7 +242,7 @@ contains
       sticks = case%adhesion%potential /= 'none' .and. case%adhesion%energy > 0.0_dp
    end function sticks
 
-   !> Which modulus a number belongs to, in words; nothing for an elastic material.
+   !> The modulus with which a number was computed, in words; empty for an elastic material.
    function with_modulus(case) result(text)
       type(case_type), intent(in) :: case
       character(:), allocatable :: text
@@ -263,7 +264,7 @@ contains
       text = text//')'
    end function with_modulus
 
-   !> To three digits, for shows.
+   !> Round a number to three digits for display.
    pure function rounded(value)
       real(dp), intent(in) :: value
       real(dp) :: rounded

@@ -1,9 +1,9 @@
-!> The rows of a run: which solve comes next, at what time, under what load and speed.
+!> The schedule of a run: the time, load and speed of each row.
 !>
-!> A phase with a duration begins with a jump where it is the first, where its load differs from the
-!> one held so far and is not ramped, or where it starts relaxed or steady; then come its steps.
-!> A steady phase at rest is a relaxed one. A phase
-!> without a duration is static: one instantaneous solve, or a series of them up to its load.
+!> A phase with a duration consists of steps. It begins with a jump if it is the first one, if its load differs
+!> from the previous load and is not ramped, or if it starts relaxed or steady. A steady phase with a
+!> velocity of zero is a relaxed one. A phase without a duration is static: one instantaneous solve, or a series
+!> of them up to its load.
 module asperity_schedule
    use case_settings, only : phase_settings_type
    use asperity_precision, only : dp
@@ -12,13 +12,13 @@ module asperity_schedule
 
    public :: change_load, change_velocity, count_rows, next_row, planned_row_type, schedule_type
 
-   !> What a row asks for.
+   !> The plan of a row.
    type :: planned_row_type
       integer :: phase = 0                        !! number of the phase, from 1
       logical :: instantaneous = .false.          !! a jump or a static solve
-      logical :: ramped = .false.                 !! the load has come here along a straight line
-      logical :: relaxed = .false.                !! the load has rested for ever
-      logical :: steady = .false.                 !! the road has slid for ever at this velocity
+      logical :: ramped = .false.                 !! the load has changed linearly up to here
+      logical :: relaxed = .false.                !! the load has acted for an infinite time
+      logical :: steady = .false.                 !! the road has slid at this velocity infinitely long
       real(dp) :: next_dt = 0.0_dp                !! the step in time after a steady row, s; 0: none
       logical :: new_speed = .false.              !! the speed of the road changed just before
       logical :: new_rate = .false.               !! the rate of the load changed just before
@@ -31,27 +31,27 @@ module asperity_schedule
       real(dp) :: road_y = 0.0_dp
       real(dp) :: velocity_x = 0.0_dp             !! of the road, m/s
       real(dp) :: velocity_y = 0.0_dp
-      logical :: pulled(2) = .false.              !! the road hangs on a force along x, y
+      logical :: pulled(2) = .false.              !! a force pulls the road along x, y
       real(dp) :: pull(2) = 0.0_dp                !! that force, Pa
       real(dp) :: pull_before(2) = 0.0_dp         !! the same at the start of the step, Pa
    end type planned_row_type
 
-   !> Where a run stands. Plain numbers, so that a checkpoint can hold them.
+   !> The position of a run in its phases. It consists of plain numbers, so that a checkpoint can store it.
    type :: schedule_type
-      integer :: row = -1                         !! last row done; -1: none
-      integer :: phase = 1                        !! phase in hand
-      integer :: step = 0                         !! steps of it that are done
-      logical :: entered = .false.                !! its first row is done or not needed
+      integer :: row = -1                         !! last row that is done; -1 if none
+      integer :: phase = 1                        !! present phase
+      integer :: step = 0                         !! number of its steps that are done
+      logical :: entered = .false.                !! the row at its start is done or not needed
       real(dp) :: start_time = 0.0_dp             !! of the phase, s
       real(dp) :: start_load = 0.0_dp             !! its load at the start, in its own control
       real(dp) :: start_x = 0.0_dp                !! displacement of the road at the start, m
       real(dp) :: start_y = 0.0_dp
-      character(12) :: held_control = ''          !! load held so far; '' before the first phase
+      character(12) :: held_control = ''          !! control of the load so far; '' at the start
       real(dp) :: held_load = 0.0_dp
       real(dp) :: held_rate = 0.0_dp              !! rate of the load in the last step, over s
       real(dp) :: velocity_x = 0.0_dp             !! of the road so far, m/s
       real(dp) :: velocity_y = 0.0_dp
-      logical :: held_pulled(2) = .false.         !! the road hung on a force so far
+      logical :: held_pulled(2) = .false.         !! a force has pulled the road so far
       real(dp) :: held_pull(2) = 0.0_dp           !! that force, Pa
       real(dp) :: start_pull(2) = 0.0_dp          !! force on the road at the start of the phase, Pa
       logical :: speed_changed = .false.          !! by `change_velocity`, since the last row
@@ -76,7 +76,7 @@ contains
       end do
    end function count_rows
 
-   !> Hold what a phase ends with.
+   !> Remember the load, the velocity and the pull with which a phase ends.
    pure subroutine hold(self, phase)
       type(schedule_type), intent(inout) :: self
       type(phase_settings_type), intent(in) :: phase
@@ -87,7 +87,7 @@ contains
       self%held_pull = phase%pull
    end subroutine hold
 
-   !> Does a phase begin with a row of its own, for a load or a pull that jumps?
+   !> Does a phase begin with an additional row, because its load or its pull jumps?
    pure function begins_with_row(phase, held) result(begins)
       type(phase_settings_type), intent(in) :: phase
       type(schedule_type), intent(in) :: held      !! with the load and the pull held so far
@@ -103,7 +103,7 @@ contains
          abs(held%held_pull - phase%pull) > 0.0_dp))
    end function begins_with_row
 
-   !> The next row, and the schedule behind it; `finished` where there is none.
+   !> Plan the next row, and advance the schedule. `finished` is true if no row is left.
    subroutine next_row(self, phases, present_load, present_pull, row, finished)
       type(schedule_type), intent(inout) :: self
       type(phase_settings_type), intent(in) :: phases(:)
@@ -144,7 +144,7 @@ contains
       end associate
    end subroutine next_row
 
-   !> A phase begins: what its load and its pull start from, and whether its speed is new.
+   !> Begin a phase: find the values from which its load and its pull start, and whether its speed is new.
    subroutine enter_phase(self, phase, present_load, present_pull, row)
       type(schedule_type), intent(inout) :: self
       type(phase_settings_type), intent(in) :: phase
@@ -161,7 +161,7 @@ contains
       self%velocity_y = phase%velocity_y
    end subroutine enter_phase
 
-   !> The row with which a phase begins at once: a jump, or a state in which it has rested for ever.
+   !> Plan the row at the start of a phase: a jump, or the state after an infinite time.
    subroutine plan_jump(self, phase, row)
       type(schedule_type), intent(in) :: self
       type(phase_settings_type), intent(in) :: phase
@@ -173,7 +173,7 @@ contains
       if (phase%linear) row%pull = merge(self%start_pull, 0.0_dp, phase%pulled)
    end subroutine plan_jump
 
-   !> The next step of a phase.
+   !> Plan the next step of a phase.
    subroutine plan_step(self, phase, present_load, row)
       type(schedule_type), intent(inout) :: self
       type(phase_settings_type), intent(in) :: phase
@@ -206,7 +206,7 @@ contains
       if (self%step == 1 .and. phase%linear .and. any(phase%pulled)) row%new_rate = .true.
    end subroutine plan_step
 
-   !> A row of steady sliding; with a velocity of zero it is one of rest.
+   !> Plan a row of steady sliding. With a velocity of zero it is a relaxed state.
    subroutine plan_steady(phase, row)
       type(phase_settings_type), intent(in) :: phase
       type(planned_row_type), intent(inout) :: row
@@ -216,7 +216,7 @@ contains
       row%next_dt = phase%dt
    end subroutine plan_steady
 
-   !> The last step of a phase is planned: the next row belongs to the phase that follows.
+   !> Leave a phase after its last step is planned: the next row belongs to the following phase.
    subroutine leave_phase(self, phase, row)
       type(schedule_type), intent(inout) :: self
       type(phase_settings_type), intent(in) :: phase
@@ -231,7 +231,8 @@ contains
       self%entered = .false.
    end subroutine leave_phase
 
-   !> A load that was changed within a phase is a ramp over one step: a kink at its start and its end.
+   !> Plan a load that was changed within a phase: it is ramped over one step, with a kink at the start and one at
+   !> the end of this step.
    subroutine note_change(self, present_load, row)
       type(schedule_type), intent(inout) :: self
       real(dp), intent(in) :: present_load(3)
@@ -244,7 +245,7 @@ contains
       self%load_changed = .false.
    end subroutine note_change
 
-   !> Prescribe another load from the last row on: in the phase in hand and all later.
+   !> Prescribe another load from the last row on, in the present and all later phases.
    subroutine change_load(self, phases, control, load)
       type(schedule_type), intent(inout) :: self
       type(phase_settings_type), intent(inout) :: phases(:)
@@ -255,7 +256,7 @@ contains
       if (self%phase > size(phases)) return
       if (self%entered) then
          self%load_changed = .true.
-         ! The rate of another quantity says nothing of that of the new one.
+         ! The rate of the old quantity cannot be compared with that of the new one.
          if (phases(self%phase)%control /= control) self%held_rate = huge(1.0_dp)
       end if
       do k = self%phase, size(phases)
@@ -266,7 +267,7 @@ contains
       end do
    end subroutine change_load
 
-   !> Let the road move with another velocity from the last row on: in the phase in hand and all later.
+   !> Let the road move with another velocity from the last row on, in the present and all later phases.
    subroutine change_velocity(self, phases, velocity, road)
       type(schedule_type), intent(inout) :: self
       type(phase_settings_type), intent(inout) :: phases(:)
@@ -279,7 +280,8 @@ contains
       if (self%entered) then
          self%speed_changed = self%speed_changed .or. abs(velocity(1) - self%velocity_x) > 0.0_dp .or. &
             abs(velocity(2) - self%velocity_y) > 0.0_dp
-         ! The road's place is computed from the start of the phase, as if it had always moved so.
+         ! The position of the road is computed from the start of the phase. That start is moved, so that the road
+         ! seems to have had the new velocity throughout the phase.
          elapsed = real(self%step, dp)/phases(self%phase)%steps*phases(self%phase)%duration
          self%start_x = road(1) - elapsed*velocity(1)
          self%start_y = road(2) - elapsed*velocity(2)
@@ -307,12 +309,12 @@ contains
       if (self%held_control /= phase%control(:12)) row%new_rate = .true.
    end subroutine note_rate
 
-   !> Say whether the rate of the load has a kink, and keep the new rate.
+   !> Decide whether the rate of the load has a kink, and keep the new rate.
    pure subroutine compare_rate(self, rate, row)
       type(schedule_type), intent(inout) :: self
-      real(dp), intent(in) :: rate                 !! of the step in hand, over s
+      real(dp), intent(in) :: rate                 !! in the present step, per s
       type(planned_row_type), intent(inout) :: row
-      real(dp), parameter :: kink = 0.25_dp        !! relative change of a rate that is more than the bend of a curve
+      real(dp), parameter :: kink = 0.25_dp        !! relative change of a rate that counts as a kink
 
       row%new_rate = abs(rate - self%held_rate) > kink*max(abs(rate), abs(self%held_rate))
       self%held_rate = rate
@@ -334,7 +336,7 @@ contains
       end if
    end function load_at_start
 
-   !> The load as a quantity has it.
+   !> The present value of the quantity that the control names.
    pure function load_in(control, present_load) result(load)
       character(12), intent(in) :: control
       real(dp), intent(in) :: present_load(3)      !! pressure, force and displacement

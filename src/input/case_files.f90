@@ -1,4 +1,4 @@
-!> The files of a case: where its result goes by default, and which of its files the result would replace.
+!> The files of a case: the default name of its result, and the files that the result would overwrite.
 module case_files
    use case_settings, only : case_type
    use path_identity, only : same_file
@@ -10,8 +10,8 @@ module case_files
 
 contains
 
-   !> What the result, or a file that is written beside it, would be written over: the input, a
-   !> height map, or '' for neither.
+   !> The file that the result, or a file beside it, would overwrite: the input, a height map, or '' for
+   !> neither.
    function overwritten_file(case) result(what)
       type(case_type), intent(in) :: case
       character(:), allocatable :: what
@@ -25,7 +25,7 @@ contains
       end do
    end function overwritten_file
 
-   !> What a case reads from a file of this name: the input, a height map, or '' for nothing.
+   !> The purpose for which a case reads a file of this name: the input, a height map, or '' if it does not.
    function used_file(case, name) result(what)
       type(case_type), intent(in) :: case
       character(*), intent(in) :: name

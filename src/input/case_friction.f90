@@ -37,7 +37,7 @@ contains
       if (friction%law == 'table') call resolve_table(group, friction, faults)
    end subroutine resolve_friction
 
-   !> The points of a law that is given by a table.
+   !> Read and check the points of a law that is given by a table.
    subroutine resolve_table(group, friction, faults)
       type(group_values_type), intent(in) :: group
       type(friction_settings_type), intent(inout) :: friction
@@ -68,7 +68,7 @@ contains
       end if
    end subroutine resolve_table
 
-   !> A warning about a variable that is given and that the law does not need; empty if there is no reason.
+   !> A warning about a variable that is given although the law does not use it; otherwise empty.
    function unused_variable(group, law, name) result(warning)
       type(group_values_type), intent(in) :: group
       character(*), intent(in) :: law

@@ -1,4 +1,4 @@
-!> What must agree for a run to go on from a checkpoint: every setting that the numbers depend on.
+!> The settings that must agree if a run is continued from a checkpoint: all on which its numbers depend.
 module case_identity
    implicit none
    private
@@ -7,8 +7,8 @@ module case_identity
 
 contains
 
-   !> The settings of a case as lines 'group: name = value', without those that the numbers do not
-   !> depend on: the title, what is written, and the threads.
+   !> The settings of a case as lines 'group: name = value', without those that do not affect the numbers:
+   !> the title, the output, and the threads.
    function identity_of(settings) result(lines)
       character(*), intent(in) :: settings       !! of `resolved_input`
       character(:), allocatable :: lines
@@ -46,7 +46,7 @@ contains
 
    contains
 
-      !> Add a line; the buffer grows by doubling, so that many phases cost in proportion.
+      !> Add a line. The buffer grows by doubling, so that the time is proportional to the number of lines.
       subroutine add(text)
          character(*), intent(in) :: text
          character(:), allocatable :: longer

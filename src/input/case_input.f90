@@ -28,12 +28,12 @@ module case_input
 
 contains
 
-   !> Read a case from a file. Of several processes the first one reads the file, and all of them the text.
-   !> Collective.
+   !> Read a case from a file. If there are several processes, the first one reads the file, and all of them
+   !> interpret the text. Collective.
    subroutine read_case(path, case, error)
       character(*), intent(in) :: path
       type(case_type), intent(out) :: case
-      type(error_type), allocatable, intent(out) :: error      !! all faults, one a line
+      type(error_type), allocatable, intent(out) :: error      !! all faults, one per line
       character(:), allocatable :: text
 
       if (is_first_process()) call read_text_file(path, text, error)
@@ -42,7 +42,7 @@ contains
       call share(text)
       call parse_case(text, path, case, error)
       call agree(error)
-      ! The first process has looked into the files of height maps, too.
+      ! Only the first process has read the files of height maps, so that only it knows their warnings.
       if (.not. allocated(error)) call share(case%warnings)
    end subroutine read_case
 
@@ -51,7 +51,7 @@ contains
       character(*), intent(in) :: text
       character(*), intent(in) :: path                         !! the file's name, for messages and results
       type(case_type), intent(out) :: case
-      type(error_type), allocatable, intent(out) :: error      !! all faults, one a line
+      type(error_type), allocatable, intent(out) :: error      !! all faults, one per line
       type(group_values_type), allocatable :: groups(:)
       type(group_values_type) :: group
       type(faults_type) :: faults
@@ -98,7 +98,7 @@ contains
       if (allocated(faults%error)) call move_alloc(faults%error, error)
    end subroutine parse_case
 
-   !> Doubts about the surfaces and the adhesion, with numbers.
+   !> Add the warnings about the surfaces and the adhesion.
    subroutine add_warnings(case)
       type(case_type), intent(inout) :: case
       character(warning_length), allocatable :: found(:)
@@ -115,7 +115,7 @@ contains
       call add_warning(case, adhesion_warning(case))
    end subroutine add_warnings
 
-   !> Values that are given and have no effect.
+   !> Warn of values that are given but have no effect.
    subroutine note_unused(groups, case)
       type(group_values_type), intent(in) :: groups(:)
       type(case_type), intent(inout) :: case
@@ -135,7 +135,7 @@ contains
       end if
    end subroutine note_unused
 
-   !> One more line, if there is one.
+   !> Add a line to the warnings, unless it is empty.
    subroutine add_warning(case, line)
       type(case_type), intent(inout) :: case
       character(*), intent(in) :: line
@@ -159,7 +159,7 @@ contains
       end do
    end subroutine check_presence
 
-   !> The first group of a name, or one of defaults.
+   !> The first group of a name, or a group of defaults.
    subroutine pick(groups, name, group)
       type(group_values_type), intent(in) :: groups(:)
       character(*), intent(in) :: name
@@ -190,7 +190,7 @@ contains
       end do
    end function pack_phases
 
-   !> A road that is pulled by a force needs friction to hold it.
+   !> Check that there is friction if a force pulls the road.
    subroutine check_pulls(groups, case, faults)
       type(group_values_type), intent(in) :: groups(:)   !! the phases
       type(case_type), intent(in) :: case

@@ -1,5 +1,5 @@
-!> The `&material` group of a case: Zener branches become Prony arms, relaxation times those at the
-!> case's temperature.
+!> The `&material` group of a case. Zener branches are converted to Prony arms, and relaxation times to the
+!> temperature of the case.
 module case_material
    use case_settings, only : material_settings_type
    use input_faults, only : faults_type
@@ -49,11 +49,11 @@ contains
       call shift_times(group, material, faults)
    end subroutine resolve_material
 
-   !> Prony arms, or Zener branches turned into arms.
+   !> Read the Prony arms, or convert Zener branches to arms.
    subroutine resolve_arms(group, material, arms, faults)
       type(group_values_type), intent(in) :: group
       type(material_settings_type), intent(inout) :: material
-      logical, intent(out) :: arms                     !! arms or branches are given, perhaps wrongly
+      logical, intent(out) :: arms                     !! arms or branches are given, possibly with faults
       type(faults_type), intent(inout) :: faults
       logical :: prony_given, zener_given
       real(dp), allocatable :: eta(:), g0(:), g1(:)
@@ -104,7 +104,7 @@ contains
             to_text(size(group%reals_value(other)))//' there', faults)
       end subroutine same_size
 
-      !> Are two lists there, and of one size?
+      !> Are two lists given, and of the same size?
       logical function both_good(name, other)
          character(*), intent(in) :: name, other
 
@@ -114,7 +114,7 @@ contains
 
    end subroutine resolve_arms
 
-   !> Bring the relaxation times to the case's temperature.
+   !> Shift the relaxation times to the temperature of the case.
    subroutine shift_times(group, material, faults)
       type(group_values_type), intent(in) :: group
       type(material_settings_type), intent(inout) :: material

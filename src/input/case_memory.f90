@@ -1,11 +1,11 @@
-!> The memory that a run of a case takes: the fields of its modules, counted as their headers do.
+!> Estimates the memory of a run from the number of fields that the header of each module states.
 !>
-!> Parts of the program whose memory depends on how a run goes are taken as they were measured
-!> (`tools/bench/memory.py` compares all of it with the peak of runs, which differs by less than a tenth):
-!> the acceleration of passes, which keeps more steps where passes are many, and of steady sliding. Not
-!> counted: a dense system of few cells in contact (module `steady_active`, at most 20 fields for as long as
-!> it is solved), and steps that are solved all at once where their passes stall (module `joint_step`, 30
-!> fields and up to 180 for the cells in contact; it gives up where there is no memory for them).
+!> The memory of some parts depends on the course of the run: the acceleration of passes, which keeps more
+!> steps if there are many passes, and that of steady sliding. For these parts measured values are used.
+!> `tools/bench/memory.py` compares the estimate with the peak of runs, which differs by less than a tenth.
+!> Two parts are not counted: a dense system for few cells in contact (module `steady_active`, at most 20
+!> fields while it is solved), and steps that are solved all at once after their passes have stalled (module
+!> `joint_step`, 30 fields and up to 180 for the cells in contact; without this memory the step is not tried).
 module case_memory
    use asperity_precision, only : dp
    use asperity_schedule, only : count_rows
@@ -18,7 +18,7 @@ module case_memory
 
    real(dp), parameter :: program_itself = 26.0e6_dp  !! with its libraries, bytes
    real(dp), parameter :: chunk = 131072.0_dp         !! most values of a chunk of the result
-   real(dp), parameter :: chunks = 4.0_dp             !! gathered at a time, with two threads
+   real(dp), parameter :: chunks = 4.0_dp             !! number of gathered chunks, with two threads
 
 contains
 
@@ -36,9 +36,10 @@ contains
       fields = normal_fields(case)
       ! Without arms there is no S, no change of S, and no traction of the past.
       if (arms > 0) fields = fields + 3.0_dp + arms
-      ! The displacement serves the next row.
+      ! The displacement is kept for the next row.
       if (slides .or. count_rows(case%phases) > 1) fields = fields + 1.0_dp
-      ! Pressure and gap before a row that may be given up (module row_stop); friction counts its own.
+      ! Copies of the pressure and the gap before a row that may be abandoned (module row_stop). The copies of
+      ! friction are counted with its other fields.
       if (count_rows(case%phases) > 1 .and. .not. (slides .and. case%friction%law /= 'none')) fields = fields + 2.0_dp
       ! The original map and its spline, the slopes, and a field that is being shifted.
       if (slides) fields = fields + merge(5.0_dp, 4.0_dp, case%solver%interpolation == 'cubic')
@@ -48,14 +49,14 @@ contains
          fields = fields + merge(130.0_dp, 32.0_dp, slides .and. case%friction%law /= 'none')
       cells = real(case%grid%nx, dp)*real(case%grid%ny, dp)
       if (present(rows)) cells = real(case%grid%nx, dp)*real(rows, dp)
-      ! Chunks that are gathered, twice as many that are stored, and one in work for each thread (module
+      ! Gathered chunks, twice as many filtered chunks, and one chunk that each thread is filtering (module
       ! hdf5_chunk_writer).
       bytes = 8.0_dp*(fields*cells + 3.0_dp*min(cells, chunks*chunk) + 2.0_dp*min(cells, chunk)) + program_itself &
          + kept_arms(case, cells)
    end function memory_needed
 
-   !> The arms before a row without friction that is taken in parts, bytes. They are kept where they take
-   !> no more than 64 MB (module row_stop). Friction counts its own.
+   !> Copies of the arms before a row without friction that is taken in parts, bytes. They are kept if they take
+   !> no more than 64 MB (module row_stop). The copies of friction are counted with its other fields.
    pure function kept_arms(case, cells) result(bytes)
       type(case_type), intent(in) :: case
       real(dp), intent(in) :: cells
@@ -71,7 +72,7 @@ contains
       if (8.0_dp*(2.0_dp + arms)*cells <= 64.0e6_dp) bytes = 8.0_dp*(2.0_dp + arms)*cells
    end function kept_arms
 
-   !> Fields of the normal solver and of the state it works on (module normal_cg).
+   !> Fields of the normal solver and of its state (module normal_cg).
    pure function normal_fields(case) result(fields)
       type(case_type), intent(in) :: case
       real(dp) :: fields
@@ -85,7 +86,7 @@ contains
       fields = fields + merge(symbols_mixed(kind), symbol(kind), case%solver%precision == 'mixed')
    end function normal_fields
 
-   !> Fields of the adhesive solver (module adhesion_cg_fast), with what its start needs in passing.
+   !> Fields of the adhesive solver (module adhesion_cg_fast), including those that only its start needs.
    pure function adhesion_fields(case) result(fields)
       type(case_type), intent(in) :: case
       real(dp) :: fields
@@ -105,11 +106,11 @@ contains
       arms = size(case%material%prony_g)
       in_time = any(.not. case%phases%static .and. case%phases%steps > 0)
       fields = 50.5_dp
-      ! What the passes of steps in time remember.
+      ! Fields that the passes of steps in time keep.
       if (in_time) fields = fields + 11.0_dp
       if (arms > 0) fields = fields + 4.0_dp + 2.0_dp*arms
-      ! The arms before a row that is taken in parts (module row_stop), of both directions: 6 + 3 arms,
-      ! but the passes remember most in other rows.
+      ! Copies of the arms of both directions before a row that is taken in parts (module row_stop): 6 + 3 arms.
+      ! They do not add to the peak, because the passes keep most fields in other rows.
       if (in_time .and. arms > 0) fields = fields + min(6.0_dp + 3.0_dp*arms, 20.0_dp)
    end function friction_fields
 

@@ -1,9 +1,9 @@
-!> The phases of a case: load and control that are inherited, time steps that are derived.
+!> The phases of a case: their loads, which may be inherited from the phase before, and their time steps.
 !>
-!> Default time step: where the road slides, one cell a step, so that the height map is shifted by
-!> whole cells (thesis, 2.2.2); elsewhere an eighth of the shortest active relaxation time, and at
-!> least 20 steps. An arm is active in a phase if its relaxation time is above a thousandth of it:
-!> faster ones have relaxed at once.
+!> Default time step: if the road slides, it moves by one cell per step, so that the height map is shifted by
+!> whole cells (thesis, 2.2.2). If it rests, the step is an eighth of the shortest active relaxation time, with
+!> at least 20 steps. An arm is active in a phase if its relaxation time is above a thousandth of the
+!> duration; faster arms are practically always relaxed.
 module case_phases
    use case_settings, only : material_settings_type, phase_settings_type
    use input_faults, only : faults_type
@@ -18,7 +18,7 @@ module case_phases
 
    real(dp), parameter :: most_steps = 1.0e9_dp
    real(dp), parameter :: most_rows = 2.0e9_dp                  !! of all phases: below 2^31
-   character(*), parameter :: one_cell = 'for one cell per step'   !! where a step comes from
+   character(*), parameter :: one_cell = 'for one cell per step'   !! reason for a time step
    character(*), parameter :: loads(3) = [character(12) :: 'pressure', 'force', 'displacement']
 
 contains
@@ -31,7 +31,7 @@ contains
       logical, intent(in) :: adhesive                         !! loads of 0 or less are allowed
       type(phase_settings_type), allocatable, intent(out) :: phases(:)
       type(faults_type), intent(inout) :: faults
-      character(:), allocatable, intent(inout) :: warnings    !! a line each
+      character(:), allocatable, intent(inout) :: warnings    !! one per line
       real(dp) :: rows
       integer :: i
 
@@ -69,7 +69,7 @@ contains
       end do
    end subroutine resolve_phases
 
-   !> Control and target: given, derived from the load that is given, or those of the phase before.
+   !> Find the control and the target: as given, derived from the given load, or those of the phase before.
    subroutine resolve_load(group, phase, faults, before)
       type(group_values_type), intent(in) :: group
       type(phase_settings_type), intent(inout) :: phase
@@ -122,7 +122,7 @@ contains
       end if
    end subroutine resolve_load
 
-   !> The force on the road along each direction where it takes the place of the velocity.
+   !> Read the force that pulls the road along each direction, if one is given instead of a velocity.
    subroutine resolve_pull(group, grid, phase, faults)
       type(group_values_type), intent(in) :: group
       type(grid_type), intent(in) :: grid
@@ -155,7 +155,7 @@ contains
       end do
    end subroutine resolve_pull
 
-   !> Without adhesion a load must press.
+   !> Check that the load is positive, unless there is adhesion.
    subroutine check_load(group, phase, adhesive, faults)
       type(group_values_type), intent(in) :: group
       type(phase_settings_type), intent(in) :: phase
@@ -168,7 +168,7 @@ contains
          '&adhesion only', faults)
    end subroutine check_load
 
-   !> Settings that exclude or need one another.
+   !> Check settings that exclude or need one another.
    subroutine check_combination(group, phase, material, faults)
       type(group_values_type), intent(in) :: group
       type(phase_settings_type), intent(in) :: phase
@@ -194,7 +194,7 @@ contains
       end if
    end subroutine check_combination
 
-   !> Settings that a steady phase excludes or needs.
+   !> Check the settings that a steady phase excludes or needs.
    subroutine check_steady(group, phase, grid, material, adhesive, faults)
       type(group_values_type), intent(in) :: group
       type(phase_settings_type), intent(in) :: phase
@@ -217,7 +217,7 @@ contains
          call group%fault('steady', 'needs a long-term shear modulus above 0: this material flows', faults)
    end subroutine check_steady
 
-   !> Number of steps and time step.
+   !> Find the number of steps and the time step.
    subroutine resolve_steps(group, phase, grid, material, faults)
       type(group_values_type), intent(in) :: group
       type(phase_settings_type), intent(inout) :: phase
@@ -225,7 +225,7 @@ contains
       type(material_settings_type), intent(in) :: material
       type(faults_type), intent(inout) :: faults
       real(dp) :: dt, cells
-      real(dp), parameter :: same = 1.0e-6_dp       !! relative difference of times that are one
+      real(dp), parameter :: same = 1.0e-6_dp       !! relative difference of times that count as equal
 
       phase%steps = 1
       phase%dt = 0.0_dp
@@ -266,7 +266,7 @@ contains
       if (cells > 0.0_dp) phase%dt_reason = trim(phase%dt_reason)//', '//to_text(cells)//' cells per step'
    end subroutine resolve_steps
 
-   !> How far a step moves the road, in cells.
+   !> Distance by which a step moves the road, in cells.
    pure real(dp) function cells_a_step(phase, grid) result(cells)
       type(phase_settings_type), intent(in) :: phase
       type(grid_type), intent(in) :: grid
@@ -275,7 +275,7 @@ contains
       if (grid%ny > 1) cells = max(cells, abs(phase%velocity_y)/grid%dy*phase%dt)
    end function cells_a_step
 
-   !> The time step where the input gives none.
+   !> The default time step.
    subroutine default_step(phase, grid, material, dt)
       type(phase_settings_type), intent(inout) :: phase
       type(grid_type), intent(in) :: grid
@@ -287,7 +287,7 @@ contains
 
       dt = phase%duration/fewest
       if (grid%nx > 0) then
-         rate = abs(phase%velocity_x)/grid%dx               ! cells in a second
+         rate = abs(phase%velocity_x)/grid%dx               ! cells per second
          if (grid%ny > 1) rate = max(rate, abs(phase%velocity_y)/grid%dy)
          if (rate > 0.0_dp) then
             dt = 1.0_dp/rate
@@ -315,7 +315,7 @@ contains
          tau = minval(material%prony_tau, mask=material%prony_tau > relaxed_at_once*phase%duration)
    end function shortest_active
 
-   !> Warn where a step is too coarse.
+   !> Warn if the time step is too long.
    subroutine warn_of_steps(number, phase, grid, material, warnings)
       integer, intent(in) :: number                            !! of the phase
       type(phase_settings_type), intent(in) :: phase

@@ -1,4 +1,4 @@
-!> A case in words: every resolved setting as an input of its own, time steps and memory.
+!> A case as text: every resolved setting as a new input, with the time steps and the memory as comments.
 module case_report
    use adhesion_advice, only : adhesion_notes
    use footprint_advice, only : footprint_note
@@ -21,8 +21,8 @@ module case_report
 
 contains
 
-   !> Every setting, given or default, as a namelist input that makes the same case. Paths are those
-   !> seen from where the program runs; relaxation times are those at the case's temperature.
+   !> Every setting, given or default, as a namelist input for the same case. Paths are relative to the present
+   !> folder of the program; relaxation times are those at the temperature of the case.
    function resolved_input(case) result(text)
       type(case_type), intent(in) :: case
       character(:), allocatable :: text
@@ -51,7 +51,7 @@ contains
       text = text//solver_text(case)
    end function resolved_input
 
-   !> Steps, memory, what adhesion will do, and warnings, as comment lines.
+   !> The steps, the memory, the effect of adhesion and the warnings as comment lines.
    function case_summary(case) result(text)
       type(case_type), intent(in) :: case
       character(:), allocatable :: text
@@ -79,7 +79,7 @@ contains
          marked('! note: ', footprint_note(case))//marked('! warning: ', case%warnings)
    end function case_summary
 
-   !> Lines with a mark before each.
+   !> Put a mark before each line.
    pure function marked(mark, lines) result(text)
       character(*), intent(in) :: mark, lines
       character(:), allocatable :: text
@@ -110,7 +110,7 @@ contains
       text = text//'/'//nl
    end function surface_text
 
-   !> One variable of a `&surface`; nothing for a blank name.
+   !> One variable of a `&surface`; empty for a blank name.
    function surface_variable(term, name) result(text)
       type(surface_settings_type), intent(in) :: term
       character(*), intent(in) :: name

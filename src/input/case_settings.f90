@@ -1,7 +1,8 @@
-!> The checked settings of a case: one type for each namelist group, everything SI.
+!> The checked settings of a case, with one type for each namelist group. All units are SI.
 !>
-!> `case_input` fills them from a file; `simulation` reads them. Choices are kept as the words of the
-!> input file, already checked, in lower case. The defaults stand in `case_input`.
+!> `case_input` fills them from a file, and `asperity_simulation` reads them. Choices are kept as the words of
+!> the input file, checked and in lower case. The defaults are in `input_reference` or are derived by the modules
+!> `case_*`.
 module case_settings
    use asperity_precision, only : dp
    use regular_grid, only : grid_type
@@ -43,7 +44,7 @@ module case_settings
       real(dp), allocatable :: table(:, :)          !! [n, 2] pressures and bounds, Pa, of law = 'table'
    end type friction_settings_type
 
-   !> `&phase`, resolved: nothing is left to be inherited or derived.
+   !> `&phase`, with all inherited and derived values.
    type :: phase_settings_type
       character(64) :: name
       logical :: static                             !! no duration: one solve
@@ -53,13 +54,13 @@ module case_settings
       character(64) :: dt_reason                    !! how dt was chosen, in words
       character(word_length) :: control             !! 'pressure' | 'force' | 'displacement'
       real(dp) :: target                            !! Pa, N or m, reached at the end
-      logical :: given                              !! the phase names its load itself
+      logical :: given                              !! the load is given in this phase
       logical :: linear                             !! ramp = 'linear'
       logical :: relaxed
       logical :: steady                             !! the first row is a state of steady sliding
       real(dp) :: velocity_x, velocity_y            !! of the road, m/s
-      logical :: pulled(2)                          !! the road hangs on a force along x, y
-      real(dp) :: pull(2)                           !! that force at the end, over the cell, Pa; 0 where it does not
+      logical :: pulled(2)                          !! a force pulls the road along x, y
+      real(dp) :: pull(2)                           !! that force at the end, over the cell, Pa; 0 without one
    end type phase_settings_type
 
    !> `&solver`
@@ -68,8 +69,8 @@ module case_settings
       integer :: max_iterations
       character(word_length) :: method              !! 'fast' | 'thesis'
       character(word_length) :: time_scheme         !! 'exponential2' | 'exponential' | 'backward_euler'
-      integer :: passes                             !! most of a step with friction; 0: until they settle
-      real(dp) :: coupling_tolerance                !! of `residual_coupling`; 0: as `passes` makes it
+      integer :: passes                             !! most passes of a step with friction; 0: until they settle
+      real(dp) :: coupling_tolerance                !! limit of `residual_coupling`; 0: depends on `passes`
       character(word_length) :: slip_law            !! 'physical' | 'thesis'
       character(word_length) :: interpolation       !! 'cubic' | 'linear'
       character(word_length) :: precision           !! 'double' | 'mixed'

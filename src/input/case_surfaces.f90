@@ -1,4 +1,5 @@
-!> The `&surface` groups of a case: defaults from the grid, and what belongs to each shape.
+!> The `&surface` groups of a case: their defaults, which depend on the grid, and the variables that belong to
+!> each shape.
 module case_surfaces
    use case_settings, only : path_length, surface_settings_type
    use input_faults, only : faults_type
@@ -70,7 +71,7 @@ contains
       if (term%shape == 'file') call resolve_path(group, path, term%file, faults)
    end subroutine resolve_surface
 
-   !> A shape needs some variables; those that do not belong to it are faults.
+   !> Report variables that a shape needs and does not have, and variables that do not belong to it.
    subroutine check_belonging(group, shape, faults)
       type(group_values_type), intent(in) :: group
       type(shape_type), intent(in) :: shape
@@ -79,7 +80,7 @@ contains
       integer :: i
 
       call group%demand('shape', faults)
-      if (shape%name == '') return                   ! the word itself is reported elsewhere
+      if (shape%name == '') return                   ! the unknown word is reported elsewhere
       do i = 1, size(shape%required)
          if (shape%required(i) /= '') &
             call group%demand(trim(shape%required(i)), faults, trim(shape%name))
@@ -91,11 +92,11 @@ contains
       end do
    end subroutine check_belonging
 
-   !> The parameters of a rough surface among each other.
+   !> Check that the parameters of a rough surface agree with each other.
    subroutine check_rough(group, term, grid_known, faults)
       type(group_values_type), intent(in) :: group
       type(surface_settings_type), intent(in) :: term
-      logical, intent(in) :: grid_known                !! defaults are known
+      logical, intent(in) :: grid_known                !! the defaults are known
       type(faults_type), intent(inout) :: faults
       logical :: long_known, rolloff_known, short_known
 
@@ -126,7 +127,7 @@ contains
          known = group%usable(name) .or. (grid_known .and. .not. group%given(name))
       end function known
 
-      !> The value where it is the default.
+      !> A note with the value if it is the default.
       function default_note(name, value) result(note)
          character(*), intent(in) :: name
          real(dp), intent(in) :: value
@@ -138,7 +139,7 @@ contains
 
    end subroutine check_rough
 
-   !> A path in the input counts from the input's folder.
+   !> Make a path of the input, which is relative to the folder of the input, relative to the present folder.
    subroutine resolve_path(group, path, file, faults)
       type(group_values_type), intent(in) :: group
       character(*), intent(in) :: path                  !! of the input

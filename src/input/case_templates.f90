@@ -1,5 +1,5 @@
-!> Inputs to start from, each complete and small enough to run in seconds. Comments come from the
-!> reference of the input. A template that the input check refuses is not offered.
+!> Templates: inputs to start from, each complete and small enough to run in seconds. Their comments are taken
+!> from the reference of the input. A template that the input check refuses is not offered.
 module case_templates
    use case_input, only : parse_case
    use case_settings, only : case_type
@@ -17,7 +17,7 @@ module case_templates
    type :: template_type
       character(16) :: name
       character(80) :: meaning
-      character(text_length) :: text       !! one assignment a line
+      character(text_length) :: text       !! one assignment per line
    end type template_type
 
 contains
@@ -91,7 +91,7 @@ contains
       names = list%name
    end function all_template_names
 
-   !> The names that are available and what they are, a line each, the name first.
+   !> The names and meanings of the available templates, one per line.
    function template_list() result(text)
       character(:), allocatable :: text
       type(template_type), allocatable :: list(:)
@@ -104,7 +104,7 @@ contains
       end do
    end function template_list
 
-   !> Can the program run it today?
+   !> Does the program accept the template?
    logical function template_is_available(name) result(available)
       character(*), intent(in) :: name
       type(case_type) :: case
@@ -116,7 +116,7 @@ contains
       available = .not. allocated(error)
    end function template_is_available
 
-   !> Number of a template; 0 if there is none of that name.
+   !> Number of a template; 0 if there is no template of this name.
    integer function find_template(name) result(number)
       character(*), intent(in) :: name
       character(16), allocatable :: names(:)
@@ -125,7 +125,7 @@ contains
       number = findloc(names == name, .true., dim=1)
    end function find_template
 
-   !> A template as an input, with comments; empty if there is none of that name.
+   !> A template as an input with comments; empty if there is no template of this name.
    function template_text(name) result(text)
       character(*), intent(in) :: name
       character(:), allocatable :: text
@@ -160,14 +160,14 @@ contains
       end associate
    end function template_text
 
-   !> An assignment with the units and the meaning of its variable behind it.
+   !> An assignment followed by the units and the meaning of its variable as a comment.
    pure function commented(assignment, group, entries) result(line)
       character(*), intent(in) :: assignment
       character(*), intent(in) :: group
       type(variable_entry_type), intent(in) :: entries(:)
       character(:), allocatable :: line
       character(:), allocatable :: name
-      integer, parameter :: column = 36           !! of the comment
+      integer, parameter :: column = 36           !! where the comment starts
       integer, parameter :: longest_choice = 80   !! longer lists of words are left out
       integer :: i
 

@@ -1,11 +1,11 @@
-!> Roughly how long a run of a case takes, for `asperity check`.
+!> Estimates how long a run of a case takes, for `asperity check`.
 !>
-!> A run spends its time in transforms and in sweeps over fields between them, so its time is
-!> (rows) x (transforms per row) x (time per transform with what belongs to it). The first is known,
-!> the second is what cases of the kind took (docs/choosing.md, docs/benchmarks.md), the third is a
-!> small transform measured here and now, scaled by N log N to the grid of the case. The number of
-!> transforms depends on the road, the load and the tolerance: the estimate says whether to wait or
-!> to come back tomorrow, within a factor of about three.
+!> A run spends its time in transforms and in the sweeps over fields between them. Its time is therefore
+!> (rows) x (transforms per row) x (time per transform, with the sweeps that go with it). The number of rows is
+!> known. The number of transforms per row is that of similar cases (docs/choosing.md, docs/benchmarks.md). The
+!> time per transform is measured with a small transform on this machine and scaled by N log N to the grid of the
+!> case. The number of transforms depends on the road, the load and the tolerance, so that the estimate is
+!> only right within a factor of about three.
 module case_time
    use case_settings, only : case_type, road_moves
    use asperity_errors, only : error_type
@@ -41,10 +41,10 @@ contains
       do k = 1, size(case%phases)
          associate (phase => case%phases(k))
             jumps = jumps - phase%steps
-            step = 0.3_dp*solve                    ! a step starts from the solution before it
+            step = 0.3_dp*solve                    ! a step starts from the solution of the step before
             if (road_moves([phase])) then
                step = 0.7_dp*solve
-               ! Passes over normal and tangential contact, each with its own solves.
+               ! Each pass solves the normal and the tangential contact.
                if (case%friction%law /= 'none') step = 4.0_dp*solve
             end if
             if (phase%static) step = solve
@@ -61,7 +61,7 @@ contains
       real(dp) :: cells, sweeps, threads
 
       cells = real(case%grid%nx, dp)*real(case%grid%ny, dp)
-      ! Sweeps over fields between the transforms, in units of a transform; padding of a free grid.
+      ! The factors for the sweeps over fields, in units of a transform, and for the padding of a free grid.
       sweeps = 2.0_dp
       if (case%friction%law /= 'none') sweeps = 3.5_dp
       if (case%adhesion%potential /= 'none') sweeps = 7.0_dp

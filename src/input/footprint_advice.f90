@@ -1,8 +1,9 @@
 !> A note on roads that slide exactly along an axis of the periodic map.
 !>
-!> After one side of the map the rubber meets the footprint that the same asperities have left in it. A
-!> rubber that has not recovered by then touches another road than a long one: friction then
-!> depends on the size of the map. In an oblique direction the footprints of a lap lie beside each other.
+!> After sliding by one side of the map, an asperity meets the footprint that it has left in the rubber itself.
+!> On a long road it would meet the footprints of others. If the rubber has not recovered by then, the
+!> friction therefore depends on the size of the map. In an oblique direction the footprints of successive laps
+!> lie beside each other.
 module footprint_advice
    use asperity_precision, only : dp
    use case_settings, only : case_type
@@ -17,7 +18,7 @@ module footprint_advice
 
 contains
 
-   !> The note for the first phase that it concerns, without an end mark; empty if there is none.
+   !> The note for the first phase that it concerns, without a line end; empty if there is no such phase.
    pure function footprint_note(case) result(text)
       type(case_type), intent(in) :: case
       character(:), allocatable :: text
@@ -27,7 +28,7 @@ contains
       text = ''
       if (case%grid%boundary /= boundary_periodic .or. case%grid%ny < 2) return
       if (size(case%material%prony_tau) == 0 .or. case%material%shear_modulus <= 0.0_dp) return
-      ! Under a constant load an arm recovers at most so much more slowly than it relaxes.
+      ! Under a constant load an arm recovers more slowly than it relaxes, at most by this factor.
       recovery = maxval(case%material%prony_tau)*(1.0_dp + sum(case%material%prony_g) &
          /case%material%shear_modulus)
       do i = 1, size(case%phases)

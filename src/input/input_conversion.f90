@@ -1,4 +1,4 @@
-!> Reads one value of the input by Fortran's own rules, and holds it against the table of the input.
+!> Reads one value of the input by Fortran's own rules, and checks it against the table of the input.
 module input_conversion
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use asperity_precision, only : dp
@@ -14,11 +14,11 @@ module input_conversion
 
    public :: convert, repeat_count
 
-   integer, parameter, public :: longest_list = 10000      !! values of a variable
+   integer, parameter, public :: longest_list = 10000      !! largest number of values of a variable
 
 contains
 
-   !> Read a repeat count; 0 where it is none.
+   !> Read a repeat count. The result is 0 if the word is not one.
    subroutine repeat_count(word, repeats)
       character(*), intent(in) :: word
       integer, intent(out) :: repeats
@@ -31,14 +31,14 @@ contains
       if (repeats > longest_list) repeats = longest_list + 1
    end subroutine repeat_count
 
-   !> Read one value by Fortran's rules, and hold it against the table.
+   !> Read one value by Fortran's rules, and check it against the table.
    subroutine convert(text, token, entry, item, good)
       character(*), intent(in) :: text
       type(token_type), intent(in) :: token
       type(variable_entry_type), intent(in) :: entry
       type(item_type), intent(out) :: item
       logical, intent(out) :: good
-      integer, parameter :: longest_word = 400      !! of a number
+      integer, parameter :: longest_word = 400      !! longest text of a number
       integer :: status
       logical :: wants_string
       character(:), allocatable :: word

@@ -1,4 +1,4 @@
-!> The faults of an input file: all are gathered, each as `file: &group: what is wrong`.
+!> Collects the faults of an input file, each as `file: &group: what is wrong`.
 module input_faults
    use asperity_errors, only : add_fault, error_input, error_type
    implicit none
@@ -6,14 +6,14 @@ module input_faults
 
    public :: faults_type
 
-   integer, parameter :: most_faults = 100     !! reported; a file with more is hopeless
+   integer, parameter :: most_faults = 100     !! largest number of faults that are reported
 
-   !> What is wrong so far.
+   !> The faults so far.
    type :: faults_type
-      character(:), allocatable :: path              !! of the file, as the user names it
-      type(error_type), allocatable :: error         !! unallocated: nothing is wrong
+      character(:), allocatable :: path              !! path of the file, as given by the user
+      type(error_type), allocatable :: error         !! unallocated if there is no fault
       integer :: count = 0
-      logical :: hopeless = .false.                  !! the file is no text: nothing else is looked at
+      logical :: hopeless = .false.                  !! the file is not a text: nothing else is checked
    contains
       procedure :: add
    end type faults_type

@@ -1,4 +1,4 @@
-!> The values of one group of the input, with the questions that are asked of them.
+!> The values of one group of the input, and functions that return and check them.
 module input_group
    use case_settings, only : path_length
    use input_faults, only : faults_type
@@ -10,7 +10,7 @@ module input_group
 
    public :: group_values_type, in_line, item_type, line_note, place, position, value_type
 
-   !> One value, as it came out of the text.
+   !> One value that was read from the text.
    type :: item_type
       real(dp) :: real = 0.0_dp
       integer :: integer = 0
@@ -22,23 +22,23 @@ module input_group
    type :: value_type
       type(variable_entry_type) :: entry
       logical :: given = .false.                 !! the input names it
-      logical :: good = .true.                   !! and its value can be used
+      logical :: good = .true.                   !! its value can be used
       integer :: line = 0
       character(:), allocatable :: shown         !! as written, for messages
-      type(item_type), allocatable :: items(:)   !! not allocated: no value, no default
-      logical, allocatable :: filled(:)          !! elements that were assigned
+      type(item_type), allocatable :: items(:)   !! not allocated if there is neither a value nor a default
+      logical, allocatable :: filled(:)          !! which elements were assigned
    end type value_type
 
    !> The values of one group, given or by default.
    type :: group_values_type
       character(12) :: name = ''
-      integer :: line = 0                        !! where it starts; 0 for a group of defaults
+      integer :: line = 0                        !! line where it starts; 0 for a group of defaults
       logical :: repeatable = .false.
       type(value_type), allocatable :: values(:)
    contains
       procedure :: given                         !! does the input name the variable?
-      procedure :: usable                        !! is it given, and good?
-      procedure :: bad                           !! is it given, and wrong?
+      procedure :: usable                        !! is it given, and valid?
+      procedure :: bad                           !! is it given, but invalid?
       procedure :: integer_value
       procedure :: real_value
       procedure :: logical_value
@@ -70,7 +70,7 @@ contains
       given = self%values(position(self, name))%given
    end function given
 
-   !> Is the variable given, and good?
+   !> Is the variable given, and valid?
    pure logical function usable(self, name)
       class(group_values_type), intent(in) :: self
       character(*), intent(in) :: name
@@ -78,7 +78,7 @@ contains
       usable = self%given(name) .and. self%values(position(self, name))%good
    end function usable
 
-   !> Is the variable given, and wrong?
+   !> Is the variable given, but invalid?
    pure logical function bad(self, name)
       class(group_values_type), intent(in) :: self
       character(*), intent(in) :: name
@@ -86,7 +86,7 @@ contains
       bad = .not. self%values(position(self, name))%good
    end function bad
 
-   !> The integer of a variable; `otherwise`, or 0, where it has none.
+   !> The integer of a variable; `otherwise`, or 0, if it has no value.
    pure integer function integer_value(self, name, otherwise) result(number)
       class(group_values_type), intent(in) :: self
       character(*), intent(in) :: name
@@ -99,7 +99,7 @@ contains
       end associate
    end function integer_value
 
-   !> The number of a variable; `otherwise`, or 0, where it has none.
+   !> The number of a variable; `otherwise`, or 0, if it has no value.
    pure real(dp) function real_value(self, name, otherwise) result(number)
       class(group_values_type), intent(in) :: self
       character(*), intent(in) :: name
@@ -112,7 +112,7 @@ contains
       end associate
    end function real_value
 
-   !> The logical of a variable; false where it has none.
+   !> The logical of a variable; false if it has no value.
    pure logical function logical_value(self, name) result(truth)
       class(group_values_type), intent(in) :: self
       character(*), intent(in) :: name
@@ -123,7 +123,7 @@ contains
       end associate
    end function logical_value
 
-   !> The string of a variable; empty where it has none.
+   !> The string of a variable; empty if it has no value.
    pure function text_value(self, name) result(text)
       class(group_values_type), intent(in) :: self
       character(*), intent(in) :: name
@@ -135,7 +135,7 @@ contains
       end associate
    end function text_value
 
-   !> The list of a variable; of size 0 where it has none.
+   !> The list of a variable; of size 0 if it has no value.
    pure function reals_value(self, name) result(numbers)
       class(group_values_type), intent(in) :: self
       character(*), intent(in) :: name
@@ -150,7 +150,7 @@ contains
       end associate
    end function reals_value
 
-   !> The strings of a variable; of size 0 where it has none.
+   !> The strings of a variable; of size 0 if it has no value.
    pure function texts_value(self, name) result(texts)
       class(group_values_type), intent(in) :: self
       character(*), intent(in) :: name
@@ -165,7 +165,7 @@ contains
       end associate
    end function texts_value
 
-   !> Is there a value, given and good or by default?
+   !> Is there a value, either a valid given one or a default?
    pure logical function has_value(value)
       type(value_type), intent(in) :: value
 
@@ -174,7 +174,7 @@ contains
       has_value = size(value%items) > 0
    end function has_value
 
-   !> Report a variable: `&group: name = value: message`, or `&group: name: message` if not given.
+   !> Report a fault of a variable: `&group: name = value: message`, or `&group: name: message` if it is not given.
    subroutine fault(self, name, message, faults)
       class(group_values_type), intent(in) :: self
       character(*), intent(in) :: name
@@ -186,7 +186,7 @@ contains
       end associate
    end subroutine fault
 
-   !> Report the group: `&group: message`.
+   !> Report a fault of the group: `&group: message`.
    subroutine group_fault(self, message, faults)
       class(group_values_type), intent(in) :: self
       character(*), intent(in) :: message
@@ -199,7 +199,7 @@ contains
       end if
    end subroutine group_fault
 
-   !> Group, variable and what was found.
+   !> The group, the variable and its value, for a message.
    function place(group, value)
       class(group_values_type), intent(in) :: group
       type(value_type), intent(in) :: value
@@ -209,7 +209,7 @@ contains
       if (value%given) place = place//' = '//value%shown
    end function place
 
-   !> Where a variable of a repeatable group stands.
+   !> The line of a variable in a repeatable group.
    function line_note(group, value) result(note)
       class(group_values_type), intent(in) :: group
       type(value_type), intent(in) :: value
@@ -228,12 +228,12 @@ contains
       note = ' (line '//to_text(line)//')'
    end function in_line
 
-   !> Report a variable that must be given and is not.
+   !> Report a required variable if it is not given.
    subroutine demand(self, name, faults, why)
       class(group_values_type), intent(in) :: self
       character(*), intent(in) :: name
       type(faults_type), intent(inout) :: faults
-      character(*), intent(in), optional :: why       !! what asks for it
+      character(*), intent(in), optional :: why       !! the reason why it is required
 
       if (self%given(name) .or. self%line == 0) return
       if (present(why)) then

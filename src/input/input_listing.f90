@@ -1,5 +1,5 @@
-!> The input for other programs: the table of its groups and variables, and the values of a text of
-!> namelists, as plain lines whose fields are parted by the control character 31, which no input may hold.
+!> The input in a form for other programs: the table of its groups and variables, and the values of a text of
+!> namelists, as plain lines. Their fields are separated by the control character 31, which no input contains.
 module input_listing
    use asperity_errors, only : error_type
    use input_faults, only : faults_type
@@ -29,7 +29,7 @@ contains
 
    !> The table of the input: lines `group`, name, required, repeatable (`yes` or `no`), meaning, and
    !> lines `variable`, group, name, kind, default, units, allowed, meaning. A default in parentheses is
-   !> none or derived.
+   !> derived, or stands for no default.
    function input_table() result(text)
       character(:), allocatable :: text
       type(group_entry_type), allocatable :: groups(:)
@@ -55,14 +55,14 @@ contains
       text = lines%text(:lines%used)
    end function input_table
 
-   !> The values that a text gives, in its order: a line `&group`, then a line for each of its variables,
-   !> the name and the values. Reals have the digits that give the same bits again, logicals are T or F,
-   !> strings stand without quotes. Names, types and ranges are checked, not how they fit together.
+   !> The values that a text contains, in their order: a line `&group`, then a line for each of its variables
+   !> with the name and the values. Reals have enough digits to reproduce the same bits, logicals are T or F, and
+   !> strings have no quotes. Names, types and ranges are checked, but not whether the values agree with each other.
    subroutine list_values(text, path, listing, error)
       character(*), intent(in) :: text
       character(*), intent(in) :: path                         !! the file's name, for messages
       character(:), allocatable, intent(out) :: listing
-      type(error_type), allocatable, intent(out) :: error      !! all faults, one a line
+      type(error_type), allocatable, intent(out) :: error      !! all faults, one per line
       type(group_values_type), allocatable :: groups(:)
       type(faults_type) :: faults
       type(lines_type) :: lines

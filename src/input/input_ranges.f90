@@ -1,4 +1,5 @@
-!> What values a variable of the input may have: its range or its words, and how a message says so.
+!> The values that a variable of the input may have (a range, or words), and the phrase that states them in a
+!> message.
 module input_ranges
    use asperity_precision, only : dp
    use input_reference, only : is_array, kind_integer, kind_logical, kind_text, kind_word, kind_words, &
@@ -40,7 +41,7 @@ contains
       end select
    end subroutine value_range
 
-   !> What must be, for a message: 'must be a positive integer'.
+   !> The phrase that states the allowed values in a message, such as 'must be a positive integer'.
    pure function allowed_phrase(entry) result(phrase)
       type(variable_entry_type), intent(in) :: entry
       character(:), allocatable :: phrase

@@ -1,6 +1,6 @@
-!> The one description of the input: every group and variable with its type, default, units, allowed
-!> values and meaning. The reader checks against it, templates take their comments from it, and the
-!> documentation prints it.
+!> The description of the input: every group and variable with its type, default, units, allowed values
+!> and meaning. The reader checks an input against this table, templates take their comments from it, and
+!> the documentation prints it.
 module input_reference
    use shear_laws, only : shear_law_words
    use surface_shapes, only : all_shapes, shape_type, shape_words
@@ -30,7 +30,7 @@ module input_reference
       character(12) :: group
       character(24) :: name
       integer :: kind
-      character(40) :: default      !! as in an input; in parentheses where it is none or derived
+      character(40) :: default      !! as in an input; in parentheses if derived or none
       character(8) :: units
       character(160) :: allowed     !! 'positive', 'not negative', 'any', an interval, or words
       character(320) :: meaning

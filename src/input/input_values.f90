@@ -1,5 +1,5 @@
-!> From scanned namelists to values: names are checked, each value is read by Fortran's own rules and
-!> held against the table of the input reference; defaults come from that table too.
+!> Converts scanned namelists to values: names are checked, and each value is read by Fortran's own rules and
+!> checked against the table of the input reference, which also supplies the defaults.
 module input_values
    use case_settings, only : path_length
    use input_faults, only : faults_type
@@ -18,7 +18,7 @@ module input_values
 
 contains
 
-   !> Read a text into groups of values; all that is wrong is added to the faults.
+   !> Read a text into groups of values, and add all errors to the faults.
    subroutine read_groups(text, groups, faults)
       character(*), intent(in) :: text
       type(group_values_type), allocatable, intent(out) :: groups(:)   !! known groups, in file order
@@ -74,7 +74,7 @@ contains
       n = count(numbers /= 0)
    end function count_nonzero
 
-   !> A group in which nothing is given.
+   !> Make a group of defaults.
    subroutine default_group(name, group)
       character(*), intent(in) :: name
       type(group_values_type), intent(out) :: group
@@ -110,7 +110,7 @@ contains
       n = count(entries%group == group)
    end function count_of
 
-   !> Take one assignment into its group.
+   !> Process one assignment, which belongs to a group.
    subroutine assign(file, assignment, group, faults)
       type(namelists_type), intent(in) :: file
       type(assignment_type), intent(in) :: assignment
@@ -192,7 +192,7 @@ contains
       value%good = .false.
    end subroutine take_values
 
-   !> What is wrong with the subscript of a variable; empty if nothing is.
+   !> The fault of the subscript of a variable; empty if there is none.
    function fault_of_subscript(assignment, entry) result(fault)
       type(assignment_type), intent(in) :: assignment
       type(variable_entry_type), intent(in) :: entry
@@ -209,7 +209,7 @@ contains
       end if
    end function fault_of_subscript
 
-   !> Split n*value: the token becomes that of the value. Other tokens stand for themselves, once.
+   !> Split n*value: the token becomes that of the value. Any other token is a value that occurs once.
    subroutine take_repetition(file, last, token, next, repeats)
       type(namelists_type), intent(in) :: file
       integer, intent(in) :: last              !! token of the assignment
@@ -234,14 +234,14 @@ contains
       if (token%first > token%last) repeats = 0
    end subroutine take_repetition
 
-   !> Append a value `repeats` times to the elements that are there.
+   !> Append a value `repeats` times to the existing elements.
    subroutine take_items(text, token, repeats, upper, value, element, fault)
       character(*), intent(in) :: text
       type(token_type), intent(in) :: token
       integer, intent(in) :: repeats
       integer, intent(in) :: upper             !! last element of the subscript; 0: none
       type(value_type), intent(inout) :: value
-      integer, intent(inout) :: element        !! last element that is there
+      integer, intent(inout) :: element        !! last existing element
       character(:), allocatable, intent(inout) :: fault
       type(item_type) :: item
       integer :: k
@@ -315,7 +315,7 @@ contains
       end do
    end subroutine finish_group
 
-   !> A proposal, if there is one.
+   !> The proposal of a similar name, if there is one.
    pure function hint(prefix, name) result(text)
       character(*), intent(in) :: prefix, name
       character(:), allocatable :: text

@@ -1,7 +1,7 @@
-!> Takes a text of namelists apart into groups and assignments, without reading the values.
+!> Splits a text of namelists into groups and assignments, without reading the values.
 !>
 !> Fortran's own `read (unit, nml=...)` stops at the first fault and says little about it. This scanner
-!> goes on to the end, so that all faults are reported at once. The form is Fortran's: `&name ... /`,
+!> continues to the end, so that all faults are reported at once. The form is Fortran's: `&name ... /`,
 !> or `&end`, `$name ... $end`; `!` starts a comment; blanks, tabs, line ends and commas separate.
 module namelist_file
    use input_faults, only : faults_type
@@ -13,15 +13,15 @@ module namelist_file
 
    public :: assignment_type, group_type, namelists_type, scan_namelists, shown_tokens
 
-   integer, parameter, public :: name_length = 32      !! a name's characters; longer ones are cut
-   integer, parameter :: from_start = 1                !! subscript where none is written
+   integer, parameter, public :: name_length = 32      !! characters of a name; longer ones are cut off
+   integer, parameter :: from_start = 1                !! value of an absent subscript
 
    !> `name = values` or `name(subscript) = values`.
    type :: assignment_type
       character(name_length) :: name = ''     !! lower case
       integer :: group = 0                    !! number of its group
       integer :: first = 0                    !! first token of the values
-      integer :: last = -1                    !! last token; before the first where there is none
+      integer :: last = -1                    !! last token; less than `first` if there is none
       integer :: line = 0
       logical :: subscripted = .false.
       integer :: subscript = from_start       !! element that takes the first value; 0: not understood
@@ -44,7 +44,7 @@ module namelist_file
 
 contains
 
-   !> Scan a text; what is wrong with its form is added to the faults.
+   !> Scan a text, and add errors of its form to the faults.
    subroutine scan_namelists(text, file, faults)
       character(*), intent(in) :: text
       type(namelists_type), intent(out) :: file
@@ -135,12 +135,12 @@ contains
 
    contains
 
-      !> The group in hand has no end.
+      !> Report that the present group has no end.
       subroutine unclosed(line)
          integer, intent(in) :: line       !! of the next group; 0 at the end of the file
          character(:), allocatable :: next
 
-         if (file%tokens(at - 1)%kind == token_broken) return       ! that is the fault
+         if (file%tokens(at - 1)%kind == token_broken) return       ! the unclosed string is the fault
          next = 'the end of the file'
          if (line > 0) next = 'the next group in line '//to_text(line)
          call faults%add('&'//trim(groups(group_count)%name), 'the group that starts in line '// &
@@ -161,7 +161,7 @@ contains
       end do
    end function number_of
 
-   !> Take one assignment, or skip what is none.
+   !> Parse one assignment, or skip a text that is not an assignment.
    subroutine parse_assignment(file, group, number, at, assignments, count, faults)
       type(namelists_type), intent(in) :: file
       type(group_type), intent(in) :: group
@@ -221,7 +221,7 @@ contains
       starts = tokens(next)%kind == token_equals
    end function starts_assignment
 
-   !> Understand (n), (n:), (n:m), (:m) or (:).
+   !> Interpret (n), (n:), (n:m), (:m) or (:).
    pure subroutine read_subscript(text, assignment)
       character(*), intent(in) :: text                        !! with its parentheses
       type(assignment_type), intent(inout) :: assignment
@@ -244,7 +244,7 @@ contains
       end if
    end subroutine read_subscript
 
-   !> A positive integer, 0 where there is none, `default` where nothing is written.
+   !> A positive integer; 0 if the text is not one, and `default` if it is empty.
    pure integer function whole(text, default)
       character(*), intent(in) :: text
       integer, intent(in) :: default

@@ -1,4 +1,4 @@
-!> Splits a text of namelists in tokens: words, strings, separators, starts and ends of groups.
+!> Splits a text of namelists into tokens: words, strings, separators, starts and ends of groups.
 module namelist_tokens
    use text_tools, only : lower
    implicit none
@@ -25,7 +25,7 @@ module namelist_tokens
 
 contains
 
-   !> Split a text in tokens.
+   !> Split a text into tokens.
    pure subroutine tokenise(text, tokens)
       character(*), intent(in) :: text
       type(token_type), allocatable, intent(out) :: tokens(:)
@@ -128,7 +128,7 @@ contains
 
    end subroutine next_token
 
-   !> Where the string that starts here ends: at its quote, or unclosed at the end of its line.
+   !> Find the end of the string that starts here: its closing quote, or the end of the line if it is not closed.
    pure subroutine string_end(text, at, last, kind)
       character(*), intent(in) :: text
       integer, intent(in) :: at

@@ -42,7 +42,7 @@ contains
       end do
    end function reference_markdown
 
-   !> Bars as commas, for a cell of a table.
+   !> Replace bars by commas, because a bar would end the cell of a table.
    pure function bars(text) result(cell)
       character(*), intent(in) :: text
       character(:), allocatable :: cell

@@ -1,10 +1,10 @@
-!> The state of a run from which it can be continued, in a file of its own: a checkpoint.
+!> Checkpoints: files with the state of a run, from which the run can be continued.
 !>
-!> The checkpoint of FILE.h5 is FILE.checkpoint.h5. It is written under another name, brought to the
-!> disk, and then replaces the old one in one step, so that there is always a whole one or none. It
+!> The checkpoint of FILE.h5 is FILE.checkpoint.h5. It is written under another name, written through to the
+!> disk, and then replaces the old one in one step, so that there is always a complete checkpoint or none. It
 !> contains the id of the result that it belongs to; the settings of the case as lines 'name =
 !> value', so that a checkpoint of another case is refused; and the state (`checkpoint_pieces`). Its
-!> user block shows whether the file is whole (`checkpoint_block`).
+!> user block shows whether the file is complete (`checkpoint_block`).
 module asperity_checkpoint
    use asperity_errors, only : add_fault, error_convergence, error_file, error_input, error_type, fail
    use asperity_parallel, only : any_process, is_first_process, share
@@ -62,13 +62,13 @@ contains
 
    !> Start a checkpoint. The present one stays until `commit`.
    !>
-   !> The file remembers the first fault of the calls up to `commit`, which reports it, so that only
-   !> `commit` has to be asked. A call with `error` reports the fault itself.
+   !> The file remembers the first fault of the calls up to `commit`, which returns it, so that it is
+   !> sufficient to check the error of `commit`. A call with `error` returns its fault itself.
    subroutine start(self, result_path, result_id, settings, error)
       class(checkpoint_writer_type), intent(inout) :: self
       character(*), intent(in) :: result_path
       character(*), intent(in) :: result_id     !! the attribute `id` of the result
-      character(*), intent(in) :: settings      !! what must agree for a run to go on, see `compare`
+      character(*), intent(in) :: settings      !! settings that must agree for a run to continue, see `compare`
       type(error_type), allocatable, intent(out), optional :: error
 
       self%path = checkpoint_path(result_path)
@@ -91,8 +91,8 @@ contains
       if (present(error)) call report(self, error)
    end subroutine put_number
 
-   !> Add the state. Collective, and the only one of these procedures that is: the first process has the
-   !> file, and the others have their rows of the fields.
+   !> Add the state. Of these procedures only this one is collective: the first process has the file, and each
+   !> of the others contributes its rows of the fields.
    subroutine put_state(self, table, error)
       class(checkpoint_writer_type), intent(inout) :: self
       type(state_table_type), intent(in) :: table
@@ -129,7 +129,7 @@ contains
       if (allocated(error)) call give_up(self)
    end subroutine report
 
-   !> Leave an unfinished checkpoint and remove its file.
+   !> Abandon an unfinished checkpoint, and remove its file.
    subroutine give_up(self)
       class(checkpoint_writer_type), intent(inout) :: self
 
@@ -149,11 +149,11 @@ contains
       path = checkpoint_path(result_path)
       if (.not. file_exists(path)) then
          if (is_complete(result_path)) then
-            call fail(error, error_file, trim(result_path)//': the run is complete: there is '// &
-               'nothing to go on with')
+            call fail(error, error_file, trim(result_path)//': the run is complete, so that '// &
+               'it cannot be continued')
          else
             call fail(error, error_file, path//': there is no such file: '//trim(result_path)// &
-               ' has no checkpoint to go on from')
+               ' has no checkpoint from which to continue')
          end if
          return
       end if
@@ -161,7 +161,7 @@ contains
       if (allocated(error)) return
       call self%file%open(path, 'read')
       call self%file%read_attribute('/', 'result_id', self%result_id)
-      call self%file%report(error)          ! the first fault of both calls
+      call self%file%report(error)          ! the first fault of the two calls above
    end subroutine open_checkpoint
 
    !> Is there a result whose run has finished?
@@ -213,7 +213,7 @@ contains
          ': the checkpoint is that of another case: it has settings that the case does not have')
    end subroutine compare
 
-   !> Find a setting among lines 'name = value'; `value` is not allocated where there is none.
+   !> Find a setting among lines 'name = value'. Without such a line `value` remains unallocated.
    pure subroutine find_setting(settings, name, value)
       character(*), intent(in) :: settings
       character(*), intent(in) :: name
@@ -261,7 +261,7 @@ contains
             if (is_first_process()) path = self%file%path
             call share(path)
             call fail(error, error_convergence, path//': /state/'//table%pieces(i)%name// &
-               ' holds a value that is not a finite number: the run cannot go on')
+               ' holds a value that is not a finite number: the run cannot continue')
             return
          end if
       end do

@@ -36,11 +36,11 @@ module asperity_progress
 
 contains
 
-   !> Start. Nothing is shown yet.
+   !> Start, without showing anything yet.
    subroutine start(self, rows, first_step, quiet)
       class(progress_type), intent(inout) :: self
       integer, intent(in) :: rows           !! rows of the history when it is complete
-      integer, intent(in) :: first_step     !! 0, or the first row of a run that goes on
+      integer, intent(in) :: first_step     !! 0, or the first row of a run that is continued
       logical, intent(in) :: quiet          !! show nothing
 
       self%quiet = quiet
@@ -98,7 +98,7 @@ contains
       self%pending = .false.
    end subroutine show
 
-   !> The line about a row.
+   !> The line of progress for a row.
    pure function progress_line(row, rows, first_step, elapsed) result(line)
       type(history_row_type), intent(in) :: row
       integer, intent(in) :: rows           !! rows of the history when it is complete

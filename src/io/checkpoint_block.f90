@@ -1,4 +1,4 @@
-!> The user block of a checkpoint: one line of text that shows whether the file is whole.
+!> The user block of a checkpoint: one line of text that shows whether the file is complete.
 !>
 !> A checkpoint is an HDF5 file whose first 512 bytes are a user block, which HDF5 does not use.
 !> They contain one line of text with the length of the file and the checksum of all bytes behind
@@ -19,7 +19,7 @@ module checkpoint_block
 
 contains
 
-   !> Write the block of a file that is complete otherwise.
+   !> Write the block of a file that is complete except for the block.
    subroutine write_block(path, error)
       character(*), intent(in) :: path
       type(error_type), allocatable, intent(out) :: error

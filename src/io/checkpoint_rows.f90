@@ -1,9 +1,8 @@
-!> The pieces of a state that are fields, in the file of a checkpoint, where several processes share
-!> their rows.
+!> Writes and reads the fields of a checkpoint if several processes share their rows.
 !>
-!> Each process has its rows in memory, and the file holds all of them in the order of the grid: it is the
-!> same for any number of processes. The first process has the file. Fields pass through it in slabs of
-!> rows. All procedures are collective.
+!> Each process has its rows in memory, and the file holds all of them in the order of the grid, so that the
+!> file is the same for any number of processes. Only the first process opens the file, and fields pass
+!> through it in slabs of rows. All procedures are collective.
 module checkpoint_rows
    use asperity_errors, only : error_input, error_type, fail
    use asperity_parallel, only : is_first_process

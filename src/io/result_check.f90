@@ -1,4 +1,4 @@
-!> Damage in a result: the parts that do not agree with their checksums or cannot be read.
+!> Finds damage in a result: parts that do not agree with their checksums or cannot be read.
 !>
 !> Fields and vectors have HDF5's checksums (Fletcher's, of each block). The rows of the history
 !> have those of the module `result_history`.
@@ -23,8 +23,7 @@ module result_check
 
 contains
 
-   !> Read a whole result, except that of the snapshots only the latest are read, up to
-   !> `most_bytes`.
+   !> Read a whole result. Of the snapshots only the latest are read, up to `most_bytes`.
    subroutine find_damage(file, found)
       type(hdf5_file_type), intent(inout) :: file
       type(damage_type), intent(out) :: found

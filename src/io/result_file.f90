@@ -1,7 +1,7 @@
-!> The result of a run: one HDF5 file, written step by step, readable at any moment.
+!> The result of a run: one HDF5 file that is written step by step and can be read at any moment.
 !>
-!> A file is built under the name FILE.new and takes its place once it contains everything but the
-!> rows of the history. A row counts when all columns have it: readers take the shortest column. A
+!> A file is built under the name FILE.new and is renamed once it contains everything but the rows of the
+!> history. A row counts when all columns have it, so that readers use the length of the shortest column. A
 !> snapshot appears as a whole (see `hdf5_tree`), and then in the XDMF file beside the result.
 !>
 !> Procedures with an optional `error` belong to chains: without it, the file remembers the first
@@ -104,7 +104,7 @@ contains
       if (allocated(error)) call give_up(self, error)
    end subroutine create_result
 
-   !> Write a slab of the height map before any sliding. The slabs have `height_rows` rows, the last one
+   !> Write a slab of the height map as it is before any sliding. The slabs have `height_rows` rows; the last one
    !> may have fewer.
    subroutine write_height_rows(self, first, height, error)
       class(result_file_type), intent(inout) :: self
@@ -116,7 +116,7 @@ contains
       call self%file%report(error)
    end subroutine write_height_rows
 
-   !> Let the new result take its place. One of the same name is replaced, and its checkpoint is removed.
+   !> Give the new result its final name. A result of the same name is replaced, and its checkpoint is removed.
    subroutine publish_result(self, error)
       class(result_file_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
@@ -135,7 +135,8 @@ contains
       self%file%path = self%path
    end subroutine publish_result
 
-   !> Remove a new result that cannot be written. The user knows the file by its own name.
+   !> Remove a new result that cannot be written. The message gives the final name of the file, because the user
+   !> does not know the other one.
    subroutine give_up(self, error)
       class(result_file_type), intent(inout) :: self
       type(error_type), allocatable, intent(inout) :: error
@@ -149,7 +150,7 @@ contains
       call remove_file(temporary)
    end subroutine give_up
 
-   !> Name of a result that has not taken its place yet.
+   !> Name of a result that does not have its final name yet.
    pure function new_path(self) result(path)
       class(result_file_type), intent(in) :: self
       character(:), allocatable :: path

@@ -1,6 +1,6 @@
-!> The parts of a result that are known before the first row: its origin, the grid and axes.
+!> Writes the parts of a result that are known before the first row: its origin, the grid and axes.
 !>
-!> The file remembers the first fault of these calls, and the caller asks for it once at the end
+!> The file remembers the first fault of these calls, and the caller checks it once at the end
 !> (see `hdf5_handle`).
 module result_frame
    use asperity_precision, only : dp
@@ -19,7 +19,7 @@ module result_frame
    character(*), parameter, public :: height_path = '/surface/height'   !! of the height of the road
    character(*), parameter, public :: axes(2) = ['x', 'y']    !! of every field, in the same group
 
-   !> What a result is about, and what it will contain when it is complete.
+   !> The case of a result, and the size of the result when it is complete.
    type :: result_plan_type
       character(:), allocatable :: title
       character(:), allocatable :: input             !! the namelists, verbatim
@@ -45,7 +45,7 @@ contains
       call file%open(path, 'create', alignment=4096)
       call file%create_group('/snapshots', expected=plan%snapshots)
       if (plan%losses > 0) call file%create_group('/losses', expected=plan%losses)
-      if (file%has_failed()) return             ! opening again would forget the fault
+      if (file%has_failed()) return             ! opening the file again would discard the fault
       call file%close()
       if (file%has_failed()) return
       call file%open(path, 'append')
@@ -60,7 +60,7 @@ contains
       call create_history_columns(file, plan%rows)
    end subroutine write_frame
 
-   !> Write where the result comes from.
+   !> Write the origin of the result.
    subroutine write_origin(file, id, plan)
       type(hdf5_file_type), intent(inout) :: file
       character(*), intent(in) :: id                 !! identity of the result

@@ -1,11 +1,11 @@
 !> The history in a result: one column per quantity, one value per row, and a checksum per row.
 !>
-!> A row counts when all columns have it: readers take the shortest column. `step` is written last.
-!> The columns have the space for all rows from the first row on (see `hdf5_file`). HDF5's own
-!> checksums would be those of whole blocks of a column, which would have to be rewritten for each
-!> row. Therefore each row has the checksum of its own values, in the column `checksum`.
+!> A row counts when all columns have it, so that readers use the length of the shortest column. `step` is
+!> written last. The space for all rows is set aside with the first row (see `hdf5_file`). HDF5's own
+!> checksums cover whole blocks of a column, which would have to be rewritten for each row. Therefore each
+!> row has a checksum of its own values, in the column `checksum`.
 !>
-!> The file remembers the first fault of these calls, and the caller asks for it once at the end
+!> The file remembers the first fault of these calls, and the caller checks it once at the end
 !> (see `hdf5_handle`). After a fault nothing is written any more.
 module result_history
    use asperity_checksum, only : crc32_of_values
@@ -27,7 +27,7 @@ module result_history
 
 contains
 
-   !> Create the columns, empty. `step` is the last in the file, so that it grows last.
+   !> Create empty columns. `step` is the last one in the file, so that it grows last.
    subroutine create_history_columns(file, expected_rows)
       type(hdf5_file_type), intent(inout) :: file
       integer, intent(in) :: expected_rows
@@ -103,7 +103,7 @@ contains
       call file%flush()
    end subroutine shorten_history
 
-   !> Do the rows of a result have checksums? Those of earlier versions have none.
+   !> Do the rows of a result have checksums? The results of early versions have none.
    function has_checksums(file) result(yes)
       type(hdf5_file_type), intent(in) :: file
       logical :: yes

@@ -1,6 +1,6 @@
-!> Where states of steady sliding lose their energy: the groups /losses/NNNNNN of a result.
+!> The groups /losses/NNNNNN of a result, which divide the losses of steady sliding by wavelength and by arm.
 !>
-!> The file remembers the first fault of these calls, and the caller asks for it once at the end
+!> The file remembers the first fault of these calls, and the caller checks it once at the end
 !> (see `hdf5_handle`).
 module result_losses
    use asperity_precision, only : dp
@@ -14,7 +14,7 @@ module result_losses
 
 contains
 
-   !> Write the losses of a row into a group that `publish_group` lets appear.
+   !> Write the losses of a row into a group. It becomes visible with `publish_group`.
    subroutine put_losses(file, step, wavelength, octave, prony_tau, arm, compression)
       type(hdf5_file_type), intent(inout) :: file
       integer, intent(in) :: step                          !! row of the history

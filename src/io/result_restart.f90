@@ -1,7 +1,7 @@
-!> Changes to a result whose run is continued after a given row: later rows, snapshots and losses are
+!> Prepares a result for a run that is continued after a given row: later rows, snapshots and losses are
 !> removed.
 !>
-!> The file remembers the first fault of these calls, and is asked for it once at the end
+!> The file remembers the first fault of these calls, and the caller checks it once at the end
 !> (see `hdf5_handle`). After a fault nothing is removed or written any more.
 module result_restart
    use asperity_errors, only : error_file, error_type, fail
@@ -22,7 +22,7 @@ module result_restart
 
 contains
 
-   !> Remove what lies behind a row, and say what the file holds.
+   !> Remove everything that belongs to later rows, and return what the file then contains.
    subroutine go_back(file, last_step, grid, expected_rows, snapshots, error)
       type(hdf5_file_type), intent(inout) :: file
       integer, intent(in) :: last_step           !! the last row to keep, from 0
@@ -38,7 +38,7 @@ contains
       call file%report(error)
       if (allocated(error)) return
       if (last_step < 0 .or. last_step >= rows) then
-         write (text, '(": the history has ", i0, " rows, the run would go on after row ", i0)') rows, last_step
+         write (text, '(": the history has ", i0, " rows, the run would continue after row ", i0)') rows, last_step
          call fail(error, error_file, file%path//trim(text))
          return
       end if

@@ -1,9 +1,9 @@
-!> Checks of the place where a result is to be written: may the file that is there be replaced?
+!> Decides whether a result may be written under a name, that is, whether an existing file may be replaced.
 !>
-!> A run may replace the result of an earlier run that has finished. It does not replace anything
-!> that is of use: an unfinished run with rows, a checkpoint, or a file that Asperity did not write,
-!> unless `overwrite` allows it. The files beside a result (see `result_names`) are replaced only if
-!> Asperity wrote them.
+!> A run may replace the result of an earlier run that has finished. Unless `overwrite` allows it, a run does
+!> not replace anything that may still be needed: an unfinished run with rows, a checkpoint, or a file that
+!> Asperity did not write. The files beside a result (see `result_names`) are replaced only if Asperity
+!> wrote them.
 module result_target
    use asperity_errors, only : error_file, error_type, fail
    use file_kind, only : file_start, is_dangling_link, is_other_than_file
@@ -99,13 +99,13 @@ contains
                'it, or choose another --output')
             return
          case (is_unfinished)
-            call fail(error, error_file, path//': holds an unfinished run: --restart goes on with it'// &
+            call fail(error, error_file, path//': holds an unfinished run: --restart continues it'// &
                ' from its last checkpoint, --overwrite replaces it, or choose another --output')
             return
          end select
       end if
       if (file_exists(checkpoint)) call fail(error, error_file, checkpoint// &
-         ': there is a checkpoint of an unfinished run: --restart goes on from it, --overwrite '// &
+         ': there is a checkpoint of an unfinished run: --restart continues it, --overwrite '// &
          'removes it, or choose another --output')
    end subroutine check_replaced
 
@@ -155,8 +155,7 @@ contains
       call file%close(error)
    end function kind_of
 
-   !> Read a result in a separate process. It is an error if that crashes or does not come to an
-   !> end.
+   !> Read a result in a separate process. It is an error if that process crashes or does not end.
    subroutine damage_of_result(path, error, fields)
       character(*), intent(in) :: path
       type(error_type), allocatable, intent(out) :: error

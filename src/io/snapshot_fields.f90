@@ -16,7 +16,7 @@ module snapshot_fields
       field_type('pressure', 'Pa', 'normal traction on the rubber, pressure positive'), &
       field_type('gap', 'm', 'gap between rubber and road'), &
       field_type('displacement_z', 'm', 'displacement of the rubber along z'), &
-      field_type('road_height', 'm', 'height of the road as it stands under the rubber'), &
+      field_type('road_height', 'm', 'height of the road in its present position under the rubber'), &
       field_type('traction_x', 'Pa', 'tangential traction on the rubber along x'), &
       field_type('traction_y', 'Pa', 'tangential traction on the rubber along y'), &
       field_type('displacement_x', 'm', 'displacement of the rubber along x'), &

@@ -8,9 +8,9 @@
 !> The table points into the state, which therefore must be a target and stay where it is while the
 !> table is in use. Pieces that are not allocated or empty in a case are left out of the table.
 !>
-!> Where several processes share the rows of the grid, `add_field` and `add_cells` add what they share: each
-!> has its rows. All other pieces are the same on every process. The table has the same pieces on all of them,
-!> also where one has no rows; therefore adding fields is collective.
+!> If several processes share the rows of the grid, `add_field` and `add_cells` add shared fields, of which
+!> each process has its rows. All other pieces are the same on every process. The table has the same pieces on
+!> all processes, even on one without rows; therefore adding fields is collective.
 module state_table
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use asperity_parallel, only : any_process
@@ -62,7 +62,7 @@ module state_table
 
 contains
 
-   !> Make space for one more piece, and name it.
+   !> Make space for another piece, and set its name, units and meaning.
    subroutine start_piece(self, name, units, meaning)
       class(state_table_type), intent(inout) :: self
       character(*), intent(in) :: name, units, meaning

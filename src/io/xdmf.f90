@@ -13,7 +13,7 @@ module xdmf
 
    public :: snapshot_type, snapshot_name, write_xdmf
 
-   !> What the XDMF file contains about a snapshot.
+   !> The data of a snapshot that the XDMF file contains.
    type :: snapshot_type
       integer :: step = 0                            !! its row in the history
       real(dp) :: time = 0.0_dp                      !! time, s
