@@ -1,16 +1,15 @@
 !> The step loop: a rubber block pressed on a road and moved over it.
 !>
-!> A row of the history is one solve: `advance` takes the next from the schedule, moves the road,
-!> solves the contact, ends the step of the material and books the energies. The caller
-!> writes files or fills arrays.
+!> A row of the history is one solve: `advance` takes the next row from the schedule, moves the road, solves the
+!> contact, ends the step of the material and books the energies. The caller writes files or fills arrays.
 !>
-!> All that a row leaves to the next is in the component `state` (module `row_state`), which can be saved and
-!> taken up again (module `simulation_state`). `propose` finds the next state without changing the present
-!> one; `accept` takes it over, and `reject` leaves no trace of it. `advance` does the same as `propose` and
+!> Everything that a row leaves to the next is in the component `state` (module `row_state`), which can be saved
+!> and restored (module `simulation_state`). `propose` finds the next state without changing the present
+!> one; `accept` makes it the present state, and `reject` discards it. `advance` does the same as `propose` and
 !> `accept` without keeping two states in memory.
 !>
-!> A row in which friction acts is made of passes: module `coupled_passes`. How the road moves at the start
-!> of a row: module `road_motion`. What the row says in the end: module `row_account`.
+!> Module `road_motion` moves the road at the start of a row, module `coupled_passes` solves a row with
+!> friction in passes, and module `row_account` fills the row of the history.
 module asperity_simulation
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use asperity_errors, only : error_type
@@ -46,14 +45,14 @@ module asperity_simulation
    !> in a warning.
    real(dp), parameter :: large_mismatch = 1.0e-2_dp
 
-   !> A run in hand. Not to be copied; its state may be.
+   !> A run. A variable of this type must not be copied, but its state may be.
    type, extends(contact_type) :: simulation_type
       logical :: converged = .true.                 !! the last row's solvers met the tolerance
       logical :: finished = .false.                 !! no row is left
       character(320) :: reason = ''                 !! why not converged
-      real(dp) :: residual = 0.0_dp                 !! of the solver that did not, or of the normal one
+      real(dp) :: residual = 0.0_dp                 !! of the solver that did not converge, or of the normal one
       real(dp) :: allowed = 0.0_dp                  !! of that residual
-      character(:), allocatable :: warnings         !! new ones, a line each; the caller clears them
+      character(:), allocatable :: warnings         !! new ones, one per line; the caller clears them
       type(state_type), allocatable :: proposed     !! found by `propose`, not yet accepted
       integer, private :: old_warnings = 0          !! characters of `warnings` before the proposal
       type(coupled_passes_type), private :: passes
@@ -76,7 +75,7 @@ contains
       type(simulation_type), intent(out) :: self
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
-      logical, intent(in), optional :: movable      !! be prepared for a motion of the road that no phase asks for
+      logical, intent(in), optional :: movable      !! the road may be moved although no phase does so
 
       self%case = case
       self%grid = case%grid
@@ -98,8 +97,8 @@ contains
       call self%state%steady%before%take(self%steady%before)
    end subroutine new_simulation
 
-   !> Find the state after the next row; the present one stays as it is. Where the solvers did not
-   !> converge, the state reached is proposed.
+   !> Find the state after the next row, without changing the present one. If the solvers do not converge, the
+   !> state that they have reached is proposed.
    subroutine propose(self, error)
       class(simulation_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
@@ -113,14 +112,14 @@ contains
       call move_alloc(present_state, self%state)
    end subroutine propose
 
-   !> Let the proposed state be the present one.
+   !> Make the proposed state the present one.
    subroutine accept(self)
       class(simulation_type), intent(inout) :: self
 
       if (allocated(self%proposed)) call move_alloc(self%proposed, self%state)
    end subroutine accept
 
-   !> Forget the proposed state, and what was said of it.
+   !> Discard the proposed state and its warnings.
    subroutine reject(self)
       class(simulation_type), intent(inout) :: self
 
@@ -132,7 +131,7 @@ contains
       call self%take_up()
    end subroutine reject
 
-   !> Go on from `state`, which the caller has replaced.
+   !> Continue from `state`, which the caller has replaced.
    subroutine take_up(self)
       class(simulation_type), intent(inout) :: self
 
@@ -140,8 +139,8 @@ contains
       self%finished = self%state%schedule%phase > size(self%case%phases)
    end subroutine take_up
 
-   !> Do the next row. Where the solvers did not converge, the state reached is kept. A row that is given
-   !> up (`stop%given_up`) leaves the state of the row before.
+   !> Do the next row. If the solvers do not converge, the state that they have reached is kept. After a row that
+   !> was abandoned (`stop%given_up`) the state is that of the row before.
    subroutine advance(self, error)
       class(simulation_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
@@ -152,7 +151,7 @@ contains
       call self%stop%release()
    end subroutine advance
 
-   !> A row, in one part or in several.
+   !> Do a row, in one part or in several.
    subroutine do_row(self, error)
       class(simulation_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
@@ -182,7 +181,7 @@ contains
       self%finished = self%state%schedule%phase > size(self%case%phases)
    end subroutine do_row
 
-   !> The next row of the schedule, and the parts in which its step is taken.
+   !> Plan the next row of the schedule, and the parts in which its step is taken.
    subroutine plan_row(self, plan, parts)
       type(simulation_type), intent(inout) :: self
       type(planned_row_type), intent(out) :: plan
@@ -198,10 +197,10 @@ contains
       end associate
    end subroutine plan_row
 
-   !> One step of a row, its history row included.
+   !> Take one step of a row, and fill the row of the history.
    subroutine take_step(self, plan, error)
       type(simulation_type), intent(inout) :: self
-      type(planned_row_type), intent(inout) :: plan      !! where the road is found, if that is not prescribed
+      type(planned_row_type), intent(inout) :: plan      !! out: the position of the road, if a force pulls it
       type(error_type), allocatable, intent(out) :: error
       type(found_step_type) :: found
       real(dp) :: start
@@ -219,7 +218,7 @@ contains
       call watch_stick_slip(self, plan, self%warnings)
    end subroutine take_step
 
-   !> The material's coefficients for the step, and where the road is expected.
+   !> Set the coefficients of the material for the step, and move the road to where it is expected.
    subroutine begin_step(self, plan, error)
       type(simulation_type), intent(inout) :: self
       type(planned_row_type), intent(inout) :: plan
@@ -237,7 +236,7 @@ contains
       end if
    end subroutine begin_step
 
-   !> Solve a step: the pressure and the tractions at its end, and where the road then is.
+   !> Solve a step: find the pressure, the tractions and the position of the road at its end.
    subroutine solve_step(self, plan, found)
       type(simulation_type), intent(inout) :: self
       type(planned_row_type), intent(inout) :: plan
@@ -277,7 +276,7 @@ contains
       end associate
    end subroutine solve_step
 
-   !> Say whether a step has converged, and if not why.
+   !> Decide whether a step has converged, and note the reason if it has not.
    subroutine judge(self, plan, found)
       type(simulation_type), intent(inout) :: self
       type(planned_row_type), intent(in) :: plan
@@ -295,8 +294,8 @@ contains
       if (found%passes > 0) call look_at_passes(self, plan, found)
    end subroutine judge
 
-   !> A row has not converged if its passes leave a larger mismatch than the case allows. If the case allows
-   !> a large one, a warning reports it.
+   !> Check the mismatch that the passes have left. The row has not converged if it is larger than the case
+   !> allows. If the case allows a large mismatch, a warning reports it.
    subroutine look_at_passes(self, plan, found)
       type(simulation_type), intent(inout) :: self
       type(planned_row_type), intent(in) :: plan
@@ -321,7 +320,7 @@ contains
       end associate
    end subroutine look_at_passes
 
-   !> A row with a number that is not finite did not converge.
+   !> A row that contains a number that is not finite has not converged.
    subroutine look_for_overflow(self)
       type(simulation_type), intent(inout) :: self
 

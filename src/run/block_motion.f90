@@ -1,4 +1,4 @@
-!> The mean tangential motion of a block with mass: state, rule in time, energy.
+!> The mean tangential motion of a block with mass: its state, the integration in time, and its energy.
 !>
 !> The mean traction T of the interface strains the block and moves its mass m (per area):
 !>
@@ -9,20 +9,20 @@
 !> with the traction T_h of the past, the height h and the step's modulus Q of the block, and x, v, a
 !> the motion of the interface over the road (the top of the block moves by -(D' - D)). With gamma = 1/2
 !> - alpha and beta = (1 - alpha)^2/4 this is the rule of Wood, Bossak and Zienkiewicz (Int. J. Numer.
-!> Methods Eng. 15 (1980) 1562): second order, stable for any step; what swings far faster than the
-!> steps decays by `fastest` = (1 + alpha)/(1 - alpha) per step, so that nothing rings against the
-!> friction. The trapezoidal rule (alpha = 0) would ring for ever once the block sticks.
+!> Methods Eng. 15 (1980) 1562). It is of second order and stable for any step. Oscillations that are far faster
+!> than the steps decay by the factor `fastest` = (1 + alpha)/(1 - alpha) per step. With the trapezoidal rule
+!> (alpha = 0) they would never decay once the block sticks.
 !>
-!> a lags behind the acceleration and is of no use where the acceleration jumps. The first step after a
-!> jump of the load or of the speed takes a = a' instead (uniform acceleration): the error of this one step is of
+!> a lags behind the acceleration, and is useless if the acceleration jumps. The first step after a jump of
+!> the load or of the speed therefore assumes a = a' (uniform acceleration). The error of this one step is of
 !> second order.
 !>
 !> Energy: with the mean force f = m (v' - v)/dt of a step,
 !>
 !>    f (x' - x) - m (alpha dt)^2 (a'^2 - a^2)/8 = m (v'^2 - v^2)/2 - alpha^3 m dt^2 (a' - a)^2/4
 !>
-!> exactly. The left side is booked as work on the mass: the second term is a state's and adds up to
-!> nothing. The last term, never negative, is what the rule loses.
+!> exactly. The left side is booked as work on the mass. Its second term is the change of a function of the state,
+!> so that it cancels over many steps. The last term, which is never negative, is the loss of the rule.
 module block_motion
    use asperity_precision, only : dp
    implicit none
@@ -30,11 +30,11 @@ module block_motion
 
    public :: block_motion_type
 
-   real(dp), parameter :: fastest = 0.5_dp               !! see above
+   real(dp), parameter :: fastest = 0.5_dp               !! decay factor, see above
    real(dp), parameter :: alpha = (fastest - 1.0_dp)/(fastest + 1.0_dp)
    real(dp), parameter :: beta = (1.0_dp - alpha)**2/4.0_dp, gamma = 0.5_dp - alpha
 
-   !> State of the mean motion, and the step in hand.
+   !> The state of the mean motion, and the inertia of the last step.
    type :: block_motion_type
       real(dp) :: height = 0.0_dp              !! h, m
       real(dp) :: mass = 0.0_dp                !! m, kg/m2; 0: no inertia
@@ -55,7 +55,7 @@ module block_motion
 
 contains
 
-   !> Has the block a mass that takes part in a step of length dt? No mass moves in no time.
+   !> Does the inertia of the block affect a step of length dt? There must be a mass, and dt must be positive.
    pure function inert(self, dt) result(yes)
       class(block_motion_type), intent(in) :: self
       real(dp), intent(in) :: dt               !! s
@@ -64,7 +64,7 @@ contains
       yes = self%mass > 0.0_dp .and. dt > 0.0_dp
    end function inert
 
-   !> What the mass adds to the modulus Q of the mean: f' = resistance U'/h - known, Pa.
+   !> The contribution of the mass to the modulus Q of the mean: f' = resistance U'/h - known, Pa.
    pure function resistance(self, dt) result(modulus)
       class(block_motion_type), intent(in) :: self
       real(dp), intent(in) :: dt               !! s, > 0
@@ -98,7 +98,7 @@ contains
    pure subroutine finish(self, advance, carried, dt)
       class(block_motion_type), intent(inout) :: self
       real(dp), intent(in) :: advance(2)       !! x' - x, m
-      real(dp), intent(in) :: carried(2)       !! f' as the fields have it: mean traction less that of the strain, Pa
+      real(dp), intent(in) :: carried(2)       !! f' from the fields: mean traction minus the part that strains the block, Pa
       real(dp), intent(in) :: dt               !! s; 0: a jump
       real(dp) :: before(2), after(2), speed(2), force(2), a(2)
 
@@ -114,7 +114,7 @@ contains
       else
          before = self%acceleration
          after = ((advance/dt - self%speed)/dt - (0.5_dp - beta)*before)/beta
-         a = (carried/self%mass - alpha*before)/(1.0_dp - alpha)      ! a' by the tractions
+         a = (carried/self%mass - alpha*before)/(1.0_dp - alpha)      ! a' from the tractions
          force = self%mass*((1.0_dp - gamma)*before + gamma*a)
       end if
       speed = self%speed + dt*((1.0_dp - gamma)*before + gamma*after)

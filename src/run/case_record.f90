@@ -1,4 +1,5 @@
-!> What a result keeps of its case besides the settings: the material and the checksums of height maps.
+!> The parts of a case that its result contains in addition to the settings: the material and the checksums of
+!> height maps.
 module case_record
    use asperity_checksum, only : hexadecimal
    use asperity_simulation, only : simulation_type
@@ -12,7 +13,7 @@ module case_record
 
 contains
 
-   !> Write the material as it is at the temperature of the case.
+   !> Write the properties of the material at the temperature of the case.
    subroutine write_material(result, m)
       type(result_file_type), intent(inout) :: result
       type(material_settings_type), intent(in) :: m
@@ -28,7 +29,7 @@ contains
       call result%write_material('temperature', m%temperature, 'C', 'temperature')
    end subroutine write_material
 
-   !> The checksums of the height maps that are files, as lines of the identity.
+   !> The checksums of height maps from files, as lines of the identity of the case.
    function map_lines(sim) result(lines)
       type(simulation_type), intent(in) :: sim
       character(:), allocatable :: lines

@@ -1,10 +1,10 @@
-!> A run of a case with its files: rows, snapshots, checkpoints, the restart.
+!> A run of a case with its files: rows, snapshots, checkpoints and restarts.
 !>
-!> The program and the Python package drive it alike: `open`, `step` until `finished`, `close`. A stop
-!> between two steps writes a checkpoint; a failing solver keeps all there is in the result.
+!> The program and the Python package use it in the same way: `open`, `step` until `finished`, `close`. A stop
+!> between two steps writes a checkpoint. If a solver fails, the result keeps all rows so far.
 !>
-!> Several processes do the same, each on its rows of the fields. The files are in module `run_files`: the
-!> first process has them, and what fails on one process fails on all of them, with the same message.
+!> Several processes do the same work, each on its rows of the fields. Module `run_files` handles the files. Only
+!> the first process opens them, and a fault on one process ends all of them with the same message.
 module case_run
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use asperity_errors, only : error_convergence, error_type, fail
@@ -27,12 +27,12 @@ module case_run
 
    public :: run_type
 
-   !> A run in hand. Not to be copied.
+   !> A run. A variable of this type must not be copied.
    type :: run_type
       type(simulation_type) :: sim
       integer :: rows = 0                          !! rows of the whole run
       logical :: finished = .false.
-      character(:), allocatable :: warnings        !! new ones, a line each; the caller clears them
+      character(:), allocatable :: warnings        !! new ones, one per line; the caller clears them
       type(run_files_type), private :: files
       integer, private :: next_time = 1            !! next of the times for snapshots
       integer, private :: last_snapshot = -1       !! row of the last snapshot
@@ -47,11 +47,11 @@ module case_run
 
 contains
 
-   !> Prepare a run and its result, or take an interrupted one up again.
+   !> Prepare a run and its result, or continue an interrupted run.
    subroutine open_run(self, case, restart, overwrite, error)
       class(run_type), intent(inout) :: self
       type(case_type), intent(in) :: case
-      logical, intent(in) :: restart               !! go on from the checkpoint of the result
+      logical, intent(in) :: restart               !! continue from the checkpoint of the result
       logical, intent(in) :: overwrite             !! replace an unfinished run and its checkpoint
       type(error_type), allocatable, intent(out) :: error
 
@@ -76,7 +76,7 @@ contains
       call collect_warnings(self)
    end subroutine open_run
 
-   !> See that every machine has the memory that its processes need. Collective.
+   !> Check that every machine has the memory that its processes need. Collective.
    subroutine look_at_memory(case, error)
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
@@ -90,7 +90,7 @@ contains
       call agree(error)
    end subroutine look_at_memory
 
-   !> Go on from the checkpoint.
+   !> Continue from the checkpoint.
    subroutine take_up(self, error)
       type(run_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
@@ -106,8 +106,8 @@ contains
       end associate
    end subroutine take_up
 
-   !> Do a row, and write what is due. With status error_convergence the row is kept all the same. A row
-   !> that is given up because a stop was asked for leaves the run as it was.
+   !> Do a row, and write what is due. A row with the status error_convergence is kept, too. A row that is
+   !> abandoned because a stop was requested does not change the run.
    subroutine step_run(self, error)
       class(run_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
@@ -132,10 +132,10 @@ contains
       end if
    end subroutine step_run
 
-   !> Leave in the result that the solver did not converge, and make an error of it.
+   !> Record in the result that the solver did not converge, and return an error.
    subroutine end_unconverged(self, error)
       type(run_type), intent(inout) :: self
-      type(error_type), allocatable, intent(inout) :: error   !! one that is already set stays
+      type(error_type), allocatable, intent(inout) :: error   !! an error that is already set is not replaced
       character(:), allocatable :: outcome
 
       associate (row => self%sim%state%row)
@@ -168,7 +168,7 @@ contains
       end associate
    end function snapshot_due
 
-   !> Write the fields that were asked for.
+   !> Write the requested fields.
    subroutine snapshot(self, error, at_stop)
       type(run_type), intent(inout) :: self
       type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is written
@@ -178,7 +178,7 @@ contains
       if (.not. allocated(error)) self%last_snapshot = self%sim%state%row%step
    end subroutine snapshot
 
-   !> Is a checkpoint due after the last row? The clock of the first process says so to all. Collective.
+   !> Is a checkpoint due after the last row? All processes go by the clock of the first one. Collective.
    function checkpoint_due(self) result(due)
       type(run_type), intent(in) :: self
       logical :: due
@@ -203,9 +203,9 @@ contains
       self%saved_at = seconds_now()
    end subroutine save_run
 
-   !> Stop between two steps: a snapshot of where the run stands, and a checkpoint. A snapshot that
-   !> is not due is dropped by a restart: the result is that of a run that never stopped. After a row
-   !> that was given up there is no snapshot, because slip and road are not part of the state.
+   !> Stop between two steps: write a snapshot of the present state, and a checkpoint. A restart removes a
+   !> snapshot that was not due, so that the result equals that of a run that never stopped. After a row that was
+   !> abandoned there is no snapshot, because the slip and the road are not part of the state.
    subroutine interrupt_run(self, error)
       class(run_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
@@ -229,7 +229,7 @@ contains
       call self%sim%destroy()
    end subroutine close_run
 
-   !> Take new warnings from the simulation, for the caller and for the result.
+   !> Move new warnings from the simulation to the caller and to the result.
    subroutine collect_warnings(self)
       type(run_type), intent(inout) :: self
 

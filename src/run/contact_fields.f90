@@ -1,5 +1,5 @@
-!> The fields of a contact by the names that they have in a result, some rows at a time: no field is copied
-!> as a whole. The rows are counted on this process.
+!> The fields of a contact under the names that they have in a result. A few rows are copied at a time, never a
+!> whole field. Row numbers are those of this process.
 module contact_fields
    use asperity_precision, only : dp, int8
    use contact_model, only : contact_type
@@ -11,10 +11,10 @@ module contact_fields
 
 contains
 
-   !> Rows of a field. The states of the cells have another type: see `contact_rows`.
+   !> Some rows of a field. The contact record has another type: see `contact_rows`.
    subroutine field_rows(self, name, first, values)
       class(contact_type), intent(in) :: self
-      character(*), intent(in) :: name              !! as in /snapshots, but for 'contact'
+      character(*), intent(in) :: name              !! as in /snapshots, except 'contact'
       integer, intent(in) :: first                  !! the first row
       real(dp), intent(out) :: values(:, :)         !! [nx, rows]
       integer :: c, last
@@ -24,7 +24,7 @@ contains
       case ('pressure')
          values = self%state%pressure(:, first:last)
       case ('gap')
-         ! Where the surfaces overlap by less than the tolerance they touch.
+         ! Cells that overlap by less than the tolerance count as touching.
          values = max(self%state%gap(:, first:last), 0.0_dp)
       case ('displacement_z')
          if (allocated(self%state%displacement)) then
@@ -46,8 +46,8 @@ contains
       end select
    end subroutine field_rows
 
-   !> The states of the cells of some rows: 0 open, 1 stick, 2 slip. Without friction all contact slips;
-   !> with it all sticks until the road moves.
+   !> Some rows of the contact record: 0 open, 1 stick, 2 slip. Without friction all cells in contact slip; with
+   !> friction they all stick until the road moves.
    subroutine contact_rows(self, first, states)
       class(contact_type), intent(in) :: self
       integer, intent(in) :: first                  !! the first row

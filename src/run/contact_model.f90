@@ -1,8 +1,8 @@
-!> A rubber block on its road: its settings, its solvers, the step in hand, and its state.
+!> A rubber block on its road: its settings, its solvers, the present step, and its state.
 !>
-!> `contact_type` joins the machinery with the one component that a row leaves to the next, `state`
-!> (module `row_state`). The stages of a step (`road_motion`, `coupled_passes`, `row_account`) work on it;
-!> `asperity_simulation` runs them.
+!> `contact_type` combines the solvers with the one component that a row leaves to the next, `state`
+!> (module `row_state`). The stages of a step (`road_motion`, `coupled_passes`, `row_account`) work on it, and
+!> `asperity_simulation` calls them.
 !>
 !> Fields of doubles besides the state and the normal solver: H; with sliding also the original map and the
 !> two slopes; with Prony arms the traction of the past; with friction those of the modules
@@ -35,18 +35,18 @@ module contact_model
 
    public :: contact_mean, contact_type, commit_step, new_contact, place_road, solve_normal
 
-   !> A block on its road. Not to be copied; its state may be.
+   !> A block on its road. A variable of this type must not be copied, but its state may be.
    type :: contact_type
-      type(state_type), allocatable :: state        !! what the last row left
+      type(state_type), allocatable :: state        !! state after the last row
       type(case_type) :: case
       type(grid_type) :: grid
       type(normal_step_type) :: side                !! the solvers of the normal contact
-      type(tangential_step_type) :: tangential      !! the solver of friction, and its step in hand
-      type(zener_type) :: material                  !! with the coefficients of the step in hand
+      type(tangential_step_type) :: tangential      !! the solver of friction, and its present step
+      type(zener_type) :: material                  !! with the coefficients of the present step
       type(interpolation_type) :: road              !! the original map
       type(workspace_type) :: work                  !! scratch fields of the stages of a step
-      type(row_stop_type) :: stop                   !! gives up a row if a stop is asked for
-      real(dp), allocatable :: height(:, :)         !! H under the rubber in the step in hand, m
+      type(row_stop_type) :: stop                   !! abandons a row if a stop is requested
+      real(dp), allocatable :: height(:, :)         !! H under the rubber in the present step, m
       real(dp), allocatable :: slope_x(:, :)        !! of the road under the rubber, -
       real(dp), allocatable :: slope_y(:, :)
       real(dp), allocatable :: past(:, :)           !! P_h, traction of the past, Pa
@@ -54,7 +54,7 @@ module contact_model
       real(dp) :: summit = 0.0_dp                   !! highest point of the original map, m
       real(dp) :: rms_height = 0.0_dp               !! of the original map about its mean, m
       real(dp) :: rms_slope = 0.0_dp                !! of the original map, -
-      logical :: slides = .false.                   !! the road moves in some phase, or may be made to
+      logical :: slides = .false.                   !! the road moves in some phase, or may be moved
       logical :: frictional = .false.               !! there is a friction law, and the road moves
    contains
       procedure :: rubs
@@ -63,8 +63,8 @@ module contact_model
 
 contains
 
-   !> Prepare the solvers, and a state at rest. `self%case`, `grid`, `height` and `slides` are set. Collective:
-   !> where memory is short on one process, all of them return.
+   !> Prepare the solvers, and a state at rest. The caller has set `case`, `grid`, `height` and `slides`.
+   !> Collective: if one process has not enough memory, all of them return.
    subroutine new_contact(self, error)
       class(contact_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
@@ -92,7 +92,7 @@ contains
       if (allocated(error)) return
       call new_books(self%state%books, self%material, self%grid%cell_area())
       allocate (self%state%pressure(nx, ny), self%state%gap(nx, ny), source=0.0_dp)
-      ! The displacement serves the next row only: what comes last can be formed from the gap.
+      ! The displacement is only needed by a later row: that of the last row can be computed from the gap.
       if (self%slides .or. count_rows(self%case%phases) > 1) &
          allocate (self%state%displacement(nx, ny), source=0.0_dp)
       if (.not. is_elastic(self%material)) allocate (self%past(nx, ny), source=0.0_dp)
@@ -123,7 +123,7 @@ contains
          + field_product(self%slope_y, self%slope_y))/self%grid%cells())
    end subroutine new_road
 
-   !> Heights and slopes of the road at a displacement, under a surface that has not moved.
+   !> Compute the heights and slopes of the road at a displacement, under a surface that has not moved.
    subroutine place_road(self, road_x, road_y)
       class(contact_type), intent(inout) :: self
       real(dp), intent(in) :: road_x, road_y        !! m
@@ -141,7 +141,7 @@ contains
       if (self%frictional) yes = self%state%tangential%moved
    end function rubs
 
-   !> Is there friction that nothing has called for yet? What touches then sticks.
+   !> Is there friction, although the road has not moved yet? All touching cells then stick.
    pure function holds(self) result(yes)
       class(contact_type), intent(in) :: self
       logical :: yes
@@ -159,13 +159,13 @@ contains
 
       task = normal_task_type(plan%control, plan%load, self%material%q, self%state%first)
       self%side%tolerance = tolerance
-      ! Without arms `past` is not allocated, and so not present.
+      ! Without arms `past` is not allocated, and therefore an absent argument.
       call self%side%solve(task, self%height, self%state%pressure, self%state%gap, self%state%level, &
          outcome, self%past)
       self%state%first = .false.
    end subroutine solve_normal
 
-   !> End the step: displacements, arms and energies of both directions.
+   !> End the step: update the displacements, arms and energies of both directions.
    subroutine commit_step(self)
       class(contact_type), intent(inout) :: self
       type(products_type) :: products

@@ -1,17 +1,17 @@
-!> Are the patches of contact large enough for the cells?
+!> Checks whether the cells are small enough to resolve the patches of contact.
 !>
-!> How far the approach of a contact of few cells is from Hertz's depends on where its summit lies among
-!> the cells (`tools/campaign_contact.py hertz`). A single round patch errs by up to 9 % where it is two to
-!> three cells across, by up to 1.5 % at four to five and a half, and by less than 1 % beyond; a line by up to
-!> 2 % at four cells and by up to 1.2 % at five. A road has patches in all places among the cells,
-!> and their errors average out. The error of a patch falls about as the square of the cells across it, that
-!> of the mean of n patches as the root of n, so that n patches need fewer cells by the fourth root of n.
-!> Three cells are the least: the contact area of a road is then still 10 % or more above that of a fine
+!> If a contact has few cells, the error of its approach depends on the position of its summit among the cells
+!> (`tools/campaign_contact.py hertz`). For a single round patch the error is up to 9 % if it is two to three cells
+!> across, up to 1.5 % at four to five and a half, and less than 1 % beyond; for a line it is up to 2 % at four
+!> cells and up to 1.2 % at five. On a road the positions of the patches differ, and their errors average out. The
+!> error of a patch is about proportional to the inverse square of the cells across it, and that of the mean of n
+!> patches to the inverse root of n, so that n patches need fewer cells by the fourth root of n. At least three cells
+!> are needed: the contact area of a road is then still 10 % or more above that of a fine
 !> grid (`tools/campaign_contact.py sizes`).
 !>
-!> The size of the patches follows from the runs of neighbouring cells that touch: a round patch of the
-!> diameter d has a mean chord of pi/4 d. The direction in which the patches are fewer cells across
-!> counts. A patch that begins nowhere along one of the directions goes through the whole map: a line.
+!> The width of the patches is computed from the runs of neighbouring cells that touch: a round patch of the
+!> diameter d has a mean chord of pi/4 d. The direction with the fewer cells counts. If no patch begins along one of
+!> the directions, the patches extend over the whole map: they are lines.
 module contact_size
    use contact_rule, only : touches
    use asperity_precision, only : dp, pi
@@ -36,8 +36,8 @@ module contact_size
 
 contains
 
-   !> At the end of a phase: keep the best resolved patches so far. At the end of the run: warn if not
-   !> even those are wide enough. Earlier in the run the contact may be small: it has to grow from nothing.
+   !> Call this at the end of each phase. It keeps the best resolved patches so far, and warns at the end of the run
+   !> if not even these are wide enough. Earlier the contact may be small, because it grows from nothing.
    subroutine watch_contact_size(grid, patches, ends, widest, message)
       type(grid_type), intent(in) :: grid
       type(patch_size_type), intent(in) :: patches   !! of the contact now
@@ -61,7 +61,7 @@ contains
          ' as wide for the same road, if need be on a smaller map around the contact'
    end subroutine watch_contact_size
 
-   !> A number with one decimal place.
+   !> Convert a number to a text with one decimal place.
    pure function tenths(number) result(text)
       real(dp), intent(in) :: number
       character(:), allocatable :: text
@@ -69,8 +69,8 @@ contains
       text = to_text(nint(10.0_dp*number)/10.0_dp)
    end function tenths
 
-   !> Mean number of cells across a patch of contact, in the direction where they are fewer, and how many
-   !> such patches need. A huge number where all cells touch. Collective.
+   !> Mean number of cells across a patch of contact, in the direction where it is smaller, and the number that such
+   !> patches need. It is a huge number if all cells touch. Collective.
    function measured_patches(grid, adhesive, pressure, gap) result(patches)
       type(grid_type), intent(in) :: grid
       logical, intent(in) :: adhesive

@@ -1,4 +1,4 @@
-!> What to do where the passes of a row did not settle.
+!> Advice for the user if the passes of a row did not settle.
 module coupling_advice
    use contact_model, only : contact_type
    use field_sums, only : row_totals
@@ -9,13 +9,13 @@ module coupling_advice
 
    public :: advice_on_passes
 
-   !> Fraction of the normal force on slopes steeper than 1/mu, where friction has no bound uphill, from which
-   !> the advice names them as the reason.
+   !> On slopes steeper than 1/mu friction has no bound uphill. If these slopes carry at least this fraction of the
+   !> normal force, the advice names them as the reason.
    real(dp), parameter :: much = 1.0e-3_dp
 
 contains
 
-   !> A sentence or two: the likely reason, and what helps.
+   !> One or two sentences about the likely reason and the remedy.
    function advice_on_passes(self) result(advice)
       class(contact_type), intent(in) :: self
       character(:), allocatable :: advice
@@ -23,19 +23,19 @@ contains
 
       jammed = jammed_part(self)
       if (self%tangential%law%jumps_at_edge()) then
-         advice = 'With this law the traction jumps where the contact ends; solving the step all at '// &
-            'once did not help, though without adhesion it has a solution; law = ''coulomb_orowan'', whose '// &
-            'strength grows from zero with the pressure, usually settles with a coefficient of up to about 1'
+         advice = 'With this law the traction jumps where the contact ends; solving for all '// &
+            'cells at once failed, too, although without adhesion a solution exists; law = ''coulomb_orowan'', '// &
+            'whose bound grows with the pressure from zero, usually settles with a coefficient of up to about 1'
       else if (jammed > much) then
          advice = to_text(100.0_dp*jammed)//' % of the normal force is on slopes above '// &
-            '1/coefficient, where friction holds any force uphill and there may be no solution: take a '// &
+            '1/coefficient, where friction can resist any uphill force, so that there may be no solution: use a '// &
             'smoother road or a lower coefficient'
       else if (self%case%solver%passes > 0) then
-         advice = 'Allow more passes (passes = 0 goes on until they settle), or more of what remains '// &
-            '(coupling_tolerance)'
+         advice = 'Allow more passes (with passes = 0 they continue until they settle), or a larger '// &
+            'coupling_tolerance'
       else
-         advice = 'A mass (density) may help, shorter steps seldom do; coupling_tolerance lets a '// &
-            'run go on with what remains, which residual_coupling tells'
+         advice = 'A mass (density) may help, shorter steps seldom do; with a larger coupling_tolerance '// &
+            'the run continues, and residual_coupling shows the remaining mismatch'
       end if
    end function advice_on_passes
 

@@ -1,6 +1,7 @@
-!> The energy that friction takes in a step, cell by cell, and how far the surface in the contact has moved.
+!> The energy that is lost by friction in a step, and the mean motion of the surface in the contact.
 !>
-!> The loss by friction is that of the mean traction over the step, second order in its length.
+!> The loss of a cell is the mean traction over the step times the slip, which is of second order in the length of
+!> the step.
 module friction_books
    use asperity_precision, only : dp, int8
    use field_sums, only : row_totals
@@ -14,13 +15,13 @@ module friction_books
    !> Sums over the cells.
    type :: rubbed_type
       real(dp) :: loss = 0.0_dp                       !! J/m2
-      real(dp) :: way(2) = 0.0_dp                     !! by which the surface in the contact has moved, m
-      real(dp) :: cells = 0.0_dp                      !! in the contact
+      real(dp) :: way(2) = 0.0_dp                     !! motion of the surface in the contact, m
+      real(dp) :: cells = 0.0_dp                      !! number of cells in contact
    end type rubbed_type
 
 contains
 
-   !> The sums of a step. The state remembers the frictional tractions for the next one.
+   !> Form the sums of a step. The state keeps the frictional tractions for the next step.
    subroutine book_friction(state, law, trial, slip, pressure, slope_x, slope_y, rubbed)
       type(tangential_state_type), intent(inout) :: state   !! displacement: at the start of the step
       type(friction_law_type), intent(in) :: law
@@ -46,7 +47,7 @@ contains
                rows(2:3, j) = rows(2:3, j) + trial(i, :, j) - state%displacement(i, :, j)
                rows(4, j) = rows(4, j) + 1.0_dp
             end if
-            ! The slip of a point that sticks is what the solver's tolerance left: it loses nothing.
+            ! The slip of a point that sticks is an error within the tolerance of the solver, and causes no loss.
             if (state%contact(i, j) /= 1_int8) rows(1, j) = rows(1, j) &
                + rubbed_off(state%rubbed(i, j) == 1_int8, state%rubbing(i, :, j), rubbing, slip(i, :, j))
             state%rubbing(i, :, j) = rubbing
@@ -57,10 +58,10 @@ contains
       rubbed = rubbed_type(total(1), total(2:3), total(4))
    end subroutine book_friction
 
-   !> What a cell loses by friction in a step, J/m2: the mean of the frictional tractions at both ends times
-   !> the slip. A cell that enters or leaves the contact has none at one end. A cell that stuck at the start
-   !> slips only once its traction has reached its bound, so that the traction of the end counts alone; so it
-   !> does where the slip has turned against the traction of the start, since the cell has stuck in between.
+   !> The loss of a cell by friction in a step, J/m2: the mean of the frictional tractions at both ends times the
+   !> slip. A cell that enters or leaves the contact has no traction at one end. A cell that stuck at the start slips
+   !> only after its traction has reached the bound, so that only the traction at the end counts. The same holds if
+   !> the slip is opposed to the traction of the start, because the cell must have stuck in between.
    pure function rubbed_off(stuck, before, after, slip) result(loss)
       logical, intent(in) :: stuck                    !! at the start of the step
       real(dp), intent(in) :: before(2)               !! T - T* at the start of the step, Pa

@@ -1,10 +1,10 @@
-!> The edge of a free map: what lies beyond it is left out of the contact.
+!> Warns if the contact comes near the edge of a free map.
 !>
-!> Outside the given map the road is at its lowest, and what moves off the map is lost. That is
-!> right as long as the points at the edge lie well below the contact: by a tenth of what the rubber is
-!> displaced by under the load, and, where it adheres, by some ranges of the attraction. (A tenth of the
-!> rms height is enough as well, except on a long map over which a summit travels: its rms height says
-!> nothing about the contact.)
+!> Outside the given map the road has its lowest height, and points that move off the map are lost. This is
+!> correct as long as the points at the edge lie well below the contact: by a tenth of the displacement of the
+!> rubber under the load, and, with adhesion, by several ranges of the attraction. (A tenth of the rms height is
+!> sufficient as well, except on a long map over which a summit travels, whose rms height is not related to the
+!> contact.)
 module map_edge
    use contact_rule, only : touches
    use asperity_precision, only : dp
@@ -23,13 +23,13 @@ module map_edge
 
 contains
 
-   !> Look at the cells at the edge: those that enter or leave within a step, one at least.
+   !> Check the cells at the edge: those that enter or leave within a step, and at least one row and column.
    subroutine look_at_edge(grid, range, rms_height, move, state, message)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: range                  !! of adhesion, m; 0: there is none
       real(dp), intent(in) :: rms_height             !! of the road, m
       real(dp), intent(in) :: move(2)                !! of the road in the step, m
-      type(state_type), intent(inout) :: state       !! `edge` says what was found so far; only a worse finding is reported
+      type(state_type), intent(inout) :: state       !! `edge` is the worst finding so far; only a worse one is reported
       character(:), allocatable, intent(inout) :: message   !! a line is added; without the time
       real(dp) :: depth, least, near, reach
       logical :: adhesive
@@ -57,7 +57,7 @@ contains
       end if
    end subroutine look_at_edge
 
-   !> Cells that touch, and the least gap, in a frame along the edge of the map.
+   !> Count the cells that touch in a frame along the edge of the map, and find the least gap there.
    subroutine scan_edge(grid, adhesive, width, state, touching, least)
       type(grid_type), intent(in) :: grid
       logical, intent(in) :: adhesive

@@ -1,7 +1,7 @@
-!> The normal side of a row: the contact solved under the row's load, without or with adhesion.
+!> The normal side of a row: it solves the contact under the load of the row, with or without adhesion.
 !>
-!> With adhesion the start is part of the case (there is real hysteresis): the first row starts from the
-!> solution without adhesion, or from full contact; later ones from the state before.
+!> With adhesion the result depends on the start, because there is real hysteresis. The first row starts from the
+!> solution without adhesion or from full contact, as the case says, and later rows from the state before.
 module normal_step
    use adhesion_cg, only : adhesion_solver_type, new_adhesion_solver
    use adhesion_potential, only : adhesion_potential_type, adhesive_energy, &
@@ -22,10 +22,11 @@ module normal_step
 
    public :: new_normal_step, normal_step_type, normal_task_type
 
-   !> Tolerance (of the duality gap) of the contact without adhesion if it only starts the one with adhesion.
+   !> Tolerance (of the duality gap) for the contact without adhesion if it is only the start of the contact with
+   !> adhesion.
    real(dp), parameter :: start_tolerance = 1e-2_dp
 
-   !> What a row asks of the normal side.
+   !> The load of a row and the modulus of its step.
    type :: normal_task_type
       character(12) :: control = 'pressure'        !! 'pressure' | 'force' | 'displacement'
       real(dp) :: load = 0.0_dp                    !! Pa, N or m
@@ -33,7 +34,7 @@ module normal_step
       logical :: first = .false.                   !! there is no state yet
    end type normal_task_type
 
-   !> Solvers and settings of the normal side. Not to be copied.
+   !> Solvers and settings of the normal side. A variable of this type must not be copied.
    type :: normal_step_type
       type(grid_type) :: grid
       logical :: adhesive = .false.
@@ -86,7 +87,7 @@ contains
       call new_adhesion_solver(self%sticky, self%grid, kernel, error, trim(solver%method))
    end subroutine new_normal_step
 
-   !> Solve under the row's load, from the pressure and gap handed in.
+   !> Solve under the load of the row, starting from the given pressure and gap.
    subroutine solve(self, task, height, pressure, gap, level, outcome, past)
       class(normal_step_type), intent(inout) :: self
       type(normal_task_type), intent(in) :: task
@@ -127,7 +128,7 @@ contains
       outcome%ffts = outcome%ffts + before%ffts
    end subroutine solve
 
-   !> The load of a row as the solvers want it: mean pressure, or level.
+   !> Convert the load of a row to a form that the solvers accept: the mean pressure, or the level.
    subroutine load_of(self, task, control, target)
       type(normal_step_type), intent(in) :: self
       type(normal_task_type), intent(in) :: task
@@ -143,8 +144,8 @@ contains
       end if
    end subroutine load_of
 
-   !> The first state with adhesion: roughly the solution without adhesion, or mere touch if the load does
-   !> not press.
+   !> Find a start for the first row with adhesion: roughly the solution without adhesion, or the first touch if the
+   !> load does not press.
    subroutine start(self, task, height, pressure, gap, level, outcome, past)
       type(normal_step_type), intent(inout) :: self
       type(normal_task_type), intent(in) :: task
@@ -179,7 +180,7 @@ contains
       end do
    end subroutine start
 
-   !> The contact without adhesion; only roughly if the contact with adhesion follows.
+   !> Solve the contact without adhesion, but only roughly if the contact with adhesion follows.
    subroutine solve_bare(self, task, height, pressure, gap, level, outcome, past)
       type(normal_step_type), intent(inout) :: self
       type(normal_task_type), intent(in) :: task

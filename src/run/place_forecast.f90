@@ -1,8 +1,8 @@
-!> Forecast of where the surface of the rubber will be in the next step, from the last steps.
+!> Forecasts the displacement of the rubber's surface in the next step from the last steps.
 !>
-!> In steady sliding the displacement U_T around the contact moves over the rubber with the road and
-!> changes slowly on the way. Let B_n be the displacement of the row before, carried along to where the
-!> road is in row n. Then
+!> In steady sliding the displacement U_T around the contact moves over the rubber with the road, and changes
+!> slowly while it does so. Let B_n be the displacement of the row before, carried along to the position of the
+!> road in row n. Then
 !>
 !>     a_n = U_n - B_n                   what the row has changed
 !>     b_n = a_n - (a_(n-1), carried)    by how much more than the row before
@@ -11,11 +11,11 @@
 !> are the errors of three forecasts of U_n: B_n, B_n + a_(n-1), and B_n + a_(n-1) + b_(n-1), which are
 !> of first, second and third order in the length of the step. The forecast of the next row takes the
 !> order whose error was least in this row, weighted by the pressure, because the road is read in the
-!> contact only. Where the contact jumps, or where the tolerance of the solver limits the differences, this
-!> leads to a low order by itself.
+!> contact only. If the contact jumps, or if the tolerance of the solver limits the accuracy of the differences,
+!> this rule chooses a low order without further checks.
 !>
-!> The differences belong to settled steps of one length and one speed. Where these change, or a row has
-!> not settled, they are forgotten: the error of such a row would be mistaken for a motion.
+!> The differences are only valid for settled steps of the same length and speed. If these change, or if a row has
+!> not settled, the differences are discarded, because the error of such a row would be mistaken for a motion.
 !>
 !> Plain data, part of the state of a run. Fields of doubles: two components each of a and b.
 module place_forecast
@@ -28,12 +28,12 @@ module place_forecast
 
    public :: new_place_forecast, place_forecast_type
 
-   real(dp), parameter :: same_length = 1.0e-6_dp    !! relative difference of two steps of one length
+   real(dp), parameter :: same_length = 1.0e-6_dp    !! relative difference of steps that count as equal
 
-   !> What the last rows have changed.
+   !> The differences of the last rows.
    type :: place_forecast_type
       real(dp) :: dt = 0.0_dp                        !! length of the last step, s
-      integer :: known = 0                           !! differences that are known: a, then b
+      integer :: known = 0                           !! number of known differences: first a, then b
       integer :: order = 1                           !! of the forecast of the next row
       real(dp), allocatable :: change(:, :, :)       !! a of the last row, m [nx, 2, rows]
       real(dp), allocatable :: more(:, :, :)         !! b of the last row, m
@@ -46,7 +46,7 @@ module place_forecast
 
 contains
 
-   !> Nothing is known yet.
+   !> Make a forecast that knows no differences yet.
    subroutine new_place_forecast(self, nx, rows)
       type(place_forecast_type), intent(out) :: self
       integer, intent(in) :: nx
@@ -61,7 +61,7 @@ contains
       class(place_forecast_type), intent(inout) :: self
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: dt                     !! s
-      logical, intent(in) :: goes_on                 !! the row goes on as the last one did
+      logical, intent(in) :: goes_on                 !! the row continues the motion of the last one
       real(dp), intent(in) :: motion(2)              !! of the rubber over the road, m
       real(dp), allocatable :: moved(:, :)
       integer :: c
@@ -81,7 +81,7 @@ contains
       end do
    end subroutine follow
 
-   !> Forget the differences: the next row cannot be forecast from the rows so far.
+   !> Discard the differences: the next row cannot be forecast from the rows so far.
    pure subroutine forget(self)
       class(place_forecast_type), intent(inout) :: self
 
@@ -89,7 +89,7 @@ contains
       self%order = 1
    end subroutine forget
 
-   !> Add what this row is expected to change to the displacement carried along.
+   !> Add the expected change of this row to the displacement that was carried along.
    subroutine add(self, place)
       class(place_forecast_type), intent(in) :: self
       real(dp), intent(inout) :: place(:, :, :)      !! in: B; out: the forecast, m [nx, 2, rows]
@@ -102,7 +102,7 @@ contains
       end do
    end subroutine add
 
-   !> Learn from a row that is solved.
+   !> Update the differences, and the order of the next forecast, with a row that is solved.
    subroutine learn(self, found, carried, pressure)
       class(place_forecast_type), intent(inout) :: self
       real(dp), intent(in) :: found(:, :, :)         !! U_n, m [nx, 2, rows]
@@ -123,7 +123,7 @@ contains
       self%known = min(self%known + 1, 2)
    end subroutine learn
 
-   !> A row of the map: the new a and b in place of the last ones, and the errors of the forecasts.
+   !> Replace a and b in a row of the map by the new ones, and compute the errors of the forecasts.
    pure subroutine learn_row(found_change, pressure, change, more, errors)
       real(dp), intent(in) :: found_change(:, :)     !! a_n, m [nx, 2]
       real(dp), intent(in) :: pressure(:)            !! Pa [nx]

@@ -1,10 +1,8 @@
-!> A road that is pulled by a force instead of driven at a velocity: where a row expects it, and where
-!> it has been found.
+!> A road that is pulled by a force instead of driven at a velocity: its expected and its computed position.
 !>
-!> The tangential solver finds how far the road has moved in a row (modules `friction_pull`,
-!> `road_pull`). Until then the row is computed with a guess, the motion of the last step. The
-!> guess changes no result beyond the tolerance: heights are read at U_T - D, which the tangential
-!> solver returns without the guess.
+!> The tangential solver finds the motion of the road in a row (modules `friction_pull` and `road_pull`). Before
+!> that, the row uses the motion of the last step as a guess. The guess affects results only within the
+!> tolerance, because heights are read at U_T - D, and this difference does not depend on it.
 module pulled_road
    use asperity_precision, only : dp
    use regular_grid, only : grid_type
@@ -18,8 +16,8 @@ module pulled_road
 
 contains
 
-   !> The direction in which a row drives the road: that of its velocity, or of the pull where it is only
-   !> pulled. Where neither acts the direction stays as it was.
+   !> The direction in which a row drives the road: that of its velocity, or that of the pull if the road is only
+   !> pulled. Without either the direction does not change.
    pure subroutine drive_direction(plan, direction)
       type(planned_row_type), intent(in) :: plan
       real(dp), intent(inout) :: direction(2)
@@ -30,7 +28,7 @@ contains
       if (any(abs(drive) > 0.0_dp)) direction = drive/norm2(drive)
    end subroutine drive_direction
 
-   !> Let the road of a row go on as in the last step along the directions in which it is pulled.
+   !> Assume that the road moves as in the last step along the directions in which it is pulled.
    subroutine guess_road(plan, road, velocity)
       type(planned_row_type), intent(inout) :: plan
       real(dp), intent(in) :: road(2)               !! displacement of the road at the last row, m
@@ -46,7 +44,7 @@ contains
       end if
    end subroutine guess_road
 
-   !> Take over where the road has been found.
+   !> Set the position of the road to the one that was computed.
    subroutine take_road(plan, schedule, tangential, moved, road, velocity)
       type(planned_row_type), intent(inout) :: plan
       type(schedule_type), intent(inout) :: schedule
@@ -73,8 +71,8 @@ contains
       end if
    end subroutine take_road
 
-   !> Warn once where a pull moves the road so far in a step that the contact is not followed. The steps of
-   !> a road that is driven are known beforehand (module `case_phases`); those of a pulled one are not.
+   !> Warn once if a pull moves the road so far in a step that the contact is not resolved in time. For a road that
+   !> is driven, module `case_phases` checks this before the run.
    subroutine watch_way(plan, grid, road, reported, message)
       type(planned_row_type), intent(in) :: plan
       type(grid_type), intent(in) :: grid
@@ -107,7 +105,7 @@ contains
 
       reason = 'the road is pulled by '//to_text(norm2(merge(plan%pull, 0.0_dp, plan%pulled)))// &
          ' Pa over the cell, and the friction holds at most '//to_text(norm2(tangential%road%held))// &
-         ' Pa: nothing is in balance. A block with density would move on'
+         ' Pa, so that there is no equilibrium. A block with density would accelerate'
    end function pull_outcome
 
 end module pulled_road

@@ -1,6 +1,6 @@
-!> What a result holds, in words.
+!> A summary of a result as text.
 !>
-!> If the run is not finished, the text attribute `outcome` of the file says why it ended. The warnings
+!> If the run is not finished, the text attribute `outcome` of the file states why it ended. The warnings
 !> of the input and of the run follow.
 module result_summary
    use case_input, only : parse_case
@@ -20,11 +20,11 @@ module result_summary
 
 contains
 
-   !> Read a result and say what it holds; it may belong to a run that is still going. Where parts of
-   !> it are damaged, there is a summary and an error.
+   !> Read a result and summarise it. Its run may still be going on. If parts of the result are damaged, there is
+   !> both a summary and an error.
    subroutine summarise_result(path, text, error)
       character(*), intent(in) :: path
-      character(:), allocatable, intent(out) :: text   !! '' where nothing can be said
+      character(:), allocatable, intent(out) :: text   !! '' if the result cannot be read
       type(error_type), allocatable, intent(out) :: error
       type(hdf5_file_type) :: file
       type(error_type), allocatable :: ignored
@@ -100,17 +100,17 @@ contains
       end if
       text = text//nl//'heights     '//to_text(minval(height))//' m to '//to_text(maxval(height))// &
          ' m, rms '//to_text(sqrt(sum((height - sum(height)/size(height))**2)/size(height)))//' m'//nl
-      text = text//attribute_line(file, 'steps_text', 'done to it  ', 400)
+      text = text//attribute_line(file, 'steps_text', 'processing  ', 400)
       call file%report(error)
       text = text//'to use it   &surface shape = ''file'', file = '''//path//''' /'//nl
    end subroutine describe_map
 
-   !> The line of an attribute of the whole file; '' where it has none, or an empty one.
+   !> The line for an attribute of the file; '' if there is no such attribute, or if it is empty.
    function attribute_line(file, name, head, most) result(line)
       type(hdf5_file_type), intent(inout) :: file
       character(*), intent(in) :: name
       character(*), intent(in) :: head               !! the words before it
-      integer, intent(in) :: most                    !! characters of it
+      integer, intent(in) :: most                    !! longest text of the attribute
       character(:), allocatable :: line
       character(:), allocatable :: words
 
@@ -158,7 +158,7 @@ contains
       end if
       if (finished == 0 .and. file%has_attribute('/', 'outcome')) then
          call file%read_attribute('/', 'outcome', outcome)
-         if (outcome == 'running') outcome = 'going on, or killed'//row_note(file)
+         if (outcome == 'running') outcome = 'still running, or killed'//row_note(file)
          text = text//'outcome     '//ordinary(outcome, 400)//nl
       end if
       call add_warnings(file, 'warnings', text)
@@ -166,8 +166,8 @@ contains
       call file%report(error)
    end subroutine describe
 
-   !> How long the last row took, so that the reader can judge whether the run still adds rows; '' if it is
-   !> not known.
+   !> The time that the last row took, so that the reader can judge whether the run is still alive; '' if it is not
+   !> known.
    function row_note(file) result(note)
       type(hdf5_file_type), intent(inout) :: file
       character(:), allocatable :: note
@@ -179,10 +179,10 @@ contains
       if (allocated(error)) return
       if (size(seconds) == 0) return
       note = ': the last row took '//to_text(real(nint(1e3_dp*seconds(size(seconds))), dp)*1e-3_dp)// &
-         ' s; see whether rows are added'
+         ' s; check whether rows are being added'
    end function row_note
 
-   !> The lines of an attribute with warnings, where there is one.
+   !> Add the lines of an attribute with warnings, if there is one.
    subroutine add_warnings(file, name, text)
       type(hdf5_file_type), intent(inout) :: file
       character(*), intent(in) :: name
@@ -201,7 +201,7 @@ contains
       end do
    end subroutine add_warnings
 
-   !> The phases of the input that the result keeps.
+   !> The phases of the input that the result contains.
    function phases_text(input) result(text)
       character(*), intent(in) :: input
       character(:), allocatable :: text
@@ -211,7 +211,7 @@ contains
 
       text = ''
       call parse_case(input, 'input.nml', case, error)
-      if (allocated(error)) return                   ! of another version, say
+      if (allocated(error)) return                   ! for example, the input of another version
       text = 'phases      '//to_text(size(case%phases))//nl
       do i = 1, size(case%phases)
          associate (phase => case%phases(i))
@@ -242,7 +242,7 @@ contains
       rows = huge(1)
       last = 0.0_dp
       largest = 0.0_dp
-      do turn = 1, 2                                 ! a growing file: what all columns have
+      do turn = 1, 2                                 ! the file may be growing: use only rows that all columns have
          do i = 1, size(names)
             call file%read('/history/'//trim(names(i)), column, error)
             if (allocated(error)) then
@@ -267,7 +267,7 @@ contains
       end if
       text = text//nl//'last row'//nl
       do i = 1, size(names)
-         if (is_of_friction(names(i)) .and. largest(i) <= 0.0_dp) cycle      ! there is none
+         if (is_of_friction(names(i)) .and. largest(i) <= 0.0_dp) cycle      ! there is no friction
          text = text//'  '//names(i)//to_text(last(i))//trim(units(i))//nl
       end do
       do i = 1, size(names)
@@ -278,7 +278,7 @@ contains
       call add_missing_work(file, text)
    end subroutine history_text
 
-   !> The line that says how large the error of the steps is in the balance of energy.
+   !> Add the line with the error of the steps in the energy balance.
    subroutine add_missing_work(file, text)
       type(hdf5_file_type), intent(inout) :: file
       character(:), allocatable, intent(inout) :: text
@@ -290,7 +290,7 @@ contains
       call file%read('/history/work_missing', missing, error)
       if (.not. allocated(error)) call file%read('/history/work_load', load, error)
       if (.not. allocated(error)) call file%read('/history/work_drive', drive, error)
-      if (allocated(error)) return                   ! of an older version
+      if (allocated(error)) return                   ! a result of an older version has no such column
       rows = min(size(missing), size(load), size(drive))
       if (rows == 0) return
       scale = maxval(abs(load(:rows) + drive(:rows)))
@@ -298,7 +298,7 @@ contains
          to_text(maxval(abs(missing(:rows)))/scale)//' of the work of load and drive (error of the steps)'//nl
    end subroutine add_missing_work
 
-   !> Is a column zero throughout where nothing slides?
+   !> Does a column contain only zeros if there is no sliding?
    pure function is_of_friction(name) result(of_friction)
       character(*), intent(in) :: name
       logical :: of_friction

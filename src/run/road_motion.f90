@@ -1,8 +1,8 @@
 !> The motion of the road under the rubber at the start of a row.
 !>
-!> The road moves on, and the fields that belong to places of the road (pressure, tractions, states
-!> of contact) are shifted with it by whole cells: they are the best start for the solvers. The
-!> rubber's surface is expected to move on as in the step before.
+!> The fields that belong to places of the road (pressure, tractions, contact record) are shifted with it by
+!> whole cells, because they are then the best start for the solvers. The surface of the rubber is expected to
+!> continue the motion of the step before.
 module road_motion
    use contact_model, only : contact_type, place_road
    use asperity_precision, only : dp
@@ -28,7 +28,7 @@ contains
       if (.not. self%slides) return
       drift = 0.0_dp
       if (self%rubs()) then
-         ! The surface is expected to move on as in the step before; where the road starts, with it.
+         ! The surface is expected to move as in the step before or, if the road has just started, with the road.
          drift = self%state%tangential%rate*plan%dt
          if (plan%new_speed .and. .not. any(abs(self%state%velocity) > 0.0_dp)) &
             drift = [plan%velocity_x, plan%velocity_y]*plan%dt
@@ -42,11 +42,11 @@ contains
          call shift_fields(self, cells - self%state%moved_cells)
          self%state%moved_cells = cells
       end if
-      ! With friction the passes read the road where the surface is.
+      ! With friction the passes read the road at the displaced surface.
       if (.not. self%rubs()) call place_road(self, plan%road_x, plan%road_y)
    end subroutine move_road
 
-   !> Shift by whole cells what moves with the road.
+   !> Shift the fields that move with the road by whole cells.
    subroutine shift_fields(self, cells)
       class(contact_type), intent(inout) :: self
       integer, intent(in) :: cells(2)

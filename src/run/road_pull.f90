@@ -1,9 +1,9 @@
-!> A road that is pulled by a force, in one step: what the tangential solver must know before it solves, and
-!> the motion of the road that follows from its solution.
+!> A road that is pulled by a force, in one step: it prepares the tangential solver, and computes the motion of
+!> the road from the solution.
 !>
-!> The pull F is a force over the cell, Pa. Without a mass the mean of the traction T of friction is F minus
-!> the part of the force that acts on the slopes of the road beside T. The solver (module `friction_pull`)
-!> finds the offset Q (D' - D) at which it is.
+!> The pull F is a force per area of the periodic cell, Pa. Without a mass the mean of the frictional traction T
+!> equals F minus the part of the force that acts on the slopes of the road in addition to T. The solver (module
+!> `friction_pull`) finds the offset Q (D' - D) for which this holds.
 !>
 !> With a mass the rubber carries F from its top to the mass, and T brakes the mass. The means obey
 !>
@@ -22,14 +22,14 @@ module road_pull
 
    public :: road_pull_type
 
-   !> The pull of the step in hand, and where the last solve has found the road.
+   !> The pull of the present step, and the motion of the road that the last solve has found.
    type :: road_pull_type
       real(dp) :: motion(2) = 0.0_dp                  !! D' - D by the last solve; before it, the guess, m
       logical :: slides_off = .false.                 !! the pull is more than the friction can hold
       real(dp) :: held(2) = 0.0_dp                    !! the most that the friction can hold, Pa; see `slides_off`
       real(dp), private :: force(2) = 0.0_dp          !! F, Pa
       real(dp), private :: q = 0.0_dp                 !! Q of the step
-      real(dp), private :: mass_offset(2) = 0.0_dp    !! of a pulled mass whose T equals F, in the units of DX'
+      real(dp), private :: mass_offset(2) = 0.0_dp    !! offset at which T of a pulled mass equals F
       real(dp), private :: mass_yields = 0.0_dp       !! displacement of a pulled mass per T - F
    contains
       procedure :: begin
@@ -54,7 +54,7 @@ contains
       self%slides_off = .false.
    end subroutine begin
 
-   !> Compute the spring that a pulled mass is for the solver.
+   !> Compute the spring by which the solver represents a pulled mass.
    pure subroutine place_mass(self, block, displacement, dt)
       class(road_pull_type), intent(inout) :: self
       type(block_motion_type), intent(in) :: block
@@ -70,12 +70,12 @@ contains
       end if
    end subroutine place_mass
 
-   !> Tell the solver the mean of T that it must reach, and the offset to start from.
+   !> Set the mean of T that the solver must reach, and the offset from which it starts.
    pure subroutine hang(self, pull, block, beside)
       class(road_pull_type), intent(in) :: self
       type(friction_pull_type), intent(inout) :: pull !! of the solver; `along` is set
       type(block_motion_type), intent(in) :: block
-      real(dp), intent(in) :: beside(2)               !! mean force on the slopes of the road beside T, Pa
+      real(dp), intent(in) :: beside(2)               !! mean force on the slopes of the road that is not in T, Pa
 
       pull%traction = self%force - beside
       if (block%mass > 0.0_dp) then
@@ -99,7 +99,7 @@ contains
       self%slides_off = pull%slides_off
    end subroutine find_motion
 
-   !> Compute the most that the friction can hold, where the solver found that the pull is more.
+   !> Compute the largest pull that the friction can hold, if the solver has found that the pull exceeds it.
    pure subroutine find_held(self, pull, traction)
       class(road_pull_type), intent(inout) :: self
       type(friction_pull_type), intent(in) :: pull    !! of the solver, after a solve

@@ -1,4 +1,4 @@
-!> The row of the history that accounts for a step: means over the cells, forces, works and losses.
+!> Fills the row of the history for a step: means over the cells, forces, works and losses.
 module row_account
    use asperity_precision, only : dp
    use asperity_schedule, only : planned_row_type
@@ -18,7 +18,7 @@ module row_account
       type(solver_result_type) :: normal             !! all normal solves
       type(solver_result_type) :: rubbing            !! all tangential solves
       integer :: passes = 0                          !! of a step with friction
-      real(dp) :: mismatch = 0.0_dp                  !! that they left
+      real(dp) :: mismatch = 0.0_dp                  !! coupling residual of the last pass
       real(dp) :: viscous_force(2) = 0.0_dp          !! steady rows: mean of -P grad H, from the losses, Pa
       real(dp) :: power_viscous = 0.0_dp             !! steady rows: W
       real(dp) :: power_friction = 0.0_dp            !! steady rows: W
@@ -35,7 +35,7 @@ module row_account
 
 contains
 
-   !> Make the row of a step that has been committed; it becomes the last row of the state.
+   !> Make the row for a step that has been committed. It becomes the last row of the state.
    subroutine account(contact, plan, found)
       class(contact_type), intent(inout) :: contact
       type(planned_row_type), intent(in) :: plan
@@ -67,7 +67,7 @@ contains
       contact%state%row = row
    end subroutine account
 
-   !> The sums over the cells that a row needs, in one pass.
+   !> Form the sums over the cells that a row needs, in one pass.
    function sum_cells(contact) result(found)
       class(contact_type), intent(in) :: contact
       type(cell_sums_type) :: found
@@ -97,7 +97,7 @@ contains
       found = cell_sums_type(sums(1), sums(2), sums(3), 0.0_dp - sums(4:5)*area, -sums(6:7)*area)
    end function sum_cells
 
-   !> Load, contact and place of a row, and its viscous friction.
+   !> Fill in the load, the contact, the position of the road, and the viscous friction.
    subroutine fill_contact(contact, plan, sums, row)
       class(contact_type), intent(in) :: contact
       type(planned_row_type), intent(in) :: plan
@@ -121,7 +121,7 @@ contains
          dot_product(sums%force, contact%state%direction)/(sums%pressure*contact%grid%cell_area())
    end subroutine fill_contact
 
-   !> Works and energies of the normal side.
+   !> Fill in the works and energies of the normal side.
    subroutine fill_energies(contact, row)
       class(contact_type), intent(in) :: contact
       type(history_row_type), intent(inout) :: row
@@ -135,8 +135,8 @@ contains
       end associate
    end subroutine fill_energies
 
-   !> The part of friction in a row, and the whole horizontal force. With slope it is the sum of T,
-   !> which holds -P grad H; without, both are added.
+   !> Fill in the columns of friction, and complete the horizontal force. With the slope effect T contains
+   !> -P grad H in the contact; without it the two are added.
    subroutine fill_friction(contact, plan, outside, force, row)
       class(contact_type), intent(in) :: contact
       type(planned_row_type), intent(in) :: plan
@@ -155,7 +155,7 @@ contains
          if (plan%dt > 0.0_dp) then
             row%sliding_speed = dot_product(slip, contact%state%direction)/plan%dt
          else if (t%block%mass > 0.0_dp) then
-            ! The mass moves on through a jump of the load.
+            ! The mass keeps its speed in a jump of the load.
             row%sliding_speed = -dot_product(t%block%speed, contact%state%direction)
          end if
          row%work_tangential = t%books%work + t%block%work + t%lost_friction
@@ -167,7 +167,7 @@ contains
       end associate
    end subroutine fill_friction
 
-   !> The rates of loss: means over a step.
+   !> Fill in the rates of loss, which are means over a step.
    subroutine fill_powers(contact, plan, row)
       class(contact_type), intent(in) :: contact
       type(planned_row_type), intent(in) :: plan
@@ -182,12 +182,12 @@ contains
       end associate
    end subroutine fill_powers
 
-   !> Quantities that a row of steady sliding knows more accurately than the sums over the cells.
+   !> Replace quantities that are known more accurately in steady sliding than from the sums over the cells.
    subroutine fill_steady(contact, found, row, force)
       class(contact_type), intent(in) :: contact
       type(found_step_type), intent(in) :: found
       type(history_row_type), intent(inout) :: row
-      real(dp), intent(inout) :: force(2)           !! in: by the slopes of the mesh; out: by the losses, N
+      real(dp), intent(inout) :: force(2)           !! in: from the slopes of the mesh; out: from the losses, N
       real(dp) :: viscous
 
       viscous = dot_product(found%viscous_force, contact%state%direction)/row%pressure
@@ -198,7 +198,7 @@ contains
       row%sliding_speed = norm2(contact%state%velocity)
    end subroutine fill_steady
 
-   !> Iterations, times and residuals of the solvers.
+   !> Fill in the iterations, times and residuals of the solvers.
    subroutine fill_solution(contact, found, row)
       class(contact_type), intent(in) :: contact
       type(found_step_type), intent(in) :: found

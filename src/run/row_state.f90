@@ -1,8 +1,8 @@
-!> What one row of a run leaves to the next, and nothing else.
+!> The state of a run: everything that one row leaves to the next, and nothing else.
 !>
 !> `state_type` is plain data: a copy of it is a saved state. `list_state` names each of its pieces, with
-!> units and meaning. The checkpoint, the restart and Python walk that list. A new variable of the state
-!> is a component and one line of the list.
+!> units and meaning. The checkpoint and the restart go through that list. A new variable of the state is a
+!> component and one line of the list.
 !>
 !> Fields of doubles: P, gap and, if there are several rows, U; with Prony arms their state (S, S - S_old
 !> and one field per arm); with friction those of module `tangential_state`; with steady phases the last
@@ -27,7 +27,7 @@ module row_state
    integer, parameter, public :: edge_near = 1      !! points enter or leave the map close to the rubber
    integer, parameter, public :: edge_touches = 2   !! cells at the edge touch
 
-   !> What rows of steady sliding leave to the next.
+   !> The part of the state that belongs to steady sliding.
    type :: steady_state_type
       logical :: now = .false.                      !! the last row was one of steady sliding
       real(dp) :: base(2) = 0.0_dp                  !! place of the road without the offset, m
@@ -38,17 +38,17 @@ module row_state
    type :: state_type
       type(schedule_type) :: schedule
       type(history_row_type) :: row                 !! the last row
-      logical :: first = .true.                     !! no state yet
+      logical :: first = .true.                     !! no row has been solved
       real(dp) :: level = 0.0_dp                    !! U - H where the gap is zero, m
       real(dp) :: direction(2) = 0.0_dp             !! of the road's last motion
       real(dp) :: velocity(2) = 0.0_dp              !! of the road in the last step, m/s
       real(dp) :: drive_force(2) = 0.0_dp           !! horizontal force on the rubber, N
       real(dp) :: drifted(2) = 0.0_dp               !! sum of the expected motions of the surface, m
-      integer :: moved_cells(2) = 0                 !! by which P has been shifted so far
+      integer :: moved_cells(2) = 0                 !! cells by which P has been shifted so far
       real(dp) :: first_mismatch = 1.0_dp           !! left by the first pass of the last step
-      logical :: passes_reported = .false.              !! passes that did not settle have been warned of
-      logical :: way_reported = .false.                 !! a pull that moves the road far has been warned of
-      type(stick_slip_watch_type) :: watch          !! what has been seen of the mean slip
+      logical :: passes_reported = .false.              !! a warning of passes that did not settle was given
+      logical :: way_reported = .false.                 !! a warning of a pull that moves the road far was given
+      type(stick_slip_watch_type) :: watch          !! observations of the mean slip
       type(patch_size_type) :: widest               !! best resolved patches of contact at the end of a phase
       integer :: edge = edge_clear                  !! worst found at the edge of a free map
       real(dp) :: dt_old = 0.0_dp                   !! length of the last step, s; 0 after a jump
@@ -70,23 +70,22 @@ contains
 
       call list_schedule(state%schedule, table)
       call list_columns(state%row, table, 'row/')
-      call table%add('first', state%first, 'there is no state yet')
+      call table%add('first', state%first, 'no row has been solved')
       call table%add('level', state%level, 'm', 'displacement less height where the gap is zero')
       call table%add('direction', state%direction, '1', 'direction of the road''s last motion')
       call table%add('drive_force', state%drive_force, 'N', 'horizontal force on the rubber')
       call table%add('velocity', state%velocity, 'm/s', 'velocity of the road in the last step')
       call table%add('drifted', state%drifted, 'm', 'sum of the expected motions of the surface')
       call table%add('moved_cells', state%moved_cells, 'cells by which the pressure has been shifted')
-      call table%add('widest/across', state%widest%across, '1', 'most cells across a patch of contact where a phase ended')
-      call table%add('widest/needed', state%widest%needed, '1', 'cells across that such patches need')
-      call table%add('edge', state%edge, 'worst that was found at the edge of a free map')
-      call table%add('stick_slip/reported', state%watch%reported, 'stick-slip has been warned of')
+      call table%add('widest', state%widest, '1', 'most cells across a patch of contact where a phase ended')
+      call table%add('edge', state%edge, 'worst finding at the edge of a free map')
+      call table%add('stick_slip/reported', state%watch%reported, 'a warning of stick-slip was given')
       call table%add('stick_slip/speed', state%watch%speed, 'm/s', 'mean slip speed')
       call table%add('stick_slip/change', state%watch%change, 'm/s', 'its change in the last step')
       call table%add('stick_slip/turns', state%watch%turns, 'alternations of that change')
       call table%add('passes/reported', state%passes_reported, &
-         'passes that did not settle have been warned of')
-      call table%add('pull/reported', state%way_reported, 'a pull that moves the road far has been warned of')
+         'a warning of passes that did not settle was given')
+      call table%add('pull/reported', state%way_reported, 'a warning of a pull that moves the road far was given')
       call table%add('passes/first_mismatch', state%first_mismatch, '1', &
          'mismatch that the first pass of the last step left')
 
@@ -105,13 +104,13 @@ contains
       call list_start('steady/before', state%steady%before, table)
    end subroutine list_state
 
-   !> Where the run stands in its phases.
+   !> The position of the run in its phases.
    subroutine list_schedule(s, table)
       type(schedule_type), intent(in), target :: s
       type(state_table_type), intent(inout) :: table
 
       call table%add('schedule/row', s%row, 'number of the last row')
-      call table%add('schedule/phase', s%phase, 'phase in hand')
+      call table%add('schedule/phase', s%phase, 'present phase')
       call table%add('schedule/step', s%step, 'steps of the phase that are done')
       call table%add('schedule/entered', s%entered, 'the first row of the phase is done')
       call table%add('schedule/start_time', s%start_time, 's', 'start of the phase')
@@ -119,15 +118,15 @@ contains
          'load at the start of the phase, in the units of its control')
       call table%add('schedule/start_x', s%start_x, 'm', 'road at the start of the phase')
       call table%add('schedule/start_y', s%start_y, 'm', 'road at the start of the phase')
-      call table%add('schedule/held_control', s%held_control, 'what is held so far')
+      call table%add('schedule/held_control', s%held_control, 'control of the load so far')
       call table%add('schedule/held_load', s%held_load, '1', &
          'load held so far, in the units of its control')
       call table%add('schedule/held_rate', s%held_rate, '1/s', &
          'rate of the load in the last step, in the units of its control')
       call table%add('schedule/velocity_x', s%velocity_x, 'm/s', 'velocity of the road so far')
       call table%add('schedule/velocity_y', s%velocity_y, 'm/s', 'velocity of the road so far')
-      call table%add('schedule/pulled_x', s%held_pulled(1), 'the road hung on a force along x so far')
-      call table%add('schedule/pulled_y', s%held_pulled(2), 'the road hung on a force along y so far')
+      call table%add('schedule/pulled_x', s%held_pulled(1), 'a force has pulled the road along x so far')
+      call table%add('schedule/pulled_y', s%held_pulled(2), 'a force has pulled the road along y so far')
       call table%add('schedule/held_pull', s%held_pull, 'Pa', 'force on the road so far, over the cell')
       call table%add('schedule/start_pull', s%start_pull, 'Pa', &
          'force on the road at the start of the phase, over the cell')
@@ -139,7 +138,7 @@ contains
          'the velocity was changed since the last row')
    end subroutine list_schedule
 
-   !> Books of energy. The area of a cell belongs to the case.
+   !> The energy books. The area of a cell is not part of the state, but of the case.
    subroutine list_books(prefix, books, table)
       character(*), intent(in) :: prefix
       type(energy_books_type), intent(in), target :: books

@@ -1,18 +1,18 @@
-!> Giving up a row that is in hand when a stop is asked for.
+!> Abandons the present row if a stop is requested.
 !>
-!> A row may take minutes: a large contact, or passes that do not settle. A run that is asked to stop lets
-!> the row end if that takes no longer than `patience`; otherwise the row is given up, and the state is that
-!> of the row before. Solvers, normal and tangential, ask for it at each iteration (module `stop_watch`), rows
-!> with friction also between two passes.
+!> A row may take minutes if the contact is large or if the passes do not settle. After a request to stop, the row
+!> may continue for the time `patience`. If it has not ended by then, it is abandoned, and the state is that of
+!> the row before. The normal and the tangential solver check this in each iteration (module `stop_watch`), and
+!> rows with friction also between two passes.
 !>
-!> For this `keep` copies, at the start of a row, what the row changes before it commits a step: P, the
-!> gap, T and T of the step before, the forecast, the states of contact, and all scalars. Before the first
-!> row P and the gap are zero and need no copy. The fields that only the end of a step changes are not
-!> copied, because the arms may have many. A row whose step is solved in parts needs them, too, once a part
-!> is committed: `keep_more` copies them if they take no more than `most_more`. Otherwise such a row can be
-!> given up in its first part only.
+!> For this purpose `keep` copies at the start of a row what the row changes before it commits a step: P, the
+!> gap, T and T of the step before, the forecast, the contact record, and all scalars. Before the first row P and
+!> the gap are zero and need no copy. The fields that change only at the end of a step are not copied, because
+!> there may be many of them (the arms). A row whose step is solved in parts needs them, too, once a part is
+!> committed: `keep_more` copies them if they take no more than `most_more`. Otherwise such a row can only be
+!> abandoned during its first part.
 !>
-!> Several processes give up a row together.
+!> Several processes abandon a row together.
 module row_stop
    use arm_state, only : arm_state_type
    use asperity_parallel, only : any_process, global_max
@@ -26,11 +26,11 @@ module row_stop
 
    real(dp), parameter :: most_more = 64.0e6_dp    !! bytes of a process that `keep_more` copies
 
-   !> Whom to ask, and the state to go back to.
+   !> The function that reports a request to stop, and the state to return to.
    type :: row_stop_type
-      procedure(stop_question), pointer, nopass :: asked => null()   !! null: rows always end
-      real(dp) :: patience = 2.0_dp            !! with a row in hand after a stop was asked for, s
-      logical :: given_up = .false.            !! the row in hand was given up
+      procedure(stop_question), pointer, nopass :: asked => null()   !! null: rows are never abandoned
+      real(dp) :: patience = 2.0_dp            !! time that a row may take after the request, s
+      logical :: given_up = .false.            !! the present row was abandoned
       type(state_type), allocatable, private :: kept
       logical, private :: complete = .false.   !! `kept` has all fields
    contains
@@ -43,7 +43,7 @@ module row_stop
 
 contains
 
-   !> A row begins: keep what it may change before it commits a step.
+   !> At the start of a row, copy what it may change before it commits a step.
    subroutine keep(self, state)
       class(row_stop_type), intent(inout) :: self
       type(state_type), intent(inout) :: state       !! unchanged on return
@@ -66,7 +66,7 @@ contains
          allocate (self%kept%pressure, source=state%pressure, stat=status)
          if (status == 0) allocate (self%kept%gap, source=state%gap, stat=status)
       end if
-      ! Where memory is too short for the copies, the row always ends.
+      ! If there is not enough memory for the copies, the row is not abandoned.
       if (any_process(status /= 0)) then
          deallocate (self%kept)
       else
@@ -74,7 +74,7 @@ contains
       end if
    end subroutine keep
 
-   !> The row has several parts: keep what the first of them will commit.
+   !> If the row has several parts, also copy what the first of them will commit.
    subroutine keep_more(self, state)
       class(row_stop_type), intent(inout) :: self
       type(state_type), intent(in) :: state
@@ -104,14 +104,14 @@ contains
       if (allocated(arms%arm)) numbers = real(size(arms%arm), dp) + size(arms%s) + size(arms%ds)
    end function numbers_of
 
-   !> A part of the row has been committed.
+   !> Note that a part of the row has been committed.
    subroutine part_ends(self)
       class(row_stop_type), intent(inout) :: self
 
       if (.not. self%complete) call self%release()
    end subroutine part_ends
 
-   !> Go back to the state at the start of the row.
+   !> Return to the state at the start of the row.
    subroutine put_back(self, state)
       class(row_stop_type), intent(inout) :: self
       type(state_type), allocatable, intent(inout) :: state
@@ -126,7 +126,7 @@ contains
       call move_alloc(self%kept, state)
    end subroutine put_back
 
-   !> The row has ended, or can no longer be given up.
+   !> Free the copies: the row has ended, or can no longer be abandoned.
    subroutine release(self)
       class(row_stop_type), intent(inout) :: self
 
@@ -158,8 +158,8 @@ contains
       call move_alloc(from%tangential%arms%arm, to%tangential%arms%arm)
    end subroutine hand_over
 
-   !> Move the states of the last steady rows. A row that is solved in parts is none of these and leaves them as
-   !> they are.
+   !> Move the states of the last steady rows. A row that is solved in parts is not a steady one, and does not
+   !> change them.
    subroutine hand_over_steady(from, to)
       type(state_type), intent(inout) :: from, to
 

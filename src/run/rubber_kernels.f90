@@ -1,6 +1,7 @@
-!> The solid of a case: the kernels (module `kernels`) of its material for both directions.
+!> The solid of a case: the kernels (module `kernels`) of its material for the normal and the tangential
+!> directions.
 !>
-!> This is the one place where a run chooses its solid.
+!> This is the only place where a run chooses its solid.
 module rubber_kernels
    use case_settings, only : material_settings_type
    use kernels, only : kernel_type, normal_half_space, tangential_half_space

@@ -1,10 +1,10 @@
 !> The files of a run: its lock, its result and its checkpoint.
 !>
-!> The first process has the files. All procedures are collective: what fails on one process fails on all
-!> of them, with the same message (module `process_agreement`).
+!> Only the first process opens the files. All procedures are collective: after a fault on one process all of
+!> them return the same error (module `process_agreement`).
 !>
 !> The procedures whose `error` is `intent(inout)` do nothing if it is already set. A caller may therefore
-!> call several in sequence, and look at the error once at the end.
+!> call several in sequence, and check the error once at the end.
 module run_files
    use asperity_checkpoint, only : checkpoint_reader_type, checkpoint_writer_type, &
       remove_checkpoint
@@ -30,13 +30,13 @@ module run_files
 
    public :: run_files_type
 
-   !> The files of a run in hand. Not to be copied.
+   !> The files of a run. A variable of this type must not be copied.
    type :: run_files_type
       character(:), allocatable :: path                !! of the result
       type(result_file_type), private :: result
-      type(file_lock_type), private :: lock            !! no other run writes this result meanwhile
+      type(file_lock_type), private :: lock            !! prevents other runs from writing this result
       character(:), allocatable, private :: settings   !! every resolved setting, one per line
-      character(:), allocatable, private :: identity   !! what must agree for a restart
+      character(:), allocatable, private :: identity   !! settings that must agree for a restart
       character(:), allocatable, private :: warnings   !! all of the run, one per line
    contains
       procedure :: take_place
@@ -57,7 +57,7 @@ contains
    subroutine take_place(self, path, restart, overwrite, error)
       class(run_files_type), intent(inout) :: self
       character(*), intent(in) :: path             !! of the result
-      logical, intent(in) :: restart               !! go on from the checkpoint of the result
+      logical, intent(in) :: restart               !! continue from the checkpoint of the result
       logical, intent(in) :: overwrite             !! replace an unfinished run and its checkpoint
       type(error_type), allocatable, intent(out) :: error
 
@@ -67,8 +67,8 @@ contains
       call agree(error)
    end subroutine take_place
 
-   !> See that the result can be written where the case wants it, that no other run writes it, and
-   !> that nothing is lost by it.
+   !> Check that the result can be written under the name that the case gives, that no other run writes it, and
+   !> that no data are lost.
    subroutine check_and_lock(self, restart, overwrite, error)
       type(run_files_type), intent(inout) :: self
       logical, intent(in) :: restart, overwrite
@@ -77,7 +77,7 @@ contains
 
       call check_place(self%path, error)
       if (allocated(error)) return
-      ! A link to a result has the lock of the result.
+      ! If the name is a link, the lock is that of its target.
       call self%lock%acquire(sibling_path(real_path(self%path), '.lock'), self%path, error)
       if (allocated(error)) return
       if (restart) then
@@ -125,7 +125,7 @@ contains
       call agree(error)
    end subroutine begin
 
-   !> Note the settings of a run, and those that must agree for a restart.
+   !> Keep the settings of a run, and those that must agree for a restart.
    subroutine describe(self, sim)
       class(run_files_type), intent(inout) :: self
       type(simulation_type), intent(in) :: sim
@@ -134,7 +134,7 @@ contains
       self%identity = identity_of(self%settings)//map_lines(sim)
    end subroutine describe
 
-   !> Go on from the checkpoint: the state, and a result without what came later.
+   !> Continue from the checkpoint: read the state, and remove later rows from the result.
    subroutine take_up(self, sim, last_snapshot, error)
       class(run_files_type), intent(inout) :: self
       type(simulation_type), intent(inout) :: sim
@@ -157,7 +157,7 @@ contains
       if (.not. allocated(error)) call share(last_snapshot)
    end subroutine take_up
 
-   !> Open the checkpoint, and see that it is that of the case. On the first process.
+   !> Open the checkpoint, and check that it belongs to the case. Only the first process calls this.
    subroutine open_checkpoint(self, sim, reader, error)
       type(run_files_type), intent(in) :: self
       type(simulation_type), intent(in) :: sim
@@ -171,7 +171,7 @@ contains
       if (allocated(error)) call reader%close()
    end subroutine open_checkpoint
 
-   !> Open the result to go on after the last row of the checkpoint. On the first process.
+   !> Open the result, to continue after the last row of the checkpoint. Only the first process calls this.
    subroutine take_up_result(self, sim, id, error)
       type(run_files_type), intent(inout) :: self
       type(simulation_type), intent(in) :: sim
@@ -185,8 +185,8 @@ contains
       if (.not. allocated(error)) call take_up_warnings(self, sim, error)
    end subroutine take_up_result
 
-   !> See that the height map is that of the checkpoint. Maps from files are bound by their checksums
-   !> in the identity; a map that is computed may differ by rounding on another machine.
+   !> Check that the height map is that of the checkpoint. For maps from files the checksums in the identity ensure
+   !> this; a computed map may differ by rounding on another machine.
    subroutine compare_map(self, sim, reader, error)
       type(run_files_type), intent(in) :: self
       type(simulation_type), intent(in) :: sim
@@ -229,7 +229,7 @@ contains
       end do
    end subroutine take_up_warnings
 
-   !> Write the last row of the history and, if it is one of steady sliding, where it loses its energy.
+   !> Write the last row of the history and, if it is one of steady sliding, its losses by wavelength and arm.
    subroutine write_row(self, sim, error)
       class(run_files_type), intent(inout) :: self
       type(simulation_type), intent(in) :: sim
@@ -240,7 +240,7 @@ contains
       call agree(error)
    end subroutine write_row
 
-   !> The same on the first process.
+   !> Write the last row on the first process, which has the file.
    subroutine append(self, sim, error)
       type(run_files_type), intent(inout) :: self
       type(simulation_type), intent(in) :: sim
@@ -256,7 +256,7 @@ contains
       end associate
    end subroutine append
 
-   !> Write the fields that were asked for.
+   !> Write the requested fields.
    subroutine snapshot(self, sim, error, at_stop)
       class(run_files_type), intent(inout) :: self
       type(simulation_type), intent(in) :: sim
@@ -281,7 +281,7 @@ contains
       end if
       call save_state(sim, writer)
       if (is_first_process()) then
-         call writer%commit(error)                 ! reports the first fault of all these calls
+         call writer%commit(error)                 ! returns the first fault of all these calls
          if (.not. allocated(error)) call self%result%link_checkpoint(error)
       end if
       call agree(error)
@@ -295,7 +295,7 @@ contains
       call add_line(self%warnings, lines)
    end subroutine note_warnings
 
-   !> Leave in the result how the run ended, and what it warned of.
+   !> Write to the result how the run ended, and its warnings.
    subroutine leave_word(self, outcome, error)
       class(run_files_type), intent(inout) :: self
       character(*), intent(in) :: outcome
@@ -310,7 +310,7 @@ contains
       call agree(error)
    end subroutine leave_word
 
-   !> The run is complete: there is nothing to go on with.
+   !> Finish the result of a complete run, which has no checkpoint any more.
    subroutine finish(self, error)
       class(run_files_type), intent(inout) :: self
       type(error_type), allocatable, intent(inout) :: error

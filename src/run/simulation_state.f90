@@ -1,5 +1,5 @@
-!> The state of a run in a checkpoint: all that the next row needs to go on to the same numbers. Collective;
-!> the first process has the checkpoint open.
+!> Writes and reads the state of a run in a checkpoint. A run that continues from it computes the same numbers to
+!> the last bit. Collective; only the first process has the checkpoint open.
 module simulation_state
    use asperity_checkpoint, only : checkpoint_reader_type, checkpoint_writer_type
    use asperity_errors, only : error_type

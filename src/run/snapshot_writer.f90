@@ -1,7 +1,7 @@
-!> Writes the fields of a run into its result, a slab of rows at a time: no field is copied as a whole.
+!> Writes the fields of a run into its result, one slab of rows at a time, so that no field is copied as a whole.
 !>
-!> Where several processes share the rows, each puts its own rows into a slab, and the first process, which
-!> alone has the result open, collects and writes it. All procedures are collective.
+!> If several processes share the rows, each copies its own rows into a slab. The first process, which alone has
+!> the result open, collects the slab and writes it. All procedures are collective.
 module snapshot_writer
    use asperity_errors, only : error_type
    use asperity_parallel, only : is_first_process
@@ -42,7 +42,7 @@ contains
       call agree(error)
    end subroutine write_snapshot
 
-   !> Write the field that was started last. A fault is kept by the result.
+   !> Write the field that was started last. The result remembers a fault.
    subroutine write_reals(result, sim, name)
       type(result_file_type), intent(inout) :: result
       type(simulation_type), intent(in) :: sim
@@ -56,7 +56,7 @@ contains
       end do
    end subroutine write_reals
 
-   !> The same for the states of contact.
+   !> Write the contact record, as `write_reals` does for other fields.
    subroutine write_states(result, sim)
       type(result_file_type), intent(inout) :: result
       type(simulation_type), intent(in) :: sim
@@ -75,7 +75,7 @@ contains
       end do
    end subroutine write_states
 
-   !> Write the height map of a new result. A fault is kept by the result.
+   !> Write the height map of a new result. The result remembers a fault.
    subroutine write_height(result, sim)
       type(result_file_type), intent(inout) :: result
       type(simulation_type), intent(in) :: sim     !! before the first row
@@ -88,7 +88,7 @@ contains
       end do
    end subroutine write_height
 
-   !> A slab of a field, whole on the first process.
+   !> Form a slab of a field, which is complete on the first process.
    subroutine form_slab(sim, name, first, slab)
       type(simulation_type), intent(in) :: sim
       character(*), intent(in) :: name

@@ -1,15 +1,15 @@
-!> The first step after a kink, in parts.
+!> Solves the first step after a kink in three parts.
 !>
-!> The scheme exponential2 takes the curvature of the motion in a step from the step before. After a
-!> jump, or where the rate of the load or the speed of the road changes, there is no such step: the motion is taken
-!> for linear, which is coarse just where fast arms make it bend most. The step is therefore solved in
-!> three parts, a quarter, a quarter and a half: linear, then with the curvature that the first has
-!> shown. This takes two more solves per kink. At a point of a rubber with five arms over four decades,
-!> in a ramp of eight steps, the error is a quarter of that of one linear step; more and finer parts gain
-!> nothing.
+!> The scheme exponential2 takes the curvature of the motion from the step before. After a jump, or after a change
+!> of the rate of the load or of the speed of the road, there is no such step. The motion would have to be
+!> assumed linear, which is inaccurate, because just then fast arms make its curvature large. The step is
+!> therefore solved in three parts of a quarter, a quarter and a half of its length. The first is linear, and the
+!> others use the curvature that results from the part before. This takes two additional solves per kink. At a
+!> point of a rubber with five arms over four decades, in a ramp of eight steps, the error is a quarter of that of
+!> one linear step; more and finer parts do not reduce it further.
 !>
-!> The parts make one row of the history: works and energies are cumulative, all else is that of the end,
-!> but for what `part_sums_type` adds up.
+!> The parts make one row of the history. Works and energies are cumulative, and most other columns are those at
+!> the end of the step; `part_sums_type` adds up the rest.
 module starting_steps
    use history_row, only : history_row_type
    use asperity_precision, only : dp
@@ -19,9 +19,9 @@ module starting_steps
 
    public :: part_sums_type, split_start
 
-   real(dp), parameter :: ends(3) = [0.25_dp, 0.5_dp, 1.0_dp]   !! of the parts, over the step
+   real(dp), parameter :: ends(3) = [0.25_dp, 0.5_dp, 1.0_dp]   !! ends of the parts, relative to the step
 
-   !> What the row of a step in parts has from all of them.
+   !> Quantities of a row to which all its parts contribute.
    type :: part_sums_type
       private
       integer :: iterations_normal = 0
@@ -44,10 +44,10 @@ module starting_steps
 
 contains
 
-   !> The parts of a step, or the step itself where it needs none.
+   !> Divide a step into parts, or return the step itself if it needs no division.
    pure subroutine split_start(plan, starts, extrapolates, road, parts)
       type(planned_row_type), intent(in) :: plan
-      logical, intent(in) :: starts                !! there is no step before from which the curvature is known
+      logical, intent(in) :: starts                !! the curvature is not known from a step before
       logical, intent(in) :: extrapolates          !! the scheme takes the curvature from the step before
       real(dp), intent(in) :: road(2)              !! displacement of the road before the step, m
       type(planned_row_type), allocatable, intent(out) :: parts(:)
@@ -65,7 +65,7 @@ contains
          if (k > 1) parts(k)%dt = (ends(k) - ends(k - 1))*plan%dt
          if (k > 1) parts(k)%new_speed = .false.
          if (k > 1) parts(k)%new_rate = .false.
-         if (k == size(ends)) exit                 ! it ends exactly where the step does
+         if (k == size(ends)) exit                 ! the last part ends exactly at the end of the step
          parts(k)%time = plan%time - rest*plan%dt
          parts(k)%load = plan%load - rest*(plan%load - plan%load_before)
          parts(k)%pull = plan%pull - rest*(plan%pull - plan%pull_before)

@@ -1,9 +1,8 @@
-!> Changing the load, the velocity of the road or the temperature of a simulation between two rows.
+!> Changes the load, the velocity of the road or the temperature of a simulation between two rows.
 !>
-!> What is set holds from the next row on, for the phase in hand and all that follow, whatever their
-!> settings say; their durations and steps stay. Within a phase the new load is reached at the end of
-!> the next step. A load that is set before a phase begins makes that phase begin with a jump, as
-!> `ramp = 'step'` does.
+!> A new value holds from the next row on, for the present phase and all later ones, and replaces their own
+!> settings; their durations and steps do not change. Within a phase the new load is reached at the end of the
+!> next step. If a load is set before a phase begins, the phase begins with a jump, as with `ramp = 'step'`.
 module steering
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use asperity_errors, only : error_input, error_type, fail
@@ -37,7 +36,7 @@ contains
       end if
    end subroutine steer_load
 
-   !> Let the road move with a velocity.
+   !> Prescribe the velocity of the road.
    subroutine steer_velocity(sim, velocity, error)
       type(simulation_type), intent(inout) :: sim
       real(dp), intent(in) :: velocity(2)             !! along x and y, m/s
@@ -55,7 +54,7 @@ contains
       end if
    end subroutine steer_velocity
 
-   !> Bring the rubber to a temperature: its relaxation times shift by the WLF law.
+   !> Change the temperature of the rubber, which shifts its relaxation times by the WLF law.
    subroutine steer_temperature(sim, temperature, start_temperature, start_tau, error)
       type(simulation_type), intent(inout) :: sim
       real(dp), intent(in) :: temperature             !! C

@@ -1,4 +1,4 @@
-!> Warnings of a run: what an engineer should know although the row has been solved.
+!> Warnings about rows that were solved but may be inaccurate.
 module step_watches
    use asperity_precision, only : dp
    use asperity_schedule, only : planned_row_type
@@ -14,7 +14,8 @@ module step_watches
 
 contains
 
-   !> Warn where a free map is too small. The state is that of the end of the step, its row the one before.
+   !> Warn if a free map is too small. The fields of the state are those at the end of the step, but `state%row` is
+   !> still the row before.
    subroutine watch_edge(contact, plan, warnings)
       class(contact_type), intent(inout) :: contact
       type(planned_row_type), intent(in) :: plan
@@ -28,7 +29,7 @@ contains
       call add_warning(warnings, contact%state%schedule%row, plan%time, message)
    end subroutine watch_edge
 
-   !> Look at the size of the patches of contact where a phase ends.
+   !> Check the size of the patches of contact at the end of a phase.
    subroutine watch_cells(contact, plan, warnings)
       class(contact_type), intent(inout) :: contact
       type(planned_row_type), intent(in) :: plan
@@ -44,7 +45,7 @@ contains
       end associate
    end subroutine watch_cells
 
-   !> Warn where the scheme makes the block stick and slip in turn. The row is done.
+   !> Warn if the numerical scheme makes the block stick and slip alternately. `state%row` is the present row.
    subroutine watch_stick_slip(contact, plan, warnings)
       class(contact_type), intent(inout) :: contact
       type(planned_row_type), intent(in) :: plan
@@ -54,7 +55,7 @@ contains
 
       if (.not. contact%frictional) return
       speed = hypot(plan%velocity_x, plan%velocity_y)
-      ! A block that comes to rest behind its road is no stick-slip.
+      ! A block that comes to rest after its road has stopped is not stick-slip.
       if (.not. plan%dt*speed > 0.0_dp) return
       call watch_slip(contact%state%watch, contact%state%row%sliding_speed, speed, &
          contact%case%solver%passes, contact%case%material%density, message)

@@ -1,8 +1,8 @@
-!> Looks for numerical stick-slip: a mean slip that jumps up and down from step to step.
+!> Detects numerical stick-slip: a mean slip that jumps up and down from step to step.
 !>
-!> The true stick-slip of a sliding block takes many steps for each turn. Where the mean slip speed
-!> rises and falls in turn, step by step, by a good part of the road's speed, it is the scheme that
-!> swings (thesis, section 3.6): pressure and traction answer each other one pass late.
+!> A period of true stick-slip takes many steps. If the mean slip speed rises and falls alternately from step to
+!> step, by a considerable part of the speed of the road, the oscillation is numerical (thesis, section 3.6):
+!> pressure and traction respond to each other with a delay of one pass.
 module stick_slip_watch
    use asperity_precision, only : dp
    use text_tools, only : to_text
@@ -11,10 +11,10 @@ module stick_slip_watch
 
    public :: stick_slip_watch_type, watch_slip
 
-   integer, parameter :: turns_to_report = 6          !! alternations more than other steps
-   real(dp), parameter :: large = 0.1_dp              !! a change that counts, of the road's speed
+   integer, parameter :: turns_to_report = 6          !! excess of alternations over other steps
+   real(dp), parameter :: large = 0.1_dp              !! least change that counts, over the speed of the road
 
-   !> What has been seen so far.
+   !> The observations so far.
    type :: stick_slip_watch_type
       logical :: reported = .false.
       real(dp) :: speed = 0.0_dp                      !! of the mean slip, m/s
@@ -24,12 +24,12 @@ module stick_slip_watch
 
 contains
 
-   !> Look at a step's mean slip. The message is empty, except the first time that stick-slip is found.
+   !> Observe the mean slip of a step. The message is empty, except when stick-slip is detected for the first time.
    subroutine watch_slip(self, slip_speed, road_speed, passes, density, message)
       type(stick_slip_watch_type), intent(inout) :: self
       real(dp), intent(in) :: slip_speed              !! mean over the surface, m/s
       real(dp), intent(in) :: road_speed              !! m/s, >= 0
-      integer, intent(in) :: passes                   !! at most, a step
+      integer, intent(in) :: passes                   !! most passes of a step
       real(dp), intent(in) :: density                 !! of the block, kg/m3; 0: no inertia
       character(:), allocatable, intent(out) :: message
       real(dp) :: change

@@ -1,9 +1,9 @@
 !> The tangential state of a run: what one row leaves to the next on the tangential side.
 !>
-!> Plain data. Module `tangential_step` solves a step with it.
+!> This is plain data, with which module `tangential_step` solves a step.
 !>
-!> Fields of doubles, two components each: T, that of the step before, U, T - T* of the step before at
-!> the rubber's own points; those of the forecast of U_T; the state of the arms (S, S - S_old, one field per arm).
+!> Fields of doubles with two components each: T, T of the step before, U, T - T* of the step before at the
+!> rubber's own points; those of the forecast of U_T; the state of the arms (S, S - S_old, one field per arm).
 module tangential_state
    use asperity_errors, only : error_type
    use asperity_precision, only : dp, int8
@@ -24,8 +24,8 @@ module tangential_state
       logical :: moved = .false.                      !! the road has moved: friction acts
       type(block_motion_type) :: block                !! mean motion of the block
       real(dp), allocatable :: traction(:, :, :)      !! T, Pa [nx, 2, rows]
-      real(dp), allocatable :: before(:, :, :)        !! T of the step before, seen from where T is, Pa
-      real(dp) :: pace = 0.0_dp                       !! length of the step that led from it to T, s; 0: none
+      real(dp), allocatable :: before(:, :, :)        !! T of the step before, carried along with the contact, Pa
+      real(dp) :: pace = 0.0_dp                       !! length of the step from `before` to T, s; 0 if none
       real(dp), allocatable :: displacement(:, :, :)  !! U_T, m
       real(dp), allocatable :: rubbing(:, :, :)       !! T - T* at the end of the last step, Pa
       integer(int8), allocatable :: contact(:, :)     !! 0 open, 1 stick, 2 slip

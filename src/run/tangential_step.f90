@@ -1,5 +1,5 @@
-!> The tangential side of a step: tractions, displacements and slip of a rubber block that is driven over
-!> a road, with the block's viscoelasticity and the inertia of its mean motion.
+!> The tangential side of a step: the tractions, displacements and slip of a rubber block that is driven over a
+!> road, with the viscoelasticity of the block and the inertia of its mean motion.
 !>
 !> Slip of a step: r = DX - U', DX = U + (D' - D), U' = A(T + T_h)/Q with the traction T_h of the
 !> past. The solver works with Q r = DX' - A(T + T_h), DX' = Q DX. The mean of a block
@@ -35,7 +35,7 @@ module tangential_step
 
    public :: new_tangential_step, tangential_step_type
 
-   !> The solver of the tangential side and the step in hand. Not to be copied.
+   !> The solver of the tangential side and the present step. A variable of this type must not be copied.
    type :: tangential_step_type
       type(grid_type) :: grid
       type(friction_law_type) :: law
@@ -52,7 +52,7 @@ module tangential_step
       type(friction_solver_type), private :: solver
       real(dp), allocatable, private :: drive(:, :, :)    !! DX'
       real(dp), allocatable, private :: past(:, :, :)     !! T_h
-      real(dp), private :: motion(2) = 0.0_dp             !! D' - D of the step in hand, m; a guess where pulled
+      real(dp), private :: motion(2) = 0.0_dp             !! D' - D of the present step, m; a guess where pulled
       real(dp), private :: dt = 0.0_dp
       real(dp), private :: q = 0.0_dp
       real(dp), private :: past_mean(2) = 0.0_dp
@@ -92,7 +92,7 @@ contains
       call new_friction_solver(self%solver, self%grid, self%operator, error, &
          merge(friction_thesis, friction_fast, case%solver%method == 'thesis'))
       self%solver%max_iterations = case%solver%max_iterations
-      ! The passes of a step measure by the displacements whether the step is solved.
+      ! The passes judge by the displacements whether a step is solved.
       self%solver%settle = .false.
       allocate (self%trial(self%grid%nx, 2, self%grid%rows()), source=0.0_dp)
       allocate (self%slip, self%drive, self%past, source=self%trial)

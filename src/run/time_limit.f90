@@ -1,9 +1,9 @@
-!> The wall time that a run may take, and whether another step still fits into it.
+!> The wall time that a run may take, and the decision whether it is sufficient for another step.
 !>
-!> The limit is given (`--time-limit`), or it is the end of the job as Slurm gives it in the
-!> environment variable SLURM_JOB_END_TIME. A run has to stop before the limit, with time for its
-!> checkpoint: the reserve is twice the longest step so far (with what it writes), twice the longest
-!> checkpoint, and a twentieth of the limit, at most half a minute.
+!> The limit is given (`--time-limit`), or it is the end of the job that Slurm states in the environment variable
+!> SLURM_JOB_END_TIME. A run must stop before the limit, with time for its checkpoint. The reserve is twice the
+!> longest step so far (including its output), plus twice the longest checkpoint, plus a twentieth of the limit or
+!> half a minute, whichever is less.
 module time_limit
    use, intrinsic :: iso_c_binding, only : c_long
    use asperity_precision, only : dp, int64
@@ -20,7 +20,7 @@ module time_limit
       real(dp), private :: margin = 0.0_dp       !! s
       real(dp), private :: longest_step = 0.0_dp !! s
       real(dp), private :: longest_save = 0.0_dp !! s
-      real(dp), private :: before = 0.0_dp       !! when the step in hand began, s
+      real(dp), private :: before = 0.0_dp       !! when the present step began, s
    contains
       procedure :: start
       procedure :: step_begins
@@ -32,7 +32,7 @@ module time_limit
    interface
       function c_time(address) bind(c, name='time') result(seconds)
          import :: c_long
-         integer(c_long), value :: address       !! 0: the result alone
+         integer(c_long), value :: address       !! null: only the result is needed
          integer(c_long) :: seconds
       end function c_time
    end interface
@@ -42,7 +42,7 @@ contains
    !> Start the clock.
    subroutine start(self, seconds)
       class(time_limit_type), intent(inout) :: self
-      real(dp), intent(in) :: seconds            !! from now on; below 0: what Slurm says, if it does
+      real(dp), intent(in) :: seconds            !! from now on; below 0: use the limit of Slurm, if any
       real(dp) :: left
       character(40) :: text
       integer(int64) :: finish
@@ -60,14 +60,14 @@ contains
       self%margin = min(30.0_dp, 0.05_dp*max(left, 0.0_dp))
    end subroutine start
 
-   !> A step begins.
+   !> Note that a step begins.
    subroutine step_begins(self)
       class(time_limit_type), intent(inout) :: self
 
       self%before = seconds_now()
    end subroutine step_begins
 
-   !> The step is done and written.
+   !> Note that the step is done and written.
    subroutine step_ends(self, saved)
       class(time_limit_type), intent(inout) :: self
       logical, intent(in) :: saved               !! with a checkpoint
@@ -91,7 +91,7 @@ contains
          self%longest_save) > self%finish
    end function is_near
 
-   !> Is there just time left for a checkpoint?
+   !> Is there only just enough time for a checkpoint?
    function has_come(self) result(come)
       class(time_limit_type), intent(in) :: self
       logical :: come

@@ -1,4 +1,4 @@
-!> The cells that may carry friction, and the horizontal force of the road beside their tractions.
+!> The cells that may carry friction, and the part of the horizontal force that their tractions do not contain.
 module touching_cells
    use adhesion_potential, only : adhesion_potential_type, adhesive_slope
    use asperity_precision, only : dp, int8
@@ -11,13 +11,12 @@ module touching_cells
 
 contains
 
-   !> Mark the cells that may carry friction, those that touch. A cell that slipped is still marked so.
+   !> Mark the cells that touch, because only they may carry friction. A cell that slipped keeps its mark.
    !>
-   !> Without adhesion the solver of the normal contact leaves small pressures, of round-off or of its
-   !> tolerance, in cells with a gap. That does no harm to a traction in proportion to the pressure. A cell
-   !> that carries the same traction under any pressure therefore counts as touching only if its gap is smaller
-   !> than the length by which its pressure presses it in: then it is the gap that is meant to be 0, and otherwise
-   !> the pressure.
+   !> Without adhesion the solver of the normal contact leaves small pressures, of the order of round-off or of its
+   !> tolerance, in cells with a gap. This is harmless if the traction is proportional to the pressure. If a cell
+   !> carries the same traction under any pressure, it counts as touching only if its gap is smaller than the
+   !> length by which its pressure presses it in. In the exact solution the smaller of the two is zero.
    subroutine mark_contact(adhesive, soft, pressure, gap, contact)
       logical, intent(in) :: adhesive                 !! the contact has an adhesive potential
       real(dp), intent(in) :: soft                    !! displacement of a cell under its own unit traction, m/Pa;
@@ -42,10 +41,10 @@ contains
       end do
    end subroutine mark_contact
 
-   !> By how much the cells break the conditions of contact, in sum and over the sum of the lengths by which
+   !> The violation of the contact conditions, summed over the cells and divided by the sum of the lengths by which
    !> their pressures press them in. The error of a cell that carries friction is its gap; that of any other cell
-   !> is its overlap with the road or the length for its pressure of the wall. 0 where there is no such length:
-   !> without any pressure, and on a grid of one cell. Collective where processes share the rows.
+   !> is its overlap with the road, or the length that belongs to its wall pressure. The result is 0 if there are
+   !> no such lengths: without any pressure, and on a grid of one cell. Collective if processes share the rows.
    function edge_error(potential, soft, contact, pressure, gap) result(error)
       type(adhesion_potential_type), intent(in) :: potential
       real(dp), intent(in) :: soft                    !! displacement of a cell under its own unit traction, m/Pa
@@ -69,8 +68,8 @@ contains
       if (soft*sums(1) > 0.0_dp) error = sums(2)/(soft*sums(1))
    end function edge_error
 
-   !> The horizontal force of the road on the rubber that T does not hold, over the area of a cell: without
-   !> slope that of all slopes, else that of the slopes which attraction pulls at outside the contact.
+   !> The horizontal force of the road on the rubber that T does not contain, over the area of a cell: without the
+   !> slope effect the force on all slopes, otherwise only that of the attraction on slopes outside the contact.
    function force_beside(contact, slope, pressure, slope_x, slope_y) result(force)
       integer(int8), intent(in) :: contact(:, :)      !! 0 open, 1 stick, 2 slip
       logical, intent(in) :: slope                    !! T contains the force of the slopes in contact
