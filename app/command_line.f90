@@ -1,4 +1,4 @@
-!> What the user typed, as a type; and the help texts.
+!> Reads the command line, and provides the help texts.
 module command_line
    use asperity_errors, only : add_fault, error_input, error_type
    use asperity_precision, only : dp
@@ -20,14 +20,14 @@ module command_line
       real(dp) :: time_limit = -1.0_dp         !! --time-limit, s; below 0 if not given
       logical :: quiet = .false.               !! --quiet
       logical :: reference = .false.           !! --reference
-      character(:), allocatable :: help_of     !! verb that help is asked for; '' for the program's
+      character(:), allocatable :: help_of     !! verb that --help is about; '' for the program
       character(:), allocatable :: handed_over !! with 'python': the verb
    end type command_type
 
    character(*), parameter :: nl = new_line('a')
    character(*), parameter :: own_verbs(4) = [character(8) :: 'run', 'check', 'template', 'info']
    character(*), parameter :: python_verbs(6) = [character(8) :: 'plot', 'report', 'watch', &
-      'import', 'fit', 'friction']             !! what the Python package does
+      'import', 'fit', 'friction']             !! verbs of the Python package
    character(*), parameter :: verbs(10) = [own_verbs, python_verbs]
    character(*), parameter :: verbs_there = 'the commands are run, check, template, info, plot, '// &
       'report, watch, import, fit and friction'
@@ -36,7 +36,7 @@ module command_line
 
 contains
 
-   !> Read the command line; all its faults are reported.
+   !> Read the command line, and report all its faults.
    subroutine read_command_line(command, error)
       type(command_type), intent(out) :: command
       type(error_type), allocatable, intent(out) :: error
@@ -76,7 +76,7 @@ contains
 
    contains
 
-      !> An option; its value may follow a '='.
+      !> Read an option, whose value may follow a '='.
       subroutine take_option()
          name = argument
          if (index(argument, '--') == 1 .and. index(argument, '=') > 0) &
@@ -111,7 +111,7 @@ contains
          end select
       end subroutine take_option
 
-      !> A word: the command, or the file that it works on. `done` if the rest cannot be understood.
+      !> Read a word: the command, or the file that it works on. Set `done` if the rest cannot be interpreted.
       subroutine take_word()
          if (command%verb == '') then
             command%verb = argument
@@ -132,7 +132,7 @@ contains
          end if
       end subroutine take_word
 
-      !> Help was asked for: of the program, or of the command that is named.
+      !> Note that help is requested: about the program, or about the command that is named.
       subroutine show_help()
          if (any(verbs == command%verb)) command%help_of = command%verb
          if (command%verb == 'help' .and. allocated(command%path)) then
@@ -152,7 +152,7 @@ contains
          call add_fault(error, error_input, 'asperity: '//message)
       end subroutine refuse
 
-      !> The value of the present option: after its '=', or the next argument.
+      !> Read the value of the present option: the text after its '=', or the next argument.
       subroutine take_value(value)
          character(:), allocatable, intent(inout) :: value
 
@@ -197,7 +197,7 @@ contains
 
    end subroutine read_command_line
 
-   !> Is the first word a command of the Python package? What follows it is then for Python to read.
+   !> Is the first word a command of the Python package? If so, Python will read the other arguments.
    subroutine look_for_python(command)
       type(command_type), intent(inout) :: command
       character(:), allocatable :: word
@@ -209,7 +209,7 @@ contains
       command%handed_over = word
    end subroutine look_for_python
 
-   !> Do options and arguments fit the verb?
+   !> Check that the options and arguments belong to the verb.
    subroutine check_fit(command, error)
       type(command_type), intent(in) :: command
       type(error_type), allocatable, intent(inout) :: error
@@ -239,7 +239,7 @@ contains
 
    contains
 
-      !> An option of another verb.
+      !> Report an option of another verb.
       subroutine alien(option)
          character(*), intent(in) :: option
 
@@ -259,7 +259,7 @@ contains
       if (n > 0) call get_command_argument(i, text)
    end function argument_text
 
-   !> A proposal, if there is one.
+   !> The proposal of a similar name, if there is one.
    pure function hint(name) result(text)
       character(*), intent(in) :: name
       character(:), allocatable :: text

@@ -1,9 +1,9 @@
-!> Stops copies of the program that mpirun or srun started side by side.
+!> Ends the program if mpirun or srun has started several independent copies of it.
 !>
-!> Without MPI, or with one that the launcher does not belong to, each copy would compute the whole case,
-!> and all would write to the same result. The launchers tell each process how many there are in variables
-!> of the environment. A job of Slurm with several tasks sets the same variables outside of srun too
-!> (SLURM_NTASKS), so only those that a launcher sets for a process are read.
+!> Without MPI, or with an MPI library that does not belong to the launcher, each copy would compute the whole
+!> case, and all would write to the same result. The launchers state the number of processes in environment
+!> variables. Some of these (SLURM_NTASKS) are also set in a Slurm job with several tasks outside of srun;
+!> therefore only variables that a launcher sets for each process are read.
 module copies_guard
    use asperity_errors, only : error_input, error_type, fail
    use asperity_parallel, only : parallel_library
@@ -13,7 +13,7 @@ module copies_guard
 
    public :: refuse_copies
 
-   !> Number of processes: Open MPI; MPICH, Intel MPI and srun with PMI; MVAPICH.
+   !> Variables with the number of processes: Open MPI; MPICH, Intel MPI and srun with PMI; MVAPICH.
    character(*), parameter :: variables(3) = [character(20) :: &
       'OMPI_COMM_WORLD_SIZE', 'PMI_SIZE', 'MV2_COMM_WORLD_SIZE']
 

@@ -14,8 +14,8 @@ module hand_over
 
    !> A shell tries one Python after another: the one that the user names, those that may belong to
    !> this program (beside it, beside an editable build, around a wheel), and those on PATH. Because
-   !> of `exec` neither the shell nor this program remains, so that signals go to Python and the
-   !> exit status is Python's.
+   !> of `exec` neither the shell nor this program remains, so that signals reach Python and the exit
+   !> status is that of Python.
    character(*), parameter :: script = &
       'folder=$1; shift'//nl// &
       'for python in "$ASPERITY_PYTHON" "$folder/python3" "$folder/../bin/python3" \'//nl// &

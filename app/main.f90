@@ -46,7 +46,7 @@ program main
       case ('check')
          call check(error)
       case default
-         ! The program may become another one, which knows nothing of the other processes.
+         ! The program may be replaced by another one, which cannot take part in exchanges with other processes.
          call end_processes()
          if (is_first_process()) call tell(error)
       end select
@@ -147,7 +147,7 @@ contains
       call run_steps(case, error)
    end subroutine run
 
-   !> --output in place of the file that the case names.
+   !> Replace the file that the case names by that of --output.
    subroutine choose_output(case, error)
       type(case_type), intent(inout) :: case
       type(error_type), allocatable, intent(out) :: error
@@ -162,9 +162,9 @@ contains
          command%output//': would overwrite '//overwritten_file(case))
    end subroutine choose_output
 
-   !> The steps of a run. A signal or the time limit stops it after the present step, with a
-   !> checkpoint; both also end a step that takes long. A signal to any process counts
-   !> for all of them, and the first process looks at the clock.
+   !> Do the steps of a run. A signal or the time limit stops it after the present step, with a
+   !> checkpoint; both also abandon a step that takes long. A signal to any process counts for all of
+   !> them, and all go by the clock of the first process.
    subroutine run_steps(case, error)
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
@@ -213,8 +213,7 @@ contains
       if (.not. allocated(error) .and. allocated(closing)) call move_alloc(closing, error)
    end subroutine run_steps
 
-   !> Stop a run such that it can be continued. The error holds the status that the program ends
-   !> with.
+   !> Stop a run such that it can be continued. The error contains the exit status of the program.
    subroutine stop_run(run, status, reason, error)
       type(run_type), intent(inout) :: run
       integer, intent(in) :: status

@@ -1,10 +1,10 @@
-!> What happens when memory runs out in the middle of a run.
+!> Ends the program with a clear message if memory runs out during a run.
 !>
-!> A run asks for its memory before it starts, and is refused there (`memory_limits`). Should an
-!> allocation fail all the same, gfortran's runtime library ends the program with status 1 and a
-!> backtrace. The linker takes the procedure below in place of the library's own, so that the
-!> program says in one line what happened and ends with the status of a file error, 3. The result
-!> holds all rows that were written, as after a kill.
+!> Before a run starts, `memory_limits` checks that there is enough memory. If an allocation fails
+!> nevertheless, gfortran's runtime library would end the program with status 1 and a backtrace. The
+!> linker uses the procedure below in place of the library's own, so that the program prints a message of
+!> one line and ends with the status of a file error, 3. The result contains all rows that were
+!> written, as after a kill.
 module out_of_memory
    use, intrinsic :: iso_c_binding, only : c_char, c_int, c_long, c_size_t
    implicit none
@@ -32,8 +32,8 @@ module out_of_memory
 
 contains
 
-   !> Called by compiled code where an allocation without `stat` fails; does not return, and
-   !> allocates nothing. The compiler passes a place and a message, which are not used.
+   !> Compiled code calls this if an allocation without `stat` fails. It does not return, and allocates
+   !> nothing. The compiler passes a place and a message, which are not used.
    subroutine end_for_memory() bind(c, name='_gfortran_os_error_at')
       integer(c_long) :: written
 

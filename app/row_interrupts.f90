@@ -1,4 +1,4 @@
-!> What may end a row of a run before it is done: a signal, or the limit on the time of the run.
+!> The requests that may end a row of a run before it is done: a signal, or the time limit of the run.
 module row_interrupts
    use, intrinsic :: iso_c_binding, only : c_int
    use asperity_parallel, only : is_first_process
@@ -13,7 +13,7 @@ module row_interrupts
 
 contains
 
-   !> Must the run stop? 1 or 0, for module `row_stop`. The clock is that of the first process.
+   !> Must the run stop? 1 or 0, for module `row_stop`. All processes go by the clock of the first one.
    function must_stop() bind(c) result(yes)
       integer(c_int) :: yes
 

@@ -30,8 +30,8 @@ module wait_policy
 
 contains
 
-   !> Start the program again with sleeping threads, unless the environment says how to wait. If the
-   !> program cannot find its own file, it continues as it is.
+   !> Start the program again with sleeping threads, unless the environment variable is set. If the program
+   !> cannot find its own file, it continues without a restart.
    subroutine wait_passively()
       type(argument_type), allocatable, target :: arguments(:)
       type(c_ptr), allocatable :: pointers(:)

@@ -1,8 +1,8 @@
 !> The public library in one place: `use asperity`.
 !>
-!> A program of its own usually needs a case read from a file or a text (`read_case`, `parse_case`), a
-!> simulation (`new_simulation`, `advance` row by row) or a whole run with its result file (`run_type`).
-!> Below these stand the parts, which can be used alone:
+!> A program that uses the library usually reads a case from a file or a text (`read_case`, `parse_case`), and
+!> makes a simulation (`new_simulation`, `advance` row by row) or a whole run with its result file (`run_type`).
+!> The parts can also be used alone:
 !>
 !> * grids (`new_grid`) and surfaces (`new_height`, `height_statistics`, `height_psd`);
 !> * solids (`normal_half_space`, `tangential_half_space`) and operators (`new_convolution`): displacements
@@ -13,7 +13,7 @@
 !> * the material in time (`new_zener`, `new_arm_state`, `past_traction`, `commit_arms`) and its energy
 !>   books (`new_books`, `book_step`).
 !>
-!> Everything is SI. Errors are values (`error_type`), an unconverged solve is an outcome.
+!> All units are SI. Errors are values (`error_type`); a solve that does not converge is an outcome, not an error.
 module asperity
    use adhesion_cg, only : adhesion_solver_type, new_adhesion_solver
    use adhesion_potential, only : adhesion_potential_type, new_adhesion_potential, &

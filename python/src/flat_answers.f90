@@ -1,6 +1,7 @@
-!> What the calls of Python have in common: grids of plain numbers, statuses and messages.
+!> Procedures that the calls from Python share: they make grids from plain numbers, and turn errors into statuses
+!> and messages.
 !>
-!> Not seen by f2py, which has no derived types.
+!> f2py does not wrap this module, because it does not support derived types.
 module flat_answers
    use, intrinsic :: iso_c_binding, only : c_double, c_int
    use asperity_errors, only : error_type
@@ -17,7 +18,7 @@ module flat_answers
 
 contains
 
-   !> The grid of plain numbers.
+   !> Make a grid from plain numbers.
    function grid_of(nx, ny, lx, ly, is_free) result(grid)
       integer(c_int), intent(in) :: nx, ny, is_free
       real(c_double), intent(in) :: lx, ly
@@ -26,7 +27,7 @@ contains
       grid = new_grid(int(nx), int(ny), lx, ly, merge(boundary_free, boundary_periodic, is_free == 1))
    end function grid_of
 
-   !> The case of an input, or of a file where the input is empty.
+   !> Read the case from an input text, or from a file if the text is empty.
    subroutine case_of(path, text, case, error)
       character(len=*), intent(in) :: path, text
       type(case_type), intent(out) :: case
@@ -39,7 +40,7 @@ contains
       end if
    end subroutine case_of
 
-   !> See that there is memory for some fields of a grid.
+   !> Check that there is memory for some fields of a grid.
    subroutine see_memory(grid, fields, task, error)
       type(grid_type), intent(in) :: grid
       integer, intent(in) :: fields                        !! doubles per cell; a free grid is padded
@@ -52,7 +53,7 @@ contains
       call need_memory(8.0_dp*fields*cells, task, error)
    end subroutine see_memory
 
-   !> What a solve was, in the arguments of a call.
+   !> Copy the outcome of a solve to the arguments of a call.
    subroutine tell(outcome, iterations, ffts, residual, seconds, converged, reason)
       type(solver_result_type), intent(in) :: outcome
       integer(c_int), intent(out) :: iterations
@@ -81,7 +82,7 @@ contains
       message = error%message
    end subroutine report
 
-   !> Copy a text into a buffer that holds it; the length tells how long it must be.
+   !> Copy a text to a buffer if it is long enough. The caller learns the necessary length from `length`.
    subroutine put_text(text, buffer, length)
       character(len=*), intent(in) :: text
       integer(c_int), intent(inout) :: buffer(:)
@@ -95,7 +96,7 @@ contains
       end do
    end subroutine put_text
 
-   !> Move new warnings to the others, a line each.
+   !> Move new warnings to the existing ones, one per line.
    subroutine take_warnings(new, warnings)
       character(:), allocatable, intent(inout) :: new
       character(len=*), intent(inout) :: warnings

@@ -1,4 +1,4 @@
-!> Python's calls for one contact on arrays, and for operators. See `flat_runs` for the rules.
+!> Calls from Python for one contact on arrays, and for operators. See `flat_runs` for the rules.
 module flat_contact
    use, intrinsic :: iso_c_binding, only : c_double, c_int
    use adhesion_potential, only : adhesive_slope, edge_of_cells, new_tabulated_potential
@@ -31,7 +31,7 @@ contains
       converged, reason, status, message)
       integer(c_int), intent(in) :: nx, ny
       real(c_double), intent(in) :: height(nx, ny)         !! m
-      real(c_double), intent(inout) :: pressure(nx, ny)    !! Pa; a start where warm
+      real(c_double), intent(inout) :: pressure(nx, ny)    !! Pa; in: the start if `warm`
       real(c_double), intent(inout) :: gap(nx, ny)         !! m
       real(c_double), intent(in) :: lx, ly
       integer(c_int), intent(in) :: is_free                !! 1: free boundary, 0: periodic
@@ -83,7 +83,7 @@ contains
       seconds, converged, reason, status, message)
       integer(c_int), intent(in) :: nx, ny
       real(c_double), intent(in) :: height(nx, ny)           !! m
-      real(c_double), intent(inout) :: pressure(nx, ny)      !! Pa; a start where that is given
+      real(c_double), intent(inout) :: pressure(nx, ny)      !! Pa; in: the start if it is given
       real(c_double), intent(inout) :: gap(nx, ny)           !! m; likewise
       real(c_double), intent(inout) :: attraction(nx, ny)    !! -e'(gap), Pa
       real(c_double), intent(in) :: lx, ly
@@ -91,7 +91,7 @@ contains
       real(c_double), intent(in) :: modulus                  !! E*, Pa
       character(len=*), intent(in) :: potential
       real(c_double), intent(in) :: energy, range_           !! J/m2 and m
-      !> Attraction, Pa, and its slope, Pa/m, at equidistant gaps from 0 to the range: the potential where
+      !> Attraction, Pa, and its slope, Pa/m, at equidistant gaps from 0 to the range. They define the potential if
       !> there is more than one value.
       integer(c_int), intent(in) :: values
       real(c_double), intent(in) :: table(values, 2)
@@ -257,7 +257,7 @@ contains
       call report(error, status, message)
    end subroutine operator_symbol
 
-   !> Free an operator; a handle that is not in use is no error.
+   !> Free an operator. A handle that is not in use is ignored.
    subroutine operator_close(handle, status, message)
       integer(c_int), intent(in) :: handle
       integer(c_int), intent(out) :: status

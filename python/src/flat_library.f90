@@ -1,4 +1,4 @@
-!> Python's calls of the library as a whole, and of the input language. See `flat_runs` for the rules.
+!> Calls from Python that concern the library as a whole or the input language. See `flat_runs` for the rules.
 module flat_library
    use, intrinsic :: iso_c_binding, only : c_double, c_int
    use asperity_errors, only : error_type
@@ -27,7 +27,7 @@ contains
       text = version_number
    end subroutine library_version
 
-   !> Use `n` threads from here on, all processors for 0; tell how many that are.
+   !> Use `n` threads from now on, or all processors if n is 0, and return the number of threads.
    subroutine set_thread_count(n, used)
       integer(c_int), intent(in) :: n
       integer(c_int), intent(out) :: used
@@ -42,7 +42,7 @@ contains
       call release_threads()
    end subroutine release_idle_threads
 
-   !> From here on these signals ask the solve in hand to stop, instead of what they do otherwise.
+   !> From now on these signals ask the present solve to stop, instead of their usual action.
    subroutine await_interrupts(n, signals)
       integer(c_int), intent(in) :: n
       integer(c_int), intent(in) :: signals(n)             !! their numbers
@@ -51,7 +51,7 @@ contains
       call begin_watch(stop_was_asked, 0.0_c_double)
    end subroutine await_interrupts
 
-   !> End what `await_interrupts` began. A signal that came meanwhile is sent again.
+   !> Restore the actions that `await_interrupts` replaced. A signal that arrived in between is sent again.
    subroutine end_interrupts(n, signals)
       integer(c_int), intent(in) :: n
       integer(c_int), intent(in) :: signals(n)
@@ -87,11 +87,11 @@ contains
       call report(error, status, message)
    end subroutine input_listed
 
-   !> What `asperity check` prints about a text.
+   !> The text that `asperity check` prints about an input.
    subroutine input_check(text, path, files, most, buffer, length, status, message)
       character(len=*), intent(in) :: text
       character(len=*), intent(in) :: path                     !! where paths start, and for messages
-      integer(c_int), intent(in) :: files                      !! 1: look into the height maps, too
+      integer(c_int), intent(in) :: files                      !! 1: read the height maps, too
       integer(c_int), intent(in) :: most
       integer(c_int), intent(inout) :: buffer(most)             !! codes of the characters
       integer(c_int), intent(out) :: length

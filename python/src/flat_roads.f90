@@ -1,4 +1,4 @@
-!> Python's calls for roads: heights, spectra, statistics, maps. See `flat_runs` for the rules.
+!> Calls from Python for roads: heights, spectra, statistics, maps. See `flat_runs` for the rules.
 module flat_roads
    use, intrinsic :: iso_c_binding, only : c_double, c_int
    use asperity_checksum, only : hexadecimal
@@ -89,7 +89,7 @@ contains
       call report(error, status, message)
    end subroutine surface_psd
 
-   !> Radially averaged power spectral density; `most` rings have room, `rings` are found.
+   !> Radially averaged power spectral density. There is space for `most` rings, and `rings` are returned.
    subroutine surface_radial_psd(height, nx, ny, lx, ly, most, wave_numbers, psd, modes, rings, &
       status, message)
       integer(c_int), intent(in) :: nx, ny
@@ -146,7 +146,7 @@ contains
    !> Checksum of a height map, as a result names it in its attribute `height_maps`.
    subroutine map_checksum(path, dataset, nx, ny, checksum_text, status, message)
       character(len=*), intent(in) :: path
-      character(len=*), intent(in) :: dataset              !! blank: the usual names
+      character(len=*), intent(in) :: dataset              !! blank: 'surface/height' or 'surface'
       integer(c_int), intent(in) :: nx, ny                 !! of the grid that the map is for
       character(len=16), intent(out) :: checksum_text
       integer(c_int), intent(out) :: status

@@ -1,11 +1,11 @@
-!> Python's calls for runs that write files, and for the row and the fields of any run.
+!> Calls from Python for runs that write files, and for the row and the fields of any run.
 !>
-!> The modules `flat_*` are the library for Python, wrapped by f2py: plain arguments, a status and a message.
+!> f2py wraps the modules `flat_*`. Their procedures have plain arguments and return a status and a message.
 !>
-!> Every argument is of a C kind that is written out, since f2py maps a renamed kind to a C float
-!> without a word. Arrays have explicit shapes and are passed without copies: an array of Python of
-!> shape (ny, nx) is one of shape [nx, ny] here. The status is 0 or that of the error.
-!> One call at a time: the planner of the FFTs is not made for two.
+!> Every argument has a C kind under its original name, because f2py maps a renamed kind to a C float without
+!> a warning. Arrays have explicit shapes and are passed without copies: an array of shape (ny, nx) in Python
+!> has the shape [nx, ny] here. The status is 0 or that of the error. Only one call may be active at a time,
+!> because the planner of the FFTs does not allow two.
 module flat_runs
    use, intrinsic :: iso_c_binding, only : c_double, c_int
    use asperity_errors, only : error_input, error_type, fail
@@ -26,14 +26,14 @@ module flat_runs
 
 contains
 
-   !> Read a case and prepare its run: the handle is for the calls that follow.
+   !> Read a case, and prepare its run. The handle identifies the run in later calls.
    subroutine run_open(path, text, output, threads, restart, overwrite, handle, rows, first, &
       result_path, warnings, status, message)
       character(len=*), intent(in) :: path
-      character(len=*), intent(in) :: text                 !! the input; empty: what the file holds
-      character(len=*), intent(in) :: output               !! of the result; blank: what the case says
-      integer(c_int), intent(in) :: threads                !! 0: what the case says
-      integer(c_int), intent(in) :: restart                !! 1: go on from the checkpoint
+      character(len=*), intent(in) :: text                 !! the input; empty: that of the file
+      character(len=*), intent(in) :: output               !! of the result; blank: as in the case
+      integer(c_int), intent(in) :: threads                !! 0: as in the case
+      integer(c_int), intent(in) :: restart                !! 1: continue from the checkpoint
       integer(c_int), intent(in) :: overwrite              !! 1: replace an unfinished run
       integer(c_int), intent(out) :: handle
       integer(c_int), intent(out) :: rows                  !! rows of the whole history
@@ -82,16 +82,16 @@ contains
       call report(error, status, message)
    end subroutine run_open
 
-   !> Do a row of the history; after an error the run is to be closed. Meanwhile some signals ask the
-   !> run to stop, as they do in the program: a row that is given up leaves the run as it was. A signal
-   !> that came is sent again at the end, to whoever handles it outside of the call.
+   !> Do a row of the history. After an error the run must be closed. During the call some signals ask the run to
+   !> stop, as they do in the program; a row that is abandoned does not change the run. A signal that arrived is
+   !> sent again at the end, so that its usual handler receives it.
    subroutine run_step(handle, n, signals, finished, step, time, contact_area, friction, warnings, &
       status, message)
       integer(c_int), intent(in) :: handle
       integer(c_int), intent(in) :: n
       integer(c_int), intent(in) :: signals(n)             !! their numbers
       integer(c_int), intent(out) :: finished              !! 1: no row is left
-      integer(c_int), intent(out) :: step                  !! -1: the row was given up
+      integer(c_int), intent(out) :: step                  !! -1: the row was abandoned
       real(c_double), intent(out) :: time, contact_area, friction
       character(len=20000), intent(out) :: warnings
       integer(c_int), intent(out) :: status
@@ -123,7 +123,7 @@ contains
       call report(error, status, message)
    end subroutine run_step
 
-   !> Write a snapshot and a checkpoint of where a run stands.
+   !> Write a snapshot and a checkpoint of the present state of a run.
    subroutine run_interrupt(handle, status, message)
       integer(c_int), intent(in) :: handle
       integer(c_int), intent(out) :: status
@@ -136,7 +136,7 @@ contains
       call report(error, status, message)
    end subroutine run_interrupt
 
-   !> Close a run; a handle that is not in use is no error.
+   !> Close a run. A handle that is not in use is ignored.
    subroutine run_close(handle, status, message)
       integer(c_int), intent(in) :: handle
       integer(c_int), intent(out) :: status
@@ -188,8 +188,7 @@ contains
       call report(error, status, message)
    end subroutine run_row
 
-   !> A field of a run or a simulation, as a snapshot would hold it; 'height' is the road under the
-   !> rubber.
+   !> A field of a run or a simulation, as in a snapshot.
    subroutine run_field(handle, name, nx, ny, values, status, message)
       integer(c_int), intent(in) :: handle
       character(len=*), intent(in) :: name

@@ -1,4 +1,5 @@
-!> Python's calls for simulations that are advanced row by row and write no files. See `flat_runs` for the rules.
+!> Calls from Python for simulations that are advanced row by row and write no files. See `flat_runs` for the
+!> rules.
 module flat_simulations
    use, intrinsic :: iso_c_binding, only : c_double, c_int
    use asperity_checkpoint, only : checkpoint_reader_type, checkpoint_writer_type
@@ -30,8 +31,8 @@ contains
    subroutine simulation_open(path, text, threads, handle, rows, nx, ny, lx, ly, warnings, status, &
       message)
       character(len=*), intent(in) :: path
-      character(len=*), intent(in) :: text                 !! the input; empty: what the file holds
-      integer(c_int), intent(in) :: threads                !! 0: what the case says
+      character(len=*), intent(in) :: text                 !! the input; empty: that of the file
+      integer(c_int), intent(in) :: threads                !! 0: as in the case
       integer(c_int), intent(out) :: handle
       integer(c_int), intent(out) :: rows                  !! rows of the whole history
       integer(c_int), intent(out) :: nx, ny
@@ -79,7 +80,7 @@ contains
       call report(error, status, message)
    end subroutine simulation_open
 
-   !> Settings without the names of height maps: their checksums say whether they are the same.
+   !> Remove the names of height maps from the settings, because their checksums show whether they are the same.
    function without_files(settings) result(kept)
       character(len=*), intent(in) :: settings             !! lines 'group: name = value'
       character(:), allocatable :: kept, line
@@ -96,7 +97,7 @@ contains
       end do
    end function without_files
 
-   !> Do a row. Where a solver did not converge, the state reached is kept and the status says so.
+   !> Do a row. If a solver does not converge, the state that it has reached is kept, and the status shows it.
    subroutine simulation_step(handle, finished, warnings, status, message)
       integer(c_int), intent(in) :: handle
       integer(c_int), intent(out) :: finished              !! 1: no row is left
@@ -127,7 +128,7 @@ contains
       call report(error, status, message)
    end subroutine simulation_step
 
-   !> Set a load, the velocity or the temperature, from the next row on.
+   !> Set a load, the velocity or the temperature from the next row on.
    subroutine simulation_steer(handle, what, first, second, status, message)
       integer(c_int), intent(in) :: handle
       character(len=*), intent(in) :: what        !! 'pressure', 'force', 'displacement', 'velocity', 'temperature'
@@ -170,7 +171,7 @@ contains
       call report(error, status, message)
    end subroutine simulation_save
 
-   !> Take the state of a simulation from the checkpoint of `path`, written by `simulation_save`.
+   !> Read the state of a simulation from the checkpoint of `path`, which `simulation_save` has written.
    subroutine simulation_load(handle, path, finished, status, message)
       integer(c_int), intent(in) :: handle
       character(len=*), intent(in) :: path
@@ -195,7 +196,7 @@ contains
       call report(error, status, message)
    end subroutine simulation_load
 
-   !> Free a simulation; a handle that is not in use is no error.
+   !> Free a simulation. A handle that is not in use is ignored.
    subroutine simulation_close(handle, status, message)
       integer(c_int), intent(in) :: handle
       integer(c_int), intent(out) :: status

@@ -1,4 +1,5 @@
-!> Operators in hand, known to Python by a number. Not seen by f2py, which has no derived types.
+!> The open operators, which Python identifies by numbers. f2py does not wrap this module, because it does not
+!> support derived types.
 module operator_handles
    use asperity_errors, only : error_input, error_type, fail
    use fft_conv, only : convolution_type
@@ -10,20 +11,20 @@ module operator_handles
 
    integer, parameter :: most = 256     !! operators at a time
 
-   !> An operator and the modulus that it is over.
+   !> An operator and the shear modulus by which its displacements are divided.
    type :: operator_type
       type(convolution_type) :: map     !! for a shear modulus of 1
       real(dp) :: modulus = 1.0_dp      !! shear modulus, Pa
    end type operator_type
 
-   !> What a handle stands for.
+   !> The operator of a handle.
    type :: slot_type
       type(operator_type), pointer :: operator => null()
       integer :: handle = 0
    end type slot_type
 
    type(slot_type) :: slots(most)
-   integer :: last_handle = 0           !! handles are never used again
+   integer :: last_handle = 0           !! handles are never reused
 
 contains
 

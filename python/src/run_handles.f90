@@ -1,5 +1,5 @@
-!> Runs and simulations in hand, known to Python by a number. Not seen by f2py, which has no derived
-!> types. A run writes files; a driven simulation is advanced row by row and writes none.
+!> The open runs and simulations, which Python identifies by numbers. A run writes files; a driven simulation is
+!> advanced row by row and writes none. f2py does not wrap this module, because it does not support derived types.
 module run_handles
    use case_run, only : run_type
    use asperity_errors, only : error_input, error_type, fail
@@ -13,15 +13,15 @@ module run_handles
    integer, parameter :: most = 64      !! runs at a time, and simulations
    character(*), parameter :: closed_simulation = 'the simulation is closed'
 
-   !> A simulation, with what it was before anyone steered it.
+   !> A simulation, with its settings before it was steered.
    type :: driven_type
       type(simulation_type) :: sim
-      character(:), allocatable :: settings      !! what a saved state must agree with
+      character(:), allocatable :: settings      !! settings that must agree with a saved state
       real(dp), allocatable :: start_tau(:)      !! relaxation times of the case, s
       real(dp) :: start_temperature = 0.0_dp     !! C
    end type driven_type
 
-   !> What a handle stands for: one of the two, or nothing.
+   !> The run or the simulation of a handle, or neither.
    type :: slot_type
       type(run_type), pointer :: run => null()
       type(driven_type), pointer :: driven => null()
@@ -29,7 +29,7 @@ module run_handles
    end type slot_type
 
    type(slot_type), target :: slots(2*most)
-   integer :: last_handle = 0           !! handles are never used again: an old one finds nothing
+   integer :: last_handle = 0           !! handles are never reused, so that an old one finds nothing
 
 contains
 
@@ -47,7 +47,7 @@ contains
 
    !> Give a free slot a new handle; 0 and null if there are too many.
    subroutine new_slot(what, handle, slot, error)
-      character(*), intent(in) :: what             !! it is for
+      character(*), intent(in) :: what             !! what it is for, for messages
       integer, intent(out) :: handle
       type(slot_type), pointer, intent(out) :: slot
       type(error_type), allocatable, intent(out) :: error
@@ -91,7 +91,7 @@ contains
       driven => slot%driven
    end subroutine new_driven
 
-   !> The run of a handle, null for a handle that is none of a run.
+   !> The run of a handle; null if the handle is not that of a run.
    function run_of(handle) result(run)
       integer, intent(in) :: handle
       type(run_type), pointer :: run
@@ -103,7 +103,7 @@ contains
       if (associated(slot)) run => slot%run
    end function run_of
 
-   !> The simulation of a handle, null for a handle that is none of a simulation.
+   !> The simulation of a handle; null if the handle is not that of a simulation.
    function driven_of(handle) result(driven)
       integer, intent(in) :: handle
       type(driven_type), pointer :: driven
@@ -151,7 +151,7 @@ contains
       if (.not. associated(sim)) call fail(error, error_input, closed_simulation)
    end subroutine find_sim
 
-   !> Forget a run that is closed, or a simulation that is destroyed; a handle that is not in use is no error.
+   !> Forget a run that is closed, or a simulation that is destroyed. A handle that is not in use is ignored.
    subroutine free_handle(handle)
       integer, intent(in) :: handle
       type(slot_type), pointer :: slot

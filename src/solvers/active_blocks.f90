@@ -1,12 +1,12 @@
-!> Which cells of a field a solver acts on: blocks of 16 cells of a row, joined to runs.
+!> The active cells of a field, on which a solver works: blocks of 16 cells of a row, joined to runs.
 !>
-!> A block is active where a cell of it has pressure or a gap below a level. Work fields are zero
-!> elsewhere, so that passes over the runs are passes over the whole grid.
+!> A block is active if one of its cells has pressure, or a gap below a level. All other cells of the work fields
+!> are zero, so that a pass over the runs has the same effect as one over the whole grid.
 !>
-!> Around the active blocks lies a rim of about 32 cells, on which a preconditioner extends the residual.
-!> It is the same for all rows of a coarse block, the wide row: a wide block of 16 cells by those rows is
-!> in use where an active block is within the rim. With half of this rim the preconditioner needs up to
-!> a third more iterations; a wider one gains nothing.
+!> Around the active blocks lies a rim of about 32 cells, to which a preconditioner extends the residual. The rim
+!> consists of wide blocks: 16 cells by all rows of a coarse block, which are called a wide row. A wide block is
+!> in use if an active block is at most as far away as the rim is wide. With half of this rim the solver needs up
+!> to a third more iterations; a wider rim does not reduce them.
 module active_blocks
    use asperity_parallel, only : on_any_process
    use asperity_precision, only : dp, sp
@@ -48,7 +48,7 @@ module active_blocks
 
 contains
 
-   !> No block is active.
+   !> Make the blocks of a grid. None of them is active yet.
    subroutine new_active_blocks(self, grid, first_y, strips, rim, threads)
       type(active_blocks_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
@@ -74,11 +74,11 @@ contains
       allocate (self%wide_runs(wide_rows), source=0)
    end subroutine new_active_blocks
 
-   !> Make no block active, and set the work fields to zero. Others use the step between solves, so all of its
-   !> cells are set.
+   !> Deactivate all blocks, and set the work fields to zero. The field of the step is used by other procedures
+   !> between solves, so that all of its cells must be set.
    subroutine clear(self, residual, direction, search, step)
       class(active_blocks_type), intent(inout) :: self
-      real(sp), intent(inout) :: residual(0:, 0:)  !! (0:nx+1, 0:rows+1), the rim is left
+      real(sp), intent(inout) :: residual(0:, 0:)  !! (0:nx+1, 0:rows+1), without its border
       real(sp), intent(inout) :: direction(:, :)   !! [nx, rows]
       real(sp), intent(inout) :: search(0:, 0:)    !! (0:nx+1, 0:rows+1)
       real(dp), intent(inout) :: step(:, :)        !! [nx, rows]
@@ -96,10 +96,10 @@ contains
       self%wide = .false.
    end subroutine clear
 
-   !> See which blocks of a row hold pressure, and the least gap of each.
+   !> Find out which blocks of a row have pressure, and the least gap of each block.
    subroutine survey_row(self, everywhere, j, pressure, gap, lowest)
       class(active_blocks_type), intent(inout) :: self
-      logical, intent(in) :: everywhere            !! look for pressure off the active blocks, too
+      logical, intent(in) :: everywhere            !! look for pressure outside the active blocks, too
       integer, intent(in) :: j                     !! number of the row
       real(dp), intent(in) :: pressure(self%nx), gap(self%nx)   !! Pa and m
       real(dp), intent(out) :: lowest              !! least gap of the row, m
@@ -117,7 +117,7 @@ contains
          end do
          self%least(b, j) = least
          lowest = min(lowest, least)
-         ! Where the solver did not act, there is no pressure.
+         ! There is no pressure where the solver has not worked.
          most = 0.0_dp
          if (everywhere .or. self%live(b, j)) then
             !$omp simd reduction(max:most)
@@ -129,8 +129,8 @@ contains
       end do
    end subroutine survey_row
 
-   !> List the runs of blocks that hold a cell with P > 0 or a gap below the level; zero the work fields
-   !> in those that left.
+   !> List the runs of blocks that have a cell with P > 0 or a gap below the level. Set the work fields to zero in
+   !> blocks that are no longer active.
    subroutine list_runs(self, level, residual, direction, step)
       class(active_blocks_type), intent(inout) :: self
       real(dp), intent(in) :: level                !! m
@@ -167,7 +167,7 @@ contains
       end do
    end subroutine list_runs
 
-   !> List the runs of wide blocks; zero the search direction in those that left.
+   !> List the runs of wide blocks. Set the search direction to zero in those that are no longer in use.
    subroutine list_wide_runs(self, search)
       class(active_blocks_type), intent(inout) :: self
       real(sp), intent(inout) :: search(0:, 0:)    !! (0:nx+1, 0:rows+1)
@@ -220,7 +220,7 @@ contains
 
    contains
 
-      !> Blocks of a line that are set or have such a block within a distance.
+      !> The blocks of a line that are set, or are close enough to one that is.
       pure function grown(line, reach)
          logical, intent(in) :: line(:)
          integer, intent(in) :: reach

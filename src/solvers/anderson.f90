@@ -6,16 +6,16 @@
 !>     x + b f - sum gamma_i (dx_i + b df_i),   gamma minimises |f - sum gamma_i df_i|
 !>
 !> with the damping b (type II: D. G. Anderson, J. ACM 12 (1965) 547; H. F. Walker, P. Ni, SIAM J. Numer.
-!> Anal. 49 (2011) 1715). For linear g this is GMRES in another form. It may overshoot where g has kinks:
-!> the caller decides when to accelerate, and calls `forget` where the old differences no longer apply.
+!> Anal. 49 (2011) 1715). For linear g this is equivalent to GMRES. It may overshoot if g has kinks.
+!> Therefore the caller decides when to accelerate, and calls `forget` when the old differences no longer apply.
 !>
-!> A state has one or more components, each with a weight in the norm; a component of weight zero is
-!> carried along by the same gamma. The least squares problem is solved by its normal equations on
-!> columns of unit length, newest column first; a column that depends on newer ones to single precision
-!> is left out. Sums are added row by row in a fixed order: results do not depend on the threads.
+!> An iterate has one or more components, each with a weight in the norm. A component of weight zero is updated
+!> with the same gamma. The least squares problem is solved by its normal equations with columns of unit length,
+!> the newest column first. A column that is linearly dependent on newer ones, within single precision, is left
+!> out. Sums are added row by row in a fixed order, so that results do not depend on the number of threads.
 !>
-!> Memory: for each pair two fields of single precision per component, which is enough because the
-!> residual itself is never taken from them; and two fields of doubles per component.
+!> Memory: two fields in single precision per component for each pair, and two fields of doubles per component.
+!> Single precision is sufficient for the pairs, because the residual itself is never computed from them.
 module anderson
    use asperity_threads, only : thread_count
    use field_sums, only : row_totals
@@ -25,15 +25,15 @@ module anderson
 
    public :: anderson_type, new_anderson
 
-   real(dp), parameter :: dependent = 1.0e-12_dp     !! squared length of what a column adds
+   real(dp), parameter :: dependent = 1.0e-12_dp     !! squared length of the independent part of a column
 
-   !> The last differences. Plain data; may be kept from solve to solve.
+   !> The last differences. This is plain data, which may be kept from solve to solve.
    type :: anderson_type
       integer :: nx = 0, components = 0
       integer :: rows = 0                            !! of this process
-      integer :: pairs = 0                           !! that are kept at most
-      integer :: used = 0                            !! pairs there are
-      real(dp) :: largest = huge(1.0_dp)             !! where a gamma is as large, none is believed
+      integer :: pairs = 0                           !! largest number of pairs
+      integer :: used = 0                            !! present number of pairs
+      real(dp) :: largest = huge(1.0_dp)             !! if a gamma is as large, none is used
       integer, private :: newest = 0
       integer, private :: threads = 1
       logical, private :: begun = .false.            !! there is a last iterate
@@ -50,7 +50,7 @@ module anderson
 
 contains
 
-   !> Make room for a number of pairs.
+   !> Allocate memory for a number of pairs.
    subroutine new_anderson(self, nx, components, rows, pairs)
       type(anderson_type), intent(out) :: self
       integer, intent(in) :: nx, components
@@ -67,7 +67,7 @@ contains
       allocate (self%last_f(nx, components, rows), self%last_g(nx, components, rows))
    end subroutine new_anderson
 
-   !> Start again: what was learnt does not apply any more.
+   !> Discard all differences and start again.
    pure subroutine forget(self)
       class(anderson_type), intent(inout) :: self
 
@@ -76,7 +76,7 @@ contains
       self%begun = .false.
    end subroutine forget
 
-   !> The next iterate from x and its residual; `plain` takes x + b f itself but learns all the same.
+   !> Compute the next iterate from x and its residual. With `plain` it is x + b f, but the new pair is still kept.
    subroutine step(self, weights, f, x, plain, damping)
       class(anderson_type), intent(inout) :: self
       real(dp), intent(in) :: weights(self%components)              !! of the components in the norm
@@ -100,9 +100,9 @@ contains
       end do
    end subroutine step
 
-   !> The next iterate without acceleration but with momentum: x + b f + m (x - the last x). What all
-   !> residuals have in common is followed in steps b/(1 - m) long, while a part that changes its sign from
-   !> one iterate to the next is damped as by b alone. What has been learnt is forgotten.
+   !> Compute the next iterate without acceleration but with momentum: x + b f + m (x - the last x). The part that
+   !> all residuals have in common is followed with an effective factor b/(1 - m), and a part that changes its sign
+   !> from one iterate to the next is damped as by b alone. All differences are discarded.
    subroutine glide(self, f, x, damping, momentum)
       class(anderson_type), intent(inout) :: self
       real(dp), intent(in) :: f(self%nx, self%components, self%rows)  !! g(x) - x
@@ -121,7 +121,7 @@ contains
       end do
    end subroutine glide
 
-   !> A row of it: the last x is the last g less the last f.
+   !> Compute a row of `glide`, where the last x is the last g minus the last f.
    subroutine glide_row(self, damping, m, j, f, x)
       class(anderson_type), intent(inout) :: self
       real(dp), intent(in) :: damping, m
@@ -137,8 +137,8 @@ contains
       x = next
    end subroutine glide_row
 
-   !> The cosine of the angle between a residual and the last one. Where there is none, 0.5, which calls
-   !> the step neither straight nor bent.
+   !> The cosine of the angle between a residual and the last one. If there is no last one, it is 0.5, which
+   !> suggests neither that the iterates follow a line nor that they turn back.
    function turn(self, f) result(cosine)
       class(anderson_type), intent(in) :: self
       real(dp), intent(in) :: f(self%nx, self%components, self%rows)  !! g(x) - x
@@ -181,7 +181,7 @@ contains
       end do
    end subroutine combine_row
 
-   !> Take in the newest pair, and find gamma.
+   !> Add the newest pair, and find gamma.
    subroutine learn(self, weights, f, x, gamma)
       class(anderson_type), intent(inout) :: self
       real(dp), intent(in) :: weights(self%components)
@@ -211,7 +211,7 @@ contains
       call solve_gram(self, sums(self%pairs + 1:), gamma)
    end subroutine learn
 
-   !> A row of the newest pair, and its products: df.df_k, then f.df_k.
+   !> Compute a row of the newest pair, and its products: df.df_k, then f.df_k.
    subroutine learn_row(self, weights, j, f, x, sums)
       class(anderson_type), intent(inout) :: self
       real(dp), intent(in) :: weights(self%components)
@@ -243,7 +243,7 @@ contains
       end do
    end subroutine learn_row
 
-   !> Minimise |f - sum gamma_i df_i|: Cholesky factors of the Gram matrix of unit columns.
+   !> Minimise |f - sum gamma_i df_i| with the Cholesky factors of the Gram matrix of unit columns.
    subroutine solve_gram(self, projections, gamma)
       class(anderson_type), intent(in) :: self
       real(dp), intent(in) :: projections(:)         !! f.df_k

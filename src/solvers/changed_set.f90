@@ -1,17 +1,17 @@
-!> Dense contact on a set of cells that changes by a few cells.
+!> Solves the contact on a set of cells directly with a dense matrix, also after a few cells have changed.
 !>
 !> The matrix K of the set C0 at the start is factored once. For C = C0 without L and with J the
 !> pressures of C0 are
 !>
 !>     p0 = K^-1 (h + level + sum over L of r_b e_b - sum over J of p_j k_j)
 !>
-!> with r_b the gap that opens at a cell which has left, and k_j the displacement of C0 by a joined cell.
-!> p0 = 0 on L, K p = h + level on J and the load are a small system for r, p_j and the level. Its
-!> columns K^-1 e_b and K^-1 k_j are kept, so a cell costs one pair of triangular solves.
+!> with r_b the gap that opens at a cell which has left, and k_j the displacement of C0 caused by a joined cell.
+!> The conditions p0 = 0 on L, K p = h + level on J and the load are a small system for r, p_j and the level. Its
+!> columns K^-1 e_b and K^-1 k_j are kept, so that a changed cell costs one pair of triangular solves.
 !>
-!> Where processes share the rows, each has its rows of the fields, and all solve the same systems: cells
-!> are known by their place in the whole grid and are listed in the order of its rows, and what the systems
-!> need of the displacement is added up from the processes that have it.
+!> If processes share the rows, each has its rows of the fields, and all of them solve the same systems. Cells are
+!> identified by their position in the whole grid and listed in the order of its rows. The displacements that the
+!> systems need are summed over the processes, of which only one has each of them.
 !>
 !> Memory: the matrix, and a column for each cell that has changed.
 module changed_set
@@ -25,9 +25,9 @@ module changed_set
 
    public :: changed_set_type, new_changed_set
 
-   !> A set of cells in contact. Not to be copied.
+   !> A set of cells in contact. A variable of this type must not be copied.
    type :: changed_set_type
-      integer :: factors = 0                           !! factorings so far
+      integer :: factors = 0                           !! number of factorisations so far
       integer, private :: threads = 1
       type(grid_type), private :: grid
       real(dp), private :: load = 0.0_dp               !! sum of P over the cells, Pa
@@ -35,12 +35,12 @@ module changed_set
       real(dp), allocatable, private :: kernel(:, :)   !! displacement by the first cell's unit pressure
       real(dp), allocatable, private :: height(:, :)   !! m
       logical, allocatable, private :: inside(:, :)    !! the set C
-      integer, allocatable, private :: number(:, :)    !! of a cell in C0; minus that of a joined one
+      integer, allocatable, private :: number(:, :)    !! number of a cell in C0; negative for joined cells
       ! Lists and systems, the same on all processes:
       integer, allocatable, private :: cells(:, :)     !! C0, column and row of the grid [2, n]
-      integer, allocatable, private :: changed(:, :)   !! cells of L and J, [2, k]; some may be neither now
-      integer, allocatable, private :: origin(:)       !! their number in C0; 0 where they were not in it
-      logical, allocatable, private :: held(:)         !! they are in C now
+      integer, allocatable, private :: changed(:, :)   !! cells of L and J, [2, k]; some may have changed back
+      integer, allocatable, private :: origin(:)       !! their number in C0; 0 if they were not in it
+      logical, allocatable, private :: held(:)         !! are they in C now?
       real(dp), allocatable, private :: right(:)       !! their height, m
       real(dp), allocatable, private :: matrix(:, :)   !! factors
       real(dp), allocatable, private :: base(:, :)     !! K^-1 h, K^-1 1
@@ -56,7 +56,7 @@ module changed_set
 
 contains
 
-   !> Take a set and factor its matrix.
+   !> Store a set of cells, and factor its matrix.
    subroutine new_changed_set(self, operator, height, load, inside, work)
       type(changed_set_type), intent(out) :: self
       type(steady_operator_type), intent(inout) :: operator
@@ -78,7 +78,7 @@ contains
       call self%refresh()
    end subroutine new_changed_set
 
-   !> Factor the matrix of the set as it is.
+   !> Factor the matrix of the present set.
    subroutine refresh(self)
       class(changed_set_type), intent(inout) :: self
       real(dp), allocatable :: listed(:, :)
@@ -150,7 +150,7 @@ contains
       yes = row >= self%grid%first_row .and. row <= self%grid%last_row
    end function has_row
 
-   !> Note the number of a cell on the process that has it.
+   !> Set the number of a cell on the process that has it.
    pure subroutine set_number(self, cell, number)
       type(changed_set_type), intent(inout) :: self
       integer, intent(in) :: cell(2)
@@ -159,7 +159,7 @@ contains
       if (has_row(self, cell(2))) self%number(cell(1), cell(2) - self%grid%first_row + 1) = number
    end subroutine set_number
 
-   !> Displacement at one cell by the pressure of another: only one process knows it, all others get zero.
+   !> Displacement of one cell under the pressure of another. Only one process knows it; it is zero on all others.
    pure function entry_here(self, at, by) result(displacement)
       type(changed_set_type), intent(in) :: self
       integer, intent(in) :: at(2), by(2)
@@ -179,7 +179,7 @@ contains
       full = self%used >= size(self%changed, 2)
    end function crowded
 
-   !> Take cells out of the set.
+   !> Remove cells from the set.
    subroutine leave(self, leaving, cells)
       class(changed_set_type), intent(inout) :: self
       logical, intent(in) :: leaving(:, :)
@@ -188,7 +188,7 @@ contains
       call change_cells(self, leaving .and. self%inside, .false., cells)
    end subroutine leave
 
-   !> Take cells into the set.
+   !> Add cells to the set.
    subroutine join(self, joining, cells)
       class(changed_set_type), intent(inout) :: self
       logical, intent(in) :: joining(:, :)
@@ -197,7 +197,7 @@ contains
       call change_cells(self, joining .and. .not. self%inside, .true., cells)
    end subroutine join
 
-   !> Take cells into the set, or out of it. Those that differ from C0 for the first time get a column.
+   !> Add cells to the set, or remove them. A cell that differs from C0 for the first time gets a column.
    subroutine change_cells(self, condition, joins, cells)
       type(changed_set_type), intent(inout) :: self
       logical, intent(in) :: condition(:, :)
@@ -223,8 +223,8 @@ contains
       end do
    end subroutine change_cells
 
-   !> The column of a cell that changes for the first time. Where there is no room the caller does without,
-   !> and the next `refresh` sees the cell.
+   !> Add the column of a cell that changes for the first time. If there is no space, the cell has no column until
+   !> the next `refresh` includes it.
    subroutine add_column(self, cell, origin, height)
       type(changed_set_type), intent(inout) :: self
       integer, intent(in) :: cell(2)
@@ -315,7 +315,7 @@ contains
       active = self%held(k) .neqv. self%origin(k) > 0
    end function is_active
 
-   !> The condition of a changed cell: no pressure where it has left, no gap where it has joined.
+   !> The equation of a changed cell: no pressure if it has left, and no gap if it has joined.
    subroutine row_of(self, active, a, row, right)
       type(changed_set_type), intent(in) :: self
       integer, intent(in) :: active(:)

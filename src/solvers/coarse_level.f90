@@ -1,14 +1,14 @@
-!> The coarse level of the normal solver: block means on a grid of about 1/8 of the cells each way.
+!> The coarse level of the normal solver: block means on a grid with about 1/8 of the cells in each direction.
 !>
-!> It serves two ends, each at the cost of transforms of 1/64 of the size:
+!> It has two purposes, each at the cost of transforms of 1/64 of the size:
 !> * the low wave numbers of the preconditioner (module schur_preconditioner);
 !> * a prediction of p.A p, with which a step length is chosen before any transform of full size.
 !>
-!> Where processes share the rows of the grid, each sums over its own rows of blocks. A level of many blocks
-!> is divided among the processes in the same way. A level of few blocks is copied: every process gets the sums
-!> of all (`share_blocks`) and does the same work on them, since that takes less time than the exchanges of a
-!> divided one. Sums over the blocks are added in the order of the rows of blocks, so that both have the
-!> same results.
+!> If processes share the rows of the grid, each sums over its own rows of blocks. A level of many blocks is
+!> divided among the processes in the same way. A level of few blocks is copied: every process gets the sums of
+!> all blocks (`share_blocks`) and does the same work on them, because this takes less time than the exchanges
+!> of a divided level. Sums over the blocks are added in the order of the rows of blocks, so that both ways
+!> have the same results.
 !>
 !> Restriction (block sums over the mean block size) and prolongation (piecewise constant) are adjoint
 !> up to a factor, so that the preconditioner stays symmetric for any numbers of cells.
@@ -26,9 +26,9 @@ module coarse_level
 
    public :: coarse_level_type, edge_rows, inner_rows, new_coarse_level
 
-   real(dp), parameter :: many_blocks = 16384.0_dp   !! from which the level is divided
+   real(dp), parameter :: many_blocks = 16384.0_dp   !! least number of blocks for which the level is divided
 
-   !> Not to be copied.
+   !> The coarse level of a grid. A variable of this type must not be copied.
    type :: coarse_level_type
       integer :: nx = 0, ny = 0                    !! blocks
       real(dp) :: cells = 1.0_dp                   !! cells of a block, on average
@@ -40,9 +40,9 @@ module coarse_level
       type(row_sharing_type) :: sharing            !! of the rows of blocks where the level is divided
       integer, allocatable :: first_y(:)           !! first row of a block among those of this process, [ny + 1]
       real(dp), allocatable :: mean(:, :)          !! block means, (nx, held(1):held(2))
-      real(dp), allocatable :: share(:, :)         !! part of a block that takes part, likewise
+      real(dp), allocatable :: share(:, :)         !! part of a block that is in use, of the same shape
       logical, private :: copied = .false.         !! all processes hold the sums of all blocks
-      real(dp), private :: fine_symbol = 0.0_dp    !! of A at the size of a block
+      real(dp), private :: fine_symbol = 0.0_dp    !! symbol of A for waves of the size of a block
       type(convolution_type), private :: normal
    contains
       generic :: sum_blocks => sum_blocks_single, sum_blocks_double
@@ -117,7 +117,7 @@ contains
       end do
    end subroutine sum_blocks_single
 
-   !> The same in double precision.
+   !> Sums over the blocks along x of values in double precision.
    pure subroutine sum_blocks_double(self, column, blocks)
       class(coarse_level_type), intent(in) :: self
       real(dp), intent(in) :: column(:)
@@ -131,8 +131,8 @@ contains
       end do
    end subroutine sum_blocks_double
 
-   !> Bring numbers for each block, which this process has for its rows of blocks, to all processes that hold
-   !> them. Collective.
+   !> Send the numbers for each block, which a process has for its own rows of blocks, to all processes that hold
+   !> these rows. Collective.
    subroutine share_blocks(self, values)
       class(coarse_level_type), intent(in) :: self
       real(dp), intent(inout) :: values(:, :)          !! [nx, held rows]
@@ -184,7 +184,7 @@ contains
       call self%normal%destroy()
    end subroutine destroy
 
-   !> The rows of a block whose neighbours belong to it, too: first, last, distance.
+   !> The rows of a block whose neighbouring rows belong to it, too: first, last, distance.
    pure function inner_rows(coarse, jb) result(which)
       type(coarse_level_type), intent(in) :: coarse
       integer, intent(in) :: jb

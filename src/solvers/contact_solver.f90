@@ -1,6 +1,6 @@
-!> What every solver of normal contact without adhesion has in common, whatever its method.
+!> The interface of all solvers of normal contact without adhesion.
 !>
-!> Module normal_solvers chooses one by the name of its method.
+!> Module `normal_solvers` chooses a solver by the name of its method.
 module contact_solver
    use fft_conv, only : convolution_type
    use normal_state, only : normal_problem_type
@@ -12,7 +12,7 @@ module contact_solver
 
    public :: contact_solver_type
 
-   !> A solver with its operator, kept from step to step. Not to be copied.
+   !> A solver with its operator, kept from step to step. A variable of this type must not be copied.
    type, abstract :: contact_solver_type
       type(grid_type) :: grid
       type(convolution_type) :: operator           !! A for the shear modulus 1 Pa
@@ -25,7 +25,8 @@ module contact_solver
    abstract interface
       !> Find the pressure P >= 0 under which gap >= 0 and P gap = 0.
       !>
-      !> Not converging is an outcome, not an error: the state reached is handed out.
+      !> A solve that does not converge is an outcome and not an error. The fields then hold the state that was
+      !> reached.
       subroutine solve_contact(self, problem, height, pressure, gap, level, outcome, past)
          import :: contact_solver_type, dp, normal_problem_type, solver_result_type
          class(contact_solver_type), intent(inout), target :: self

@@ -1,8 +1,9 @@
 !> LU factors of a dense matrix that needs no pivoting, such as one with a positive definite symmetric
 !> part.
 !>
-!> By blocks of columns: the diagonal block and the panel below it are factored, then the rest is updated
-!> by matrix products. Threads share the columns of the rest, so results do not depend on their number.
+!> The work proceeds by blocks of columns: the diagonal block and the panel below it are factored, and then the
+!> rest of the matrix is updated by matrix products. Threads share the columns of the rest, so that results do
+!> not depend on their number.
 module dense_factors
    use asperity_precision, only : dp
    implicit none

@@ -1,7 +1,7 @@
 !> Rejects solutions that are not finite.
 !>
 !> Maxima and comparisons ignore values that are not a number (NaN), so that a measure of error may look
-!> small although fields have overflowed. The solvers look at the fields that they hand out.
+!> small although fields have overflowed. The solvers therefore check the fields that they return.
 module finite_fields
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use field_sums, only : row_total

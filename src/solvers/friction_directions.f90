@@ -1,4 +1,4 @@
-!> The sweeps of the preconditioned directions of `friction_cg_fast`, at the points of one row.
+!> The sweeps of `friction_cg_fast` that form the preconditioned directions, over the points of one row.
 !>
 !> Like those of module `friction_rows`, which explains `tangent`, they are loops without branches or
 !> structures that the compiler can turn into vector instructions.
@@ -11,7 +11,7 @@ module friction_directions
    public :: scaled_row, total_of, turn_sums_type, turned_row, uniform_type, unscaled_row, z_sums_type
 
    !> The part of the mean mode that is treated apart from the preconditioner (module
-   !> `friction_preconditioner`): c, and what it displaces on average, (h/N) E c.
+   !> `friction_preconditioner`): c, and the mean displacement that it causes, (h/N) E c.
    type :: uniform_type
       real(dp) :: traction(2) = 0.0_dp       !! c, Pa
       real(dp) :: displacement(2) = 0.0_dp   !! m
@@ -38,7 +38,7 @@ module friction_directions
 
 contains
 
-   !> w Z (g - H e c) of a row, and g.z_old.
+   !> Compute w Z (g - H e c) in a row, and g.z_old.
    pure subroutine scaled_row(compliance, uniform, r, tangent, z, a, cross)
       real(dp), intent(in) :: compliance             !! a_0
       type(uniform_type), intent(in) :: uniform
@@ -69,14 +69,14 @@ contains
       end do
    end subroutine scaled_row
 
-   !> z of a row from the preconditioned field; g.z, the sums of z and of lam w z.
+   !> Compute z in a row from the preconditioned field, g.z, and the sums of z and of lam w z.
    pure subroutine unscaled_row(compliance, uniform, r, tangent, z, sums)
       real(dp), intent(in) :: compliance
       type(uniform_type), intent(in) :: uniform
       real(dp), intent(in), contiguous :: r(:, :)          !! [nx, 2] m
       real(dp), intent(in), contiguous :: tangent(:, :)    !! [nx, 3]
       real(dp), intent(inout), contiguous :: z(:, :)       !! [nx, 2] in: the preconditioned field
-      type(z_sums_type), intent(inout) :: sums             !! comes with g.z_old
+      type(z_sums_type), intent(inout) :: sums             !! in: with g.z_old
       real(dp) :: rv, rx_z, ry_z, gx, gy, bent, over, rz, sx, sy, bx, by, cx, cy, mean_x, mean_y
       integer :: i
 
@@ -93,7 +93,7 @@ contains
       do i = 1, size(r, 1)
          over = (1.0_dp - tangent(i, 3))/compliance
          bent = compliance*(1.0_dp - tangent(i, 3))
-         ! The part of r along v goes first: beside a long slip, g is otherwise lost in its round-off.
+         ! Subtract the part of r along v first. If the slip is long, g would otherwise be lost in its round-off.
          rv = r(i, 1)*tangent(i, 1) + r(i, 2)*tangent(i, 2)
          rx_z = r(i, 1) - rv*tangent(i, 1)
          ry_z = r(i, 2) - rv*tangent(i, 2)
@@ -115,7 +115,7 @@ contains
       sums%bent = [bx, by]
    end subroutine unscaled_row
 
-   !> d = z + w Z c + beta Z d of a row, z' = z + w Z c; g.d and the curvature of the bounds along d.
+   !> Compute d = z + w Z c + beta Z d and z' = z + w Z c in a row, g.d, and the curvature of the bounds along d.
    pure subroutine turned_row(compliance, beta, c, r, tangent, z, d, sums)
       real(dp), intent(in) :: compliance
       real(dp), intent(in) :: beta

@@ -1,4 +1,4 @@
-!> The fields of the tangential problem: the caller's, and those that the methods share.
+!> The fields of the tangential problem: those of the caller, and the work fields that the methods share.
 !>
 !> Vector fields have the shape [nx, 2, rows], so that a row of both components is one contiguous argument.
 module friction_fields
@@ -8,18 +8,18 @@ module friction_fields
 
    public :: friction_fields_type, friction_work_type
 
-   !> The caller's fields.
+   !> The fields of the caller.
    type :: friction_fields_type
       real(dp), pointer, contiguous :: pressure(:, :) => null()    !! [nx, rows] P, Pa
       real(dp), pointer, contiguous :: slope_x(:, :) => null()     !! [nx, rows] H_x; any size without slope
       real(dp), pointer, contiguous :: slope_y(:, :) => null()     !! [nx, rows] H_y
       real(dp), pointer, contiguous :: drive(:, :, :) => null()    !! [nx, 2, rows] DX', m
-      !> [nx, 2, rows] T_h, a given traction, Pa: r = DX' - A (T + T_h) at no cost of a product. May be
-      !> missing.
+      !> [nx, 2, rows] T_h, a given traction, Pa: r = DX' - A (T + T_h), without an additional product. It may
+      !> be missing.
       real(dp), pointer, contiguous :: past(:, :, :) => null()
       !> [nx, rows] The share of its bound that a cell may carry, 0 to 1: 0 where it is open, 1 where it is in
       !> contact; in between it touches without pressure, in a part of its area. `pressure` is then P times
-      !> the share, and the states are only looked at for cells that likely slip. May be missing.
+      !> the share, and the states are only used to find cells that are likely to slip. It may be missing.
       real(dp), pointer, contiguous :: share(:, :) => null()
       real(dp), pointer, contiguous :: traction(:, :, :) => null() !! [nx, 2, rows] T, Pa; in: the start
       real(dp), pointer, contiguous :: slip(:, :, :) => null()     !! [nx, 2, rows] out: r, everywhere, m

@@ -1,9 +1,9 @@
-!> What a method for the tangential problem is.
+!> The interface of all methods for the tangential problem.
 !>
-!> A method iterates on a `friction_problem_type` until it is solved. It may give up: the solver sees
-!> from `solved` whether it has. It asks once in each iteration whether the solve is to be given up
-!> (module `stop_watch`); if so it returns with `stopped`. To add a method: extend the type, and make it
-!> in `choose_method` of module `friction_cg`.
+!> A method iterates on a `friction_problem_type` until the problem is solved. It may also give up; the solver
+!> then finds that `solved` is false. A method calls `stop_is_due` (module `stop_watch`) once in each iteration, and
+!> returns with `stopped` if a stop is due. To add a method, extend the type, and add its name to
+!> `choose_method` of module `friction_cg`.
 module friction_method
    use asperity_precision, only : dp, int64
    use fft_conv, only : convolution_type
@@ -13,17 +13,17 @@ module friction_method
 
    public :: friction_goal_type, friction_method_type
 
-   !> When to stop.
+   !> The conditions under which an iteration ends.
    type :: friction_goal_type
       real(dp) :: tolerance = 1.0e-6_dp      !! of the residual and of the change of T
       integer :: most_iterations = 1000      !! counted over all calls of a solve
-      real(dp) :: fall = 0.0_dp              !! stop where the residual has fallen by this factor, too
+      real(dp) :: fall = 0.0_dp              !! also stop when the residual has fallen by this factor
    end type friction_goal_type
 
-   !> A method with its work fields. Not to be copied.
+   !> A method with its work fields. A variable of this type must not be copied.
    type, abstract :: friction_method_type
-      integer(int64) :: ffts = 0             !! transforms done so far beside those of the operator
-      logical :: stopped = .false.           !! the last call of `iterate` was given up
+      integer(int64) :: ffts = 0             !! transforms so far, without those of the operator
+      logical :: stopped = .false.           !! the last call of `iterate` was stopped
    contains
       procedure(iterate_method), deferred :: iterate
       procedure(free_memory), deferred :: destroy
@@ -31,8 +31,8 @@ module friction_method
 
    abstract interface
 
-      !> Iterate until the problem is solved, the goal's limits are reached, or the method gives up. On
-      !> entry and on return the slip and its measures belong to T.
+      !> Iterate until the problem is solved, a limit of the goal is reached, or the method gives up. On entry and on
+      !> return the slip and its measures are those that belong to T.
       subroutine iterate_method(self, problem, operator, goal, iterations)
          import :: convolution_type, friction_goal_type, friction_method_type, friction_problem_type
          implicit none

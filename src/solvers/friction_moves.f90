@@ -1,4 +1,4 @@
-!> Moves of the traction: T' = T + step d, and every point back within its bound.
+!> Moves of the traction: T' = T + step d, after which points outside their bound are returned to it.
 module friction_moves
    use asperity_precision, only : dp, int8
    use fft_conv, only : convolution_type
@@ -9,20 +9,20 @@ module friction_moves
 
    public :: move, move_total, pseudo_inverse
 
-   real(dp), parameter :: few = 1.0e-6_dp      !! points that cannot make good for all others
-   integer, parameter :: corrections = 12       !! of a total, at most
+   real(dp), parameter :: few = 1.0e-6_dp      !! fraction of points that cannot compensate for the others
+   integer, parameter :: corrections = 12       !! largest number of corrections of a total
    !> The part of a total that may be missing: the slip that it makes over the largest residual.
    real(dp), parameter :: negligible = 0.1_dp
 
 contains
 
-   !> T' = T + step d, put back.
+   !> Compute T' = T + step d, and return points to their bounds.
    subroutine move(problem, operator, step, direction, again, transform, returned)
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
       real(dp), intent(in) :: step
       real(dp), intent(in), contiguous :: direction(:, :, :)     !! [nx, 2, rows] d, Pa
-      logical, intent(in) :: again                   !! from the T before the last move
+      logical, intent(in) :: again                   !! start again from the T before the last move
       logical, intent(in) :: transform               !! transform the rows of T' on the way
       logical, intent(out) :: returned               !! points were put back
       type(move_sums_type) :: sums
@@ -31,11 +31,11 @@ contains
       returned = sums%returned > 0.0_dp
    end subroutine move
 
-   !> The same, but the points that stuck keep the total of T + step d as far as their bounds allow it: a
-   !> uniform traction c makes up for what the points that are put back lose. Without it, a small change of
-   !> the total would move the whole contact if the mean mode is stiff. (What points that slip miss by
-   !> turning is of second order.) What is missed, m(c), is monotone: c is found by Newton's steps, each cut
-   !> short where it goes too far.
+   !> Do the same as `move`, but keep the total of T + step d as far as the bounds allow it. A uniform traction c
+   !> is added at the points that stuck, to compensate for the points that are returned to their bounds. Without
+   !> it, a change of the total would move the whole contact if the mean mode is soft. (The total that slipping
+   !> points lose by turning is of second order.) The missing total m(c) is monotone, so that c is found by Newton's
+   !> method, with steps that are shortened if they go too far.
    subroutine move_total(problem, operator, step, direction, again, returned)
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
@@ -63,7 +63,7 @@ contains
       returned = sums%returned > 0.0_dp
    end subroutine move_total
 
-   !> Add s to the uniform traction c of a move, or the part of s where m.s = 0 (regula falsi, Illinois).
+   !> Add s to the uniform traction c of a move, or the part of s for which m.s = 0 (regula falsi, Illinois).
    subroutine correct_total(problem, operator, how, direction, s, allowed, sums, trial)
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
@@ -102,7 +102,7 @@ contains
 
    contains
 
-      !> Move with c + t s, and m.s there.
+      !> Move with c + t s, and compute m.s.
       subroutine try(value)
          real(dp), intent(out) :: value
 
@@ -114,7 +114,7 @@ contains
 
    end subroutine correct_total
 
-   !> The rows of all moves.
+   !> Move all rows, and form the sums.
    subroutine move_rows(problem, operator, how, direction, transform, sums)
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
@@ -136,7 +136,7 @@ contains
       problem%change = sqrt(sums%changed/max(sums%size, tiny(1.0_dp)))
    end subroutine move_rows
 
-   !> A row of T' = T + step d, put back.
+   !> Compute a row of T' = T + step d, and return points to their bounds.
    subroutine move_row(problem, how, d, j, sums)
       type(friction_problem_type), intent(inout) :: problem
       type(move_type), intent(in) :: how
@@ -154,11 +154,11 @@ contains
       problem%contact(:, j) = int(state, int8)
    end subroutine move_row
 
-   !> Inverse of the symmetric semidefinite matrix (xx, xy; xy, yy) on the axes that it does not leave
-   !> out; 0 for 0.
+   !> Pseudo-inverse of the symmetric semidefinite matrix (xx, xy; xy, yy). Eigenvalues that are too small are
+   !> left out; the result for a zero matrix is zero.
    pure function pseudo_inverse(matrix, left_out) result(inverse)
       real(dp), intent(in) :: matrix(3)              !! xx, xy, yy
-      real(dp), intent(in) :: left_out               !! of the larger eigenvalue
+      real(dp), intent(in) :: left_out               !! an eigenvalue below this part of the larger one is left out
       real(dp) :: inverse(2, 2)
       real(dp) :: larger, smaller, axis(2)
 

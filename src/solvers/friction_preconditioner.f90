@@ -1,5 +1,5 @@
-!> The preconditioner of the tangential problem: from the slip that should vanish, the change of traction
-!> that would remove it if every point kept its state.
+!> The preconditioner of the tangential problem. From the slip that should vanish, it computes the change of
+!> traction that would remove this slip if every point kept its state.
 !>
 !> With the names of module `friction_cg_fast`,
 !>
@@ -8,20 +8,20 @@
 !>     w = a_0/(a_0 + lam)                   a_0: displacement of a cell under its own unit traction
 !>     z = Z [w M (w g) + (1-w)/(a_0+lam) g] M: inverse of the periodic 2 x 2 symbol
 !>
-!> Where all points slip far, lam is much larger than a_0 and w is small: what a cell displaces hardly
-!> counts beside the curvature of the bounds, and M less still, since it comes with the square of w. Then
-!> z = w/a_0 g, without transforms; the number of iterations stays the same.
+!> If all points slip far, lam is much larger than a_0 and w is small. The displacement of a cell is then
+!> negligible compared with the curvature of the bounds, and the term with M even more so, because it has the
+!> factor w^2. In this case z = w/a_0 g is used, which needs no transforms and as many iterations.
 !>
-!> A thick block makes the mean mode h of a periodic operator (for G = 1) its largest by far. Every
-!> field that is zero outside the contact excites it. It is taken out of g and z by the two fields e = w
-!> Z of uniform traction: with E = sum of w Z, H = A + lam and A ~ h/N on the mean, H e = (h/N) E + lam
-!> w Z and K = e.H e = (h/N) E E + sum of lam w^2 Z,
+!> In a thick block the mean mode h of a periodic operator (for G = 1) is by far its largest. Every field that is
+!> zero outside the contact excites it. It is eliminated from g and z with the two fields e = w Z of
+!> uniform traction: with E = sum of w Z, H = A + lam, and A ~ h/N on the mean, H e = (h/N) E + lam w Z and
+!> K = e.H e = (h/N) E E + sum of lam w^2 Z,
 !>
 !>     c = K^-1 sum(w g)
 !>     Z (g - H e c) goes through the preconditioner to z0
 !>     z = z0 + e (c - K^-1 (H e).z0)
 !>
-!> The last term is left to the sweep that forms the next direction, which adds w Z `shift` to z.
+!> The last term is added later, by the sweep that forms the next direction: it adds w Z `shift` to z.
 module friction_preconditioner
    use asperity_errors, only : error_type
    use asperity_precision, only : dp, pi
@@ -36,12 +36,12 @@ module friction_preconditioner
 
    public :: friction_preconditioner_type, new_friction_preconditioner
 
-   real(dp), parameter :: light = 0.1_dp         !! mean w of points that all slip below which M is left out
+   real(dp), parameter :: light = 0.1_dp         !! M is left out if all points slip and their mean w is less
 
-   !> The preconditioner, and what its last use found.
+   !> The preconditioner, and the results of its last use.
    type :: friction_preconditioner_type
       type(convolution_type), private :: inverse         !! M
-      real(dp), private :: half_wave = 0.0_dp            !! mean compliance where there is none, m
+      real(dp), private :: half_wave = 0.0_dp            !! mean compliance if the solid has none, m
       logical, private :: periodic = .true.
       real(dp), allocatable :: z(:, :, :)                !! [nx, 2, rows]
       real(dp) :: shift(2) = 0.0_dp                      !! w Z shift is still to be added to z
@@ -76,7 +76,7 @@ contains
       allocate (self%z(grid%nx, 2, grid%rows()), source=0.0_dp)
    end subroutine new_friction_preconditioner
 
-   !> Let the mean mode of M be the inverse of the operator's.
+   !> Set the mean mode of M to the inverse of that of the operator.
    subroutine set_mean_stiffness(self, operator)
       class(friction_preconditioner_type), intent(inout) :: self
       type(convolution_type), intent(in) :: operator
@@ -88,7 +88,7 @@ contains
       call self%inverse%symbols%set_mean_compliance(1.0_dp/mean)
    end subroutine set_mean_stiffness
 
-   !> z from the residual, g.z and g.z_old.
+   !> Compute z from the residual, g.z and g.z_old.
    subroutine apply(self, problem)
       class(friction_preconditioner_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
@@ -113,7 +113,7 @@ contains
       self%gz = sums%gz + dot_product(problem%sums%residual, self%shift)
    end subroutine apply
 
-   !> Do all points slip, with bounds so curved that A hardly counts beside them? Then M is of no use.
+   !> Do all points slip with bounds so curved that A is negligible in comparison? M is then left out.
    pure function bounds_outweigh(problem) result(yes)
       type(friction_problem_type), intent(in) :: problem
       logical :: yes
@@ -123,7 +123,7 @@ contains
       yes = problem%slipping == problem%cells .and. weights < light*problem%cells
    end function bounds_outweigh
 
-   !> The rows of z with 1/a_0 for M, which needs no transforms: what is left is z = w/a_0 Z (g - H e c).
+   !> Compute the rows of z with 1/a_0 in place of M, without transforms: z = w/a_0 Z (g - H e c).
    subroutine divide_rows(self, problem, uniform, rows)
       type(friction_preconditioner_type), intent(inout) :: self
       type(friction_problem_type), intent(in) :: problem
@@ -143,7 +143,7 @@ contains
       end do
    end subroutine divide_rows
 
-   !> The rows of z with M.
+   !> Compute the rows of z with M.
    subroutine precondition_rows(self, problem, uniform, rows)
       type(friction_preconditioner_type), intent(inout) :: self
       type(friction_problem_type), intent(in) :: problem
@@ -179,13 +179,13 @@ contains
       call self%inverse%forward_row(2, j, g(:, 2))
    end subroutine scale_row
 
-   !> A row of z.
+   !> Transform a row back, and compute z in it.
    subroutine unscale_row(self, problem, uniform, j, sums)
       type(friction_preconditioner_type), intent(inout) :: self
       type(friction_problem_type), intent(in) :: problem
       type(uniform_type), intent(in) :: uniform
       integer, intent(in) :: j
-      type(z_sums_type), intent(inout) :: sums     !! comes with g.z_old
+      type(z_sums_type), intent(inout) :: sums     !! in: with g.z_old
 
       call self%inverse%backward_row(1, j, self%z(:, 1, j))
       call self%inverse%backward_row(2, j, self%z(:, 2, j))
@@ -193,7 +193,7 @@ contains
          problem%work%tangent(:, :, j), self%z(:, :, j), sums)
    end subroutine unscale_row
 
-   !> K^-1 and (h/N) E; 0 where the mean mode is left alone.
+   !> K^-1 and (h/N) E. They are 0 if the mean mode is not treated separately.
    subroutine mean_mode(problem, inverse, coupling)
       type(friction_problem_type), intent(in) :: problem
       real(dp), intent(out) :: inverse(2, 2)

@@ -1,26 +1,25 @@
-!> The tangential problem of one step, and the state of its solution: what the methods of `friction_cg`
-!> share.
+!> The tangential problem of one step and the state of its solution, which all methods of `friction_cg` share.
 !>
-!> Unknown: the traction T on the contact. The slip is r = DX - A (T + T_h), T_h a given traction.
-!> Wanted is T within the bound of module `friction_law`, with r = 0 where T is inside (stick) and,
-!> where T is on the bound (slip), r along the direction of slip v (D = T - T*, or D - n (n.D) by
-!> the physical law). The residual of a point
+!> The unknown is the traction T on the contact. The slip is r = DX - A (T + T_h), where T_h is a given traction. T
+!> must be within the bound of module `friction_law`, with r = 0 where T is inside the bound (stick) and, where
+!> T is on the bound (slip), r along the direction of slip v (D = T - T*, or D - n (n.D) by the physical law).
+!> The residual of a point is
 !>
 !>     g = r                      inside, or on the bound with r.v < 0
 !>     g = r - (r.v) v/|v|^2      on the bound with r.v >= 0
 !>
-!> so that g = 0 everywhere is the solution: stick, direction of slip and no reversed slip.
+!> so that g = 0 everywhere is the solution: points stick, or slip in the right direction and not in reverse.
 !>
-!> A method changes T by `move` or `move_total` (module `friction_moves`), and then brings the slip and
-!> its measures up to date: by `update_slip` from T itself, or by `advance_slip` from the slip before and
-!> the product A d that the method has at hand. Whoever changes T or r measures again: `tangent`, the
-!> states of the points, the residual and the sums of the last measure always belong to T and r.
+!> A method changes T by `move` or `move_total` (module `friction_moves`), and then updates the slip and its
+!> measures: by `update_slip` from T itself, or by `advance_slip` from the slip before and the product A d that
+!> the method has computed. Every procedure that changes T or r measures again, so that `tangent`, the states of
+!> the points, the residual and the sums of the last measure always belong to the present T and r.
 !>
-!> Where the total of T is prescribed, the position c of the road is unknown too: r = DX + c - A (T + T_h).
+!> If the total of T is prescribed, the position c of the road is unknown, too: r = DX + c - A (T + T_h).
 !> Module `road_spring` gives c as a function of the total.
 !>
 !> Each pass over the fields is one loop over rows, fused with the transforms of its row. Sums are
-!> formed by row and added up in order: the results do not depend on the number of threads or processes.
+!> formed by row and added up in order, so that the results do not depend on the number of threads or processes.
 module friction_problem
    use asperity_precision, only : dp, int8
    use fft_conv, only : columns_apply, convolution_type
@@ -35,12 +34,12 @@ module friction_problem
 
    public :: friction_problem_type
 
-   !> A point whose s (module `friction_law`) is below this is on its bound.
+   !> A point whose s (module `friction_law`) is below this value is on its bound.
    real(dp), parameter :: on_bound = 1.0_dp + 1.0e-9_dp
    real(dp), parameter :: outermost = 4.0_dp              !! a slipping point whose s is above it sticks
    real(dp), parameter :: stiffest = 1.0e15_dp            !! curvature of a bound, in units of a_0
 
-   !> The problem, and the state of its solution.
+   !> The problem and the state of its solution.
    type, extends(friction_fields_type) :: friction_problem_type
       type(friction_law_type) :: law
       integer :: nx = 0
@@ -52,7 +51,7 @@ module friction_problem
       real(dp) :: mean_compliance(2) = 0.0_dp
       real(dp) :: least_scale = 0.0_dp       !! least `scale`, m: keeps round-off from counting as displacement
       logical :: near = .false.              !! T starts near the solution
-      logical :: settle = .true.             !! the problem is solved only when T no longer changes, too
+      logical :: settle = .true.             !! solved only if T no longer changes, too
       type(road_spring_type) :: spring       !! holds the road where the total of T is prescribed
       ! The state of the solution.
       type(friction_work_type), pointer :: work => null()
@@ -60,7 +59,7 @@ module friction_problem
       logical :: fresh = .false.             !! r comes from DX - A T, not from a recurrence
       integer :: cells = 0                   !! in contact
       integer :: slipping = 0                !! on the bound
-      integer :: released = 0                !! left the bound since the last move
+      integer :: released = 0                !! points that left the bound since the last move
       type(measure_sums_type) :: sums        !! of the last measure
       real(dp) :: scale = 0.0_dp             !! of the displacements, m
       real(dp) :: residual = 0.0_dp          !! largest |g| over that scale
@@ -81,7 +80,7 @@ module friction_problem
 
 contains
 
-   !> Project the first T: points that slipped in the step before go onto their bound, others within it.
+   !> Project the first T: points that slipped in the step before are placed on their bound, and others within it.
    !> Then compute the slip of this T and measure it.
    subroutine start(self, operator)
       class(friction_problem_type), intent(inout) :: self
@@ -133,7 +132,7 @@ contains
          t = 0.0_dp
          if (self%contact(i, j) /= contact_open) then
             t = self%traction(i, :, j)
-            ! Slip points go back on their bound from both sides, others only from outside.
+            ! Slipping points are returned to their bound from both sides, others only from outside.
             limit = merge(outermost, 1.0_dp, self%contact(i, j) == contact_slip)
             call self%place_on_bound(i, j, limit, t, s)
             self%contact(i, j) = merge(contact_slip, contact_stick, s < limit .or. s <= on_bound)
@@ -159,7 +158,7 @@ contains
       call self%law%place_on_bound(self%pressure(i, j), self%slope_at(i, j), limit, t, s, share)
    end subroutine place_on_bound
 
-   !> grad H at a point, 0 where the slope does not count.
+   !> grad H at a point; 0 if the slope effect is off.
    pure function slope_at(self, i, j) result(slope)
       class(friction_problem_type), intent(in) :: self
       integer, intent(in) :: i, j
@@ -214,7 +213,7 @@ contains
       end do
    end subroutine transform_tractions
 
-   !> r = DX - A T from T alone; then measure.
+   !> Compute r = DX - A T from T alone, and measure it.
    subroutine refresh_slip(self, operator)
       class(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
@@ -223,7 +222,7 @@ contains
       call self%update_slip(operator)
    end subroutine refresh_slip
 
-   !> r = DX - A T from the transformed rows of T; then measure.
+   !> Compute r = DX - A T from the transformed rows of T, and measure it.
    subroutine update_slip(self, operator)
       class(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
@@ -234,7 +233,7 @@ contains
       call take_slip(self, operator, 1.0_dp)
    end subroutine update_slip
 
-   !> r = r - step A d, after the operator's columns have been done for d; then measure.
+   !> Update r = r - step A d, after the columns of the transform have been done for d, and measure it.
    subroutine advance_slip(self, operator, step)
       class(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
@@ -245,7 +244,7 @@ contains
       call take_slip(self, operator, step)
    end subroutine advance_slip
 
-   !> Transform all rows back, update r and measure it: what `update_slip` and `advance_slip` share.
+   !> Transform all rows back, update r and measure it. `update_slip` and `advance_slip` share this.
    subroutine take_slip(self, operator, factor)
       type(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
@@ -282,7 +281,7 @@ contains
       end do
    end subroutine take_slip_row
 
-   !> r = DX + c, without a product, because T is zero everywhere.
+   !> Set r = DX + c without a product, because T is zero everywhere.
    subroutine start_from_rest(self)
       type(friction_problem_type), intent(inout) :: self
       integer :: c, j
@@ -298,7 +297,7 @@ contains
       call shift_slip(self, self%spring%offset)
    end subroutine start_from_rest
 
-   !> Move the free end of the spring by `way`, and the road with it; then measure.
+   !> Move the free end of the spring by `way`, and the road with it, and measure.
    subroutine move_spring_end(self, way)
       class(friction_problem_type), intent(inout) :: self
       real(dp), intent(in) :: way(2)               !! m
@@ -307,7 +306,7 @@ contains
       call shift_slip(self, way)
    end subroutine move_spring_end
 
-   !> r = r + way; then measure.
+   !> Add `way` to r everywhere, and measure it.
    subroutine shift_slip(self, way)
       type(friction_problem_type), intent(inout) :: self
       real(dp), intent(in) :: way(2)               !! m
@@ -341,7 +340,7 @@ contains
       self%contact(:, j) = int(state, int8)
    end subroutine measure_row
 
-   !> The residual from the sums of `measure_row`.
+   !> Compute the residual from the sums of `measure_row`.
    subroutine finish_measure(self, rows)
       type(friction_problem_type), intent(inout) :: self
       type(measure_sums_type), intent(in) :: rows(:)
@@ -355,7 +354,7 @@ contains
       self%residual = sqrt(self%sums%largest)/self%scale
    end subroutine finish_measure
 
-   !> Do residual and, where it counts, change of T meet a tolerance?
+   !> Does the residual meet a tolerance, and with `settle` also the change of T?
    pure function solved(self, tolerance) result(yes)
       class(friction_problem_type), intent(in) :: self
       real(dp), intent(in) :: tolerance

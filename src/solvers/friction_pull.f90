@@ -1,16 +1,16 @@
-!> A prescribed total of the traction, for the tangential solver.
+!> A prescribed total of the traction for the tangential solver.
 !>
-!> Along x, y or both the mean of T over the grid can be prescribed. How far the road is, `offset`, is
-!> then found: r = DX' + offset - A (T + T_h). The road hangs on springs (module `road_spring`) that
+!> The mean of T over the grid can be prescribed along x, y or both. The position `offset` of the road is
+!> then an unknown: r = DX' + offset - A (T + T_h). The road is held by springs (module `road_spring`) that
 !> are much softer than the contact, and their ends are moved until the total is right.
 !>
-!> The mean mode of the operator adds a uniform displacement that only the road's place depends on. It
-!> is taken out of the operator for the solve, so that the springs have to be softer than the contact
-!> alone, and given back to the offset afterwards. On a free map the symbol at zero wave number adds such
-!> a uniform displacement, too.
+!> The mean mode of the operator adds a uniform displacement, which affects only the position of the road. It is
+!> removed from the operator during the solve, so that the springs need only be softer than the contact itself, and
+!> added to the offset afterwards. On a free map the symbol at zero wave number adds such a uniform displacement,
+!> too.
 !>
-!> With a mass between the pull and the contact the total of T may differ from the pull. It then moves
-!> the road by offset = (offset given) - yielding (mean T - traction), which is a spring of its own.
+!> If there is a mass between the pull and the contact, the total of T may differ from the pull. The difference
+!> moves the road: offset = (given offset) - yielding (mean T - traction). This is a spring, too.
 module friction_pull
    use fft_conv, only : convolution_type
    use field_sums, only : field_count, field_sum
@@ -22,18 +22,18 @@ module friction_pull
 
    public :: friction_pull_type
 
-   real(dp), parameter :: softer = 100.0_dp      !! the spring against the contact
+   real(dp), parameter :: softer = 100.0_dp      !! compliance of the springs over that of the contact
 
-   !> The prescribed mean traction, and the road's offset that the solver found for it.
+   !> The prescribed mean traction, and the offset of the road that the solver finds for it.
    type :: friction_pull_type
       logical :: along(2) = .false.              !! the mean of T is prescribed along x, y
       real(dp) :: traction(2) = 0.0_dp           !! that mean, Pa
-      !> Before a solve this is a guess, or the place of a mass whose T has the mean prescribed; after it
-      !> what was found, 0 where nothing is prescribed. In the units of DX'.
+      !> Before a solve this is a guess, or the offset of a mass for which T has the prescribed mean. After the solve
+      !> it is the solution, or 0 along a direction without a prescribed mean. In the units of DX'.
       real(dp) :: offset(2) = 0.0_dp
       real(dp) :: yielding(2) = 0.0_dp           !! m for G = 1 Pa; 0: the total is met
       logical :: slides_off = .false.            !! out: the pull is more than the friction can hold
-      real(dp), private :: mean_mode(2) = 0.0_dp !! symbols taken out of the operator
+      real(dp), private :: mean_mode(2) = 0.0_dp !! symbols that were removed from the operator
    contains
       procedure :: hang
       procedure :: take_off
@@ -43,12 +43,12 @@ module friction_pull
 
 contains
 
-   !> Hang the road on its springs.
+   !> Attach the road to its springs.
    subroutine hang(self, problem, operator, soft)
       class(friction_pull_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
-      real(dp), intent(in) :: soft               !! from this compliance on the mean mode is treated apart, m
+      real(dp), intent(in) :: soft               !! mean modes from this compliance on are treated separately, m
       real(dp) :: cells, touching
       integer :: c
 
@@ -76,7 +76,7 @@ contains
          problem%compliance/sqrt(touching)*norm2(problem%spring%pull))
    end subroutine hang
 
-   !> Give the operator its mean mode back, and add the displacement of this mode to the road's offset.
+   !> Restore the mean mode of the operator, and add the displacement of this mode to the offset of the road.
    subroutine take_off(self, problem, operator)
       class(friction_pull_type), intent(inout) :: self
       type(friction_problem_type), intent(in) :: problem

@@ -1,19 +1,19 @@
-!> The work of the tangential solver at the points of one row: moves of the traction and measures of the
+!> The sweeps of the tangential solver over the points of one row: moves of the traction and measures of the
 !> slip. Module `friction_directions` has the sweeps of the preconditioned directions.
 !>
-!> These are loops that the compiler can turn into vector instructions: no branches, no calls, no
-!> structures. A field inside a structure could overlap another one, and the loop would stay scalar. This is
-!> why the fields are arguments of their own.
+!> The compiler can turn these loops into vector instructions, because they have no branches, calls or
+!> structures. The fields are separate arguments, because a field inside a structure could overlap another one,
+!> and the loop would then remain scalar.
 !>
-!> What does not change in a solve is gathered for a row in `site`, with one column each for the pressure P,
-!> the slopes H_x and H_y of the road, the friction force F (module `friction_law`, procedure `bound_row`)
-!> and N_z of the unit normal of the road. Where the slope does not count, H_x = H_y = 0 and N_z = 1.
+!> Quantities that do not change during a solve are gathered for a row in `site`, with one column each for the
+!> pressure P, the slopes H_x and H_y of the road, the friction force F (module `friction_law`, procedure
+!> `bound_row`) and N_z of the unit normal of the road. Without the slope effect H_x = H_y = 0 and N_z = 1.
 !>
 !> States: 0 open, 1 stick, 2 slip, as `contact_open` and so on, here as numbers of the same kind as
-!> the fields. The field `tangent` says how a point may move: (v_x, v_y, w), the unit direction of slip
-!> and the weight w = a_0/(a_0 + curvature of the bound) of a slip point; v = 0 and w = 1 where a point
-!> sticks; v = 0 and w = 0 where it is open, or where nothing but T* is allowed. The projection
-!> Z a = a - v (v.a) then takes the part along v from all of them.
+!> the fields. The field `tangent` describes how a point may move. It is (v_x, v_y, w): the unit direction of slip
+!> and the weight w = a_0/(a_0 + curvature of the bound) of a slipping point; v = 0 and w = 1 if the point
+!> sticks; v = 0 and w = 0 if it is open, or if only T* is allowed. The projection Z a = a - v (v.a) thus
+!> removes the part along v at slipping points and changes nothing at others.
 !>
 !> The sums of a row are small types with named components; `total_of` adds those of all rows in order.
 module friction_rows
@@ -31,11 +31,11 @@ module friction_rows
 
    !> Sums of `returned_row`.
    type :: move_sums_type
-      real(dp) :: returned = 0.0_dp          !! points put back
+      real(dp) :: returned = 0.0_dp          !! number of points returned to their bounds
       real(dp) :: changed = 0.0_dp           !! |T' - T|^2
       real(dp) :: size = 0.0_dp              !! |T'|^2
       real(dp) :: missed(2) = 0.0_dp         !! T' - T - step d of the points that stuck
-      real(dp) :: arriving(3) = 0.0_dp       !! part of a uniform traction that they take: xx, xy, yy
+      real(dp) :: arriving(3) = 0.0_dp       !! part of a uniform traction that they accept: xx, xy, yy
    end type move_sums_type
 
    !> Sums of `tangent_row` and `measured_row`; symmetric matrices as xx, xy, yy.
@@ -60,25 +60,25 @@ module friction_rows
    type :: move_type
       real(dp) :: step = 0.0_dp
       real(dp) :: uniform(2) = 0.0_dp        !! Pa
-      !> From the T before the last move; and from the states before it, unless the slip has been measured
-      !> since. Then points that the last move put back on their bound slip.
+      !> The move starts again from the T before the last move. It also starts from the states before that move,
+      !> unless the slip has been measured since; then points that the last move returned to their bound slip.
       logical :: again = .false.
    end type move_type
 
    !> The constants of the bound and of the measures.
    type, public :: row_constants_type
       real(dp) :: coefficient = 0.0_dp       !! mu; 0 with constant shear, which is all in F
-      real(dp) :: strength = -1.0_dp         !! sigma_max beside F (Coulomb-Orowan), Pa; < 0: none
+      real(dp) :: strength = -1.0_dp         !! sigma_max in addition to F (Coulomb-Orowan), Pa; < 0: none
       logical :: physical = .false.          !! slip by the physical law on a slope, else along D
       real(dp) :: compliance = 0.0_dp        !! a_0
       real(dp) :: stiffest = 0.0_dp          !! largest curvature of a bound, in units of a_0
-      real(dp) :: on_bound = 1.0_dp          !! s below it is on the bound
-      real(dp) :: outermost = 1.0_dp         !! s below it puts a slip point out to the bound
+      real(dp) :: on_bound = 1.0_dp          !! a point with a smaller s is on the bound
+      real(dp) :: outermost = 1.0_dp         !! a slipping point with a smaller s is moved to the bound
    end type row_constants_type
 
 contains
 
-   !> First half of a move: T + step d. `returned_row` puts it back within the bound.
+   !> First half of a move: T + step d. `returned_row` then returns points to their bounds.
    pure subroutine stepped_row(move, d, tangent, state, t, old, slips)
       type(move_type), intent(in) :: move
       real(dp), intent(in), contiguous :: d(:, :)          !! [nx, 2] Pa
@@ -105,8 +105,8 @@ contains
       end do
    end subroutine stepped_row
 
-   !> Second half of a move: points that slipped go back on their bound from both sides, others only from
-   !> outside. Points that stuck get the uniform part of the move first.
+   !> Second half of a move: points that slipped are returned to their bound from both sides, others only from
+   !> outside. The uniform part of the move is added first at points that stuck.
    pure subroutine returned_row(k, uniform, site, slips, old, t, state, sums)
       type(row_constants_type), intent(in) :: k
       real(dp), intent(in) :: uniform(2)                   !! Pa
@@ -145,7 +145,7 @@ contains
          limit = merge(k%outermost, 1.0_dp, slips(i) > 0.5_dp)
          out = s < limit .and. state(i) > 0.5_dp
          put = merge(s, 1.0_dp, out)
-         ! A point that came to the bound still moves along it.
+         ! A point that has reached its bound may still move along it.
          inverse = merge(inverse, 0.0_dp, out)
          axis_x = inverse*ex
          axis_y = inverse*ey
@@ -177,10 +177,10 @@ contains
          merge(1.0_dp, unbounded, reach >= 0.0_dp .and. force <= 0.0_dp), reach > 0.0_dp)
    end function ratio
 
-   !> First half of a measure: how each point may move. Points that slip against their traction are
-   !> released. With the direction of slip v = S^-1 D the bound is |S^-1/2 D| = const to first order (its
-   !> change with n.D left out): a multiplier lam = r.v/|v|^2 and the curvature lam e.(S^-1 e)/|e|^2 along
-   !> its tangent e.
+   !> First half of a measure: find out how each point may move, and release points that slip against their
+   !> traction. With the direction of slip v = S^-1 D, the bound is |S^-1/2 D| = const to first order (without its
+   !> change with n.D). It has the multiplier lam = r.v/|v|^2, and the curvature lam e.(S^-1 e)/|e|^2 along its
+   !> tangent e.
    pure subroutine tangent_row(k, site, t, r, state, tangent, released)
       type(row_constants_type), intent(in) :: k
       real(dp), intent(in), contiguous :: site(:, :)       !! [nx, 5]
@@ -212,7 +212,7 @@ contains
          released = released + merge(1.0_dp, 0.0_dp, back)
          slip = slip .and. .not. back
          state(i) = merge(merge(2.0_dp, 1.0_dp, slip), 0.0_dp, on)
-         ! From here on v is of unit length where it slips freely, else 0.
+         ! From here on v has unit length if the point slips freely, and is 0 otherwise.
          inverse = merge(1.0_dp/merge(uu, 1.0_dp, free), 0.0_dp, slip .and. free)
          lam = min(ru*inverse, k%stiffest*k%compliance)
          turned = site(i, 5)*(site(i, 3)*ux - site(i, 2)*uy)
@@ -224,7 +224,7 @@ contains
       end do
    end subroutine tangent_row
 
-   !> Second half of a measure: the sums of a row, from how its points may move.
+   !> Second half of a measure: form the sums of a row, using `tangent`.
    pure subroutine measured_row(compliance, t, old, r, drive, state, tangent, sums)
       real(dp), intent(in) :: compliance                   !! a_0
       real(dp), intent(in), contiguous :: t(:, :)          !! [nx, 2] Pa

@@ -1,10 +1,10 @@
-!> How far the gap of an iteration can be trusted, and when it must be computed from the pressure again.
+!> Decides when the gap of an iteration must be computed again from the pressure.
 !>
-!> An iteration adds the displacement of its step to the gap. The errors of these sums grow: slowly
-!> with products in double precision, faster with products in single precision. So the gap is replaced
-!> by a fresh product of the whole pressure, always in double precision, after some number of steps, and
-!> whenever the sums say that the problem is solved. The comparison of the two tells whether steps in
-!> single precision are still of use.
+!> Each iteration adds the displacement of its step to the gap. The errors of these sums grow, slowly with
+!> products in double precision and faster with products in single precision. The gap is therefore replaced by a
+!> new product of the whole pressure, always in double precision, after a number of steps and whenever the
+!> problem seems to be solved. The difference between the two shows whether steps in single precision are still
+!> useful.
 module gap_watch
    use asperity_precision, only : dp
    implicit none
@@ -17,13 +17,13 @@ module gap_watch
    integer, parameter :: careful_age = 10      !! the same for a tolerance below `careful`
    real(dp), parameter :: careful = 1e-7_dp
 
-   !> What is known of the gap.
+   !> The accuracy of the gap.
    type :: gap_watch_type
       logical :: fresh = .false.               !! it is the product of the whole pressure
       logical :: single = .false.              !! the products of steps are in single precision
       integer, private :: age = 0              !! steps since the last fresh gap
       integer, private :: oldest = longest_age
-      real(dp), private :: expected = huge(1.0_dp)  !! error by the sums before the last fresh gap
+      real(dp), private :: expected = huge(1.0_dp)  !! error according to the sums before the last fresh gap
       real(dp), private :: before = huge(1.0_dp)    !! error of the last fresh gap but one
    contains
       procedure :: is_due
@@ -45,16 +45,16 @@ contains
       if (mixed) self%oldest = merge(careful_age, mixed_age, tolerance < careful)
    end subroutine new_gap_watch
 
-   !> Must the gap be computed again before anything is concluded from it?
+   !> Must the gap be computed again before any decision is based on it?
    pure function is_due(self, solved) result(due)
       class(gap_watch_type), intent(in) :: self
-      logical, intent(in) :: solved            !! the problem is solved by the gap as it stands
+      logical, intent(in) :: solved            !! the problem is solved according to the present gap
       logical :: due
 
       due = .not. self%fresh .and. (solved .or. self%age >= self%oldest)
    end function is_due
 
-   !> A step was added to the gap.
+   !> Note that a step was added to the gap.
    subroutine note_step(self)
       class(gap_watch_type), intent(inout) :: self
 
@@ -62,7 +62,7 @@ contains
       self%age = self%age + 1
    end subroutine note_step
 
-   !> The gap will be computed again; remember the error that the sums give.
+   !> Note that the gap will be computed again, and keep the error according to the sums.
    subroutine expect(self, error)
       class(gap_watch_type), intent(inout) :: self
       real(dp), intent(in) :: error
@@ -70,7 +70,7 @@ contains
       self%expected = error
    end subroutine expect
 
-   !> The gap was computed again.
+   !> Note that the gap was computed again.
    subroutine note_fresh(self)
       class(gap_watch_type), intent(inout) :: self
 
@@ -80,7 +80,7 @@ contains
 
    !> Compare the error of a fresh gap with the expected one.
    !>
-   !> If the sums have drifted, residuals before and after do not make conjugate directions. If the drift
+   !> If the sums have drifted, directions formed with residuals before and after are not conjugate. If the drift
    !> exceeds the progress since the last fresh gap, the steps continue in double precision.
    subroutine judge(self, error, drifted)
       class(gap_watch_type), intent(inout) :: self

@@ -1,13 +1,13 @@
 !> The springs that hold the road while the total of the traction is prescribed along x, y or both.
 !>
-!> Where the total F of the traction T is prescribed, the position c of the road is unknown. The road is
-!> held by a spring of compliance kappa, whose free end is at X:
+!> If the total F of the traction T is prescribed, the position c of the road is unknown. The road is held by a
+!> spring of compliance kappa, whose free end is at X:
 !>
 !>     c = X - kappa (sum(T) - F)
 !>
-!> Thus sum(T) = F where X = c. The solver finds T for a given X, and `move_end` then moves X towards c
-!> (method of multipliers). A spring much softer than the contact needs few such moves. A mass that takes
-!> the place of the spring needs none.
+!> Thus sum(T) = F if X = c. The solver finds T for a given X, and `move_end` then moves X towards c
+!> (method of multipliers). A spring much softer than the contact needs few such moves. A mass in place of the
+!> spring needs none.
 module road_spring
    use asperity_precision, only : dp
    use field_sums, only : vector_sum
@@ -46,7 +46,7 @@ contains
       self%offset_step = self%offset - before
    end subroutine follow
 
-   !> Move the free end of the springs. The total of T stays, so the road moves by the same distance.
+   !> Move the free end of the springs. The total of T does not change, so that the road moves by the same distance.
    pure subroutine move_end(self, way)
       class(road_spring_type), intent(inout) :: self
       real(dp), intent(in) :: way(2)         !! m

@@ -1,4 +1,4 @@
-!> What a solver returns to its caller: an outcome, not an error.
+!> The record that a solver returns to its caller. It describes an outcome and not an error.
 module solver_result
    use asperity_precision, only : dp, int64
    implicit none
@@ -13,8 +13,8 @@ module solver_result
       real(dp) :: residual = 0.0_dp             !! relative residual, recomputed at the end
       real(dp) :: load_error = 0.0_dp           !! relative error of the prescribed load
       logical :: converged = .false.            !! the residual met the tolerance
-      logical :: stopped = .false.              !! given up (module stop_watch): the fields have no meaning
-      character(64) :: reason = ''              !! why the solver came back
+      logical :: stopped = .false.              !! stopped (module stop_watch): the fields have no meaning
+      character(64) :: reason = ''              !! why the solver returned
       real(dp) :: seconds = 0.0_dp              !! wall time of the solve
    end type solver_result_type
 
