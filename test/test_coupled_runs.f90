@@ -9,7 +9,7 @@ module test_coupled_runs
    use case_input, only : parse_case
    use case_settings, only : case_type
    use check, only : begin_suite, check_close, check_no_error, check_that, selected
-   use history_row, only : column_type, history_columns, row_values
+   use history_table, only : column_type, history_columns, row_values
    use simulation_runs, only : last, nl, record_type, run_case
    use simulation_state, only : load_state, save_state
    use text_tools, only : to_text

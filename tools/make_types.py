@@ -1,12 +1,19 @@
-"""Write the types of the input and of the history for type checkers, and a table for the docs.
+"""Write the files that follow from the tables of the program: the input, the history, the fields.
 
     python tools/make_types.py            writes the files
     python tools/make_types.py --check    ends with status 1 if they are not what they should be
 
-`python/asperity/runs/group_types.py` holds the groups of an input, from the table of the input in
-the Fortran library; `python/asperity/results/column_types.py` and the table of the history in
-`docs/result_file.md` hold the columns of the history, from the table in `src/io/history_row.f90`.
+| table | files |
+| --- | --- |
+| the columns of the history, in `src/io/history_row.f90` | `src/io/history_list.f90`, the list of \
+the columns; `python/asperity/results/column_types.py`; the table in `docs/result_file.md` |
+| the fields of a snapshot, in `src/io/snapshot_fields.f90` | \
+`python/asperity/results/field_types.py`; the table in `docs/result_file.md` |
+| the input, in `src/input/input_reference.f90` | `python/asperity/runs/group_types.py` |
+
+The Fortran list is written first: importing the package then builds the library with it.
 """
+
 
 from __future__ import annotations
 
@@ -15,13 +22,18 @@ import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
-from asperity.runs import namelists
-from asperity.runs.row import Column, columns
+if TYPE_CHECKING:
+    from asperity.runs import namelists
+    from asperity.runs.row import Column, Field
 
 ROOT = Path(__file__).resolve().parent.parent
 GROUPS = ROOT / "python/asperity/runs/group_types.py"
 COLUMNS = ROOT / "python/asperity/results/column_types.py"
+FIELDS = ROOT / "python/asperity/results/field_types.py"
+ROW = ROOT / "src/io/history_row.f90"
+LIST = ROOT / "src/io/history_list.f90"
 PAGE = ROOT / "docs/result_file.md"
 
 HEAD = '''"""The groups of an input and their variables, for type checkers and editors.
@@ -186,14 +198,116 @@ def write_columns(found: Sequence[Column]) -> str:
     return "\n".join(text)
 
 
-def write_page(found: Sequence[Column]) -> str:
-    """Return the page on the result file with the table of the columns."""
-    rows = [f"| `{column.name}` | {'-' if column.units == '1' else column.units} | "
-            f"{column.long_name} |" for column in found]
-    before, history = PAGE.read_text().split("## `/history`", 1)
-    table = re.compile(r"(?<=\n\| --- \| --- \| --- \|\n)(\| .*\n)*?(?=\| `checksum` )")
-    lines = "".join(f"{row}\n" for row in rows)
-    return f"{before}## `/history`{table.sub(lambda _: lines, history, count=1)}"
+FIELDS_HEAD = '''"""The names of the fields that a snapshot may contain.
+
+Written by `tools/make_types.py` from the program's table of the fields.
+"""
+'''
+
+
+def write_fields(found: Sequence[Field]) -> str:
+    """Return the module of the fields: those of every case, and those of friction."""
+    text = FIELDS_HEAD
+    for name, frictional in [("NORMAL_FIELDS", False), ("TANGENTIAL_FIELDS", True)]:
+        lines = "".join(f'    "{field.name}",\n' for field in found
+                        if field.is_frictional == frictional)
+        text += f"\n{name} = (\n{lines})\n"
+    return text
+
+
+def write_page(found: Sequence[Column], fields: Sequence[Field]) -> str:
+    """Return the page on the result file with the tables of the columns and of the fields."""
+    page = PAGE.read_text()
+    for head, entries, first_kept in [("## `/history`", found, "checksum"),
+                                      ("## `/snapshots/NNNNNN`", fields, "x")]:
+        lines = "".join(f"| `{entry.name}` | {'-' if entry.units == '1' else entry.units} | "
+                        f"{entry.long_name} |\n" for entry in entries)
+        before, behind = page.split(f"{head}\n", 1)
+        table = re.compile(rf"(?<=\n\| --- \| --- \| --- \|\n)(\| .*\n)*?(?=\| `{first_kept}` )")
+        page = f"{before}{head}\n{table.sub(lambda _: lines, behind, count=1)}"  # noqa: B023
+    return page
+
+
+class Component(NamedTuple):
+    """A component of `history_row_type`: its name, its units ('' for an integer), its meaning."""
+
+    name: str
+    units: str
+    meaning: str
+
+
+def read_components(source: str) -> list[tuple[str, list[Component]]]:
+    """Return the sections of `history_row_type`: the comment before each, and its components."""
+    body = source.split("type :: history_row_type\n", 1)[1].split("end type", 1)[0]
+    sections: list[tuple[str, list[Component]]] = []
+    for line in filter(None, map(str.strip, body.splitlines())):
+        if line.startswith("! "):
+            sections.append((line[2:], []))
+            continue
+        found = re.fullmatch(
+            r"(?:integer|(real\(dp\))) :: (\w+) = \S+ +!! (?:\[(\S+)\] )?(.+)", line)
+        if not found or bool(found[1]) != bool(found[3]):
+            sys.exit(f"{ROW}: must be 'real(dp) :: name = 0.0_dp !! [units] meaning' or "
+                     f"'integer :: name = 0 !! meaning': {line}")
+        if len(found[4]) > 80:
+            sys.exit(f"{ROW}: the meaning has more than 80 characters: {line}")
+        sections[-1][1].append(Component(found[2], found[3] or "", found[4]))
+    return sections
+
+
+def write_list(source: str) -> str:
+    """Return the module that lists the columns, from the module of the row."""
+    sections = read_components(source)
+    text = [LIST_HEAD]
+    names = [f"list_section_{number}" for number in range(1, len(sections) + 1)]
+    text += [f"      call {name}(row, table, prefix)" for name in names]
+    text += ["   end subroutine list_columns", ""]
+    for name, (title, components) in zip(names, sections, strict=True):
+        text += [f"   !> {title}", f"   subroutine {name}(row, table, prefix)", LIST_ARGUMENTS]
+        for column in components:
+            units = f"'{column.units}', " if column.units else ""
+            meaning = column.meaning.replace("'", "''")
+            line = f"      call table%add(prefix//'{column.name}', row%{column.name}, {units}"
+            if len(line) + len(meaning) + 3 > 100:
+                text += [f"{line}&", f"         '{meaning}')"]
+            else:
+                text += [f"{line}'{meaning}')"]
+        text += [f"   end subroutine {name}", ""]
+    return "\n".join([*text, "end module history_list", ""])
+
+
+LIST_ARGUMENTS = """      type(history_row_type), intent(in), target :: row
+      type(state_table_type), intent(inout) :: table
+      character(*), intent(in) :: prefix
+"""
+
+LIST_HEAD = """!> The list of the columns of the history: name, units, meaning and variable of each.
+!>
+!> `python tools/make_types.py` writes this module from the declarations in module `history_row`.
+module history_list
+   use history_row, only : history_row_type
+   use state_table, only : state_table_type
+   implicit none
+   private
+
+   public :: list_columns
+
+contains
+
+   !> List all columns.
+   subroutine list_columns(row, table, prefix)
+      type(history_row_type), intent(in), target :: row
+      type(state_table_type), intent(inout) :: table
+      character(*), intent(in) :: prefix           !! of all names
+"""
+
+
+def settle(texts: dict[Path, str], check: bool) -> bool:
+    """Write files, unless they are only to be checked; return whether all have their texts."""
+    for path, text in texts.items():
+        if not check and (not path.exists() or path.read_text() != text):
+            path.write_text(text)
+    return all(path.exists() and path.read_text() == text for path, text in texts.items())
 
 
 def main() -> int:
@@ -201,12 +315,15 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--check", action="store_true")
     wanted = parser.parse_args()
+    good = settle({LIST: write_list(ROW.read_text())}, wanted.check)
+
+    from asperity.runs import namelists
+    from asperity.runs.row import columns, fields
+
     texts = {GROUPS: write_groups(list(namelists.table().values())),
-             COLUMNS: write_columns(columns()), PAGE: write_page(columns())}
-    for path, text in texts.items():
-        if not wanted.check:
-            path.write_text(text)
-    return int(any(path.read_text() != text for path, text in texts.items()))
+             COLUMNS: write_columns(columns()), FIELDS: write_fields(fields()),
+             PAGE: write_page(columns(), fields())}
+    return int(not settle(texts, wanted.check) or not good)
 
 
 if __name__ == "__main__":

@@ -17,12 +17,13 @@ module flat_runs
    use case_run, only : run_type
    use case_settings, only : case_type
    use flat_answers, only : case_of, put_text, report, take_warnings
-   use history_row, only : column_type, history_columns, row_values
+   use history_table, only : column_type, history_columns, row_values
+   use snapshot_fields, only : known_fields
    use run_handles, only : find_run, find_sim, free_handle, new_run, run_of
    implicit none
    private
 
-   public :: row_columns, run_close, run_field, run_interrupt, run_open, run_row, run_step
+   public :: row_columns, run_close, run_field, run_interrupt, run_open, run_row, run_step, snapshot_columns
 
 contains
 
@@ -167,6 +168,23 @@ contains
       end do
       call put_text(text, buffer, length)
    end subroutine row_columns
+
+   !> The fields that a snapshot may contain: lines 'name units frictional long_name', with frictional = 1 for
+   !> fields that exist only with friction.
+   subroutine snapshot_columns(most, buffer, length)
+      integer(c_int), intent(in) :: most                       !! characters that the buffer holds
+      integer(c_int), intent(inout) :: buffer(most)             !! codes of the characters
+      integer(c_int), intent(out) :: length                    !! of the text; above `most`: none is written
+      character(:), allocatable :: text
+      integer :: i
+
+      text = ''
+      do i = 1, size(known_fields)
+         text = text//trim(known_fields(i)%name)//' '//trim(known_fields(i)%units)//' '// &
+            merge('1', '0', known_fields(i)%frictional)//' '//trim(known_fields(i)%long_name)//new_line('a')
+      end do
+      call put_text(text, buffer, length)
+   end subroutine snapshot_columns
 
    !> The last row of a run or a simulation, in the order of `row_columns`.
    subroutine run_row(handle, n, values, status, message)

@@ -12,7 +12,9 @@ from pathlib import Path
 import pytest
 from conftest import ROOT
 
-from asperity.runs.row import Column, columns
+from asperity.runs import namelists
+from asperity.runs.row import Column, Field, columns, fields
+from asperity.runs.simulation import FIELDS
 
 # A comment `E: text` is an error that mypy must report in that line, `N: text` a type it reveals;
 # there must be no others.
@@ -101,21 +103,56 @@ def test_types_are_those_of_the_program() -> None:
     assert done.returncode == 0, "python tools/make_types.py writes them again"
 
 
-def test_a_new_column_is_stated_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A line of the program's table becomes types of a row and a history, and a row of the page."""
+def changes(before: str, after: str) -> list[str]:
+    """Return the lines that differ between two texts."""
+    return [line[2:] for line in difflib.ndiff(before.splitlines(), after.splitlines())
+            if line.startswith(("+", "-"))]
+
+
+def test_a_new_column_is_one_declaration(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A declaration in the row becomes a line of the list that the result and checkpoint use."""
     monkeypatch.syspath_prepend(ROOT / "tools")
     make_types = importlib.import_module("make_types")
-    known = columns()
+    row = (ROOT / "src/io/history_row.f90").read_text()
+    listed = (ROOT / "src/io/history_list.f90").read_text()
+    assert make_types.write_list(row) == listed
+    new = ("      real(dp) :: slip_distance = 0.0_dp   !! [m] the surface's slip\n"
+           "      integer :: jumps = 0   !! jumps of the contact\n")
+    more = row.replace("   end type history_row_type", f"{new}   end type history_row_type")
+    assert changes(listed, make_types.write_list(more)) == [
+        "      call table%add(prefix//'slip_distance', row%slip_distance, 'm', "
+        "'the surface''s slip')",
+        "      call table%add(prefix//'jumps', row%jumps, 'jumps of the contact')"]
+    with pytest.raises(SystemExit, match="units"):
+        make_types.write_list(more.replace("[m] the", "the"))
+
+
+def test_a_new_column_or_field_reaches_types_and_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A line of the program's tables becomes types in Python, and a row of the page."""
+    monkeypatch.syspath_prepend(ROOT / "tools")
+    make_types = importlib.import_module("make_types")
+    known, stored = columns(), fields()
+    page = (ROOT / "docs/result_file.md").read_text()
+    assert make_types.write_page(known, stored) == page
     more = (*known, Column("slip_distance", "m", False, "distance that the surface has slipped"),
             Column("jumps", "1", True, "jumps of the contact"))
-    assert make_types.write_page(known) == (ROOT / "docs/result_file.md").read_text()
-    added = [difflib.ndiff(write(known).splitlines(), write(more).splitlines())
-             for write in (make_types.write_columns, make_types.write_page)]
-    types, table = ([line[2:] for line in lines if line.startswith(("+", "-"))] for lines in added)
-    assert types == [
+    assert changes(make_types.write_columns(known), make_types.write_columns(more)) == [
         "    slip_distance: float  # distance that the surface has slipped, m",
         "    jumps: int  # jumps of the contact",
         "    slip_distance: NDArray[np.float64]  # distance that the surface has slipped, m",
         "    jumps: NDArray[np.int32]  # jumps of the contact"]
-    assert table == ["| `slip_distance` | m | distance that the surface has slipped |",
-                     "| `jumps` | - | jumps of the contact |"]
+    assert changes(page, make_types.write_page(more, stored)) == [
+        "| `slip_distance` | m | distance that the surface has slipped |",
+        "| `jumps` | - | jumps of the contact |"]
+    heat = Field("heat", "J/m2", True, "energy lost by friction")
+    assert changes(page, make_types.write_page(known, (*stored, heat))) == [
+        "| `heat` | J/m2 | energy lost by friction |"]
+    assert changes(make_types.write_fields(stored), make_types.write_fields((*stored, heat))) == [
+        '    "heat",']
+
+
+def test_fields_are_those_of_the_input() -> None:
+    """The input accepts exactly the fields of the table, and a simulation has the same."""
+    words = namelists.table()["output"].variables["snapshot_fields"].allowed
+    assert re.findall(r"'([^']*)'", words) == [field.name for field in fields()]
+    assert (*(field.name for field in fields()), "height") == FIELDS

@@ -12,7 +12,7 @@ module asperity_checksum
    implicit none
    private
 
-   public :: checksum_of_checksums, checksum_of_field, checksum_of_file, checksum_of_text, checksums_of_rows, &
+   public :: checksum_of_checksums, checksum_of_file, checksum_of_text, checksums_of_rows, &
       crc32_of_values, hexadecimal
 
    integer(int64), parameter :: polynomial = &
@@ -62,15 +62,6 @@ contains
       if (status /= 0) call fail(error, error_file, path//': cannot be read')
    end subroutine checksum_of_file
 
-   !> Checksum of a field. It is computed from the checksums of the rows, so that threads can work on
-   !> different rows.
-   function checksum_of_field(field) result(sum)
-      real(dp), intent(in) :: field(:, :)           !! [nx, ny]
-      integer(int64) :: sum
-
-      sum = checksum_of_checksums(size(field, 1), checksums_of_rows(field))
-   end function checksum_of_field
-
    !> Checksums of the rows of a field, or of a part of it.
    function checksums_of_rows(field) result(rows)
       real(dp), intent(in) :: field(:, :)           !! [nx, rows]
@@ -86,7 +77,7 @@ contains
       end do
    end function checksums_of_rows
 
-   !> Checksum of a field from those of all its rows.
+   !> Checksum of a field from those of all its rows, which threads may compute separately.
    function checksum_of_checksums(nx, rows) result(sum)
       integer, intent(in) :: nx                     !! values of a row
       integer(int64), intent(in) :: rows(:)

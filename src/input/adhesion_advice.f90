@@ -29,8 +29,7 @@ module adhesion_advice
    implicit none
    private
 
-   public :: adhesion_criteria, adhesion_edge, adhesion_notes, adhesion_warning, largest_cell, &
-      softest_modulus
+   public :: adhesion_criteria, adhesion_edge, adhesion_notes, adhesion_warning
 
    character(*), parameter :: nl = new_line('a')
    real(dp), parameter :: smooth_limit = 0.7_dp    !! largest cell over the width of the zone

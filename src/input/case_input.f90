@@ -17,6 +17,7 @@ module case_input
    use process_agreement, only : agree
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use shear_laws, only : law_variables
+   use snapshot_fields, only : field_names, field_needs_friction
    use surface_warnings, only : find_warnings, warning_length
    use asperity_text_file, only : read_text_file
    use text_tools, only : to_text
@@ -292,6 +293,7 @@ contains
       type(faults_type), intent(inout) :: faults
       type(output_settings_type) :: output
       character(path_length), allocatable :: fields(:)
+      character(24), allocatable :: names(:)
       real(dp) :: finish
       integer :: i
 
@@ -323,23 +325,15 @@ contains
          allocate (fields, source=group%texts_value('snapshot_fields'))
          allocate (output%snapshot_fields(size(fields)))
          output%snapshot_fields = fields(:)(:word_length)
-         if (case%friction%law == 'none' .and. any(is_tangential(output%snapshot_fields))) &
+         if (case%friction%law == 'none' .and. any(field_needs_friction(output%snapshot_fields))) &
             call group%fault('snapshot_fields', 'traction, slip and displacement_x, displacement_y need '// &
             '&friction', faults)
       else
-         output%snapshot_fields = [character(word_length) :: 'pressure', 'gap', 'displacement_z', 'contact', &
-            'road_height', 'traction_x', 'traction_y', 'displacement_x', 'displacement_y', 'slip_x', 'slip_y']
-         if (case%friction%law == 'none') output%snapshot_fields = pack(output%snapshot_fields, &
-            .not. is_tangential(output%snapshot_fields))
+         names = field_names(case%friction%law /= 'none')
+         allocate (output%snapshot_fields(size(names)))
+         output%snapshot_fields = names
       end if
       case%output = output
    end subroutine resolve_output
-
-   !> Is this a field of friction?
-   elemental logical function is_tangential(field)
-      character(*), intent(in) :: field
-
-      is_tangential = index(field, '_x') > 0 .or. index(field, '_y') > 0
-   end function is_tangential
 
 end module case_input

@@ -19,7 +19,7 @@ module case_time
    implicit none
    private
 
-   public :: duration_text, seconds_needed, transforms_needed
+   public :: duration_text, seconds_needed
 
    integer, parameter :: probe = 128               !! cells along a side of the measured transform
    real(dp), parameter :: seconds_of_a_row = 2.0e-3_dp  !! to append a row to the file and flush it

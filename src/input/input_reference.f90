@@ -3,11 +3,12 @@
 !> the documentation prints it.
 module input_reference
    use shear_laws, only : shear_law_words
+   use snapshot_fields, only : field_words
    use surface_shapes, only : all_shapes, shape_type, shape_words
    implicit none
    private
 
-   public :: group_entries, group_entry_type, is_array, is_required, variable_entries, variable_entry_type
+   public :: group_entries, group_entry_type, is_array, variable_entries, variable_entry_type
 
    integer, parameter, public :: kind_integer = 1
    integer, parameter, public :: kind_real = 2
@@ -32,7 +33,7 @@ module input_reference
       integer :: kind
       character(40) :: default      !! as in an input; in parentheses if derived or none
       character(8) :: units
-      character(160) :: allowed     !! 'positive', 'not negative', 'any', an interval, or words
+      character(240) :: allowed     !! 'positive', 'not negative', 'any', an interval, or words
       character(320) :: meaning
    end type variable_entry_type
 
@@ -253,8 +254,6 @@ contains
 
    pure function solver_and_output() result(rows)
       type(variable_entry_type), allocatable :: rows(:)
-      character(*), parameter :: fields = '''pressure'' | ''gap'' | ''displacement_z'' | ''contact'' | '// &
-         '''road_height'' | ''traction_x'' | ''traction_y'' | ''displacement_x'' | ''displacement_y'' | ''slip_x'' | ''slip_y'''
 
       rows = [ &
          row('solver', 'tolerance', kind_real, '1e-6', '', '(0, 1)', 'Largest allowed residual of every solve.'), &
@@ -287,7 +286,7 @@ contains
             'snapshot_times.'), &
          row('output', 'snapshot_times', kind_reals, '(none)', 's', 'not negative', &
             'Times of the snapshots, in increasing order.'), &
-         row('output', 'snapshot_fields', kind_words, '(all that the case has)', '', fields, &
+         row('output', 'snapshot_fields', kind_words, '(all that the case has)', '', field_words(), &
             'Fields that a snapshot contains.'), &
          row('output', 'checkpoint_every', kind_integer, '0', 'steps', 'not negative', &
             'Number of steps between checkpoints; 0 means only after checkpoint_minutes and when a signal '// &
@@ -298,13 +297,6 @@ contains
             'Compression level (deflate) of the fields; 0 means no compression. Higher levels than 1 save '// &
             'hardly any space and take longer.')]
    end function solver_and_output
-
-   !> Must the user give it wherever it applies?
-   pure logical function is_required(entry)
-      type(variable_entry_type), intent(in) :: entry
-
-      is_required = index(entry%default, '(required') == 1
-   end function is_required
 
    !> Does it take a list?
    pure logical function is_array(entry)

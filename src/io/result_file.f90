@@ -15,7 +15,8 @@ module result_file
    use hdf5_chunk_writer, only : chunk_writer_type
    use hdf5_file, only : hdf5_file_type
    use hdf5_slabs, only : slab_rows
-   use history_row, only : history_row_type, row_values
+   use history_row, only : history_row_type
+   use history_table, only : row_values
    use random_id, only : new_id
    use regular_grid, only : grid_type
    use result_frame, only : height_path, result_plan_type, write_frame

@@ -7,7 +7,7 @@ module result_frame
    use asperity_version, only : version_number
    use hdf5_file, only : hdf5_file_type
    use hdf5_slabs, only : create_field
-   use history_row, only : history_columns
+   use history_table, only : history_columns
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use result_history, only : create_history_columns
    use utc_clock, only : utc_time

@@ -12,7 +12,7 @@ module result_history
    use asperity_errors, only : error_type
    use asperity_precision, only : dp
    use hdf5_file, only : hdf5_file_type
-   use history_row, only : column_type, history_columns
+   use history_table, only : column_type, history_columns
    use text_tools, only : to_text
    implicit none
    private

@@ -1,16 +1,15 @@
 !> Coulomb-Orowan friction: the smaller of mu N and sigma_max (thesis, section 3.1.2).
+!>
+!> mu N is the bound of Coulomb's law, and sigma_max is the `strength_beside` of this law.
 module coulomb_orowan_law
    use asperity_precision, only : dp
-   use shear_law, only : shear_law_type
+   use coulomb_law, only : coulomb_law_type
    implicit none
    private
 
    public :: new_coulomb_orowan_law, coulomb_orowan_law_type
 
-   type, extends(shear_law_type) :: coulomb_orowan_law_type
-   contains
-      procedure :: forces
-      procedure :: force
+   type, extends(coulomb_law_type) :: coulomb_orowan_law_type
    end type coulomb_orowan_law_type
 
 contains
@@ -25,27 +24,5 @@ contains
       self%strength_beside = strength
       self%variables = [character(16) :: 'coefficient', 'shear_strength']
    end function new_coulomb_orowan_law
-
-   !> mu N of a row. The limit sigma_max is the `strength_beside` of the law.
-   pure subroutine forces(self, n, force)
-      class(coulomb_orowan_law_type), intent(in) :: self
-      integer, intent(in) :: n
-      real(dp), intent(inout) :: force(n)      !! in: N; out: the bound, Pa
-      integer :: i
-
-      do i = 1, n
-         force(i) = self%coefficient*force(i)
-      end do
-   end subroutine forces
-
-   !> mu N. The limit sigma_max is the `strength_beside` of the law.
-   pure function force(self, pressure, share)
-      class(coulomb_orowan_law_type), intent(in) :: self
-      real(dp), intent(in) :: pressure         !! N, Pa
-      real(dp), intent(in) :: share(2)
-      real(dp) :: force                        !! Pa
-
-      force = self%coefficient*share(1)*pressure
-   end function force
 
 end module coulomb_orowan_law

@@ -21,7 +21,7 @@ module asperity_simulation
    use coupled_passes, only : coupled_passes_type, new_coupled_passes
    use coupling_advice, only : advice_on_passes
    use finite_fields, only : reason_overflow
-   use history_row, only : row_values
+   use history_table, only : row_values
    use pulled_road, only : guess_road, pull_outcome, take_road, watch_way
    use rising_clock, only : seconds_now
    use road_motion, only : move_road

@@ -15,7 +15,7 @@ module case_run
    use asperity_threads, only : set_threads
    use case_memory, only : memory_needed
    use case_settings, only : case_type
-   use history_row, only : row_values
+   use history_table, only : row_values
    use memory_limits, only : need_memory
    use process_agreement, only : agree
    use regular_grid, only : grid_type

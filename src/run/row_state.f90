@@ -10,8 +10,9 @@
 module row_state
    use asperity_precision, only : dp
    use asperity_schedule, only : schedule_type
-   use history_row, only : history_row_type, list_columns
    use contact_size, only : patch_size_type
+   use history_list, only : list_columns
+   use history_row, only : history_row_type
    use state_table, only : state_table_type
    use steady_step, only : steady_start_type
    use stick_slip_watch, only : stick_slip_watch_type
@@ -77,7 +78,8 @@ contains
       call table%add('velocity', state%velocity, 'm/s', 'velocity of the road in the last step')
       call table%add('drifted', state%drifted, 'm', 'sum of the expected motions of the surface')
       call table%add('moved_cells', state%moved_cells, 'cells by which the pressure has been shifted')
-      call table%add('widest', state%widest, '1', 'most cells across a patch of contact where a phase ended')
+      call table%add('widest/across', state%widest%across, '1', 'most cells across a patch of contact where a phase ended')
+      call table%add('widest/needed', state%widest%needed, '1', 'cells across that such patches need')
       call table%add('edge', state%edge, 'worst finding at the edge of a free map')
       call table%add('stick_slip/reported', state%watch%reported, 'a warning of stick-slip was given')
       call table%add('stick_slip/speed', state%watch%speed, 'm/s', 'mean slip speed')

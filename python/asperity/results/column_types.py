@@ -34,13 +34,13 @@ class RowColumns:
     work_tangential: float  # work of the tangential traction and of the driven mass, J
     work_load: float  # normal force times displacement, summed over the steps, J
     work_drive: float  # horizontal force of the drive times displacement of the road, summed, J
-    work_missing: float  # work_load + work_drive less all works and energies: the error of the steps, J
+    work_missing: float  # work_load + work_drive minus all works and energies: the error of the steps, J
     energy_elastic: float  # energy stored in the rubber, J
     energy_adhesive: float  # energy of adhesion, J
     energy_kinetic: float  # kinetic energy of the interface, J
     energy_radiated: float  # energy set free by jumps of an adhesive contact within a step, J
-    dissipated_viscous: float  # energy lost in the rubber, the scheme's own loss included, J
-    dissipated_numerical: float  # the part of the lost energy that is the scheme's own, J
+    dissipated_viscous: float  # energy lost in the rubber, including the loss of the time scheme, J
+    dissipated_numerical: float  # the part of this energy that the time scheme lost, J
     dissipated_friction: float  # energy lost by friction in the interface, J
     power_viscous: float  # rate of loss in the rubber; mean over the step, or of the steady state, W
     power_friction: float  # rate of loss by friction; mean over the step, or of the steady state, W
@@ -49,7 +49,7 @@ class RowColumns:
     residual_normal: float  # residual of the normal solution, recomputed
     residual_tangential: float  # residual of the tangential solution, recomputed
     passes: int  # passes of a step with friction
-    residual_coupling: float  # mismatch of the road under the surface found and the road solved on
+    residual_coupling: float  # mismatch between the road under the computed surface and the road solved on
     ffts: float  # real transforms of the size of the grid
     seconds: float  # wall time of the solvers, s
 
@@ -77,13 +77,13 @@ class HistoryColumns:
     work_tangential: NDArray[np.float64]  # work of the tangential traction and of the driven mass, J
     work_load: NDArray[np.float64]  # normal force times displacement, summed over the steps, J
     work_drive: NDArray[np.float64]  # horizontal force of the drive times displacement of the road, summed, J
-    work_missing: NDArray[np.float64]  # work_load + work_drive less all works and energies: the error of the steps, J
+    work_missing: NDArray[np.float64]  # work_load + work_drive minus all works and energies: the error of the steps, J
     energy_elastic: NDArray[np.float64]  # energy stored in the rubber, J
     energy_adhesive: NDArray[np.float64]  # energy of adhesion, J
     energy_kinetic: NDArray[np.float64]  # kinetic energy of the interface, J
     energy_radiated: NDArray[np.float64]  # energy set free by jumps of an adhesive contact within a step, J
-    dissipated_viscous: NDArray[np.float64]  # energy lost in the rubber, the scheme's own loss included, J
-    dissipated_numerical: NDArray[np.float64]  # the part of the lost energy that is the scheme's own, J
+    dissipated_viscous: NDArray[np.float64]  # energy lost in the rubber, including the loss of the time scheme, J
+    dissipated_numerical: NDArray[np.float64]  # the part of this energy that the time scheme lost, J
     dissipated_friction: NDArray[np.float64]  # energy lost by friction in the interface, J
     power_viscous: NDArray[np.float64]  # rate of loss in the rubber; mean over the step, or of the steady state, W
     power_friction: NDArray[np.float64]  # rate of loss by friction; mean over the step, or of the steady state, W
@@ -92,6 +92,6 @@ class HistoryColumns:
     residual_normal: NDArray[np.float64]  # residual of the normal solution, recomputed
     residual_tangential: NDArray[np.float64]  # residual of the tangential solution, recomputed
     passes: NDArray[np.int32]  # passes of a step with friction
-    residual_coupling: NDArray[np.float64]  # mismatch of the road under the surface found and the road solved on
+    residual_coupling: NDArray[np.float64]  # mismatch between the road under the computed surface and the road solved on
     ffts: NDArray[np.float64]  # real transforms of the size of the grid
     seconds: NDArray[np.float64]  # wall time of the solvers, s

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..base.names import NamedFields, UnknownNameError, unknown_name
 from ..base.presenters import present
+from .field_types import NORMAL_FIELDS, TANGENTIAL_FIELDS
 from .reading import read_file, scalar_of, text_of
 from .result_file import ResultFile
 
@@ -20,9 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = ["Snapshot", "Snapshots"]
-
-_NORMAL = ("pressure", "gap", "displacement_z", "contact", "road_height")
-_TANGENTIAL = ("traction_x", "traction_y", "displacement_x", "displacement_y", "slip_x", "slip_y")
 
 
 class Snapshot(NamedFields):
@@ -77,11 +75,11 @@ class Snapshot(NamedFields):
         if name in self._meanings:
             return
         text = unknown_name("field of the snapshot", name, self._meanings)
-        if name in _TANGENTIAL:
+        if name in TANGENTIAL_FIELDS:
             text = (f"the snapshot holds no {name}: there are {', '.join(self._meanings)};"
                     " tangential fields are stored with `&friction`, unless `&output"
                     " snapshot_fields` leaves them out")
-        elif name in _NORMAL:
+        elif name in NORMAL_FIELDS:
             text = (f"the snapshot holds no {name}: there are {', '.join(self._meanings)};"
                     " `&output snapshot_fields` chooses what is stored")
         raise UnknownNameError(text)

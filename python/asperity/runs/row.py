@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,9 +13,10 @@ from ..base import library
 from ..base.names import NamedValues
 from ..results.column_types import RowColumns
 
-__all__ = ["Column", "Row", "columns"]
+__all__ = ["Column", "Field", "Row", "columns", "fields"]
 
 _columns = library.bare("row_columns")
+_fields = library.bare("snapshot_columns")
 
 
 class Column(NamedTuple):
@@ -26,16 +28,34 @@ class Column(NamedTuple):
     long_name: str
 
 
+class Field(NamedTuple):
+    """What a field of a snapshot holds."""
+
+    name: str
+    units: str
+    is_frictional: bool
+    long_name: str
+
+
+def _entries(write: Callable[[NDArray[np.intc]], int]) -> list[tuple[str, str, bool, str]]:
+    """Return the lines of a table of the library: name, units, a truth, and the meaning."""
+    buffer = np.zeros(100000, dtype=np.intc)
+    length = int(write(buffer))
+    lines = bytes(buffer[:length].astype(np.uint8)).decode().splitlines()
+    parts = (line.split(" ", 3) for line in lines)
+    return [(name, units, truth == "1", long_name) for name, units, truth, long_name in parts]
+
+
 @functools.cache
 def columns() -> tuple[Column, ...]:
     """Return the columns of the history, in the order of the library."""
-    buffer = np.zeros(100000, dtype=np.intc)
-    length = int(_columns(buffer))
-    found = []
-    for line in bytes(buffer[:length].astype(np.uint8)).decode().splitlines():
-        name, units, is_whole, long_name = line.split(" ", 3)
-        found.append(Column(name, units, is_whole == "1", long_name))
-    return tuple(found)
+    return tuple(Column(*entry) for entry in _entries(_columns))
+
+
+@functools.cache
+def fields() -> tuple[Field, ...]:
+    """Return the fields that a snapshot may contain, in the order of the library."""
+    return tuple(Field(*entry) for entry in _entries(_fields))
 
 
 class Row(NamedValues, RowColumns):

@@ -19,6 +19,7 @@ from ..base import library
 from ..base.check import whole
 from ..base.errors import NotConverged
 from ..base.names import NamedFields, UnknownNameError, unknown_name
+from ..results.field_types import NORMAL_FIELDS, TANGENTIAL_FIELDS
 from . import namelists
 from .row import Row, columns
 
@@ -34,8 +35,7 @@ _row = library.call("run_row")
 _field = library.call("run_field")
 
 #: The fields of a simulation are those of a snapshot, and `height`, which is `road_height`.
-FIELDS = ("pressure", "gap", "displacement_z", "traction_x", "traction_y", "displacement_x",
-          "displacement_y", "slip_x", "slip_y", "contact", "road_height", "height")
+FIELDS = (*NORMAL_FIELDS, *TANGENTIAL_FIELDS, "height")
 
 _LOADS = ("pressure", "force", "displacement")
 
