@@ -64,6 +64,16 @@ CASES = {
     "steady": ROUGH.format(boundary="periodic")
     + VISCOELASTIC.replace(" /", ", thickness = 2e-3 /")
     + "&phase steady = .true., pressure = 3e4, velocity_x = 1e-2 /\n",
+    "steady friction": ROUGH.format(boundary="periodic")
+    + VISCOELASTIC.replace(" /", ", thickness = 2e-3 /")
+    + "&friction law = 'coulomb', coefficient = 0.4 /\n"
+    "&phase steady = .true., pressure = 3e4, velocity_x = 1e-2, velocity_y = 3e-3 /\n"
+    "&phase steady = .true., velocity_x = 3e-2, velocity_y = 9e-3 /\n",
+    # cells at the edge are partly sheared: Newton's method for all cells at once
+    "steady constant shear": ROUGH.format(boundary="periodic")
+    + VISCOELASTIC
+    + "&friction law = 'constant_shear', shear_strength = 2e5 /\n"
+    "&phase steady = .true., pressure = 1e5, velocity_x = 1e-2, velocity_y = 3e-3 /\n",
 }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+import sys
 from pathlib import Path
 
 import h5py
@@ -254,3 +255,18 @@ def test_check_notes_footprints(program: str, tmp_path: Path, velocity: str, tol
     )
     done = subprocess.run([program, "check", str(case)], capture_output=True, text=True, check=True)
     assert ("meets its own footprint" in done.stdout) == told, done.stdout
+
+
+@pytest.mark.parametrize("laws", [("constant_shear",), ("coulomb", "coulomb_orowan", "none")])
+def test_random_rows_against_dense_matrices(program: str, laws: tuple[str, ...]) -> None:
+    """Pressures, tractions and powers of the tool's random cases; with constant shear in the closed
+    form of the law, in which cells may be partly sheared.
+    """
+    tool = Path(__file__).parents[2] / "tools" / "steady_campaign.py"
+    done = subprocess.run(
+        [sys.executable, str(tool), "--count", "16", "--seed", "5", "--program", program,
+         "--laws", *laws], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    counts = {tuple(line.split()[:3]): int(line.split()[3]) for line in done.stdout.splitlines()
+              if len(line.split()) == 4}
+    assert sum(n for (_, _, end), n in counts.items() if end == "right") >= 20

@@ -1,14 +1,12 @@
-!> The equations of a step with friction for all cells at once.
+!> The equations of a step with friction for all cells at once (module `joint_system`).
 !>
-!> Unknown are a number s per cell (module `joint_cells`: gap, pressure and share of the bound), its traction
-!> T, and the level. With the road H read at the displacement that T makes, the equations are
+!> With the road H read at the displacement that T makes, the equations are
 !>
 !>     U_z - H - level = gap            of every cell, U_z = A_z (P + P_h)/Q
 !>     T = bound(T + r/a)               r the slip, a the tangential compliance of a cell; 0 where open
 !>     mean of P = load                 or the level is given
 !>
-!> Each is scaled: lengths by what the mean pressure of the contact presses a cell in, tractions by that
-!> pressure or by the strength, whichever is larger.
+!> An evaluation takes six transforms.
 module joint_equations
    use adhesion_potential, only : adhesive_slope
    use asperity_errors, only : error_type
@@ -18,41 +16,20 @@ module joint_equations
    use asperity_schedule, only : planned_row_type
    use contact_model, only : contact_type
    use fft_conv, only : columns_apply, convolution_type, new_convolution
-   use field_sums, only : field_count, field_sum, largest_of_rows, row_totals
-   use joint_cells, only : cell_rules_type
+   use field_sums, only : largest_of_rows, row_totals
+   use joint_system, only : joint_state_type, joint_system_type
    use regular_grid, only : boundary_periodic, grid_type
    use rubber_kernels, only : normal_kernel
    implicit none
    private
 
-   public :: joint_equations_type, joint_state_type
-
-   real(dp), parameter :: least_slope = 0.05_dp        !! of the road, in the width of the second range of s
-
-   !> A state of all cells, and what it leaves of the equations.
-   type :: joint_state_type
-      real(dp), allocatable :: s(:, :)                 !! m [nx, rows]
-      real(dp), allocatable :: t(:, :, :)              !! Pa [nx, 2, rows]
-      real(dp) :: level = 0.0_dp                       !! m
-      real(dp), allocatable :: left(:, :, :)           !! of the equations of a cell, scaled [nx, 3, rows]
-      real(dp) :: left_load = 0.0_dp                   !! of the load, scaled, times the root of the cells in contact
-      real(dp) :: merit = 0.0_dp                       !! root of the sum of squares
-      real(dp) :: worst = 0.0_dp                       !! largest
-   contains
-      procedure :: make_room
-      procedure :: copy
-   end type joint_state_type
+   public :: joint_equations_type
 
    !> The equations and their work space. Not to be copied.
-   type :: joint_equations_type
+   type, extends(joint_system_type) :: joint_equations_type
       logical :: ready = .false.
-      integer :: evaluations = 0                       !! so far, of six transforms each
-      type(cell_rules_type) :: rules
-      real(dp), allocatable :: width(:, :)             !! of the second range of s, m [nx, rows]
-      real(dp) :: unit_length = 1.0_dp                 !! of s, m
-      real(dp) :: unit_traction = 1.0_dp               !! Pa
-      real(dp) :: root = 1.0_dp                        !! of the number of cells in contact at the start
-      real(dp), private :: unit_pressure = 1.0_dp      !! of the mean, Pa
+      class(contact_type), pointer, private :: contact => null()   !! of the step at hand
+      type(planned_row_type), private :: plan
       real(dp), private :: compliance = 0.0_dp         !! of a cell under its own unit pressure, G = 1, m/Pa
       type(convolution_type), private :: operator      !! A_z, G = 1
       real(dp), allocatable, private :: pressure(:, :), height(:, :), slope_x(:, :), slope_y(:, :)
@@ -65,31 +42,6 @@ module joint_equations
    end type joint_equations_type
 
 contains
-
-   !> Allocate the fields of a state.
-   subroutine make_room(self, grid, status)
-      class(joint_state_type), intent(inout) :: self
-      type(grid_type), intent(in) :: grid
-      integer, intent(out) :: status                   !! not 0: there is not enough memory
-
-      allocate (self%s(grid%nx, grid%rows()), source=0.0_dp, stat=status)
-      if (status == 0) allocate (self%t(grid%nx, 2, grid%rows()), source=0.0_dp, stat=status)
-      if (status == 0) allocate (self%left(grid%nx, 3, grid%rows()), source=0.0_dp, stat=status)
-   end subroutine make_room
-
-   !> Copy another state into the fields that are there.
-   subroutine copy(self, other)
-      class(joint_state_type), intent(inout) :: self
-      type(joint_state_type), intent(in) :: other
-
-      self%s(:, :) = other%s
-      self%t(:, :, :) = other%t
-      self%left(:, :, :) = other%left
-      self%level = other%level
-      self%left_load = other%left_load
-      self%merit = other%merit
-      self%worst = other%worst
-   end subroutine copy
 
    !> Operator and work space. Where there is no memory for them, or only one cell, `ready` remains .false.
    subroutine prepare(self, contact)
@@ -114,14 +66,18 @@ contains
    end subroutine prepare
 
    !> The start: the state of the contact; and the units.
-   subroutine start(self, contact, begun)
+   subroutine start(self, contact, plan, begun)
       class(joint_equations_type), intent(inout) :: self
-      class(contact_type), intent(in) :: contact
+      class(contact_type), intent(inout), target :: contact      !! until the step is solved
+      type(planned_row_type), intent(in) :: plan
       type(joint_state_type), intent(inout) :: begun
       logical, allocatable :: touching(:, :)
-      real(dp) :: slope
       integer :: c
 
+      self%contact => contact
+      self%plan = plan
+      self%grid = contact%grid
+      self%evaluations = 0
       associate (rules => self%rules, state => contact%state)
          rules%potential = contact%side%potential
          rules%law = contact%tangential%law
@@ -130,14 +86,7 @@ contains
          rules%soft = self%compliance/contact%material%q
          rules%soft_along = contact%tangential%cell_compliance()
          touching = state%tangential%contact /= 0_int8
-         self%root = sqrt(max(real(field_count(touching), dp), 1.0_dp))
-         self%unit_pressure = max(field_sum(abs(state%pressure)), tiny(1.0_dp))/contact%grid%cells()
-         self%unit_traction = self%unit_pressure*contact%grid%cells()/self%root**2
-         self%unit_length = rules%soft*self%unit_traction
-         self%unit_traction = max(self%unit_traction, rules%law%bare_strength())
-         slope = max(contact%rms_slope, least_slope)
-         rules%width = rules%soft_along*slope*self%unit_traction
-         if (rules%law%jumps_at_edge()) rules%width = rules%soft_along*slope*rules%law%bare_strength()
+         call self%take_units(touching, state%pressure, contact%rms_slope)
          self%width(:, :) = merge(rules%width, 0.0_dp, rules%has_jump(contact%slope_x, contact%slope_y))
          begun%s(:, :) = rules%number_of(self%width, touching, state%pressure, state%gap)
          do c = 1, 2
@@ -148,7 +97,15 @@ contains
    end subroutine start
 
    !> What a state leaves of the equations.
-   subroutine evaluate(self, contact, plan, state)
+   subroutine evaluate(self, state)
+      class(joint_equations_type), intent(inout) :: self
+      type(joint_state_type), intent(inout) :: state
+
+      call evaluate_step(self, self%contact, self%plan, state)
+   end subroutine evaluate
+
+   !> The same with the contact and the row at hand.
+   subroutine evaluate_step(self, contact, plan, state)
       class(joint_equations_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact
       type(planned_row_type), intent(in) :: plan
@@ -179,7 +136,7 @@ contains
       state%worst = max(largest_of_rows(largest), abs(state%left_load))
       state%left_load = state%left_load*self%root
       state%merit = sqrt(sums(1) + state%left_load**2)
-   end subroutine evaluate
+   end subroutine evaluate_step
 
    !> The mean pressure that is prescribed, Pa.
    pure function wanted_mean(contact, plan) result(mean)
@@ -232,10 +189,9 @@ contains
    end subroutine evaluate_row
 
    !> Hand the solution to the contact, if there is memory for the shares of the cells.
-   subroutine hand_out(self, contact, plan, found, done)
+   subroutine hand_out(self, contact, found, done)
       class(joint_equations_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact
-      type(planned_row_type), intent(in) :: plan
       type(joint_state_type), intent(inout) :: found
       logical, intent(out) :: done
       real(dp) :: slope(2)
@@ -249,7 +205,7 @@ contains
          if (allocated(contact%tangential%share)) deallocate (contact%tangential%share)
          return
       end if
-      call evaluate(self, contact, plan, found)
+      call evaluate(self, found)
       slope = 0.0_dp
       associate (state => contact%state, rubbing => contact%state%tangential)
          state%pressure(:, :) = self%pressure

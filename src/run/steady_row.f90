@@ -106,7 +106,7 @@ contains
             star = tangential%law%normal_traction(found%pressure(i, j), slope)
             state%contact(i, j) = 0_int8
             state%rubbing(i, :, j) = 0.0_dp
-            if (found%pressure(i, j) <= 0.0_dp) cycle
+            if (found%pressure(i, j) <= 0.0_dp .and. .not. any(abs(found%traction(i, :, j)) > 0.0_dp)) cycle
             state%rubbing(i, :, j) = state%traction(i, :, j) - star
             state%contact(i, j) = 2_int8
             if (tangential%law%bound_ratio(found%pressure(i, j), slope, state%traction(i, :, j) - star) > within) &

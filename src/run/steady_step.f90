@@ -223,7 +223,7 @@ contains
       if (.not. problem%warm) return
       part = onward(self, problem%target)
       associate (c => self%contact, a => self%last, b => self%before)
-         scale = field_sum(a%pressure)/max(field_sum(a%gap), tiny(1.0_dp))
+         scale = field_sum(a%pressure)/max(field_sum(a%gap), field_sum(b%gap), tiny(1.0_dp))
          do j = 1, self%grid%rows()
             ! Pressure and gap are one quantity on both sides of zero.
             c%pressure(:, j) = a%pressure(:, j) - scale*a%gap(:, j)
@@ -273,7 +273,8 @@ contains
       self%last%pressure_mean = target
       self%last%velocity = self%medium%velocity
       self%last%pressure = self%contact%pressure
-      self%last%gap = max(self%contact%gap, 0.0_dp)
+      ! In contact the gap is round-off. Where all cells touch, it would outweigh the pressure in the next start.
+      self%last%gap = merge(0.0_dp, max(self%contact%gap, 0.0_dp), self%contact%pressure > 0.0_dp)
       self%last%traction = self%contact%traction
    end subroutine keep_state
 
@@ -322,7 +323,8 @@ contains
       direction = self%medium%velocity/norm2(self%medium%velocity)
       associate (c => self%contact)
          do i = 1, self%grid%nx
-            if (c%pressure(i, j) <= 0.0_dp) cycle
+            ! A partly sheared cell has traction and no pressure.
+            if (c%pressure(i, j) <= 0.0_dp .and. .not. self%frictional) cycle
             slope = [c%slope_x(i, j), c%slope_y(i, j)]
             sums(1:2) = sums(1:2) + c%pressure(i, j)*slope
             if (.not. self%frictional) cycle

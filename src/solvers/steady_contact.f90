@@ -4,11 +4,13 @@ module steady_contact
    use asperity_precision, only : dp
    use field_sums, only : field_count, row_totals
    use friction_law, only : friction_law_type
+   use normal_state, only : gap_measure_type, measure_gap, normal_problem_type, reason_converged
    use solver_result, only : solver_result_type
+   use steady_operator, only : steady_operator_type
    implicit none
    private
 
-   public :: contact_mean, explain, read_road, steady_contact_type
+   public :: contact_mean, explain, judge_gap, read_road, steady_contact_type
 
    !> A steady contact with friction.
    type :: steady_contact_type
@@ -42,6 +44,25 @@ contains
          contact%slope_y)
    end subroutine read_road
 
+   !> The gap of a pressure over the road as it was read, and the error of the pressure.
+   subroutine judge_gap(contact, operator, task, normal)
+      type(steady_contact_type), intent(inout) :: contact
+      type(steady_operator_type), intent(inout) :: operator
+      type(normal_problem_type), intent(in) :: task
+      type(solver_result_type), intent(inout) :: normal
+      type(gap_measure_type) :: found
+
+      call operator%displace(contact%pressure, contact%gap)
+      contact%gap = contact%gap - contact%height
+      found = measure_gap(task, contact%pressure, contact%gap, operator%threads)
+      contact%level = found%level
+      contact%gap = contact%gap - contact%level
+      normal%residual = found%error
+      normal%load_error = found%load_error
+      normal%converged = found%error <= task%tolerance
+      if (normal%converged) normal%reason = reason_converged
+   end subroutine judge_gap
+
    !> Mean of the displacement weighted by the pressure.
    function contact_mean(contact) result(mean)
       type(steady_contact_type), intent(in) :: contact
@@ -61,10 +82,10 @@ contains
       mean = sums(1:2)/max(sums(3), tiny(1.0_dp))
    end function contact_mean
 
-   !> Why there may be no solution. A constant shear stress jumps at the rim of the contact: the cell
-   !> that it takes out of contact is drawn into it again without it. With `coulomb_orowan` the stress
-   !> grows from zero with the pressure, and the rim has a solution. Uphill the law on the slope gives
-   !> T = P tan(atan(mu) + alpha), which has no bound where mu tan(alpha) reaches 1: the road wedges.
+   !> Why there may be no solution. Uphill the law on the slope gives T = P tan(atan(mu) + alpha), which has
+   !> no bound where mu tan(alpha) reaches 1: the road wedges. A strength bounds the traction of all laws that
+   !> have one, and a solution exists; with constant shear the solver may miss it, because the traction jumps
+   !> at the edge of the contact.
    subroutine explain(contact, law, normal, rubbing)
       type(steady_contact_type), intent(in) :: contact
       type(friction_law_type), intent(in) :: law
@@ -72,8 +93,8 @@ contains
 
       if (normal%converged .and. rubbing%converged) return
       if (law%jumps_at_edge()) then
-         normal%reason = 'cells at the rim come and go; law = ''coulomb_orowan'' avoids this'
-      else if (law%slope) then
+         normal%reason = 'cells at the edge come and go; law = ''coulomb_orowan'' avoids this'
+      else if (law%slope .and. law%strength_beside() < 0.0_dp) then
          if (field_count(contact%pressure > 0.0_dp .and. law%reach_coefficient()*hypot(contact%slope_x, &
             contact%slope_y) >= 1.0_dp) > 0.0_dp) &
             normal%reason = 'the road wedges: slopes in contact exceed 1/coefficient'

@@ -17,25 +17,27 @@
 !> Converged means: the duality gap of P under the road at x + u, u = A_T T of the traction handed out,
 !> and |bound(T + c_t r) - T|/|T|, all recomputed, are below the tolerance.
 !>
-!> Where the rounds do not settle, the contact of the least error is handed out.
+!> Where the rounds stall, all cells are solved at once from the contact of the least error (module
+!> `steady_joint`). If that fails, too, this contact is handed out.
 !>
 !> Memory beside the caller's: 19 fields, 50 for the acceleration in single precision, and 10 of doubles.
 module steady_friction
    use anderson, only : anderson_type, new_anderson
    use field_sums, only : field_count, field_mean, field_sum, row_total, row_totals
    use friction_law, only : friction_law_type
-   use asperity_interpolation, only : displaced, interpolation_type
-   use normal_state, only : gap_measure_type, measure_gap, normal_problem_type, prepare_problem, &
-      reason_converged, reason_iterations
+   use asperity_interpolation, only : displaced, interpolation_type, shifted
+   use normal_state, only : normal_problem_type, prepare_problem, reason_converged, reason_iterations
    use asperity_precision, only : dp, int64
    use projection, only : project_simplex
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
    use stop_watch, only : stop_is_due
    use steady_bound, only : bound_tractions, compare_tractions, largest_force
-   use steady_contact, only : contact_mean, explain, read_road, steady_contact_type
+   use steady_contact, only : contact_mean, explain, judge_gap, read_road, steady_contact_type
+   use steady_joint, only : attempt_due, steady_joint_type
    use steady_normal, only : new_steady_normal, steady_measure_type, steady_normal_type
    use steady_operator, only : steady_operator_type
+   use steady_start, only : contact_without_friction, full_sliding, ratio_of_sliding
    use steady_pace, only : components, pace_type
    implicit none
    private
@@ -60,6 +62,7 @@ module steady_friction
       real(dp), allocatable, private :: ratio(:, :, :)     !! T/P [nx, 2, rows]
       real(dp), allocatable, private :: place(:, :, :)     !! u+, m [nx, 2, rows]
       type(anderson_type), private :: memory
+      type(steady_joint_type), private :: joint
    contains
       procedure :: solve
    end type steady_friction_type
@@ -118,6 +121,8 @@ contains
             pace%accepted = 0.5_dp*pace%accepted
          end if
          if (rubbing%iterations >= task%max_iterations) then
+            normal%reason = reason_iterations
+            rubbing%reason = reason_iterations
             call finish(self, operator, task, road, contact, normal, rubbing)
             call return_to_best(self, operator, task, road, pace, contact, normal, rubbing)
             call explain(contact, self%law, normal, rubbing)
@@ -125,6 +130,11 @@ contains
          end if
          if (rubbing%iterations >= doubtful .and. mod(rubbing%iterations, looks) == 0) &
             call keep_best(self, operator, task, road, pace, contact)
+         pace%attempt = attempt_due(self%law, rubbing%iterations)
+         if (pace%attempt > 0) then
+            call solve_at_once(self, operator, task, road, pace, contact, normal, rubbing)
+            if (normal%stopped .or. (normal%converged .and. rubbing%converged)) exit
+         end if
          call advance(self, operator, task, pace, rubbing%iterations, &
             max(change, measure%change/measure%size), measure)
       end do
@@ -139,14 +149,10 @@ contains
       type(interpolation_type), intent(inout) :: road
       type(steady_contact_type), intent(inout) :: contact
       type(solver_result_type), intent(out) :: normal
-      type(normal_problem_type) :: rough
       integer :: c
 
       call self%memory%forget()
-      do c = 1, 2
-         self%ratio(:, c, :) = merge(1.0_dp, self%law%reach_coefficient(), self%law%jumps_at_edge()) &
-            *self%direction(c)
-      end do
+      call ratio_of_sliding(self%law, self%direction, self%ratio)
       if (task%warm) then
          call self%normal%start(operator, task, contact%height, contact%pressure, contact%gap)
          call operator%shear(contact%traction, contact%displacement, contact%slip)
@@ -156,14 +162,8 @@ contains
             contact%slope_x, contact%slope_y)
          call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio)
       else
-         rough = task
-         rough%tolerance = max(task%tolerance, 1e-2_dp)
-         call self%normal%solve(operator, rough, contact%height, contact%pressure, contact%gap, &
-            contact%level, normal)
+         call contact_without_friction(self%normal, operator, task, contact, normal)
          if (normal%stopped) return
-         contact%displacement = 0.0_dp
-         contact%slip = 0.0_dp
-         contact%offset = 0.0_dp
       end if
       self%state(:, 1, :) = self%normal%z
       do c = 1, 2
@@ -236,6 +236,40 @@ contains
       self%best(:, 1, :) = contact%pressure
       self%best(:, 2:3, :) = contact%traction
    end subroutine keep_best
+
+   !> Solve all cells at once, first from the best contact, in a second attempt from that without friction:
+   !> on steep roads the best one may be far off. If this fails, the rounds go on as if nothing had happened.
+   subroutine solve_at_once(self, operator, task, road, pace, contact, normal, rubbing)
+      class(steady_friction_type), intent(inout) :: self
+      type(steady_operator_type), intent(inout) :: operator
+      type(normal_problem_type), intent(in) :: task
+      type(interpolation_type), intent(inout) :: road
+      type(pace_type), intent(in) :: pace
+      type(steady_contact_type), intent(inout) :: contact
+      type(solver_result_type), intent(inout) :: normal, rubbing
+      type(solver_result_type) :: start
+      real(dp), allocatable :: ratio(:, :, :)
+      real(dp) :: scale
+
+      allocate (ratio, source=self%ratio)
+      call finish(self, operator, task, road, contact, normal, rubbing)
+      call return_to_best(self, operator, task, road, pace, contact, normal, rubbing)
+      if (pace%attempt > 1) then
+         scale = self%normal%c
+         call shifted(road, self%base(1), self%base(2), contact%height, contact%slope_x, contact%slope_y)
+         call contact_without_friction(self%normal, operator, task, contact, start)
+         normal%stopped = start%stopped
+         if (normal%stopped) return
+         call full_sliding(self%law, self%c, self%direction, self%ratio, contact)
+         self%normal%c = scale
+         call operator%set_scale(scale)
+      end if
+      self%joint%direction = self%direction
+      self%joint%base = self%base
+      self%joint%c = self%c
+      call self%joint%solve(self%law, operator, task, road, contact, normal, rubbing)
+      self%ratio(:, :, :) = ratio
+   end subroutine solve_at_once
 
    !> Hand out the kept contact where it is better than that in hand: rounds that do not settle may swing.
    subroutine return_to_best(self, operator, task, road, pace, contact, normal, rubbing)
@@ -350,22 +384,12 @@ contains
       type(interpolation_type), intent(inout) :: road
       type(steady_contact_type), intent(inout) :: contact
       type(solver_result_type), intent(inout) :: normal, rubbing
-      type(gap_measure_type) :: found
       real(dp), allocatable :: again(:, :, :), rows(:, :)
       integer :: j
 
       call operator%shear(contact%traction, contact%displacement, contact%slip)
       call read_road(contact, road, self%base, self%direction)
-      call operator%displace(contact%pressure, contact%gap)
-      contact%gap = contact%gap - contact%height
-      found = measure_gap(task, contact%pressure, contact%gap, operator%threads)
-      contact%level = found%level
-      contact%gap = contact%gap - contact%level
-      normal%residual = found%error
-      normal%load_error = found%load_error
-      normal%converged = found%error <= task%tolerance
-      if (normal%converged) normal%reason = reason_converged
-
+      call judge_gap(contact, operator, task, normal)
       call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio)
       allocate (again, mold=contact%traction)
       call bound_tractions(self%law, self%c, contact%pressure, contact%slope_x, contact%slope_y, &

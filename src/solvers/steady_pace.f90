@@ -26,6 +26,7 @@ module steady_pace
       real(dp) :: marked = huge(1.0_dp)          !! change some rounds ago
       integer :: since = 0                       !! rounds since then
       real(dp) :: weights(components) = 0.0_dp   !! of the components in the acceleration
+      integer :: attempt = 0                     !! to solve all cells at once: its number after this round
       real(dp) :: accepted = 0.0_dp              !! change below which a solution is checked
       real(dp) :: best = huge(1.0_dp)            !! largest error of the kept contact
    contains

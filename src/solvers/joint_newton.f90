@@ -1,0 +1,348 @@
+!> Newton's method for the pressures, gaps, tractions and the level of a contact with friction at once
+!> (module `joint_system`).
+!>
+!> Newton's steps are solved by GMRES with products from differences of the equations, and shortened where
+!> the equations are not met better. Open cells are not unknown: their gaps follow (with adhesion only those
+!> that are attracted hardly). If this fails and some traction may jump, the equations are solved with a
+!> pressure that rises in partly sheared cells, which takes the jump away, and the rise goes to nothing
+!> (`descend`).
+!>
+!> Fields of doubles: 25; and the directions of GMRES, 3 numbers of single precision per unknown cell and
+!> direction. Where there is not enough memory, nothing is solved.
+module joint_newton
+   use adhesion_potential, only : adhesive_curvature
+   use asperity_parallel, only : any_process
+   use asperity_precision, only : dp
+   use field_sums, only : field_count, largest_of_rows
+   use gmres, only : cell_vector_type, gmres_type
+   use joint_system, only : joint_state_type, joint_system_type
+   use regular_grid, only : grid_type
+   use stop_watch, only : stop_is_due
+   implicit none
+   private
+
+   public :: joint_newton_type
+
+   integer, parameter :: most_steps = 25
+   integer, parameter :: most_directions = 120         !! of GMRES, for a step
+   real(dp), parameter :: accuracy = 1.0e-4_dp         !! of a solve by GMRES
+   real(dp), parameter :: difference = 1.0e-7_dp       !! largest change of an unknown in a product, scaled
+   real(dp), parameter :: attracted = 1.0e-4_dp        !! e'' over the stiffness of a cell, for it to be unknown
+   real(dp), parameter :: astray = 100.0_dp            !! times what was left at the start
+   real(dp), parameter :: idle = 1.0e-4_dp             !! part by which a step must lower what is left
+   real(dp), parameter :: share_of_tolerance = 1.0e-3_dp, round_off = 1.0e-11_dp   !! of what may be left
+   real(dp), parameter :: lengths(10) = [1.0_dp, 0.7_dp, 0.5_dp, 0.3_dp, 0.15_dp, 0.07_dp, 0.03_dp, 0.01_dp, &
+      0.003_dp, 0.001_dp]                              !! of a step
+   ! The rise of the pressure in partly sheared cells:
+   integer, parameter :: most_descents = 30            !! solves with one
+   real(dp), parameter :: first_factor = 0.1_dp        !! from one solve to the next
+   real(dp), parameter :: last_factor = 0.95_dp        !! a solution ends between two rises as close as this
+   real(dp), parameter :: least_rise = 1.0e-5_dp, most_rise = 1.0e2_dp
+
+   !> The method and its work space. Not to be copied.
+   type :: joint_newton_type
+      logical :: ready = .false.
+      type(joint_state_type) :: now                    !! in: the start; out: the solution
+      integer, allocatable, private :: first(:)        !! [rows + 1] of the list of unknown cells
+      integer, allocatable, private :: cell(:)         !! its cells, i
+      type(joint_state_type), private :: trial, best, begun
+      real(dp), allocatable, private :: follow(:, :)   !! change of s of the cells that are not unknown, m [nx, rows]
+   contains
+      procedure :: prepare
+      procedure :: solve
+      procedure :: destroy
+   end type joint_newton_type
+
+contains
+
+   !> Room for the states. Where there is not enough memory, `ready` remains .false.
+   subroutine prepare(self, grid)
+      class(joint_newton_type), intent(inout) :: self
+      type(grid_type), intent(in) :: grid
+      integer :: status(7), n
+
+      call self%now%make_room(grid, status(1))
+      call self%trial%make_room(grid, status(2))
+      call self%best%make_room(grid, status(3))
+      call self%begun%make_room(grid, status(4))
+      n = grid%rows()
+      allocate (self%follow(grid%nx, n), source=0.0_dp, stat=status(5))
+      allocate (self%first(n + 1), source=1, stat=status(6))
+      allocate (self%cell(grid%nx*n), source=0, stat=status(7))
+      self%ready = .not. any_process(any(status /= 0))
+      if (.not. self%ready) call self%destroy()
+   end subroutine prepare
+
+   !> Solve a system from the state `now`.
+   subroutine solve(self, system, tolerance, solved)
+      class(joint_newton_type), intent(inout) :: self
+      class(joint_system_type), intent(inout) :: system
+      real(dp), intent(in) :: tolerance                !! of the solution; far less is left of the equations
+      logical, intent(out) :: solved
+      real(dp) :: goal
+
+      goal = max(share_of_tolerance*tolerance, round_off)
+      call self%begun%copy(self%now)
+      call iterate(self, system, goal, solved)
+      if (.not. solved .and. field_count(system%width > 0.0_dp) > 0) &
+         call descend(self, system, goal, solved)
+   end subroutine solve
+
+   !> Is the solution to be given up, for a stop or because it takes too long?
+   function is_to_end(system) result(yes)
+      class(joint_system_type), intent(in) :: system
+      logical :: yes
+
+      yes = stop_is_due() .or. system%evaluations >= system%most_evaluations
+   end function is_to_end
+
+   !> Newton's steps from the state at hand.
+   subroutine iterate(self, system, goal, solved)
+      class(joint_newton_type), intent(inout) :: self
+      class(joint_system_type), intent(inout) :: system
+      real(dp), intent(in) :: goal                     !! largest part that may be left
+      logical, intent(out) :: solved
+      type(cell_vector_type) :: step
+      real(dp) :: first
+      integer :: k
+      logical :: found
+
+      call system%evaluate(self%now)
+      first = self%now%merit
+      do k = 1, most_steps
+         if (.not. self%now%worst > goal .or. self%now%merit > astray*first) exit
+         if (is_to_end(system)) exit
+         call find_step(self, system, step, found)
+         if (.not. found) exit
+         call take_step(self, system, step, k)
+      end do
+      solved = self%now%worst <= goal
+   end subroutine iterate
+
+   !> Solve with a pressure that rises within the second range, and let this rise go to nothing. Each
+   !> solution is the start of the next.
+   subroutine descend(self, system, goal, solved)
+      class(joint_newton_type), intent(inout) :: self
+      class(joint_system_type), intent(inout) :: system
+      real(dp), intent(in) :: goal
+      logical, intent(out) :: solved
+      real(dp) :: factor, last
+      integer :: k
+      logical :: met                                   !! the equations with the rise at hand
+
+      solved = .false.
+      last = 0.0_dp
+      factor = first_factor
+      call set_rise(system, self%begun, 1.0_dp)
+      do k = 1, most_descents
+         if (is_to_end(system)) exit
+         call self%now%copy(self%begun)
+         call iterate(self, system, goal, met)
+         solved = met .and. .not. system%rules%rise > 0.0_dp
+         if (solved) exit
+         if (met) then
+            call self%begun%copy(self%now)
+            last = system%rules%rise
+            factor = max(factor**1.5_dp, first_factor)
+            call set_rise(system, self%begun, merge(last*factor, 0.0_dp, last > least_rise))
+         else if (.not. last > 0.0_dp) then
+            call set_rise(system, self%begun, 10.0_dp*system%rules%rise)
+         else
+            factor = sqrt(factor)
+            call set_rise(system, self%begun, last*factor)
+         end if
+         if (system%rules%rise > most_rise .or. factor > last_factor) exit
+      end do
+      system%rules%rise = 0.0_dp
+   end subroutine descend
+
+   !> Change the rise, and s in cells with a pressure such that it remains.
+   subroutine set_rise(system, state, rise)
+      class(joint_system_type), intent(inout) :: system
+      type(joint_state_type), intent(inout) :: state
+      real(dp), intent(in) :: rise
+      real(dp) :: pressed, width
+      integer :: i, j
+
+      do j = 1, size(state%s, 2)
+         do i = 1, size(state%s, 1)
+            width = system%width(i, j)
+            if (state%s(i, j) < width .or. .not. width > 0.0_dp) cycle
+            pressed = state%s(i, j) - width + system%rules%rise*width
+            if (pressed >= rise*width) then
+               state%s(i, j) = pressed - rise*width + width
+            else
+               state%s(i, j) = pressed/rise
+            end if
+         end do
+      end do
+      system%rules%rise = rise
+   end subroutine set_rise
+
+   !> Newton's step, scaled. There is none where memory runs out.
+   subroutine find_step(self, system, step, found)
+      class(joint_newton_type), intent(inout) :: self
+      class(joint_system_type), intent(inout) :: system
+      type(cell_vector_type), intent(inout) :: step
+      logical, intent(out) :: found
+      type(gmres_type) :: krylov
+      type(cell_vector_type) :: v
+      integer :: cells, status(2)
+
+      call list_cells(self, system)
+      cells = self%first(size(self%first)) - 1
+      if (allocated(step%cells)) deallocate (step%cells)
+      allocate (step%cells(3, cells), stat=status(1))
+      allocate (v%cells(3, cells), stat=status(2))
+      found = .not. any_process(any(status /= 0))
+      if (.not. found) return
+
+      call gather(self, self%now%left, v)
+      v%cells = -v%cells
+      v%beside = -self%now%left_load
+      call krylov%begin(v, self%first, most_directions, accuracy)
+      do while (krylov%unsolved())
+         if (is_to_end(system)) exit
+         call krylov%next(v)
+         call change(self, system, v)
+         call gather(self, self%trial%left, v)
+         v%beside = self%trial%left_load
+         call krylov%take(v)
+      end do
+      call krylov%solution(step)
+   end subroutine find_step
+
+   !> The list of unknown cells.
+   subroutine list_cells(self, system)
+      class(joint_newton_type), intent(inout) :: self
+      class(joint_system_type), intent(in) :: system
+      logical :: unknown(size(self%now%s, 1))
+      integer :: i, j
+
+      self%first(1) = 1
+      do j = 1, size(self%now%s, 2)
+         unknown = self%now%s(:, j) >= 0.0_dp .or. abs(adhesive_curvature(system%rules%potential, &
+            max(-self%now%s(:, j), 0.0_dp)))*system%rules%soft > attracted
+         self%first(j + 1) = self%first(j) + count(unknown)
+         self%cell(self%first(j):self%first(j + 1) - 1) = pack([(i, i=1, size(unknown))], unknown)
+      end do
+   end subroutine list_cells
+
+   !> The equations' change with a vector of the unknowns, in `trial%left` of all cells.
+   subroutine change(self, system, v)
+      class(joint_newton_type), intent(inout) :: self
+      class(joint_system_type), intent(inout) :: system
+      type(cell_vector_type), intent(in) :: v
+      real(dp) :: length
+      integer :: j
+
+      length = difference/max(largest_of_rows([maxval(abs(v%cells))]), abs(v%beside)/system%root, tiny(1.0_dp))
+      call add(self, system, v, length)
+      call system%evaluate(self%trial)
+      !$omp parallel do default(none) shared(self, length) private(j)
+      do j = 1, size(self%now%s, 2)
+         self%trial%left(:, :, j) = (self%trial%left(:, :, j) - self%now%left(:, :, j))/length
+      end do
+      self%trial%left_load = (self%trial%left_load - self%now%left_load)/length
+   end subroutine change
+
+   !> The state at hand and a multiple of a vector, as `trial`.
+   subroutine add(self, system, v, length)
+      class(joint_newton_type), intent(inout) :: self
+      class(joint_system_type), intent(in) :: system
+      type(cell_vector_type), intent(in) :: v
+      real(dp), intent(in) :: length
+      integer :: i, j, k
+
+      self%trial%level = self%now%level + length*v%beside*system%unit_length/system%root
+      !$omp parallel do default(none) shared(self, system, v, length) private(i, j, k)
+      do j = 1, size(self%now%s, 2)
+         self%trial%s(:, j) = self%now%s(:, j)
+         self%trial%t(:, :, j) = self%now%t(:, :, j)
+         do k = self%first(j), self%first(j + 1) - 1
+            i = self%cell(k)
+            self%trial%s(i, j) = self%trial%s(i, j) + length*v%cells(1, k)*system%unit_length
+            self%trial%t(i, :, j) = self%trial%t(i, :, j) + length*v%cells(2:3, k)*system%unit_traction
+         end do
+      end do
+   end subroutine add
+
+   !> The unknown cells of a field.
+   subroutine gather(self, field, v)
+      class(joint_newton_type), intent(in) :: self
+      real(dp), intent(in) :: field(:, :, :)           !! [nx, 3, rows]
+      type(cell_vector_type), intent(inout) :: v
+      integer :: j, k
+
+      do j = 1, size(field, 3)
+         do k = self%first(j), self%first(j + 1) - 1
+            v%cells(:, k) = field(self%cell(k), :, j)
+         end do
+      end do
+   end subroutine gather
+
+   !> Go along the step as far as the equations are met better.
+   subroutine take_step(self, system, step, round)
+      class(joint_newton_type), intent(inout) :: self
+      class(joint_system_type), intent(inout) :: system
+      type(cell_vector_type), intent(in) :: step
+      integer, intent(in) :: round
+      integer :: j, k, turn
+
+      call change(self, system, step)
+      do j = 1, size(self%follow, 2)
+         self%follow(:, j) = -(self%now%left(:, 1, j) + self%trial%left(:, 1, j))*system%unit_length
+         self%follow(self%cell(self%first(j):self%first(j + 1) - 1), j) = 0.0_dp
+      end do
+      self%best%merit = huge(1.0_dp)
+      do k = 1, size(lengths)
+         call try_length(self, system, step, lengths(k))
+         if (self%trial%merit < self%best%merit) call self%best%copy(self%trial)
+         if (self%trial%merit < (1.0_dp - 0.2_dp*lengths(k))*self%now%merit) then
+            call self%now%copy(self%trial)
+            return
+         end if
+      end do
+      if (round > 2 .and. self%best%merit >= (1.0_dp - idle)*self%now%merit) then
+         ! No length helps: any way out of the corner.
+         turn = 1 + modulo(7*round, 4)
+         call try_length(self, system, step, lengths(turn))
+         call self%best%copy(self%trial)
+      end if
+      call self%now%copy(self%best)
+   end subroutine take_step
+
+   !> The state after a part of a step, as `trial`.
+   subroutine try_length(self, system, step, length)
+      class(joint_newton_type), intent(inout) :: self
+      class(joint_system_type), intent(inout) :: system
+      type(cell_vector_type), intent(in) :: step
+      real(dp), intent(in) :: length
+      integer :: c, j
+
+      call add(self, system, step, length)
+      do j = 1, size(self%follow, 2)
+         self%trial%s(:, j) = self%trial%s(:, j) + length*self%follow(:, j)
+         do c = 1, 2
+            where (self%trial%s(:, j) < 0.0_dp) self%trial%t(:, c, j) = 0.0_dp
+         end do
+      end do
+      call system%evaluate(self%trial)
+   end subroutine try_length
+
+   !> Free the fields.
+   subroutine destroy(self)
+      class(joint_newton_type), intent(inout) :: self
+      type(joint_state_type) :: none
+
+      self%now = none
+      self%trial = none
+      self%best = none
+      self%begun = none
+      if (allocated(self%follow)) deallocate (self%follow)
+      if (allocated(self%first)) deallocate (self%first)
+      if (allocated(self%cell)) deallocate (self%cell)
+      self%ready = .false.
+   end subroutine destroy
+
+end module joint_newton

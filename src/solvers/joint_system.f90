@@ -1,0 +1,111 @@
+!> A contact with friction as equations for all cells at once, which module `joint_newton` solves.
+!>
+!> Unknown are a number s per cell (module `joint_cells`: gap, pressure and share of the bound), its traction
+!> T, and the level. There are two such systems: a step in time (module `joint_equations`) and a state of
+!> steady sliding (module `steady_joint`). Each says what a state leaves of its equations:
+!>
+!>     U_z - H - level = gap            of every cell
+!>     T = bound of T and the slip      0 where the cell is open
+!>     mean of P = load                 or the level is given
+!>
+!> Each is scaled: lengths by what the mean pressure of the contact presses a cell in, tractions by that
+!> pressure or by the strength, whichever is larger.
+module joint_system
+   use asperity_precision, only : dp
+   use field_sums, only : field_count, field_sum
+   use joint_cells, only : cell_rules_type
+   use regular_grid, only : grid_type
+   implicit none
+   private
+
+   public :: joint_state_type, joint_system_type
+
+   real(dp), parameter :: least_slope = 0.05_dp        !! of the road, in the width of the second range of s
+
+   !> A state of all cells, and what it leaves of the equations.
+   type :: joint_state_type
+      real(dp), allocatable :: s(:, :)                 !! m [nx, rows]
+      real(dp), allocatable :: t(:, :, :)              !! Pa [nx, 2, rows]
+      real(dp) :: level = 0.0_dp                       !! m
+      real(dp), allocatable :: left(:, :, :)           !! of the equations of a cell, scaled [nx, 3, rows]
+      real(dp) :: left_load = 0.0_dp                   !! of the load, scaled, times the root of the cells in contact
+      real(dp) :: merit = 0.0_dp                       !! root of the sum of squares
+      real(dp) :: worst = 0.0_dp                       !! largest
+   contains
+      procedure :: make_room
+      procedure :: copy
+   end type joint_state_type
+
+   !> The equations.
+   type, abstract :: joint_system_type
+      type(grid_type) :: grid
+      integer :: evaluations = 0                       !! so far
+      integer :: most_evaluations = huge(1)            !! before the solution is given up
+      type(cell_rules_type) :: rules
+      real(dp), allocatable :: width(:, :)             !! of the second range of s, m [nx, rows]
+      real(dp) :: unit_length = 1.0_dp                 !! of s, m
+      real(dp) :: unit_traction = 1.0_dp               !! Pa
+      real(dp) :: unit_pressure = 1.0_dp               !! of the mean, Pa
+      real(dp) :: root = 1.0_dp                        !! of the number of cells in contact at the start
+   contains
+      procedure(evaluate_state), deferred :: evaluate
+      procedure :: take_units
+   end type joint_system_type
+
+   abstract interface
+      !> What a state leaves of the equations.
+      subroutine evaluate_state(self, state)
+         import :: joint_state_type, joint_system_type
+         class(joint_system_type), intent(inout) :: self
+         type(joint_state_type), intent(inout) :: state
+      end subroutine evaluate_state
+   end interface
+
+contains
+
+   !> Allocate the fields of a state.
+   subroutine make_room(self, grid, status)
+      class(joint_state_type), intent(inout) :: self
+      type(grid_type), intent(in) :: grid
+      integer, intent(out) :: status                   !! not 0: there is not enough memory
+
+      allocate (self%s(grid%nx, grid%rows()), source=0.0_dp, stat=status)
+      if (status == 0) allocate (self%t(grid%nx, 2, grid%rows()), source=0.0_dp, stat=status)
+      if (status == 0) allocate (self%left(grid%nx, 3, grid%rows()), source=0.0_dp, stat=status)
+   end subroutine make_room
+
+   !> Copy another state into the fields that are there.
+   subroutine copy(self, other)
+      class(joint_state_type), intent(inout) :: self
+      type(joint_state_type), intent(in) :: other
+
+      self%s(:, :) = other%s
+      self%t(:, :, :) = other%t
+      self%left(:, :, :) = other%left
+      self%level = other%level
+      self%left_load = other%left_load
+      self%merit = other%merit
+      self%worst = other%worst
+   end subroutine copy
+
+   !> The units, and the width of the second range, of a contact from which the solution begins.
+   subroutine take_units(self, touching, pressure, rms_slope)
+      class(joint_system_type), intent(inout) :: self
+      logical, intent(in) :: touching(:, :)
+      real(dp), intent(in) :: pressure(:, :)           !! Pa
+      real(dp), intent(in) :: rms_slope                !! of the road
+      real(dp) :: slope
+
+      associate (rules => self%rules)
+         self%root = sqrt(max(real(field_count(touching), dp), 1.0_dp))
+         self%unit_pressure = max(field_sum(abs(pressure)), tiny(1.0_dp))/self%grid%cells()
+         self%unit_traction = self%unit_pressure*self%grid%cells()/self%root**2
+         self%unit_length = rules%soft*self%unit_traction
+         self%unit_traction = max(self%unit_traction, rules%law%bare_strength())
+         slope = max(rms_slope, least_slope)
+         rules%width = rules%soft_along*slope*self%unit_traction
+         if (rules%law%jumps_at_edge()) rules%width = rules%soft_along*slope*rules%law%bare_strength()
+      end associate
+   end subroutine take_units
+
+end module joint_system
