@@ -1,7 +1,8 @@
-!> Adhesive contact: one solver for periodic and free grids, fast and by the thesis's method.
+!> Adhesive contact: one solver for periodic and free grids, with the fast method or that of the thesis.
 !>
-!> Module adhesion_state has the problem, its equations and what a method is; adhesion_patch what differs
-!> between the grids; adhesion_cg_fast the fast method, adhesion_cg_thesis the thesis's.
+!> Module `adhesion_state` defines the problem, its equations and the interface of a method; `adhesion_patch`
+!> contains the differences between the grids; `adhesion_cg_fast` is the fast method, and `adhesion_cg_thesis` that
+!> of the thesis.
 module adhesion_cg
    use adhesion_cg_fast, only : adhesion_fast_type, new_adhesion_fast
    use adhesion_cg_thesis, only : adhesion_thesis_type, new_adhesion_thesis
@@ -19,7 +20,8 @@ module adhesion_cg
 
    public :: adhesion_solver_type, new_adhesion_solver
 
-   !> The solver with its operators and work fields, kept from step to step. Not to be copied.
+   !> The solver with its operators and work fields, kept from step to step. A variable of this type must not be
+   !> copied.
    type :: adhesion_solver_type
       class(adhesion_method_type), allocatable, private :: method
    contains
@@ -57,8 +59,8 @@ contains
       end select
    end subroutine new_adhesion_solver
 
-   !> Solve an adhesive contact problem. Not converging is an outcome, with its reason by name: the
-   !> state reached is handed out.
+   !> Solve an adhesive contact problem. A solve that does not converge is an outcome with a reason; the fields then
+   !> hold the state that was reached.
    !>
    !> Start: in periodic mode `gap`; in free mode `pressure` with `level` (the level is the target where
    !> that is prescribed). With problem%full_contact from there instead.

@@ -16,8 +16,8 @@
 !> * B_h is between 0.8 and 1.3 times B (square cells), so that a step leaves about a quarter of the residual.
 !> * A prescribed mean gap (periodic mode): p is the mean multiplier over g > 0, directions have no mean
 !>   there, and a shift of the stepped gaps keeps their sum.
-!> * A prescribed force in free mode: the level is one more unknown that moves with the mode psi. Its
-!>   residual is the force that is `missing`, its part of a step is a number, `lift`.
+!> * A prescribed force in free mode: the level is an additional unknown, which moves with the mode psi. Its
+!>   residual is the `missing` force, and its part of a step is the number `lift`.
 !> * Gauss: the preconditioner in the model is scaled from both sides by (1 + max(e'', 0)/k)^(-1/2), k = 0.02
 !>   Q B at the Nyquist wave number: near contact that potential is stiffer than the solid.
 !>
@@ -56,11 +56,12 @@ module adhesion_cg_fast
 
    public :: adhesion_fast_type, new_adhesion_fast
 
-   integer, parameter :: most_updates = 40      !! steps between fresh products with B
-   integer, parameter :: most_failures = 8      !! directions in a row that give no step
+   integer, parameter :: most_updates = 40      !! steps between new products with B
+   integer, parameter :: most_failures = 8      !! successive directions without a step
    real(dp), parameter :: short = 0.01_dp       !! part of a step below which the model was wrong
 
-   !> The solver with its operators and work fields, kept from solve to solve. Not to be copied.
+   !> The solver with its operators and work fields, kept from solve to solve. A variable of this type must not be
+   !> copied.
    type, extends(adhesion_method_type) :: adhesion_fast_type
       type(adhesion_work_type), private :: work
       real(dp), allocatable, private :: state(:, :)        !! of the contact, in free mode
@@ -140,7 +141,7 @@ contains
       outcome%seconds = omp_get_wtime() - outcome%seconds
    end subroutine solve
 
-   !> Minimise the energy from the start that the contact is at.
+   !> Minimise the energy, starting from the present state of the contact.
    subroutine minimise(self, now, outcome)
       type(adhesion_fast_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(inout) :: now
@@ -182,7 +183,7 @@ contains
       outcome%converged = outcome%reason == reason_converged
    end subroutine minimise
 
-   !> An end without a proof: measure what there is; it may be a solution all the same.
+   !> Measure the last state if the loop has ended without a proof. It may be a solution nevertheless.
    subroutine take_last_look(self, now, outcome)
       type(adhesion_fast_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(inout) :: now
@@ -197,7 +198,7 @@ contains
          outcome%reason = reason_converged
    end subroutine take_last_look
 
-   !> The traction by a product with B.
+   !> Compute the traction by a product with B.
    subroutine refresh(self, now)
       type(adhesion_fast_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(inout) :: now
@@ -217,7 +218,7 @@ contains
       if (.not. self%work%patch%periodic) residual = self%work%patch%true_residual(now)
    end function proven_residual
 
-   !> How far to go along the step: t, after one product with B.
+   !> Find the part t of the step that is taken, after one product with B.
    subroutine find_part(self, now, part, form, stretch)
       type(adhesion_fast_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(inout) :: now
@@ -273,7 +274,7 @@ contains
       known%slope = known%slope - now%force*now%lift
    end subroutine form_step
 
-   !> g = g + t s, u and level with it, and the traction by recurrence.
+   !> Update g = g + t s, u and the level, and the traction by recurrence.
    subroutine update(self, now, part, form, stretch)
       type(adhesion_fast_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(inout) :: now

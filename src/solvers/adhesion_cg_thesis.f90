@@ -2,11 +2,11 @@
 !>
 !> Conjugate gradients on the gap outside the contact, without preconditioner: the step alpha of eq. 2.26
 !> and the factor beta of eq. 2.28 take the linearised adhesive traction into account; gaps that would be
-!> negative are closed, and a point in contact is released where its pressure is below -e'(0+). Both
-!> denominators can be negative or zero, and a step can raise the energy: then beta = 0, alpha is taken
-!> without the adhesive part, and steps that raise the energy are quartered. Four transforms an
-!> iteration, two more for each quartered step. It is kept for comparison; the fast method is module
-!> adhesion_cg_fast, which has the same problem, units and measure of error.
+!> negative are closed, and a point in contact is released if its pressure is below -e'(0+). Both
+!> denominators can be negative or zero, and a step can raise the energy. In these cases beta is 0, alpha is
+!> computed without the adhesive part, and steps that raise the energy are quartered. An iteration takes four
+!> transforms, and two more for each quartered step. The method is kept for comparison; the fast method is module
+!> `adhesion_cg_fast`, which has the same problem, units and measure of error.
 !>
 !> Fields of doubles: H, g, P, and the work fields residual, direction, product B d, trial gap, trial
 !> traction; the spectrum of B.
@@ -33,9 +33,9 @@ module adhesion_cg_thesis
    public :: adhesion_thesis_type, new_adhesion_thesis
 
    integer, parameter :: most_quarterings = 30   !! of a step that raises the energy
-   integer, parameter :: most_failures = 2       !! directions in a row that give no step
+   integer, parameter :: most_failures = 2       !! successive directions without a step
 
-   !> The solver with its operator and work fields. Not to be copied.
+   !> The solver with its operator and work fields. A variable of this type must not be copied.
    type, extends(adhesion_method_type) :: adhesion_thesis_type
       type(adhesion_patch_type), private :: patch
       real(dp), allocatable, private :: residual(:, :)         !! -G outside the contact
@@ -107,7 +107,7 @@ contains
       outcome%seconds = omp_get_wtime() - outcome%seconds
    end subroutine solve
 
-   !> The method's loop: measure, direction, step, update.
+   !> The loop of the method: measure, direction, step, update.
    subroutine iterate(self, now, trial, outcome)
       type(adhesion_thesis_type), intent(inout) :: self
       type(adhesion_contact_type), intent(inout) :: now
@@ -119,7 +119,7 @@ contains
 
       self%direction = 0.0_dp
       self%product = 0.0_dp
-      curvature = 0.0_dp                                       ! d.(Q B + e'') d; 0: directions start anew
+      curvature = 0.0_dp                                       ! d.(Q B + e'') d; 0: directions start again
       failures = 0
       outcome%reason = reason_limit
       do
@@ -151,7 +151,7 @@ contains
       outcome%converged = outcome%reason == reason_converged
    end subroutine iterate
 
-   !> The contact after the step, which is quartered until the energy does not rise.
+   !> Find the contact after the step, which is quartered until the energy does not rise.
    subroutine find_step(self, now, first, trial, taken)
       type(adhesion_thesis_type), intent(inout) :: self
       type(adhesion_contact_type), intent(in) :: now

@@ -1,24 +1,24 @@
 !> A step of the fast method for adhesive contact: towards the minimum of a local model of the energy.
 !>
-!> The model of the energy about the gap g has B_h (module adhesion_model) in place of B, and all else as it
-!> is: the attraction, not linearised, and g >= 0. It is minimised by the iteration of module
-!> adhesion_directions (preconditioned conjugate gradients on the free cells) without any transform of full
-!> size, so that the long way of an edge that advances cell by cell takes few of those. A step ends after
-!> `most_iterations`: more would make it exact for B_h, which is not B.
+!> The model of the energy about the gap g has B_h (module `adhesion_model`) in place of B. Everything else is
+!> exact: the attraction, which is not linearised, and g >= 0. The model is minimised by the iteration of module
+!> `adhesion_directions` (preconditioned conjugate gradients on the free cells) without any transform of full
+!> size. An edge that advances cell by cell over a long way therefore needs few such transforms. A step ends
+!> after `most_iterations`; more would only make it more accurate for B_h, which differs from B.
 !>
-!> Gaps that would be negative after an iteration are closed. The traction then needs the product of what that
-!> added to the step, too: its stencil part is enough, since the cells are scattered and a product with B follows
-!> the step. All of the product is formed where the sum of the gap is kept, which moves all open cells; where the
-!> attraction jumps, since then an iteration may close gaps by far; on free grids, where the cells that close may
-!> be a large part of the contact, and what their product lacks far away adds up in the level; and after steps
-!> that failed.
+!> Gaps that would be negative after an iteration are closed, which changes the step and thus the traction. The
+!> stencil part of the product is usually sufficient for this correction, because the closed cells are scattered
+!> and a product with B follows the step. The whole product is formed if the sum of the gap is prescribed, because
+!> all open cells then move; if the attraction jumps, because an iteration may then close gaps by a large amount;
+!> on free grids, because the closed cells may be a large part of the contact, and the missing part of their
+!> product, far away, adds up in the level; and after steps that failed.
 !>
-!> Where the attraction is strong the energy has many minima, and a long step can leap over the one that
-!> a slow motion would stop at. Therefore no iteration changes g + z_0 of a cell by more than a share of it:
-!> the attraction changes little, and the cells that have come into contact resist before their neighbours
-!> follow. Without this limit rough surfaces end with 5 to 10 % more contact. The number of iterations in a step
-!> limits its way, too: 24 of them instead of 8 would need a fifth fewer transforms, but on rough surfaces half of
-!> the solutions would be other minima than the one at which a slow loading arrives.
+!> If the attraction is strong, the energy has many minima, and a long step can leap over the minimum at which a
+!> slow motion would stop. Therefore no iteration changes g + z_0 of a cell by more than a fraction of it: the
+!> attraction then changes little, and the cells that have come into contact resist before their neighbours
+!> follow. Without this limit rough surfaces end with 5 to 10 % more contact. The number of iterations limits
+!> the length of a step, too: with 24 instead of 8 a fifth fewer transforms would be needed, but on rough surfaces
+!> half of the solutions would be other minima than the one that a slow loading reaches.
 module adhesion_descent
    use adhesion_directions, only : find_direction
    use adhesion_potential, only : has_smooth_potential
@@ -38,13 +38,13 @@ module adhesion_descent
    real(dp), parameter :: goal = 0.1_dp               !! share of the residual that may be left
    real(dp), parameter :: longest = 0.7_dp            !! change of g + z_0 over g + z_0 in an iteration
    real(dp), parameter :: boldest = 100.0_dp          !! the same where the attraction jumps
-   real(dp), parameter :: least_stiffness = 0.25_dp   !! of the form s.B_h s, that is left by the attraction
+   real(dp), parameter :: least_stiffness = 0.25_dp   !! least part of s.B_h s that the attraction leaves
 
 contains
 
-   !> The step from the gap that is at hand, measured, towards a minimum of the model: in work%direction and
-   !> now%lift. After steps that failed, or of which hardly anything could be taken, it is shorter, until as
-   !> many have been taken.
+   !> Compute the step from the present, measured gap towards a minimum of the model, in work%direction and
+   !> now%lift. After steps that failed, or of which hardly anything could be taken, it is shorter, until as many
+   !> steps have succeeded.
    subroutine approach_minimum(work, now)
       type(adhesion_work_type), intent(inout) :: work
       type(adhesion_iteration_type), intent(inout) :: now
@@ -68,7 +68,7 @@ contains
       inner%bumped = .false.
       most = max(1, most_iterations/4**min(now%caution, 10))
       share = longest/4**min(now%caution, 10)
-      ! A jump of the attraction would hold every cell that comes to it in a small step.
+      ! With small steps a jump of the attraction would stop every cell that reaches it.
       if (.not. has_smooth_potential(now%problem%potential)) share = boldest/4**min(now%caution, 10)
       do k = 1, most
          if (k > 1) call measure(work, inner)
@@ -85,7 +85,7 @@ contains
       now%held = inner%held
    end subroutine approach_minimum
 
-   !> An iteration in the model: along the direction by the length that its curvature predicts.
+   !> Do an iteration in the model: move along the direction by the length that its curvature predicts.
    subroutine descend(work, inner, share)
       type(adhesion_work_type), intent(inout) :: work
       type(adhesion_iteration_type), intent(inout) :: inner
@@ -113,7 +113,7 @@ contains
       inner%bumped = clipped .and. .not. whole
       if (.not. (clipped .or. abs(shift) > 0.0_dp)) return
       if (whole) then
-         ! The shift moves all open cells: the traction needs a product of the step that was really made.
+         ! The shift moves all open cells, so that the traction needs a product of the actual step.
          call form_product(work, form)
          inner%pending = inner%problem%modulus
       else
@@ -121,7 +121,7 @@ contains
       end if
    end subroutine descend
 
-   !> B_h of the change of the displacement, whose rows have been put, and the form.
+   !> Compute the product of B_h with the change of the displacement, whose rows have been put, and the form.
    subroutine form_product(work, form)
       type(adhesion_work_type), intent(inout) :: work
       real(dp), intent(out) :: form

@@ -1,5 +1,5 @@
-!> Directions of the fast method for adhesive contact (module adhesion_cg_fast): d = z + beta d with z = M r, from
-!> the residual r that was measured.
+!> Directions of the fast method for adhesive contact (module `adhesion_cg_fast`): d = z + beta d with z = M r,
+!> where r is the measured residual.
 module adhesion_directions
    use adhesion_state, only : control_approach, control_pressure, diagonal_scaling
    use adhesion_work, only : adhesion_iteration_type, adhesion_work_type
@@ -11,9 +11,9 @@ module adhesion_directions
 
    public :: find_direction
 
-   ! Passes over z. The first is left out where the sum of the gap is free.
+   ! Passes over z. The first is left out if the sum of the gap is not prescribed.
    integer, parameter :: sum_pass = 0           !! add up
-   integer, parameter :: last_pass = 2          !! z is what it will be
+   integer, parameter :: last_pass = 2          !! z is final
 
    !> Sums of a row of z.
    type :: z_sums_type
@@ -81,7 +81,7 @@ contains
       !$omp end do
       !$omp end parallel
       sums = sum_of(rows, self%patch%sharing)
-      ! Cells in contact that the mean would close drop out, which changes the mean: once more.
+      ! Cells in contact that the mean would close are left out. This changes the mean, so repeat the pass.
       do pass = first + 1, last_pass
          mean = sums%total/max(sums%moving, 1.0_dp)
          !$omp parallel do default(none) shared(self, now, pass, mean, rows) private(j) &

@@ -1,22 +1,22 @@
 !> A local model of the stiffness B of an adhesive contact, and an approximate inverse of it.
 !>
-!> The model is a stencil, which fits B at short waves (module adhesion_stencil), and a coarse grid of about
-!> an eighth of the cells each way, on which what the stencil lacks at long waves is added:
+!> The model consists of a stencil, which fits B at short waves (module `adhesion_stencil`), and a correction for
+!> long waves on a coarse grid with about an eighth of the cells in each direction:
 !>     B_h s = stencil s + R^T missing R s.
 !> R is a weighted mean onto the coarse grid and R^T (up to a factor) linear interpolation back; `missing`
-!> acts below `band`, and makes up for what R and R^T let pass of a wave. A product costs a pass over the cells
-!> and transforms of 2/64 of the full size. For a half-space with square cells
-!> B_h is between 0.8 and 1.3 times B, so that a minimum of the model's energy is near one of the true energy.
+!> acts below `band`, and is divided by the part of a wave that R and R^T transmit. A product costs a pass over the
+!> cells and transforms of 2/64 of the full size. For a half-space with square cells B_h is between 0.8 and 1.3
+!> times B, so that a minimum of the model's energy is near a minimum of the true energy.
 !>
 !> The inverse serves to precondition the model: M r = theta r + R^T (1/B - theta) R r with the low symbols.
 !> Both are symmetric for any numbers of cells, and M is positive.
 !>
-!> A field goes in by `put_row`; `transform_product` or `transform_inverse` does the work between, and rows come
-!> back by `product_row` or `inverse_row`: the passes over memory are the caller's.
+!> The caller passes the rows of a field by `put_row`, calls `transform_product` or `transform_inverse`, and gets
+!> the rows of the result by `product_row` or `inverse_row`, so that no additional pass over memory is needed.
 !>
 !> Processes share the rows of the coarse grid, too: each has those whose centres lie on its rows of the
-!> grid. What one of them needs of its neighbours are restricted rows and coarse rows at the rims, and the rows
-!> beside its own for the stencil (`halo`).
+!> grid. From its neighbours a process needs restricted rows and coarse rows at the rims, and the rows next to its
+!> own for the stencil (`halo`).
 !>
 !> Memory: 1/16 of a field.
 module adhesion_model
@@ -37,12 +37,12 @@ module adhesion_model
    real(dp), parameter :: least_passed = 0.1_dp   !! coarse symbols make up for no more than this
    real(dp), parameter :: short_waves = 1.6_dp    !! theta times B at the Nyquist wave number
 
-   !> Not to be copied.
+   !> The model of a grid. A variable of this type must not be copied.
    type :: adhesion_model_type
       type(row_halo_type) :: halo                 !! rows that the stencil needs
       integer, private :: nx = 0, ny = 0          !! the grid
       integer, private :: mx = 0, my = 0          !! the coarse grid
-      type(row_sharing_type), private :: sharing  !! who holds the rows of the coarse grid
+      type(row_sharing_type), private :: sharing  !! how processes share the rows of the coarse grid
       integer, allocatable, private :: own(:)     !! rows of the grid that this process holds
       type(row_halo_type), private :: fine_halo   !! restricted rows that coarse rows need
       type(row_halo_type), private :: coarse_halo !! coarse rows that rows of the grid need
@@ -54,7 +54,7 @@ module adhesion_model
       real(dp), allocatable, private :: rows(:, :)         !! restricted along x, [mx, rows and foreign ones]
       real(dp), allocatable, private :: field(:, :)        !! on the coarse grid, [mx, rows and foreign ones]
       type(convolution_type), private :: inverse  !! the coarse part of M
-      type(convolution_type), private :: missing  !! what the stencil lacks
+      type(convolution_type), private :: missing  !! correction of the stencil at long waves
    contains
       procedure :: put_row
       procedure :: transform_product
@@ -132,7 +132,7 @@ contains
       call self%inverse%set_symbol(inverse)
    end subroutine set_low_symbols
 
-   !> Who holds which coarse rows, and what each process needs of others.
+   !> Determine which process holds which coarse rows, and which rows each process needs from others.
    pure subroutine share_rows(self, fine)
       type(adhesion_model_type), intent(inout) :: self
       type(row_sharing_type), intent(in) :: fine
@@ -156,7 +156,7 @@ contains
          reshape(spread(fine%owner, 2, 2*reach), [size(around)]))
    end subroutine share_rows
 
-   !> The coarse cell after one, on a periodic grid.
+   !> The coarse cell that follows another one, on a periodic grid.
    elemental function upper(lower, m) result(cell)
       integer, intent(in) :: lower
       integer, intent(in) :: m                      !! coarse cells
@@ -165,7 +165,7 @@ contains
       cell = merge(1, lower + 1, lower == m)
    end function upper
 
-   !> What linear interpolation and its adjoint leave of a wave: sinc^4.
+   !> The part of a wave that linear interpolation and its adjoint transmit: sinc^4.
    elemental function passed(k, m) result(share)
       integer, intent(in) :: k                      !! wave number
       integer, intent(in) :: m                      !! coarse cells
@@ -175,7 +175,7 @@ contains
       if (k > 0) share = (sin(pi*k/m)/(pi*k/m))**4
    end function passed
 
-   !> Between which coarse cells the centres of the cells lie; the grid is periodic.
+   !> Find the coarse cells between which the centres of the cells lie. The grid is periodic.
    pure subroutine neighbours(n, m, lower, weight)
       integer, intent(in) :: n, m
       integer, intent(out) :: lower(n)
@@ -190,7 +190,7 @@ contains
       end do
    end subroutine neighbours
 
-   !> Hand in row j of a field, of those of this process: weighted sums onto the coarse cells.
+   !> Add row j of a field, counted on this process, to the weighted sums on the coarse cells.
    subroutine put_row(self, j, row)
       class(adhesion_model_type), intent(inout) :: self
       integer, intent(in) :: j
@@ -244,14 +244,14 @@ contains
 
    end subroutine restrict_columns
 
-   !> Between putting rows and `product_row`. Collective.
+   !> Do the transforms between `put_row` and `product_row`. Collective.
    subroutine transform_product(self)
       class(adhesion_model_type), intent(inout) :: self
 
       call convolve(self, self%missing)
    end subroutine transform_product
 
-   !> Between putting rows and `inverse_row`. Collective.
+   !> Do the transforms between `put_row` and `inverse_row`. Collective.
    subroutine transform_inverse(self)
       class(adhesion_model_type), intent(inout) :: self
 
@@ -297,7 +297,7 @@ contains
       call add_stencil(self%weights, s(:, at(1)), s(:, at(2)), s(:, at(3)), s(:, at(4)), s(:, at(5)), product)
    end subroutine stencil_row
 
-   !> Where the rows are that the stencil reads for row j.
+   !> The positions of the rows that the stencil reads for row j.
    pure function around(self, j) result(places)
       class(adhesion_model_type), intent(in) :: self
       integer, intent(in) :: j

@@ -1,25 +1,25 @@
-!> The patch of an adhesive contact: what differs between periodic and free grids.
+!> The patch of an adhesive contact: the differences between periodic and free grids.
 !>
 !> The methods work on fields of one layout, the grid of the unknowns. Its cells from (1, 1) to (nx, ny)
-!> are the patch, where the unknown is the gap g. In periodic mode the patch is everything. B is the
-!> inverse of the periodic operator for G = 1; its mean mode is zero, and the mean of the traction, the
-!> load p, is kept as a number beside the field.
+!> are the patch, where the unknown is the gap g. In periodic mode the patch is the whole grid. B is the
+!> inverse of the periodic operator for G = 1. Its mean mode is zero, and the mean of the traction, the
+!> load p, is kept as a separate number.
 !>
-!> In free mode the grid is doubled. The truncated operator of Love's coefficients has no symbol to
-!> invert. But on the doubled grid the wrapped coefficients have one, K, that is positive, and B = 1/K
-!> there. The padding has no adhesion, its surface is free, and the unknown there is the displacement u:
-!> minimised over it, the energy is that of the free operator on the patch (Schur complement). With
+!> In free mode the grid is doubled. The truncated operator of Love's coefficients has no symbol that could be
+!> inverted. On the doubled grid, however, the wrapped coefficients have a positive symbol K, and B = 1/K
+!> there. The padding has no adhesion, its surface is free, and the unknown there is the displacement u.
+!> If the energy is minimised over u, it is that of the free operator on the patch (Schur complement). With
 !> u = g + H + level on the patch,
 !>
 !>     P = Q B u - P_h on the patch, 0 in the padding
 !>
-!> Where the load is prescribed the level is one more unknown. It moves with the mode psi, which is 1 on
-!> the patch and falls in the padding as the displacement of a uniform pressure does. A solution is
-!> checked with the displacement of its pressure by the true free operator: there the padding drops out.
+!> If the load is prescribed, the level is an additional unknown. It moves with the mode psi, which is 1 on
+!> the patch and falls in the padding like the displacement of a uniform pressure. A solution is checked with the
+!> displacement of its pressure by the true free operator, which does not involve the padding.
 !>
 !> Processes share the rows of the road's grid. A process that has row j of the patch also has row ny + j of
-!> the padding, so that all have as much of the patch, which takes more work, and no field moves between the
-!> road's grid and that of the unknowns. Fields of the unknowns have the rows of the patch first.
+!> the padding. Thus all processes have equal parts of the patch, which takes more work, and no field has to be
+!> moved between the road's grid and that of the unknowns. Fields of the unknowns have the rows of the patch first.
 module adhesion_patch
    use adhesion_potential, only : adhesive_slope
    use adhesion_symbols, only : adhesion_symbols_type, new_adhesion_symbols
@@ -60,16 +60,16 @@ module adhesion_patch
       type(residual_units_type) :: units
    end type adhesion_contact_type
 
-   !> A patch with its operators. Not to be copied.
+   !> A patch with its operators. A variable of this type must not be copied.
    type :: adhesion_patch_type
       logical :: periodic = .true.
       integer :: nx = 0                                    !! cells of the patch along x
       integer :: rows = 0                                  !! rows of the patch that this process holds
       integer :: mx = 0, my = 0                            !! cells of the grid of the unknowns
       integer :: all_rows = 0                              !! rows of that grid that this process holds
-      type(row_sharing_type) :: sharing                    !! who holds the rows of the unknowns
+      type(row_sharing_type) :: sharing                    !! how processes share the rows of the unknowns
       integer :: threads = 1
-      real(dp) :: cells = 1.0_dp                           !! number of the patch's
+      real(dp) :: cells = 1.0_dp                           !! number of cells of the patch
       type(convolution_type) :: stiffness                  !! B for G = 1
       real(dp) :: nyquist = 0.0_dp                         !! B at the Nyquist wave number
       real(dp) :: longest = 0.0_dp                         !! B at the least wave number
@@ -120,7 +120,7 @@ contains
       if (.not. self%periodic) call make_psi(self)
    end subroutine new_adhesion_patch
 
-   !> Who holds the rows of the unknowns: those of the patch as on its grid, and the padding alike.
+   !> Share the rows of the unknowns: the rows of the patch as on its grid, and those of the padding likewise.
    pure subroutine share_unknowns(self, grid)
       type(adhesion_patch_type), intent(inout) :: self
       type(grid_type), intent(in) :: grid
@@ -149,7 +149,7 @@ contains
       call self%stiffness%quadratic_form(self%psi, self%psi_form)
    end subroutine make_psi
 
-   !> How many cells of row j belong to the patch: the first ones.
+   !> Number of cells of row j that belong to the patch; these are the first ones.
    pure function inner(self, j) result(n)
       class(adhesion_patch_type), intent(in) :: self
       integer, intent(in) :: j
@@ -170,7 +170,7 @@ contains
          + (field_mean(height) - problem%datum) < 0.0_dp
    end function is_closed_up
 
-   !> The traction from the state by a product with B.
+   !> Compute the traction from the state by a product with B.
    subroutine evaluate_traction(self, contact)
       class(adhesion_patch_type), intent(inout) :: self
       class(adhesion_contact_type), intent(inout) :: contact
@@ -200,8 +200,8 @@ contains
       end associate
    end subroutine evaluate_traction
 
-   !> The gradient of the energy on the patch less the load p; and p, the mean multiplier over the open
-   !> cells, in periodic mode at a prescribed level.
+   !> Compute the gradient of the energy on the patch without the load p and, in periodic mode at a prescribed
+   !> level, p itself, which is the mean multiplier over the open cells.
    subroutine evaluate_gradient(self, contact, gradient)
       type(adhesion_patch_type), intent(in) :: self
       class(adhesion_contact_type), intent(inout) :: contact
@@ -290,8 +290,8 @@ contains
       natural = max(natural, abs(load - contact%force)/max(abs(contact%force), contact%units%traction))
    end function true_residual
 
-   !> Gap, pressure and level of the solution, with gaps of exactly zero where the wall carries the
-   !> cell; and the error of what was prescribed.
+   !> Return the gap, pressure and level of the solution, with gaps of exactly zero in cells that the wall carries,
+   !> and the error of the prescribed load or level.
    subroutine hand_out(self, contact, gap, pressure, level, load_error)
       class(adhesion_patch_type), intent(in) :: self
       class(adhesion_contact_type), intent(in) :: contact

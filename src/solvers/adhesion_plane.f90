@@ -1,13 +1,13 @@
-!> A step for adhesive contact in the plane of the step of the model and the step before.
+!> Combines the step of the model with the step before, for adhesive contact.
 !>
 !> Near an instability of the contact one mode is soft: its stiffness is a small difference between that of the
-!> solid and that of the attraction. The local model of the energy (module adhesion_descent) is wrong by a
-!> quarter there, so that its steps are many times too short along that mode, or have the wrong sign. The true
+!> solid and that of the attraction. An error of a quarter in the local model of the energy (module
+!> `adhesion_descent`) makes its steps many times too short along that mode, or reverses their sign. The true
 !> form of a step is known, however, since every step is multiplied by B. Therefore the step s of the model is
 !> made conjugate to the step d before it, with the true second derivatives H = Q B + e'':
 !>     s = s + b d,     b = -(G.d + s.H d)/(d.H d)
 !> which is the conjugate gradient method with the model as its preconditioner. Where H is not positive along
-!> d the step goes on along d. In both cases w = b d is shortened until it changes no g + z_0 by more than a
+!> d, the step continues along d. In both cases w = b d is shortened until it changes no g + z_0 by more than a
 !> share, and gaps that would be negative are closed. `stretch_step` then lengthens the step to the minimum
 !> of the energy along it.
 module adhesion_plane
@@ -30,7 +30,7 @@ module adhesion_plane
 
 contains
 
-   !> The step of the model, in work%direction and now%lift, combined with the step before.
+   !> Combine the step of the model, in work%direction and now%lift, with the step before.
    subroutine widen_step(work, now)
       type(adhesion_work_type), intent(inout) :: work
       type(adhesion_iteration_type), intent(inout) :: now
@@ -53,7 +53,7 @@ contains
       call close_step(work, now, shift)
    end subroutine widen_step
 
-   !> Slope of the energy along the step before after that of the model, and the stiffness along it.
+   !> Compute the slope of the energy along the step before, after the step of the model, and the stiffness along it.
    subroutine look_along(work, now, slope, stiffness)
       type(adhesion_work_type), intent(inout) :: work
       type(adhesion_iteration_type), intent(in) :: now
@@ -128,7 +128,7 @@ contains
       tau = min(least_of_rows(least), 1.0_dp)
    end function allowed_part
 
-   !> s = s + b d but for cells that s closes.
+   !> Set s = s + b d, except in cells that s closes.
    subroutine combine(work, now, b)
       type(adhesion_work_type), intent(inout) :: work
       type(adhesion_iteration_type), intent(in) :: now
@@ -148,7 +148,7 @@ contains
       end do
    end subroutine combine
 
-   !> The step that closes gaps which would be negative.
+   !> Limit the step so that it closes the gaps that would be negative.
    subroutine close_step(work, now, shift)
       type(adhesion_work_type), intent(inout) :: work
       type(adhesion_iteration_type), intent(in) :: now
@@ -164,7 +164,7 @@ contains
       end do
    end subroutine close_step
 
-   !> Lengthen the step, of which all is known, to the minimum that its second derivative predicts.
+   !> Lengthen the step, whose product is known, to the minimum that its second derivative predicts.
    subroutine stretch_step(work, now, known, stretch)
       type(adhesion_work_type), intent(inout) :: work
       type(adhesion_iteration_type), intent(inout) :: now

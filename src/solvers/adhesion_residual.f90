@@ -1,7 +1,7 @@
 !> The residual of the fast method for adhesive contact (module adhesion_cg_fast).
 !>
-!> `measure` finds r and the error from the traction at hand. The traction of the model (module adhesion_descent) is
-!> brought up to date in the same pass over the cells.
+!> `measure` computes r and the error from the present traction. In the same pass over the cells it updates the
+!> traction of the model (module `adhesion_descent`).
 module adhesion_residual
    use adhesion_patch, only : evaluate_gradient
    use adhesion_potential, only : adhesive_slopes
@@ -19,7 +19,7 @@ module adhesion_residual
 
 contains
 
-   !> The gradient G, the natural residual, and r, which is handed to the preconditioner.
+   !> Compute the gradient G, the natural residual, and r, which is passed to the preconditioner.
    subroutine measure(self, now)
       type(adhesion_work_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(inout) :: now
@@ -63,8 +63,8 @@ contains
       now%residual = max(now%residual, abs(now%missing)/max(abs(now%force), now%units%traction))
    end subroutine measure
 
-   !> Add what is pending to a row of the traction of the model: a multiple of the product, and what the cells
-   !> that closed on the way add, of which the stencil is enough.
+   !> Add the pending terms to a row of the traction of the model: a multiple of the product, and the contribution
+   !> of cells that closed, for which the stencil is sufficient.
    subroutine add_product_row(self, now, j)
       type(adhesion_work_type), intent(in) :: self
       type(adhesion_iteration_type), intent(inout) :: now
@@ -79,7 +79,7 @@ contains
       now%traction(:, j) = now%traction(:, j) + now%problem%modulus*bumps
    end subroutine add_product_row
 
-   !> A row of r and of M's input, from the row of G less p.
+   !> Compute a row of r and of the input of M from the row of G without p.
    subroutine measure_row(self, now, j, worst, least, padding)
       type(adhesion_work_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(in) :: now

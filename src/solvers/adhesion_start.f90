@@ -1,4 +1,4 @@
-!> The start of an adhesive contact: the state that an iteration begins with, and the units of its residual.
+!> The start of an adhesive contact: the state from which an iteration begins, and the units of its residual.
 module adhesion_start
    use adhesion_patch, only : adhesion_contact_type, adhesion_patch_type
    use adhesion_state, only : control_approach, control_pressure, resolved_traction, traction_scale
@@ -12,8 +12,8 @@ module adhesion_start
 
 contains
 
-   !> Put a contact at its start, in `gap` (periodic) or in `pressure` and `level` (free), or in full
-   !> contact; and settle the units of the residual.
+   !> Set the first state of a contact from `gap` (periodic) or from `pressure` and `level` (free), or to full
+   !> contact, and choose the units of the residual.
    subroutine begin_contact(self, contact, gap, pressure)
       class(adhesion_patch_type), intent(inout) :: self
       class(adhesion_contact_type), intent(inout) :: contact    !! with its fields and the level set
@@ -39,7 +39,7 @@ contains
          max(greatest, contact%problem%modulus*self%longest*deviation)))
    end subroutine begin_contact
 
-   !> The load or the sum of the gap that is prescribed, and the gap on what is allowed.
+   !> Set the prescribed load or sum of the gap, and make the gap satisfy the constraints.
    subroutine begin_periodic(self, contact)
       type(adhesion_patch_type), intent(in) :: self
       class(adhesion_contact_type), intent(inout) :: contact
@@ -68,8 +68,8 @@ contains
       end if
    end subroutine begin_periodic
 
-   !> The state of the pressure and the level handed in, or full contact. The gap of a pressure is not
-   !> sharp: gaps within the tolerance count as none, so that a contact that is handed in stays one.
+   !> Set the state from the given pressure and level, or to full contact. The gap that follows from a pressure has
+   !> errors. Therefore gaps within the tolerance are set to zero, so that cells in contact stay in contact.
    subroutine begin_free(self, contact, gap, pressure)
       type(adhesion_patch_type), intent(inout) :: self
       class(adhesion_contact_type), intent(inout) :: contact

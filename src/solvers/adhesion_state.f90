@@ -1,4 +1,4 @@
-!> What the methods for adhesive contact share: the problem, its equations, and what a method is.
+!> The problem of adhesive contact, its equations, and the interface of its methods.
 !>
 !> The energy of a state with the gap g >= 0 (equations for one cell area; modulus Q, traction of the
 !> past P_h of a viscoelastic material, mean pressure p; elastic: Q = G and P_h = 0)
@@ -6,8 +6,8 @@
 !> has the gradient G = Q B(H+g) - P_h + e'(g) + p; a solution has G = 0 where g > 0 and G >= 0 where
 !> g = 0. The contact pressure, attraction included, is P = p + Q B(H+g) - P_h = G - e'(g).
 !>
-!> The module adhesion_patch has what differs between periodic and free grids, adhesion_steps how far to
-!> go along a direction.
+!> Module `adhesion_patch` contains the differences between periodic and free grids, and module `adhesion_steps`
+!> chooses the length of a step.
 module adhesion_state
    use adhesion_potential, only : adhesion_potential_type, adhesive_curvature, adhesive_slope, &
       potential_none
@@ -28,7 +28,7 @@ module adhesion_state
    character(*), parameter, public :: reason_closed = &
       'full contact: the displacement leaves no gap'
 
-   !> An adhesive contact problem but for its fields.
+   !> An adhesive contact problem without its fields.
    type :: adhesion_problem_type
       type(adhesion_potential_type) :: potential
       real(dp) :: modulus = 1.0_dp          !! shear modulus of the step (Q of module zener), Pa
@@ -38,14 +38,14 @@ module adhesion_state
       real(dp) :: target = 0.0_dp
       real(dp) :: tolerance = 1e-6_dp       !! of the natural residual max|min(g/z_0, G z_0/gamma_0)|
       integer :: max_iterations = 2000
-      logical :: full_contact = .false.     !! start from full contact, not from what is handed in
+      logical :: full_contact = .false.     !! start from full contact, not from the given state
       !> Highest point of H, m, set by module adhesion_cg: the methods count heights and levels from it,
       !> so that a map far from zero costs no digits.
       real(dp) :: datum = 0.0_dp
    end type adhesion_problem_type
 
-   !> A method for adhesive contact with its operators and work fields, kept from step to step. Not to
-   !> be copied. To add a method: extend this type, and make it in `new_adhesion_solver`.
+   !> A method for adhesive contact with its operators and work fields, kept from step to step. A variable of this
+   !> type must not be copied. To add a method, extend this type, and add its name to `new_adhesion_solver`.
    type, abstract :: adhesion_method_type
    contains
       procedure(solve_contact), deferred :: solve
@@ -54,8 +54,8 @@ module adhesion_state
 
    abstract interface
 
-      !> Solve an adhesive contact problem. Not converging is an outcome: the state reached, lowest in
-      !> energy so far, is handed out.
+      !> Solve an adhesive contact problem. A solve that does not converge is an outcome; the fields then hold the
+      !> state with the lowest energy so far.
       subroutine solve_contact(self, problem, height, gap, pressure, level, outcome, past)
          import :: adhesion_method_type, adhesion_problem_type, dp, solver_result_type
          implicit none

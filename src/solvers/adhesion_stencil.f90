@@ -16,7 +16,7 @@ module adhesion_stencil
 
    integer, parameter :: reach = 2                      !! cells on each side
    integer, parameter :: terms = (reach + 1)**2
-   integer, parameter :: samples = 128                  !! wave numbers that are looked at, in each direction
+   integer, parameter :: samples = 128                  !! wave numbers for the fit in each direction
    real(dp), parameter :: band = pi/16.0_dp             !! least wave number per cell that is fitted
    real(dp), parameter :: ridge = 1e-10_dp              !! for grids with fewer waves than weights
 
@@ -32,7 +32,7 @@ contains
       real(dp) :: matrix(terms, terms), right(terms), column(terms*(terms + 1)), term(terms), kx, ky
       integer :: i, j, k, size_of_sums
 
-      ! Sums of each wave number along x by one process, which all then add up in the same order.
+      ! One process forms the sums of each wave number along x, and all processes add them in the same order.
       size_of_sums = size(column)*(mx/2 + 1)
       allocate (sums(size_of_sums), source=0.0_dp)
       do i = modes(1), modes(2)

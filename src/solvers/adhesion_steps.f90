@@ -1,9 +1,10 @@
-!> How far an iteration for adhesive contact goes along its step s.
+!> Chooses the length of a step s for adhesive contact.
 !>
-!> A step closes gaps on its way: with s, g + s >= 0. It is multiplied by B, which makes the energy along g + t s
-!> exact, and `choose_step` finds the part t that is taken.
+!> A step may close gaps: it satisfies g + s >= 0. With its product with B the energy along g + t s is known
+!> exactly, and `choose_step` finds the part t that is taken.
 !>
-!> Sums are made row by row and then in the order of the rows: they do not depend on the threads.
+!> Sums are formed row by row and added in the order of the rows, so that they do not depend on the number of
+!> threads.
 module adhesion_steps
    use adhesion_potential, only : adhesive_slopes, has_smooth_potential
    use adhesion_state, only : adhesion_problem_type
@@ -15,9 +16,9 @@ module adhesion_steps
 
    public :: choose_step, form_step_row, known_of_step, step_sums_type, stepped_gap, sum_shift
 
-   real(dp), parameter :: sharpness = 0.2_dp      !! what is left of the slope in a line search
+   real(dp), parameter :: sharpness = 0.2_dp      !! part of the slope that a line search may leave
 
-   !> What is known of E along the segment g + t s, 0 <= t <= 1; or the part of a row of it.
+   !> Sums for the energy E along the segment g + t s, 0 <= t <= 1, of all rows or of one row.
    type :: step_sums_type
       real(dp) :: slope = 0.0_dp            !! G.s
       real(dp) :: form = 0.0_dp             !! Q s.B s, known for all rows only
@@ -37,7 +38,7 @@ module adhesion_steps
 
 contains
 
-   !> Take in the value at a place between the ends.
+   !> Narrow the bracket with the value at a place between its ends.
    pure subroutine narrow(self, place, value)
       class(bracket_type), intent(inout) :: self
       real(dp), intent(in) :: place, value
@@ -51,7 +52,7 @@ contains
       end if
    end subroutine narrow
 
-   !> Where the chord between the ends is zero, kept off both ends.
+   !> The zero of the chord between the ends, with a minimum distance from both ends.
    pure function chord_root(self, margin) result(root)
       class(bracket_type), intent(in) :: self
       real(dp), intent(in) :: margin               !! least distance from an end, over their distance
@@ -108,7 +109,7 @@ contains
          if (.not. sums(2) > 0.0_dp) exit
          next = (sums(1) - total)/sums(2)
          if (next <= shift) then
-            ! The sum is too small: all that is open is lifted.
+            ! The sum is too small: lift all open cells.
             if (shift == 0.0_dp) shift = next
             exit
          end if
@@ -116,7 +117,7 @@ contains
       end do
    end function sum_shift
 
-   !> What is known of a row of the step s without B s.
+   !> Form the sums for a row of the step s that do not need B s.
    subroutine form_step_row(problem, gap, wall, s, sums)
       type(adhesion_problem_type), intent(in) :: problem
       real(dp), intent(in), contiguous :: gap(:)       !! g, m
@@ -144,7 +145,7 @@ contains
       sums%energy = energy
    end subroutine form_step_row
 
-   !> What is known of a step from its rows.
+   !> Add up the sums of all rows of a step.
    function known_of_step(rows, sharing) result(known)
       type(step_sums_type), intent(in) :: rows(:)
       type(row_sharing_type), intent(in) :: sharing    !! of the rows
@@ -164,8 +165,8 @@ contains
       known%curvature = sums(4)
    end function known_of_step
 
-   !> How far to go along the segment s: all of it, or t near a minimum of the energy on the way, never where
-   !> the energy is higher than at t = 0; 0 if there is no such t.
+   !> Choose the part t of the step s: all of it, or a t near a minimum of the energy along s. The energy is never
+   !> higher than at t = 0; t is 0 if there is no such point.
    function choose_step(known, problem, gap, step, threads) result(t)
       type(step_sums_type), intent(in) :: known
       type(adhesion_problem_type), intent(in) :: problem
@@ -187,11 +188,11 @@ contains
       do pass = 1, merge(8, 1, smooth)
          call look(t, slope, rise)
          risen = rise > noise
-         ! The whole step, which comes from a model that knows the way there, is taken even if the energy has
-         ! another minimum on the straight way.
+         ! The whole step is taken even if the energy has another minimum along the straight line, because the
+         ! model from which the step comes has followed the energy to this point.
          if (.not. risen .and. (abs(slope) <= sharpness*abs(known%slope) .or. .not. smooth &
             .or. (slope < 0.0_dp .and. t >= 1.0_dp))) return
-         ! Where the energy has risen the first minimum lies before t, whatever the slope is there.
+         ! If the energy has risen, the first minimum lies before t, even if the slope at t is negative.
          if (slope > 0.0_dp .or. risen) slope = max(slope, 0.5_dp*abs(known%slope))
          call bracket%narrow(t, slope)
          t = bracket%chord_root(0.05_dp)

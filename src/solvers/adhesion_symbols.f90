@@ -1,6 +1,6 @@
-!> The symbols of the stiffness B of an adhesive contact and of about its inverse, by wave numbers along x.
+!> The symbols of the stiffness B of an adhesive contact and of its approximate inverse, by wave numbers along x.
 !>
-!> A process needs those of the columns that it transforms, and no others: `form` makes them.
+!> `form` computes only the symbols that a process needs, those of the columns that it transforms.
 module adhesion_symbols
    use asperity_errors, only : error_input, error_type, fail
    use asperity_parallel, only : any_process
@@ -12,12 +12,12 @@ module adhesion_symbols
 
    public :: adhesion_symbols_type, new_adhesion_symbols
 
-   !> The symbols that are at hand.
+   !> The symbols that have been computed.
    type :: adhesion_symbols_type
       type(grid_type), private :: grid
       type(kernel_type), private :: kernel             !! what the solid is, normal
       integer, private :: mx = 0, my = 0               !! cells of the grid of the unknowns
-      integer, private :: modes(2) = [0, -1]           !! first and last wave number at hand
+      integer, private :: modes(2) = [0, -1]           !! first and last wave number that were computed
       real(dp), allocatable :: stiffness(:, :)         !! B for G = 1, (first:last, 0:my/2)
       real(dp), allocatable :: compliance(:, :)        !! about its inverse, > 0
    contains
@@ -26,7 +26,7 @@ module adhesion_symbols
 
 contains
 
-   !> Symbols of a solid, none at hand yet.
+   !> Prepare the symbols of a solid, without computing any.
    subroutine new_adhesion_symbols(self, grid, kernel, mx, my)
       type(adhesion_symbols_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
@@ -39,7 +39,7 @@ contains
       self%my = my
    end subroutine new_adhesion_symbols
 
-   !> Have the symbols of some wave numbers along x at hand; more may be. Collective.
+   !> Compute the symbols of some wave numbers along x, unless they are already available. Collective.
    subroutine form(self, modes, error)
       class(adhesion_symbols_type), intent(inout) :: self
       integer, intent(in) :: modes(2)                  !! first and last, none if the last is less

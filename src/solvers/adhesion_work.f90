@@ -1,4 +1,5 @@
-!> The work fields of the fast method for adhesive contact (module adhesion_cg_fast), and where its iteration stands.
+!> The work fields and the state of the iteration of the fast method for adhesive contact (module
+!> `adhesion_cg_fast`).
 module adhesion_work
    use adhesion_model, only : adhesion_model_type
    use adhesion_patch, only : adhesion_contact_type, adhesion_patch_type
@@ -8,7 +9,7 @@ module adhesion_work
 
    public :: adhesion_iteration_type, adhesion_work_type
 
-   ! Where the traction comes from. Only a fresh one proves a solution.
+   ! The source of the traction. Only a fresh one proves a solution.
    integer, parameter, public :: updated = 1    !! it was updated with the steps: it has gathered round-off
    integer, parameter, public :: fresh = 2      !! it is a product with B
 
@@ -33,19 +34,19 @@ module adhesion_work
       real(dp) :: scaling = 0.0_dp                   !! k of the Gauss potential, Pa/m; 0: none
    end type adhesion_work_type
 
-   !> A contact that is being solved, and where its iteration stands.
+   !> A contact that is being solved, and the state of its iteration.
    type, extends(adhesion_contact_type) :: adhesion_iteration_type
       integer :: source = fresh                  !! of the traction
       integer :: updates = 0                     !! of the traction since it was fresh
-      integer :: failures = 0                    !! directions in a row that gave no step
+      integer :: failures = 0                    !! successive directions without a step
       integer :: caution = 0                     !! how much shorter steps are, after failures
-      real(dp) :: residual = 0.0_dp              !! natural residual by the traction at hand
+      real(dp) :: residual = 0.0_dp              !! natural residual of the present traction
       real(dp) :: limit = 0.0_dp                 !! residual at which a solution is checked
       real(dp) :: least = 0.0_dp                 !! least gap, m
       real(dp) :: missing = 0.0_dp               !! prescribed force less sum of P, free mode, Pa
       real(dp) :: old_missing = 0.0_dp           !! in the iteration before
       real(dp) :: psi_r = 0.0_dp                 !! psi.r of the padding, Pa
-      real(dp) :: old_rz = 0.0_dp                !! r.z of the iteration before; 0: directions start anew
+      real(dp) :: old_rz = 0.0_dp                !! r.z of the iteration before; 0: directions start again
       real(dp) :: lift = 0.0_dp                  !! d of the level
       real(dp) :: slope = 0.0_dp                 !! r.d
       real(dp) :: bend = 0.0_dp                  !! d.e'' d

@@ -15,30 +15,30 @@
 !> beta = 0 in the first iteration, also after the fallback; where more than a tenth of the contact was
 !> released from its bound to stick; after a shortened step; and where d would not point downhill.
 !>
-!> The same in words. The preconditioner turns the slip that should vanish, g, into the change of traction z
-!> that would remove it if each point kept its state. `turn` adds a part
-!> of the last direction. `take_step` goes along d as far as the quadratic model says, and puts every
-!> point that now lies outside its bound back on it. This changes states: a point that was put back
-!> slips from now on, and a slipping point whose slip has turned against its traction sticks. The slip
-!> of the new traction is then computed with A, and the measure of it gives the g of the next iteration.
-!> The loop ends when g is small at all points; where g vanishes, the guess of the states holds.
+!> In words: the preconditioner turns the slip that should vanish, g, into the change of traction z that would
+!> remove it if each point kept its state. `turn` adds a part of the last direction. `take_step` moves along d by
+!> the length that the quadratic model gives, and returns every point that is now outside its bound to it. This
+!> changes states: a point that was returned slips from now on, and a slipping point whose slip has turned
+!> against its traction sticks. The slip of the new traction is then computed with A, and its measure gives the
+!> g of the next iteration. The loop ends when g is small at all points, because the guess of the states is then
+!> right.
 !>
-!> Points that are put back in great number change the total traction, and a stiff mean mode then
-!> throws the slip to the other side. The points that stuck therefore keep their total of T + alpha d:
-!> a uniform c is added to it before they are put back, found without a transform. Without this c, the set
-!> of slipping points can go back and forth for ever.
+!> If many points are returned to their bounds, the total traction changes, and a mean mode with a large compliance
+!> then reverses the slip. The points that stuck therefore keep their total of T + alpha d: a uniform c, which is
+!> found without a transform, is added before they are returned. Without this c the set of slipping points can
+!> alternate for ever.
 !>
-!> Where a move has overshot still, g'.(T' - T) < -alpha g.d/2 (from a good start -2 alpha g.d), a
-!> shorter one along the same path is taken, to where a secant sees g'.(T' - T) vanish. This needs no
-!> energy, which does not exist where the slope counts.
+!> If a move has still overshot, that is, g'.(T' - T) < -alpha g.d/2 (from a good start -2 alpha g.d), a shorter
+!> move along the same path is taken, to the point where a secant predicts that g'.(T' - T) vanishes. This does
+!> not need an energy, which does not exist with the slope effect.
 !>
 !> An iteration costs two operator products, of which the first needs no inverse transform where
 !> points slip, and one preconditioner; each shortened step costs one product more. beta is formed with
 !> z_old instead of the old g, which is not kept: the preconditioner is symmetric, so that both agree as
 !> long as no point changes its state.
 !>
-!> There is no proof that this converges. Where it stalls, or finds no step downhill, some steps of
-!> spectral projected gradients (module `friction_cg_gradient`) follow, and then it goes on.
+!> There is no proof that this converges. If it stalls, or finds no step downhill, some steps of spectral
+!> projected gradients (module `friction_cg_gradient`) follow, and then the method continues.
 module friction_cg_fast
    use asperity_errors, only : error_type
    use asperity_precision, only : dp
@@ -58,7 +58,7 @@ module friction_cg_fast
 
    public :: friction_fast_type, new_friction_fast
 
-   integer, parameter :: patience = 30      !! iterations in which the residual has to fall tenfold
+   integer, parameter :: patience = 30      !! iterations in which the residual must fall tenfold
    integer, parameter :: trials = 2         !! of a shorter step
    !> A move is shortened where g'.(T' - T) is below -overshoot*alpha*g.d. The first iterations of a step
    !> that continues another one may overshoot more, because shortening costs more there than it gains.
@@ -76,7 +76,7 @@ module friction_cg_fast
       procedure :: destroy
    end type friction_fast_type
 
-   !> Where an iteration stands.
+   !> The state of an iteration.
    type :: iteration_type
       logical :: restart = .true.                !! d = z, without the direction before
       real(dp) :: old_gz = 0.0_dp                !! g.z in the iteration before
@@ -102,8 +102,7 @@ contains
       allocate (self%d(grid%nx, 2, grid%rows()), source=0.0_dp)
    end subroutine new_friction_fast
 
-   !> Iterate, as `friction_method_type` says; where the conjugate gradients stall, with the fallback in
-   !> turns.
+   !> Iterate, as `friction_method_type` says. If the conjugate gradients stall, the fallback alternates with them.
    subroutine iterate(self, problem, operator, goal, iterations)
       class(friction_fast_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
@@ -175,14 +174,14 @@ contains
       now%old_gz = gz
       call turn(self, problem, operator, beta, now)
       if (now%slope <= 0.0_dp .and. beta > 0.0_dp) then
-         self%preconditioner%shift = 0.0_dp                                ! z holds it already
+         self%preconditioner%shift = 0.0_dp                                ! z contains the shift already
          call turn(self, problem, operator, 0.0_dp, now)
       end if
       call operator%columns(merge(columns_form, columns_apply, problem%slipping > 0), now%form)
       call problem%spring%add_form(self%d, now%form)
    end subroutine find_direction
 
-   !> T' = T + alpha d, put back, and the slip that it leaves. Where that has overshot, a shorter step.
+   !> Compute T' = T + alpha d, returned to the bounds, and its slip. If this has overshot, take a shorter step.
    subroutine take_step(self, problem, operator, now)
       type(friction_fast_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem

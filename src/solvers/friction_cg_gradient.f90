@@ -4,9 +4,9 @@
 !>     alpha = s.s/s.y or s.y/y.y     s = T' - T, y = r - r' (Barzilai and Borwein, 1988), the shorter
 !>                                    one where the two differ much
 !>
-!> One product of the operator an iteration, no preconditioner. The radial return is no Euclidean
-!> projection where the slope counts, but its fixed points are the solution: T + alpha r returns to
-!> T where r = 0, and where T is on the bound and r is along D.
+!> An iteration takes one product of the operator, and there is no preconditioner. With the slope effect the
+!> radial return is not a Euclidean projection, but its fixed points are the solutions: T + alpha r is returned to
+!> T if r = 0, or if T is on the bound and r is along D.
 module friction_cg_gradient
    use asperity_precision, only : dp
    use fft_conv, only : convolution_type
@@ -86,11 +86,11 @@ contains
       end do
    end subroutine form_step
 
-   !> The next length, from the step just done.
+   !> Compute the next length from the last step.
    function next_alpha(self, problem, first_alpha) result(alpha)
       type(friction_gradient_type), intent(in) :: self
       type(friction_problem_type), intent(in) :: problem
-      real(dp), intent(in) :: first_alpha              !! where the step says nothing
+      real(dp), intent(in) :: first_alpha              !! if the step gives no information
       real(dp) :: alpha
       real(dp), allocatable :: rows(:, :)              !! s.s, s.y, y.y
       real(dp) :: s(2), y(2), products(3), shortest, longest

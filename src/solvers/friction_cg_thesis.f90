@@ -1,4 +1,4 @@
-!> The thesis's method for the tangential problem: conjugate gradients of Hager and Zhang with the
+!> The method of the thesis for the tangential problem: conjugate gradients of Hager and Zhang with the
 !> terms K of the moving bound and the residual perpendicular to the traction (thesis, section 3.2).
 !>
 !>     t = d + K_1                                             (K_1, K_2: derivatives of the return)
@@ -9,10 +9,10 @@
 !>     y = g' - g ; beta = -y.g'/t.y + theta t.g' y.y/(t.y)^2   (eq. 3.14)
 !>     d = g' + beta d
 !>
-!> Repaired against the printed text: the denominator of eq. 3.16 is |D|^2; the K_2 term takes the
-!> whole residual r, which holds the curvature of the bound; slip points go back on the bound from
-!> both sides; K_1 and K_2 are in closed form (module `friction_law`). Restarts with d = g where t.g
-!> <= 0. Two products of the operator an iteration, the first without its inverse transform.
+!> Corrections of the printed text: the denominator of eq. 3.16 is |D|^2; the K_2 term contains the
+!> whole residual r, which includes the curvature of the bound; slipping points are returned to the bound from
+!> both sides; K_1 and K_2 are in closed form (module `friction_law`). The method restarts with d = g if t.g <= 0.
+!> An iteration takes two products of the operator, the first without its inverse transform.
 module friction_cg_thesis
    use asperity_precision, only : dp
    use fft_conv, only : columns_form, convolution_type
@@ -66,7 +66,7 @@ contains
          call operator%columns(columns_form, form)
          call problem%spring%add_form(self%tangent, form)
          if (.not. (form > 0.0_dp .and. abs(ascent) > 0.0_dp)) return
-         ! The bound bends towards the solution or away: keep the step positive and finite.
+         ! The bound may curve towards the solution or away from it: keep the step positive and finite.
          alpha = ascent/max(form - bend, 0.1_dp*form)
          call move(problem, operator, alpha, self%direction, .false., .true., returned)
          call problem%update_slip(operator)

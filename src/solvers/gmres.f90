@@ -1,8 +1,8 @@
-!> The method of generalised minimal residuals for a linear system A x = b whose matrix is known by its
-!> products only.
+!> The method of generalised minimal residuals (GMRES) for a linear system A x = b whose matrix is only known
+!> through its products.
 !>
-!> (Y. Saad, M. H. Schultz, SIAM J. Sci. Stat. Comput. 7 (1986) 856.) Of all x that are sums of b, A b,
-!> A^2 b, ... the one with the least |b - A x|. The caller forms the products:
+!> Of all linear combinations x of b, A b, A^2 b, ... it finds the one with the least |b - A x| (Y. Saad,
+!> M. H. Schultz, SIAM J. Sci. Stat. Comput. 7 (1986) 856). The caller forms the products:
 !>
 !>    call krylov%begin(b, most, tolerance)
 !>    do while (krylov%unsolved())
@@ -12,10 +12,10 @@
 !>    end do
 !>    call krylov%solution(x)
 !>
-!> A vector has three numbers per cell of a list and one number beside them. The list is ordered by the
-!> rows of the grid, and sums are formed by row and added up in order: they do not depend on the threads
-!> or processes. The directions are stored in single precision, which limits the accuracy of x to 1e-6. Memory
-!> is taken for each direction as it comes; where there is none left, no more directions are wanted.
+!> A vector has three numbers for each cell of a list, and one additional number. The list is ordered by the
+!> rows of the grid, and sums are formed by row and added up in order, so that they do not depend on the number of
+!> threads or processes. The directions are stored in single precision, which limits the accuracy of x to 1e-6.
+!> Memory is allocated for each direction when it is needed; if there is none left, the method ends.
 module gmres
    use asperity_parallel, only : any_process
    use asperity_precision, only : dp, sp
@@ -59,7 +59,7 @@ module gmres
 
 contains
 
-   !> Begin with a right side.
+   !> Begin to solve for a right side.
    subroutine begin(self, b, first, most, tolerance)
       class(gmres_type), intent(inout) :: self
       type(cell_vector_type), intent(in) :: b
@@ -87,7 +87,7 @@ contains
       self%right(1) = self%length
    end subroutine begin
 
-   !> Keep a vector over its length as a direction, if there is memory for it on all processes.
+   !> Keep a vector, divided by its length, as a direction, if all processes have memory for it.
    subroutine keep(self, n, v, length)
       class(gmres_type), intent(inout) :: self
       integer, intent(in) :: n                      !! number of the direction
@@ -104,7 +104,7 @@ contains
       self%basis(n)%beside = v%beside/length
    end subroutine keep
 
-   !> Is another direction wanted?
+   !> Is another direction needed?
    pure function unsolved(self) result(yes)
       class(gmres_type), intent(in) :: self
       logical :: yes
@@ -112,7 +112,7 @@ contains
       yes = self%left > self%tolerance .and. self%used < self%most .and. .not. self%short_of_memory
    end function unsolved
 
-   !> The direction whose product is wanted.
+   !> Return the direction whose product is needed next.
    subroutine next(self, v)
       class(gmres_type), intent(in) :: self
       type(cell_vector_type), intent(inout) :: v
@@ -121,10 +121,10 @@ contains
       v%beside = self%basis(self%used + 1)%beside
    end subroutine next
 
-   !> Take the product: its part across all directions is the next one (Gram-Schmidt, twice).
+   !> Accept the product. Its part orthogonal to all directions is the next direction (Gram-Schmidt, twice).
    subroutine take(self, w)
       class(gmres_type), intent(inout) :: self
-      type(cell_vector_type), intent(inout) :: w    !! out: of no use
+      type(cell_vector_type), intent(inout) :: w    !! out: undefined
       real(dp), allocatable :: column(:), part(:)
       real(dp) :: length, turned
       integer :: k, n, round
@@ -146,7 +146,7 @@ contains
       column(n + 1) = length
       if (length > 0.0_dp) call keep(self, n + 1, w, length)
 
-      ! The matrix of all columns so far becomes a triangle by rotations.
+      ! Rotations make the matrix of all columns so far triangular.
       do k = 1, n - 1
          turned = self%rotation(1, k)*column(k) + self%rotation(2, k)*column(k + 1)
          column(k + 1) = self%rotation(1, k)*column(k + 1) - self%rotation(2, k)*column(k)

@@ -1,7 +1,7 @@
-!> Normal contact by the thesis's conjugate gradients (thesis, 2.1.2), so that its counts can be
-!> repeated: three transforms an iteration.
+!> Normal contact by the conjugate gradients of the thesis (2.1.2), with which its counts can be
+!> reproduced. An iteration takes three transforms.
 !>
-!> The direction's quadratic form by Parseval (eq. 2.8) is the first, U = A P the other two. The
+!> The quadratic form of the direction by Parseval (eq. 2.8) takes the first transform, and U = A P the others. The
 !> pressure is clipped and rescaled to the load; the contact is where P > 0 or the surfaces overlap.
 !> The stopping criterion is that of module normal_cg.
 module normal_cg_thesis
@@ -24,7 +24,7 @@ module normal_cg_thesis
 
    public :: new_thesis_solver, thesis_solver_type
 
-   !> The solver with its operator. Not to be copied.
+   !> The solver with its operator. A variable of this type must not be copied.
    type, extends(contact_solver_type) :: thesis_solver_type
    contains
       procedure :: solve

@@ -22,7 +22,7 @@ module normal_passes
    public :: clip_step, clip_type, find_clip, longest_multiple, new_direction, &
       new_normal_work, normal_work_type, survey, try_pressure, update_state
 
-   !> The work fields of a solver, and what belongs to them.
+   !> The work fields of a solver, with the active blocks, the preconditioner and the sums.
    type :: normal_work_type
       type(grid_type) :: grid
       integer :: threads = 1
@@ -42,7 +42,7 @@ module normal_passes
       real(sp), allocatable :: shares(:)             !! numbers of cells in which it acts
    end type strip_type
 
-   !> How a trial pressure is put back on what is allowed: factor max(trial - shift, 0).
+   !> How a trial pressure is projected on the admissible pressures: factor max(trial - shift, 0).
    type :: clip_type
       logical :: clipped = .false.                   !! some trial pressure is negative
       real(dp) :: shift = 0.0_dp                     !! Pa
@@ -73,7 +73,7 @@ contains
       end associate
    end subroutine new_normal_work
 
-   !> Find which blocks hold pressure, the least gap of each, and the sums of the state.
+   !> Find out which blocks have pressure, the least gap of each block, and the sums of the state.
    subroutine survey(self, prescribed, pressure, gap)
       type(normal_work_type), intent(inout) :: self
       real(dp), intent(in) :: prescribed             !! level, m

@@ -1,8 +1,9 @@
-!> The numbers per block of module schur_preconditioner, and what its conjugate gradients do with them.
+!> The numbers per block of module `schur_preconditioner`, and the part of its conjugate gradients that works on
+!> them.
 !>
-!> Coarse parts of the image b, of the search direction d and of the response e are constant in a block.
-!> So what they add to the sums over the cells of N follows from a few sums per block, without a pass over
-!> the cells:
+!> The coarse parts of the image b, of the search direction d and of the response e are constant in a block.
+!> Their contributions to the sums over the cells of N therefore follow from a few sums per block, without a pass
+!> over the cells:
 !>     b = image + pending,   e = K d + addition,   d = correction - om b + beta d_old.
 !>
 !> Arrays hold the rows of blocks of the coarse level that this process holds. Products over all blocks are
@@ -20,7 +21,7 @@ module schur_blocks
 
    integer, parameter :: small = 16384         !! blocks below which one thread is faster
 
-   !> The numbers per block. Not to be copied.
+   !> The numbers per block. A variable of this type must not be copied.
    type :: schur_blocks_type
       type(schur_coarse_type), private :: model
       integer, private :: threads = 1
@@ -45,7 +46,7 @@ module schur_blocks
 
 contains
 
-   !> Make them for the coarse level of a grid. Collective where processes share the rows.
+   !> Make the numbers for the coarse level of a grid. Collective if processes share the rows.
    subroutine new_schur_blocks(self, grid, coarse, c0, threads, error)
       type(schur_blocks_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
@@ -64,7 +65,7 @@ contains
       call new_schur_coarse(self%model, grid, c0, coarse%h, coarse%nx, coarse%sharing, threads, error)
    end subroutine new_schur_blocks
 
-   !> The coarse part of the image of the residual, and what it adds to the sums. Collective.
+   !> Compute the coarse part of the image of the residual, and its contribution to the sums. Collective.
    subroutine image_parts(self, coarse, form, square)
       class(schur_blocks_type), intent(inout) :: self
       type(coarse_level_type), intent(in) :: coarse
@@ -99,7 +100,7 @@ contains
       call self%model%set_weights(self%cells_off)
    end subroutine start
 
-   !> The coarse part of W applied to -b. Collective.
+   !> Compute the coarse part of W applied to -b. Collective.
    subroutine weigh(self, coarse, product)
       class(schur_blocks_type), intent(inout) :: self
       type(coarse_level_type), intent(in) :: coarse
@@ -116,7 +117,7 @@ contains
       product = -totals(1)
    end subroutine weigh
 
-   !> The next search direction and the coarse part of its response. Collective.
+   !> Compute the next search direction and the coarse part of its response. Collective.
    subroutine turn(self, coarse, beta)
       class(schur_blocks_type), intent(inout) :: self
       type(coarse_level_type), intent(in) :: coarse
@@ -131,8 +132,8 @@ contains
       call self%model%add_missing(1.0_dp, self%search_off, self%addition)
    end subroutine turn
 
-   !> What the coarse part of the response adds to the sums; the step before is part of b from here on.
-   !> Collective.
+   !> Compute the contribution of the coarse part of the response to the sums. From here on b includes the step
+   !> before. Collective.
    subroutine response_parts(self, coarse, form, cross, square)
       class(schur_blocks_type), intent(inout) :: self
       type(coarse_level_type), intent(in) :: coarse

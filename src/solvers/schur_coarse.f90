@@ -2,9 +2,9 @@
 !>
 !> The model of the inverse operator B ~ |q| (wave numbers per cell) is a stencil of symbol
 !>     c0 + c1 (4 - 2 cos kx - 2 cos ky),
-!> which fits |q| well where q is large. What is missing below pi/16 per cell is added on the grid of
-!> block means (module coarse_level). With c0 = 0.7 the sum of both fits |q| to a factor of 1.8.
-!> (With c0 = 1 to a factor of 2.1, which is better where the residual is not extended.)
+!> which fits |q| well if q is large. The part that is missing below pi/16 per cell is added on the grid of
+!> block means (module `coarse_level`). With c0 = 0.7 the sum of both fits |q| within a factor of 1.8. (With
+!> c0 = 1 the factor is 2.1, but this is better if the residual is not extended.)
 !>
 !> The same grid holds the coarse part of W, an approximate inverse of the model on the cells N off the
 !> contact:
@@ -36,14 +36,14 @@ module schur_coarse
    real(dp), parameter :: least_shift = 0.03_dp, contact_shift = 0.7_dp
    real(dp), parameter :: power = 0.3_dp       !! of the share of N in w
 
-   !> The coarse part. Not to be copied.
+   !> The coarse part. A variable of this type must not be copied.
    type :: schur_coarse_type
       real(dp), private :: cells = 1.0_dp                !! cells of a block
       real(dp), private :: blocks = 1.0_dp               !! number of blocks
       logical, private :: shared = .false.               !! other processes hold the other rows of blocks
       integer, private :: threads = 1
       real(dp), allocatable, private :: weight(:, :)     !! w of each block, [blocks along x, rows]
-      type(convolution_type), private :: missing         !! what the stencil lacks
+      type(convolution_type), private :: missing         !! the part of B that the stencil lacks
       type(row_column_type), private :: transform        !! for W
       real(dp), allocatable, private :: model(:, :)      !! symbol of B, for the modes of this process
       real(sp), allocatable, private :: symbol(:, :, :)  !! of W, with the factor of the transforms
@@ -91,7 +91,7 @@ contains
       allocate (self%symbol(own(1):own(2), 0:shape%ny/2, 1), source=0.0_sp)
    end subroutine new_schur_coarse
 
-   !> What the coarse level adds to the stencil, and the sum of both, at its wave vectors.
+   !> Compute the part of B that the coarse level adds to the stencil, and the sum of both, at its wave vectors.
    pure subroutine model_symbols(grid, c0, h, first, missing, model)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: c0
@@ -125,7 +125,8 @@ contains
 
    end subroutine model_symbols
 
-   !> What the coarse level adds to the stencil, from the sums of a field over the blocks. Collective.
+   !> Compute the addition of the coarse level to the stencil's product from the sums of a field over the blocks.
+   !> Collective.
    subroutine add_missing(self, factor, sums, addition)
       class(schur_coarse_type), intent(inout) :: self
       real(dp), intent(in) :: factor
@@ -155,7 +156,8 @@ contains
       do j = 1, size(cells_off, 2)
          self%weight(:, j) = (cells_off(:, j)/self%cells)**power
       end do
-      ! The shift is rounded, so that the symbol is seldom made again. Numbers of cells are added without error.
+      ! The shift is rounded, so that the symbol seldom has to be computed again. Numbers of cells are added
+      ! without error.
       all_off = sum(cells_off)
       if (self%shared) all_off = global_sum(all_off)
       taken = nint(32.0_dp*(1.0_dp - all_off(1)/(self%cells*self%blocks)))/32.0_dp

@@ -1,11 +1,11 @@
-!> Steady contact of few cells, solved on the cells in contact alone.
+!> Solves a steady contact of few cells directly, with the cells in contact as the only unknowns.
 !>
-!> With a guess C of the cells in contact, K P = H + level on C and the load give P there: a dense
-!> system, whose matrix takes its entries from the displacement of one loaded cell. Cells with P < 0
-!> leave C, those that overlap join it, until C stays. Few cells make the system cheap where the
-!> splitting of `steady_normal` is slow: small patches far apart, or a summit on a tall map. Near the
-!> solution a few rounds are enough. There is no proof that C settles, and from a distant guess it
-!> swings: the attempt is given up as soon as it does not come closer, and the caller goes on.
+!> With a guess C of the cells in contact, P follows from K P = H + level on C and the load. This is a dense
+!> system, whose entries come from the displacement caused by one loaded cell. Cells with P < 0 leave C, and cells
+!> that overlap join it, until C does not change any more. For few cells the system is cheap, and the splitting
+!> of `steady_normal` is slow in such cases: small patches far apart, or a summit on a tall map. Near the
+!> solution a few rounds are sufficient. There is no proof that C settles, and from a distant guess it
+!> oscillates. The attempt therefore ends as soon as it does not come closer, and the caller continues.
 !>
 !> The matrix is factored for the first guess. Cells that leave or join later change the solution by a
 !> small system of their own (module `changed_set`), which makes the rounds after the first cheap.
@@ -20,14 +20,14 @@ module steady_active
 
    public :: finish_on_contact, worthwhile
 
-   integer, parameter :: most_rounds = 30        !! of joining
-   integer, parameter :: most_departures = 12    !! of leaving, within a round
-   integer, parameter :: most_factors = 4        !! of the matrix, in an attempt
+   integer, parameter :: most_rounds = 30        !! rounds in which cells join
+   integer, parameter :: most_departures = 12    !! times that cells leave within a round
+   integer, parameter :: most_factors = 4        !! factorisations of the matrix in an attempt
    integer, parameter :: patience = 6            !! rounds that need not come closer
 
 contains
 
-   !> Is a dense system cheap beside the transforms spent so far, and small beside the solver's fields?
+   !> Is a dense system cheap compared with the transforms so far, and small compared with the solver's fields?
    pure function worthwhile(cells_in_contact, cells, transforms) result(cheap)
       real(dp), intent(in) :: cells_in_contact, cells
       integer, intent(in) :: transforms                !! real transforms since the solve began
@@ -42,8 +42,8 @@ contains
       cheap = m**2 <= fields*n .and. m**3 <= part*transforms*factoring*n*log(n)/log(2.0_dp)
    end function worthwhile
 
-   !> Solve from the contact of a pressure. In: P of the right load; out where it succeeds: the solution,
-   !> its gap U - H and its error. The pressure is otherwise left alone.
+   !> Solve, starting from the contact of a pressure with the right load. If this succeeds, the pressure is the
+   !> solution, and its gap U - H and its error are returned. Otherwise the pressure is not changed.
    subroutine finish_on_contact(operator, task, height, pressure, gap, found, success)
       type(steady_operator_type), intent(inout) :: operator
       type(normal_problem_type), intent(in) :: task
@@ -86,7 +86,7 @@ contains
       end do
    end subroutine finish_on_contact
 
-   !> The pressure of the set, without the cells that would pull.
+   !> Compute the pressure of the set, and remove cells with negative pressure from it.
    subroutine settle_departures(set, pressure, level, solved)
       type(changed_set_type), intent(inout) :: set
       real(dp), intent(inout) :: pressure(:, :)

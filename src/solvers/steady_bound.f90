@@ -54,7 +54,7 @@ contains
       end do
    end subroutine bound_tractions
 
-   !> What a traction is compared to: it keeps its ratio to this while the pressure changes.
+   !> The unit of a traction. While the pressure changes, the ratio of the traction to this unit is kept.
    pure function unit_of(law, pressure) result(unit)
       type(friction_law_type), intent(in) :: law
       real(dp), intent(in) :: pressure
@@ -64,7 +64,7 @@ contains
       if (law%jumps_at_edge()) unit = law%bare_strength()
    end function unit_of
 
-   !> The ratio T/unit of every cell; where there is no pressure the ratio stays as it is.
+   !> Compute the ratio T/unit of every cell. Without pressure the ratio does not change.
    subroutine compare_tractions(law, pressure, traction, ratio)
       type(friction_law_type), intent(in) :: law
       real(dp), intent(in) :: pressure(:, :)
@@ -104,8 +104,8 @@ contains
       traction = star + shortened(law, pressure, slope, along, across, 1.0_dp + steep)
    end function bounded
 
-   !> D = across/(1 + l) + along stretch/(stretch + l) on the bound. The ratio of the bound rises with l
-   !> up to 1: Newton's secants within a bracket.
+   !> Find D = across/(1 + l) + along stretch/(stretch + l) on the bound. The ratio of the bound rises with l up to
+   !> 1, so that l is found by secants within a bracket.
    pure function shortened(law, pressure, slope, along, across, stretch) result(d)
       type(friction_law_type), intent(in) :: law
       real(dp), intent(in) :: pressure, slope(2)

@@ -1,4 +1,4 @@
-!> Where a steady state loses its energy: by octaves of the wavelength and by arms of the material.
+!> Divides the energy that a steady state loses by octaves of the wavelength and by arms of the material.
 !>
 !> A mode with pressure P^ and traction T^ (module steady_symbols) loses per area and time
 !>
@@ -55,7 +55,7 @@ contains
       octave = 1 + max(0, floor(log(longest/wavelength)/log(2.0_dp) + 1e-9_dp))
    end function octave_of
 
-   !> How many modes of the whole spectrum a mode of the half spectrum stands for.
+   !> Number of modes of the whole spectrum that a mode of the half spectrum represents.
    pure function mode_weight(grid, i) result(weight)
       type(grid_type), intent(in) :: grid
       integer, intent(in) :: i

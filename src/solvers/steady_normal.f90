@@ -47,9 +47,9 @@ module steady_normal
       real(dp) :: scale = 0.0_dp                 !! c that would fit this state, Pa/m; 0: not known
    end type steady_measure_type
 
-   !> How a solve is getting on.
+   !> The progress of a solve.
    type :: progress_type
-      type(steady_measure_type) :: measure       !! of the state in hand
+      type(steady_measure_type) :: measure       !! of the present state
       real(dp) :: least = huge(1.0_dp)           !! least error so far
       real(dp) :: reference = huge(1.0_dp)       !! residual that later ones are compared to, Pa
       integer :: checks = 0                      !! times that the error was within the tolerance
@@ -57,7 +57,7 @@ module steady_normal
       integer(int64) :: ffts_before = 0          !! of the operator, before the solve
    end type progress_type
 
-   !> Work fields. Not to be copied.
+   !> Work fields. A variable of this type must not be copied.
    type :: steady_normal_type
       type(grid_type) :: grid
       real(dp) :: c = 0.0_dp                            !! Pa/m
@@ -76,7 +76,7 @@ module steady_normal
 
 contains
 
-   !> Make room.
+   !> Allocate the work fields.
    subroutine new_steady_normal(self, grid)
       type(steady_normal_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
@@ -134,9 +134,9 @@ contains
       outcome%ffts = operator%ffts - progress%ffts_before
    end subroutine solve
 
-   !> Is the pressure in hand the solution? The error of an evaluation is a cheap estimate: where it is small,
-   !> the pressure is checked. Now and then the solution is tried on the cells in contact alone. The best
-   !> pressure so far is kept.
+   !> Decide whether the present pressure is the solution. The error of an evaluation is a cheap estimate; if it is
+   !> small, the pressure is checked. From time to time a direct solution on the cells in contact is tried. The
+   !> best pressure so far is kept.
    subroutine judge(self, operator, task, height, progress, gap, found, outcome)
       class(steady_normal_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
@@ -170,7 +170,7 @@ contains
       if (outcome%converged) outcome%reason = reason_converged
    end subroutine judge
 
-   !> The next z: an accelerated step, a plain one after the residual has grown, or with another c.
+   !> Compute the next z by an accelerated step, by a plain one if the residual has grown, or with another c.
    subroutine advance(self, operator, task, iteration, progress)
       class(steady_normal_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
@@ -189,7 +189,7 @@ contains
       end if
    end subroutine advance
 
-   !> The first state: from the pressure and the gap handed in, or from the road alone.
+   !> Make the first state from the given pressure and gap, or from the road alone.
    subroutine start(self, operator, task, height, pressure, gap)
       class(steady_normal_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
@@ -240,7 +240,7 @@ contains
          measure%scale = 2.0_dp*(field_sum(max(pressure, 0.0_dp))/touching)/open_gap
    end subroutine scale_of
 
-   !> Bounds that keep c in the range of the compliances.
+   !> Limit c to the range of the compliances.
    pure function bounded(operator, c) result(limited)
       type(steady_operator_type), intent(in) :: operator
       real(dp), intent(in) :: c
@@ -249,7 +249,7 @@ contains
       limited = min(max(c, 0.02_dp/operator%longest), 50.0_dp/operator%shortest)
    end function bounded
 
-   !> By what factor two scales differ; 1 where one is not known.
+   !> The factor by which two scales differ; 1 if one of them is not known.
    pure function misfit(a, b) result(factor)
       real(dp), intent(in) :: a, b
       real(dp) :: factor
@@ -331,8 +331,8 @@ contains
       sums = [load, work, change, squares, cells, inside, outside, least]
    end subroutine measure_row
 
-   !> Change c where a fitting one differs much; z then stands for the same pressure and gap. What was
-   !> learnt is forgotten.
+   !> Change c if it differs much from one that fits. z is adjusted so that it represents the same pressure and gap,
+   !> and the acceleration discards its differences.
    subroutine rescale(self, operator, task, scale, changed)
       class(steady_normal_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
@@ -344,7 +344,7 @@ contains
       if (changed) call self%take_scale(operator, task, scale)
    end subroutine rescale
 
-   !> Take another c for the state z.
+   !> Change c, and adjust the state z.
    subroutine take_scale(self, operator, task, scale)
       class(steady_normal_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
@@ -359,7 +359,7 @@ contains
       call self%memory%forget()
    end subroutine take_scale
 
-   !> The error of the pressure in hand, by a fresh U = K P. The gap is that of U - H.
+   !> Compute the error of the present pressure from a new product U = K P. The gap is U - H.
    subroutine check(self, operator, task, height, gap, found)
       type(steady_normal_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
