@@ -25,7 +25,7 @@ module adhesion_directions
 
 contains
 
-   !> The direction d = z + beta d, or d = z where that one does not descend.
+   !> Compute the direction d = z + beta d, or d = z if the former does not descend.
    subroutine find_direction(self, now)
       type(adhesion_work_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(inout) :: now
@@ -46,8 +46,8 @@ contains
       if (now%slope <= 0.0_dp .and. beta > 0.0_dp) call turn(self, 0.0_dp, level_z, now)
    end subroutine find_direction
 
-   !> z = M r on the free cells and in the padding, without cells in contact that it would close; of zero
-   !> mean where the sum of the gap is prescribed, and with the level's mode where that is unknown.
+   !> Compute z = M r on the free cells and in the padding, except in cells in contact that z would close. Its mean is
+   !> zero if the sum of the gap is prescribed, and it includes the mode of the level if that is unknown.
    subroutine precondition(self, now, level_z, sums)
       type(adhesion_work_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(in) :: now
@@ -93,7 +93,7 @@ contains
       end do
    end subroutine precondition
 
-   !> A row of z from what M has made of r; 0 on the cells that are not free.
+   !> Compute a row of z from M r. It is 0 on the cells that are not free.
    subroutine take_z_row(self, now, level_z, j, z)
       type(adhesion_work_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(in) :: now
@@ -125,7 +125,7 @@ contains
       end do
    end subroutine take_free_cells
 
-   !> Keep cells in contact from closing in a row of z whose mean is free; the sums of the row.
+   !> Set z to 0 in cells in contact that it would close, in a row whose mean is free, and form the sums of the row.
    subroutine sum_z_row(self, now, j, sums)
       type(adhesion_work_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(in) :: now
@@ -139,7 +139,7 @@ contains
       sums%old_rz = row_product(self%exchange(:, j), self%old(:, j))
    end subroutine sum_z_row
 
-   !> z without cells in contact that it would close.
+   !> Set z to 0 in cells in contact that it would close.
    pure subroutine keep_contact(state, z)
       real(dp), intent(in), contiguous :: state(:)
       real(dp), intent(inout), contiguous :: z(:)
@@ -150,11 +150,11 @@ contains
       end do
    end subroutine keep_contact
 
-   !> Take the mean off a row of z, and keep cells in contact from closing; the sums of the row.
+   !> Subtract the mean from a row of z, set z to 0 in cells in contact that it would close, and form the sums.
    subroutine center_row(self, now, pass, mean, j, sums)
       type(adhesion_work_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(in) :: now
-      integer, intent(in) :: pass                      !! in sum_pass z is left as it is
+      integer, intent(in) :: pass                      !! z is not changed in sum_pass
       real(dp), intent(in) :: mean                     !! m
       integer, intent(in) :: j
       type(z_sums_type), intent(out) :: sums
@@ -198,8 +198,8 @@ contains
       sums = z_sums_type(totals(1), totals(2), totals(3), totals(4))
    end function sum_of
 
-   !> d = z + beta d on the free cells and in the padding, 0 elsewhere; the level's alike. The change of the
-   !> displacement along d is handed to the model.
+   !> Compute d = z + beta d on the free cells and in the padding, and 0 elsewhere, and likewise for the level. The
+   !> change of the displacement along d is passed to the model.
    subroutine turn(self, beta, level_z, now)
       type(adhesion_work_type), intent(inout) :: self
       real(dp), intent(in) :: beta

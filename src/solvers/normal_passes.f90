@@ -88,9 +88,9 @@ contains
       end do
    end subroutine survey
 
-   !> direction = z + beta direction where it acts: on S, except in empty cells that z would empty
-   !> further. The constant that makes sum(direction) zero is kept in `offset` and not subtracted; the
-   !> products and block means are those with it subtracted.
+   !> Compute direction = z + beta direction where it acts: on S, except in cells without pressure in which z is
+   !> negative. The constant that makes sum(direction) zero is kept in `offset` and not subtracted; the products and
+   !> block means are those after its subtraction.
    subroutine new_direction(self, fixed_load, preconditioned, beta, pressure, slope, square)
       type(normal_work_type), intent(inout) :: self
       logical, intent(in) :: fixed_load              !! the direction may not change the load
@@ -132,7 +132,7 @@ contains
       self%coarse%mean(:, :) = (self%coarse%mean - self%offset*self%coarse%share)/self%coarse%cells
    end subroutine new_direction
 
-   !> The direction in a row.
+   !> Compute the direction in a row.
    subroutine direction_row(self, preconditioned, beta, j, pressure, strip, sums)
       type(normal_work_type), intent(inout), target :: self
       logical, intent(in) :: preconditioned
@@ -160,7 +160,7 @@ contains
       end do
    end subroutine direction_row
 
-   !> step = trial pressure P + alpha (direction - offset), and its sums above 0.
+   !> Compute step = trial pressure P + alpha (direction - offset), and its sums above 0.
    subroutine try_pressure(self, alpha, pressure, step, sums)
       type(normal_work_type), intent(in) :: self
       real(dp), intent(in) :: alpha
@@ -187,10 +187,9 @@ contains
       sums = total(rows)
    end subroutine try_pressure
 
-   !> How the trial pressure in `step` is put back on what is allowed. Where the load is given, that is the
-   !> shift t for which max(trial - t, 0) has the load's sum, by Newton's method from below. A trial
-   !> pressure far above the load leaves of that sum only what round-off allows, and a factor makes up
-   !> for the rest.
+   !> Find the projection of the trial pressure in `step` on the admissible pressures. If the load is given, this is
+   !> the shift t for which max(trial - t, 0) has the sum of the load, found by Newton's method from below. If the
+   !> trial pressure is far above the load, round-off limits the accuracy of this sum, and a factor corrects it.
    subroutine find_clip(self, fixed_load, load, step, sums, clip)
       type(normal_work_type), intent(in) :: self
       logical, intent(in) :: fixed_load
@@ -210,12 +209,12 @@ contains
       kept = load
       next = 0.0_dp
       do
-         if (above%cells < 1.0_dp) exit                   ! too far: what was kept before it is the best
+         if (above%cells < 1.0_dp) exit                   ! too far: the shift before is the best one
          clip%shift = next
          kept = above%above
          if (kept - load <= 1e-15_dp*load) exit
          next = clip%shift + (kept - load)/above%cells
-         if (next <= clip%shift) exit                    ! all that round-off allows
+         if (next <= clip%shift) exit                    ! the limit of round-off is reached
          !$omp parallel do default(none) shared(self, step, next, rows) private(j, k, n) &
          !$omp schedule(dynamic, 8) num_threads(self%threads)
          do j = 1, self%grid%rows()
@@ -230,8 +229,8 @@ contains
       if (abs(kept - load) > 1e-13_dp*load) clip%factor = load/kept
    end subroutine find_clip
 
-   !> step = (trial pressure put back on what is allowed) - P, its sums and block means. Its rows are
-   !> transformed at once.
+   !> Compute step = (projected trial pressure) - P, its sums and block means. Each row is transformed as soon as it
+   !> is formed.
    subroutine clip_step(self, operator, clip, level, pressure, gap, step, sums)
       type(normal_work_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
@@ -275,7 +274,7 @@ contains
       sums = total(rows)
    end subroutine clip_step
 
-   !> The longest multiple of the step that leaves no pressure negative.
+   !> The longest multiple of the step for which no pressure becomes negative.
    function longest_multiple(self, pressure, step) result(longest)
       type(normal_work_type), intent(in) :: self
       real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows()), step(self%grid%nx, self%grid%rows())
@@ -292,7 +291,7 @@ contains
       longest = least_of_rows([longest])
    end function longest_multiple
 
-   !> P = P + alpha step, gap = gap + factor A step, and the survey of the new state.
+   !> Update P = P + alpha step and gap = gap + factor A step, and survey the new state.
    subroutine update_state(self, operator, prescribed, factor, alpha, step, pressure, gap)
       type(normal_work_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator   !! holds the columns of A step

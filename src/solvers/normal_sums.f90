@@ -1,4 +1,4 @@
-!> The sums that the passes of the normal solver take over the cells of a row.
+!> The sums over the cells of a row that the passes of the normal solver form.
 !>
 !> A pass fills one record per row, whichever thread works on the row. `total` adds the records in
 !> the order of the rows, so that a result does not depend on the number of threads.
@@ -11,7 +11,7 @@ module normal_sums
    public :: direction_sums_type, state_sums_type, step_sums_type, total, &
       trial_sums_type
 
-   !> Of a direction d before its offset is taken off.
+   !> Sums of a direction d before its offset is subtracted.
    type :: direction_sums_type
       real(dp) :: value = 0.0_dp            !! d
       real(dp) :: cells = 0.0_dp            !! number of cells where d acts
@@ -20,20 +20,20 @@ module normal_sums
       real(dp) :: square = 0.0_dp           !! d^2
    end type direction_sums_type
 
-   !> Of a trial pressure above a limit.
+   !> Sums of a trial pressure above a limit.
    type :: trial_sums_type
-      real(dp) :: above = 0.0_dp            !! what lies above the limit, Pa
+      real(dp) :: above = 0.0_dp            !! sum of the parts above the limit, Pa
       real(dp) :: cells = 0.0_dp            !! number of cells above the limit
       real(dp) :: least = 0.0_dp            !! least trial pressure, at most 0, Pa
    end type trial_sums_type
 
-   !> Of a step s.
+   !> Sums of a step s.
    type :: step_sums_type
       real(dp) :: slope = 0.0_dp            !! (level - gap) s
       real(dp) :: square = 0.0_dp           !! s^2
    end type step_sums_type
 
-   !> Of a state (pressure P and gap g).
+   !> Sums of a state (pressure P and gap g).
    type :: state_sums_type
       real(dp) :: load = 0.0_dp             !! P, Pa
       real(dp) :: work = 0.0_dp             !! P g, Pa m

@@ -1,4 +1,4 @@
-!> The passes of module normal_cg over neighbouring cells of one row.
+!> The innermost loops of module `normal_cg` over neighbouring cells of one row.
 !>
 !> Each is one loop without branches, so that it runs in vector registers. No masks are stored: a cell
 !> is in the contact set S if the residual is not 0, and the direction acts where it is not 0.
@@ -15,7 +15,7 @@ module normal_sweeps
 
 contains
 
-   !> The residual scale (level - gap) on S = {P > 0 or gap < level}, zero elsewhere.
+   !> Compute the residual scale (level - gap) on S = {P > 0 or gap < level}, and zero elsewhere.
    pure subroutine residual_cells(n, scale, level, pressure, gap, residual, column)
       integer, intent(in) :: n
       real(dp), intent(in) :: scale, level
@@ -33,8 +33,8 @@ contains
       end do
    end subroutine residual_cells
 
-   !> direction = z + beta (direction - offset), z = M r, where it acts: on S, except in empty cells that
-   !> z would empty further.
+   !> Compute direction = z + beta (direction - offset) with z = M r where it acts: on S, except in cells without
+   !> pressure in which z is negative.
    pure subroutine direction_cells(n, length, image, response, correction, residual, beta, offset, &
       pressure, direction, column, shares, sums)
       integer, intent(in) :: n
@@ -80,7 +80,7 @@ contains
       sums%square = sums%square + square
    end subroutine direction_cells
 
-   !> trial = P + alpha (direction - offset), and its sums above the limit 0.
+   !> Compute trial = P + alpha (direction - offset), and its sums above the limit 0.
    pure subroutine trial_cells(n, alpha, offset, pressure, direction, trial, sums)
       integer, intent(in) :: n
       real(dp), intent(in) :: alpha, offset
@@ -107,7 +107,7 @@ contains
       sums%least = lowest
    end subroutine trial_cells
 
-   !> Sum of what is above a limit, and the number of such values.
+   !> Sum of the parts of the values above a limit, and the number of such values.
    pure subroutine above_cells(n, limit, values, sums)
       integer, intent(in) :: n
       real(dp), intent(in) :: limit
@@ -127,7 +127,7 @@ contains
       sums%cells = sums%cells + cells
    end subroutine above_cells
 
-   !> step = factor max(trial - shift, 0) - P; the trial pressure is in `step` before.
+   !> Compute step = factor max(trial - shift, 0) - P. In: `step` holds the trial pressure.
    pure subroutine clip_cells(n, factor, shift, level, pressure, gap, step, column, sums)
       integer, intent(in) :: n
       real(dp), intent(in) :: factor, shift, level
@@ -151,7 +151,7 @@ contains
       sums%square = sums%square + square
    end subroutine clip_cells
 
-   !> The longest multiple of the step that leaves no pressure negative, if less than `longest`.
+   !> The longest multiple of the step for which no pressure becomes negative, if it is less than `longest`.
    pure subroutine longest_cells(n, pressure, step, longest)
       integer, intent(in) :: n
       real(dp), intent(in) :: pressure(n), step(n)
@@ -179,7 +179,7 @@ contains
       acts = 0.5_sp + sign(0.5_sp, abs(direction) - tiny(1.0_sp))
    end function acts
 
-   !> P = P + alpha step, and the sums of the new state without its least gap.
+   !> Update P = P + alpha step, and form the sums of the new state without its least gap.
    pure subroutine load_cells(n, alpha, target, gap, step, pressure, sums)
       integer, intent(in) :: n
       real(dp), intent(in) :: alpha
@@ -197,7 +197,7 @@ contains
       distance = 0.0_dp
       !$omp simd reduction(+:load, work, touched, cells, distance) private(p, inside)
       do i = 1, n
-         ! Round-off may not leave a trace where the step empties a cell.
+         ! If the step removes all pressure of a cell, the pressure must be exactly 0, without round-off.
          p = max(pressure(i) + alpha*step(i), 0.0_dp)
          pressure(i) = p
          load = load + p
