@@ -197,7 +197,7 @@ contains
       distance = 0.0_dp
       !$omp simd reduction(+:load, work, touched, cells, distance) private(p, inside)
       do i = 1, n
-         ! If the step removes all pressure of a cell, the pressure must be exactly 0, without round-off.
+         ! Round-off must not make the pressure negative in a cell where the step removes all of it.
          p = max(pressure(i) + alpha*step(i), 0.0_dp)
          pressure(i) = p
          load = load + p
