@@ -64,7 +64,7 @@ contains
       character(*), intent(in) :: path
       integer, intent(in) :: rows
       integer, intent(in) :: compression
-      logical, intent(in) :: restart        !! go on from the checkpoint
+      logical, intent(in) :: restart        !! continue from the checkpoint
       type(error_type), allocatable, intent(out) :: error
       type(result_file_type) :: output
       type(checkpoint_writer_type) :: state

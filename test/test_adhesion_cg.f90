@@ -103,7 +103,7 @@ contains
       end do
    end function noise
 
-   !> B u for G = 1 by a sum over the wave vectors, without any FFT: as slow as it is independent.
+   !> B u for G = 1 by a sum over the wave vectors. It uses no FFT, so that it is slow but independent of the library.
    function stiffness_sum(grid, u) result(traction)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: u(:, :)
@@ -233,7 +233,7 @@ contains
       call check_close(maxval(abs(min(gap/range, traction/scale))), 0.0_dp, 1.01e-8_dp, &
          name//': natural residual')
       call check_close(outcome%residual, maxval(abs(min(gap/range, traction/scale))), 1e-10_dp, &
-         name//': the residual told')
+         name//': the residual that is returned')
       call check_that(minval(pressure, mask=gap == 0.0_dp) >= &
          -adhesive_slope(problem%potential, 0.0_dp) - 1e-8_dp*scale, name//': release rule')
       call check_close(sum(pressure)/size(pressure), 0.05_dp, 1e-14_dp, name//': load')

@@ -130,7 +130,7 @@ contains
       call check_that(any(gap == 0.0_dp) .and. any(gap > 0.0_dp), name//': a partial contact')
       call check_close(maxval(abs(min(true_gap/0.6_dp, &
          (pressure + adhesive_slope(problem%potential, max(true_gap, 0.0_dp)))/scale))), &
-         outcome%residual, 1e-10_dp + outcome%load_error, name//': true residual, as told')
+         outcome%residual, 1e-10_dp + outcome%load_error, name//': true residual, as returned')
       call check_order(outcome%residual, '<=', 1e-7_dp, name//': true residual')
 
       problem%control = control_approach
@@ -358,7 +358,7 @@ contains
       call solver%destroy()
    end subroutine force_is_derivative_of_energy
 
-   !> Tabor 5 and 8 on a mesh too coarse for them: the solver gets there all the same.
+   !> Tabor 5 and 8 on a mesh that is too coarse for them: the solver converges nevertheless.
    subroutine strong_attraction_on_coarse_mesh()
       real(dp) :: radius, level
 

@@ -68,7 +68,7 @@ contains
          to_text(errors(1))//', '//to_text(errors(2))//', '//to_text(errors(3)), errors)
    end subroutine rule_of_motion_is_second_order
 
-   !> A block that is held comes to rest: what is left of speed and force halves from step to step.
+   !> A block that is held comes to rest: the remaining speed and force are halved from step to step.
    subroutine held_block_comes_to_rest()
       type(block_motion_type) :: block
       real(dp) :: known(2), force

@@ -201,10 +201,10 @@ contains
       call control%start(1.0e-6_dp, 1.0_dp)
       call check_order(control%accuracy, '>', 1.0e-4_dp, 'where nothing is known')
       call control%judge(1.0e-2_dp)
-      call check_close(control%accuracy, 1.0e-3_dp, 1.0e-18_dp, 'a tenth of what is left')
+      call check_close(control%accuracy, 1.0e-3_dp, 1.0e-18_dp, 'a tenth of the last mismatch')
       call control%judge(1.0e-3_dp)
-      call check_close(control%accuracy, 1.0e-4_dp, 1.0e-18_dp, 'a tenth of what is left')
-      call check_that(control%best_yet .and. .not. (control%forget .or. control%go_back), 'goes on')
+      call check_close(control%accuracy, 1.0e-4_dp, 1.0e-18_dp, 'a tenth of the last mismatch')
+      call check_that(control%best_yet .and. .not. (control%forget .or. control%go_back), 'the passes continue')
       call control%judge(1.0e-3_dp)
       call check_that(.not. control%best_yet .and. control%damping < 1.0_dp, 'shorter where it is slow', &
          [control%damping])

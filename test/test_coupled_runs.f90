@@ -179,7 +179,7 @@ contains
       end do
    end subroutine orders_in_time_with_friction
 
-   !> A viscoelastic block that starts to slide along x and goes on over a third of the road.
+   !> A viscoelastic block that starts to slide along x and slides over a third of the road.
    function order_case(profile, steps) result(text)
       logical, intent(in) :: profile
       integer, intent(in) :: steps

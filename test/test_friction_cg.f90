@@ -916,7 +916,7 @@ contains
       call end_case(self)
    end subroutine block_dragged_into_full_slip_and_back
 
-   !> One thread and two give the same: FFTW may plan anew, so to round-off.
+   !> One thread and two give the same results, to round-off, because FFTW may choose other plans.
    subroutine two_threads_agree_to_round_off()
       type(case_type) :: self
       real(dp), allocatable :: tx(:, :)

@@ -145,7 +145,7 @@ contains
       call check_close(kernel%largest_stiffness(grid), 128.0_dp*pi, 1e-12_dp, 'largest stiffness of a line')
    end subroutine extreme_stiffness_of_a_grid
 
-   !> The operator gives back the mean compliance that it was made with or told.
+   !> The operator returns the mean compliance that was set when it was made or later.
    subroutine mean_mode_of_an_operator()
       type(convolution_type) :: operator
       type(error_type), allocatable :: error

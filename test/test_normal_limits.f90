@@ -266,7 +266,7 @@ contains
       end do
    end subroutine tiny_loads_end_on_the_highest_cell
 
-   !> Loads that drown in the round-off of a step are met all the same: on strips, and after larger ones.
+   !> Loads below the round-off of a step are met nevertheless: on strips, and after larger loads.
    subroutine load_below_round_off_is_met()
       real(dp), parameter :: loads(6) = [2e-2_dp, 3e-8_dp, 1e-14_dp, 1e-5_dp, 2e-13_dp, 1e-1_dp]
       type(grid_type) :: grid
@@ -341,7 +341,7 @@ contains
       end do
    end subroutine small_contact_on_a_tall_map
 
-   !> The height's zero is no matter.
+   !> The result does not depend on the zero of the height.
    subroutine zero_of_heights_does_not_matter()
       type(grid_type) :: grid
       type(normal_problem_type) :: problem

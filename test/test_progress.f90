@@ -36,7 +36,7 @@ contains
       call check_that(progress_line(row, 101, 0, 2.0_dp) == 'step 9/100  time 1.250E-02 s  '// &
          'area 0.2500  friction  0.5000  iterations 12+7  5.0 steps/s  18 s left', 'a line')
       call check_order(index(progress_line(row, 101, 5, 50.0_dp), '10.0 s/step  15 min 10 s left'), '>', 0, &
-         'a slow run that goes on')
+         'a slow run that is continued')
       row%step = 100
       call check_that(index(progress_line(row, 101, 0, 2.0_dp), 'left') == 0, 'the last step')
       call check_that(index(progress_line(row, 101, 0, 0.0_dp), 'step 100/100') == 1, 'no time yet')

@@ -75,7 +75,7 @@ contains
    end subroutine give_up_advance
 
    !> A row that is given up at any iteration or pass, in any part of its step, leaves the state of the row
-   !> before, and the run goes on to the same numbers.
+   !> before, and the run continues to the same numbers.
    subroutine give_up_case(text, every, what)
       character(*), intent(in) :: text, what
       integer, intent(in) :: every                  !! of the places to give up that are tried

@@ -100,7 +100,7 @@ contains
       call file%close(error)
    end subroutine layout_is_kept
 
-   !> A run that goes on from its checkpoint drops what came after it, and ends the same.
+   !> A run that continues from its checkpoint drops later rows, and ends with the same result.
    subroutine run_goes_on()
       type(hdf5_file_type) :: file
       type(error_type), allocatable :: error

@@ -171,7 +171,7 @@ contains
       end do
    end subroutine fields_shift_by_whole_cells
 
-   !> By whole cells a field is carried to the last bit; on a free grid its rim goes on.
+   !> A field is carried by whole cells without a change of any bit; beyond a free grid its rim is continued.
    subroutine fields_are_carried()
       type(grid_type) :: grid
       real(dp), allocatable :: field(:, :), moved(:, :)
@@ -191,7 +191,7 @@ contains
          call carry(grid, field, [0.0_dp, 4.0_dp*grid%dy], moved)
          do j = 1, grid%rows()
             call check_close(moved(2, j), value(2, min(grid%first_row + j + 3, grid%ny)), 1.0e-9_dp, &
-               'the rim goes on')
+               'the rim is continued')
          end do
          deallocate (moved)
       end do

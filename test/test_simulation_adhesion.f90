@@ -191,7 +191,7 @@ contains
       call check_close(record%rows(last(record))%force, 0.0_dp, 1e-6_dp*unit_force, 'and is free')
    end subroutine pull_off
 
-   !> Under a prescribed pull there is an end: told by name, with the rows before it as they were.
+   !> Under a prescribed pull the contact ends with its own reason, and the rows before are not changed.
    subroutine detachment_is_reported()
       character(*), parameter :: pulls(5) = [character(8) :: '1e-5', '-1e-5', '-2e-5', '-2.9e-5', '-3e-5']
       type(case_type) :: case

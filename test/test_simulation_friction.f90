@@ -240,20 +240,20 @@ contains
       type(record_type) :: record
       type(stick_slip_watch_type) :: watch
       character(:), allocatable :: message
-      integer :: k, told
+      integer :: k, warned
 
-      told = 0
+      warned = 0
       do k = 1, 20
          call watch_slip(watch, merge(1.2_dp, 0.8_dp, mod(k, 2) == 0), 1.0_dp, 2, 0.0_dp, message)
-         if (len(message) > 0) told = told + 1
+         if (len(message) > 0) warned = warned + 1
       end do
-      call check_that(told == 1, 'a slip that swings from step to step is told once')
+      call check_that(warned == 1, 'a slip that swings from step to step causes one warning')
       watch = stick_slip_watch_type()
       do k = 1, 100
          call watch_slip(watch, 1.0_dp + 0.9_dp*sin(0.3_dp*k), 1.0_dp, 2, 0.0_dp, message)
-         if (len(message) > 0) told = told + 1
+         if (len(message) > 0) warned = warned + 1
       end do
-      call check_that(told == 1, 'a slip that swings over many steps is not')
+      call check_that(warned == 1, 'a slip that swings over many steps causes none')
 
       call slide('0', 1, record)
       call check_order(index(record%warnings, report), '>', 0, 'numerical stick-slip is reported')

@@ -149,7 +149,7 @@ contains
          call check_close(driven%rows(k)%contact_area, pulled%rows(k)%contact_area, 2e-3_dp, 'as driven: area')
       end do
       call check_close(pulled%rows(3)%road_y - pulled%rows(2)%road_y, -1e-3_dp*dt, 1e-18_dp, &
-         'pulled along x only: the road goes on along y')
+         'pulled along x only: the road keeps its motion along y')
       call check_order(pulled%rows(4)%stick_area, '<', pulled%rows(4)%contact_area, &
          'pulled: something slips')
    end subroutine pulled_road_goes_as_a_driven_one
@@ -166,7 +166,7 @@ contains
       call run_case(start//'&phase traction_x = 8e4, ramp = ''linear'', duration = 1, steps = 2 /', 'far', far)
       first = index(far%warnings, 'the pull moves the road by 2.56 cells in a step')
       call check_that(first > 0 .and. index(far%warnings, 'dt = 0.195312') > first, 'a far way: '//far%warnings)
-      call check_that(index(far%warnings, 'the pull moves', back=.true.) == first, 'a far way is told once')
+      call check_that(index(far%warnings, 'the pull moves', back=.true.) == first, 'one warning of a long way')
       call run_case(start//'&phase traction_x = 8e4, ramp = ''linear'', duration = 1, steps = 10 /', 'near', near)
       call check_that(index(near%warnings, 'the pull moves') == 0, 'half a cell per step is followed')
       call run_case(start//'&phase traction_x = 8e4, duration = 1, steps = 10 /', 'jump', far)

@@ -526,10 +526,10 @@ contains
          'moved off the map', record)
       first = index(record%warnings, 'points enter or leave the free map')
       call check_that(first > 0 .and. index(record%warnings(first + 1:), 'points enter or leave') == 0, &
-         'points that come near, told once: '//record%warnings)
+         'points that come near, one warning: '//record%warnings)
       first = index(record%warnings, 'cells at the edge of the free map touch')
       call check_that(first > 0 .and. index(record%warnings(first + 1:), 'cells at the edge') == 0, &
-         'a sphere that leaves the map, told once: '//record%warnings)
+         'a sphere that leaves the map, one warning: '//record%warnings)
       ! A long map has a large rms height: what counts is the depth of the contact.
       call run_case('&material shear_modulus = 1e6 /'//nl// &
          '&grid nx = 80, ny = 30, lx = 0.8e-3, ly = 0.3e-3, boundary = ''free'' /'//nl// &

@@ -56,7 +56,7 @@ contains
       call check_that(size(parts) == 1, 'a jump is not split')
    end subroutine parts_lie_on_the_line_of_the_step
 
-   !> Which steps begin with another rate of the load: none where a ramp goes on over two phases.
+   !> Which steps begin with another rate of the load: none if a ramp continues over two phases.
    subroutine steps_that_begin_with_another_rate()
       type(phase_settings_type) :: phases(5)
       type(schedule_type) :: schedule

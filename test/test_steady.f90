@@ -222,7 +222,7 @@ contains
       end associate
    end subroutine plane_strain_with_the_flat_law
 
-   !> A steady phase with a duration goes on from its state: nothing changes but by the error of the
+   !> A steady phase with a duration continues from its state: nothing changes except by the error of the
    !> steps, while a start from rest is far away.
    subroutine run_goes_on_from_the_steady_state()
       type(record_type) :: steady, rest

@@ -478,7 +478,7 @@ contains
       term%line = 7
       call new_height(grid, [term], h, error)
       call check_that(error%message == 'wet road.nml: &surface: file = ''build/no_such_file.h5'':'// &
-         ' there is no such file (line 7)', 'a missing file is told with its place in the input')
+         ' there is no such file (line 7)', 'the message about a missing file gives its place in the input')
       call check_that(error%status == error_file, 'a missing file: status')
       open (newunit=unit, file=path, status='replace', action='write')
       write (unit, '(a)') 'not HDF5'

@@ -75,7 +75,7 @@ contains
       end do
    end subroutine new_body
 
-   !> End the step in hand at the tractions p.
+   !> End the present step at the tractions p.
    subroutine load(self, p, damage)
       type(body_type), intent(inout) :: self
       real(dp), intent(in) :: p(cells)
@@ -424,7 +424,7 @@ contains
       end do
    end subroutine elastic
 
-   !> Books and histories taken to an array and back go on to the same numbers.
+   !> Books and states of arms that are copied and restored lead to the same numbers.
    subroutine restarted()
       type(body_type) :: body, other
       real(dp) :: p(cells)

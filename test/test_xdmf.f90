@@ -49,7 +49,7 @@ contains
          'spacing')
       call check_order(index(text, '</Xdmf>'), '>', 0, 'whole')
       call write_xdmf(path, 'a.h5', grid, snapshots(:1), error)
-      call check_that(count_of(content(), '<Time') == 1, 'written anew')
+      call check_that(count_of(content(), '<Time') == 1, 'written again')
       call write_xdmf('no_such_folder/x.xdmf', 'a.h5', grid, snapshots, error)
       call check_error(error, 'no_such_folder/x.xdmf: cannot be written', 'missing folder')
       call remove_file(path)

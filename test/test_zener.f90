@@ -57,7 +57,7 @@ contains
       call check_no_error(error, 'a history')
    end subroutine new_point
 
-   !> End the step in hand at a given P, or at a given U.
+   !> End the present step at a given P, or at a given U.
    subroutine reach(self, p, u)
       type(point_type), intent(inout) :: self
       real(dp), intent(in), optional :: p, u
