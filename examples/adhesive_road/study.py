@@ -100,7 +100,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold what adhesion adds against trends, and the mesh against its criterion."""
+    """Check what adhesion adds against trends, and the mesh against its criterion."""
     # Wider cells let go and stick at the whim of the algorithm.
     assert data["largest_cell"] > CELL, "cells too wide for the range of adhesion"
     gain = np.array([one["dyn"] - other["dyn"] for one, other in

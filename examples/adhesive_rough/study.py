@@ -44,7 +44,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold the loop against what must be: monotone, with hysteresis, above the bare contact."""
+    """Check the loop against what must be: monotone, with hysteresis, above the bare contact."""
     area, gap, load = data["area"], data["gap"], data["load"]
     turn = int(load.argmax())
     np.testing.assert_allclose(load[turn::-1], load[turn:], rtol=1e-9)

@@ -49,7 +49,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold the loops against the books and what adhesion must do."""
+    """Check the loops against the energy balance and the effects of adhesion."""
     for name, loop in data["loops"].items():
         # What the load did is stored or lost; the load's work is a sum over the steps, of second
         # order in them.

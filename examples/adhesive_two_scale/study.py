@@ -89,7 +89,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold what the thesis says of adhesion at the default and over the speed."""
+    """Check what the thesis says of adhesion at the default and over the speed."""
     sticky, bare = data["adhesive"], data["bare"]
     high, high_bare = data["adhesive_high"], data["bare_high"]
     # eq. 4.9 with the moduli of our compound: the numbers of the thesis, 0.9, 0.5 and 0.22

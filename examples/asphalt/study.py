@@ -137,7 +137,7 @@ def _sections(found: dict[str, Any]) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold the curves against what is claimed."""
+    """Check the curves against what is claimed."""
     friction, theory_ = data["friction_mean"], data["friction_persson"]
     area = data["contact_area_mean"]
     assert np.isfinite(friction).all(), "some point did not converge"

@@ -77,7 +77,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold the load against the relaxation function, and the area against what was wanted."""
+    """Check the load against the relaxation function, and the area against the wanted one."""
     assert data["area_error_rest"] < (0.1 if quick else 0.03)
     assert data["approach_change"] < (0.03 if quick else 0.01)
     assert abs(data["load_after_rest"] / data["exact_after_rest"] - 1) < 0.01

@@ -68,7 +68,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold radius, approach, pressure and displacement against the theory."""
+    """Check radius, approach, pressure and displacement against the theory."""
     cell, end = data["cell"], data["known_radius"][-1]
     # The area is a count of cells: half a cell at the edge of the contact.
     error = np.abs(data["radius"] - data["known_radius"]).max()

@@ -89,7 +89,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold the forces against Hunter and the thesis, and the tractions against the law."""
+    """Check the forces against Hunter and the thesis, and the tractions against the law."""
     for name, known in data["known"].items():
         end = data["end"][name]
         # 0.2 % of the whole force. The viscous part takes 1 %: 24 mm and its images take 0.6 %, the

@@ -31,7 +31,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold that speed raises friction, and that both waves of the road show in it."""
+    """Check that speed raises friction, and that both waves of the road show in it."""
     slow, fast = data["found"]["slow"], data["found"]["fast"]
     # Both rise; the loss factor at the two frequencies of the road rises, too.
     assert fast["maximum"] > slow["maximum"] + 0.015

@@ -89,7 +89,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold the counts of 'fast', their growth, and the areas that stick."""
+    """Check the counts of 'fast', their growth, and the areas that stick."""
     assert data["fast_converged"].all(), "fast: not converged"
     for method in ("fast", "thesis"):
         good = data[f"{method}_converged"]

@@ -45,7 +45,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold the series against the master curves, and the files against the script."""
+    """Check the series against the master curves, and the files against the script."""
     omega = data["omega"]
     middle = (omega >= 1.0) & (omega <= 1e10)
     # One arm a decade ripples around a smooth curve, the more the steeper the transition is.

@@ -86,7 +86,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold force, traction and stick radius against the theory, and its error against its order."""
+    """Check force, traction and stick radius against the theory, and the error of the theory."""
     cell = data["cell"]
     deviation = data["deviation"]
     # nu = 0: the theory is exact; the grid's error is 5e-5 at 48 cells; the sphere's motion over

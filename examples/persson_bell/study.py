@@ -104,7 +104,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold the curves against limits, and the runs against the theory."""
+    """Check the curves against limits, and the runs against the theory."""
     wide = data["wide"]
     for number, (friction, area) in enumerate(zip(wide["cuts"], wide["areas"], strict=True)):
         peak = int(friction.argmax())

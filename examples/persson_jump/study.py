@@ -165,7 +165,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold the runs against the theory, the books against each other, the drop against proof."""
+    """Check the runs against the theory, the energy balance, and the drop of the load."""
     for number, found in enumerate(data["by_speed"] + data["by_load"]):
         # The sum of energies stored and lost is the work, to round-off.
         assert found["open"] < 1e-9, f"case {number}: books open by {found['open']}"

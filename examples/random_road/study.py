@@ -85,7 +85,7 @@ def roughness(curve: dict[str, np.ndarray]) -> float:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold that the rough road's friction is lower and smoother, with the same trends."""
+    """Check that the rough road's friction is lower and smoother, with the same trends."""
     assert data["random_plateau"] < data["wavy_plateau"]
     assert data["random_maximum"] < data["wavy_maximum"]
     assert roughness(data["random_curve"]) < 0.7 * roughness(data["wavy_curve"])

@@ -41,7 +41,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold the thesis's statements on load."""
+    """Check the thesis's statements on load."""
     two, one = data["two"], data["one"]
     for found, scales in ((two, 2), (one, 1)):
         # "Steady-state friction first increases along with the normal load", "goes through a

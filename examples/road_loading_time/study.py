@@ -30,7 +30,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold the thesis's statements on loading time."""
+    """Check the thesis's statements on loading time."""
     # The maximum grows with the time; the plateau hardly depends on it (true steady sliding
     # would not; the interface slides one period of the long wave).
     rise = data["maximum"] - data["plateau"]

@@ -1,4 +1,4 @@
-"""The power spectral density of a road: what is asked for, and what a map has.
+"""The power spectral density of a road: the law, and maps that are generated from it.
 
 Self-affine maps of both generators, with and without roll-off, from the thesis's eq. 1.6, beside
 the law: power spectral density, that of a profile, statistics and the distribution of heights.
@@ -130,7 +130,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold the maps against the law."""
+    """Check the maps against the law."""
     for generator in GENERATORS:
         found = data[generator]
         assert abs(found["variance"] / RMS_HEIGHT**2 - 1) < 1e-9, "Parseval's sum is not <h2>"

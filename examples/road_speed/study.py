@@ -34,7 +34,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold that the maximum grows with speed, and how the plateau does."""
+    """Check that the maximum grows with speed, and how the plateau does."""
     # "mu_max keeps increasing with speed just as G' does with the frequency."
     assert (np.diff(data["maximum"]) > 0.0).all(), "the maximum does not grow with speed"
     assert (data["maximum"] - data["plateau"] > 2e-3).all()

@@ -35,7 +35,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold the area between the theories, and its growth below linear."""
+    """Check the area between the theories, and its growth below linear."""
     load, area = data["load"], data["area"]
     assert data["residual"] < 1e-6
     assert (np.diff(area) > 0).all()

@@ -111,7 +111,7 @@ def _change(one: dict[str, Any], other: dict[str, Any]) -> float:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold each temperature and scale against the change of times that it is."""
+    """Check each temperature and scale against the equivalent change of times."""
     # The same numbers but for rounding, and for what it makes of the iterations: see TOLERANCE.
     # Cells of contact are whole: none may differ.
     differs = max(*data["temperature_differs"], *data["scale_differs"])

@@ -49,7 +49,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold the jump against what Persson's theory says of it."""
+    """Check the jump against what Persson's theory says of it."""
     history, slow, fast = data["history"], data["slow"], data["fast"]
     # Friction shoots up within a few cells of sliding, then decays.
     assert data["rows_to_peak"] <= 4

@@ -113,7 +113,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold what is sick, what is cured, and that the cure does not change the answer."""
+    """Check which cases oscillate, and that the cures do not change the friction."""
     cases = data["cases"]
     sick = cases[SICK]
     # each step turns the speed round

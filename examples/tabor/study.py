@@ -55,7 +55,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold both potentials against the theory."""
+    """Check both potentials against the theory."""
     exact = data["theory"]
     # The area counts whole cells: at 96 per side, about 20 over the radius, that is 2 %; at 288
     # it is less than 1 %.

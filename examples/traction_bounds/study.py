@@ -161,7 +161,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold closed form against the thesis's equations, and the runs against the closed form."""
+    """Check closed form against the thesis's equations, and the runs against the closed form."""
     assert abs(data["along"][0] - data["along"][1]) < 1e-12, "not eq. 3.2"
     assert data["ellipse"] < 1e-12, "not on the ellipse of eq. 3.4"
     # The runs interpolate height and slope by cubics. With 18 and 32 cells in the short wave that

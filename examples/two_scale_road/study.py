@@ -35,7 +35,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Hold the stages of the start: stick, growing slip, maximum, oscillations."""
+    """Check the stages of the start: stick, growing slip, maximum, oscillations."""
     found = data["found"]
     after = data["time"] - road.LOADING
     driven = after > 1e-9
