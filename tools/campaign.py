@@ -252,7 +252,7 @@ def try_run(chance, folder):
     miss = np.abs((work - kept) - (work - kept)[0]).max()
     scale = max(np.abs(work).max(), np.abs(history["energy_elastic"]).max(), 1e-300)
     if miss > 1e-3 * scale:
-        raise Wrong(f"the books miss {miss / scale:.2g} of the work")
+        raise Wrong(f"the energy balance misses {miss / scale:.2g} of the work")
     return "ran"
 
 

@@ -71,7 +71,7 @@ def slow(speed: Any) -> Any:
 def fast(speed: Any) -> Any:
     """Return the friction at high speed.
 
-    The dashpot flows under the pressure of the glassy contact: mu V F = G0/eta p.A p with
+    The damper flows under the pressure of the glassy contact: mu V F = G0/eta p.A p with
     p.A p = 4/5 F delta of Hertz.
     """
     return 0.8 * RATIO * WIDTH / RADIUS / np.asarray(speed)

@@ -41,8 +41,8 @@ def read_file(path: Path, read: Callable[[h5py.File], T]) -> T:
             if "locking flag" in detail:  # the caller has the file open with h5py's defaults
                 options = {}
             reason = OSError(f"{path}: cannot be read: {detail}; if its run was killed,"
-                             " `asperity run CASE.nml --restart` goes on from the last checkpoint;"
-                             " otherwise run the case again")
+                             " `asperity run CASE.nml --restart` continues from the last"
+                             " checkpoint; otherwise run the case again")
         time.sleep(0.02 * (attempt + 1))
     raise reason from None
 

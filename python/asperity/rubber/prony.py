@@ -48,7 +48,7 @@ class FitErrors:
 
 
 class Prony:
-    """Generalised Maxwell solid in shear.
+    """A viscoelastic solid in shear: a spring parallel to arms (a generalised Maxwell solid).
 
     Parameters
     ----------

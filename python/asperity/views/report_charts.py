@@ -132,7 +132,8 @@ class _Charts:
         self.chart("energy", "energy", "Work, stored and lost", "Energy", "J", lines)
         missing = closure(self.run)
         if missing is not None and np.any(missing > 0.0):
-            self.chart("energy", "closure", "What the books miss", "Over the largest energy", "1",
+            self.chart("energy", "closure", "Error of the energy balance",
+                       "Over the largest energy", "1",
                        self.series("closure", "work minus stored minus lost", 0, "", missing),
                        log=True)
 
