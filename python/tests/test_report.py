@@ -306,7 +306,7 @@ def test_command(result, tmp_path, capsys):
     case = tmp_path / "case.nml"
     case.write_text("&grid /")
     assert main(["report", str(result), "-o", str(case)]) == 2
-    assert "case.nml: is no name of a page: must end in .html" in capsys.readouterr().err
+    assert "case.nml: the name of a page must end in .html" in capsys.readouterr().err
     assert case.read_text() == "&grid /"
     assert asperity.open(result).finished
 

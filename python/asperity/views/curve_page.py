@@ -1,4 +1,4 @@
-"""The page of a friction curve: one HTML file that needs nothing else, for any browser."""
+"""The page of a friction curve: one self-contained HTML file for any browser."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["curve_page", "write_curve_page"]
 
 SCRIPTS = ("save.js", "chart.js", "map.js", "curve.js")
-_BUDGET = 12e6          # characters of all maps together
+_BUDGET = 12e6          # characters that all maps may take together
 _SIDES = (192, 128, 96, 64, 48, 32)
 
 _NAMES = {"friction": "friction", "friction_viscous": "viscous", "friction_interface": "interface",
@@ -35,7 +35,7 @@ def write_curve_page(curve: FrictionCurve, path: str | Path) -> Path:
     Parameters
     ----------
     curve : FrictionCurve
-        What to show.
+        The curve to show.
     path : str or Path
         NAME.html.
 
@@ -48,7 +48,7 @@ def write_curve_page(curve: FrictionCurve, path: str | Path) -> Path:
     """
     target = Path(path)
     if target.suffix.lower() not in (".html", ".htm"):
-        raise ValueError(f"{target}: is no name of a page: must end in .html")
+        raise ValueError(f"{target}: the name of a page must end in .html")
     target.write_text(curve_page(curve), encoding="utf-8", newline="\n")
     return target
 
@@ -97,7 +97,7 @@ def _numbers(values: NDArray[Any]) -> Any:
 
 
 def _data(curve: FrictionCurve) -> dict[str, Any]:
-    """Return what the page draws."""
+    """Return the data of the charts and maps."""
     values: dict[str, Any] = {}
     for name in curve.values:
         mean, low, high = curve.mean(name)
@@ -105,7 +105,7 @@ def _data(curve: FrictionCurve) -> dict[str, Any]:
                    f"{name}_high": _numbers(high)}
     if not float(curve.settings.get("coefficient", 0.0)):
         for name in ("friction_viscous", "friction_interface"):
-            values.pop(name, None)  # the whole friction is viscous
+            values.pop(name, None)  # all friction is viscous
     values |= {name: _numbers(array) for name, array in curve.theory.items()}
     maps, grid = _maps(curve)
     return {
@@ -118,7 +118,7 @@ def _data(curve: FrictionCurve) -> dict[str, Any]:
 
 
 def _maps(curve: FrictionCurve) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the pressure of the points of the first patch, and the grid of the maps."""
+    """Return the pressure maps of the first patch, one per point, and their grid."""
     if not curve.sources:
         return {}, {}
     runs = {path: open_result(path) for path in {path for path, _ in curve.sources.values()}}
@@ -138,15 +138,15 @@ def _maps(curve: FrictionCurve) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def _curves_section() -> str:
-    """Return the charts and the choices above them."""
-    return ('<p class="soft">Mean over the patches with its 95 % interval; broken: Persson\'s'
-            " theory for the same roughness. Click on a point to see where it touches and where it"
-            ' loses energy.</p>\n<div class="choices" id="choices"></div>\n<div class="charts"'
-            ' id="curves"></div>')
+    """Return the charts and the controls above them."""
+    return ('<p class="soft">Mean over the patches with its 95 % interval. The dashed line is'
+            " Persson's theory for the same roughness. Click on a point to see where it touches and"
+            ' where it loses energy.</p>\n<div class="choices" id="choices"></div>\n'
+            '<div class="charts" id="curves"></div>')
 
 
 def _point_section(data: dict[str, Any]) -> str:
-    """Return the losses and the map of the chosen point."""
+    """Return the energy losses and the pressure map of the chosen point."""
     parts = ['<p>At <strong id="point"></strong>:</p>']
     if data["losses"]:
         parts.append('<div class="charts" id="losses"></div>')
@@ -156,7 +156,7 @@ def _point_section(data: dict[str, Any]) -> str:
 
 
 def _notes(curve: FrictionCurve) -> str:
-    """Return the notes."""
+    """Return the box of notes, empty without notes."""
     if not curve.notes:
         return ""
     lines = "".join(f"<li>{escape(note)}</li>" for note in curve.notes)
@@ -175,19 +175,19 @@ def _table(curve: FrictionCurve) -> str:
 
 
 def _cell(value: float) -> str:
-    """Return a number of the table."""
+    """Return a number as a cell of the table."""
     return f"{value:.4g}".replace("-", "−") if math.isfinite(value) else "–"
 
 
 def _settings(curve: FrictionCurve) -> str:
-    """Return how the curve was made."""
+    """Return the settings of the curve and the list of its patches."""
     rows = "".join(f"<tr><th>{escape(name.replace('_', ' '))}</th><td>{escape(value)}</td></tr>"
                    for name, value in curve.settings_text().items())
     patches = "".join(f"<li>{escape(label)}</li>" for label in curve.patches)
     left = np.asarray(curve.theory["friction_left_out"])
     more = ""
     if np.any(left > 1e-4):
-        more = (f"<p>By Persson's theory, the waves that are left out would add up to"
-                f" {float(left.max()):.3g} to the friction.</p>")
+        more = (f"<p>Persson's theory predicts that the waves left out of the road add at"
+                f" most {float(left.max()):.3g} to the friction.</p>")
     return (f'<div class="wide"><table>{rows}</table></div>{more}<details><summary>Patches'
             f"</summary><ol>{patches}</ol></details>")

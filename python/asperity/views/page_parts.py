@@ -1,4 +1,4 @@
-"""What the pages share: the files they are made of, data in them, colours."""
+"""Parts that all pages share: the files of a page, its data as JSON, and its colours."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ PAGE = Path(__file__).with_name("page")
 
 
 def fill_page(parts: Mapping[str, str]) -> str:
-    """Return the page with its parts put in.
+    """Return the page with its parts filled in.
 
-    In one pass: what is put in is not looked through again.
+    One pass fills in all parts, so that text inside a part is never taken for a placeholder.
     """
     return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], page_file("report.html"))
 
@@ -29,7 +29,7 @@ def page_file(name: str) -> str:
 
 
 def page_json(data: dict[str, Any]) -> str:
-    """Return data as JSON that cannot end the element it stands in."""
+    """Return data as JSON without `<`, which could end the surrounding script element."""
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c")
 

@@ -63,7 +63,7 @@ def write_report(run: Run, path: str | os.PathLike[str] | None = None) -> Path:
     if target.suffix.lower() in (".h5", ".hdf5"):
         raise ValueError(f"{target}: the page would overwrite a result: name a file .html")
     if target.suffix.lower() not in (".html", ".htm") and not target.is_dir():
-        raise ValueError(f"{target}: is no name of a page: must end in .html")
+        raise ValueError(f"{target}: the name of a page must end in .html")
     text = report_page(run)
     target.write_text(text, encoding="utf-8", newline="\n")
     return target

@@ -1,6 +1,6 @@
 """A live view of a run in the terminal: friction and contact area as lines of text.
 
-The result is opened anew for each look, as `asperity.open` does: that is how later rows are seen.
+The view opens the result again for each update, as `asperity.open` does, and so sees the new rows.
 """
 
 from __future__ import annotations
@@ -41,11 +41,16 @@ def sparkline(values: ArrayLike, width: int = 40, bars: str = BARS) -> str:
     Parameters
     ----------
     values : array_like
-        Shape (n,); nan is left blank. More than `width` values are averaged.
+        Values, shape (n,). A nan is left blank. More than `width` values are averaged in groups.
     width : int
-        Most letters.
+        Largest number of characters.
     bars : str
-        Letters from low to high.
+        Characters from low to high.
+
+    Returns
+    -------
+    str
+        One character per value or per group, at most `width`.
 
     Examples
     --------
@@ -74,12 +79,12 @@ def sparkline(values: ArrayLike, width: int = 40, bars: str = BARS) -> str:
 
 
 class Pace:
-    """How fast rows are written, from the looks at the file.
+    """Estimate of how fast a run writes rows, from repeated readings of its file.
 
     Parameters
     ----------
     memory : float
-        Seconds that are looked back.
+        Readings older than this many seconds are dropped.
     """
 
     def __init__(self, memory: float = 60.0) -> None:
@@ -87,11 +92,11 @@ class Pace:
         self.looks: list[tuple[float, int]] = []
 
     def look(self, now: float, rows: int) -> None:
-        """Note a number of rows at a time in seconds; fewer than before start anew."""
+        """Add the number of rows at a time in seconds; start again if it fell."""
         if self.looks and rows < self.looks[-1][1]:
             self.looks.clear()
         self.looks.append((now, rows))
-        # Of looks that saw nothing new the first and the last are enough.
+        # Of the readings without a new row, the first and the last are enough.
         if len(self.looks) > 2 and self.looks[-3][1] == self.looks[-2][1] == rows:
             self.looks.pop(-2)
         while len(self.looks) > 2 and now - self.looks[1][0] > self.memory:
@@ -99,19 +104,19 @@ class Pace:
 
     @property
     def still(self) -> float:
-        """Seconds since the number of rows was seen to change."""
+        """Seconds since the number of rows last changed."""
         last, rows = self.looks[-1]
         return last - min(when for when, count in self.looks if count == rows)
 
     @property
     def rate(self) -> float | None:
-        """Rows a second; None while it is not known."""
+        """Rows per second; None as long as it is unknown."""
         (first, start), (last, rows) = self.looks[0], self.looks[-1]
         return (rows - start) / (last - first) if last > first and rows > start else None
 
 
 def state_of(run: Run, pace: Pace) -> str:
-    """Return how far a run is, in words."""
+    """Return the progress of a run in words."""
     rows, expected = run.history.rows, int(run.attributes.get("expected_rows", 0) or 0)
     of = f" of {expected}" if expected else ""
     words = [f"finished, {rows}{of} rows" if run.finished else rows_of(run)]
@@ -178,19 +183,19 @@ def picture(run: Run, pace: Pace, width: int, unicode: bool = True) -> list[str]
 
 def watch(path: str | os.PathLike[str], *, every: float = 1.0, once: bool = False,
           stream: TextIO | None = None) -> int:
-    """Follow a run until it has ended: is finished, was stopped, or did not converge.
+    """Follow a run until it ends: it finishes, is stopped, or fails to converge.
 
     Parameters
     ----------
     path : str or path
         The result, RESULT.h5.
     every : float
-        Seconds between two looks.
+        Seconds between two updates.
     once : bool
-        Show what there is and return.
+        Show the present state and return.
     stream : text file, optional
-        Where to write; stdout if left out. A terminal gets a view that is drawn over itself, any
-        other stream a plain line for each change.
+        Where to write; stdout by default. On a terminal the view is redrawn in place; any other
+        stream receives a plain line for each change.
 
     Returns
     -------
@@ -233,12 +238,12 @@ def watch(path: str | os.PathLike[str], *, every: float = 1.0, once: bool = Fals
             time.sleep(every)
             run.refresh()
     except KeyboardInterrupt:
-        # The view ends; the run, another process, goes on.
+        # Only the view ends. The run is another process and continues.
         out.write("\n" if live else "")
         out.flush()
         return 130
     except BrokenPipeError:
-        # The reader, such as `head`, has had enough; nothing more can be written at exit, either.
+        # The reader, such as `head`, has closed the pipe, so nothing may be written at exit either.
         if stream is None:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
@@ -268,11 +273,11 @@ def _ascii(text: str) -> str:
 
 
 def _news(run: Run) -> tuple[Any, ...]:
-    """Return what a plain line tells: another one is due when it changes."""
+    """Return the content of a plain line; a new line is written when it changes."""
     return run.history.rows, run.finished, run.outcome, seems_dead(run)
 
 
 def _over(out: TextIO, before: list[str], lines: list[str]) -> None:
-    """Draw lines over those drawn before."""
+    """Redraw the view in place of the lines drawn before."""
     up = f"\x1b[{len(before)}A" if before else ""
     out.write(up + "".join(f"\r\x1b[2K{line}\n" for line in lines) + "\x1b[J")
