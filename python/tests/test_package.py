@@ -47,6 +47,21 @@ def test_what_an_installation_holds(root):
     assert any("asperity/_core." in name for name in files)
 
 
+def test_headers_of_our_numpy_come_before_those_of_the_system(root, tmp_path):
+    """Debian keeps headers of its own NumPy in the folder of Python's headers.
+
+    With them the extension was compiled for another NumPy than it runs with, and failed on import.
+    """
+    subprocess.run(["meson", "setup", str(tmp_path), "-Dpython=true", "-Dapp=false",
+                    "-Dlibrary=false"], cwd=root, check=True, capture_output=True)
+    commands = json.loads((tmp_path / "compile_commands.json").read_text())
+    words = next(one["command"] for one in commands if one["file"].endswith("fortranobject.c"))
+    folders = [word[2:] for word in words.split() if word.startswith("-I")]
+    of_numpy = next(k for k, name in enumerate(folders) if name.endswith("numpy/_core/include"))
+    of_python = next(k for k, name in enumerate(folders) if re.search(r"python3\.\d+$", name))
+    assert of_numpy < of_python
+
+
 def test_public_names_are_documented():
     for name in asperity.__all__:
         thing = getattr(asperity, name)
