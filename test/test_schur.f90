@@ -33,6 +33,12 @@ contains
          call preconditioner_is_the_schur_complement(boundary_free, 19, 21, 1.0_dp)
       end if
       if (selected('iterations_stay_few_at_every_load')) call iterations_stay_few_at_every_load()
+      if (selected('oblong_cells_take_few_iterations')) then
+         call oblong_cells_take_few_iterations(96, 90, 8.0_dp, 24)
+         call oblong_cells_take_few_iterations(90, 96, 1.0_dp/8.0_dp, 24)
+         call oblong_cells_take_few_iterations(90, 96, 14.0_dp, 32)
+         call oblong_cells_take_few_iterations(96, 90, 40.0_dp, 110)
+      end if
    end subroutine run_schur
 
    !> M r is the Schur complement of the model, which is a dense matrix on a small grid.
@@ -162,5 +168,23 @@ contains
          call check_order(solution%outcome%iterations, '<=', 13, 'few iterations at every load')
       end do
    end subroutine iterations_stay_few_at_every_load
+
+   !> Oblong cells: the stencil fits them, and the residual is extended where that helps.
+   subroutine oblong_cells_take_few_iterations(nx, ny, aspect, most)
+      integer, intent(in) :: nx, ny
+      real(dp), intent(in) :: aspect                 !! dy/dx
+      integer, intent(in) :: most
+      type(grid_type) :: grid, square
+      type(normal_problem_type) :: problem
+      type(solution_type) :: solution
+      real(dp), allocatable :: h(:, :)
+
+      square = new_grid(nx, ny, 1.0_dp, real(ny, dp)/nx, boundary_periodic)
+      grid = new_grid(nx, ny, 1.0_dp, aspect*ny/nx, boundary_periodic)
+      call rough_problem(square, 8.0_dp, 0.05_dp, problem, h)
+      call run_problem(grid, problem, h, solution)
+      call check_that(solution%outcome%converged, solution%outcome%reason)
+      call check_order(solution%outcome%iterations, '<=', most, 'few iterations on oblong cells')
+   end subroutine oblong_cells_take_few_iterations
 
 end module test_schur

@@ -14,6 +14,7 @@ module test_surface
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use roughness, only : height_psd, height_statistics, roughness_type
    use asperity_surface, only : check_terms, new_height
+   use scale_warnings, only : oblong_warning, steepness_warning
    use surface_warnings, only : find_warnings, warning_length
    use surface_settings, only : default_surface, real_variable, surface_settings_type
    use surface_shapes, only : all_shapes, shape_type
@@ -42,6 +43,7 @@ contains
       if (selected('long_maps_are_read_in_slabs')) call long_maps_are_read_in_slabs()
       if (selected('warnings_name_what_is_doubtful')) call warnings_name_what_is_doubtful()
       if (selected('map_that_contradicts_the_case')) call map_that_contradicts_the_case()
+      if (selected('lengths_that_do_not_fit_together')) call lengths_that_do_not_fit_together()
    end subroutine run_surface
 
    !> The generator is SplitMix64: the first outputs from state 0 and 1234567 are known.
@@ -620,5 +622,40 @@ contains
       call find_warnings(grid, [term], warnings)
       call check_that(size(warnings) == 0, 'a missing file is an error elsewhere')
    end subroutine map_that_contradicts_the_case
+
+   !> Very oblong cells and very steep waves are doubtful: a length may be in another unit.
+   subroutine lengths_that_do_not_fit_together()
+      type(grid_type) :: grid
+      type(surface_settings_type) :: term
+      character(:), allocatable :: text
+
+      grid = new_grid(20, 30, 2e-3_dp, 2e-3_dp*1.5_dp*99.0_dp, boundary_periodic)
+      call check_that(oblong_warning(grid) == '', 'cells 99 times as long as wide: no warning')
+      grid = new_grid(20, 30, 2e-3_dp*150.0_dp, 3e-3_dp, boundary_free)
+      text = oblong_warning(grid)
+      call check_that(index(text, 'cells of 1.500E-02 m by 1.000E-04 m') > 0 .and. &
+         index(text, '1.50E+02') > 0, 'cells 150 times as long as wide: '//text)
+      grid = new_grid(20, 1, 2e-3_dp, 1.0_dp, boundary_periodic)
+      call check_that(oblong_warning(grid) == '', 'a line has no width')
+
+      term = default_surface(grid)
+      term%shape = 'sine'
+      term%wavelength = 1e-3_dp
+      term%amplitude = 4e-4_dp
+      call check_that(steepness_warning(term) == '', 'a steep wave, without a warning')
+      term%amplitude = -4e-1_dp
+      text = steepness_warning(term)
+      call check_that(index(text, '2.51E+03') > 0, 'an amplitude in another unit: '//text)
+      term%shape = 'self_affine'
+      term%wavelength_long = 1e-3_dp
+      term%rms_height = 1.0_dp
+      text = steepness_warning(term)
+      call check_that(index(text, '6.28E+03') > 0, 'an rms height in another unit: '//text)
+      term%rms_height = 0.0_dp
+      term%rms_slope = 2.9_dp
+      call check_that(steepness_warning(term) == '', 'a steep road, without a warning')
+      term%shape = 'sphere'
+      call check_that(steepness_warning(term) == '', 'a sphere has no waves')
+   end subroutine lengths_that_do_not_fit_together
 
 end module test_surface

@@ -4,6 +4,7 @@ python tools/campaign_contact.py normal 200000      grids of up to 256 cells, al
 python tools/campaign_contact.py extreme 2000       tiny loads, displacements beyond full contact
 python tools/campaign_contact.py sizes              errors of rough contacts of few cells
 python tools/campaign_contact.py hertz              errors of single contacts of few cells
+python tools/campaign_contact.py oblong             iterations with cells longer than wide
 """
 
 import argparse
@@ -180,11 +181,25 @@ def sizes():
                   f" {100 * (areas[n] / areas[512] - 1):+.1f} % of that of 512 x 512 cells")
 
 
+def oblong():
+    """Print the iterations of a rough contact whose cells become longer and longer."""
+    height = asperity.surface.self_affine(128, lx=1.0, wavelength_short=1 / 16, rms_slope=1.0)
+    for ratio in (1, 2, 4, 10, 16, 30, 100, 300, 1000):
+        counts = []
+        for pressure in (0.01, 0.1, 0.3):
+            try:
+                found = asperity.solve_normal(height, 1.0, float(ratio), 1.0, pressure=pressure)
+                counts.append(f"{found.iterations}")
+            except asperity.NotConverged:
+                counts.append("not converged")
+        print(f"cells {ratio} times as long as wide: iterations {', '.join(counts)}")
+
+
 def main():
     """Run the chosen campaign."""
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["normal", "extreme", "sizes", "hertz"])
+    parser.add_argument("what", choices=["normal", "extreme", "sizes", "hertz", "oblong"])
     parser.add_argument("count", nargs="?", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
@@ -194,6 +209,8 @@ def main():
         sizes()
     elif given.what == "hertz":
         hertz(rng, given.count)
+    elif given.what == "oblong":
+        oblong()
     elif given.what == "normal":
         campaign((normal_problem(rng) for _ in range(given.count)), asperity.solve_normal)
     else:

@@ -18,8 +18,11 @@
 !> block (module schur_blocks). What the last step adds to b is left to the caller:
 !>     M r = image + length response + pending.
 !>
-!> On small grids the extension saves no time, and on flat cells the stencil is too poor a model for it:
-!> there M r = B_SS r.
+!> The weights of the stencil are as one over the sides of a cell, like |q| itself. With one over their
+!> squares, as of a Laplacian, they would be far too large along the short side of oblong cells.
+!>
+!> On small grids of nearly square cells the extension saves no time, and on very oblong cells the
+!> stencil is too poor a model for it: there M r = B_SS r. In between it halves the iterations.
 !>
 !> Fields are in single precision: errors of 1e-7 do not matter in a preconditioner. N is restricted to a
 !> rim around the contact (the wide blocks of module active_blocks). Memory: four such fields, of which two may be
@@ -45,8 +48,10 @@ module schur_preconditioner
 
    real(dp), parameter :: c0_extended = 0.7_dp !! of the stencil
    real(dp), parameter :: c0_plain = 1.0_dp    !! the same without an extension
-   real(dp), parameter :: least_cells = 131072.0_dp   !! cells from which the extension saves time
-   real(dp), parameter :: largest_aspect = 2.0_dp     !! of a cell: beyond it the stencil fits |q| too badly
+   real(dp), parameter :: least_cells = 131072.0_dp   !! cells from which the extension saves time ...
+   real(dp), parameter :: least_oblong = 4096.0_dp    !! ... if they are oblong
+   real(dp), parameter :: oblong = 2.0_dp             !! aspect of an oblong cell
+   real(dp), parameter :: largest_aspect = 16.0_dp    !! beyond it the stencil fits |q| too badly
    real(dp), parameter :: solved = 1e-8_dp     !! reduction of the residual on N that is enough
 
    !> The preconditioner with its fields. Not to be copied.
@@ -90,17 +95,18 @@ contains
       logical, intent(in), optional :: extends           !! chosen by the grid if absent
       type(c_ptr), intent(in), optional :: memory
       real(sp), pointer, contiguous :: pair(:, :, :)
-      real(dp) :: wx, wy, c0
+      real(dp) :: wx, wy, c0, aspect
 
       self%grid = grid
       call new_rim_halo(self%rim, grid)
       self%threads = threads
-      self%extends = min(grid%nx, grid%ny) > 1 .and. grid%cells() >= least_cells &
-         .and. max(grid%dx/grid%dy, grid%dy/grid%dx) <= largest_aspect
+      aspect = max(grid%dx/grid%dy, grid%dy/grid%dx)
+      self%extends = min(grid%nx, grid%ny) > 1 .and. aspect <= largest_aspect &
+         .and. grid%cells() >= merge(least_oblong, least_cells, aspect > oblong)
       if (present(extends)) self%extends = extends
       c0 = merge(c0_extended, c0_plain, self%extends)
-      wx = merge(0.0_dp, stencil_c1*(coarse%h/grid%dx)**2, grid%nx == 1)
-      wy = merge(0.0_dp, stencil_c1*(coarse%h/grid%dy)**2, grid%ny == 1)
+      wx = merge(0.0_dp, stencil_c1*coarse%h/grid%dx, grid%nx == 1)
+      wy = merge(0.0_dp, stencil_c1*coarse%h/grid%dy, grid%ny == 1)
       self%weights = real([c0 + 2.0_dp*(wx + wy), wx, wy], sp)
       allocate (self%residual(0:grid%nx + 1, 0:grid%rows() + 1), source=0.0_sp)
       allocate (self%search(0:grid%nx + 1, 0:grid%rows() + 1), source=0.0_sp)

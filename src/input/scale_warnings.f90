@@ -1,0 +1,61 @@
+!> Warnings about lengths that do not fit together, as where a value is given in another unit: very
+!> oblong cells and very steep roads.
+module scale_warnings
+   use asperity_precision, only : dp, pi
+   use regular_grid, only : grid_type
+   use surface_settings, only : surface_settings_type
+   use surface_shapes, only : find_shape, shape_type
+   implicit none
+   private
+
+   public :: oblong_warning, steepness_warning
+
+   real(dp), parameter :: largest_aspect = 100.0_dp   !! of a cell: beyond it the normal solver needs many iterations
+   real(dp), parameter :: largest_slope = 3.0_dp      !! far beyond what a theory for small slopes describes
+
+contains
+
+   !> A warning if the cells are so oblong that contacts may not converge. Empty if all is well.
+   pure function oblong_warning(grid) result(text)
+      type(grid_type), intent(in) :: grid
+      character(:), allocatable :: text
+      character(300) :: line
+      real(dp) :: aspect
+
+      text = ''
+      if (min(grid%nx, grid%ny) == 1) return
+      aspect = max(grid%dx/grid%dy, grid%dy/grid%dx)
+      if (aspect <= largest_aspect) return
+      write (line, '(2(a, es9.3), a, es8.2, a)') '&grid: cells of ', grid%dx, ' m by ', grid%dy, &
+         ' m have sides whose ratio is ', aspect, ': above 100 the contact takes hundreds of iterations or '// &
+         'does not converge; check lx and ly, or choose nx and ny so that the cells are nearly square'
+      text = trim(line)
+   end function oblong_warning
+
+   !> A warning if the slope of a surface is far from small. Empty if all is well. Of a random surface
+   !> whose height is given this is the slope of its longest waves, the least that it can be.
+   pure function steepness_warning(term) result(text)
+      type(surface_settings_type), intent(in) :: term  !! checked
+      character(:), allocatable :: text
+      character(300) :: line
+      type(shape_type) :: shape
+      real(dp) :: slope
+
+      text = ''
+      shape = find_shape(term%shape)
+      if (term%shape == 'self_affine') then
+         slope = term%rms_slope
+         if (term%rms_height > 0.0_dp) slope = 2.0_dp*pi*term%rms_height/term%wavelength_long
+      else if (shape%shortest_wave > 0.0_dp) then
+         slope = 2.0_dp*pi*abs(term%amplitude)/term%wavelength
+      else
+         return
+      end if
+      if (slope <= largest_slope) return
+      write (line, '(a, es8.2, a)') '&surface: the slope of '''//trim(term%shape)//''' is about ', slope, &
+         ', but the solid is linear and its surface flat, which holds for small slopes only: check the '// &
+         'units of its heights and wavelengths'
+      text = trim(line)
+   end function steepness_warning
+
+end module scale_warnings
