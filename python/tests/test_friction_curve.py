@@ -394,9 +394,13 @@ def test_what_left_out_waves_add(curve):
 def test_picture(curve, tmp_path):
     figure = curve.plot()
     labels = [panel.get_ylabel() for panel in figure.axes]
-    assert labels == ["Friction coefficient", "Viscous friction coefficient",
-                      "Contact area fraction"]
+    assert labels == ["friction coefficient", "viscous friction coefficient",
+                      "contact area fraction"]
+    # The legend stands beside the panels, where it hides nothing.
+    assert not any(panel.get_legend() for panel in figure.axes)
     figure.savefig(tmp_path / "curve.png")
+    legend = figure.legends[0].get_window_extent()
+    assert not any(panel.get_window_extent().overlaps(legend) for panel in figure.axes)
     assert (tmp_path / "curve.png").stat().st_size > 20000
 
 
@@ -441,6 +445,14 @@ def test_page_in_a_browser(curve, tmp_path):
             browser.window(*size, touch=size[0] < 500)
             wide = browser.run("return document.documentElement.scrollWidth")
             assert wide <= size[0] + 1
+            # A number is on one line: a narrow table is moved sideways, not broken within words.
+            lines = browser.run("return [...document.querySelectorAll('table.points tr')].map((row)"
+                                " => row.getBoundingClientRect().height)")
+            assert len(lines) == 13 and max(lines) < 40
+            areas = browser.run("return [...document.querySelectorAll('#curves figure')].map("
+                                "(figure) => [...figure.querySelectorAll('text[text-anchor=end]')]"
+                                ".map((text) => text.textContent))")
+            assert min(len(texts) for texts in areas) >= 2, areas
 
 
 # ---- from files ------------------------------------------------------------------------------

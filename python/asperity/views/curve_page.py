@@ -170,8 +170,8 @@ def _table(curve: FrictionCurve) -> str:
     top = "".join(f"<th>{head}</th>" for head in heads)
     body = "".join("<tr>" + "".join(f"<td>{_cell(value)}</td>" for value in row) + "</tr>"
                    for row in curve.rows())
-    return (f'<div class="wide"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody>'
-            "</table></div>")
+    return (f'<div class="wide"><table class="points"><thead><tr>{top}</tr></thead>'
+            f"<tbody>{body}</tbody></table></div>")
 
 
 def _cell(value: float) -> str:

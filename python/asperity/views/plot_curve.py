@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from .style import COLOURS, DOUBLE_COLUMN, print_style, si_scale
 
@@ -37,9 +38,9 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
     order = ("pressure", "temperature", "speed")
     place = order.index(along)
     with print_style():
-        panels = [("friction", "", "Friction coefficient"),
-                  ("friction_viscous", "friction_persson", "Viscous friction coefficient"),
-                  ("contact_area", "area_persson", "Contact area fraction")]
+        panels = [("friction", "", "friction coefficient"),
+                  ("friction_viscous", "friction_persson", "viscous friction coefficient"),
+                  ("contact_area", "area_persson", "contact area fraction")]
         if not float(curve.settings.get("coefficient", 0.0)):
             panels = panels[1:]  # without friction in the interface all of it is viscous
         figure, places = plt.subplots(1, len(panels), figsize=(DOUBLE_COLUMN, 2.8),
@@ -61,15 +62,20 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
         for panel, (_, _, text) in zip(places, panels, strict=True):
             if along != "temperature":
                 panel.set_xscale("log")
-            panel.set_xlabel({"speed": "Speed (m/s)", "pressure": "Pressure (Pa)",
-                              "temperature": "Temperature (°C)"}[along])
+            panel.set_xlabel({"speed": "speed (m/s)", "pressure": "pressure (Pa)",
+                              "temperature": "temperature (°C)"}[along])
             panel.set_ylabel(text)
             panel.grid(alpha=0.3)
         for panel in places[:-1]:
             panel.set_ylim(bottom=min(0.0, panel.get_ylim()[0]))
         places[-1].set_yscale("log")
+        places[-1].yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        places[-1].yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        places[-1].yaxis.set_minor_formatter(NullFormatter())
         places[0].plot([], [], "k--", linewidth=0.9, label="Persson's theory")
-        places[0].legend(frameon=True, framealpha=0.8, edgecolor="none")
+        # Beside the panels: the intervals may fill them.
+        figure.legend(*places[0].get_legend_handles_labels(), loc="outside lower center",
+                      frameon=False, ncols=4)
         figure.suptitle(str(curve.settings.get("title", "")), parse_math=False)
     return figure
 

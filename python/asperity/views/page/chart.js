@@ -43,11 +43,23 @@ function ticks(low, high, count) {
   return found;
 }
 
-/** Powers of ten between two logarithms, thinned to about `count`. */
+/**
+ * Logarithms of round values between two logarithms: powers of ten, thinned to about `count`, or over less
+ * than two decades 1, 2 and 5 times powers of ten. A single power would not tell the scale.
+ */
 function powers(low, high, count) {
   const found = [];
   const step = Math.max(1, Math.ceil((high - low) / Math.max(count, 1)));
   for (let i = Math.ceil(low - 1e-9); i <= high + 1e-9; i += step) found.push(i);
+  if (found.length > 2) return found;
+  const between = [];
+  for (let i = Math.floor(low); i <= high; i++) {
+    for (const factor of [1, 2, 5]) {
+      const place = factor === 1 ? i : i + Math.log10(factor);
+      if (place >= low - 1e-9 && place <= high + 1e-9) between.push(place);
+    }
+  }
+  if (between.length > 1 && between.length <= Math.max(count, 2) + 2) return between;
   return found.length > 1 ? found : ticks(low, high, 3);
 }
 

@@ -122,7 +122,7 @@ function lossCharts() {
       const values = data.losses[name][chosen.pressure][chosen.temperature][chosen.speed];
       const series = [{label: title, colour: name === "loss_arm" ? 1 : 0, dash: "", x, y: values}];
       if (made[name]) { made[name].update(series); continue; }
-      made[name] = new Chart(parent, {title, label: "Loss", unit: "W/m2", logX: true, zero: true,
+      made[name] = new Chart(parent, {title, label: "Loss", unit: "W/m²", logX: true, zero: true,
         xLabel: label, xUnit: unit, series});
     }
   };
