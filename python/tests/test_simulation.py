@@ -258,3 +258,23 @@ def test_a_callback_sees_each_row_and_may_end_the_run(tmp_path):
 
     with pytest.raises(AttributeError, match=r"Use asperity\.Simulation"):
         asperity.run(text, output=tmp_path / "steered.h5", callback=steer)
+
+
+def test_what_is_set_must_exist_and_be_a_number():
+    """A misspelt load would be ignored without a word."""
+    sim = asperity.Simulation(BASE + SLIDE)
+    for name, near in (("presure", "'pressure'"), ("velocity_x", "'velocity'")):
+        with pytest.raises(AttributeError, match=f"named '{name}': did you mean {near}"):
+            setattr(sim, name, 1e5)
+    for name in ("pressure", "force", "displacement", "temperature", "velocity"):
+        with pytest.raises(ValueError, match=rf"^{name} = 'much': must be"):
+            setattr(sim, name, "much")
+    with pytest.raises(ValueError, match=r"^velocity = nan: must be"):
+        sim.velocity = (np.nan, 0.0)
+
+    class Controlled(asperity.Simulation):
+        target: float
+
+    controlled = Controlled(BASE + SLIDE)
+    controlled.target = 0.3
+    assert controlled.target == 0.3

@@ -117,8 +117,17 @@ def run(
         # A result outlives this process, so height maps that are arrays are copied beside it.
         case = case.kept_in((Path(output) if output else case.result).parent)
     path, text = namelists.source(case)
-    handle, rows, first, result, notes = _open(os.fsencode(path), namelists.encode(text), target,
-                                               threads or 0, int(restart), int(overwrite))
+    try:
+        handle, rows, first, result, notes = _open(os.fsencode(path), namelists.encode(text),
+                                                   target, threads or 0, int(restart),
+                                                   int(overwrite))
+    except OSError as error:
+        # The library names the options of the command.
+        message = str(error)
+        for option, argument in (("--restart", "restart=True"), ("--overwrite", "overwrite=True"),
+                                 ("--output", "output")):
+            message = message.replace(option, argument)
+        raise OSError(message) from None
     failure: NotConverged | None = None
     view: RunView | None = None
     stops = _Stops()

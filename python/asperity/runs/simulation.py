@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base import library
-from ..base.check import whole
+from ..base.check import number, whole
 from ..base.errors import NotConverged
 from ..base.names import NamedFields, UnknownNameError, unknown_name
 from ..results.field_types import NORMAL_FIELDS, TANGENTIAL_FIELDS
@@ -230,13 +230,23 @@ class Simulation:
 
     # --- steering ---------------------------------------------------------------------------
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Set an attribute that exists: a misspelt load would otherwise be ignored silently."""
+        known = hasattr(type(self), name) or any(
+            name in vars(kind).get("__annotations__", {}) for kind in type(self).__mro__)
+        if not (known or name.startswith("_")):
+            raise AttributeError(unknown_name("quantity that can be set", name,
+                                              (*_LOADS, "velocity", "temperature")))
+        super().__setattr__(name, value)
+
     def _set(self, what: str, first: float, second: float = 0.0) -> None:
         """Change a value for the next rows, and record it for a saved state."""
-        _steer(self._handle, what, float(first), float(second))
+        pair = [number(what, first), number(what, second)]
+        _steer(self._handle, what, *pair)
         if what in _LOADS:
             for other in _LOADS:
                 self._steered.pop(other, None)
-        self._steered[what] = [float(first), float(second)]
+        self._steered[what] = pair
 
     @property
     def pressure(self) -> float:
@@ -273,7 +283,10 @@ class Simulation:
 
     @velocity.setter
     def velocity(self, value: tuple[float, float]) -> None:
-        pair = np.asarray(value, dtype=float)
+        try:
+            pair = np.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            pair = np.empty(0)
         if pair.shape != (2,):
             raise ValueError(f"velocity = {value!r}: must be two numbers, along x and y, in m/s")
         self._set("velocity", pair[0], pair[1])
