@@ -58,6 +58,8 @@ Version: $version
 Libs: -L\${prefix}/lib -lhdf5
 Cflags: -I\${prefix}/include
 END
+  # Where Debian's HDF5 is installed, too, the build of Asperity looks for its name first.
+  cp "$prefix/lib/pkgconfig/hdf5.pc" "$prefix/lib/pkgconfig/hdf5-serial.pc"
 }
 
 build_fftw() {

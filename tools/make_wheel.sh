@@ -1,13 +1,22 @@
 #!/bin/sh
 # Build the source archive and, from it, a wheel that carries its shared libraries: build/dist.
 # About two minutes. On Linux only; the wheel runs where the C library is as new as here.
+# The libraries are those of the system, or of tools/build_libraries.sh PREFIX where ASPERITY_LIBRARIES=PREFIX.
 set -eu
+caller=$PWD
 cd "$(dirname "$0")/.."
 . tools/setup.sh
 if ! [ .venv/ready_wheel -nt tools/requirements_wheel.txt ] || ! [ .venv/ready_wheel -nt .venv/ready ]; then
   echo "asperity: installing the tools that build wheels into .venv" >&2
   python -m pip install -q --disable-pip-version-check -r tools/requirements_wheel.txt
   touch .venv/ready_wheel
+fi
+
+if [ -n "${ASPERITY_LIBRARIES:-}" ]; then
+  ASPERITY_LIBRARIES=$(cd "$caller" && cd "$ASPERITY_LIBRARIES" && pwd)
+  PKG_CONFIG_PATH=$ASPERITY_LIBRARIES/lib/pkgconfig${PKG_CONFIG_PATH:+:$PKG_CONFIG_PATH}
+  LD_LIBRARY_PATH=$ASPERITY_LIBRARIES/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
+  export ASPERITY_LIBRARIES PKG_CONFIG_PATH LD_LIBRARY_PATH
 fi
 
 rm -rf build/dist build/plain
