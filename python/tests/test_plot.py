@@ -1,5 +1,6 @@
 """Pictures: what they show, and that they are written."""
 
+import errno
 import subprocess
 import sys
 
@@ -429,3 +430,16 @@ def test_a_film_has_a_frame_for_each_snapshot(road, tmp_path, monkeypatch, capsy
         assert np.abs(np.asarray(picture.convert("L"), dtype=float) - first).max() > 50
     assert main(["plot", str(road / "road.h5"), "--film", "pressure", "-o", "x.png"]) == 2
     assert "must be .gif or .mp4" in capsys.readouterr().err
+
+
+def test_a_full_disk_is_told_with_the_name_of_the_picture(tmp_path, monkeypatch, capsys):
+    from matplotlib.figure import Figure
+
+    def full(figure, path, **options):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    frictional_result(tmp_path / "road.h5")
+    monkeypatch.setattr(Figure, "savefig", full)
+    assert main(["plot", str(tmp_path / "road.h5")]) == 3
+    told = f"asperity: {tmp_path / 'road.png'}: No space left on device\n"
+    assert capsys.readouterr().err == told

@@ -131,7 +131,10 @@ def test_whether_a_run_goes_on_is_seen_from_its_lock(program: str, stuck: Path,
     assert asperity.open(result).state.endswith("its process has ended")
     lines = io.StringIO()
     watch(result, once=True, stream=lines)
-    assert "its process has ended (--restart goes on" in lines.getvalue()
+    assert "ended (there is no checkpoint: --overwrite starts again)" in lines.getvalue()
+    result.with_suffix(".checkpoint.h5").touch()
+    watch(result, once=True, stream=lines)
+    assert "its process has ended (--restart continues" in lines.getvalue()
 
 
 # A solve that takes some minutes.

@@ -128,7 +128,7 @@ def _other_groups(path: Path) -> str:
 def _fit(chosen: argparse.Namespace) -> int:
     """Fit a table, write the files, and print a summary."""
     from ..rubber.dma import fit_dma, read_dma
-    from ..views.style import check_picture
+    from ..views.style import check_picture, save_picture
 
     columns = {}
     for given in chosen.column:
@@ -177,7 +177,7 @@ def _fit(chosen: argparse.Namespace) -> int:
         import matplotlib.pyplot
 
         figure = fit.plot()
-        figure.savefig(chosen.plot, dpi=150)
+        save_picture(figure, chosen.plot, 150)
         matplotlib.pyplot.close(figure)
         print(f"wrote {chosen.plot}", file=messages)
     return 0

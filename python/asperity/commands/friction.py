@@ -182,6 +182,8 @@ def _friction(chosen: argparse.Namespace) -> int:
 
 def _write(curve: FrictionCurve, output: Path) -> Path:
     """Write a file, whose ending determines its kind."""
+    from ..views.style import save_picture
+
     kind = output.suffix.lower()
     if kind == ".csv":
         return curve.to_csv(output)
@@ -194,5 +196,5 @@ def _write(curve: FrictionCurve, output: Path) -> Path:
 
         matplotlib.use("Agg")
     figure = curve.plot()
-    figure.savefig(output, dpi=300)
+    save_picture(figure, output, 300)
     return output

@@ -53,7 +53,7 @@ def _plot(chosen: argparse.Namespace) -> int:
     import matplotlib.pyplot as plt
 
     from ..results import open_result
-    from ..views.style import check_picture
+    from ..views.style import check_picture, save_picture
 
     if chosen.output is not None and chosen.output.is_dir():
         raise IsADirectoryError(f"{chosen.output}: is a folder: name a picture in it")
@@ -76,7 +76,7 @@ def _plot(chosen: argparse.Namespace) -> int:
         plt.show()
         return 0
     output = chosen.output or run.path.with_suffix(".png")
-    figure.savefig(output, dpi=300)
+    save_picture(figure, output, 300)
     plt.close(figure)
     print(f"wrote {output}")
     return 0

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from .result_file import ResultFile
 
 __all__ = ["duration", "held", "note_of", "rows_of", "seems_dead", "short_time", "silence",
-           "standing", "time_of_row"]
+           "standing", "time_of_row", "way_on"]
 
 LAST = 20  # number of last rows from which the time of the next one is estimated
 PATIENCE = 20.0  # factor on the longest of them before a run counts as killed
@@ -137,3 +137,10 @@ def standing(run: ResultFile) -> str:
     """Return the state of the run in words."""
     note = note_of(run)
     return "finished" if run.finished else f"not finished{', ' if note else ''}{note}"
+
+
+def way_on(run: ResultFile) -> str:
+    """Return how a run that ended too early is continued. Without a checkpoint it cannot be."""
+    if run.path.with_suffix(".checkpoint.h5").exists():
+        return "--restart continues from the last checkpoint"
+    return "there is no checkpoint: --overwrite starts again"

@@ -23,6 +23,7 @@ from ..results.standing import (
     short_time,
     silence,
     time_of_row,
+    way_on,
 )
 from ..results.steady import steady_mean
 from .page_parts import PAGE, colour_scales, fill_page, page_file, page_json
@@ -149,7 +150,7 @@ def _notes(run: Run) -> str:
 
 def _unfinished(run: Run) -> str:
     """Return why a run is not finished, if the file contains that, and what to do."""
-    again = ("<code>asperity run CASE.nml --restart</code> continues from the last checkpoint.")
+    again = f"<code>asperity run CASE.nml</code>: {way_on(run)}."
     if run.outcome != "running":
         return f"Outcome: {escape(run.outcome)}; {again}"
     quiet = silence(run)

@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from ..results import Snapshot
 
 __all__ = ["COLOURS", "DOUBLE_COLUMN", "LABELS", "NO_CONTACT", "PRINT", "SINGLE_COLUMN", "SLIP",
-           "STICK", "axis_text", "check_picture", "label_of", "print_style", "scale_limit",
-           "sentence", "si_scale", "typical_value", "when"]
+           "STICK", "axis_text", "check_picture", "label_of", "print_style", "save_picture",
+           "scale_limit", "sentence", "si_scale", "typical_value", "when"]
 
 # Okabe and Ito's palette: blue, vermilion, green, purple, orange, sky blue, black.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -91,6 +93,14 @@ def check_picture(path: Path | None) -> None:
     if path and path.suffix[1:].lower() not in FigureCanvasBase.get_supported_filetypes():
         raise ValueError(f"{path}: the ending must be .png, .pdf, .svg or another that matplotlib"
                          " writes")
+
+
+def save_picture(figure: Figure, path: Path, dpi: int) -> None:
+    """Write a figure. Where that fails, the message names the file, as on a full disk."""
+    try:
+        figure.savefig(path, dpi=dpi)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from None
 
 
 def si_scale(values: ArrayLike, units: str) -> tuple[float, str]:

@@ -24,6 +24,7 @@ from ..results.standing import (
     short_time,
     silence,
     time_of_row,
+    way_on,
 )
 from .style import si_scale
 
@@ -135,10 +136,10 @@ def state_of(run: Run, pace: Pace) -> str:
     if quiet >= 10.0:
         words.append(f"no new row for {duration(quiet)}")
     if held(run) is False:
-        words.append("its process has ended (--restart continues from the last checkpoint)")
+        words.append(f"its process has ended ({way_on(run)})")
     elif seems_dead(run):
         words[-1] += (f" where a row takes up to {short_time(time_of_row(run) or 0.0)}: perhaps no"
-                     " longer running (--restart continues from the last checkpoint)")
+                     f" longer running ({way_on(run)})")
     return ", ".join(words)
 
 
