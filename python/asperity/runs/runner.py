@@ -122,12 +122,7 @@ def run(
                                                    target, threads or 0, int(restart),
                                                    int(overwrite))
     except OSError as error:
-        # The library names the options of the command.
-        message = str(error)
-        for option, argument in (("--restart", "restart=True"), ("--overwrite", "overwrite=True"),
-                                 ("--output", "output")):
-            message = message.replace(option, argument)
-        raise OSError(message) from None
+        raise OSError(_with_arguments(str(error))) from None
     failure: NotConverged | None = None
     view: RunView | None = None
     stops = _Stops()
@@ -160,6 +155,14 @@ def run(
     if failure is not None:
         raise NotConverged(str(failure), opened) from None
     return opened
+
+
+def _with_arguments(message: str) -> str:
+    """Return a message of the library, which names options of the command, for callers of `run`."""
+    for option, argument in (("--restart", "restart=True"), ("--overwrite", "overwrite=True"),
+                             ("--output", "output")):
+        message = message.replace(option, argument)
+    return message
 
 
 def _shape(result: bytes) -> tuple[int, int]:

@@ -287,8 +287,9 @@ class Simulation:
             pair = np.asarray(value, dtype=float)
         except (TypeError, ValueError):
             pair = np.empty(0)
-        if pair.shape != (2,):
-            raise ValueError(f"velocity = {value!r}: must be two numbers, along x and y, in m/s")
+        if pair.shape != (2,) or not np.isfinite(pair).all():
+            raise ValueError(f"velocity = {value!r}: must be two finite numbers, along x and y,"
+                             " in m/s")
         self._set("velocity", pair[0], pair[1])
 
     @property
