@@ -180,6 +180,7 @@ contains
          run%sim%stop%asked => must_stop
          call progress%start(run%rows, max(run%sim%state%schedule%row + 1, 0), &
             command%quiet .or. .not. is_first_process())
+
          do while (.not. run%finished)
             call tell_warnings(run, progress)
             signal = nint(global_max(real(stop_signal(), dp)))
@@ -192,6 +193,7 @@ contains
                call stop_run(run, stopped_by_limit, 'the time limit is near: stopped', error)
                exit
             end if
+
             if (any_process(checkpoint_asked())) then
                call forget_checkpoint()
                call limit%step_begins()
@@ -199,6 +201,7 @@ contains
                if (allocated(error)) exit
                call limit%step_ends(.true.)
             end if
+
             call limit%step_begins()
             call run%step(error)
             call limit%step_ends(.false.)
@@ -206,6 +209,7 @@ contains
             if (run%sim%state%schedule%row >= 0) call progress%update(run%sim%state%row)
             if (allocated(error)) exit
          end do
+
          call tell_warnings(run, progress)
          call progress%finish()
       end if

@@ -54,6 +54,7 @@ contains
       first = 0
       result_path = ''
       warnings = ''
+
       call case_of(path, text, case, error)
       if (.not. allocated(error)) then
          if (output /= '') then
@@ -62,12 +63,14 @@ contains
                ': would be written over '//overwritten_file(case))
          end if
       end if
+
       if (.not. allocated(error)) then
          if (threads > 0) case%solver%threads = threads
          result_path = case%output%file
          warnings = case%warnings
          call new_run(number, run, error)
       end if
+
       if (.not. allocated(error)) then
          call run%open(case, restart == 1, overwrite == 1, error)
          if (allocated(error)) then

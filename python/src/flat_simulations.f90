@@ -53,6 +53,7 @@ contains
       lx = 0.0_c_double
       ly = 0.0_c_double
       warnings = ''
+
       call case_of(path, text, case, error)
       if (.not. allocated(error)) call new_driven(number, driven, error)
       if (.not. allocated(error)) then

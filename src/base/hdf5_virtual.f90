@@ -126,6 +126,7 @@ contains
       allocate (sources(0))
       list = h5dget_create_plist(dataset)
       if (list < 0) return
+
       if (h5pget_layout(list) == layout_virtual) then
          if (h5pget_virtual_count(list, count) < 0) count = 0
          deallocate (sources)

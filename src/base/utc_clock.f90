@@ -22,6 +22,7 @@ contains
       if (minutes < 0) days = -1
       if (minutes >= 1440) days = 1
       minutes = minutes - 1440*days
+
       day = day + days
       if (day < 1) then
          month = month - 1
@@ -31,6 +32,7 @@ contains
          end if
          day = last_day()
       end if
+
       length = last_day()
       if (day > length) then
          day = 1

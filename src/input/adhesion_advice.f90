@@ -62,6 +62,7 @@ contains
 
       text = ''
       if (.not. sticks(case)) return
+
       modulus = softest_modulus(case)
       pressure = largest_pressure(case)
       text = 'adhesion: '//zone_in_words(case)//' = '//to_text(largest_cell(case, modulus))// &
@@ -69,6 +70,7 @@ contains
       if (case%adhesion%potential == 'maugis_dugdale') text = text//nl// &
          'adhesion: the attraction ends linearly over range +- '//to_text(rounded(adhesion_edge(case)))// &
          ' m, so that the cells do not pin the contact'
+
       do i = 1, size(case%surfaces)
          associate (term => case%surfaces(i), adhesion => case%adhesion)
             select case (term%shape)

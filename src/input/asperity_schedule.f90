@@ -115,6 +115,7 @@ contains
 
       finished = self%phase > size(phases)
       if (finished) return
+
       associate (phase => phases(self%phase))
          if (self%step == 0 .and. .not. self%entered) &
             call enter_phase(self, phase, present_load, present_pull, row)
@@ -126,15 +127,18 @@ contains
          row%velocity_y = phase%velocity_y
          row%pulled = phase%pulled
          row%pull = phase%pull
+
          if (.not. self%entered .and. begins_with_row(phase, self)) then
             call plan_jump(self, phase, row)
          else
             call plan_step(self, phase, present_load, row)
          end if
+
          row%relaxed = phase%relaxed .and. row%instantaneous
          if (phase%steady .and. row%instantaneous) call plan_steady(phase, row)
          row%ramped = phase%linear .and. self%step > 0 .and. self%row >= 0
          self%entered = .true.
+
          part = real(self%step, dp)/phase%steps
          row%time = self%start_time + part*phase%duration
          row%road_x = self%start_x + part*phase%duration*phase%velocity_x

@@ -127,6 +127,7 @@ contains
          call group%group_fault('wlf_c1 and wlf_c2 must be given together', faults)
          return
       end if
+
       difference = material%temperature - material%reference_temperature
       if (.not. abs(difference) > 0.0_dp) return
       if (.not. group%given('wlf_c1')) then
@@ -135,12 +136,14 @@ contains
             to_text(material%reference_temperature)//': a shift needs wlf_c1 and wlf_c2', faults)
          return
       end if
+
       if (.not. material%wlf_c2 + difference > 0.0_dp) then
          call group%fault('temperature', 'is below the range of the WLF shift: it must be above '// &
             'reference_temperature - wlf_c2 = '// &
             to_text(material%reference_temperature - material%wlf_c2), faults)
          return
       end if
+
       factor = wlf_shift(material%temperature, material%reference_temperature, material%wlf_c1, &
          material%wlf_c2)
       if (.not. (factor > 1.0e-100_dp .and. factor < 1.0e100_dp)) then

@@ -43,6 +43,7 @@ contains
             if (group%given('name')) phase%name = group%text_value('name')
             if (len(group%text_value('name')) > len(phase%name)) &
                call group%fault('name', 'must have at most '//to_text(len(phase%name))//' characters', faults)
+
             phase%duration = group%real_value('duration')
             phase%static = .not. phase%duration > 0.0_dp .and. .not. group%bad('duration')
             phase%linear = group%text_value('ramp') == 'linear'
@@ -50,17 +51,20 @@ contains
             phase%steady = group%logical_value('steady')
             phase%velocity_x = group%real_value('velocity_x')
             phase%velocity_y = group%real_value('velocity_y')
+
             call resolve_pull(group, grid, phase, faults)
             if (i == 1) then
                call resolve_load(group, phase, faults)
             else
                call resolve_load(group, phase, faults, phases(i - 1))
             end if
+
             call check_load(group, phase, adhesive, faults)
             call check_combination(group, phase, material, faults)
             if (phase%steady) call check_steady(group, phase, grid, material, adhesive, faults)
             call resolve_steps(group, phase, grid, material, faults)
             call warn_of_steps(i, phase, grid, material, warnings)
+
             rows = rows + phase%steps + 1.0_dp
             if (rows > most_rows .and. rows - phase%steps - 1.0_dp <= most_rows) &
                call group%group_fault('the phases up to this one have '//to_text(rows)// &

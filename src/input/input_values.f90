@@ -165,6 +165,7 @@ contains
       comma_before = .true.
       next = assignment%first
       fault = fault_of_subscript(assignment, value%entry)
+
       do while (fault == '' .and. next <= assignment%last)
          token = file%tokens(next)
          next = next + 1
@@ -185,6 +186,7 @@ contains
          end if
          call take_items(file%text, token, repeats, assignment%upper, value, element, fault)
       end do
+
       if (fault == '' .and. element == assignment%subscript - 1) &
          fault = 'has no value: it '//allowed_phrase(value%entry)
       if (fault == '') return

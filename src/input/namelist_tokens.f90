@@ -40,6 +40,7 @@ contains
       if (len(text) >= 3) then                        ! the mark that some editors put before UTF-8
          if (text(:3) == char(239)//char(187)//char(191)) at = 4
       end if
+
       do while (at <= len(text))
          select case (text(at:at))
          case (new_line('a'))

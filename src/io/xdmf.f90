@@ -51,6 +51,7 @@ contains
          call fail(error, error_file, path//': cannot be written: '//trim(reason))
          return
       end if
+
       write (unit, '(a)', iostat=status, iomsg=reason) '<?xml version="1.0" ?>'//new_line('a')// &
          '<Xdmf Version="2.0">'//new_line('a')//'<Domain>'//new_line('a')// &
          '<Grid Name="snapshots" GridType="Collection" CollectionType="Temporal">'
@@ -60,6 +61,7 @@ contains
       end do
       if (status == 0) write (unit, '(a)', iostat=status, iomsg=reason) &
          '</Grid>'//new_line('a')//'</Domain>'//new_line('a')//'</Xdmf>'
+
       close (unit, iostat=closed)
       if (status == 0 .and. closed /= 0) then
          status = closed

@@ -132,12 +132,14 @@ contains
       call distinct_arms(g, tau, a, t)
       n = size(t)
       a = a*t                                              ! g tau
+
       fluidity = 0.0_dp
       roots = n
       if (g_e <= 0.0_dp .and. n > 0) then
          roots = n - 1
          fluidity = 1.0_dp/sum(a)
       end if
+
       allocate (lambda(roots), strength(roots))
       do k = 1, roots
          origin = k
@@ -156,6 +158,7 @@ contains
             end if
             low = min(low, high)
          end if
+
          do halving = 1, 200
             middle = sqrt(low)*sqrt(high)
             if (middle <= low .or. middle >= high) exit
@@ -166,6 +169,7 @@ contains
                low = middle
             end if
          end do
+
          middle = merge(-low, low, above)
          lambda(k) = t(origin) - middle
          strength(k) = 1.0_dp/(lambda(k)*sum(a/((t - t(origin)) + middle)**2))

@@ -79,6 +79,7 @@ contains
          call add_fault(error, error_input, 'time_scheme = '''//trim(scheme)// &
             ''': must be ''backward_euler'', ''exponential'' or ''exponential2''')
       end select
+
       if (size(g) /= size(tau)) then
          call add_fault(error, error_input, 'as many moduli as relaxation times are needed')
       else if (.not. all(g > 0.0_dp .and. g <= huge(g)) .or. &
@@ -91,6 +92,7 @@ contains
          call add_fault(error, error_input, &
             'the shear modulus of an elastic material must be positive')
       end if
+
       if (allocated(error)) return
       self%g_e = g_e
       allocate (self%g, source=g)

@@ -256,20 +256,24 @@ contains
             largest(i) = maxval(abs(column(:rows)))
          end do
       end do
+
       if (rows == 0) then
          text = text//'rows        0'//nl
          return
       end if
+
       text = text//'rows        '//to_text(rows)
       if (file%has_attribute('/', 'expected_rows')) then
          call file%read_attribute('/', 'expected_rows', expected)
          if (expected /= rows) text = text//' of '//to_text(expected)
       end if
+
       text = text//nl//'last row'//nl
       do i = 1, size(names)
          if (is_of_friction(names(i)) .and. largest(i) <= 0.0_dp) cycle      ! there is no friction
          text = text//'  '//names(i)//to_text(last(i))//trim(units(i))//nl
       end do
+
       do i = 1, size(names)
          if (index(names(i), 'residual') == 0) cycle
          if (is_of_friction(names(i)) .and. largest(i) <= 0.0_dp) cycle

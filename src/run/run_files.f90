@@ -107,9 +107,11 @@ contains
             plan%snapshots = plan%snapshots + rows/case%output%snapshot_every
          if (sim%has_steady) plan%losses = count(case%phases%steady)
          plan%compression = case%output%compression
+
          if (is_first_process()) call self%result%create(self%path, sim%grid, plan, error)
          call agree(error)
          if (allocated(error)) return
+
          call write_height(self%result, sim)
          if (is_first_process()) then
             call self%result%publish(error)

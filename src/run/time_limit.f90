@@ -116,12 +116,14 @@ contains
       rest = trim(text)
       valid = .false.
       if (verify(rest, '0123456789:-') /= 0 .or. len(rest) == 0 .or. len(rest) > 20) return
+
       dash = index(rest, '-')
       if (dash > 0) then
          if (.not. is_number(rest(:dash - 1))) return
          read (rest(:dash - 1), *, iostat=status) days
          rest = rest(dash + 1:)
       end if
+
       count = 0
       last = .false.
       do while (.not. last)
@@ -133,6 +135,7 @@ contains
          read (rest(:colon - 1), *, iostat=status) parts(count)
          if (.not. last) rest = rest(colon + 1:)
       end do
+
       if (dash > 0 .or. count == 3) then
          seconds = 86400.0_dp*days + 3600.0_dp*parts(1) + 60.0_dp*parts(2) + parts(3)
       else

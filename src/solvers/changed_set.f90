@@ -91,6 +91,7 @@ contains
       room = max(48, n/4)
       allocate (self%cells(2, n), self%matrix(n, n), self%base(n, 2), self%changed(2, room), &
          self%columns(n, room), self%origin(room), self%held(room), self%right(room))
+
       self%used = 0
       self%factors = self%factors + 1
       self%number = 0
@@ -98,6 +99,7 @@ contains
       do a = 1, n
          call set_number(self, self%cells(:, a), a)
       end do
+
       !$omp parallel do default(none) shared(self, n) private(a, b) num_threads(self%threads)
       do b = 1, n
          do a = 1, n
@@ -109,6 +111,7 @@ contains
             self%matrix(:, b) = global_sum(self%matrix(:, b))
          end do
       end if
+
       call factor(self%matrix, self%threads)
       self%base(:, 1) = listed(4, :)
       self%base(:, 2) = 1.0_dp

@@ -251,6 +251,7 @@ contains
       cyy = 0.0_dp
       gain = 0.0_dp
       largest = 0.0_dp
+
       !$omp simd private(ux, uy, ru, gx, gy, weight, bent) reduction(max: largest) &
       !$omp reduction(+: slipping, driven, moved, wgx, wgy, wxx, wxy, wyy, cxx, cxy, cyy, gain)
       do i = 1, size(state)
@@ -276,6 +277,7 @@ contains
          gain = gain + gx*(t(i, 1) - old(i, 1)) + gy*(t(i, 2) - old(i, 2))
          largest = max(largest, gx**2 + gy**2)
       end do
+
       sums = measure_sums_type(0.0_dp, slipping, driven, moved, [wgx, wgy], [wxx, wxy, wyy], &
          [cxx, cxy, cyy], gain, largest)
    end subroutine measured_row

@@ -214,6 +214,7 @@ contains
          call new_line_transform(along_x(c), mx, odd=c == 3)
          call new_line_transform(along_y(c), my, odd=c == 3)
       end do
+
       !$omp parallel default(none) shared(self, grid, mx, my, start, table, parts, along_x, along_y) &
       !$omp private(line, a, c, i, j)
       allocate (line(0:mx/2, parts))
@@ -241,6 +242,7 @@ contains
          !$omp end do
       end do
       !$omp end parallel
+
       do c = 1, parts
          call along_x(c)%destroy()
          call along_y(c)%destroy()

@@ -41,6 +41,7 @@ contains
       n = [ny, nx]
       spectrum_shape = [ny, nx/2 + 1]
       field_shape = [ny, 2*(nx/2 + 1)]
+
       self%buffer = fftw_alloc_real(2*int(nx/2 + 1, c_size_t)*int(ny, c_size_t))
       if (c_associated(self%buffer)) then
          !$omp critical (fftw_planner)
@@ -50,6 +51,7 @@ contains
             1_c_int, 0_c_int, self%buffer, field_shape, 1_c_int, 0_c_int, fftw_estimate)
          !$omp end critical (fftw_planner)
       end if
+
       if (.not. (c_associated(self%forward) .and. c_associated(self%backward))) then
          write (text, '("a transform of ", i0, " x ", i0, " points")') nx, ny
          if (c_associated(self%buffer)) then
@@ -60,6 +62,7 @@ contains
          call destroy_real_transform(self)
          return
       end if
+
       call c_f_pointer(self%buffer, self%space, [2*(nx/2 + 1), ny])
       call c_f_pointer(self%buffer, self%spectrum, [nx/2 + 1, ny])
    end subroutine new_real_transform

@@ -159,6 +159,7 @@ contains
          bend_last = 2.0_dp*lines(:, n - 1) - 5.0_dp*lines(:, n - 2) + 4.0_dp*lines(:, n - 3) &
             - lines(:, n - 4)
       end if
+
       lines(:, 0) = lines(:, 0) - bend_first/6.0_dp
       if (n > 1) lines(:, n - 1) = lines(:, n - 1) - bend_last/6.0_dp
       pivot(1) = 0.0_dp
@@ -169,6 +170,7 @@ contains
       do k = n - 2, 1, -1
          lines(:, k) = lines(:, k) - pivot(k + 1)*lines(:, k + 1)
       end do
+
       if (n > 1) then
          lines(:, -1) = 2.0_dp*lines(:, 0) - lines(:, 1) + bend_first
          lines(:, n) = 2.0_dp*lines(:, n - 1) - lines(:, n - 2) + bend_last

@@ -125,6 +125,7 @@ contains
       end if
       call transformed(grid, height, 0.0_dp, transform, error)
       if (allocated(error)) return
+
       rings = nint(k/width) + 1
       allocate (k_sum(0:rings), power_sum(0:rings), source=0.0_dp)
       allocate (counted(0:rings), source=0)
@@ -139,6 +140,7 @@ contains
             power_sum(b) = power_sum(b) + weight*power(transform%spectrum(i, j))
          end do
       end do
+
       call destroy_real_transform(transform)
       modes = pack(counted, counted > 0)
       wave_numbers = pack(k_sum, counted > 0)/modes
@@ -223,6 +225,7 @@ contains
       allocate (row_sums(4, grid%ny))
       lowest = huge(1.0_dp)
       highest = -huge(1.0_dp)
+
       !$omp parallel do default(none) shared(grid, height, row_sums) private(i) &
       !$omp reduction(min:lowest) reduction(max:highest)
       do j = 1, grid%ny
@@ -233,6 +236,7 @@ contains
             highest = max(highest, height(i, j))
          end do
       end do
+
       mean = sum(row_sums(1, :))/cells
       !$omp parallel do default(none) shared(grid, height, row_sums, mean) private(i, deviation)
       do j = 1, grid%ny
@@ -244,6 +248,7 @@ contains
             row_sums(4, j) = row_sums(4, j) + deviation**4
          end do
       end do
+
       sums = sum(row_sums(2:4, :), dim=2)/cells
       statistics%mean = mean
       statistics%lowest = lowest
