@@ -25,7 +25,7 @@ module joint_equations
 
    public :: joint_equations_type
 
-   !> The equations and their work space. Not to be copied.
+   !> The equations and their work space. A variable of this type must not be copied.
    type, extends(joint_system_type) :: joint_equations_type
       logical :: ready = .false.
       class(contact_type), pointer, private :: contact => null()   !! of the step at hand
@@ -43,7 +43,8 @@ module joint_equations
 
 contains
 
-   !> Operator and work space. Where there is no memory for them, or only one cell, `ready` remains .false.
+   !> Make the operator and the work space. If there is not enough memory, or only one cell, `ready` remains
+   !> .false.
    subroutine prepare(self, contact)
       class(joint_equations_type), intent(inout) :: self
       class(contact_type), intent(in) :: contact
@@ -65,7 +66,7 @@ contains
       if (.not. self%ready) call destroy(self)
    end subroutine prepare
 
-   !> The start: the state of the contact; and the units.
+   !> Set the units, and make the first state from that of the contact.
    subroutine start(self, contact, plan, begun)
       class(joint_equations_type), intent(inout) :: self
       class(contact_type), intent(inout), target :: contact      !! until the step is solved
@@ -96,7 +97,7 @@ contains
       end associate
    end subroutine start
 
-   !> What a state leaves of the equations.
+   !> Compute the residuals of a state.
    subroutine evaluate(self, state)
       class(joint_equations_type), intent(inout) :: self
       type(joint_state_type), intent(inout) :: state
@@ -167,7 +168,7 @@ contains
       call self%operator%columns(columns_apply)
    end subroutine form_pressure
 
-   !> A row of what is left of the equations.
+   !> Compute a row of the residuals.
    subroutine evaluate_row(self, contact, state, j)
       class(joint_equations_type), intent(inout) :: self
       class(contact_type), intent(in) :: contact
@@ -188,7 +189,7 @@ contains
       end do
    end subroutine evaluate_row
 
-   !> Hand the solution to the contact, if there is memory for the shares of the cells.
+   !> Copy the solution to the contact, if there is memory for the shares of the cells.
    subroutine hand_out(self, contact, found, done)
       class(joint_equations_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact

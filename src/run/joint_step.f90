@@ -1,11 +1,11 @@
-!> All of a step with friction at once, for steps whose passes do not settle.
+!> Solves a step with friction for all unknowns at once, if its passes do not settle.
 !>
-!> A pass takes pressure, traction and place one after the other; where the traction of a cell jumps as the
-!> cell opens, the passes swing between two states. The equations of module `joint_equations` have all
-!> unknowns at once, and are continuous; module `joint_newton` solves them.
+!> A pass computes pressure, traction and place one after the other. If the traction of a cell jumps when the
+!> cell opens, the passes oscillate between two states. The equations of module `joint_equations` contain all
+!> unknowns and are continuous; module `joint_newton` solves them.
 !>
-!> Fields of doubles, from the first use on: 30; and the directions of GMRES. Where there is not enough
-!> memory, the step is not solved.
+!> Memory from the first use on: 30 fields of doubles, and the directions of GMRES. If there is not enough memory,
+!> the step is not solved.
 module joint_step
    use asperity_schedule, only : planned_row_type
    use contact_model, only : contact_type
@@ -16,7 +16,7 @@ module joint_step
 
    public :: joint_step_type
 
-   !> The equations and the method. Not to be copied.
+   !> The equations and the method. A variable of this type must not be copied.
    type :: joint_step_type
       type(joint_equations_type), private :: equations
       type(joint_newton_type), private :: newton
@@ -27,14 +27,14 @@ module joint_step
 
 contains
 
-   !> Solve a step from the state that the last pass has left. If it is solved the state of the contact, the
-   !> trial displacement and the shares of the cells are those of the solution.
+   !> Solve a step, starting from the state after the last pass. If the step is solved, the state of the contact,
+   !> the trial displacement and the shares of the cells are those of the solution.
    subroutine solve(self, contact, plan, solved, transforms)
       class(joint_step_type), intent(inout) :: self
       class(contact_type), intent(inout), target :: contact
       type(planned_row_type), intent(in) :: plan
       logical, intent(out) :: solved
-      integer, intent(out) :: transforms               !! that it took
+      integer, intent(out) :: transforms               !! number of transforms
 
       solved = .false.
       transforms = 0

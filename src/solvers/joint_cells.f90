@@ -1,15 +1,15 @@
 !> The states of a cell in the joint equations of a step with friction, in one number per cell.
 !>
 !> A cell is open, or it touches without pressure in a part of its area, or it is in contact. The number
-!> s, m, says which:
+!> s, a length, determines the state:
 !>
 !>     s < 0              open: the gap is -s, no pressure but that of adhesion, no traction
 !>     0 <= s <= width    touches: no gap, no pressure of the wall, the share s/width of the bound
 !>     s > width          in contact: no gap, a pressure of the wall in proportion to s - width
 !>
-!> so that pressure, gap and share are continuous functions of s. The second range is there where the
-!> traction would jump as the cell opens: with constant shear stress; with adhesion on a slope, where T* is
-!> not zero at that moment; and on slopes above 1/coefficient. Elsewhere the width is 0.
+!> so that pressure, gap and share are continuous functions of s. The second range exists only if the
+!> traction would otherwise jump when the cell opens: with constant shear stress; with adhesion on a slope, where
+!> T* is then not zero; and on slopes above 1/coefficient. In all other cells the width is 0.
 module joint_cells
    use adhesion_potential, only : adhesion_potential_type, adhesive_slope
    use asperity_precision, only : dp
@@ -19,7 +19,7 @@ module joint_cells
 
    public :: cell_rules_type
 
-   !> What a cell does.
+   !> The parameters of the states of a cell.
    type :: cell_rules_type
       type(adhesion_potential_type) :: potential
       type(friction_law_type) :: law
@@ -27,8 +27,8 @@ module joint_cells
       real(dp) :: soft_along = 0.0_dp               !! the same of the tangential traction, m/Pa
       real(dp) :: width = 0.0_dp                    !! of the second range, m
       real(dp) :: attraction = 0.0_dp               !! of a cell without a gap, Pa
-      !> Part of its rise above the second range with which the pressure rises within it. 0 is the law; with
-      !> more there is no jump.
+      !> Rate at which the pressure rises within the second range, relative to the rate above it. The law demands 0;
+      !> with a larger value there is no jump.
       real(dp) :: rise = 0.0_dp
    contains
       procedure :: has_jump
@@ -94,8 +94,8 @@ contains
       if (s >= 0.0_dp .and. s < width) share = s/width
    end function share_of
 
-   !> By how much the traction of a cell differs from the one on or within its bound that it and its slip
-   !> lead to: zero where the cell obeys the law.
+   !> The difference between the traction of a cell and the admissible one that follows from this traction and
+   !> the slip. It is zero if the cell obeys the law.
    pure function lacking(self, share, pressure, slope, slip, t) result(left)
       class(cell_rules_type), intent(in) :: self
       real(dp), intent(in) :: share

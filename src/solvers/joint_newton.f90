@@ -1,14 +1,13 @@
-!> Newton's method for the pressures, gaps, tractions and the level of a contact with friction at once
+!> Newton's method for all unknowns of a contact with friction: the pressures, gaps, tractions and the level
 !> (module `joint_system`).
 !>
-!> Newton's steps are solved by GMRES with products from differences of the equations, and shortened where
-!> the equations are not met better. Open cells are not unknown: their gaps follow (with adhesion only those
-!> that are attracted hardly). If this fails and some traction may jump, the equations are solved with a
-!> pressure that rises in partly sheared cells, which takes the jump away, and the rise goes to nothing
-!> (`descend`).
+!> Newton's steps are computed by GMRES with products from differences of the equations, and shortened if they do
+!> not reduce the residual. The gaps of open cells are not unknowns, but follow from the others (with adhesion
+!> only if they are hardly attracted). If this fails and a traction may jump, the pressure is made to rise
+!> slightly in partly sheared cells, which removes the jump, and this rise is then reduced to zero (`descend`).
 !>
-!> Fields of doubles: 25; and the directions of GMRES, 3 numbers of single precision per unknown cell and
-!> direction. Where there is not enough memory, nothing is solved.
+!> Memory: 25 fields of doubles, and the directions of GMRES with 3 numbers in single precision per unknown cell
+!> and direction. If there is not enough memory, nothing is solved.
 module joint_newton
    use adhesion_potential, only : adhesive_curvature
    use asperity_parallel, only : any_process
@@ -24,22 +23,22 @@ module joint_newton
    public :: joint_newton_type
 
    integer, parameter :: most_steps = 25
-   integer, parameter :: most_directions = 120         !! of GMRES, for a step
+   integer, parameter :: most_directions = 120         !! directions of GMRES for a step
    real(dp), parameter :: accuracy = 1.0e-4_dp         !! of a solve by GMRES
    real(dp), parameter :: difference = 1.0e-7_dp       !! largest change of an unknown in a product, scaled
    real(dp), parameter :: attracted = 1.0e-4_dp        !! e'' over the stiffness of a cell, for it to be unknown
-   real(dp), parameter :: astray = 100.0_dp            !! times what was left at the start
-   real(dp), parameter :: idle = 1.0e-4_dp             !! part by which a step must lower what is left
-   real(dp), parameter :: share_of_tolerance = 1.0e-3_dp, round_off = 1.0e-11_dp   !! of what may be left
+   real(dp), parameter :: astray = 100.0_dp            !! a residual this much larger than the first ends the attempt
+   real(dp), parameter :: idle = 1.0e-4_dp             !! part by which a step must reduce the residual
+   real(dp), parameter :: share_of_tolerance = 1.0e-3_dp, round_off = 1.0e-11_dp   !! of the residual that may remain
    real(dp), parameter :: lengths(10) = [1.0_dp, 0.7_dp, 0.5_dp, 0.3_dp, 0.15_dp, 0.07_dp, 0.03_dp, 0.01_dp, &
       0.003_dp, 0.001_dp]                              !! of a step
    ! The rise of the pressure in partly sheared cells:
-   integer, parameter :: most_descents = 30            !! solves with one
+   integer, parameter :: most_descents = 30            !! largest number of solves with a rise
    real(dp), parameter :: first_factor = 0.1_dp        !! from one solve to the next
-   real(dp), parameter :: last_factor = 0.95_dp        !! a solution ends between two rises as close as this
+   real(dp), parameter :: last_factor = 0.95_dp        !! the solutions end if even this factor fails
    real(dp), parameter :: least_rise = 1.0e-5_dp, most_rise = 1.0e2_dp
 
-   !> The method and its work space. Not to be copied.
+   !> The method and its work space. A variable of this type must not be copied.
    type :: joint_newton_type
       logical :: ready = .false.
       type(joint_state_type) :: now                    !! in: the start; out: the solution
@@ -55,7 +54,7 @@ module joint_newton
 
 contains
 
-   !> Room for the states. Where there is not enough memory, `ready` remains .false.
+   !> Allocate the states. If there is not enough memory, `ready` remains .false.
    subroutine prepare(self, grid)
       class(joint_newton_type), intent(inout) :: self
       type(grid_type), intent(in) :: grid
@@ -77,7 +76,7 @@ contains
    subroutine solve(self, system, tolerance, solved)
       class(joint_newton_type), intent(inout) :: self
       class(joint_system_type), intent(inout) :: system
-      real(dp), intent(in) :: tolerance                !! of the solution; far less is left of the equations
+      real(dp), intent(in) :: tolerance                !! of the solution; the equations are solved far better
       logical, intent(out) :: solved
       real(dp) :: goal
 
@@ -88,7 +87,7 @@ contains
          call descend(self, system, goal, solved)
    end subroutine solve
 
-   !> Is the solution to be given up, for a stop or because it takes too long?
+   !> Must the attempt end, because of a stop or because it takes too long?
    function is_to_end(system) result(yes)
       class(joint_system_type), intent(in) :: system
       logical :: yes
@@ -96,11 +95,11 @@ contains
       yes = stop_is_due() .or. system%evaluations >= system%most_evaluations
    end function is_to_end
 
-   !> Newton's steps from the state at hand.
+   !> Do Newton's steps from the present state.
    subroutine iterate(self, system, goal, solved)
       class(joint_newton_type), intent(inout) :: self
       class(joint_system_type), intent(inout) :: system
-      real(dp), intent(in) :: goal                     !! largest part that may be left
+      real(dp), intent(in) :: goal                     !! largest residual that may remain
       logical, intent(out) :: solved
       type(cell_vector_type) :: step
       real(dp) :: first
@@ -119,8 +118,8 @@ contains
       solved = self%now%worst <= goal
    end subroutine iterate
 
-   !> Solve with a pressure that rises within the second range, and let this rise go to nothing. Each
-   !> solution is the start of the next.
+   !> Solve with a pressure that rises within the second range, and reduce this rise to zero step by step. Each
+   !> solve starts from the solution before.
    subroutine descend(self, system, goal, solved)
       class(joint_newton_type), intent(inout) :: self
       class(joint_system_type), intent(inout) :: system
@@ -128,7 +127,7 @@ contains
       logical, intent(out) :: solved
       real(dp) :: factor, last
       integer :: k
-      logical :: met                                   !! the equations with the rise at hand
+      logical :: met                                   !! the equations with the present rise are solved
 
       solved = .false.
       last = 0.0_dp
@@ -156,7 +155,7 @@ contains
       system%rules%rise = 0.0_dp
    end subroutine descend
 
-   !> Change the rise, and s in cells with a pressure such that it remains.
+   !> Change the rise, and adjust s in cells with pressure so that their pressure does not change.
    subroutine set_rise(system, state, rise)
       class(joint_system_type), intent(inout) :: system
       type(joint_state_type), intent(inout) :: state
@@ -179,7 +178,7 @@ contains
       system%rules%rise = rise
    end subroutine set_rise
 
-   !> Newton's step, scaled. There is none where memory runs out.
+   !> Compute Newton's step, scaled. None is found if there is not enough memory.
    subroutine find_step(self, system, step, found)
       class(joint_newton_type), intent(inout) :: self
       class(joint_system_type), intent(inout) :: system
@@ -212,7 +211,7 @@ contains
       call krylov%solution(step)
    end subroutine find_step
 
-   !> The list of unknown cells.
+   !> List the unknown cells.
    subroutine list_cells(self, system)
       class(joint_newton_type), intent(inout) :: self
       class(joint_system_type), intent(in) :: system
@@ -228,7 +227,7 @@ contains
       end do
    end subroutine list_cells
 
-   !> The equations' change with a vector of the unknowns, in `trial%left` of all cells.
+   !> Compute the derivative of the equations along a vector of the unknowns, in `trial%left` of all cells.
    subroutine change(self, system, v)
       class(joint_newton_type), intent(inout) :: self
       class(joint_system_type), intent(inout) :: system
@@ -246,7 +245,7 @@ contains
       self%trial%left_load = (self%trial%left_load - self%now%left_load)/length
    end subroutine change
 
-   !> The state at hand and a multiple of a vector, as `trial`.
+   !> Add a multiple of a vector to the present state, and store the result in `trial`.
    subroutine add(self, system, v, length)
       class(joint_newton_type), intent(inout) :: self
       class(joint_system_type), intent(in) :: system
@@ -267,7 +266,7 @@ contains
       end do
    end subroutine add
 
-   !> The unknown cells of a field.
+   !> Gather the values of a field in the unknown cells.
    subroutine gather(self, field, v)
       class(joint_newton_type), intent(in) :: self
       real(dp), intent(in) :: field(:, :, :)           !! [nx, 3, rows]
@@ -281,7 +280,7 @@ contains
       end do
    end subroutine gather
 
-   !> Go along the step as far as the equations are met better.
+   !> Take the step, or a part of it that reduces the residual.
    subroutine take_step(self, system, step, round)
       class(joint_newton_type), intent(inout) :: self
       class(joint_system_type), intent(inout) :: system
@@ -304,7 +303,7 @@ contains
          end if
       end do
       if (round > 2 .and. self%best%merit >= (1.0_dp - idle)*self%now%merit) then
-         ! No length helps: any way out of the corner.
+         ! No length reduces the residual. Take a short step nevertheless, to leave this point.
          turn = 1 + modulo(7*round, 4)
          call try_length(self, system, step, lengths(turn))
          call self%best%copy(self%trial)
@@ -312,7 +311,7 @@ contains
       call self%now%copy(self%best)
    end subroutine take_step
 
-   !> The state after a part of a step, as `trial`.
+   !> Compute the state after a part of a step, as `trial`.
    subroutine try_length(self, system, step, length)
       class(joint_newton_type), intent(inout) :: self
       class(joint_system_type), intent(inout) :: system

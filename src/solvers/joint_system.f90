@@ -1,15 +1,15 @@
-!> A contact with friction as equations for all cells at once, which module `joint_newton` solves.
+!> The equations of a contact with friction for all cells at once, which module `joint_newton` solves.
 !>
-!> Unknown are a number s per cell (module `joint_cells`: gap, pressure and share of the bound), its traction
+!> The unknowns are a number s per cell (module `joint_cells`: gap, pressure and share of the bound), its traction
 !> T, and the level. There are two such systems: a step in time (module `joint_equations`) and a state of
-!> steady sliding (module `steady_joint`). Each says what a state leaves of its equations:
+!> steady sliding (module `steady_joint`). Each computes the residuals of its equations:
 !>
 !>     U_z - H - level = gap            of every cell
 !>     T = bound of T and the slip      0 where the cell is open
 !>     mean of P = load                 or the level is given
 !>
-!> Each is scaled: lengths by what the mean pressure of the contact presses a cell in, tractions by that
-!> pressure or by the strength, whichever is larger.
+!> Each equation is scaled: lengths by the depth to which the mean pressure of the contact presses a cell, and
+!> tractions by that pressure or by the strength, whichever is larger.
 module joint_system
    use asperity_precision, only : dp
    use field_sums, only : field_count, field_sum
@@ -22,13 +22,13 @@ module joint_system
 
    real(dp), parameter :: least_slope = 0.05_dp        !! of the road, in the width of the second range of s
 
-   !> A state of all cells, and what it leaves of the equations.
+   !> A state of all cells, and its residuals.
    type :: joint_state_type
       real(dp), allocatable :: s(:, :)                 !! m [nx, rows]
       real(dp), allocatable :: t(:, :, :)              !! Pa [nx, 2, rows]
       real(dp) :: level = 0.0_dp                       !! m
-      real(dp), allocatable :: left(:, :, :)           !! of the equations of a cell, scaled [nx, 3, rows]
-      real(dp) :: left_load = 0.0_dp                   !! of the load, scaled, times the root of the cells in contact
+      real(dp), allocatable :: left(:, :, :)           !! residuals of the equations of a cell, scaled [nx, 3, rows]
+      real(dp) :: left_load = 0.0_dp                   !! residual of the load, scaled, times `root`
       real(dp) :: merit = 0.0_dp                       !! root of the sum of squares
       real(dp) :: worst = 0.0_dp                       !! largest
    contains
@@ -40,7 +40,7 @@ module joint_system
    type, abstract :: joint_system_type
       type(grid_type) :: grid
       integer :: evaluations = 0                       !! so far
-      integer :: most_evaluations = huge(1)            !! before the solution is given up
+      integer :: most_evaluations = huge(1)            !! after which the attempt ends
       type(cell_rules_type) :: rules
       real(dp), allocatable :: width(:, :)             !! of the second range of s, m [nx, rows]
       real(dp) :: unit_length = 1.0_dp                 !! of s, m
@@ -53,7 +53,7 @@ module joint_system
    end type joint_system_type
 
    abstract interface
-      !> What a state leaves of the equations.
+      !> Compute the residuals of a state.
       subroutine evaluate_state(self, state)
          import :: joint_state_type, joint_system_type
          class(joint_system_type), intent(inout) :: self
@@ -74,7 +74,7 @@ contains
       if (status == 0) allocate (self%left(grid%nx, 3, grid%rows()), source=0.0_dp, stat=status)
    end subroutine make_room
 
-   !> Copy another state into the fields that are there.
+   !> Copy another state to the existing fields.
    subroutine copy(self, other)
       class(joint_state_type), intent(inout) :: self
       type(joint_state_type), intent(in) :: other
@@ -88,7 +88,7 @@ contains
       self%worst = other%worst
    end subroutine copy
 
-   !> The units, and the width of the second range, of a contact from which the solution begins.
+   !> Choose the units and the width of the second range for a contact from which the solution starts.
    subroutine take_units(self, touching, pressure, rms_slope)
       class(joint_system_type), intent(inout) :: self
       logical, intent(in) :: touching(:, :)

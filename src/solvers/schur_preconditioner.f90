@@ -1,5 +1,5 @@
-!> The preconditioner of the normal solver: the residual is extended off the contact before a local
-!> model of the operator's inverse is applied to it.
+!> The preconditioner of the normal solver. It extends the residual outside the contact before it applies a local
+!> model of the operator's inverse.
 !>
 !> On a fixed contact set S the matrix of the problem is A_SS. Its inverse is
 !>     B_SS - B_SN B_NN^-1 B_NS,
@@ -11,18 +11,19 @@
 !> schur_coarse). If the model fits |q| within a factor, the Schur complements fit within the same
 !> factor on any set S, so that the number of iterations hardly depends on the grid and the load.
 !>
-!> The minimum over N is approached by a few steps of conjugate gradients, preconditioned by a constant
+!> The minimum over N is approximated by a few steps of conjugate gradients, preconditioned by a constant
 !> and a coarse part, W p = om p + coarse part. A step needs one pass over the cells. The pass adds the
-!> step before to the image b = B v, forms the search direction d, and its response e = K d. The other
+!> step before to the image b = B v, and forms the search direction d and its response e = K d. The other
 !> sums that conjugate gradients need follow from block sums, because coarse parts are constant in a
-!> block (module schur_blocks). What the last step adds to b is left to the caller:
+!> block (module `schur_blocks`). The caller adds the contribution of the last step to b:
 !>     M r = image + length response + pending.
 !>
-!> The weights of the stencil are as one over the sides of a cell, like |q| itself. With one over their
-!> squares, as of a Laplacian, they would be far too large along the short side of oblong cells.
+!> The weights of the stencil are proportional to the inverse sides of a cell, like |q| itself. If they were
+!> proportional to the inverse squares, like those of a Laplacian, they would be far too large along the short side of
+!> oblong cells.
 !>
-!> On small grids of nearly square cells the extension saves no time, and on very oblong cells the
-!> stencil is too poor a model for it: there M r = B_SS r. In between it halves the iterations.
+!> On small grids of nearly square cells the extension saves no time, and for very oblong cells the stencil is too
+!> inaccurate for it. In these cases M r = B_SS r. In all others the extension halves the iterations.
 !>
 !> Fields are in single precision: errors of 1e-7 do not matter in a preconditioner. N is restricted to a
 !> rim around the contact (the wide blocks of module active_blocks). Memory: four such fields, of which two may be
@@ -54,7 +55,7 @@ module schur_preconditioner
    real(dp), parameter :: largest_aspect = 16.0_dp    !! beyond it the stencil fits |q| too badly
    real(dp), parameter :: solved = 1e-8_dp     !! reduction of the residual on N that is enough
 
-   !> The preconditioner with its fields. Not to be copied.
+   !> The preconditioner with its fields. A variable of this type must not be copied.
    type :: schur_preconditioner_type
       type(grid_type), private :: grid
       type(row_halo_type), private :: rim                !! rows of other processes that the stencil reads
@@ -66,7 +67,7 @@ module schur_preconditioner
       real(sp), allocatable :: search(:, :)              !! (0:nx+1, 0:ny+1), d, 0 on S
       real(sp), pointer, contiguous :: image(:, :) => null()      !! [nx, ny], b
       real(sp), pointer, contiguous :: response(:, :) => null()   !! [nx, ny], e of the last step
-      logical, private :: owns = .false.                 !! and frees these two
+      logical, private :: owns = .false.                 !! this object frees these two
       real(sp) :: length = 0.0_sp                        !! multiple of e that is still to be added to b
       type(image_sums_type), private :: sums
    contains
@@ -76,7 +77,7 @@ module schur_preconditioner
       procedure :: destroy
    end type schur_preconditioner_type
 
-   !> What a pass needs to know of a step.
+   !> The numbers of a step that a pass needs.
    type :: step_type
       logical :: first = .false., last = .false.
       real(sp) :: beta = 0.0_sp                          !! multiple of the old direction

@@ -1,4 +1,5 @@
-!> A contact in steady sliding with friction: its fields, where it reads the road, and why there may be none.
+!> A contact in steady sliding with friction: its fields, the road under it, and the reasons why there may be no
+!> solution.
 module steady_contact
    use asperity_interpolation, only : displaced, interpolation_type
    use asperity_precision, only : dp
@@ -27,7 +28,8 @@ module steady_contact
 
 contains
 
-   !> The road at x + u, u = A_T T less its mean over the contact; and r. In: slip holds d(A_T T)/ds.
+   !> Compute the road at x + u, where u is A_T T minus its mean over the contact, and r. In: slip holds
+   !> d(A_T T)/ds.
    subroutine read_road(contact, road, base, direction)
       type(steady_contact_type), intent(inout) :: contact
       type(interpolation_type), intent(inout) :: road

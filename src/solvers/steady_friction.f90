@@ -1,6 +1,6 @@
 !> Steady sliding with friction: pressure, traction and the road under the displaced rubber at once.
 !>
-!> Unknown are the state z of the normal solver (module steady_normal), the displacement u with which
+!> The unknowns are the state z of the normal solver (module `steady_normal`), the displacement u with which
 !> the road is read, and the slip r = e + du/ds. One round of the iteration is
 !>
 !>     P = pressure of z;   T = bound(P (T/P) + c_t r)                      (module steady_bound)
@@ -46,9 +46,9 @@ module steady_friction
 
    integer, parameter :: pairs = 10              !! of the acceleration
    integer, parameter :: doubtful = 100          !! rounds after which the best contact is kept
-   integer, parameter :: looks = 25              !! rounds between two looks at it
+   integer, parameter :: looks = 25              !! rounds between two checks of it
 
-   !> Work fields. Not to be copied.
+   !> Work fields. A variable of this type must not be copied.
    type :: steady_friction_type
       type(grid_type) :: grid
       type(friction_law_type) :: law
@@ -69,7 +69,7 @@ module steady_friction
 
 contains
 
-   !> Make room.
+   !> Allocate the work fields.
    subroutine new_steady_friction(self, grid, law)
       type(steady_friction_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
@@ -141,7 +141,7 @@ contains
       normal%ffts = operator%ffts - before
    end subroutine solve
 
-   !> The first state: that handed in, or the frictionless one.
+   !> Make the first state from the given one, or from the frictionless solution.
    subroutine begin(self, operator, task, road, contact, normal)
       class(steady_friction_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
@@ -174,7 +174,7 @@ contains
          /max(field_count(contact%pressure > 0.0_dp), 1.0_dp))
    end subroutine begin
 
-   !> One round: from the state to its residual. The contact takes P, T, A_T T and the road at u+.
+   !> Do one round: compute the residual of the state. The contact receives P, T, A_T T and the road at u+.
    subroutine round(self, operator, task, road, pace, contact, measure, change)
       class(steady_friction_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
@@ -216,8 +216,8 @@ contains
       self%residual(:, 1, :) = self%normal%z - self%state(:, 1, :)
    end subroutine round
 
-   !> Judge the contact of the round, and keep it if it is the best so far. The rounds go on as if
-   !> nothing had happened.
+   !> Compute the error of the present contact, and keep the contact if it is the best so far. This does not affect
+   !> the rounds.
    subroutine keep_best(self, operator, task, road, pace, contact)
       class(steady_friction_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
@@ -271,7 +271,8 @@ contains
       self%ratio(:, :, :) = ratio
    end subroutine solve_at_once
 
-   !> Hand out the kept contact where it is better than that in hand: rounds that do not settle may swing.
+   !> Return to the kept contact if it is better than the present one, because rounds that do not settle may
+   !> oscillate.
    subroutine return_to_best(self, operator, task, road, pace, contact, normal, rubbing)
       class(steady_friction_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
@@ -313,7 +314,7 @@ contains
       ratio = sqrt(sums(1)/max(sums(2), tiny(1.0_dp)))
    end function ratio_of_lengths
 
-   !> The next state: a relaxed or an accelerated step; and how the rounds go on.
+   !> Compute the next state by a relaxed or an accelerated step, and decide how the rounds continue.
    subroutine advance(self, operator, task, pace, rounds, change, measure)
       class(steady_friction_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
@@ -359,7 +360,7 @@ contains
       length = sqrt(row_total(rows))
    end function length_of
 
-   !> Hand out: P, T within its bound and that of the slopes, and what follows from them.
+   !> Complete the result: P, T within its bound, and all fields that follow from them.
    subroutine finish(self, operator, task, road, contact, normal, rubbing)
       class(steady_friction_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator

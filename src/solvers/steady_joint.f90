@@ -1,4 +1,4 @@
-!> A state of steady sliding with friction for all cells at once, where the rounds of `steady_friction` stall.
+!> Solves a state of steady sliding with friction for all cells at once, if the rounds of `steady_friction` stall.
 !>
 !> The equations are those of module `joint_system` with U_z = K P, the road read at x + A_T T, and the slip
 !> r |V|. They contain the third state of a cell, between open and in contact, so that constant shear is
@@ -40,7 +40,7 @@ module steady_joint
       procedure :: evaluate
    end type steady_system_type
 
-   !> The method and its work space. Not to be copied.
+   !> The method and its work space. A variable of this type must not be copied.
    type :: steady_joint_type
       real(dp) :: base(2) = 0.0_dp                     !! as in the equations
       real(dp) :: direction(2) = 0.0_dp
@@ -53,7 +53,7 @@ module steady_joint
 
 contains
 
-   !> The number of the attempt that is due after this many rounds, which have stalled by then; 0: none is.
+   !> The number of the attempt that is due after this many rounds without convergence; 0 if none is due.
    pure function attempt_due(law, rounds) result(attempt)
       type(friction_law_type), intent(in) :: law
       integer, intent(in) :: rounds
@@ -66,7 +66,7 @@ contains
       if (rounds == 2*first) attempt = 2
    end function attempt_due
 
-   !> Solve from a contact. Where this fails, the contact is of no use.
+   !> Solve, starting from a contact. If this fails, the contact is undefined.
    subroutine solve(self, law, operator, task, road, contact, normal, rubbing)
       class(steady_joint_type), intent(inout) :: self
       type(friction_law_type), intent(in) :: law
@@ -100,7 +100,7 @@ contains
       end associate
    end subroutine solve
 
-   !> The start: the state of the contact; and the units.
+   !> Set the units, and make the first state from that of the contact.
    subroutine start(system, begun)
       type(steady_system_type), intent(inout) :: system
       type(joint_state_type), intent(inout) :: begun
@@ -140,7 +140,7 @@ contains
       soft_along = field_sum(load*shear(:, 1, :))
    end subroutine find_softness
 
-   !> What a state leaves of the equations.
+   !> Compute the residuals of a state.
    subroutine evaluate(self, state)
       class(steady_system_type), intent(inout) :: self
       type(joint_state_type), intent(inout) :: state
@@ -156,7 +156,7 @@ contains
       call compare(self, self%contact, state)
    end subroutine evaluate
 
-   !> What is left in each cell, with the displacement U_z in the place of the gap; and of the load.
+   !> Compute the residuals of each cell, where U_z is in the place of the gap, and that of the load.
    subroutine compare(self, contact, state)
       type(steady_system_type), intent(in) :: self
       type(steady_contact_type), intent(in) :: contact
@@ -166,7 +166,7 @@ contains
       integer :: i, j
 
       allocate (rows(2, self%grid%rows()), largest(self%grid%rows()))
-      stretch = self%c*self%rules%soft_along           ! of r to a length: T + c_t r is what returns to the bound
+      stretch = self%c*self%rules%soft_along           ! converts r to a length: T + c_t r is returned to the bound
       slope = 0.0_dp
       !$omp parallel do default(none) shared(self, contact, state, rows, largest, stretch) &
       !$omp private(i, j, share) firstprivate(slope)
@@ -189,7 +189,7 @@ contains
       state%merit = sqrt(sums(1) + state%left_load**2)
    end subroutine compare
 
-   !> The solution as the contact, with its errors.
+   !> Copy the solution to the contact, and compute its errors.
    subroutine hand_out(system, found, task, normal, rubbing)
       type(steady_system_type), intent(inout) :: system
       type(joint_state_type), intent(inout) :: found
@@ -210,7 +210,7 @@ contains
          sums = row_totals(rows)
          rubbing%residual = sqrt(sums(1)/max(sums(2), tiny(1.0_dp)))
          rubbing%converged = rubbing%residual <= task%tolerance
-         ! On slopes above 1/mu the third state takes the jump from stick to open, which no law has.
+         ! On slopes above 1/mu the third state replaces the jump from stick to open, which is not part of any law.
          if (.not. rules%law%jumps_at_edge()) rubbing%converged = rubbing%converged .and. &
             .not. field_count(found%s >= 0.0_dp .and. found%s < system%width) > 0.0_dp
          if (rubbing%converged) rubbing%reason = reason_converged

@@ -1,8 +1,8 @@
-!> How the rounds of steady sliding with friction go on (module `steady_friction`): how much of a change is
+!> Controls the rounds of steady sliding with friction (module `steady_friction`): the part of a change that is
 !> taken, and whether the rounds are accelerated.
 !>
-!> From far away the acceleration diverges, so the rounds begin plain. It begins where the change of a
-!> round is small, and ends where the change grows again; it then begins anew only closer to the solution.
+!> Far from the solution the acceleration would diverge, so that the first rounds are plain. It begins when the
+!> change of a round is small, and ends when the change grows again; it then restarts only closer to the solution.
 !> Plain rounds that do not halve their change in `slow` rounds are relaxed more strongly and solve the
 !> normal contact more accurately.
 module steady_pace
@@ -14,7 +14,7 @@ module steady_pace
 
    integer, parameter, public :: components = 5  !! of a state: z, u, r
 
-   integer, parameter :: slow = 25               !! plain rounds between two looks at their progress
+   integer, parameter :: slow = 25               !! plain rounds between two checks of their progress
 
    !> The pace of the rounds.
    type :: pace_type
@@ -54,7 +54,7 @@ contains
       if (self%accelerated) self%least = min(self%least, change)
    end subroutine choose
 
-   !> Note a plain step, and slow down where such steps make no progress.
+   !> Note a plain step, and slow down if such steps make no progress.
    subroutine note_plain(self, change)
       class(pace_type), intent(inout) :: self
       real(dp), intent(in) :: change             !! of the last round

@@ -1,4 +1,4 @@
-!> Starts of steady sliding with friction: the contact without friction, and full sliding in one direction.
+!> Start values for steady sliding with friction: the contact without friction, and full sliding in one direction.
 module steady_start
    use asperity_precision, only : dp
    use friction_law, only : friction_law_type
@@ -13,11 +13,11 @@ module steady_start
 
    public :: contact_without_friction, full_sliding, ratio_of_sliding
 
-   real(dp), parameter :: rough = 1e-2_dp              !! tolerance of a start
+   real(dp), parameter :: rough = 1e-2_dp              !! tolerance of the frictionless contact
 
 contains
 
-   !> The contact without friction, with the road as it was read.
+   !> Solve the contact without friction on the road as it was read last.
    subroutine contact_without_friction(solver, operator, task, contact, outcome)
       type(steady_normal_type), intent(inout) :: solver
       type(steady_operator_type), intent(inout) :: operator
