@@ -264,7 +264,7 @@ def sphere_map():
 
 
 @pytest.mark.parametrize(("potential", "share"), [("exponential", 0.7), ("maugis_dugdale", 1.0)])
-def test_cells_too_coarse_for_the_range_are_told(potential, share):
+def test_cells_too_coarse_for_the_range_are_reported(potential, share):
     """In the words and by the bounds of the program: 0.7 E* range^2/energy, or the whole of it."""
     bound = share * MODULUS * 0.1e-6**2 / ENERGY
     n = round(SIDE / bound)

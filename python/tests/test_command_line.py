@@ -53,7 +53,7 @@ def folder(tmp_path_factory):
     ("1e6 /", "1e6, temperature = 50, wlf_c1 = 5, wlf_c2 = 100 /", ""),
     ("1e6 /", "1e6, temperature = 20 /", ""),
 ])
-def test_values_without_effect_are_told(program, folder, old, new, told):
+def test_values_without_effect_are_reported(program, folder, old, new, told):
     done = check(program, folder, GOOD.replace(old, new, 1))
     assert done.returncode == 0
     assert done.out.count("has no effect") == (1 if told else 0)
@@ -241,8 +241,8 @@ def test_check_reads_height_maps(program, tmp_path):
     assert call(program, "check", tmp_path / "case.nml").returncode == 2  # from another folder
 
 
-def test_a_missing_height_map_is_told_with_its_place(program, tmp_path):
-    """Input, group, variable and line are named; several maps are told at once."""
+def test_a_missing_height_map_is_reported_with_its_place(program, tmp_path):
+    """The message names input, group, variable and line, and reports several maps at once."""
     text = GOOD.replace("shape = 'sphere', radius = 0.01 /",
                         "shape = 'file', file = 'nowhere.h5' /\n"
                         "&surface shape = 'file', file = 'case.nml' /")

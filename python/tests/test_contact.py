@@ -174,7 +174,7 @@ def test_wrong_values(changes, message):
 
 
 def test_masked_points_are_refused():
-    """What lies below a mask is no height."""
+    """Values below a mask are not heights."""
     height = np.ma.masked_array(np.ones((4, 6)), False)
     height[1, 2] = np.ma.masked
     for call in (lambda: asperity.solve_normal(height, 1.0, 1.0, 1e6, pressure=1.0),

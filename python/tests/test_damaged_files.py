@@ -48,7 +48,7 @@ def test_declared_size_beyond_32_bits(program: str, case: Path, tmp_path: Path) 
 
 
 def test_virtual_map_without_its_source(program: str, case: Path, tmp_path: Path) -> None:
-    """A virtual dataset reads as zeros where its source is missing: that is no flat road."""
+    """A virtual dataset without its source reads as zeros, which must not pass for a flat road."""
     heights = np.random.default_rng(2).standard_normal((16, 12)) * 1e-4
     (tmp_path / "part").mkdir()
 

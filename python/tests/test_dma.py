@@ -158,7 +158,7 @@ def test_several_temperatures_with_shifts_from_the_overlap(tmp_path, amount, err
     assert np.abs(np.log10(ratio)).max() < 0.05
 
 
-def test_sweeps_that_do_not_reach_each_other_are_told():
+def test_sweeps_that_do_not_overlap_are_reported():
     rows = np.array(sweeps((-40.0, 20.0), np.logspace(0, 1, 6)))
     fit = fit_dma(DmaTable(TWO_PI * rows[:, 0], 1e6 * rows[:, 1], 1e6 * rows[:, 2], rows[:, 3]))
     assert any("-40 and 20 C hardly overlap" in note for note in fit.notes)
@@ -414,7 +414,7 @@ def test_commas_between_thousands(tmp_path):
 
 
 def test_data_that_say_little_are_named(tmp_path):
-    """One frequency is refused; a narrow band and fewer points than arms are told."""
+    """One frequency is an error; a narrow band and fewer points than arms give notes."""
     head = "f (Hz),G' (Pa),G'' (Pa)"
     one = read_dma(write(tmp_path / "one.csv", head, [(10.0, 2e6, 1e5)] * 4))
     with pytest.raises(ValueError, match=r"all 4 points are at one frequency, 62.83 rad/s"):

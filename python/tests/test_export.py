@@ -43,7 +43,7 @@ def test_to_xarray_without_xarray(result, monkeypatch):
 
 
 def read_vtk(path):
-    """Return the image that VTK reads, and the errors it told."""
+    """Return the image that VTK reads, and the errors that it reported."""
     reader = vtk.vtkXMLImageDataReader()
     errors = []
     reader.AddObserver("ErrorEvent", lambda *_: errors.append("error"))

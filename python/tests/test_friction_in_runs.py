@@ -1,4 +1,4 @@
-"""The bound and the law of slip, computed anew from what a run has written.
+"""The bound and the law of slip, recomputed from the fields that a run has written.
 
 Nothing of the program is used: the slope of the road under each point is read from the map by the
 rule of the manual (cubic spline, or bilinear between central differences), and the bound follows

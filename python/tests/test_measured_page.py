@@ -60,7 +60,7 @@ def test_from_measurements_to_friction(program, tmp_path, monkeypatch, capsys):
 
 
 def test_the_page_names_every_option():
-    """Options of both verbs are told in the page, and those told exist."""
+    """The page describes the options of both verbs, and all options that it names exist."""
     from asperity.__main__ import main
 
     shown = set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", PAGE))

@@ -176,7 +176,7 @@ def test_westergaard_on_three_processes(tmp_path: Path) -> None:
 
 
 def test_a_sliding_viscoelastic_wave_on_three_processes(tmp_path: Path) -> None:
-    """Full contact from rest: the road crosses the rows of all processes, a cell in each step."""
+    """Full contact from rest: the road crosses the rows of all processes by one cell per step."""
     rows, steps, speed, amplitude = 128, 64, 0.05, 1e-6
     rubber = Prony(1e6, [2e6, 4e6], [1e-3, 1e-2])
     duration = steps * 1e-3 / rows / speed
@@ -328,7 +328,7 @@ STUCK = """&grid nx = 48, ny = 41, lx = 1e-3, ly = 0.9e-3 /
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 def test_a_row_is_given_up_together_though_clocks_differ(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The patience with a row in hand ends on one process long before it ends on the others."""
+    """The time limit of the present row ends on one process long before it ends on the others."""
     library = tmp_path / "other_clock.so"
     subprocess.run(["gcc", "-O1", "-shared", "-fPIC", "-o", library,
                     Path(__file__).with_name("other_clock.c")], check=True)

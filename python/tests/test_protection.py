@@ -70,7 +70,7 @@ def test_overwrite_in_python(program: str, case: Path) -> None:
 
 
 def test_result_in_use(program: str, case: Path) -> None:
-    """A second run on the same result ends at once and says who has it; the first goes on."""
+    """A second run on the same result ends at once and names the first, which continues."""
     result = case.with_suffix(".h5")
     process = vc.start(program, case)
     vc.wait_for_rows(process, result, 2)
@@ -148,7 +148,7 @@ def test_height_map_stays(program: str, tmp_path: Path, name: str) -> None:
 
 
 def test_other_hdf5_file_stays(program: str, case: Path) -> None:
-    """Neither is an HDF5 file that is no result replaced, nor anything that is no HDF5 file."""
+    """A file that is not a result is never replaced, whether it is an HDF5 file or not."""
     result = case.with_suffix(".h5")
     with h5py.File(result, "w") as file:
         file["precious"] = 1.0
@@ -220,7 +220,7 @@ def test_time_limit(program: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("text", ["", "x", "1:2:3:4", "0", "-1", "1-", "1.5", ":", "99999999999"])
 def test_time_limit_is_checked(program: str, case: Path, text: str) -> None:
-    """What is no duration is an error of the command line."""
+    """A text that is not a duration is an error of the command line."""
     done = vc.run(program, case, f"--time-limit={text}")
     assert done.returncode == 2, done.stderr
     assert "--time-limit" in done.stderr

@@ -117,12 +117,12 @@ def test_the_advice_on_arms_is_measured():
     assert max(abs(number(cell)) for cell in kept[3][1:]) < 5 < abs(number(kept[1][1]))
 
 
-def test_the_foretold_memory_is_what_runs_take():
+def test_the_predicted_memory_is_what_runs_take():
     page = (ROOT / "docs" / "choosing.md").read_text()
     kept = rows(page.split("<!-- cost: begin -->")[1].split("<!-- cost: end -->")[0])[1:]
     assert len(kept) == 6
-    for _, told, taken, *_ in kept:
-        assert float(told) == pytest.approx(float(taken), rel=0.1)
+    for _, predicted, taken, *_ in kept:
+        assert float(predicted) == pytest.approx(float(taken), rel=0.1)
 
 
 def test_pull_off_of_the_guide_shows_the_limit_of_the_grid():

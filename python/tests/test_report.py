@@ -216,8 +216,8 @@ def test_the_page_says_whether_a_run_seems_dead(tmp_path):
     assert "Outcome: stopped after step 5;" in text and "perhaps killed" not in text
 
 
-def test_what_is_no_number_is_told(tmp_path):
-    """Damaged values are named; the page is whole without them."""
+def test_values_that_are_not_finite_are_reported(tmp_path):
+    """The page names damaged values and is complete without them."""
     path = frictional_result(tmp_path / "holes.h5")
     with h5py.File(path, "a") as file:
         for name in ("friction", "seconds", "residual_normal"):
@@ -234,7 +234,7 @@ def test_what_is_no_number_is_told(tmp_path):
     assert fields["gap"]["high"] == 0.0
 
 
-def test_residuals_above_the_tolerance_are_told(frictional):
+def test_residuals_above_the_tolerance_are_reported(frictional):
     with h5py.File(frictional, "a") as file:
         file.attrs["settings"] = "&solver\n  tolerance = 2.5e-7\n/\n"
     text = report_page(asperity.open(frictional))

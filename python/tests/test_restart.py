@@ -1,4 +1,4 @@
-"""A run that stops and goes on gives the numbers of one that never stopped."""
+"""A run that stops and continues gives the same numbers as one that never stopped."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ def test_other_height_map(program: str, tmp_path: Path) -> None:
 
 
 def test_result_of_another_run(program: str, tmp_path: Path) -> None:
-    """A checkpoint goes on with the result that it was written with, and with no other."""
+    """A checkpoint continues only the result that it was written with."""
     heights = 4e-6 * np.random.default_rng(1).standard_normal((17, 24))
     write_map(tmp_path, heights)
     case = stopped_case(program, tmp_path, "case")
@@ -218,7 +218,7 @@ def test_checkpoint_without_its_result(program: str, case: Path) -> None:
 
 
 def test_output_elsewhere(program: str, case: Path, tmp_path: Path, reference: Path) -> None:
-    """--restart goes on with the result that --output names."""
+    """--restart continues the result that --output names."""
     elsewhere = tmp_path / "folder"
     elsewhere.mkdir()
     process = vc.start(program, case, "--output", str(elsewhere / "road.h5"))
@@ -231,7 +231,7 @@ def test_output_elsewhere(program: str, case: Path, tmp_path: Path, reference: P
 
 
 def test_file_too_large(program: str, case: Path, reference: Path) -> None:
-    """A full disk: exit 3, the rows are kept; with room again the run goes on."""
+    """On a full disk a run ends with status 3 and keeps its rows; with space it continues."""
     case.write_text(vc.text(output="checkpoint_every = 5, snapshot_every = 2"))
     size = reference.stat().st_size
     done = vc.run(program, case, preexec_fn=lambda: resource.setrlimit(

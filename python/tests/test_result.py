@@ -118,8 +118,8 @@ def unfinished(path, *, ago, seconds=0.25, outcome="running"):
     return asperity.open(path)
 
 
-def test_a_killed_run_is_told_from_one_that_goes_on(tmp_path):
-    """What counts is how long nothing was written against the time a row takes."""
+def test_a_killed_run_is_distinguished_from_one_that_continues(tmp_path):
+    """The test compares the time since the last write with the time of a row."""
     dead = unfinished(tmp_path / "dead.h5", ago=190)
     assert dead.state == ("not finished, last written 3 min 10 s ago, and a row takes up to 0.25 s:"
                           " perhaps no longer running")

@@ -100,7 +100,7 @@ def test_a_look_at_a_run_that_goes_on(case, monkeypatch):
     assert rows == list(range(1, 10))
 
 
-def test_faults_of_the_input_are_all_told(case):
+def test_all_faults_of_the_input_are_reported(case):
     case.write_text(SLIDING.replace("nx = 32", "nx = -4").replace("'sine'", "'sinus'"))
     with pytest.raises(ValueError, match=r"nx = -4") as caught:
         asperity.run(case)

@@ -1,4 +1,4 @@
-"""Signals to a run, and a look at it while it goes on."""
+"""Signals to a run, and readings of its result while it runs."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def stuck(tmp_path: Path) -> Path:
 
 
 def test_stop_within_a_row(program: str, stuck: Path) -> None:
-    """A row that takes long is given up; the run goes on from the row before."""
+    """A stop abandons a long row; a restart continues from the row before."""
     result = stuck.with_suffix(".h5")
     for restart in ([], ["--restart"]):
         process = vc.start(program, stuck, *restart)
@@ -163,7 +163,7 @@ def wait_for_work(process: subprocess.Popen, seconds: float = 1.0) -> None:
     (("--time-limit", "0:03"), 124, "the time limit is near: stopped before the first row")])
 def test_stop_within_a_solve(program: str, tmp_path: Path, more: tuple[str, ...], status: int,
                              reason: str) -> None:
-    """A row without friction is given up as well, for a signal and for the limit of time."""
+    """A row without friction is abandoned as well, for a signal and for the time limit."""
     case = tmp_path / "endless.nml"
     case.write_text(ENDLESS)
     process = vc.start(program, case, *more)
@@ -214,7 +214,7 @@ def test_stop_before_the_first_row(program: str, case: Path) -> None:
 
 
 def test_checkpoint_on_demand(program: str, case: Path) -> None:
-    """SIGUSR1 writes a checkpoint and the run goes on to its end."""
+    """SIGUSR1 writes a checkpoint, and the run continues to its end."""
     result, checkpoint = case.with_suffix(".h5"), case.with_suffix(".checkpoint.h5")
     process = vc.start(program, case)
     assert not checkpoint.exists()

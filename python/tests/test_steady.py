@@ -183,7 +183,7 @@ def curve(speeds: int = 8) -> str:
 
 
 def test_restart(program: str, tmp_path: Path) -> None:
-    """A curve that is stopped goes on to the same bits, with the losses of every row."""
+    """A curve that is stopped and continued has the same bits, with the losses of every row."""
     whole, parts = tmp_path / "whole.nml", tmp_path / "parts.nml"
     for path in (whole, parts):
         path.write_text(curve())
@@ -221,7 +221,7 @@ def test_restart(program: str, tmp_path: Path) -> None:
     ],
 )
 def test_messages(program: str, tmp_path: Path, change: str, message: str) -> None:
-    """What a steady phase excludes is told with what is allowed."""
+    """The message says what a steady phase excludes and what it allows."""
     case = tmp_path / "case.nml"
     case.write_text(
         "&grid nx = 8, ny = 8, lx = 1 / &surface shape = 'flat' /"

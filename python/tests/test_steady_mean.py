@@ -13,7 +13,7 @@ LX, LY = 1e-3, 0.5e-3
 
 
 def run_of(travel, friction, angle=0.0, settings=""):
-    """Return what steady_mean needs of a run: a slide of 0.1 m/s after a row at rest."""
+    """Return the parts of a run that steady_mean needs: a slide of 0.1 m/s after a row at rest."""
     along = np.concatenate([[0.0], np.asarray(travel)])
     columns = {"time": along / 0.1, "road_x": along * math.cos(angle),
                "road_y": along * math.sin(angle), "phase": np.full(along.size, 1),
@@ -42,7 +42,7 @@ def test_whole_laps_give_the_mean_and_parts_do_not():
     assert abs(friction[len(friction) // 2:].mean() - 0.3) > 0.01  # which the second half is not
 
 
-def test_part_of_a_lap_is_told():
+def test_part_of_a_lap_is_reported():
     found = steady_mean(run_of(*waves(0.8)))
     assert found.laps == pytest.approx(0.4) and math.isnan(found.error)
     assert "even have the wrong sign" in found.note
@@ -67,7 +67,7 @@ def test_the_error_is_that_of_the_laps():
 
 
 def test_laps_of_oblique_slides():
-    """A lap ends where the road begins anew along one of the axes."""
+    """A lap ends where the road repeats along one of the axes."""
     angle = math.radians(20.0)
     lap = min(LX / math.cos(angle), LY / math.sin(angle))
     travel = np.arange(1, 1001) * lap * 4.5 / 1000

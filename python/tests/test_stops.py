@@ -44,7 +44,7 @@ OUTPUTS = ["snapshot_every = 5", "snapshot_times = 0, 0.011, 0.06, 0.15", ""]
 
 @pytest.mark.parametrize("output", OUTPUTS)
 def test_snapshots_after_stops(tmp_path: Path, output: str) -> None:
-    """The snapshot of a stop is there to look at, and gone when the run goes on."""
+    """A stop writes a snapshot, which is removed when the run continues."""
     whole, parts = tmp_path / "whole.nml", tmp_path / "parts.nml"
     for case in (whole, parts):
         case.write_text(vc.text(steps=8, size=24, output=output or "compression = 0"))
@@ -87,7 +87,7 @@ OVER_THE_EDGE = """
 @pytest.mark.parametrize("text, word", [(SWINGING, "numerical stick-slip"),
                                         (OVER_THE_EDGE, "edge")])
 def test_warnings_after_stops(tmp_path: Path, text: str, word: str) -> None:
-    """What a run has seen so far is in the checkpoint: no warning is lost or told twice."""
+    """The checkpoint contains the warnings so far: none is lost or repeated."""
     whole, parts = tmp_path / "whole.nml", tmp_path / "parts.nml"
     for case in (whole, parts):
         case.write_text(text)

@@ -209,7 +209,7 @@ def test_a_failing_case_does_not_lose_the_others(tmp_path):
     assert len(kept.failed) == 1 and kept.contact_area[1] == 1.0
 
 
-def test_wrong_inputs_are_told_before_anything_runs(tmp_path):
+def test_wrong_inputs_are_reported_before_anything_runs(tmp_path):
     parameters = {"phase.pressure": [1e3, -1e3], "grid.nx": [64]}
     with pytest.raises(ValueError, match=r"phase.pressure = -1000.0, grid.nx = 64: .*adhesion"):
         sweep(wave(), parameters, folder=tmp_path / "new")

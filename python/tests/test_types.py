@@ -1,4 +1,4 @@
-"""What type checkers know: the groups of an input, the columns of a history, of a row."""
+"""Type checkers know the groups of an input and the columns of a history and of a row."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def test_a_new_column_is_one_declaration(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_a_new_column_or_field_reaches_types_and_page(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A line of the program's tables becomes types in Python, and a row of the page."""
+    """A line of the program's tables becomes types in Python and a row of the page."""
     monkeypatch.syspath_prepend(ROOT / "tools")
     make_types = importlib.import_module("make_types")
     known, stored = columns(), fields()

@@ -92,7 +92,7 @@ def test_plain_lines_where_there_is_no_terminal(tmp_path, monkeypatch):
 
 
 def test_a_run_that_was_killed_or_stopped(tmp_path, monkeypatch):
-    """A silent run is told once that it is perhaps dead; the view of a stopped one ends."""
+    """The view reports once that a silent run may be dead, and ends for a stopped run."""
     path = frictional_result(tmp_path / "silent.h5", finished=0)
     looks = []
 

@@ -24,7 +24,7 @@ OURS = re.compile(r"lib(fftw3f?|hdf5\w*|gfortran|gomp|quadmath|sz|aec)[-.]")
 
 @pytest.fixture(scope="module")
 def built():
-    """Return the folder with the archive and the wheel, made anew."""
+    """Build the archive and the wheel; return their folder."""
     if not (ROOT / ".git").exists():
         pytest.skip("the archive is made from a git repository")
     subprocess.run(["sh", "tools/make_wheel.sh"], cwd=ROOT, check=True, capture_output=True)

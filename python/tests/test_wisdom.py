@@ -16,7 +16,7 @@ CASE = """&grid nx = {n}, ny = {n}, lx = 1.0 /
 
 
 def state(path: Path) -> tuple[int, int]:
-    """What changes when a file is written anew."""
+    """Return the state of a file that changes when it is written again."""
     status = path.stat()
     return status.st_ino, status.st_mtime_ns
 

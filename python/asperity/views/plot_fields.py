@@ -124,7 +124,22 @@ def plot_section(snapshot: Snapshot, ax: Axes | None = None) -> Axes:
 
 
 def frame_of(grid: Grid) -> tuple[float, str, tuple[float, float, float, float]]:
-    """Return the factor and unit of lengths, and the edges of the map in that unit."""
+    """Return the unit of lengths of a map, and the map's edges.
+
+    Parameters
+    ----------
+    grid : Grid
+        Grid of the map.
+
+    Returns
+    -------
+    factor : float
+        Lengths in m times this factor are in the unit.
+    unit : str
+        The unit, such as ``"mm"``.
+    edges : tuple of float
+        Edges of the outer cells in this unit: left, right, bottom, top.
+    """
     length, unit = si_scale([grid.lx, grid.ly], "m")
     edges = length * np.array([-0.5 * grid.dx, grid.lx - 0.5 * grid.dx,
                                -0.5 * grid.dy, grid.ly - 0.5 * grid.dy])
@@ -135,6 +150,24 @@ def field_style(field: NDArray[Any], name: str, units: str) -> tuple[float, str,
     """Return factor and unit of the colour scale of a field, and arguments of imshow.
 
     The scale of a field with both signs is white at zero. The scale of one sign begins at zero.
+
+    Parameters
+    ----------
+    field : ndarray
+        Values, shape (ny, nx), in `units`.
+    name : str
+        Name of the field, such as ``"pressure"``.
+    units : str
+        SI unit of the field.
+
+    Returns
+    -------
+    factor : float
+        Values times this factor are in the unit.
+    unit : str
+        The unit of the colour scale, such as ``"MPa"``.
+    style : dict
+        The arguments ``cmap``, ``vmin`` and ``vmax`` of `imshow`, in this unit.
     """
     factor, unit = si_scale(typical_value(field), units)
     low, high = float(field.min()) * factor, float(field.max()) * factor
@@ -156,7 +189,20 @@ def field_style(field: NDArray[Any], name: str, units: str) -> tuple[float, str,
 
 
 def without_open_cells(field: NDArray[Any], name: str) -> NDArray[Any]:
-    """Return a field to be drawn, in which cells without pressure (out of contact) are masked."""
+    """Return a field for a picture, in which cells out of contact are masked.
+
+    Parameters
+    ----------
+    field : ndarray
+        Values, shape (ny, nx).
+    name : str
+        Name of the field. Only ``"pressure"`` without tension is masked, where it is zero.
+
+    Returns
+    -------
+    ndarray
+        The masked field, or the field itself.
+    """
     if name == "pressure" and field.min(initial=0.0) >= 0.0:
         return np.ma.masked_less_equal(field, 0.0)
     return field
@@ -194,7 +240,18 @@ def _map(grid: Grid, field: NDArray[Any], name: str, label: str, units: str, axe
 
 
 def state_style(run: ResultFile) -> dict[str, Any]:
-    """Return arguments of imshow for the map of open, sticking and slipping cells."""
+    """Return arguments of imshow for the map of open, sticking and slipping cells.
+
+    Parameters
+    ----------
+    run : ResultFile
+        The result; without friction, sticking and slipping cells have the same colour.
+
+    Returns
+    -------
+    dict
+        The arguments ``cmap`` and ``norm`` of `imshow`, for the values 0, 1 and 2.
+    """
     colours = [NO_CONTACT, STICK, SLIP] if has_friction(run) else [NO_CONTACT, STICK, STICK]
     return {"cmap": ListedColormap(colours), "norm": BoundaryNorm([-0.5, 0.5, 1.5, 2.5], 3)}
 
