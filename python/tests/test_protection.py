@@ -45,7 +45,7 @@ def test_unfinished_run_is_kept(program: str, case: Path) -> None:
     assert done.returncode == 3
     assert "y.h5: holds an unfinished run: --restart continues it" in done.stderr
     assert result.read_bytes() == before
-    with pytest.raises(OSError, match=r"unfinished run: restart=True continues it .* another output"):
+    with pytest.raises(OSError, match=r"run: restart=True continues it .* another output"):
         asperity.run(case)
     result.unlink()
     done = vc.run(program, case)
