@@ -109,6 +109,7 @@ contains
             if (found%pressure(i, j) <= 0.0_dp .and. .not. any(abs(found%traction(i, :, j)) > 0.0_dp)) cycle
             state%rubbing(i, :, j) = state%traction(i, :, j) - star
             state%contact(i, j) = 2_int8
+            if (.not. found%pressure(i, j) > 0.0_dp) cycle       ! partly sheared: it slips
             if (tangential%law%bound_ratio(found%pressure(i, j), slope, state%traction(i, :, j) - star) > within) &
                state%contact(i, j) = 1_int8
          end do
