@@ -503,6 +503,18 @@ contains
       ! (R gamma_0^2/E*^2)^(1/3)/z_0 = 0.5
       call check_that(index(notes, 'paraboloid: Tabor parameter 0.5') > 0 .and. case%warnings == '', &
          'advice: '//notes//case%warnings)
+      ! a = (3 pi gamma_0 R^2/(4 E*))^(1/3) = 6.65 um: an eighth of it is less than 38 um/44.
+      call parse_case(free_map//sphere//elastic//sticky('maugis_dugdale', '0.5e-6')// &
+         '&phase displacement = -1e-7 /', 'test.nml', case, error)
+      call check_no_error(error, 'advice: pull')
+      call check_that(index(case%warnings, 'are larger than '// &
+         to_text((0.75_dp*pi*energy*radius**2/e_star)**(1.0_dp/3.0_dp)/8.0_dp)//' m, an eighth') > 0, &
+         'advice: pull: '//case%warnings)
+      ! A third is enough for a smooth potential.
+      call parse_case(free_map//sphere//elastic//sticky('gauss', '0.5e-6')//'&phase displacement = -1e-7 /', &
+         'test.nml', case, error)
+      call check_no_error(error, 'advice: pull on fine cells')
+      call check_that(case%warnings == '', 'advice: pull on fine cells: '//case%warnings)
       call parse_case('&grid nx = 64, ny = 37, lx = 40e-6, ly = 23.0940107675850e-6 /'//nl// &
          '&surface shape = ''hexagonal_wave'', amplitude = 0.8e-6, wavelength = 40e-6 /'//nl//elastic// &
          sticky('exponential', '0.5e-6')//'&phase pressure = 5e4 /', 'test.nml', case, error)

@@ -5,6 +5,7 @@ python tools/campaign_contact.py extreme 2000       tiny loads, displacements be
 python tools/campaign_contact.py sizes              errors of rough contacts of few cells
 python tools/campaign_contact.py hertz              errors of single contacts of few cells
 python tools/campaign_contact.py oblong             iterations with cells longer than wide
+python tools/campaign_contact.py pull               errors of the pull-off force of spheres
 """
 
 import argparse
@@ -166,6 +167,43 @@ def hertz(rng, count):
                       f" wrong ({inside.size} places)")
 
 
+def largest_pull(parameter, cells, place, potential):
+    """Return the pull-off force of a sphere; `cells` are those of a = (3 pi w R^2/(4 E*))^(1/3).
+
+    In Maugis's units: R = 1, w = 1/pi, E* = 3/4, so that a = 1 and the force is in pi w R.
+    """
+    reach, dx = 2 / (np.pi * parameter), 1 / cells
+    n = math.ceil((3.6 + 2 * reach) / dx)
+    x, y = ((np.arange(n) - n // 2 - part) * dx for part in place)
+    height = -(x**2 + y[:, None] ** 2) / 2
+    contact, least = "non_adhesive", 0.0
+    for approach in np.linspace(0.2, -1.4 - reach / 2, 80):
+        contact = asperity.solve_adhesive(
+            height, n * dx, None, 0.75, potential=potential, energy=1 / np.pi, range=reach,
+            displacement=approach, boundary="free", start=contact)
+        least = min(least, contact.force)
+    return -least
+
+
+def pull():
+    """Print the worst error of the pull-off force by the cells of a over summits in four places."""
+    for potential in ("maugis_dugdale", "exponential"):
+        for parameter in (0.5, 1.0, 2.0):
+            if potential == "maugis_dugdale":
+                exact = -min(asperity.theory.maugis(1.0, 0.75, 1 / np.pi, contact_radius=radius,
+                                                    maugis_parameter=parameter).force
+                             for radius in np.linspace(0.02, 1.5, 400))
+            else:
+                exact = largest_pull(parameter, 20.0, (0.1, 0.3), potential)
+            for cells in (2.0, 3.0, 4.0, 6.0, 8.0, 12.0):
+                errors = [largest_pull(parameter, cells, place, potential) / exact - 1
+                          for place in ((0.0, 0.0), (0.5, 0.5), (0.0, 0.5), (0.3, 0.15))]
+                # a/dx = pi lambda^2/3 over dx in E* range^2/w
+                print(f"{potential}, lambda {parameter:g}, {cells:g} cells in a (dx ="
+                      f" {np.pi * parameter**2 / 3 / cells:.2f} E* range^2/energy): pull-off"
+                      f" {100 * max(errors, key=abs):+.1f} % at worst", flush=True)
+
+
 def sizes():
     """Print the errors of the area of rough maps by cells across a patch."""
     for pressure in (0.002, 0.01, 0.05, 0.2):
@@ -199,7 +237,7 @@ def main():
     """Run the chosen campaign."""
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["normal", "extreme", "sizes", "hertz", "oblong"])
+    parser.add_argument("what", choices=["normal", "extreme", "sizes", "hertz", "pull", "oblong"])
     parser.add_argument("count", nargs="?", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
@@ -207,6 +245,8 @@ def main():
     rng = np.random.default_rng(given.seed)
     if given.what == "sizes":
         sizes()
+    elif given.what == "pull":
+        pull()
     elif given.what == "hertz":
         hertz(rng, given.count)
     elif given.what == "oblong":

@@ -3,8 +3,11 @@
 !> * Resolution. The zone where the surfaces separate is about E* z_0^2/gamma_0 wide. If the cells are larger
 !>   than 0.7 times this width, the contact edge sticks to the grid, and the state depends on the path. With
 !>   maugis_dugdale the cells may be as large as the zone, because the edge of its range is widened to suit the
-!>   cells (module `adhesion_potential`). The pull-off force of a sphere then has an error of 2 %, and of 4 % on
-!>   cells of 1.6 times the width.
+!>   cells (module `adhesion_potential`).
+!> * Size of the contact. A sphere is pulled off from a contact of about the radius a = (3 pi gamma_0
+!>   R^2/(4 E*))^(1/3). With two cells in a the pull-off force is up to 13 % too large, even if the cells resolve
+!>   the zone above. With three cells in a and a smooth potential it is right within 4 %, with eight cells and
+!>   maugis_dugdale within 3 % (`python tools/campaign_contact.py pull`).
 !> * Tabor's parameter of a sphere, (R gamma_0^2/(E*^2 z_0^3))^(1/3) (thesis, eq. 1.2).
 !> * The criteria of the thesis (eq. 4.7-4.9) for each wave or random term. If one of them is small
 !>   compared with 1, adhesion may be neglected:
@@ -29,11 +32,13 @@ module adhesion_advice
    implicit none
    private
 
-   public :: adhesion_criteria, adhesion_edge, adhesion_notes, adhesion_warning
+   public :: adhesion_criteria, adhesion_edge, adhesion_notes, adhesion_warning, pull_off_warning
 
    character(*), parameter :: nl = new_line('a')
    real(dp), parameter :: smooth_limit = 0.7_dp    !! largest cell over the width of the zone
    real(dp), parameter :: square_limit = 1.0_dp    !! the same for maugis_dugdale
+   real(dp), parameter :: smooth_cells = 3.0_dp    !! cells in the radius of a contact at pull-off
+   real(dp), parameter :: square_cells = 8.0_dp    !! the same for maugis_dugdale
 
 contains
 
@@ -51,6 +56,46 @@ contains
       text = '&adhesion: cells of '//to_text(cell)//' m are larger than '//zone_in_words(case)//' = '// &
          to_text(limit)//' m'//with_modulus(case)//': the edge of the contact sticks to the grid'
    end function adhesion_warning
+
+   !> A warning where a sphere is pulled off from a contact of too few cells; empty if there are enough.
+   !> Under a load that presses the contact is larger, and its size in the run is looked at instead.
+   function pull_off_warning(case) result(text)
+      type(case_type), intent(in) :: case
+      character(:), allocatable :: text
+      character(:), allocatable :: part
+      real(dp) :: cell, modulus, radius, cells
+      integer :: i
+
+      text = ''
+      if (.not. (sticks(case) .and. pulls(case))) return
+      cell = longer_side(case)
+      modulus = contact_modulus(case, softest_modulus(case))
+      cells = smooth_cells
+      part = 'a third'
+      if (case%adhesion%potential == 'maugis_dugdale') then
+         cells = square_cells
+         part = 'an eighth'
+      end if
+      do i = 1, size(case%surfaces)
+         associate (term => case%surfaces(i))
+            if (term%shape /= 'sphere' .and. term%shape /= 'paraboloid') cycle
+            radius = (0.75_dp*pi*case%adhesion%energy*term%radius**2/modulus)**(1.0_dp/3.0_dp)
+            if (cells*cell <= radius) cycle
+            text = '&adhesion: cells of '//to_text(cell)//' m are larger than '//to_text(radius/cells)// &
+               ' m, '//part//' of the radius of the contact from which the '//trim(term%shape)//' is pulled off, '// &
+               '(3 pi energy radius^2/(4 E*))^(1/3)'//with_modulus(case)//': the pull-off force will be too large'
+            return
+         end associate
+      end do
+   end function pull_off_warning
+
+   !> Does the load of a phase pull, or does it lift the rubber from first touch?
+   pure function pulls(case)
+      type(case_type), intent(in) :: case
+      logical :: pulls
+
+      pulls = any(case%phases%target < 0.0_dp)
+   end function pulls
 
    !> Numbers that show the effect of adhesion, one per line, without a line end after the last; empty without
    !> adhesion.

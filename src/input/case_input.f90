@@ -1,6 +1,6 @@
 !> Reads a case: a file of namelists becomes checked settings, or one error with all its faults.
 module case_input
-   use adhesion_advice, only : adhesion_warning
+   use adhesion_advice, only : adhesion_warning, pull_off_warning
    use case_friction, only : resolve_friction, unused_variable
    use case_files, only : default_result, overwritten_file
    use case_material, only : resolve_material
@@ -119,6 +119,7 @@ contains
          call add_warning(case, steepness_warning(case%surfaces(i)))
       end do
       call add_warning(case, adhesion_warning(case))
+      call add_warning(case, pull_off_warning(case))
    end subroutine add_warnings
 
    !> Warn of values that are given but have no effect.
