@@ -57,6 +57,7 @@ contains
       if (selected('line_contacts_along_x_and_y_agree')) call line_contacts_along_x_and_y_agree()
       if (selected('uniform_contact_moves_by_mean_mode')) call uniform_contact_moves_by_mean_mode()
       if (selected('own_solution_is_kept')) call own_solution_is_kept()
+      if (selected('expected_slip_is_a_good_start')) call expected_slip_is_a_good_start()
       if (selected('past_traction_is_like_a_drive')) call past_traction_is_like_a_drive()
       if (selected('block_dragged_into_full_slip_and_back')) &
          call block_dragged_into_full_slip_and_back()
@@ -90,8 +91,9 @@ contains
    end subroutine new_case
 
    !> Solve.
-   subroutine solve_case(self, past)
+   subroutine solve_case(self, past, slip_unit)
       type(case_type), intent(inout), target :: self
+      real(dp), intent(in), optional :: slip_unit       !! rx and ry times this are the slip that is expected
       real(dp), intent(in), contiguous, target, optional :: past(:, :, :)   !! T_h, [nx, 2, ny]
       type(friction_fields_type) :: fields
       real(dp), allocatable, target :: drive(:, :, :), traction(:, :, :), slip(:, :, :)
@@ -109,6 +111,11 @@ contains
       if (present(past)) fields%past => past
       fields%traction => traction
       fields%slip => slip
+      if (present(slip_unit)) then
+         fields%slip_unit = slip_unit
+         slip(:, 1, :) = self%rx
+         slip(:, 2, :) = self%ry
+      end if
       fields%contact => self%contact
       call self%solver%solve(self%operator, self%law, fields, self%result)
       self%tx = traction(:, 1, :)
@@ -849,6 +856,51 @@ contains
       call check_that(all((self%contact /= contact_open) .eqv. self%p > 0.0_dp), 'contact of it')
       call end_case(self)
    end subroutine own_solution_is_kept
+
+   !> Where all points slip far, the direction of the slip alone makes the start: after the solution's own slip
+   !> there is nothing left to do, whatever the points knew of their tractions.
+   subroutine expected_slip_is_a_good_start()
+      type(case_type) :: self
+      real(dp), allocatable :: tx(:, :), ty(:, :)
+      integer :: boundary, k, before
+
+      do boundary = boundary_periodic, boundary_free
+         do k = 1, 2
+            call new_case(self, 40, 32, 1.0_dp, 0.8_dp, boundary, 0.5_dp, 0.5_dp)
+            call set_rough(self, 8 + boundary, 0.1_dp, 0.2_dp)
+            self%law = new_friction_law('coulomb', 0.3_dp, 0.0_dp, 0.0_dp, .true., k == 1)
+            self%drive_x = 2.0_dp
+            self%drive_y = 1.0_dp
+            call run_case(self, 'full slip', 1e-8_dp)
+            call check_that(.not. any(self%contact == contact_stick), 'all points slip')
+            before = self%result%iterations
+            tx = self%tx
+            ty = self%ty
+
+            ! Half of the points forget their traction, as if they had just come into contact.
+            self%tx(::2, :) = 0.0_dp
+            self%ty(::2, :) = 0.0_dp
+            where (self%contact /= contact_open) self%contact = contact_stick
+            self%rx = 0.2_dp*self%rx
+            self%ry = 0.2_dp*self%ry
+            call solve_case(self, slip_unit=5.0_dp)
+            call check_that(self%result%converged, 'converged')
+            call check_that(self%result%iterations == 0 .and. before > 2, 'nothing is left to do', &
+               [real(self%result%iterations, dp), real(before, dp)])
+            call prove(self, 'from the slip', 1e-8_dp)
+            call check_order(maxval(hypot(self%tx - tx, self%ty - ty)), '<=', 1e-6_dp*maxval(hypot(tx, ty)), &
+               'the same tractions')
+
+            ! A slip that is expected to go the other way is only a bad start.
+            self%rx = -self%rx
+            self%ry = -self%ry
+            call solve_case(self, slip_unit=1.0_dp)
+            call check_that(self%result%converged, 'converged from the wrong slip')
+            call prove(self, 'from the wrong slip', 1e-8_dp)
+            call end_case(self)
+         end do
+      end do
+   end subroutine expected_slip_is_a_good_start
 
    !> A given traction T_h of the memory is the same as -A T_h in the drive.
    subroutine past_traction_is_like_a_drive()

@@ -42,6 +42,11 @@ contains
          call contact_at_the_edge_of_a_free_patch()
       if (selected('odd_prime_thin_and_stretched_grids')) call odd_prime_thin_and_stretched_grids()
       if (selected('used_solver_starts_afresh')) call used_solver_starts_afresh()
+      if (selected('solves_of_one_step_spare_products')) then
+         call solves_of_one_step_spare_products(boundary_periodic, control_pressure)
+         call solves_of_one_step_spare_products(boundary_periodic, control_approach)
+         call solves_of_one_step_spare_products(boundary_free, control_pressure)
+      end if
    end subroutine run_normal_limits
 
    !> A spike: one cell carries the load, with its own influence coefficient as the compliance.
@@ -485,5 +490,56 @@ contains
       end do
       call solver%destroy()
    end subroutine used_solver_starts_afresh
+
+   !> A road that changes a little, as from pass to pass of a step. The solve that goes on from the
+   !> displacement before spares a product at the start and one at the end, and the gap that it hands out
+   !> is still that of its pressure.
+   subroutine solves_of_one_step_spare_products(boundary, control)
+      integer, intent(in) :: boundary, control
+      type(grid_type) :: grid
+      type(normal_solver_type) :: solver
+      type(normal_problem_type) :: problem
+      type(solver_result_type) :: outcome, first, whole
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: h(:, :), p(:, :), gap(:, :), start(:, :), u(:, :), changed(:, :), fresh(:, :)
+      real(dp) :: level, levels(2), e1
+
+      grid = new_grid(70, 48, 1.0_dp, 0.8_dp, boundary)
+      call rough_height(grid, 6.0_dp, h)
+      allocate (p(70, 48), gap(70, 48), source=0.0_dp)
+      call new_normal_solver(solver, grid, normal_half_space(poisson), error)
+      call check_no_error(error, 'a solver')
+      problem%modulus = unit_modulus
+      problem%rms_height = rms(h)
+      problem%tolerance = 1e-8_dp
+      problem%control = control
+      problem%target = merge(0.03_dp, -1.5_dp*problem%rms_height, control == control_pressure)
+      problem%one_of_many = .true.
+      call solver%solve(problem, h, p, gap, level, first)
+      start = p
+      u = gap + h + level
+      changed = h + 0.01_dp*cshift(h, 7, 1)
+
+      problem%warm = .true.
+      problem%displaced = .true.
+      gap(:, :) = u
+      call solver%solve(problem, changed, p, gap, levels(1), outcome)
+      fresh = gap
+      problem%one_of_many = .false.
+      problem%displaced = .false.
+      call solver%solve(problem, changed, start, fresh, levels(2), whole)
+
+      call check_that(outcome%converged .and. whole%converged, 'both converged')
+      call check_that(outcome%iterations > 0 .and. outcome%iterations == whole%iterations, 'the same iterations')
+      call check_that(whole%ffts - outcome%ffts == 4, 'two products spared', [real(whole%ffts - outcome%ffts, dp)])
+      call check_order(maxval(abs(p - start)), '<=', 1e-9_dp*maxval(p), 'the same pressure')
+      call check_order(maxval(abs(gap - fresh)), '<=', 1e-11_dp*problem%rms_height, 'the same gap')
+      call check_close(levels(1), levels(2), 1e-11_dp*problem%rms_height, 'the same level')
+      if (boundary == boundary_periodic .and. control == control_pressure) then
+         call duality_gap(grid, problem%modulus, changed, p, e1)
+         call check_order(e1, '<=', 1.01e-8_dp, 'the error by an operator of its own')
+      end if
+      call solver%destroy()
+   end subroutine solves_of_one_step_spare_products
 
 end module test_normal_limits

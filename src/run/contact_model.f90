@@ -150,14 +150,18 @@ contains
    end function holds
 
    !> Solve the normal contact under the row's load.
-   subroutine solve_normal(self, plan, tolerance, outcome)
+   subroutine solve_normal(self, plan, tolerance, outcome, one_of_many, displaced)
       class(contact_type), intent(inout) :: self
       type(planned_row_type), intent(in) :: plan
       real(dp), intent(in) :: tolerance
       type(solver_result_type), intent(out) :: outcome
+      logical, intent(in), optional :: one_of_many  !! solves of a row, of which each goes on where the last ended
+      logical, intent(in), optional :: displaced    !! without adhesion: `gap` holds the displacement U, m
       type(normal_task_type) :: task
 
       task = normal_task_type(plan%control, plan%load, self%material%q, self%state%first)
+      if (present(one_of_many)) task%one_of_many = one_of_many
+      if (present(displaced)) task%displaced = displaced
       self%side%tolerance = tolerance
       ! Without arms `past` is not allocated, and therefore an absent argument.
       call self%side%solve(task, self%height, self%state%pressure, self%state%gap, self%state%level, &

@@ -32,6 +32,9 @@ module normal_step
       real(dp) :: load = 0.0_dp                    !! Pa, N or m
       real(dp) :: modulus = 0.0_dp                 !! Q, Pa
       logical :: first = .false.                   !! there is no state yet
+      logical :: one_of_many = .false.             !! solves of a row, of which each goes on where the last ended
+      !> Without adhesion: the gap handed in is the displacement U of the pressure handed in, m.
+      logical :: displaced = .false.
    end type normal_task_type
 
    !> Solvers and settings of the normal side. A variable of this type must not be copied.
@@ -197,6 +200,8 @@ contains
       problem%max_iterations = self%max_iterations
       problem%rms_height = self%rms_height
       problem%warm = .not. task%first
+      problem%one_of_many = task%one_of_many
+      problem%displaced = task%displaced
       call load_of(self, task, problem%control, problem%target)
       call self%normal%solve(problem, height, pressure, gap, level, outcome, past)
    end subroutine solve_bare

@@ -43,6 +43,8 @@ module tangential_step
       real(dp) :: tolerance = 1e-6_dp                 !! of the next solve
       real(dp), allocatable :: trial(:, :, :)         !! U_T at the end of the step, m [nx, 2, rows]
       real(dp), allocatable :: slip(:, :, :)          !! of the step, m
+      logical, private :: foresees = .true.           !! `slip` serves as a forecast, except with the thesis's method
+      logical, private :: slip_expected = .false.     !! `slip` is about that of the step
       logical :: pulled(2) = .false.                  !! the road is pulled by a force along x, y
       type(road_pull_type) :: road                    !! that force, and the motion that follows from it
       !> The share of its bound that each cell may carry, in place of the rule of contact [nx, rows];
@@ -60,6 +62,7 @@ module tangential_step
    contains
       procedure :: begin
       procedure :: extrapolate
+      procedure :: expect
       procedure :: solve
       procedure :: try
       procedure :: cell_compliance
@@ -94,6 +97,7 @@ contains
       self%solver%max_iterations = case%solver%max_iterations
       ! The passes judge by the displacements whether a step is solved.
       self%solver%settle = .false.
+      self%foresees = case%solver%method /= 'thesis'
       allocate (self%trial(self%grid%nx, 2, self%grid%rows()), source=0.0_dp)
       allocate (self%slip, self%drive, self%past, source=self%trial)
    end subroutine new_tangential_step
@@ -119,6 +123,7 @@ contains
       self%solver%near = .false.
       call self%road%begin(pull, motion, self%q)
       if (allocated(self%share)) deallocate (self%share)
+      self%slip_expected = .false.
       state%moved = state%moved .or. any(abs(motion) > 0.0_dp) .or. any(pulled .and. abs(pull) > 0.0_dp)
       if (.not. state%moved) return
       ! When the road returns to where it began, only round-off is left of the displacements: it must not be
@@ -223,6 +228,23 @@ contains
       self%solver%near = factor > 0.0_dp
    end subroutine extrapolate
 
+   !> Expect the surface at a place at the end of the step. Cells that slip far start in the direction of the
+   !> slip that follows from it; in later passes of the step, of the slip that the last pass has found.
+   subroutine expect(self, state, place)
+      class(tangential_step_type), intent(inout) :: self
+      type(tangential_state_type), intent(in) :: state
+      real(dp), intent(in) :: place(:, :, :)          !! U_T, m [nx, 2, rows]
+      integer :: c, j
+
+      self%slip_expected = self%foresees
+      !$omp parallel do default(none) shared(self, state, place) private(c, j)
+      do j = 1, self%grid%rows()
+         do c = 1, 2
+            self%slip(:, c, j) = state%displacement(:, c, j) + self%motion(c) - place(:, c, j)
+         end do
+      end do
+   end subroutine expect
+
    !> Set the compliance of the mean mode. On a free grid there is no mean mode to set.
    subroutine set_thickness(self, thickness)
       type(tangential_step_type), intent(inout) :: self
@@ -270,6 +292,7 @@ contains
       fields%past => self%past
       fields%traction => state%traction
       fields%slip => self%slip
+      if (self%slip_expected .and. .not. allocated(self%share)) fields%slip_unit = self%q
       fields%contact => state%contact
       call self%solver%solve(self%operator, self%law, fields, outcome)
       call find_motion(self, state)

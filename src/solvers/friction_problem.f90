@@ -24,7 +24,7 @@ module friction_problem
    use asperity_precision, only : dp, int8
    use fft_conv, only : columns_apply, convolution_type
    use friction_fields, only : friction_fields_type, friction_work_type
-   use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type
+   use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type, unbounded
    use field_sums, only : row_total
    use friction_rows, only : measure_sums_type, measured_row, row_constants_type, site_columns, &
       tangent_row, total_of
@@ -37,6 +37,7 @@ module friction_problem
    !> A point whose s (module `friction_law`) is below this value is on its bound.
    real(dp), parameter :: on_bound = 1.0_dp + 1.0e-9_dp
    real(dp), parameter :: outermost = 4.0_dp              !! a slipping point whose s is above it sticks
+   real(dp), parameter :: far = 10.0_dp                   !! a long slip, in units of a_0 F
    real(dp), parameter :: stiffest = 1.0e15_dp            !! curvature of a bound, in units of a_0
 
    !> The problem and the state of its solution.
@@ -58,6 +59,7 @@ module friction_problem
       type(row_constants_type) :: constants
       logical :: fresh = .false.             !! r comes from DX - A T, not from a recurrence
       integer :: cells = 0                   !! in contact
+      integer :: foreseen = 0                !! of them started along the slip that was expected
       integer :: slipping = 0                !! on the bound
       integer :: released = 0                !! points that left the bound since the last move
       type(measure_sums_type) :: sums        !! of the last measure
@@ -86,20 +88,21 @@ contains
       class(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
       real(dp), allocatable :: sizes(:)
-      integer, allocatable :: cells(:)
+      integer, allocatable :: cells(:), foreseen(:)
       integer :: j
 
-      allocate (sizes(self%rows), cells(self%rows))
+      allocate (sizes(self%rows), cells(self%rows), foreseen(self%rows))
       self%constants = row_constants_type(coefficient=self%law%reach_coefficient(), &
          strength=self%law%strength_beside(), physical=self%law%slope .and. self%law%physical_slip, &
          compliance=self%compliance, stiffest=stiffest, on_bound=on_bound, outermost=outermost)
-      !$omp parallel do default(none) shared(self, operator, sizes, cells) private(j) &
+      !$omp parallel do default(none) shared(self, operator, sizes, cells, foreseen) private(j) &
       !$omp num_threads(self%threads)
       do j = 1, self%rows
-         call start_row(self, j, cells(j), sizes(j))
+         call start_row(self, j, cells(j), foreseen(j), sizes(j))
          call self%transform_row(operator, j)
       end do
       self%cells = row_total(cells)
+      self%foreseen = row_total(foreseen)
       self%change = 0.0_dp
       if (row_total(sizes) > 0.0_dp .or. associated(self%past)) then
          call self%update_slip(operator)
@@ -109,10 +112,11 @@ contains
    end subroutine start
 
    !> Compute the bound of a row and its first T.
-   subroutine start_row(self, j, cells, size)
+   subroutine start_row(self, j, cells, foreseen, size)
       type(friction_problem_type), intent(inout) :: self
       integer, intent(in) :: j
       integer, intent(out) :: cells                !! in contact
+      integer, intent(out) :: foreseen             !! of them started along the slip that is expected
       real(dp), intent(out) :: size                !! |T|^2, Pa^2
       real(dp) :: limit, s, site(self%nx, site_columns), t(2)
       integer :: i
@@ -127,6 +131,7 @@ contains
          self%contact(:, j) = merge(self%contact(:, j), contact_open, self%pressure(:, j) > 0.0_dp)
       end if
       cells = 0
+      foreseen = 0
       size = 0.0_dp
       do i = 1, self%nx
          t = 0.0_dp
@@ -134,6 +139,7 @@ contains
             t = self%traction(i, :, j)
             ! Slipping points are returned to their bound from both sides, others only from outside.
             limit = merge(outermost, 1.0_dp, self%contact(i, j) == contact_slip)
+            if (self%slip_unit > 0.0_dp) call start_along_slip(self, i, j, t, limit, foreseen)
             call self%place_on_bound(i, j, limit, t, s)
             self%contact(i, j) = merge(contact_slip, contact_stick, s < limit .or. s <= on_bound)
             cells = cells + 1
@@ -143,6 +149,27 @@ contains
          self%work%old(i, :, j) = t
       end do
    end subroutine start_row
+
+   !> Let a point that is expected to slip far start along that slip. Its slip is long beside the displacement
+   !> of a cell under its own bound, so that its direction hardly depends on the tractions that are still to be
+   !> found. What was left of the last step in such a point may be worse: a point that has just come into contact
+   !> has no traction, and would stick at first.
+   pure subroutine start_along_slip(self, i, j, t, limit, foreseen)
+      class(friction_problem_type), intent(in) :: self
+      integer, intent(in) :: i, j
+      real(dp), intent(inout) :: t(2)              !! Pa
+      real(dp), intent(inout) :: limit             !! of s below which it is put on its bound
+      integer, intent(inout) :: foreseen           !! points that start so
+      real(dp) :: slip(2), length
+
+      slip = self%slip_unit*self%law%slip_along_slope(self%slope_at(i, j), self%slip(i, :, j))
+      length = norm2(slip)
+      if (length <= far*self%compliance*self%work%bound(i, 1, j)) return
+      t = self%law%normal_traction(self%pressure(i, j), self%slope_at(i, j)) &
+         + (self%work%bound(i, 1, j)/length)*slip
+      limit = unbounded
+      foreseen = foreseen + 1
+   end subroutine start_along_slip
 
    !> Put the traction of a point on its bound if its s is below a limit.
    pure subroutine place_on_bound(self, i, j, limit, t, s)

@@ -166,11 +166,15 @@ contains
          self%work%offset = 0.0_dp
          cells = self%grid%cells()
          call prepare_problem(problem, self%grid, self%operator%threads, height, task, determined)
-         call new_gap_watch(watch, self%mixed, task%tolerance)
+         call new_gap_watch(watch, self%mixed, task%tolerance, task%one_of_many)
          product => self%operator
          if (watch%single) product => self%quick
          call first_pressure(task, self%grid, product, height, pressure, past)
-         call compute_gap()
+         if (task%warm .and. task%displaced) then
+            call take_gap()
+         else
+            call compute_gap()
+         end if
          if (.not. determined) call end_loop(now, reason_undetermined)
       end subroutine start_solve
 
@@ -185,7 +189,7 @@ contains
             call watch%expect(measure%error)
             call compute_gap()
          end if
-         if (watch%fresh .and. measure%error <= task%tolerance) &
+         if (watch%proves() .and. measure%error <= task%tolerance) &
             call narrow_scale(task, height, pressure, self%operator%threads, measure)
          if (measure%strict <= task%tolerance) then
             now%phase = phase_ended
@@ -204,19 +208,35 @@ contains
 
       !> The gap by a product of the whole pressure, and its measure.
       subroutine compute_gap()
+         call evaluate_gap(task, self%operator, height, pressure, gap, past)
+         call measure_it()
+         call watch%note_fresh()
+      end subroutine compute_gap
+
+      !> The gap from the displacement that was handed in, and its measure.
+      subroutine take_gap()
+         integer :: j
+
+         !$omp parallel do default(none) shared(gap, height, task) private(j) num_threads(self%operator%threads)
+         do j = 1, self%grid%rows()
+            gap(:, j) = gap(:, j) + (task%datum - height(:, j))
+         end do
+         call measure_it()
+      end subroutine take_gap
+
+      !> The measure of the gap.
+      subroutine measure_it()
          type(state_sums_type) :: sums
 
-         call evaluate_gap(task, self%operator, height, pressure, gap, past)
          call survey(self%work, task%target, pressure, gap)
          sums = total(self%work%state)
          measure = combine_measures(task, cells, sums)
          if (watch%single) call self%quick%set_unit(sums%load/cells)
-         call watch%note_fresh()
-      end subroutine compute_gap
+      end subroutine measure_it
 
       !> The result, measured by a fresh gap.
       subroutine finish_solve()
-         if (.not. watch%fresh) call compute_gap()
+         if (.not. watch%proves()) call compute_gap()
          if (determined .and. measure%load_error > task%tolerance) then
             ! A step whose round-off exceeds the load leaves a wrong load: project the whole pressure.
             call project_simplex(pressure, task%target*cells)
