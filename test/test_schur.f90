@@ -113,7 +113,7 @@ contains
          call s%active%survey_row(.true., j, pressure(:, j), gap(:, j), least)
       end do
       call s%active%list_runs(0.0_dp, s%preconditioner%residual, direction, step)
-      call s%active%list_wide_runs(s%preconditioner%search)
+      call s%active%list_wide_runs(s%preconditioner%search, far=.false.)
       call s%preconditioner%set_residual(s%coarse, s%active, 1.0_dp, 0.0_dp, pressure, gap)
       call s%preconditioner%extend(s%coarse, s%active, steps, form)
       do jb = 1, s%coarse%ny

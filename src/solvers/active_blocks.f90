@@ -6,7 +6,9 @@
 !> Around the active blocks lies a rim of about 32 cells, to which a preconditioner extends the residual. The rim
 !> consists of wide blocks: 16 cells by all rows of a coarse block, which are called a wide row. A wide block is
 !> in use if an active block is at most as far away as the rim is wide. With half of this rim the solver needs up
-!> to a third more iterations; a wider rim does not reduce them.
+!> to a third more iterations. Up to about 1024 x 1024 cells a wider rim does not reduce them. On larger grids the
+!> gaps between patches of contact are wider. If they are not most of the grid, the far rim of a sixteenth of the
+!> longer side saves iterations: 34 instead of 48 transforms for 2048 x 2048 cells of which a tenth touches.
 module active_blocks
    use asperity_parallel, only : on_any_process
    use asperity_precision, only : dp, sp
@@ -19,6 +21,7 @@ module active_blocks
    integer, parameter :: width = 16            !! cells of a block
    integer, parameter :: rim_x = 2             !! blocks of the rim along x ...
    integer, parameter :: rim_y = 4             !! ... and wide rows along y, about as many cells
+   integer, parameter :: far_part = 16         !! the far rim is the longer side over this
 
    !> The blocks of a grid.
    type :: active_blocks_type
@@ -27,6 +30,7 @@ module active_blocks
       integer, private :: threads = 1
       logical, private :: periodic = .false.
       integer, private :: rim(2) = 0               !! along x and y
+      integer, private :: far_rim(2) = 0           !! the same, on large grids
       integer, private :: strips(2) = 0            !! first and last wide row of this process
       integer, allocatable, private :: first_y(:)  !! first row of each wide row, and the end
       integer, allocatable :: runs(:)              !! number of a row's active runs
@@ -64,6 +68,7 @@ contains
       self%strips = strips
       self%first_y = first_y
       if (rim) self%rim = [rim_x, rim_y]
+      if (rim) self%far_rim = max(self%rim, max(grid%nx, grid%ny)/(far_part*width*rim_x)*self%rim)
       self%threads = threads
       blocks = (self%nx + width - 1)/width
       wide_rows = size(first_y) - 1
@@ -168,11 +173,12 @@ contains
    end subroutine list_runs
 
    !> List the runs of wide blocks. Set the search direction to zero in those that are no longer in use.
-   subroutine list_wide_runs(self, search)
+   subroutine list_wide_runs(self, search, far)
       class(active_blocks_type), intent(inout) :: self
       real(sp), intent(inout) :: search(0:, 0:)    !! (0:nx+1, 0:rows+1)
+      logical, intent(in) :: far                   !! with the far rim
       logical, allocatable :: holds(:, :), stretched(:, :)
-      integer :: b, j, k, first, last, n, rows, blocks
+      integer :: b, j, k, first, last, n, rows, blocks, rim(2)
       logical :: now, before
 
       blocks = size(self%live, 1)
@@ -186,11 +192,12 @@ contains
       end do
       ! The rim of a block may reach rows of other processes.
       holds(:, :) = on_any_process(holds)
+      rim = merge(self%far_rim, self%rim, far)
       do j = 1, rows
-         stretched(:, j) = grown(holds(:, j), self%rim(1))
+         stretched(:, j) = grown(holds(:, j), rim(1))
       end do
       do b = 1, blocks
-         holds(b, :) = grown(stretched(b, :), self%rim(2))
+         holds(b, :) = grown(stretched(b, :), rim(2))
       end do
       !$omp parallel do default(none) shared(self, search, holds, blocks) &
       !$omp private(b, j, k, first, last, n, now, before) num_threads(self%threads)
@@ -225,17 +232,21 @@ contains
          logical, intent(in) :: line(:)
          integer, intent(in) :: reach
          logical :: grown(size(line))
-         integer :: b, k, length, near
+         integer :: b, k, turns, left, right, length
 
-         length = size(line)
+         ! The blocks since the last one that is set, in both directions; a periodic line is passed twice.
          grown = line
-         do b = 1, length
-            if (.not. line(b)) cycle
-            do k = -min(reach, length), min(reach, length)
-               near = b + k
-               if (self%periodic) near = modulo(near - 1, length) + 1
-               if (near >= 1 .and. near <= length) grown(near) = .true.
-            end do
+         length = size(line)
+         turns = merge(2, 1, self%periodic)
+         left = reach
+         right = reach
+         do k = 1, turns*length
+            b = 1 + modulo(k - 1, length)
+            left = merge(0, left + 1, line(b))
+            if (left <= reach) grown(b) = .true.
+            b = length + 1 - b
+            right = merge(0, right + 1, line(b))
+            if (right <= reach) grown(b) = .true.
          end do
       end function grown
 

@@ -72,10 +72,12 @@ module normal_cg
    real(dp), parameter :: useless = 0.1_dp     !! largest part of a clipped step that counts as little
    real(dp), parameter :: nothing = 1e-3_dp    !! largest part that counts as nothing
 
-   ! Steps by which the preconditioner extends the residual. A third one saves iterations only where most
+   ! Steps by which the preconditioner extends the residual. More of them save iterations only where most
    ! cells touch: the gaps between are then narrow, and the coarse level sees little of them.
-   integer, parameter :: few_steps = 2, more_steps = 3
-   real(dp), parameter :: much_contact = 0.3_dp   !! part of the cells in contact from which it pays
+   integer, parameter :: few_steps = 2, more_steps = 3, most_steps = 4
+   real(dp), parameter :: some_contact = 0.03_dp  !! part of the cells in contact from which the far rim pays,
+   real(dp), parameter :: much_contact = 0.3_dp   !! and from which more steps pay
+   real(dp), parameter :: large = 1.5e6_dp        !! cells from which they pay
 
    !> The solver with its operators and work fields, kept from step to step. Not to be copied.
    type, extends(contact_solver_type) :: normal_solver_type
@@ -202,7 +204,8 @@ contains
          associate (work => self%work)
             if (work%scale <= 0.0_dp) work%scale = unit_of(measure%duality_gap, task%rms_height)
             call work%active%list_runs(measure%level, work%preconditioner%residual, work%direction, self%step)
-            call work%active%list_wide_runs(work%preconditioner%search)
+            call work%active%list_wide_runs(work%preconditioner%search, &
+               far=cells >= large .and. measure%contact > some_contact)
          end associate
       end subroutine measure_state
 
@@ -291,13 +294,15 @@ contains
       real(dp), contiguous, intent(in) :: pressure(:, :), gap(:, :)
       type(iteration_type), intent(inout) :: now
       real(dp) :: rz, beta
+      integer :: steps
       logical :: fixed_load
 
       fixed_load = task%control == control_pressure
       call work%preconditioner%set_residual(work%coarse, work%active, work%scale, measure%level, &
          pressure, gap)
-      call work%preconditioner%extend(work%coarse, work%active, &
-         merge(more_steps, few_steps, measure%contact > much_contact), rz)
+      steps = few_steps
+      if (measure%contact > much_contact) steps = merge(most_steps, more_steps, work%grid%cells() >= large)
+      call work%preconditioner%extend(work%coarse, work%active, steps, rz)
       beta = 0.0_dp
       if (now%phase == phase_conjugate .and. now%rz > 0.0_dp) beta = rz/now%rz
       now%rz = rz
