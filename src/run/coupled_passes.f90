@@ -70,6 +70,8 @@ module coupled_passes
    !> Accuracy of the pass that proves a joint solution, in tolerances.
    real(dp), parameter :: proof = 1.0e-3_dp
 
+   real(dp), parameter :: exact_load = 1.0e-12_dp       !! relative error of a load that counts as met exactly
+
    !> Slopes in the contact count as at least this part of the rms slope of the map.
    real(dp), parameter :: least_slope = 0.1_dp
 
@@ -200,7 +202,8 @@ contains
       call displaced(contact%road, plan%road_x, plan%road_y, self%place(:, 1, :), self%place(:, 2, :), &
          contact%height, contact%slope_x, contact%slope_y)
       call solve_normal(contact, plan, accuracy, part, one_of_many=.true., displaced=self%gap_known)
-      self%gap_known = .not. contact%side%adhesive
+      ! A pressure that misses the load is scaled to it at the start of the next solve.
+      self%gap_known = .not. contact%side%adhesive .and. part%load_error <= exact_load
       normal%stopped = part%stopped
       if (normal%stopped) return
       call add_result(normal, part)
