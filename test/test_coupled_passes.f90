@@ -9,7 +9,8 @@ module test_coupled_passes
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use place_forecast, only : new_place_forecast, place_forecast_type
    use simulation_runs, only : check_books, nl, record_type, run_case
-   use touching_cells, only : edge_error, mark_contact
+   use edge_shares, only : edge_rule_type, new_edge_rule
+   use touching_cells, only : mark_contact, mark_shares
    implicit none
    private
 
@@ -58,27 +59,39 @@ contains
       call check_close(moved(nx, 2), field(nx, 2), 1.0e-14_dp, 'free, at the rim')
    end subroutine carried_fields_move_with_the_contact
 
-   !> Four cells: in contact, open, open with a pressure of round-off, and one whose gap is meant to be 0.
+   !> Five cells: in contact, open, open with a pressure of round-off, one whose gap is meant to be 0, and one
+   !> that overlaps with the road.
    subroutine edge_cells_are_judged_one_by_one()
-      real(dp), parameter :: soft = 1.0e-12_dp
-      real(dp), parameter :: pressure(4, 1) = reshape([3.0e6_dp, 0.0_dp, 1.0e-8_dp, 1.0e6_dp], [4, 1])
-      real(dp), parameter :: gap(4, 1) = reshape([0.0_dp, 1.0e-6_dp, 1.0e-6_dp, 1.0e-9_dp], [4, 1])
+      real(dp), parameter :: soft = 1.0e-12_dp, reach = 2.0e-6_dp
+      real(dp), parameter :: pressure(5, 1) = reshape([3.0e6_dp, 0.0_dp, 1.0e-8_dp, 1.0e6_dp, 0.0_dp], [5, 1])
+      real(dp), parameter :: gap(5, 1) = reshape([0.0_dp, 1.0e-6_dp, 1.0e-6_dp, 1.0e-9_dp, -3.0e-6_dp], [5, 1])
       type(adhesion_potential_type) :: none
-      integer(int8) :: contact(4, 1)
+      type(edge_rule_type) :: rule
+      real(dp) :: share(5, 1), expected(5)
+      integer(int8) :: contact(5, 1)
 
       contact = 0_int8
-      call mark_contact(.false., 0.0_dp, pressure, gap, contact)
-      call check_that(all(contact(:, 1) == [1, 0, 1, 1]), 'the pressure alone decides')
       contact(1, 1) = 2_int8
-      call mark_contact(.false., soft, pressure, gap, contact)
-      call check_that(all(contact(:, 1) == [2, 0, 0, 1]), 'the gap counts, and a cell that slipped keeps its mark')
+      call mark_contact(.false., pressure, gap, contact)
+      call check_that(all(contact(:, 1) == [2, 0, 1, 1, 0]), 'the pressure decides, and a cell that slipped keeps its mark')
+      rule = new_edge_rule(none, soft, reach/(soft*0.1_dp), 0.1_dp)
+      call check_close(rule%reach, reach, 1.0e-9_dp, 'reach')
+      call rule%decide(pressure, gap, share)
+      call check_that(all(nint(share(:, 1)) == [1, 0, 0, 1, 1]), 'the gap decides, too')
+      call mark_shares(share, contact)
+      call check_that(all(contact(:, 1) == [2, 0, 0, 1, 1]), 'cells with a share')
+
+      share = 0.5_dp
+      call rule%move(pressure, gap, share)
+      expected = [1.0_dp, 0.0_dp, 0.0_dp, 0.5_dp + 0.4995_dp, 1.0_dp]
+      call check_close(maxval(abs(share(:, 1) - expected)), 0.0_dp, 1.0e-9_dp, 'shares that have moved')
+
       ! The pressures press the cells in by 4 um in all.
-      call check_close(edge_error(none, soft, contact, pressure, gap), 0.25e-3_dp, 1.0e-9_dp, 'gap of a cell in contact')
-      call check_close(edge_error(none, soft, contact, pressure, gap - 3.0e-6_dp), 2.5_dp, 1.0e-3_dp, &
-         'overlap of all cells')
-      contact(1, 1) = 0_int8
-      call check_close(edge_error(none, soft, contact, pressure, gap), 0.75_dp + 0.25e-3_dp, 1.0e-9_dp, &
-         'pressure of an open cell')
+      share(:, 1) = [1.0_dp, 0.0_dp, 0.0_dp, 1.0_dp, 1.0_dp]
+      call check_close(rule%error(share, pressure, gap), 3.001_dp/4.0_dp, 1.0e-9_dp, 'gap and overlap with traction')
+      share(:, 1) = [0.5_dp, 0.0_dp, 0.5_dp, 0.0_dp, 0.0_dp]
+      call check_close(rule%error(share, pressure, gap), (3.0_dp + 1.0_dp + 1.0_dp + 3.0_dp)/4.0_dp, 1.0e-9_dp, &
+         'pressure without the whole traction, gap and overlap')
    end subroutine edge_cells_are_judged_one_by_one
 
    !> A displacement that moves along by a cell a step and grows with the square of the time is forecast
@@ -196,9 +209,9 @@ contains
       type(pass_control_type) :: control
       integer :: i
 
-      call control%start(1.0e-6_dp, 1.0e-7_dp)
+      call control%start(1.0e-6_dp, 1.0e-7_dp, sharing=.false.)
       call check_close(control%accuracy, 1.0e-6_dp, 1.0e-20_dp, 'where one pass was enough')
-      call control%start(1.0e-6_dp, 1.0_dp)
+      call control%start(1.0e-6_dp, 1.0_dp, sharing=.false.)
       call check_order(control%accuracy, '>', 1.0e-4_dp, 'where nothing is known')
       call control%judge(1.0e-2_dp)
       call check_close(control%accuracy, 1.0e-3_dp, 1.0e-18_dp, 'a tenth of the last mismatch')

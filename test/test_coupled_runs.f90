@@ -8,9 +8,9 @@ module test_coupled_runs
    use asperity_simulation, only : new_simulation, simulation_type
    use case_input, only : parse_case
    use case_settings, only : case_type
-   use check, only : begin_suite, check_close, check_no_error, check_that, selected
+   use check, only : begin_suite, check_close, check_no_error, check_order, check_that, selected
    use history_table, only : column_type, history_columns, row_values
-   use simulation_runs, only : last, nl, record_type, run_case
+   use simulation_runs, only : check_books, last, nl, record_type, run_case
    use simulation_state, only : load_state, save_state
    use text_tools, only : to_text
    implicit none
@@ -30,6 +30,7 @@ contains
          call same_bits_on_threads_and_after_restart(swinging(), 'swinging block')
       if (selected('orders_in_time_with_friction')) call orders_in_time_with_friction()
       if (selected('missing_work_of_the_flat_law')) call missing_work_of_the_flat_law()
+      if (selected('constant_shear_settles_and_books_close')) call constant_shear_settles_and_books_close()
    end subroutine run_coupled_runs
 
    !> A steep road under a viscoelastic block, with a drop of the load: rows of many passes.
@@ -249,5 +250,23 @@ contains
          '&phase pressure = '//to_text(1.6e6_dp*slope)//', relaxed = .true., duration = 0.8e-3, velocity_x = 1.0, steps = '// &
          to_text(steps)//' /'//nl//'&solver tolerance = 1e-7 /'
    end function flat_case
+
+   !> A steep road with a constant shear stress, where cells at the edge are partly sheared: passes without the
+   !> shares of the cells leave 1e-4 or more in its steps.
+   subroutine constant_shear_settles_and_books_close()
+      type(record_type) :: record
+
+      call run_case('&grid nx = 48, ny = 41, lx = 1e-3, ly = 0.9e-3 /'//nl// &
+         '&surface shape = ''self_affine'', hurst = 0.8, wavelength_long = 0.5e-3, '// &
+         'wavelength_short = 0.15e-3, rms_slope = 0.5, seed = 3 /'//nl// &
+         '&material shear_modulus = 0.5e6, prony_g = 1e6, prony_tau = 1e-2, thickness = 1e-3 /'//nl// &
+         '&friction law = ''constant_shear'', shear_strength = 3e5 /'//nl// &
+         '&phase pressure = 5e4, duration = 0.01, steps = 2 /'//nl// &
+         '&phase velocity_x = 10e-3, duration = 0.003, steps = 6 /'//nl// &
+         '&solver tolerance = 1e-6 /', 'constant shear', record)
+      call check_order(maxval(record%rows%residual_coupling), '<=', 1.0e-6_dp, 'the steps settle')
+      call check_order(maxval(record%rows%passes), '<=', 80, 'within few passes')
+      call check_books(record, 'constant shear', 1.0e-6_dp)
+   end subroutine constant_shear_settles_and_books_close
 
 end module test_coupled_runs

@@ -88,7 +88,7 @@ contains
       if (allocated(error)) return
       call new_contact(self, error)
       if (allocated(error)) return
-      if (self%frictional) call new_coupled_passes(self%passes, self%grid)
+      if (self%frictional) call new_coupled_passes(self%passes, self%grid, sharing=self%tangential%law%jumps_at_edge())
       self%has_steady = self%slides .and. any(case%phases%steady)
       if (.not. self%has_steady) return
       call new_steady_step(self%steady, case, self%rms_height, error)

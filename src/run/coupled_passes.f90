@@ -19,6 +19,11 @@
 !> around the contact move with it. Otherwise the road would be read as stretched beside the contact.
 !> `carry` therefore moves U_T along with the contact; at the fixed point it does nothing.
 !>
+!> Where the traction of a cell would jump as it opens, passes would swing between the two states of such cells.
+!> There the shares of the strength that cells may carry are unknown as well (module `edge_shares`). Each
+!> pass moves them after its normal solve, and the acceleration takes them together with the place, as a third
+!> component. The first `deciding` passes of a row, in which the contact is only being found, set them to 0 or 1.
+!>
 !> The first place comes from the rows before: the displacement moves with the road, its mean goes on
 !> as in the last step, and `place_forecast` adds what the last rows have changed in it. A jump of the
 !> load is solved by the same loop, without motion and time, and its tractions are not extrapolated.
@@ -35,20 +40,25 @@
 !> mismatch is within the tolerance, and the solves of the pass were asked to be that accurate too, the
 !> row is solved. Otherwise `pass_control` judges the pass, which sets the accuracy of the next one and
 !> how far to go, and `choose_place` goes to the next place. When the passes run out, the row keeps
-!> what the last pass has left; the last of more than ten passes is done at the best place so far. Passes
-!> that have stalled are left for module `joint_step`, which solves the step at once; the next pass is then
-!> done at its solution, with its shares of the bounds, and proves it. A
-!> normal solve that does not converge ends the loop. A row that is given up for a stop (module
-!> `row_stop`) is left as it is.
+!> what the last pass has left; the last of more than ten passes is done at the best place so far. Once in a
+!> row, passes that have stalled are left for module `joint_step`, which solves the step at once; the next
+!> pass is then done at its solution, with its shares of the bounds, and proves it. A normal solve that does
+!> not converge ends the loop. A row that is given up for a stop (module `row_stop`) is left as it is.
+!>
+!> The work of a row is bounded: by `most_passes`, by the iterations that a case allows to a normal and to a
+!> tangential solve (`max_iterations`), and by the bound of the joint step.
 !>
 !> Fields of doubles: two components each for the place, its residual, the best place and the displacement
-!> carried along; and those of the acceleration. The check borrows three from the workspace of the contact.
+!> carried along; those of the acceleration; where the traction jumps, a third component of all of them but
+!> one, and the shares. The check borrows three from the workspace of the contact.
 module coupled_passes
    use anderson, only : anderson_type, new_anderson
    use carried_field, only : carry
    use contact_model, only : contact_mean, contact_type, solve_normal
    use asperity_interpolation, only : displaced
    use field_sums, only : row_totals
+   use friction_law, only : contact_open
+   use edge_shares, only : edge_rule_type, new_edge_rule
    use joint_step, only : joint_step_type
    use pass_control, only : pass_control_type
    use asperity_precision, only : dp
@@ -56,7 +66,6 @@ module coupled_passes
    use asperity_schedule, only : planned_row_type
    use solver_result, only : solver_result_type
    use stop_watch, only : stop_is_due
-   use touching_cells, only : edge_error
    implicit none
    private
 
@@ -66,6 +75,9 @@ module coupled_passes
 
    integer, parameter :: pairs = 6                      !! of passes that the acceleration remembers
    real(dp), parameter :: largest_factor = 1.0e3_dp     !! of a remembered pair; a larger one is round-off
+
+   integer, parameter :: deciding = 2                   !! first passes of a row whose shares are 0 or 1
+   real(dp), parameter :: weight_of_share = 2.0_dp      !! in the norm of the acceleration, times the reach
 
    !> Accuracy of the pass that proves a joint solution, in tolerances.
    real(dp), parameter :: proof = 1.0e-3_dp
@@ -80,10 +92,13 @@ module coupled_passes
       integer :: passes = 0                             !! done in the last row
       real(dp) :: residual = 0.0_dp                     !! mismatch that the last row left
       logical, private :: gap_known = .false.           !! pressure, gap and heights are those of the last pass
-      real(dp), allocatable, private :: place(:, :, :)      !! z, m [nx, 2, rows]
-      real(dp), allocatable, private :: carried(:, :, :)    !! U_T of the row before, carried along, m
-      real(dp), allocatable, private :: residuals(:, :, :)  !! U_T, carried, less z, m
-      real(dp), allocatable, private :: best_place(:, :, :) !! z of the least mismatch, m
+      !> z, m; with shares also share times reach, m [nx, 2 or 3, rows].
+      real(dp), allocatable, private :: place(:, :, :)
+      real(dp), allocatable, private :: carried(:, :, :)    !! U_T of the row before, carried along, m [nx, 2, rows]
+      real(dp), allocatable, private :: residuals(:, :, :)  !! what a pass makes of the place, less the place, m
+      real(dp), allocatable, private :: best_place(:, :, :) !! that of the least mismatch, m
+      logical, private :: sharing = .false.             !! the shares of the cells are unknown, too
+      type(edge_rule_type), private :: edge             !! how they move, in the row in hand
       type(anderson_type), private :: mixing
       type(joint_step_type), private :: joint
    contains
@@ -94,13 +109,18 @@ module coupled_passes
 contains
 
    !> Allocate the work space.
-   subroutine new_coupled_passes(self, grid)
+   subroutine new_coupled_passes(self, grid, sharing)
       type(coupled_passes_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
+      logical, intent(in) :: sharing                     !! the traction of a cell would jump as it opens
+      integer :: unknowns
 
-      allocate (self%place(grid%nx, 2, grid%rows()), source=0.0_dp)
-      allocate (self%carried, self%residuals, self%best_place, source=self%place)
-      call new_anderson(self%mixing, grid%nx, 2, grid%rows(), pairs)
+      self%sharing = sharing
+      unknowns = merge(3, 2, sharing)
+      allocate (self%place(grid%nx, unknowns, grid%rows()), source=0.0_dp)
+      allocate (self%residuals, self%best_place, source=self%place)
+      allocate (self%carried(grid%nx, 2, grid%rows()), source=0.0_dp)
+      call new_anderson(self%mixing, grid%nx, unknowns, grid%rows(), pairs)
       self%mixing%largest = largest_factor
    end subroutine new_coupled_passes
 
@@ -115,6 +135,7 @@ contains
       type(pass_control_type) :: control
       real(dp) :: tolerance
       integer :: most
+      logical :: solved                                  !! the step, all at once
       logical :: unlike                                  !! this row goes on differently from the last one
 
       tolerance = contact%case%solver%tolerance
@@ -123,8 +144,7 @@ contains
       call self%mixing%forget()
       unlike = plan%instantaneous .or. plan%new_speed
       call predict(self, contact, plan%dt, motion, goes_on=.not. unlike)
-      call control%start(tolerance, merge(1.0_dp, contact%state%first_mismatch, unlike))
-      control%jumps = contact%tangential%law%jumps_at_edge()
+      call control%start(tolerance, merge(1.0_dp, contact%state%first_mismatch, unlike), self%sharing)
       if (.not. plan%instantaneous) &
          call contact%tangential%extrapolate(contact%state%tangential, .not. plan%new_speed)
       if (.not. unlike) call contact%tangential%expect(contact%state%tangential, self%place)
@@ -141,13 +161,13 @@ contains
          if (self%passes == 1 .and. .not. plan%instantaneous) contact%state%first_mismatch = self%residual
          if (self%passes == most .or. .not. normal%converged) exit
          if (control%accuracy <= tolerance .and. self%residual <= tolerance) exit
-         if (allocated(contact%tangential%share)) deallocate (contact%tangential%share)
+         if (.not. self%sharing) call drop_shares(contact)
          contact%stop%given_up = stop_is_due()
          if (contact%stop%given_up) return
          call control%judge(self%residual)
          if (control%joint_due) then
-            call solve_jointly(self, contact, plan, control, rubbing)
-            if (allocated(contact%tangential%share)) cycle
+            call solve_jointly(self, contact, plan, control, rubbing, solved)
+            if (solved) cycle
          end if
          call choose_place(self, contact, control)
          ! The last of many passes is for the best place that was found.
@@ -164,14 +184,14 @@ contains
 
    !> Where the passes have stalled: solve the step all at once. If that succeeds, the next pass is done at
    !> its solution, and accurately: it proves that the step is solved.
-   subroutine solve_jointly(self, contact, plan, control, rubbing)
+   subroutine solve_jointly(self, contact, plan, control, rubbing, solved)
       class(coupled_passes_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact
       type(planned_row_type), intent(in) :: plan
       type(pass_control_type), intent(inout) :: control
       type(solver_result_type), intent(inout) :: rubbing   !! all tangential solves; its transforms are added
+      logical, intent(out) :: solved
       integer :: transforms
-      logical :: solved
 
       call self%joint%solve(contact, plan, solved, transforms)
       self%gap_known = .false.
@@ -180,6 +200,13 @@ contains
       self%place(:, :, :) = contact%tangential%trial
       control%accuracy = proof*contact%case%solver%tolerance
    end subroutine solve_jointly
+
+   !> Shares of a joint solution apply to the pass that proves it only.
+   subroutine drop_shares(contact)
+      class(contact_type), intent(inout) :: contact
+
+      if (allocated(contact%tangential%share)) deallocate (contact%tangential%share)
+   end subroutine drop_shares
 
    !> One pass at the place, and the mismatch that it leaves.
    subroutine do_pass(self, contact, plan, accuracy, normal, rubbing)
@@ -207,13 +234,30 @@ contains
       normal%stopped = part%stopped
       if (normal%stopped) return
       call add_result(normal, part)
+      if (self%sharing) call take_shares(self, contact)
       contact%tangential%tolerance = accuracy
       call contact%tangential%solve(contact%state%tangential, contact%state%pressure, contact%state%gap, &
          contact%slope_x, contact%slope_y, part)
       call add_result(rubbing, part)
       if (rubbing%stopped) return
-      self%residual = mismatch(contact, plan)
+      self%residual = mismatch(self, contact, plan)
    end subroutine do_pass
+
+   !> After the normal solve of a pass: the shares that its tangential solve works with, and how they have moved.
+   subroutine take_shares(self, contact)
+      class(coupled_passes_type), intent(inout) :: self
+      class(contact_type), intent(inout) :: contact
+
+      if (.not. allocated(contact%tangential%share)) &
+         allocate (contact%tangential%share(size(self%place, 1), size(self%place, 3)))
+      contact%tangential%share(:, :) = self%place(:, 3, :)/self%edge%reach
+      if (self%passes <= deciding) then
+         call self%edge%decide(contact%state%pressure, contact%state%gap, contact%tangential%share)
+      else
+         call self%edge%move(contact%state%pressure, contact%state%gap, contact%tangential%share)
+      end if
+      self%residuals(:, 3, :) = self%edge%reach*contact%tangential%share - self%place(:, 3, :)
+   end subroutine take_shares
 
    !> The first place of a row: the displacement of the row before, moved along with the contact, which
    !> follows the road over the rubber, plus the mean motion of the rubber's surface; and what the last rows
@@ -231,11 +275,15 @@ contains
             self%carried(:, c, :))
          self%carried(:, c, :) = self%carried(:, c, :) + contact%drift(c)
       end do
-      self%place(:, :, :) = self%carried
+      self%place(:, :2, :) = self%carried
       associate (forecast => contact%state%tangential%forecast)
          call forecast%follow(contact%grid, dt, goes_on, contact%drift - motion)
-         call forecast%add(self%place)
+         call forecast%add(self%place(:, :2, :))
       end associate
+      if (.not. self%sharing) return
+      self%edge = new_edge_rule(contact%side%potential, contact%tangential%cell_compliance(), &
+         contact%tangential%law%bare_strength(), contact%rms_slope)
+      self%place(:, 3, :) = merge(self%edge%reach, 0.0_dp, contact%state%tangential%contact /= contact_open)
    end subroutine predict
 
    !> The next place, from what the last pass found.
@@ -254,31 +302,33 @@ contains
       end if
       !$omp parallel do default(none) shared(self, contact) private(j)
       do j = 1, contact%grid%rows()
-         self%residuals(:, :, j) = contact%tangential%trial(:, :, j) - self%place(:, :, j)
+         self%residuals(:, :2, j) = contact%tangential%trial(:, :, j) - self%place(:, :2, j)
       end do
-      motion = contact_mean(contact, self%residuals)
+      motion = contact_mean(contact, self%residuals(:, :2, :))
       do c = 1, 2
          call carry(contact%grid, contact%tangential%trial(:, c, :), motion, self%residuals(:, c, :))
       end do
       !$omp parallel do default(none) shared(self, contact) private(j)
       do j = 1, contact%grid%rows()
-         self%residuals(:, :, j) = self%residuals(:, :, j) - self%place(:, :, j)
+         self%residuals(:, :2, j) = self%residuals(:, :2, j) - self%place(:, :2, j)
       end do
       if (control%plain) then
          call control%follow(self%mixing%turn(self%residuals))
          call self%mixing%glide(self%residuals, self%place, control%damping, control%momentum)
       else
-         call self%mixing%step([1.0_dp, 1.0_dp], self%residuals, self%place, plain=.false., &
+         call self%mixing%step([1.0_dp, 1.0_dp, weight_of_share], self%residuals, self%place, plain=.false., &
             damping=control%damping)
       end if
+      if (self%sharing) self%place(:, 3, :) = min(max(self%place(:, 3, :), 0.0_dp), self%edge%reach)
    end subroutine choose_place
 
    !> What remains of the coupling: by how much the road at U_T differs from the road solved on. The
    !> larger of two means that are weighted by the pressure: the difference of the heights over the
    !> rms height of the map, and that of the slopes over the slopes in the contact. With constant shear a cell
    !> with hardly any pressure carries as much as any other, and these means do not see whether it obeys the
-   !> law: there the mean error of the cells at the edge counts as well, `edge_error`.
-   function mismatch(contact, plan) result(residual)
+   !> law: there the mean error of the cells at the edge counts as well.
+   function mismatch(self, contact, plan) result(residual)
+      class(coupled_passes_type), intent(in) :: self
       class(contact_type), intent(inout) :: contact
       type(planned_row_type), intent(in) :: plan
       real(dp) :: residual
@@ -303,14 +353,13 @@ contains
       end do
       sums = row_totals(rows)
       edges = 0.0_dp
-      if (contact%tangential%law%jumps_at_edge()) then
+      if (self%sharing) then
          ! From here on `height` holds the gap over the road at U_T.
          !$omp parallel do default(none) shared(contact, height) private(j)
          do j = 1, contact%grid%rows()
             height(:, j) = contact%state%gap(:, j) + contact%height(:, j) - height(:, j)
          end do
-         edges = edge_error(contact%side%potential, contact%tangential%cell_compliance(), &
-            contact%state%tangential%contact, contact%state%pressure, height)
+         edges = self%edge%error(contact%tangential%share, contact%state%pressure, height)
       end if
       call contact%work%take_back(height)
       call contact%work%take_back(slope_x)

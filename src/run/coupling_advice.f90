@@ -23,9 +23,9 @@ contains
 
       jammed = jammed_part(self)
       if (self%tangential%law%jumps_at_edge()) then
-         advice = 'With this law the traction jumps where the contact ends; solving for all '// &
-            'cells at once failed, too, although without adhesion a solution exists; law = ''coulomb_orowan'', '// &
-            'whose bound grows with the pressure from zero, usually settles with a coefficient of up to about 1'
+         advice = 'With this law the traction jumps where the contact ends, although without adhesion a '// &
+            'solution exists; law = ''coulomb_orowan'', whose bound grows with the pressure from zero, usually '// &
+            'settles with a coefficient of up to about 1'
       else if (jammed > much) then
          advice = to_text(100.0_dp*jammed)//' % of the normal force is on slopes above '// &
             '1/coefficient, where friction can resist any uphill force, so that there may be no solution: use a '// &

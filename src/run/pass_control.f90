@@ -22,8 +22,8 @@
 !>   without halving it, the acceleration begins again from the place reached; what was the best place
 !>   before is forgotten, since it belongs to the state that ended.
 !>
-!> Passes that stall with an accelerated step where a traction jumps, or with plain steps, may not come
-!> to an end at all: then the step should be solved all at once (`joint_due`).
+!> Passes that stall with plain steps may not come to an end at all. Once in a row the step should then be solved
+!> all at once (`joint_due`), unless the shares of the cells are unknown, which the joint step does not have.
 module pass_control
    use asperity_precision, only : dp
    implicit none
@@ -38,7 +38,7 @@ module pass_control
    real(dp), parameter :: usual_share = 0.1_dp, least_share = 1.0e-6_dp
    real(dp), parameter :: falls = 0.3_dp            !! a mismatch below this part of the least one falls
    real(dp), parameter :: slow = 0.5_dp             !! a mismatch above this part of the last falls slowly
-   real(dp), parameter :: slow_damping = 0.5_dp
+   real(dp), parameter :: slow_damping = 0.5_dp, sharing_damping = 0.8_dp
    real(dp), parameter :: astray = 10.0_dp
    real(dp), parameter :: first_plain = 0.3_dp, shortest = 0.05_dp, longest = 0.5_dp  !! plain steps
    real(dp), parameter :: grows = 1.2_dp, shrinks = 0.5_dp, gathers = 0.7_dp          !! how they change
@@ -57,10 +57,11 @@ module pass_control
       logical :: go_back = .false.                  !! to the best place so far
       logical :: plain = .false.                    !! the steps are not accelerated
       logical :: best_yet = .false.                 !! the last pass was the best
-      logical :: jumps = .false.                    !! a traction jumps where the contact ends; to be set after `start`
       logical :: joint_due = .false.                !! the step should be solved all at once
       real(dp), private :: tolerance = 0.0_dp
       real(dp), private :: share = usual_share
+      logical, private :: may_be_joint = .true.     !! the row may still be solved all at once
+      real(dp), private :: slowed = slow_damping    !! damping where the mismatch falls slowly
       real(dp), private :: length = 1.0_dp          !! of plain steps
       real(dp), private :: plain_start = 0.0_dp     !! mismatch where the plain steps began
       real(dp), private :: least = huge(1.0_dp)     !! mismatch so far
@@ -78,11 +79,16 @@ module pass_control
 contains
 
    !> Before the first pass of a step.
-   subroutine start(self, tolerance, expected)
+   subroutine start(self, tolerance, expected, sharing)
       class(pass_control_type), intent(out) :: self
       real(dp), intent(in) :: tolerance             !! of the case
       real(dp), intent(in) :: expected              !! mismatch of the first pass, as in the row before
+      !> The shares of the cells at the edge are unknown, too. With them the mismatch falls slowly where cells
+      !> change their states one after the other, and damping would only delay that.
+      logical, intent(in) :: sharing
 
+      self%may_be_joint = .not. sharing
+      if (sharing) self%slowed = sharing_damping
       self%tolerance = tolerance
       self%accuracy = min(max(coarsest, tolerance), max(tolerance, usual_share*expected))
       call spare_a_pass(self)
@@ -95,7 +101,7 @@ contains
 
       self%seen = self%seen + 1
       self%damping = 1.0_dp
-      if (self%seen > 2 .and. mismatch > slow*self%last) self%damping = slow_damping
+      if (self%seen > 2 .and. mismatch > slow*self%last) self%damping = self%slowed
       self%last = mismatch
 
       self%idle = self%idle + 1
@@ -120,8 +126,9 @@ contains
          self%since = 0
       end if
       if (self%plain) then
-         self%joint_due = self%since >= stalled_plain
-         if (self%joint_due .or. mismatch < gained*self%plain_start) call accelerate(self, mismatch)
+         self%joint_due = self%since >= stalled_plain .and. self%may_be_joint
+         if (self%joint_due) self%may_be_joint = .false.
+         if (self%since >= stalled_plain .or. mismatch < gained*self%plain_start) call accelerate(self, mismatch)
       else if (self%since >= stalled) then
          call go_plain(self)
       end if
@@ -147,7 +154,6 @@ contains
       self%damping = self%length
       self%momentum = 0.0_dp
       self%plain_start = self%least
-      self%joint_due = self%jumps
    end subroutine go_plain
 
    !> End the plain steps: the acceleration begins again from here.

@@ -25,7 +25,7 @@ module tangential_step
    use road_pull, only : road_pull_type
    use rubber_kernels, only : tangential_kernel
    use solver_result, only : solver_result_type
-   use touching_cells, only : force_beside, mark_contact
+   use touching_cells, only : force_beside, mark_contact, mark_shares
    use tangential_state, only : tangential_state_type
    use viscoelastic_energy, only : book_step
    use arm_state, only : commit_arms, new_products, past_traction, products_type
@@ -281,9 +281,9 @@ contains
          weighed = pressure*self%share
          fields%pressure => weighed
          fields%share => self%share
+         call mark_shares(self%share, state%contact)
       else
-         call mark_contact(self%adhesive, merge(self%cell_compliance(), 0.0_dp, self%law%jumps_at_edge()), &
-            pressure, gap, state%contact)
+         call mark_contact(self%adhesive, pressure, gap, state%contact)
       end if
       call hang_road(self, state, pressure, slope_x, slope_y)
       fields%slope_x => slope_x

@@ -1,0 +1,141 @@
+!> The cells at the edge of the contact where the traction of a cell would jump as it opens: with a law whose
+!> strength does not vanish with the pressure (constant shear).
+!>
+!> Such a cell has three states ([theory](theory.md)): open, without traction; in contact, with a pressure
+!> and the whole strength; and between them touching, with neither gap nor pressure, and a share of the
+!> strength. A pass solves for the pressure and for the traction one after the other, so that none of the two
+!> solves can find the share. It is therefore an unknown of the passes, and moves from pass to pass:
+!>
+!>     share <- share + (soft P_w - gap)/reach        cut off at 0 and 1
+!>
+!> P_w is the pressure of the wall, soft P_w the length by which it presses a cell in, and the reach the
+!> length by which a full share moves the cell down the slope of the road. The share stays where it is
+!> only if the cell is in one of the three states. Where the share decides whether the cell touches, the
+!> rule is nearly Newton's method for that cell alone, and all cells of the edge move at once.
+module edge_shares
+   use adhesion_potential, only : adhesion_potential_type, adhesive_slope
+   use asperity_precision, only : dp
+   use field_sums, only : row_totals
+   implicit none
+   private
+
+   public :: edge_reach, edge_rule_type, new_edge_rule
+
+   real(dp), parameter :: least_slope = 0.05_dp        !! of a road in the reach
+
+   !> What the rule needs to know of a step.
+   type :: edge_rule_type
+      type(adhesion_potential_type) :: potential
+      real(dp) :: soft = 0.0_dp                        !! displacement of a cell under its own unit traction, m/Pa
+      real(dp) :: reach = 0.0_dp                       !! m
+   contains
+      procedure :: decide
+      procedure :: move
+      procedure :: error
+   end type edge_rule_type
+
+contains
+
+   !> The length by which the whole strength moves a cell down the slopes of a road, m.
+   pure function edge_reach(soft, strength, rms_slope) result(reach)
+      real(dp), intent(in) :: soft                     !! displacement of a cell under its own unit traction, m/Pa
+      real(dp), intent(in) :: strength                 !! Pa
+      real(dp), intent(in) :: rms_slope
+      real(dp) :: reach
+
+      reach = soft*strength*max(rms_slope, least_slope)
+   end function edge_reach
+
+   !> The rule of a step.
+   pure function new_edge_rule(potential, soft, strength, rms_slope) result(rule)
+      type(adhesion_potential_type), intent(in) :: potential
+      real(dp), intent(in) :: soft                     !! displacement of a cell under its own unit traction, m/Pa
+      real(dp), intent(in) :: strength                 !! of the law without pressure, Pa
+      real(dp), intent(in) :: rms_slope                !! of the road
+      type(edge_rule_type) :: rule
+
+      rule%potential = potential
+      rule%soft = soft
+      rule%reach = max(edge_reach(soft, strength, rms_slope), tiny(1.0_dp))
+   end function new_edge_rule
+
+   !> Pressure of the wall in a cell, Pa: without the attraction.
+   elemental function wall_pressure(self, pressure, gap) result(wall)
+      class(edge_rule_type), intent(in) :: self
+      real(dp), intent(in) :: pressure                 !! attraction included, Pa
+      real(dp), intent(in) :: gap                      !! m
+      real(dp) :: wall
+
+      wall = pressure + adhesive_slope(self%potential, max(gap, 0.0_dp))
+   end function wall_pressure
+
+   !> Shares of 0 and 1 only, from pressure and gap alone. The solver of the normal contact leaves small
+   !> pressures, of round-off or of its tolerance, in cells with a gap: the larger of the two lengths decides.
+   subroutine decide(self, pressure, gap, share)
+      class(edge_rule_type), intent(in) :: self
+      real(dp), intent(in) :: pressure(:, :)           !! attraction included, Pa
+      real(dp), intent(in) :: gap(:, :)                !! m
+      real(dp), intent(inout) :: share(:, :)
+      integer :: j
+
+      !$omp parallel do default(none) shared(self, pressure, gap, share) private(j)
+      do j = 1, size(share, 2)
+         share(:, j) = merge(1.0_dp, 0.0_dp, &
+            self%soft*wall_pressure(self, pressure(:, j), gap(:, j)) > gap(:, j))
+      end do
+   end subroutine decide
+
+   !> Move the shares by what pressure and gap of a pass ask for.
+   subroutine move(self, pressure, gap, share)
+      class(edge_rule_type), intent(in) :: self
+      real(dp), intent(in) :: pressure(:, :)           !! attraction included, Pa
+      real(dp), intent(in) :: gap(:, :)                !! m
+      real(dp), intent(inout) :: share(:, :)
+      integer :: j
+
+      !$omp parallel do default(none) shared(self, pressure, gap, share) private(j)
+      do j = 1, size(share, 2)
+         share(:, j) = share(:, j) &
+            + (self%soft*wall_pressure(self, pressure(:, j), gap(:, j)) - gap(:, j))/self%reach
+         share(:, j) = min(max(share(:, j), 0.0_dp), 1.0_dp)
+      end do
+   end subroutine move
+
+   !> By how much the cells are off their states, in sum and over the sum of the lengths by which their
+   !> pressures press them in. A cell without traction may have neither a pressure of the wall nor an overlap with
+   !> the road, a cell with traction no gap, and a cell with a part of the traction no pressure of the wall.
+   !> 0 where there is no such length: without any pressure, and on a grid of one cell. Collective where
+   !> processes share the rows.
+   function error(self, share, pressure, gap)
+      class(edge_rule_type), intent(in) :: self
+      real(dp), intent(in) :: share(:, :)
+      real(dp), intent(in) :: pressure(:, :)           !! attraction included, Pa
+      real(dp), intent(in) :: gap(:, :)                !! m
+      real(dp) :: error
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: sums(2)
+      integer :: j
+
+      allocate (rows(2, size(gap, 2)))
+      !$omp parallel do default(none) shared(self, share, pressure, gap, rows) private(j)
+      do j = 1, size(gap, 2)
+         rows(1, j) = sum(abs(pressure(:, j)))
+         rows(2, j) = sum(cell_error(self, share(:, j), pressure(:, j), gap(:, j)))
+      end do
+      sums = row_totals(rows)
+      error = 0.0_dp
+      if (self%soft*sums(1) > 0.0_dp) error = sums(2)/(self%soft*sums(1))
+   end function error
+
+   !> The same of a cell, m.
+   elemental function cell_error(self, share, pressure, gap) result(error)
+      class(edge_rule_type), intent(in) :: self
+      real(dp), intent(in) :: share, pressure, gap
+      real(dp) :: error
+
+      error = 0.0_dp
+      if (share < 1.0_dp) error = max(self%soft*abs(wall_pressure(self, pressure, gap)), -gap)
+      if (share > 0.0_dp) error = max(error, abs(gap))
+   end function cell_error
+
+end module edge_shares
