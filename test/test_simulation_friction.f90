@@ -255,7 +255,8 @@ contains
       end do
       call check_that(warned == 1, 'a slip that swings over many steps causes none')
 
-      call slide('0', 1, record)
+      ! The motion is chaotic. In 60 steps, one of 20 blocks that differ by 1e-6 does not alternate often enough.
+      call slide('0', 1, record, steps=180)
       call check_order(index(record%warnings, report), '>', 0, 'numerical stick-slip is reported')
       call check_that(index(record%warnings, report) == index(record%warnings, report, back=.true.), &
          'and once')
@@ -273,17 +274,22 @@ contains
    contains
 
       !> The block with a density, kg/m3.
-      subroutine slide(density, passes, record)
+      subroutine slide(density, passes, record, steps)
          character(*), intent(in) :: density
          integer, intent(in) :: passes
          type(record_type), intent(out) :: record
+         integer, intent(in), optional :: steps        !! default 60
+         integer :: n
 
+         n = 60
+         if (present(steps)) n = steps
          call run_case('&grid nx = 48, ny = 1, lx = 1e-3, ly = 1e-3 /'//nl// &
             '&surface shape = ''sine'', amplitude = 3e-5, wavelength = 0.5e-3 /'//nl// &
             '&material poisson = 0.5, shear_modulus = 1e6, thickness = 2e-2, density = '//density// &
             ' /'//nl//'&friction law = ''coulomb'', coefficient = 0.5 /'//nl// &
-            '&phase pressure = 0.15e6 /'//nl//'&phase velocity_x = 1, duration = 3e-3, steps = 60 /' &
-            //nl//'&solver interpolation = ''linear'', passes = '//to_text(passes)//', coupling_tolerance = 100 /', &
+            '&phase pressure = 0.15e6 /'//nl//'&phase velocity_x = 1, duration = '//to_text(5e-5_dp*n)// &
+            ', steps = '//to_text(n)//' /'//nl// &
+            '&solver interpolation = ''linear'', passes = '//to_text(passes)//', coupling_tolerance = 100 /', &
             'stick-slip, density '//density, record)
       end subroutine slide
 

@@ -75,7 +75,7 @@ def grid_cells(text: str) -> int:
 
 
 def run_case(seed: int, folder: Path, program: str, scheme: str = "exponential2",
-             cells: int = 10**9) -> tuple[str, int]:
+             cells: int = 10**9, tolerance: float | None = None) -> tuple[str, int]:
     """Run a case of the campaign with a snapshot of each row; return its text and status.
 
     The status is -1, and nothing is run, if the law is another one or the grid has more cells.
@@ -85,6 +85,8 @@ def run_case(seed: int, folder: Path, program: str, scheme: str = "exponential2"
         return text, -1
     text = text.replace("file = 'out.h5'", "file = 'out.h5', snapshot_every = 1")
     text = text.replace("threads = 1,", f"threads = 1, time_scheme = '{scheme}',")
+    if tolerance is not None:
+        text = re.sub(r"tolerance = [^,/\s]+", f"tolerance = {tolerance:g}", text)
     (folder / "case.nml").write_text(text)
     done = subprocess.run([program, "run", "case.nml", "--quiet"], cwd=folder,
                           capture_output=True, check=False)
@@ -102,6 +104,48 @@ def run_starts(text: str, folder: Path, program: str) -> None:
                    check=False)
 
 
+def distance(found: tuple, state: tuple) -> float:
+    """Return the difference of pressure and traction between two states, as a part of the load."""
+    return float(sum(np.abs(found[k] - state[k]).sum() for k in (0, 1)) / np.abs(state[0]).sum())
+
+
+def read_run(folder: Path, text: str) -> tuple[Case, dict[str, np.ndarray], list[tuple]]:
+    """Return the dense case of a run, some columns of its history, and the state after each row."""
+    with h5py.File(folder / "road.h5") as file:
+        case = Case(text, file["surface"][:])
+    with h5py.File(folder / "out.h5") as file:
+        history = {name: file["history"][name][:] for name in (
+            "step", "time", "road_x", "road_y", "pressure")}
+        states = [fields(file[f"snapshots/{step:06d}"]) for step in history["step"]]
+    return case, history, states
+
+
+def left_in_rows(folder: Path, text: str) -> list[float]:
+    """Return how far the state of the program is from a dense solution, for each row.
+
+    That is what it leaves in the equations, or its distance from the solution that Newton's method
+    reaches from it, if that is less: a cell between two states may be read as in the wrong one.
+    Unlike `replay` this also judges rows with several solutions. It is meant for runs whose rows
+    are not taken in parts (`time_scheme = 'exponential'`).
+    """
+    case, history, states = read_run(folder, text)
+    road = np.array([history["road_x"], history["road_y"]])
+    case.rest(states[0][0], history["pressure"][0])
+    worst = []
+    for k in range(1, len(states)):
+        case.begin(history["time"][k] - history["time"][k - 1], road[:, k] - road[:, k - 1],
+                   history["pressure"][k])
+        step = DenseStep(case)
+        begun = step.start(*states[k])
+        off = max(float(np.abs(part).max()) for part in step.residual(begun))
+        found, left = step.newton(begun)
+        if left < ACCURATE:
+            off = min(off, distance(step.fields(found), states[k]))
+        worst.append(off)
+        case.commit(*states[k][:2])
+    return worst
+
+
 def replay(folder: Path, text: str, settled: bool = False) -> dict[str, Any]:
     """Solve all steps of a run but the last one, and begin that; if settled, solve that, too.
 
@@ -109,12 +153,7 @@ def replay(folder: Path, text: str, settled: bool = False) -> dict[str, Any]:
     """
     kept: dict[str, Any] = {}
     divided = 0
-    with h5py.File(folder / "road.h5") as file:
-        case = Case(text, file["surface"][:])
-    with h5py.File(folder / "out.h5") as file:
-        history = {name: file["history"][name][:] for name in (
-            "step", "time", "road_x", "road_y", "pressure")}
-        states = [fields(file[f"snapshots/{step:06d}"]) for step in history["step"]]
+    case, history, states = read_run(folder, text)
     whole = case.first_step_length
     road = np.array([history["road_x"], history["road_y"]])
     case.rest(states[0][0], history["pressure"][0])
@@ -139,8 +178,7 @@ def replay(folder: Path, text: str, settled: bool = False) -> dict[str, Any]:
                 return {**(kept or end), "before": worst, "divided": divided, "rows": k - 1}
             found, left = step.solve(guesses)
             pressure, traction, gap = step.fields(found)
-            error = sum(np.abs(a - b).sum() for a, b in (
-                (pressure, states[k][0]), (traction, states[k][1]))) / np.abs(states[k][0]).sum()
+            error = distance((pressure, traction), states[k])
             if left > ACCURATE:
                 raise ArithmeticError(f"row {k}, part {i + 1}: residual {left:.1e}")
             if last:                             # the past is that of the program

@@ -12,8 +12,6 @@ With `rise` > 0 the pressure also grows a little in the second range, as with `c
 steps have no jump and are easier to solve; `solve` lets `rise` go to 0.
 """
 
-import itertools
-
 import numpy as np
 from dense_case import Case
 
@@ -206,20 +204,15 @@ class DenseStep:
         """Take the traction off open cells."""
         return found[0], np.where(self.modes(found[0])[0], 0.0, found[1]), found[2]
 
-    def start(self, pressure: np.ndarray, traction: np.ndarray, gap: np.ndarray,
-              little: float = 1e-6) -> Found:
-        """Return a state found elsewhere in these terms.
-
-        A cell without its whole traction is taken to be partly sheared if its pressure is little,
-        as a part of the load; otherwise it sticks.
-        """
+    def start(self, pressure: np.ndarray, traction: np.ndarray, gap: np.ndarray) -> Found:
+        """Return a state found elsewhere in these terms."""
         case = self.case
         touches = gap <= 0.0
         road, level, _ = self.surface((gap, traction, 0.0), pressure)
         wall = np.maximum(pressure + case.attraction, 0)
         slope = road[1:3] * (1.0 if case.slope else 0.0)
         share = self.size(traction + pressure * slope, slope) / case.strength
-        partly = touches & (wall < little * case.load) & (share < 1 - 1e-6)
+        partly = touches & (wall < 1e-6 * case.load) & (share < 1 - 1e-6)
         s = np.where(touches, self.width + wall * self.soft, -gap)
         s = np.where(partly, np.clip(share, 0, 1) * self.width, s)
         return self.tidy((s, traction, float(level[touches].mean()) if touches.any() else 0.0))
@@ -227,8 +220,8 @@ class DenseStep:
     def solve(self, guesses: list[tuple]) -> tuple[Found, float]:
         """Solve the step with partly sheared cells, from the best start that works."""
         best = None
-        for guess, little in itertools.product(guesses, (1e-6, 1e-2)):
-            found, left = self.newton(self.start(*guess, little))
+        for guess in guesses:
+            found, left = self.newton(self.start(*guess))
             if best is None or left < best[1]:
                 best = found, left
             if left < ACCURATE:

@@ -3,9 +3,9 @@
 !> The memory of some parts depends on the course of the run: the acceleration of passes, which keeps more
 !> steps if there are many passes, and that of steady sliding. For these parts measured values are used.
 !> `tools/bench/memory.py` compares the estimate with the peak of runs, which differs by less than a tenth.
-!> Two parts are not counted: a dense system for few cells in contact (module `steady_active`, at most 20
-!> fields while it is solved), and steps that are solved all at once after their passes have stalled (module
-!> `joint_step`, 30 fields and up to 180 for the cells in contact; without this memory the step is not tried).
+!> A dense system for few cells in contact (module `steady_active`) is not counted; it takes at most 20 fields
+!> while it is solved. A step that is solved all at once after its passes have stalled (module `joint_step`) is
+!> rare, and without its memory the passes go on; `joint_memory` therefore returns that memory separately.
 module case_memory
    use asperity_precision, only : dp
    use asperity_schedule, only : count_rows
@@ -14,7 +14,12 @@ module case_memory
    implicit none
    private
 
-   public :: memory_needed
+   public :: joint_memory, memory_needed
+
+   !> Fields of a step that is solved all at once: the equations and four states; and the directions of GMRES, if
+   !> all cells touch.
+   real(dp), parameter :: joint_fields = 30.0_dp, joint_directions = 180.0_dp
+   real(dp), parameter :: most_kept = 64.0e6_dp       !! bytes of the copies of a row that is taken in parts
 
    real(dp), parameter :: program_itself = 26.0e6_dp  !! with its libraries, bytes
    real(dp), parameter :: chunk = 131072.0_dp         !! most values of a chunk of the result
@@ -55,12 +60,26 @@ contains
          + kept_arms(case, cells)
    end function memory_needed
 
-   !> Copies of the arms before a row without friction that is taken in parts, bytes. They are kept if they take
-   !> no more than 64 MB (module row_stop). The copies of friction are counted with its other fields.
+   !> The most memory that a run takes beyond `memory_needed` if a step with friction is solved all at once, bytes.
+   !> It is 0 if that cannot happen: without steps in time, without friction, and if a force pulls the road.
+   pure function joint_memory(case) result(bytes)
+      type(case_type), intent(in) :: case
+      real(dp) :: bytes
+      logical :: in_time
+
+      in_time = any(.not. case%phases%static .and. case%phases%steps > 0)
+      bytes = 0.0_dp
+      if (.not. in_time .or. .not. road_moves(case%phases) .or. case%friction%law == 'none') return
+      bytes = 8.0_dp*(joint_fields + joint_directions)*real(case%grid%nx, dp)*real(case%grid%ny, dp)
+   end function joint_memory
+
+   !> Copies of the arms, and with friction of the displacements, before a row that is taken in parts, bytes. They are
+   !> kept if they take no more than 64 MB (module row_stop).
    pure function kept_arms(case, cells) result(bytes)
       type(case_type), intent(in) :: case
       real(dp), intent(in) :: cells
       real(dp) :: bytes
+      real(dp) :: fields
       logical :: in_time
       integer :: arms
 
@@ -68,8 +87,9 @@ contains
       in_time = any(.not. case%phases%static .and. case%phases%steps > 0)
       bytes = 0.0_dp
       if (arms == 0 .or. .not. in_time .or. case%solver%time_scheme /= 'exponential2') return
-      if (road_moves(case%phases) .and. case%friction%law /= 'none') return
-      if (8.0_dp*(2.0_dp + arms)*cells <= 64.0e6_dp) bytes = 8.0_dp*(2.0_dp + arms)*cells
+      fields = 2.0_dp + arms
+      if (road_moves(case%phases) .and. case%friction%law /= 'none') fields = 12.0_dp + 3.0_dp*arms
+      if (8.0_dp*fields*cells <= most_kept) bytes = 8.0_dp*fields*cells
    end function kept_arms
 
    !> Fields of the normal solver and of its state (module normal_cg).
@@ -109,9 +129,19 @@ contains
       ! Fields that the passes of steps in time keep.
       if (in_time) fields = fields + 11.0_dp
       if (arms > 0) fields = fields + 4.0_dp + 2.0_dp*arms
-      ! Copies of the arms of both directions before a row that is taken in parts (module row_stop): 6 + 3 arms.
-      ! They do not add to the peak, because the passes keep most fields in other rows.
-      if (in_time .and. arms > 0) fields = fields + min(6.0_dp + 3.0_dp*arms, 20.0_dp)
+      ! The shares of the cells as a third unknown of the passes: in the place, in the differences that the
+      ! acceleration remembers, and for the tangential solver.
+      if (in_time .and. jumps_at_edge(case)) fields = fields + 13.0_dp
    end function friction_fields
+
+   !> Does the traction of a cell jump when the cell opens?
+   pure function jumps_at_edge(case) result(jumps)
+      type(case_type), intent(in) :: case
+      logical :: jumps
+
+      jumps = case%friction%law == 'constant_shear'
+      if (case%friction%law /= 'table') return
+      if (allocated(case%friction%table)) jumps = case%friction%table(1, 2) > 0.0_dp
+   end function jumps_at_edge
 
 end module case_memory

@@ -197,7 +197,8 @@ contains
       self%gap_known = .false.
       rubbing%ffts = rubbing%ffts + transforms
       if (.not. solved) return
-      self%place(:, :, :) = contact%tangential%trial
+      self%place(:, :2, :) = contact%tangential%trial
+      if (self%sharing) self%place(:, 3, :) = self%edge%reach*contact%tangential%share
       control%accuracy = proof*contact%case%solver%tolerance
    end subroutine solve_jointly
 

@@ -25,6 +25,10 @@ module joint_equations
 
    public :: joint_equations_type
 
+   !> Evaluations of the equations in an attempt, of six transforms each. They bound the work of a step that
+   !> cannot be solved. Attempts that succeed rarely take a tenth of them.
+   integer, parameter :: most_evaluations = 10000
+
    !> The equations and their work space. A variable of this type must not be copied.
    type, extends(joint_system_type) :: joint_equations_type
       logical :: ready = .false.
@@ -79,6 +83,7 @@ contains
       self%plan = plan
       self%grid = contact%grid
       self%evaluations = 0
+      self%most_evaluations = most_evaluations
       associate (rules => self%rules, state => contact%state)
          rules%potential = contact%side%potential
          rules%law = contact%tangential%law

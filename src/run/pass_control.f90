@@ -23,7 +23,7 @@
 !>   before is forgotten, since it belongs to the state that ended.
 !>
 !> Passes that stall with plain steps may not come to an end at all. Once in a row the step should then be solved
-!> all at once (`joint_due`), unless the shares of the cells are unknown, which the joint step does not have.
+!> all at once (`joint_due`). Only once, because an attempt may cost as much as many passes.
 module pass_control
    use asperity_precision, only : dp
    implicit none
@@ -87,7 +87,6 @@ contains
       !> change their states one after the other, and damping would only delay that.
       logical, intent(in) :: sharing
 
-      self%may_be_joint = .not. sharing
       if (sharing) self%slowed = sharing_damping
       self%tolerance = tolerance
       self%accuracy = min(max(coarsest, tolerance), max(tolerance, usual_share*expected))
