@@ -1,19 +1,19 @@
 !> The passes of a row in which friction acts.
 !>
-!> Pressure, traction and the place where the rubber's surface reads the road depend on each other.
+!> The pressure, the traction and the place where the rubber's surface touches the road depend on each other.
 !> Let D be the displacement of the road, U_T the tangential displacement of the rubber's surface, and z
-!> (the place) the guess of U_T with which the road is read. A pass does
+!> (the place) the guess of U_T with which the road is read. A pass computes
 !>
 !>    H, grad H  from the original map at X + z - D
 !>    P          the normal contact on H
 !>    T, U_T     the tangential contact under P, on the slopes grad H
 !>
-!> and the row is solved where U_T = z: pressure, traction, heights and slopes then belong together. The
+!> and the row is solved if U_T = z, because pressure, traction, heights and slopes are then consistent. The
 !> plain iteration z <- U_T need not converge. T contains -P grad H, which contributes eigenvalues
 !> between -1 and -2 times |grad H|^2 to dU_T/dz; friction adds some of the order of mu |grad H|; and a
 !> thick block multiplies the mean of both by its compliance. The passes therefore use Anderson
-!> acceleration on the whole field z (module `anderson`); `pass_control` says how accurate their solves
-!> are and how long their steps.
+!> acceleration on the whole field z (module `anderson`). Module `pass_control` determines the accuracy of their
+!> solves and the length of their steps.
 !>
 !> The traction T was found at the place z. If U_T - z moves the contact along the rubber, the strains
 !> around the contact move with it. Otherwise the road would be read as stretched beside the contact.
@@ -45,12 +45,12 @@
 !> pass is then done at its solution, with its shares of the bounds, and proves it. A normal solve that does
 !> not converge ends the loop. A row that is given up for a stop (module `row_stop`) is left as it is.
 !>
-!> The work of a row is bounded: by `most_passes`, by the iterations that a case allows to a normal and to a
-!> tangential solve (`max_iterations`), and by the bound of the joint step.
+!> The work of a row is bounded by `most_passes`, by the iterations that a case allows to a normal and to a
+!> tangential solve (`max_iterations`), and by the evaluations that `joint_equations` allows.
 !>
 !> Fields of doubles: two components each for the place, its residual, the best place and the displacement
-!> carried along; those of the acceleration; where the traction jumps, a third component of all of them but
-!> one, and the shares. The check borrows three from the workspace of the contact.
+!> carried along, and those of the acceleration. If the traction of a cell jumps as it opens, all of these but the
+!> displacement have a third component, and there is a field of shares. The check borrows three from the workspace of the contact.
 module coupled_passes
    use anderson, only : anderson_type, new_anderson
    use carried_field, only : carry
@@ -71,9 +71,9 @@ module coupled_passes
 
    public :: coupled_passes_type, new_coupled_passes
 
-   integer, parameter, public :: most_passes = 400      !! where the case leaves the number open
+   integer, parameter, public :: most_passes = 400      !! if the case does not limit the number
 
-   integer, parameter :: pairs = 6                      !! of passes that the acceleration remembers
+   integer, parameter :: pairs = 6                      !! number of passes that the acceleration remembers
    real(dp), parameter :: largest_factor = 1.0e3_dp     !! of a remembered pair; a larger one is round-off
 
    integer, parameter :: deciding = 2                   !! first passes of a row whose shares are 0 or 1
@@ -87,10 +87,10 @@ module coupled_passes
    !> Slopes in the contact count as at least this part of the rms slope of the map.
    real(dp), parameter :: least_slope = 0.1_dp
 
-   !> The work space of the passes and what they came to.
+   !> The work space of the passes and their outcome.
    type :: coupled_passes_type
       integer :: passes = 0                             !! done in the last row
-      real(dp) :: residual = 0.0_dp                     !! mismatch that the last row left
+      real(dp) :: residual = 0.0_dp                     !! mismatch of the last row
       logical, private :: gap_known = .false.           !! pressure, gap and heights are those of the last pass
       !> z, m; with shares also share times reach, m [nx, 2 or 3, rows].
       real(dp), allocatable, private :: place(:, :, :)
@@ -136,7 +136,7 @@ contains
       real(dp) :: tolerance
       integer :: most
       logical :: solved                                  !! the step, all at once
-      logical :: unlike                                  !! this row goes on differently from the last one
+      logical :: unlike                                  !! this row does not continue the motion of the last one
 
       tolerance = contact%case%solver%tolerance
       most = contact%case%solver%passes
@@ -153,7 +153,7 @@ contains
       self%gap_known = .false.
       do
          self%passes = self%passes + 1
-         ! Early passes are solved coarsely; what the row keeps is solved to the tolerance.
+         ! Early passes are solved coarsely; the result that the row keeps is solved to the tolerance.
          if (self%passes == most) control%accuracy = min(control%accuracy, tolerance)
          call do_pass(self, contact, plan, control%accuracy, normal, rubbing)
          contact%stop%given_up = normal%stopped .or. rubbing%stopped
@@ -170,7 +170,7 @@ contains
             if (solved) cycle
          end if
          call choose_place(self, contact, control)
-         ! The last of many passes is for the best place that was found.
+         ! The last of many passes is done at the best place that was found.
          if (self%passes == most - 1 .and. most > 10) self%place(:, :, :) = self%best_place
       end do
       associate (forecast => contact%state%tangential%forecast)
@@ -182,8 +182,8 @@ contains
       end associate
    end subroutine solve
 
-   !> Where the passes have stalled: solve the step all at once. If that succeeds, the next pass is done at
-   !> its solution, and accurately: it proves that the step is solved.
+   !> If the passes have stalled, solve the step all at once. If that succeeds, the next pass starts from its
+   !> solution with accurate solves, and verifies that the step is solved.
    subroutine solve_jointly(self, contact, plan, control, rubbing, solved)
       class(coupled_passes_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact
@@ -209,7 +209,7 @@ contains
       if (allocated(contact%tangential%share)) deallocate (contact%tangential%share)
    end subroutine drop_shares
 
-   !> One pass at the place, and the mismatch that it leaves.
+   !> Do one pass at the place, and compute the mismatch that it leaves.
    subroutine do_pass(self, contact, plan, accuracy, normal, rubbing)
       class(coupled_passes_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact
@@ -260,15 +260,15 @@ contains
       self%residuals(:, 3, :) = self%edge%reach*contact%tangential%share - self%place(:, 3, :)
    end subroutine take_shares
 
-   !> The first place of a row: the displacement of the row before, moved along with the contact, which
-   !> follows the road over the rubber, plus the mean motion of the rubber's surface; and what the last rows
-   !> have changed in it.
+   !> Compute the first place of a row: the displacement of the row before, moved along with the contact, which
+   !> follows the road over the rubber, plus the mean motion of the rubber's surface, plus the forecast of module
+   !> `place_forecast`.
    subroutine predict(self, contact, dt, motion, goes_on)
       class(coupled_passes_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact
       real(dp), intent(in) :: dt                         !! s
       real(dp), intent(in) :: motion(2)                  !! of the road, m
-      logical, intent(in) :: goes_on                     !! the row goes on as the last one did
+      logical, intent(in) :: goes_on                     !! the row continues the motion of the last one
       integer :: c
 
       do c = 1, 2
@@ -287,7 +287,7 @@ contains
       self%place(:, 3, :) = merge(self%edge%reach, 0.0_dp, contact%state%tangential%contact /= contact_open)
    end subroutine predict
 
-   !> The next place, from what the last pass found.
+   !> Compute the next place from the result of the last pass.
    subroutine choose_place(self, contact, control)
       class(coupled_passes_type), intent(inout) :: self
       class(contact_type), intent(in) :: contact
@@ -371,7 +371,7 @@ contains
          sums(3)/max(sums(4), least_slope*contact%rms_slope*sums(1), tiny(1.0_dp)))
    end function mismatch
 
-   !> Add the record of a solve to that of the row: the last outcome, all the work.
+   !> Add the record of a solve to that of the row: keep the last outcome, and add up the work.
    subroutine add_result(total, part)
       type(solver_result_type), intent(inout) :: total
       type(solver_result_type), intent(in) :: part

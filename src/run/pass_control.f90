@@ -32,29 +32,29 @@ module pass_control
    public :: pass_control_type
 
    real(dp), parameter :: coarsest = 1.0e-3_dp      !! accuracy of a solve
-   real(dp), parameter :: finest = 1.0e-4_dp        !! accuracy of a solve, in tolerances
+   real(dp), parameter :: finest = 1.0e-4_dp        !! best accuracy of a solve, in tolerances
    real(dp), parameter :: round_off = 1.0e-11_dp    !! accuracy that double precision can reach
    real(dp), parameter :: nearly = 3.0_dp           !! an accuracy within this factor of the tolerance nearly meets it
    real(dp), parameter :: usual_share = 0.1_dp, least_share = 1.0e-6_dp
-   real(dp), parameter :: falls = 0.3_dp            !! a mismatch below this part of the least one falls
-   real(dp), parameter :: slow = 0.5_dp             !! a mismatch above this part of the last falls slowly
+   real(dp), parameter :: falls = 0.3_dp            !! a mismatch below this part of the least one is a success
+   real(dp), parameter :: slow = 0.5_dp             !! a mismatch above this part of the last is slow progress
    real(dp), parameter :: slow_damping = 0.5_dp, sharing_damping = 0.8_dp
    real(dp), parameter :: astray = 10.0_dp
    real(dp), parameter :: first_plain = 0.3_dp, shortest = 0.05_dp, longest = 0.5_dp  !! plain steps
-   real(dp), parameter :: grows = 1.2_dp, shrinks = 0.5_dp, gathers = 0.7_dp          !! how they change
+   real(dp), parameter :: grows = 1.2_dp, shrinks = 0.5_dp, gathers = 0.7_dp          !! factors by which they change
    real(dp), parameter :: most_momentum = 0.95_dp
    real(dp), parameter :: straight = 0.8_dp, bent = 0.2_dp  !! cosine of the angle between two residuals
-   real(dp), parameter :: gained = 0.1_dp           !! part of the mismatch at their start at which plain steps end
+   real(dp), parameter :: gained = 0.1_dp           !! plain steps end at this part of their first mismatch
    integer, parameter :: patience = 2
    integer, parameter :: stalled = 15, stalled_plain = 60
 
-   !> What the passes of a step have shown.
+   !> The observations of the passes of a step, and the decisions for the next one.
    type :: pass_control_type
       real(dp) :: accuracy = coarsest               !! of the solves of the next pass
       real(dp) :: damping = 1.0_dp                  !! of the step to the next place
       real(dp) :: momentum = 0.0_dp                 !! of the plain steps
       logical :: forget = .false.                   !! the acceleration starts again
-      logical :: go_back = .false.                  !! to the best place so far
+      logical :: go_back = .false.                  !! return to the best place so far
       logical :: plain = .false.                    !! the steps are not accelerated
       logical :: best_yet = .false.                 !! the last pass was the best
       logical :: joint_due = .false.                !! the step should be solved all at once
@@ -78,7 +78,7 @@ module pass_control
 
 contains
 
-   !> Before the first pass of a step.
+   !> Begin a step, before its first pass.
    subroutine start(self, tolerance, expected, sharing)
       class(pass_control_type), intent(out) :: self
       real(dp), intent(in) :: tolerance             !! of the case
@@ -93,7 +93,7 @@ contains
       call spare_a_pass(self)
    end subroutine start
 
-   !> After a pass.
+   !> Judge a pass, and decide how the next one is done.
    pure subroutine judge(self, mismatch)
       class(pass_control_type), intent(inout) :: self
       real(dp), intent(in) :: mismatch
@@ -133,15 +133,15 @@ contains
       end if
    end subroutine judge
 
-   !> Ask a pass that would be solved nearly to the tolerance for the tolerance itself: it may then be the
-   !> last one.
+   !> If the next pass would be solved nearly to the tolerance, require the tolerance itself, because it may then be
+   !> the last pass.
    pure subroutine spare_a_pass(self)
       class(pass_control_type), intent(inout) :: self
 
       if (self%accuracy <= nearly*self%tolerance) self%accuracy = min(self%accuracy, self%tolerance)
    end subroutine spare_a_pass
 
-   !> Go back to the best place, and on in plain steps.
+   !> Return to the best place, and continue in plain steps.
    pure subroutine go_plain(self)
       class(pass_control_type), intent(inout) :: self
 
@@ -169,8 +169,8 @@ contains
       self%seen = 0
    end subroutine accelerate
 
-   !> Before a plain step: steps and momentum grow while the residual keeps its direction, and fall where it
-   !> turns.
+   !> Prepare a plain step: its length and the momentum grow while the residual keeps its direction, and become
+   !> smaller if it turns.
    pure subroutine follow(self, cosine)
       class(pass_control_type), intent(inout) :: self
       real(dp), intent(in) :: cosine                !! of the angle between the last two residuals

@@ -7,7 +7,7 @@
 !> Which points stick is not known beforehand. A method (module `friction_method`) therefore guesses: the
 !> points on their bound slip along it, the others stick. Under this guess it takes a step towards r = 0
 !> on the sticking points and towards r along D on the slipping ones, puts back every T that has left its
-!> bound, which makes that point slip, and releases points whose slip has turned against their traction,
+!> bound, so that this point slips, and releases points whose slip has turned against their traction,
 !> which makes them stick. The problem is solved when the guess holds and the residual g of all points is
 !> small; module `friction_problem` defines g.
 !>
@@ -25,11 +25,10 @@
 !> Memory beside the caller's fields: eleven fields, the two of the operator's spectrum and the two
 !> of the preconditioner's with its symbols (3/4 of a field); four more once the fallback is needed.
 !>
-!> Iterations against the mesh: examples/friction_iterations and docs/benchmarks.md. An iteration of
-!> 'fast' takes one and a half products of the operator where points slip.
-!> The preconditioner of 'fast' takes one product of its own, without padding, an iteration.
-!> There is no proof of convergence where the slope counts. Cones steeper than 1/mu have no bound
-!> uphill; where many points jam so, a solution may not be found, or not be there.
+!> examples/friction_iterations and docs/benchmarks.md show how the iterations depend on the mesh. An iteration of
+!> 'fast' takes one and a half products of the operator if points slip, and one product of its preconditioner,
+!> without padding. With the slope effect there is no proof of convergence. On slopes steeper than 1/mu the
+!> traction has no bound uphill. If many points are on such slopes, a solution may not be found, or may not exist.
 module friction_cg
    use asperity_errors, only : error_type
    use asperity_precision, only : dp
@@ -56,8 +55,8 @@ module friction_cg
    integer, parameter, public :: friction_thesis = 2
    integer, parameter, public :: friction_gradient = 3
 
-   integer, parameter :: hangings = 60           !! of the spring, at most
-   integer, parameter :: idle_hangings = 3       !! in full slip, after which nothing helps
+   integer, parameter :: hangings = 60           !! largest number of moves of the spring
+   integer, parameter :: idle_hangings = 3       !! moves in full slip after which more are useless
    !> If the mean compliance over the length of the map exceeds this, the fast method treats the mean mode
    !> apart. Below it, that would cost iterations; above, it saves them.
    real(dp), parameter :: thick = 0.2_dp
@@ -65,7 +64,7 @@ module friction_cg
    !> round-off. It would often end just below the tolerance, with an error of the friction above it.
    real(dp), parameter :: aim = 0.3_dp, resolved = 1.0e-10_dp
 
-   !> The solver for one operator, kept from solve to solve. Not to be copied.
+   !> The solver for one operator, kept from solve to solve. A variable of this type must not be copied.
    type :: friction_solver_type
       real(dp) :: tolerance = 1.0e-6_dp
       integer :: max_iterations = 1000
@@ -110,7 +109,7 @@ contains
       end if
    end subroutine new_friction_solver
 
-   !> Make the method that is asked for.
+   !> Make the requested method.
    subroutine choose_method(self, method, grid, kernel, error)
       type(friction_solver_type), intent(inout) :: self
       integer, intent(in) :: method
@@ -159,7 +158,7 @@ contains
             call meet_pull(self, problem, operator, result%iterations, result%converged)
          if (problem%fresh .or. .not. result%converged) exit
 
-         ! A slip that was found by recurrence has gathered round-off and proves nothing.
+         ! A slip that was computed by recurrence has accumulated round-off, and therefore proves nothing.
          call problem%refresh_slip(operator)
          if (problem%residual <= self%tolerance) exit
       end do
@@ -195,7 +194,7 @@ contains
       call self%pull%hang(problem, operator, thick*self%length)
    end subroutine set_problem
 
-   !> Say why the solve ended.
+   !> The reason why the solve ended.
    function reason(self, problem, result) result(text)
       class(friction_solver_type), intent(in) :: self
       type(friction_problem_type), intent(in) :: problem

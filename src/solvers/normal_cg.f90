@@ -6,31 +6,31 @@
 !> of a viscoelastic material; nothing else changes with it). After Polonsky and Keer (1999), with
 !> * the exact projection on {P >= 0, sum P = load} instead of a rescaling;
 !> * the direction kept through changes of the contact set (Fletcher-Reeves);
-!> * a preconditioner ~ |q| of a local stencil and block means, of which the residual is extended off the
-!>   contact (module schur_preconditioner);
+!> * a preconditioner ~ |q| that consists of a local stencil and block means, for which the residual is extended
+!>   outside the contact (module `schur_preconditioner`);
 !> * the step length predicted on the block means, so that the clipped step s is known before the
 !>   transform: two transforms per iteration, always;
 !> * passes over active blocks of 16 cells only, except the one that updates the gap.
-!> The thesis's own algorithm (2.1.2) is in module normal_cg_thesis.
+!> The algorithm of the thesis (2.1.2) is in module `normal_cg_thesis`.
 !>
-!> An iteration measures the error, chooses a direction d, projects P + alpha d on what is allowed, which
-!> makes a step s, and adds the multiple of s to P that minimises the energy. How the next direction is
-!> made is the phase of the loop:
+!> An iteration measures the error, chooses a direction d, projects P + alpha d on the admissible pressures, which
+!> gives a step s, and adds the multiple of s to P that minimises the energy. The phase of the loop determines
+!> how the next direction is formed:
 !>
-!>     restart    d = M r, the preconditioned residual: at first, and where the last direction has lost
-!>                its meaning (little was taken of a clipped step, the gap has drifted, a plain step)
+!>     restart    d = M r, the preconditioned residual: at first, and if the last direction is of no more use
+!>                (little was taken of a clipped step, the gap has drifted, or the step was plain)
 !>     conjugate  d = M r + beta d: after every other step
-!>     plain      d = r: after several steps that the projection bent until they did not descend. M r may
-!>                point uphill once it is projected; r never does.
-!>     ended      there is nothing more to do
+!>     plain      d = r: after several steps that did not descend after they were projected. M r may point uphill
+!>                once it is projected; r never does.
+!>     ended      the loop has ended
 !>
-!> Converged means that the duality gap e1 = (mean gap under the pressure - least gap)/h_rms and the
-!> error of the load, both of a fresh U = A P, are below the tolerance. Where the contact is small on a
-!> tall map, iterations go on to a smaller scale than h_rms (`narrow_scale` of module normal_state).
+!> The solve has converged if the duality gap e1 = (mean gap under the pressure - least gap)/h_rms and the
+!> error of the load, both of a new product U = A P, are below the tolerance. If the contact is small on a tall
+!> map, a smaller scale than h_rms is used (`narrow_scale` of module `normal_state`).
 !>
-!> In mixed precision the products A s of the steps are in single precision: their errors are small
-!> beside s. The pressure and the gap stay in double precision; module gap_watch says when the gap is
-!> computed afresh in double precision, and when single precision no longer helps.
+!> In mixed precision the products A s of the steps are in single precision, because their errors are small
+!> compared with s. The pressure and the gap remain in double precision. Module `gap_watch` decides when the gap
+!> is computed again in double precision, and when single precision is no longer useful.
 !>
 !> Fields of doubles: H, P, gap and step; three fields in single precision (the direction, the residual
 !> and the search direction of the preconditioner); the operator's spectrum, in whose memory lie two more
@@ -65,8 +65,8 @@ module normal_cg
    integer, parameter :: phase_plain = 3
    integer, parameter :: phase_ended = 4
 
-   ! kappa is the ratio of the true d.A d to the predicted one. Every step that does not descend, or hardly
-   ! does, makes it four times larger, and so the next trial shorter.
+   ! kappa is the ratio of the true d.A d to the predicted one. A step that does not descend, or hardly descends,
+   ! makes kappa four times larger and thus the next trial shorter.
    real(dp), parameter :: often_bent = 1e3_dp  !! kappa from which the direction is the plain residual
    real(dp), parameter :: hopeless = 1e9_dp    !! kappa from which no step is expected to descend
    real(dp), parameter :: useless = 0.1_dp     !! largest part of a clipped step that counts as little
@@ -79,7 +79,8 @@ module normal_cg
    real(dp), parameter :: much_contact = 0.3_dp   !! and from which more steps pay
    real(dp), parameter :: large = 1.5e6_dp        !! cells from which they pay
 
-   !> The solver with its operators and work fields, kept from step to step. Not to be copied.
+   !> The solver with its operators and work fields, kept from step to step. A variable of this type must not be
+   !> copied.
    type, extends(contact_solver_type) :: normal_solver_type
       logical :: mixed = .false.                      !! products of steps in single precision
       type(convolution_type) :: quick                 !! A in single precision, if mixed
@@ -89,7 +90,7 @@ module normal_cg
       procedure :: destroy
    end type normal_solver_type
 
-   !> What an iteration leaves to the next.
+   !> The numbers that an iteration passes to the next one.
    type :: iteration_type
       integer :: phase = phase_restart
       real(dp) :: kappa = 1.0_dp            !! true d.A d over its prediction
@@ -158,7 +159,7 @@ contains
 
    contains
 
-      !> The first pressure and its gap.
+      !> Compute the first pressure and its gap.
       subroutine start_solve()
          began = omp_get_wtime()
          before = transforms(self)
@@ -180,8 +181,8 @@ contains
          if (.not. determined) call end_loop(now, reason_undetermined)
       end subroutine start_solve
 
-      !> The error of the present state, by a fresh gap where the sums cannot be trusted, and the blocks to
-      !> work on. The loop ends where the problem is solved.
+      !> Compute the error of the present state, with a new gap if the sums are not accurate enough, and find the
+      !> active blocks. The loop ends if the problem is solved.
       subroutine measure_state()
          logical :: drifted
 
@@ -209,7 +210,7 @@ contains
          end associate
       end subroutine measure_state
 
-      !> The gap by a product of the whole pressure, and its measure.
+      !> Compute the gap by a product of the whole pressure, and measure it.
       subroutine compute_gap()
          call evaluate_gap(task, self%operator, height, pressure, gap, past)
          call measure_it()
@@ -237,7 +238,7 @@ contains
          if (watch%single) call self%quick%set_unit(sums%load/cells)
       end subroutine measure_it
 
-      !> The result, measured by a fresh gap.
+      !> Measure the result with a new gap.
       subroutine finish_solve()
          if (.not. watch%proves()) call compute_gap()
          if (determined .and. measure%load_error > task%tolerance) then
@@ -286,7 +287,7 @@ contains
       now%reason = reason
    end subroutine end_loop
 
-   !> The direction of an iteration, according to the phase; it sets the phase of the next one.
+   !> Choose the direction of an iteration according to the phase, and set the phase of the next one.
    subroutine choose_direction(work, task, measure, pressure, gap, now)
       type(normal_work_type), intent(inout) :: work
       type(normal_problem_type), intent(in) :: task
@@ -320,8 +321,8 @@ contains
       if (now%slope <= 0.0_dp) call end_loop(now, 'no direction of descent is left')
    end subroutine choose_direction
 
-   !> The step of an iteration: a trial along the direction, projected on what is allowed, and how much of
-   !> it is taken. A step that does not descend is rejected (alpha = 0), and the next trial is shorter.
+   !> Choose the step of an iteration: a trial along the direction, projected on the admissible pressures, and the
+   !> part of it that is taken. A step that does not descend is rejected (alpha = 0), and the next trial is shorter.
    subroutine choose_step(self, product, task, level, pressure, gap, now)
       class(normal_solver_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: product
@@ -361,7 +362,7 @@ contains
       end if
    end subroutine shorten
 
-   !> How much of the projected step is taken, by the product of the operator with it.
+   !> Compute the part of the projected step that is taken, from the product of the operator with it.
    subroutine choose_length(self, product, modulus, pressure, clipped, step, now)
       class(normal_solver_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: product
@@ -386,7 +387,7 @@ contains
          call end_loop(now, 'no direction of descent is left')
          return
       end if
-      ! A direction that points out of what is allowed would only grow: do not keep it.
+      ! A direction that points out of the admissible pressures would only grow. Do not keep it.
       if (clipped .and. now%alpha < useless) now%phase = phase_restart
       if (clipped .and. now%alpha < nothing) then
          now%kappa = max(before, now%kappa)

@@ -1,4 +1,4 @@
-!> What the methods for normal contact share: the problem, the start, the gap, the measure of error.
+!> The parts that all methods for normal contact share: the problem, the start, the gap, and the error measure.
 module normal_state
    use fft_conv, only : columns_apply, convolution_type
    use field_sums, only : cell_count, field_mean, field_rms, largest_of_rows, least_of_rows, row_total
@@ -23,7 +23,7 @@ module normal_state
 
    real(dp), parameter :: shallow = 10.0_dp             !! longest scale over the displacement under load
 
-   !> A normal contact problem but for its fields.
+   !> A normal contact problem without its fields.
    type :: normal_problem_type
       real(dp) :: modulus = 1.0_dp          !! shear modulus of the step (Q of module zener), Pa
       integer :: control = control_pressure
@@ -39,7 +39,7 @@ module normal_state
       real(dp) :: least_scale = 0.0_dp      !! the least one that round-off allows; set here, m
    end type normal_problem_type
 
-   !> How far a state is from the solution.
+   !> The distance of a state from the solution.
    type :: gap_measure_type
       real(dp) :: level = 0.0_dp            !! mean of U - H + datum over P > 0, or the prescribed one, m
       real(dp) :: weighted_level = 0.0_dp   !! the same weighted by P, or the prescribed one, m
@@ -53,13 +53,13 @@ module normal_state
 
 contains
 
-   !> Complete a problem for its fields: a height to which errors are compared that round-off resolves
-   !> (for a flat surface, what the load moves it by); and whether a pressure is determined: in periodic
+   !> Complete a problem for its fields: find a height to which errors are compared and that round-off resolves
+   !> (for a flat surface, the displacement under the load), and whether the pressure is determined: in periodic
    !> mode no approach may close the mean gap.
    !>
-   !> The solvers count heights, gaps and levels from the highest point of the map. Under a small load
-   !> all that touches lies near that point, where these differences are then exact: the gap is not
-   !> the small difference of two large numbers.
+   !> The solvers count heights, gaps and levels from the highest point of the map. Under a small load all touching
+   !> cells lie near that point, so that these differences are exact, and the gap is not the small difference of two
+   !> large numbers.
    subroutine prepare_problem(problem, grid, threads, height, task, determined)
       type(normal_problem_type), intent(in) :: problem
       type(grid_type), intent(in) :: grid
@@ -103,11 +103,11 @@ contains
       if (highest - lowest <= resolved) task%least_scale = task%rms_height
    end subroutine prepare_problem
 
-   !> Set the height that the duality gap is solved to for a state near the solution.
+   !> Set the height to which the duality gap is compared, for a state near the solution.
    !>
-   !> The rms height says little where the contact is small on a tall map, as of a sphere's summit: then
-   !> the mean displacement under the load does, and the scale is ten times that. On a rough contact it
-   !> is the rms height.
+   !> If the contact is small on a tall map, such as on the summit of a sphere, the rms height is not a useful scale,
+   !> and ten times the mean displacement under the load is used instead. For a rough contact the scale is the rms
+   !> height.
    subroutine narrow_scale(task, height, pressure, threads, measure)
       type(normal_problem_type), intent(inout) :: task
       real(dp), intent(in) :: height(:, :), pressure(:, :)
@@ -198,7 +198,7 @@ contains
          measure%load_error = abs(sums%load/(cells*problem%target) - 1.0_dp)
          measure%duality_gap = measure%weighted_level - sums%least
       else
-         ! No load, and none is wanted: the surfaces just touch.
+         ! There is no load, and none is prescribed: the surfaces just touch.
          measure%level = sums%least
          measure%weighted_level = sums%least
          measure%load_error = merge(1.0_dp, 0.0_dp, problem%target > 0.0_dp)
@@ -255,8 +255,8 @@ contains
       end do
    end subroutine evaluate_gap
 
-   !> The start: the pressure handed in, or that of full contact (Westergaard) in periodic mode and a
-   !> cap of the height in free mode, put on what is allowed.
+   !> Compute the first pressure: the given one, or else that of full contact (Westergaard) in periodic mode and a
+   !> cap of the height in free mode, projected on the admissible pressures.
    subroutine first_pressure(problem, grid, operator, height, pressure, past)
       type(normal_problem_type), intent(in) :: problem
       type(grid_type), intent(in) :: grid
@@ -304,8 +304,8 @@ contains
       end if
    end subroutine first_pressure
 
-   !> Clip a start, and scale it to the load where that is prescribed: unlike a projection, that keeps
-   !> the contact where it is.
+   !> Clip the first pressure, and scale it to the load if that is prescribed. Unlike a projection, scaling does not
+   !> change the cells in contact.
    subroutine rescale(problem, grid, threads, pressure, usable)
       type(normal_problem_type), intent(in) :: problem
       type(grid_type), intent(in) :: grid
@@ -333,7 +333,7 @@ contains
       end do
    end subroutine rescale
 
-   !> Hand out a solution: what its measure says of it, and the gap counted from the level.
+   !> Return a solution: the outcome according to its measure, and the gap counted from the level.
    subroutine hand_out(problem, task, measure, determined, threads, gap, level, outcome)
       type(normal_problem_type), intent(in) :: problem      !! as the caller gave it
       type(normal_problem_type), intent(in) :: task         !! the problem, completed for its fields
