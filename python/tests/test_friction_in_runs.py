@@ -92,7 +92,9 @@ def test_law_in_three_dimensions(tmp_path, law, slope, slip_law, seed, interpola
                         slip_law=slip_law, seed=seed, interpolation=interpolation,
                         file=tmp_path / "case.h5")
     if law == "constant_shear":
-        text = text.replace("coefficient = 0.0, ", "")
+        # The gaps of partly sheared cells are as small as the mismatch of the passes.
+        text = text.replace("coefficient = 0.0, ", "").replace("tolerance = 1e-8, passes = 30",
+                                                               "tolerance = 1e-10")
     if law == "coulomb":
         text = text.replace(" shear_strength = 0.0,", "")
     case.write_text(text)
@@ -100,10 +102,13 @@ def test_law_in_three_dimensions(tmp_path, law, slope, slip_law, seed, interpola
     seen = np.zeros(3, dtype=int)
     assert len(run.snapshots) == 29
     for snapshot in run.snapshots[1:]:
-        touching = snapshot.pressure > 0
         state = np.asarray(snapshot.contact)
-        assert (state[touching] > 0).all()
+        assert (state[snapshot.pressure > 0] > 0).all() or law == "constant_shear"
         # With constant shear a cell that touches without pressure carries a part of the strength.
+        # Its pressure is zero to the tolerance.
+        little = 1e-8 * snapshot.pressure.max() if law == "constant_shear" else 0.0
+        touching = snapshot.pressure > little
+        assert (state[touching] > 0).all()
         partly = (state > 0) & ~touching
         assert not partly.any() or law == "constant_shear"
         assert np.abs(snapshot.gap[partly]).max(initial=0) < 1e-8 * np.ptp(run.height)
