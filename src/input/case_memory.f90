@@ -32,36 +32,41 @@ contains
       type(case_type), intent(in) :: case
       integer, intent(in), optional :: rows        !! of the process; default all
       real(dp) :: bytes
-      real(dp) :: cells, fields
-      logical :: slides
+      real(dp) :: buffers, cells, copies, fields
+      logical :: rubs, slides
       integer :: arms
 
       arms = size(case%material%prony_g)
       slides = road_moves(case%phases)
+      rubs = slides .and. case%friction%law /= 'none'
       fields = normal_fields(case)
       ! Without arms there is no S, no change of S, and no traction of the past.
       if (arms > 0) fields = fields + 3.0_dp + arms
       ! The displacement is kept for the next row.
       if (slides .or. count_rows(case%phases) > 1) fields = fields + 1.0_dp
-      ! Copies of the pressure and the gap before a row that may be abandoned (module row_stop). The copies of
-      ! friction are counted with its other fields.
-      if (count_rows(case%phases) > 1 .and. .not. (slides .and. case%friction%law /= 'none')) fields = fields + 2.0_dp
       ! The original map and its spline, the slopes, and a field that is being shifted.
       if (slides) fields = fields + merge(5.0_dp, 4.0_dp, case%solver%interpolation == 'cubic')
       if (case%adhesion%potential /= 'none') fields = fields + adhesion_fields(case)
-      if (slides .and. case%friction%law /= 'none') fields = fields + friction_fields(case)
-      if (any(case%phases%steady)) &
-         fields = fields + merge(130.0_dp, 32.0_dp, slides .and. case%friction%law /= 'none')
+      if (rubs) fields = fields + friction_fields(case)
+      if (any(case%phases%steady)) fields = fields + merge(130.0_dp, 32.0_dp, rubs)
       cells = real(case%grid%nx, dp)*real(case%grid%ny, dp)
       if (present(rows)) cells = real(case%grid%nx, dp)*real(rows, dp)
+
+      ! Copies of the pressure and the gap before a row that may be abandoned (module row_stop). The copies of
+      ! friction are counted with its other fields.
+      copies = kept_arms(case, cells)
+      if (count_rows(case%phases) > 1 .and. .not. rubs) copies = copies + 16.0_dp*cells
       ! Gathered chunks, twice as many filtered chunks, and one chunk that each thread is filtering (module
       ! hdf5_chunk_writer).
-      bytes = 8.0_dp*(fields*cells + 3.0_dp*min(cells, chunks*chunk) + 2.0_dp*min(cells, chunk)) + program_itself &
-         + kept_arms(case, cells)
+      buffers = 8.0_dp*(3.0_dp*min(cells, chunks*chunk) + 2.0_dp*min(cells, chunk))
+
+      ! The solvers need the copies, and the result needs the buffers, but not at the same time. The measured
+      ! fields of friction presuppose both.
+      bytes = 8.0_dp*fields*cells + program_itself + merge(copies + buffers, max(copies, buffers), rubs)
    end function memory_needed
 
    !> The most memory that a run takes beyond `memory_needed` if a step with friction is solved all at once, bytes.
-   !> It is 0 if that cannot happen: without steps in time, without friction, and if a force pulls the road.
+   !> It is 0 without steps in time and without friction.
    pure function joint_memory(case) result(bytes)
       type(case_type), intent(in) :: case
       real(dp) :: bytes
@@ -103,6 +108,7 @@ contains
 
       kind = merge(2, 1, case%grid%boundary == boundary_free)
       fields = 5.9_dp + spectrum(kind)
+      if (case%solver%method == 'thesis') fields = fields - 2.0_dp
       fields = fields + merge(symbols_mixed(kind), symbol(kind), case%solver%precision == 'mixed')
    end function normal_fields
 
@@ -113,7 +119,7 @@ contains
 
       fields = 12.7_dp
       if (case%grid%boundary == boundary_free) fields = 62.0_dp
-      if (case%solver%method == 'thesis') fields = 3.4_dp
+      if (case%solver%method == 'thesis') fields = 5.4_dp
    end function adhesion_fields
 
    !> Fields of friction (modules tangential_step, friction_cg, coupled_passes, row_stop).
