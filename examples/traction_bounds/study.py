@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 MINUTES = 0.2
 
 SIDE, COEFFICIENT, SHEAR = 1e-3, 0.8, 0.12e6       # m, Coulomb's, Pa
+TOLERANCE = 1e-7
 TITLES = {"coulomb": "Coulomb", "constant_shear": "constant shear stress",
           "coulomb_orowan": "Coulomb-Orowan"}
 LAWS = tuple(TITLES)
@@ -93,11 +94,11 @@ def _run(folder: Path, name: str, cells: int) -> list[dict[str, Any]]:
         friction=friction,
         phase=[{"pressure": 0.15e6},
                {"velocity_x": 0.1, "velocity_y": 0.03, "duration": 0.6e-3, "steps": 12}],
-        solver={"passes": 8, "interpolation": "cubic", "tolerance": 1e-7, "slip_law": slip_law},
+        # With constant shear the shares of the cells at the edge take more passes.
+        solver={"passes": 0 if law == "constant_shear" else 8, "interpolation": "cubic",
+                "tolerance": TOLERANCE, "slip_law": slip_law},
         output={"snapshot_every": 3})
-    # Cells at the edge come and go with the whole shear strength: see the README.
-    with common.expected(*([common.UNSETTLED] if law == "constant_shear" else [])):
-        run = common.run(case, folder / f"{name}.h5")
+    run = common.run(case, folder / f"{name}.h5")
     waves, grid = _waves(run.path), run.grid
     x0, y0 = np.meshgrid(grid.x, grid.y)
     found = []
@@ -110,7 +111,8 @@ def _run(folder: Path, name: str, cells: int) -> list[dict[str, Any]]:
         phases = [1j * amplitude * np.exp(1j * (a * x + b * y)) for a, b, amplitude in waves]
         hx = sum((a * phase).real for (a, _, _), phase in zip(waves, phases, strict=True))
         hy = sum((b * phase).real for (_, b, _), phase in zip(waves, phases, strict=True))
-        on = snapshot.pressure > 0
+        # Partly sheared cells of constant shear have no pressure, to the tolerance of all cells.
+        on = snapshot.pressure > TOLERANCE * snapshot.pressure.sum()
         p, hx, hy = snapshot.pressure[on], hx[on], hy[on]
         tx, ty = snapshot.traction_x[on], snapshot.traction_y[on]
         dx, dy = tx + p * hx, ty + p * hy
@@ -166,11 +168,9 @@ def check(data: dict[str, Any], quick: bool) -> None:
     assert data["ellipse"] < 1e-12, "not on the ellipse of eq. 3.4"
     # The runs interpolate height and slope by cubics. With 18 and 32 cells in the short wave that
     # makes 7e-4 and 1.1e-4 of the bound; with a limit of the shear stress the pressure under it is
-    # larger beside the bound, and so is the error. A constant shear stress jumps at the rim of the
-    # contact, which flickers from pass to pass: half a percent, once.
-    close = {"coulomb": 1e-3, "thesis": 1e-3, "coulomb_orowan": 4e-3} if quick else \
-        {"coulomb": 2e-4, "thesis": 2e-4, "coulomb_orowan": 8e-4}
-    close["constant_shear"] = 0.015
+    # larger beside the bound, and so is the error.
+    cone, limited = (1e-3, 4e-3) if quick else (2e-4, 8e-4)
+    close = {"coulomb": cone, "thesis": cone, "coulomb_orowan": limited, "constant_shear": limited}
     for name, most in close.items():
         assert data[f"{name}_off"] < most, f"{name}: {data[f'{name}_off']:.1e} off the bound"
         assert data[f"{name}_inside"] > 1 - most, f"{name}: {data[f'{name}_inside']}: out of bounds"

@@ -333,8 +333,9 @@ def test_a_stop_is_clean_and_is_taken_up(tmp_path, number):
                                stderr=subprocess.PIPE, start_new_session=True,
                                preexec_fn=hear_ctrl_c)
     first = tmp_path / "phase1.pressure=1000.0.h5"
+    second = tmp_path / "phase1.pressure=2000.0.h5"
     end = time.monotonic() + PATIENCE
-    while rows_of(first) < 3:
+    while rows_of(first) < 3 or rows_of(second) < 1:
         assert process.poll() is None, process.stderr.read()
         assert time.monotonic() < end, "no rows come up"
         time.sleep(0.02)

@@ -163,7 +163,7 @@ contains
       real(dp) :: slip(2), length
 
       slip = self%slip_unit*self%law%slip_along_slope(self%slope_at(i, j), self%slip(i, :, j))
-      length = norm2(slip)
+      length = sqrt(slip(1)**2 + slip(2)**2)       ! not norm2, whose rounding depends on the size of the numbers
       if (length <= far*self%compliance*self%work%bound(i, 1, j)) return
       t = self%law%normal_traction(self%pressure(i, j), self%slope_at(i, j)) &
          + (self%work%bound(i, 1, j)/length)*slip
