@@ -1,4 +1,4 @@
-!> Templates: inputs to start from, each complete and small enough to run in seconds. Their comments are taken
+!> Templates are inputs to start from, each complete and small enough to run in seconds. Their comments are taken
 !> from the reference of the input. A template that the input check refuses is not offered.
 module case_templates
    use case_input, only : parse_case

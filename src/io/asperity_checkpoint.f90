@@ -1,4 +1,4 @@
-!> Checkpoints: files with the state of a run, from which the run can be continued.
+!> Checkpoints are files with the state of a run, from which the run can be continued.
 !>
 !> The checkpoint of FILE.h5 is FILE.checkpoint.h5. It is written under another name, written through to the
 !> disk, and then replaces the old one in one step, so that there is always a complete checkpoint or none. It

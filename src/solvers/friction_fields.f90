@@ -23,8 +23,8 @@ module friction_fields
       real(dp), pointer, contiguous :: share(:, :) => null()
       real(dp), pointer, contiguous :: traction(:, :, :) => null() !! [nx, 2, rows] T, Pa; in: the start
       real(dp), pointer, contiguous :: slip(:, :, :) => null()     !! [nx, 2, rows] out: r, everywhere, m
-      !> In: `slip` times this is about r; 0: nothing is known of it. Cells that are expected to slip far start
-      !> on their bound, in the direction of their slip.
+      !> If positive, `slip` times this is about r when a solve begins; 0 if nothing is known of r. Cells that
+      !> are expected to slip far start on their bound, in the direction of their slip.
       real(dp) :: slip_unit = 0.0_dp
       !> [nx, rows] In: 0 open, 1 in contact, 2 in contact and likely to slip, as it did in the step
       !> before: its traction starts on the bound. Without adhesion a point with P <= 0 is taken as

@@ -1,4 +1,4 @@
-!> Kernels: the response of a solid's surface to tractions, for a shear modulus of 1.
+!> Kernels, that is, the response of a solid's surface to tractions, for a shear modulus of 1.
 !>
 !> On a periodic grid a wave exp(i q.x) of traction causes A(q) times the same wave of displacement. A is a
 !> number for the normal direction, and a symmetric 2 x 2 matrix (xx, yy, xy) for the tangential ones. On a free
