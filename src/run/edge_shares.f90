@@ -1,7 +1,7 @@
 !> The cells at the edge of the contact where the traction of a cell would jump as it opens: with a law whose
 !> strength does not vanish with the pressure (constant shear).
 !>
-!> Such a cell has three states ([theory](theory.md)): open, without traction; in contact, with a pressure
+!> Such a cell has three states (see docs/theory.md): open, without traction; in contact, with a pressure
 !> and the whole strength; and between them touching, with neither gap nor pressure, and a share of the
 !> strength. A pass solves for the pressure and for the traction one after the other, so that none of the two
 !> solves can find the share. It is therefore an unknown of the passes, and moves from pass to pass:
