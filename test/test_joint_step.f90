@@ -1,4 +1,5 @@
-!> Tests of steps with friction that are solved all at once: GMRES, the states of a cell, and runs.
+!> Tests of what solves a step with friction all at once: GMRES, and the states of a cell. Runs with such steps
+!> are in python/tests/test_hard_steps.py and test_constant_shear.py.
 module test_joint_step
    use adhesion_potential, only : new_adhesion_potential
    use asperity_errors, only : error_type
@@ -7,7 +8,6 @@ module test_joint_step
    use friction_law, only : new_friction_law
    use gmres, only : cell_vector_type, gmres_type
    use joint_cells, only : cell_rules_type
-   use simulation_runs, only : check_books, nl, record_type, run_case
    implicit none
    private
 
@@ -19,7 +19,6 @@ contains
       call begin_suite('joint_step')
       if (selected('gmres_solves_a_system')) call gmres_solves_a_system()
       if (selected('states_join_without_a_jump')) call states_join_without_a_jump()
-      if (selected('constant_shear_settles_and_books_close')) call constant_shear_settles_and_books_close()
    end subroutine run_joint_step
 
    !> A matrix without symmetry, with the number beside the cells; against its known solution.
@@ -78,22 +77,5 @@ contains
       call check_that(rules%slips(0.25_dp, 0.0_dp, [0.0_dp, 0.0_dp], [0.75e5_dp, 0.0_dp]), 'known to slip')
       call check_that(.not. rules%slips(0.5_dp, 0.0_dp, [0.0_dp, 0.0_dp], [0.75e5_dp, 0.0_dp]), 'or to stick')
    end subroutine states_join_without_a_jump
-
-   !> A steep road with a constant shear stress: passes alone leave 1e-4 or more in its steps.
-   subroutine constant_shear_settles_and_books_close()
-      type(record_type) :: record
-
-      call run_case('&grid nx = 48, ny = 41, lx = 1e-3, ly = 0.9e-3 /'//nl// &
-         '&surface shape = ''self_affine'', hurst = 0.8, wavelength_long = 0.5e-3, '// &
-         'wavelength_short = 0.15e-3, rms_slope = 0.5, seed = 3 /'//nl// &
-         '&material shear_modulus = 0.5e6, prony_g = 1e6, prony_tau = 1e-2, thickness = 1e-3 /'//nl// &
-         '&friction law = ''constant_shear'', shear_strength = 3e5 /'//nl// &
-         '&phase pressure = 5e4, duration = 0.01, steps = 2 /'//nl// &
-         '&phase velocity_x = 10e-3, duration = 0.003, steps = 6 /'//nl// &
-         '&solver tolerance = 1e-6 /', 'constant shear', record)
-      call check_order(maxval(record%rows%residual_coupling), '<=', 1.0e-6_dp, 'the steps settle')
-      call check_order(maxval(record%rows%passes), '>', 15, 'the passes alone do not')
-      call check_books(record, 'constant shear', 1.0e-6_dp)
-   end subroutine constant_shear_settles_and_books_close
 
 end module test_joint_step

@@ -81,9 +81,8 @@ def slopes_under(run: asperity.Run, snapshot, interpolation: str) -> tuple[np.nd
 def test_law_in_three_dimensions(tmp_path, law, slope, slip_law, seed, interpolation):
     """The force of the road lies in the cone of its normal, and slip is along its tangential part.
 
-    Passes enough that slopes, pressure and traction belong together. Constant shear is taken on
-    the level only: a cell at the edge that comes and goes brings all of sigma_max with it, and the
-    passes need not settle.
+    There are enough passes that slopes, pressure and traction belong together. Constant shear is
+    tested without the slope; tools/constant_shear.py and its tests compare it on slopes.
     """
     case = tmp_path / "case.nml"
     mu = MU if law != "constant_shear" else 0.0
