@@ -23,8 +23,10 @@ module joint_newton
    public :: joint_newton_type
 
    integer, parameter :: most_steps = 25
+   integer, parameter :: few_steps = 3                 !! that must halve the residual of a hasty solution
    integer, parameter :: most_directions = 120         !! directions of GMRES for a step
    real(dp), parameter :: accuracy = 1.0e-4_dp         !! of a solve by GMRES
+   real(dp), parameter :: far = 0.1_dp                 !! residual from which `far_accuracy` is sufficient
    real(dp), parameter :: difference = 1.0e-7_dp       !! largest change of an unknown in a product, scaled
    real(dp), parameter :: attracted = 1.0e-4_dp        !! e'' over the stiffness of a cell, for it to be unknown
    real(dp), parameter :: astray = 100.0_dp            !! a residual this much larger than the first ends the attempt
@@ -41,6 +43,8 @@ module joint_newton
    !> The method and its work space. A variable of this type must not be copied.
    type :: joint_newton_type
       logical :: ready = .false.
+      real(dp) :: far_accuracy = accuracy              !! of a solve by GMRES far from the solution
+      logical :: hasty = .false.                       !! give up if the residual falls slowly, and do not descend
       type(joint_state_type) :: now                    !! in: the start; out: the solution
       integer, allocatable, private :: first(:)        !! [rows + 1] of the list of unknown cells
       integer, allocatable, private :: cell(:)         !! its cells, i
@@ -83,7 +87,7 @@ contains
       goal = max(share_of_tolerance*tolerance, round_off)
       call self%begun%copy(self%now)
       call iterate(self, system, goal, solved)
-      if (.not. solved .and. field_count(system%width > 0.0_dp) > 0) &
+      if (.not. solved .and. .not. self%hasty .and. field_count(system%width > 0.0_dp) > 0) &
          call descend(self, system, goal, solved)
    end subroutine solve
 
@@ -102,15 +106,20 @@ contains
       real(dp), intent(in) :: goal                     !! largest residual that may remain
       logical, intent(out) :: solved
       type(cell_vector_type) :: step
-      real(dp) :: first
+      real(dp) :: first, marked                        !! residuals at the start, and some steps ago
       integer :: k
       logical :: found
 
       call system%evaluate(self%now)
       first = self%now%merit
+      marked = first
       do k = 1, most_steps
          if (.not. self%now%worst > goal .or. self%now%merit > astray*first) exit
          if (is_to_end(system)) exit
+         if (self%hasty .and. mod(k, few_steps) == 1) then
+            if (k > 1 .and. self%now%merit > 0.5_dp*marked) exit
+            marked = self%now%merit
+         end if
          call find_step(self, system, step, found)
          if (.not. found) exit
          call take_step(self, system, step, k)
@@ -196,16 +205,19 @@ contains
       found = .not. any_process(any(status /= 0))
       if (.not. found) return
 
+      call system%renew(self%now)
       call gather(self, self%now%left, v)
       v%cells = -v%cells
       v%beside = -self%now%left_load
-      call krylov%begin(v, self%first, most_directions, accuracy)
+      call system%improve(self%now, self%first, self%cell, v)
+      call krylov%begin(v, self%first, most_directions, merge(self%far_accuracy, accuracy, self%now%worst > far))
       do while (krylov%unsolved())
          if (is_to_end(system)) exit
          call krylov%next(v)
          call change(self, system, v)
          call gather(self, self%trial%left, v)
          v%beside = self%trial%left_load
+         call system%improve(self%now, self%first, self%cell, v)
          call krylov%take(v)
       end do
       call krylov%solution(step)

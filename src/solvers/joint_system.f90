@@ -13,6 +13,7 @@
 module joint_system
    use asperity_precision, only : dp
    use field_sums, only : field_count, field_sum
+   use gmres, only : cell_vector_type
    use joint_cells, only : cell_rules_type
    use regular_grid, only : grid_type
    implicit none
@@ -49,6 +50,8 @@ module joint_system
       real(dp) :: root = 1.0_dp                        !! of the number of cells in contact at the start
    contains
       procedure(evaluate_state), deferred :: evaluate
+      procedure :: renew
+      procedure :: improve
       procedure :: take_units
    end type joint_system_type
 
@@ -87,6 +90,22 @@ contains
       self%merit = other%merit
       self%worst = other%worst
    end subroutine copy
+
+   !> Prepare `improve` for a state. Here there is nothing to prepare.
+   subroutine renew(self, state)
+      class(joint_system_type), intent(inout) :: self
+      type(joint_state_type), intent(in) :: state
+   end subroutine renew
+
+   !> Multiply scaled residuals of a list of cells by an approximate inverse of the derivative of the equations, so
+   !> that GMRES takes fewer directions. Here the approximation is 1.
+   subroutine improve(self, state, first, cell, v)
+      class(joint_system_type), intent(inout) :: self
+      type(joint_state_type), intent(in) :: state
+      integer, intent(in) :: first(:)                  !! [rows + 1] the first cell of each row in the list
+      integer, intent(in) :: cell(:)                   !! the cells of the list, i
+      type(cell_vector_type), intent(inout) :: v
+   end subroutine improve
 
    !> Choose the units and the width of the second range for a contact from which the solution starts.
    subroutine take_units(self, touching, pressure, rms_slope)

@@ -34,11 +34,11 @@ module steady_friction
    use stop_watch, only : stop_is_due
    use steady_bound, only : bound_tractions, compare_tractions, largest_force
    use steady_contact, only : contact_mean, explain, judge_gap, read_road, steady_contact_type
-   use steady_joint, only : attempt_due, steady_joint_type
+   use steady_joint, only : steady_joint_type
    use steady_normal, only : new_steady_normal, steady_measure_type, steady_normal_type
    use steady_operator, only : steady_operator_type
    use steady_start, only : contact_without_friction, full_sliding, ratio_of_sliding
-   use steady_pace, only : components, pace_type
+   use steady_pace, only : along_path, along_second_path, components, from_here, no_attempt, pace_type
    implicit none
    private
 
@@ -130,8 +130,9 @@ contains
          end if
          if (rubbing%iterations >= doubtful .and. mod(rubbing%iterations, looks) == 0) &
             call keep_best(self, operator, task, road, pace, contact)
-         pace%attempt = attempt_due(self%law, rubbing%iterations)
-         if (pace%attempt > 0) then
+         call pace%choose_attempt(rubbing%iterations, max(change, measure%change/measure%size), task%tolerance, &
+            self%law%jumps_at_edge())
+         if (pace%attempt /= no_attempt) then
             call solve_at_once(self, operator, task, road, pace, contact, normal, rubbing)
             if (normal%stopped .or. (normal%converged .and. rubbing%converged)) exit
          end if
@@ -237,8 +238,8 @@ contains
       self%best(:, 2:3, :) = contact%traction
    end subroutine keep_best
 
-   !> Solve all cells at once, first from the best contact, in a second attempt from that without friction:
-   !> on steep roads the best one may be far off. If this fails, the rounds go on as if nothing had happened.
+   !> Solve all cells at once, from the present contact, from the best one, or from that without friction: on steep
+   !> roads the best one may be far off. If this fails, the rounds go on as if nothing had happened.
    subroutine solve_at_once(self, operator, task, road, pace, contact, normal, rubbing)
       class(steady_friction_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
@@ -252,23 +253,29 @@ contains
       real(dp) :: scale
 
       allocate (ratio, source=self%ratio)
+      scale = self%normal%c
       call finish(self, operator, task, road, contact, normal, rubbing)
-      call return_to_best(self, operator, task, road, pace, contact, normal, rubbing)
-      if (pace%attempt > 1) then
-         scale = self%normal%c
+      if (pace%attempt /= from_here) call return_to_best(self, operator, task, road, pace, contact, normal, rubbing)
+      if (pace%attempt == along_path .or. pace%attempt == along_second_path) then
          call shifted(road, self%base(1), self%base(2), contact%height, contact%slope_x, contact%slope_y)
          call contact_without_friction(self%normal, operator, task, contact, start)
          normal%stopped = start%stopped
          if (normal%stopped) return
          call full_sliding(self%law, self%c, self%direction, self%ratio, contact)
-         self%normal%c = scale
-         call operator%set_scale(scale)
       end if
       self%joint%direction = self%direction
       self%joint%base = self%base
       self%joint%c = self%c
+      self%joint%attempt = pace%attempt
       call self%joint%solve(self%law, operator, task, road, contact, normal, rubbing)
+      if (normal%stopped .or. (normal%converged .and. rubbing%converged)) return
+
+      ! The next round needs the scale and the road as they were.
+      self%normal%c = scale
+      call operator%set_scale(scale)
       self%ratio(:, :, :) = ratio
+      call displaced(road, self%base(1), self%base(2), self%place(:, 1, :), self%place(:, 2, :), &
+         contact%height, contact%slope_x, contact%slope_y)
    end subroutine solve_at_once
 
    !> Return to the kept contact if it is better than the present one, because rounds that do not settle may

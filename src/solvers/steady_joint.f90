@@ -5,27 +5,39 @@
 !> solved in its closed form: without a gap and without pressure, a cell may carry a share of the strength.
 !> Its traction then has no jump at the edge of the contact, where the plain law often has no solution.
 !>
-!> An evaluation takes eight transforms.
+!> Newton's method starts from a contact that is near the solution, or follows a path of solutions (`follow_path`).
+!> An evaluation takes eight transforms, and the approximate inverse for GMRES (module `steady_inverse`) two more.
 module steady_joint
    use asperity_interpolation, only : interpolation_type
+   use asperity_parallel, only : any_process
    use asperity_precision, only : dp
    use field_sums, only : field_count, field_mean, field_sum, largest_of_rows, row_totals
    use friction_law, only : friction_law_type
+   use gmres, only : cell_vector_type
    use joint_newton, only : joint_newton_type
    use joint_system, only : joint_state_type, joint_system_type
    use normal_state, only : normal_problem_type, reason_converged
+   use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
    use steady_contact, only : judge_gap, read_road, steady_contact_type
+   use steady_inverse, only : contact_inverse_type
    use steady_operator, only : steady_operator_type
+   use steady_pace, only : along_path, along_second_path, from_here, no_attempt
    use stop_watch, only : stop_is_due
    implicit none
    private
 
-   public :: attempt_due, steady_joint_type
+   public :: steady_joint_type
 
-   integer, parameter :: first_attempt = 150           !! rounds before the first attempt; twice as many before the second
-   integer, parameter :: first_with_jump = 100         !! the same where the traction jumps at the edge
-   integer, parameter :: most_evaluations = 2000       !! of an attempt
+   integer, parameter :: near_evaluations = 1000       !! most of an attempt from the present contact
+   integer, parameter :: most_evaluations = 4000       !! most of another one, ...
+   real(dp), parameter :: large = 16384.0_dp           !! ... on grids of this number of cells
+   real(dp), parameter :: most_on_small = 5.0_dp       !! factor by which it may be larger on smaller grids
+   real(dp), parameter :: accepted = 30.0_dp           !! tolerances with which a solution is first judged
+   real(dp), parameter :: rough = 1.0e-2_dp            !! tolerance of the solutions along the path
+   real(dp), parameter :: first_step = 0.25_dp         !! along the path
+   real(dp), parameter :: growth = 1.5_dp              !! of a step that succeeded
+   real(dp), parameter :: shortest_step = 1.0e-3_dp
 
    !> The equations of a state.
    type, extends(joint_system_type) :: steady_system_type
@@ -36,8 +48,14 @@ module steady_joint
       real(dp) :: direction(2) = 0.0_dp                !! e
       real(dp) :: c = 0.0_dp                           !! c_t, Pa
       real(dp) :: target = 0.0_dp                      !! mean pressure, Pa
+      real(dp) :: displaced = 1.0_dp                   !! part of u with which the road is read
+      real(dp) :: stretched = 1.0_dp                   !! part of du/ds in the slip
+      type(contact_inverse_type) :: inverse
+      real(dp), allocatable :: wanted(:, :)            !! displacements, then pressures of the inverse [nx, rows]
    contains
       procedure :: evaluate
+      procedure :: renew
+      procedure :: improve
    end type steady_system_type
 
    !> The method and its work space. A variable of this type must not be copied.
@@ -45,6 +63,8 @@ module steady_joint
       real(dp) :: base(2) = 0.0_dp                     !! as in the equations
       real(dp) :: direction(2) = 0.0_dp
       real(dp) :: c = 0.0_dp
+      integer :: attempt = no_attempt                  !! where the solution starts (module steady_pace)
+      logical, private :: ready = .false.              !! the fields are allocated
       type(steady_system_type), private :: system
       type(joint_newton_type), private :: newton
    contains
@@ -52,19 +72,6 @@ module steady_joint
    end type steady_joint_type
 
 contains
-
-   !> The number of the attempt that is due after this many rounds without convergence; 0 if none is due.
-   pure function attempt_due(law, rounds) result(attempt)
-      type(friction_law_type), intent(in) :: law
-      integer, intent(in) :: rounds
-      integer :: attempt
-      integer :: first
-
-      first = merge(first_with_jump, first_attempt, law%jumps_at_edge())
-      attempt = 0
-      if (rounds == first) attempt = 1
-      if (rounds == 2*first) attempt = 2
-   end function attempt_due
 
    !> Solve, starting from a contact. If this fails, the contact is undefined.
    subroutine solve(self, law, operator, task, road, contact, normal, rubbing)
@@ -79,8 +86,8 @@ contains
 
       normal%converged = .false.
       rubbing%converged = .false.
-      if (.not. self%newton%ready) call self%newton%prepare(operator%grid)
-      if (.not. self%newton%ready) return
+      if (.not. self%ready) call prepare(self, operator%grid)
+      if (.not. self%ready) return
       associate (system => self%system)
          system%operator => operator
          system%road => road
@@ -91,14 +98,131 @@ contains
          system%c = self%c
          system%target = task%target
          system%evaluations = 0
-         system%most_evaluations = most_evaluations
+         system%most_evaluations = budget(self%attempt, operator%grid%cells())
          system%rules%law = law
          call start(system, self%newton%now)
-         call self%newton%solve(system, task%tolerance, solved)
-         normal%stopped = stop_is_due()
+         ! A jump may need many steps, because cells change their state one after the other.
+         self%newton%hasty = .not. law%jumps_at_edge()
+         if (self%attempt == along_path .or. self%attempt == along_second_path) then
+            call follow_path(self, system, accepted*task%tolerance, solved)
+         else
+            call self%newton%solve(system, accepted*task%tolerance, solved)
+         end if
          if (solved) call hand_out(system, self%newton%now, task, normal, rubbing)
+         if (solved .and. .not. (normal%converged .and. rubbing%converged)) then
+            call self%newton%solve(system, task%tolerance, solved)
+            if (solved) call hand_out(system, self%newton%now, task, normal, rubbing)
+         end if
+         normal%stopped = stop_is_due()
       end associate
    end subroutine solve
+
+   !> Allocate the fields. If there is not enough memory, `ready` remains .false.
+   subroutine prepare(self, grid)
+      class(steady_joint_type), intent(inout) :: self
+      type(grid_type), intent(in) :: grid
+      integer :: status(3)
+
+      if (.not. self%newton%ready) call self%newton%prepare(grid)
+      if (.not. self%newton%ready) return
+      self%newton%far_accuracy = rough
+      allocate (self%system%width(grid%nx, grid%rows()), stat=status(1))
+      allocate (self%system%wanted(grid%nx, grid%rows()), stat=status(2))
+      call self%system%inverse%make_room(grid, status(3))
+      self%ready = .not. any_process(any(status /= 0))
+      if (self%ready) return
+      if (allocated(self%system%width)) deallocate (self%system%width)
+      if (allocated(self%system%wanted)) deallocate (self%system%wanted)
+      self%system%inverse = contact_inverse_type()
+   end subroutine prepare
+
+   !> The largest number of evaluations of an attempt. On small grids they cost little time, and contacts of few cells
+   !> are the hardest to solve.
+   pure function budget(attempt, cells) result(evaluations)
+      integer, intent(in) :: attempt
+      real(dp), intent(in) :: cells                    !! of the grid
+      integer :: evaluations
+
+      evaluations = near_evaluations
+      if (attempt /= from_here) &
+         evaluations = nint(most_evaluations*min(max(sqrt(large/cells), 1.0_dp), most_on_small))
+   end function budget
+
+   !> Follow the solutions while the part of the tangential displacement that counts grows from 0 to 1. Without it all
+   !> cells slide straight ahead under the pressure of the contact without friction, where the path begins. On a second
+   !> path the slip counts fully from the beginning, and only the part with which the road is read grows: either path
+   !> may turn back where the other one does not. Each solution is predicted by the straight line through the last
+   !> two. A step that does not succeed soon is halved.
+   subroutine follow_path(self, system, tolerance, solved)
+      class(steady_joint_type), intent(inout) :: self
+      class(steady_system_type), intent(inout) :: system
+      real(dp), intent(in) :: tolerance
+      logical, intent(out) :: solved
+      type(joint_state_type) :: met, before            !! the last two solutions
+      real(dp) :: last_step, part, reached, step
+      integer :: status(2)
+
+      call met%make_room(system%grid, status(1))
+      call before%make_room(system%grid, status(2))
+      solved = .not. any_process(any(status /= 0))
+      if (.not. solved) return
+      self%newton%hasty = .false.
+      call count_part(system, self%attempt, 0.0_dp)
+      call self%newton%solve(system, rough, solved)
+      reached = 0.0_dp
+      last_step = 0.0_dp
+      step = first_step
+      call met%copy(self%newton%now)
+      do while (solved)
+         step = min(step, 1.0_dp - reached)
+         part = reached + step
+         if (part > 1.0_dp - shortest_step) part = 1.0_dp
+         call count_part(system, self%attempt, part)
+         self%newton%hasty = self%attempt == along_path
+         if (last_step > 0.0_dp) call extend_line(before, met, step/last_step, self%newton%now)
+         call self%newton%solve(system, merge(rough, tolerance, part < 1.0_dp), solved)
+         if (solved) then
+            if (.not. part < 1.0_dp) exit
+            call before%copy(met)
+            call met%copy(self%newton%now)
+            reached = part
+            last_step = step
+            step = growth*step
+         else
+            call self%newton%now%copy(met)
+            step = 0.5_dp*step
+            solved = step > shortest_step .and. system%evaluations < system%most_evaluations
+         end if
+      end do
+      call count_part(system, self%attempt, 1.0_dp)
+   end subroutine follow_path
+
+   !> Set the part of the tangential displacement that counts.
+   pure subroutine count_part(system, attempt, part)
+      class(steady_system_type), intent(inout) :: system
+      integer, intent(in) :: attempt
+      real(dp), intent(in) :: part
+
+      system%displaced = part
+      if (attempt == along_path) system%stretched = part
+   end subroutine count_part
+
+   !> Predict a state on the straight line through two others.
+   subroutine extend_line(from, through, part, next)
+      type(joint_state_type), intent(in) :: from, through
+      real(dp), intent(in) :: part                     !! beyond the second one, relative to their distance
+      type(joint_state_type), intent(inout) :: next
+      integer :: c, j
+
+      next%level = through%level + part*(through%level - from%level)
+      do j = 1, size(next%s, 2)
+         next%s(:, j) = through%s(:, j) + part*(through%s(:, j) - from%s(:, j))
+         do c = 1, 2
+            next%t(:, c, j) = merge(through%t(:, c, j) + part*(through%t(:, c, j) - from%t(:, c, j)), 0.0_dp, &
+               next%s(:, j) >= 0.0_dp)
+         end do
+      end do
+   end subroutine extend_line
 
    !> Set the units, and make the first state from that of the contact.
    subroutine start(system, begun)
@@ -113,7 +237,6 @@ contains
          call find_softness(system%operator, rules%soft, rules%soft_along)
          slope = sqrt(field_mean(contact%slope_x**2 + contact%slope_y**2))
          call system%take_units(touching, contact%pressure, slope)
-         if (.not. allocated(system%width)) allocate (system%width, mold=contact%pressure)
          system%width(:, :) = merge(rules%width, 0.0_dp, rules%has_jump(contact%slope_x, contact%slope_y))
          begun%s(:, :) = rules%number_of(system%width, touching, contact%pressure, contact%gap)
          do c = 1, 2
@@ -151,6 +274,8 @@ contains
          contact%traction(:, :, :) = state%t
          call self%operator%displace(contact%pressure, contact%gap)
          call self%operator%shear(contact%traction, contact%displacement, contact%slip)
+         if (self%displaced < 1.0_dp) contact%displacement = self%displaced*contact%displacement
+         if (self%stretched < 1.0_dp) contact%slip = self%stretched*contact%slip
          call read_road(contact, self%road, self%base, self%direction)
       end associate
       call compare(self, self%contact, state)
@@ -188,6 +313,40 @@ contains
       state%left_load = state%left_load*self%root
       state%merit = sqrt(sums(1) + state%left_load**2)
    end subroutine compare
+
+   !> Prepare the approximate inverse for the cells that carry pressure in a state.
+   subroutine renew(self, state)
+      class(steady_system_type), intent(inout) :: self
+      type(joint_state_type), intent(in) :: state
+
+      call self%inverse%renew(self%operator, state%s >= self%width)
+   end subroutine renew
+
+   !> Replace the residuals of gap and load by the changes of pressure and level that would remove them if the
+   !> tractions did not change. Those of the tractions remain as they are.
+   subroutine improve(self, state, first, cell, v)
+      class(steady_system_type), intent(inout) :: self
+      type(joint_state_type), intent(in) :: state
+      integer, intent(in) :: first(:), cell(:)
+      type(cell_vector_type), intent(inout) :: v
+      real(dp) :: level
+      integer :: i, j, k
+
+      self%wanted(:, :) = 0.0_dp
+      do j = 1, size(state%s, 2)
+         do k = first(j), first(j + 1) - 1
+            if (self%inverse%inside(cell(k), j)) self%wanted(cell(k), j) = v%cells(1, k)*self%unit_length
+         end do
+      end do
+      call self%inverse%solve(self%operator, v%beside*self%unit_pressure/self%root, self%wanted, level)
+      do j = 1, size(state%s, 2)
+         do k = first(j), first(j + 1) - 1
+            i = cell(k)
+            if (self%inverse%inside(i, j)) v%cells(1, k) = self%wanted(i, j)*self%rules%soft/self%unit_length
+         end do
+      end do
+      v%beside = level*self%root/self%unit_length
+   end subroutine improve
 
    !> Copy the solution to the contact, and compute its errors.
    subroutine hand_out(system, found, task, normal, rubbing)

@@ -5,6 +5,11 @@
 !> change of a round is small, and ends when the change grows again; it then restarts only closer to the solution.
 !> Plain rounds that do not halve their change in `slow` rounds are relaxed more strongly and solve the
 !> normal contact more accurately.
+!>
+!> Rounds converge slowly where some cells nearly stick: the direction of their traction follows the slip only by a
+!> small part in each round. Near the solution Newton's method for all cells (module `steady_joint`) is then faster.
+!> It is tried from the present contact if the rounds that are still needed, by their progress so far, would take more
+!> transforms. Far from the solution it is tried if a number of rounds has not been sufficient.
 module steady_pace
    use asperity_precision, only : dp
    implicit none
@@ -14,7 +19,20 @@ module steady_pace
 
    integer, parameter, public :: components = 5  !! of a state: z, u, r
 
-   integer, parameter :: slow = 25               !! plain rounds between two checks of their progress
+   integer, parameter :: slow = 12               !! plain rounds between two checks of their progress
+
+   ! Attempts to solve all cells at once:
+   integer, parameter, public :: no_attempt = 0
+   integer, parameter, public :: from_here = 1   !! from the present contact
+   integer, parameter, public :: from_best = 2   !! from the best contact so far
+   integer, parameter, public :: along_path = 3  !! from the contact without friction, along a path of solutions
+   integer, parameter, public :: along_second_path = 4
+   integer, parameter :: first_far = 150         !! rounds before the first attempt from afar; half as many before each of the next
+   integer, parameter :: first_with_jump = 100   !! the same where the traction jumps at the edge
+   integer, parameter :: compared = 8            !! rounds by which their progress is measured
+   integer, parameter :: patience = 25           !! rounds after an attempt from here without another one
+   real(dp), parameter :: within_reach = 1.0e-3_dp   !! change from which an attempt from here usually succeeds
+   real(dp), parameter :: price = 1000.0_dp      !! transforms of such an attempt
 
    !> The pace of the rounds.
    type :: pace_type
@@ -26,11 +44,14 @@ module steady_pace
       real(dp) :: marked = huge(1.0_dp)          !! change some rounds ago
       integer :: since = 0                       !! rounds since then
       real(dp) :: weights(components) = 0.0_dp   !! of the components in the acceleration
-      integer :: attempt = 0                     !! to solve all cells at once: its number after this round
+      integer :: attempt = no_attempt            !! to solve all cells at once, after this round
+      integer, private :: next_attempt = compared + 1     !! the round of the next one from here
+      real(dp), private :: recent(compared) = huge(1.0_dp)   !! changes of the last rounds
       real(dp) :: accepted = 0.0_dp              !! change below which a solution is checked
       real(dp) :: best = huge(1.0_dp)            !! largest error of the kept contact
    contains
       procedure :: choose
+      procedure :: choose_attempt
       procedure :: note_plain
    end type pace_type
 
@@ -53,6 +74,33 @@ contains
       end if
       if (self%accelerated) self%least = min(self%least, change)
    end subroutine choose
+
+   !> Decide whether all cells are to be solved at once after a round.
+   subroutine choose_attempt(self, rounds, change, tolerance, jumps)
+      class(pace_type), intent(inout) :: self
+      integer, intent(in) :: rounds              !! so far
+      real(dp), intent(in) :: change             !! of the last round
+      real(dp), intent(in) :: tolerance          !! of the change
+      logical, intent(in) :: jumps               !! the traction jumps at the edge of the contact
+      real(dp) :: decades_left, decades_per_round, transforms
+      integer :: first, k
+
+      first = merge(first_with_jump, first_far, jumps)
+      k = 1 + mod(rounds, compared)
+      decades_per_round = log10(self%recent(k)/change)/compared
+      decades_left = log10(change/tolerance)
+      self%recent(k) = change
+      self%attempt = no_attempt
+      if (rounds == first) self%attempt = from_best
+      if (2*rounds == 3*first) self%attempt = along_path
+      if (rounds == 2*first) self%attempt = along_second_path
+      if (self%attempt /= no_attempt .or. rounds < self%next_attempt .or. change > within_reach) return
+
+      transforms = 6.0_dp + 2.0_dp*self%inner
+      if (decades_left*transforms <= decades_per_round*price) return
+      self%attempt = from_here
+      self%next_attempt = rounds + max(patience, rounds/2)
+   end subroutine choose_attempt
 
    !> Note a plain step, and slow down if such steps make no progress.
    subroutine note_plain(self, change)
