@@ -327,7 +327,8 @@ contains
          'road.nml: &grid: nx = -4: must be a positive integer')
       call refuse(no_grid//'&grid nx = 1.5, ny = 4, lx = 1.0 /', 'nx = 1.5: must be a positive integer')
       call refuse(no_grid//'&grid nx = ''a'', ny = 4, lx = 1.0 /', 'nx = ''a'': must be a positive integer')
-      call refuse(no_grid//'&grid nx = 99999999999, ny = 4, lx = 1.0 /', 'nx = 99999999999: must be a positive')
+      call refuse(no_grid//'&grid nx = 99999999999, ny = 4, lx = 1.0 /', &
+         'nx = 99999999999: must be a positive integer of at most 2147483647')
       call refuse(no_grid//'&grid nx = 4 5, ny = 4, lx = 1.0 /', 'nx = 4 5: takes one value only')
       call refuse(no_grid//'&grid nx = , ny = 4, lx = 1.0 /', '&grid: nx')
       call refuse(no_grid//'&grid nx = 2*4, ny = 4, lx = 1.0 /', 'nx = 2*4: takes one value only')

@@ -14,7 +14,7 @@ module test_surface
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use roughness, only : height_psd, height_statistics, roughness_type
    use asperity_surface, only : check_terms, new_height
-   use scale_warnings, only : oblong_warning, steepness_warning
+   use scale_warnings, only : cap_warning, oblong_warning, steepness_warning
    use surface_warnings, only : find_warnings, warning_length
    use surface_settings, only : default_surface, real_variable, surface_settings_type
    use surface_shapes, only : all_shapes, shape_type
@@ -656,6 +656,16 @@ contains
       call check_that(steepness_warning(term) == '', 'a steep road, without a warning')
       term%shape = 'sphere'
       call check_that(steepness_warning(term) == '', 'a sphere has no waves')
+
+      grid = new_grid(20, 30, 2e-3_dp, 6e-3_dp, boundary_periodic)
+      term%radius = 8.1e-4_dp
+      call check_that(cap_warning(term, grid) == '', 'a sphere of a little more than four cells')
+      term%radius = 7.9e-4_dp
+      text = cap_warning(term, grid)
+      call check_that(index(text, 'the radius of the ''sphere'', 7.900E-04 m, is less than four cells of 2.000E-04 m') > 0, &
+         'a sphere of less than four cells: '//text)
+      term%shape = 'cylinder'
+      call check_that(cap_warning(term, grid) == '', 'a cylinder lies along y')
    end subroutine lengths_that_do_not_fit_together
 
 end module test_surface

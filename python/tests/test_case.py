@@ -214,7 +214,7 @@ def test_misspelt_names_are_refused_at_once(build, told):
     ("grid.nx", -4, "&grid: nx = -4: must be a positive integer$"),
     ("grid.nx", 4.5, "nx = 4.5: must be a positive integer$"),
     ("grid.nx", True, "must be a positive integer$"),
-    ("grid.nx", 2**31, "must be a positive integer$"),
+    ("grid.nx", 2**31, "must be a positive integer of at most 2147483647$"),
     ("grid.nx", [4, 4], "takes one value only"),
     ("grid.lx", float("nan"), "lx = nan: must be a positive number$"),
     ("grid.lx", float("inf"), "must be a positive number$"),

@@ -6,7 +6,7 @@ module input_values
    use input_group, only : group_values_type, in_line, item_type, line_note, place, position, value_type
    use input_conversion, only : convert, longest_list, repeat_count
    use input_ranges, only : allowed_phrase
-   use input_reference, only : group_entries, group_entry_type, is_array, variable_entries, variable_entry_type
+   use input_reference, only : group_entries, group_entry_type, is_array, kind_integer, variable_entries, variable_entry_type
    use namelist_file, only : assignment_type, namelists_type, scan_namelists, shown_tokens
    use namelist_tokens, only : token_broken, token_comma, token_string, token_type, token_word, &
       tokenise
@@ -254,6 +254,7 @@ contains
          fault = allowed_phrase(value%entry)
          if (token%kind == token_string .and. token%last - token%first - 1 > path_length) &
             fault = fault//' of at most '//to_text(path_length)//' characters'
+         if (is_too_large(text(token%first:token%last), value%entry)) fault = fault//' of at most '//to_text(huge(1))
       else if (.not. is_array(value%entry) .and. element + repeats > 1) then
          fault = 'takes one value only: it '//allowed_phrase(value%entry)
       else if (element + repeats > longest_list) then
@@ -271,6 +272,18 @@ contains
          end if
       end do
    end subroutine take_items
+
+   !> Is the text an integer beyond the largest one of this program?
+   pure logical function is_too_large(text, entry)
+      character(*), intent(in) :: text
+      type(variable_entry_type), intent(in) :: entry
+      integer :: status, value
+
+      is_too_large = .false.
+      if (entry%kind /= kind_integer .or. verify(text, '0123456789') > 0) return
+      read (text, *, iostat=status) value
+      is_too_large = status /= 0
+   end function is_too_large
 
    !> Set an element of a list that grows as needed.
    pure subroutine put(value, element, item, good)

@@ -1,5 +1,5 @@
 !> Warnings about lengths that do not fit together, as where a value is given in another unit: very
-!> oblong cells and very steep roads.
+!> oblong cells, very steep roads, and spheres smaller than the cells.
 module scale_warnings
    use asperity_precision, only : dp, pi
    use regular_grid, only : grid_type
@@ -8,9 +8,10 @@ module scale_warnings
    implicit none
    private
 
-   public :: oblong_warning, steepness_warning
+   public :: cap_warning, oblong_warning, steepness_warning
 
    real(dp), parameter :: largest_aspect = 100.0_dp   !! of a cell: beyond it the normal solver needs many iterations
+   real(dp), parameter :: least_radius = 4.0_dp       !! of a cap, cells: below it no contact on the cap is resolved
    real(dp), parameter :: largest_slope = 3.0_dp      !! far beyond what a theory for small slopes describes
 
 contains
@@ -57,5 +58,25 @@ contains
          'units of its heights and wavelengths'
       text = trim(line)
    end function steepness_warning
+
+   !> A warning if a sphere or a cylinder has a radius of few cells, so that the road is hardly more than a spike on a
+   !> plane. Empty if all is well.
+   pure function cap_warning(term, grid) result(text)
+      type(surface_settings_type), intent(in) :: term  !! checked
+      type(grid_type), intent(in) :: grid
+      character(:), allocatable :: text
+      character(300) :: line
+      real(dp) :: side
+
+      text = ''
+      side = grid%dx
+      if (term%shape == 'sphere' .and. grid%ny > 1) side = max(grid%dx, grid%dy)
+      if (.not. any(term%shape == ['sphere  ', 'cylinder'])) return
+      if (term%radius >= least_radius*side) return
+      write (line, '(a, es9.3, a, es9.3, a)') '&surface: the radius of the '''//trim(term%shape)//''', ', term%radius, &
+         ' m, is less than four cells of ', side, ' m: the road is a spike on a plane; check the units, or use '// &
+         'smaller cells'
+      text = trim(line)
+   end function cap_warning
 
 end module scale_warnings
