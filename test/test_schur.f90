@@ -37,7 +37,15 @@ contains
          call oblong_cells_take_few_iterations(96, 90, 8.0_dp, 24)
          call oblong_cells_take_few_iterations(90, 96, 1.0_dp/8.0_dp, 24)
          call oblong_cells_take_few_iterations(90, 96, 14.0_dp, 32)
-         call oblong_cells_take_few_iterations(96, 90, 40.0_dp, 110)
+         call oblong_cells_take_few_iterations(96, 90, 40.0_dp, 36)
+         call oblong_cells_take_few_iterations(96, 90, 300.0_dp, 36)
+         call oblong_cells_take_few_iterations(90, 96, 1e4_dp, 36)
+         call oblong_cells_take_few_iterations(96, 90, 1e-4_dp, 36)
+         call oblong_cells_take_few_iterations(64, 12, 1e6_dp, 36)
+      end if
+      if (selected('waves_extend_the_residual_by_means')) then
+         call waves_extend_the_residual_by_means(boundary_periodic, 20, 12, 100.0_dp)
+         call waves_extend_the_residual_by_means(boundary_free, 9, 23, 1e-3_dp)
       end if
    end subroutine run_schur
 
@@ -90,6 +98,54 @@ contains
       call s%preconditioner%destroy()
       call s%coarse%destroy()
    end subroutine preconditioner_is_the_schur_complement
+
+   !> For very oblong cells M = E^T B E: E^T B E of the whole grid is B, and the same matrix with the rows and columns of
+   !> N added to those of S in the same block is M for any S.
+   subroutine waves_extend_the_residual_by_means(boundary, nx, ny, aspect)
+      integer, intent(in) :: boundary, nx, ny
+      real(dp), intent(in) :: aspect                 !! dy/dx
+      type(setting_type) :: s
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: b(:, :), e(:, :), unit(:), r(:), z(:), exact(:)
+      integer, allocatable :: block(:)
+      logical, allocatable :: inside(:)
+      real(dp) :: form
+      integer :: i, j, n
+
+      s%grid = new_grid(nx, ny, 1.0_dp, aspect*ny/nx, boundary)
+      call new_coarse_level(s%coarse, s%grid, normal_half_space(0.3_dp), error)
+      call check_no_error(error, 'a coarse level')
+      call new_active_blocks(s%active, s%grid, s%coarse%first_y, s%coarse%strips, .false., 1)
+      call new_schur_preconditioner(s%preconditioner, s%grid, s%coarse, 1, error)
+      call check_no_error(error, 'a preconditioner')
+      n = nx*ny
+      allocate (b(n, n), e(n, n), unit(n), r(n), z(n))
+      do i = 1, n
+         ! The residual is not 0 in any cell, so that all cells are in S.
+         unit(:) = 1e-6_dp
+         unit(i) = 1.0_dp
+         call apply(s, unit, [(.true., j=1, n)], 0, b(:, i), form)
+      end do
+      call check_order(maxval(abs(b - transpose(b))), '<=', 1e-4_dp*maxval(abs(b)), 'B is symmetric')
+
+      inside = [(modulo(7*i*i + 3*i, 11) < 5, i=1, n)]
+      block = [((s%coarse%block_x(i) + s%coarse%nx*(count(s%coarse%first_y <= j) - 1), i=1, nx), j=1, ny)]
+      do i = 1, n
+         e(:, i) = 0.0_dp
+         if (.not. inside(i)) cycle
+         where (.not. inside .and. block == block(i)) e(:, i) = 1.0_dp/count(inside .and. block == block(i))
+         e(i, i) = 1.0_dp
+      end do
+      r = [(sin(1.7_dp*i) + 0.3_dp, i=1, n)]
+      where (.not. inside) r = 0.0_dp
+      exact = matmul(transpose(e), matmul(b, matmul(e, r)))
+      call apply(s, r, inside, 0, z, form)
+      where (.not. inside) z = 0.0_dp
+      call check_order(norm2(z - exact), '<=', 1e-4_dp*norm2(exact), 'M r is E^T B E r')
+      call check_close(form, dot_product(r, z), 1e-5_dp*form, 'and its form')
+      call s%preconditioner%destroy()
+      call s%coarse%destroy()
+   end subroutine waves_extend_the_residual_by_means
 
    !> z = M r for a residual on a contact set; z is B v elsewhere.
    subroutine apply(s, r, inside, steps, z, form)

@@ -222,7 +222,7 @@ def sizes():
 def oblong():
     """Print the iterations of a rough contact whose cells become longer and longer."""
     height = asperity.surface.self_affine(128, lx=1.0, wavelength_short=1 / 16, rms_slope=1.0)
-    for ratio in (1, 2, 4, 10, 16, 30, 100, 300, 1000):
+    for ratio in (1, 2, 4, 10, 16, 30, 100, 300, 1000, 10000):
         counts = []
         for pressure in (0.01, 0.1, 0.3):
             try:

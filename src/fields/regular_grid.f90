@@ -19,6 +19,8 @@ module regular_grid
 
    real(dp), parameter, public :: block_cells = 8.0_dp   !! cells of a block along a side, if square
 
+   real(dp), parameter :: largest_aspect = 16.0_dp   !! of cells that a stencil fits
+
    !> Cell (i, j), from 0, has its centre at x = i dx, y = j dy.
    type :: grid_type
       integer :: nx = 0                         !! cells along x
@@ -37,6 +39,7 @@ module regular_grid
       procedure :: area
       procedure :: cell_area
       procedure :: cell_side
+      procedure :: very_oblong
       procedure :: blocks
       procedure :: strip_start
       procedure :: share_rows
@@ -154,6 +157,13 @@ contains
       if (self%ny == 1) side = self%dx
       if (self%nx == 1) side = self%dy
    end function cell_side
+
+   !> Are the cells so oblong that a stencil is too inaccurate a model of the solid?
+   pure logical function very_oblong(self)
+      class(grid_type), intent(in) :: self
+
+      very_oblong = min(self%nx, self%ny) > 1 .and. max(self%dx, self%dy) > largest_aspect*min(self%dx, self%dy)
+   end function very_oblong
 
    !> Number of rows that this process holds.
    pure function rows(self)

@@ -97,7 +97,7 @@ contains
       if (8.0_dp*fields*cells <= most_kept) bytes = 8.0_dp*fields*cells
    end function kept_arms
 
-   !> Fields of the normal solver and of its state (module normal_cg).
+   !> Fields of the normal solver and of its state (modules normal_cg and, for very oblong cells, wave_preconditioner).
    pure function normal_fields(case) result(fields)
       type(case_type), intent(in) :: case
       real(dp) :: fields
@@ -109,6 +109,7 @@ contains
       kind = merge(2, 1, case%grid%boundary == boundary_free)
       fields = 5.9_dp + spectrum(kind)
       if (case%solver%method == 'thesis') fields = fields - 2.0_dp
+      if (case%solver%method /= 'thesis' .and. case%grid%very_oblong()) fields = fields + 0.625_dp
       fields = fields + merge(symbols_mixed(kind), symbol(kind), case%solver%precision == 'mixed')
    end function normal_fields
 

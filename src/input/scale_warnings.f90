@@ -10,13 +10,13 @@ module scale_warnings
 
    public :: cap_warning, oblong_warning, steepness_warning
 
-   real(dp), parameter :: largest_aspect = 100.0_dp   !! of a cell: beyond it the normal solver needs many iterations
+   real(dp), parameter :: largest_aspect = 100.0_dp   !! of a cell: beyond it a length is often wrong
    real(dp), parameter :: least_radius = 4.0_dp       !! of a cap, cells: below it no contact on the cap is resolved
    real(dp), parameter :: largest_slope = 3.0_dp      !! far beyond what a theory for small slopes describes
 
 contains
 
-   !> A warning if the cells are so oblong that contacts may not converge. Empty if all is well.
+   !> A warning if the cells are so oblong that a length may be in another unit. Empty if all is well.
    pure function oblong_warning(grid) result(text)
       type(grid_type), intent(in) :: grid
       character(:), allocatable :: text
@@ -28,8 +28,8 @@ contains
       aspect = max(grid%dx/grid%dy, grid%dy/grid%dx)
       if (aspect <= largest_aspect) return
       write (line, '(2(a, es9.3), a, es8.2, a)') '&grid: cells of ', grid%dx, ' m by ', grid%dy, &
-         ' m have sides whose ratio is ', aspect, ': above 100 the contact takes hundreds of iterations or '// &
-         'does not converge; check lx and ly, or choose nx and ny so that the cells are nearly square'
+         ' m have sides whose ratio is ', aspect, ': above 100 a length is often in another unit; '// &
+         'check lx and ly, or choose nx and ny so that the cells are nearly square'
       text = trim(line)
    end function oblong_warning
 

@@ -33,6 +33,7 @@ module coarse_level
       integer :: nx = 0, ny = 0                    !! blocks
       real(dp) :: cells = 1.0_dp                   !! cells of a block, on average
       real(dp) :: h = 0.0_dp                       !! side of a square cell of the same area, m
+      type(kernel_type) :: kernel                  !! what the solid is, normal
       integer, allocatable :: block_x(:)           !! block of a cell along x, [nx of the grid]
       integer, allocatable :: last_x(:)            !! last cell of a block along x, [nx]
       integer :: strips(2) = 0                     !! first and last row of blocks of this process ...
@@ -74,7 +75,10 @@ contains
       self%ny = counts(2)
       self%cells = grid%cells()/(real(self%nx, dp)*self%ny)
       self%h = h
+      self%kernel = kernel
       self%fine_symbol = kernel%compliance(2.0_dp*pi/(block_cells*h))
+      ! A block of very oblong cells is much longer than the waves that its mean does not contain.
+      if (grid%very_oblong()) self%fine_symbol = kernel%compliance(2.0_dp*pi/(block_cells*min(grid%dx, grid%dy)))
 
       allocate (self%block_x(grid%nx), self%last_x(self%nx), self%first_y(self%ny + 1))
       do i = 1, grid%nx

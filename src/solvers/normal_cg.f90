@@ -43,7 +43,7 @@ module normal_cg
    use finite_fields, only : reject_overflow
    use fft_conv, only : columns_apply, convolution_type, new_convolution
    use gap_watch, only : gap_watch_type, new_gap_watch
-   use normal_passes, only : clip_step, clip_type, find_clip, longest_multiple, &
+   use normal_passes, only : clip_step, clip_type, find_clip, keep_block_sums, longest_multiple, &
       new_direction, new_normal_work, normal_work_type, survey, try_pressure, update_state
    use normal_state, only : combine_measures, control_pressure, evaluate_gap, first_pressure, gap_measure_type, &
       hand_out, narrow_scale, normal_problem_type, prepare_problem, reason_iterations, reason_undetermined
@@ -301,11 +301,13 @@ contains
       fixed_load = task%control == control_pressure
       call work%preconditioner%set_residual(work%coarse, work%active, work%scale, measure%level, &
          pressure, gap)
+      work%preconditioner%waves%fixed_load = fixed_load
       steps = few_steps
       if (measure%contact > much_contact) steps = merge(most_steps, more_steps, work%grid%cells() >= large)
       call work%preconditioner%extend(work%coarse, work%active, steps, rz)
       beta = 0.0_dp
-      if (now%phase == phase_conjugate .and. now%rz > 0.0_dp) beta = rz/now%rz
+      if (now%phase == phase_conjugate .and. now%rz > 0.0_dp) &
+         beta = max(rz - work%preconditioner%overlap, 0.0_dp)/now%rz
       now%rz = rz
       now%slope = 0.0_dp
       if (now%phase /= phase_plain) then
@@ -340,6 +342,8 @@ contains
       predicted = self%work%coarse%predict_form(now%square)/task%modulus
       alpha = now%slope/max(now%kappa*predicted, tiny(1.0_dp))
       call try_pressure(self%work, alpha, pressure, self%step, trial)
+      if (self%work%preconditioner%by_waves .and. now%phase == phase_conjugate) &
+         call keep_block_sums(self%work, self%step, trial)
       call find_clip(self%work, task%control == control_pressure, &
          task%target*self%grid%nx*self%grid%ny, self%step, trial, clip)
       call clip_step(self%work, product, clip, level, pressure, gap, self%step, step)

@@ -19,7 +19,7 @@ module normal_passes
    implicit none
    private
 
-   public :: clip_step, clip_type, find_clip, longest_multiple, new_direction, &
+   public :: clip_step, clip_type, find_clip, keep_block_sums, longest_multiple, new_direction, &
       new_normal_work, normal_work_type, survey, try_pressure, update_state
 
    !> The work fields of a solver, with the active blocks, the preconditioner and the sums.
@@ -186,6 +186,81 @@ contains
       end do
       sums = total(rows)
    end subroutine try_pressure
+
+   !> Subtract from the trial pressure in `step` a number per block, so that the sum of each block remains what it is if
+   !> negative pressures become 0. The sums of the blocks of very oblong cells are stiff: if they change, the energy
+   !> rises by much more than the direction gains.
+   subroutine keep_block_sums(self, step, sums)
+      type(normal_work_type), intent(in) :: self
+      real(dp), intent(inout) :: step(self%grid%nx, self%grid%rows())
+      type(trial_sums_type), intent(out) :: sums     !! of the new trial pressure above 0
+      type(trial_sums_type), allocatable :: rows(:)
+      integer :: jb
+
+      allocate (rows(self%grid%rows()))
+      !$omp parallel do default(none) shared(self, step, rows) private(jb) schedule(dynamic) num_threads(self%threads)
+      do jb = self%coarse%strips(1), self%coarse%strips(2)
+         call keep_strip_sums(self, jb, step, rows)
+      end do
+      sums = total(rows)
+   end subroutine keep_block_sums
+
+   !> The same for a row of blocks. The numbers are found by Newton's method from below, as in `find_clip`.
+   subroutine keep_strip_sums(self, jb, step, rows)
+      type(normal_work_type), intent(in) :: self
+      integer, intent(in) :: jb                      !! row of blocks
+      real(dp), intent(inout) :: step(self%grid%nx, self%grid%rows())
+      type(trial_sums_type), intent(inout) :: rows(:)
+      real(dp), dimension(self%coarse%nx) :: wanted, above, cells, shift, next
+      integer :: j, k
+
+      shift(:) = 0.0_dp
+      call sum_strip(self, jb, step, shift, wanted, above, cells)
+      do
+         next(:) = shift + (above - max(wanted, 0.0_dp))/max(cells, 1.0_dp)
+         where (above - wanted <= 1e-15_dp*abs(wanted)) next = shift
+         if (.not. any(next > shift)) exit           ! also at the limit of round-off, and with NaN
+         shift(:) = max(next, shift)
+         call sum_strip(self, jb, step, shift, next, above, cells)
+      end do
+
+      do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
+         rows(j) = trial_sums_type()
+         do k = 1, self%active%runs(j)
+            associate (first => self%active%first(k, j), last => self%active%last(k, j))
+               step(first:last, j) = step(first:last, j) - shift(self%coarse%block_x(first:last))
+               call above_cells(last - first + 1, 0.0_dp, step(first, j), rows(j))
+               rows(j)%least = min(rows(j)%least, minval(step(first:last, j)))
+            end associate
+         end do
+      end do
+   end subroutine keep_strip_sums
+
+   !> Sums over the active cells of each block in a row of blocks: of the values, of their parts above a shift, and the
+   !> number of cells above it.
+   pure subroutine sum_strip(self, jb, values, shift, sums, above, cells)
+      type(normal_work_type), intent(in) :: self
+      integer, intent(in) :: jb                      !! row of blocks
+      real(dp), intent(in) :: values(self%grid%nx, self%grid%rows())
+      real(dp), intent(in) :: shift(:)               !! [blocks along x]
+      real(dp), intent(out) :: sums(:), above(:), cells(:)
+      integer :: b, i, j, k
+
+      sums(:) = 0.0_dp
+      above(:) = 0.0_dp
+      cells(:) = 0.0_dp
+      do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
+         do k = 1, self%active%runs(j)
+            do i = self%active%first(k, j), self%active%last(k, j)
+               b = self%coarse%block_x(i)
+               sums(b) = sums(b) + values(i, j)
+               if (values(i, j) <= shift(b)) cycle
+               above(b) = above(b) + (values(i, j) - shift(b))
+               cells(b) = cells(b) + 1.0_dp
+            end do
+         end do
+      end do
+   end subroutine sum_strip
 
    !> Find the projection of the trial pressure in `step` on the admissible pressures. If the load is given, this is
    !> the shift t for which max(trial - t, 0) has the sum of the load, found by Newton's method from below. If the

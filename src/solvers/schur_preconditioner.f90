@@ -22,8 +22,8 @@
 !> proportional to the inverse squares, like those of a Laplacian, they would be far too large along the short side of
 !> oblong cells.
 !>
-!> On small grids of nearly square cells the extension saves no time, and for very oblong cells the stencil is too
-!> inaccurate for it. In these cases M r = B_SS r. In all others the extension halves the iterations.
+!> On small grids of nearly square cells the extension saves no time: there M r = B_SS r. In all other cases it halves
+!> the iterations. For very oblong cells the stencil is too inaccurate, and module `wave_preconditioner` forms M r.
 !>
 !> Fields are in single precision: errors of 1e-7 do not matter in a preconditioner. N is restricted to a
 !> rim around the contact (the wide blocks of module active_blocks). Memory: four such fields, of which two may be
@@ -42,6 +42,7 @@ module schur_preconditioner
    use schur_coarse, only : om, stencil_c1
    use schur_sweeps, only : image_cells, image_sums_type, last_response_cells, response_cells, &
       response_sums_type, search_cells, start_search_cells
+   use wave_preconditioner, only : new_wave_preconditioner, wave_preconditioner_type
    implicit none
    private
 
@@ -52,7 +53,6 @@ module schur_preconditioner
    real(dp), parameter :: least_cells = 131072.0_dp   !! cells from which the extension saves time ...
    real(dp), parameter :: least_oblong = 4096.0_dp    !! ... if they are oblong
    real(dp), parameter :: oblong = 2.0_dp             !! aspect of an oblong cell
-   real(dp), parameter :: largest_aspect = 16.0_dp    !! beyond it the stencil fits |q| too badly
    real(dp), parameter :: solved = 1e-8_dp     !! reduction of the residual on N that is enough
 
    !> The preconditioner with its fields. A variable of this type must not be copied.
@@ -60,7 +60,10 @@ module schur_preconditioner
       type(grid_type), private :: grid
       type(row_halo_type), private :: rim                !! rows of other processes that the stencil reads
       integer, private :: threads = 1
-      logical :: extends = .false.                       !! the residual is extended at all
+      logical :: extends = .false.                       !! the residual is extended by steps on N
+      logical :: by_waves = .false.                      !! cells are so oblong that M r comes from `waves`
+      real(dp) :: overlap = 0.0_dp                       !! (r before).M r, if by waves; `search` holds r before
+      type(wave_preconditioner_type) :: waves
       type(schur_blocks_type) :: blocks                  !! coarse parts and sums of each block
       real(sp), private :: weights(3) = 0.0_sp           !! of the stencil: centre, along x, along y
       real(sp), allocatable :: residual(:, :)            !! (0:nx+1, 0:ny+1), v on S, 0 on N
@@ -102,7 +105,8 @@ contains
       call new_rim_halo(self%rim, grid)
       self%threads = threads
       aspect = max(grid%dx/grid%dy, grid%dy/grid%dx)
-      self%extends = min(grid%nx, grid%ny) > 1 .and. aspect <= largest_aspect &
+      self%by_waves = grid%very_oblong()
+      self%extends = min(grid%nx, grid%ny) > 1 .and. .not. self%by_waves &
          .and. grid%cells() >= merge(least_oblong, least_cells, aspect > oblong)
       if (present(extends)) self%extends = extends
       c0 = merge(c0_extended, c0_plain, self%extends)
@@ -120,6 +124,7 @@ contains
          allocate (self%image(grid%nx, grid%rows()), self%response(grid%nx, grid%rows()))
       end if
       call new_schur_blocks(self%blocks, grid, coarse, c0, threads, error)
+      if (self%by_waves) call new_wave_preconditioner(self%waves, grid, coarse, error)
    end subroutine new_schur_preconditioner
 
    !> The residual scale (level - gap) on S = {P > 0 or gap < level}, its block means, and K of it.
@@ -135,6 +140,10 @@ contains
       real(dp) :: totals(2)
       integer :: j, k, jb
 
+      if (self%by_waves) then
+         call self%waves%set_residual(coarse, active, scale, level, pressure, gap, self%residual)
+         return
+      end if
       allocate (rows(self%grid%rows()))
       !$omp parallel default(none) shared(self, coarse, active, scale, level, pressure, gap, rows) &
       !$omp private(j, k, jb, column) num_threads(self%threads)
@@ -213,8 +222,13 @@ contains
       real(dp) :: product, before, first, length
       integer :: k
 
-      call self%blocks%image_parts(coarse, form, square)
       self%length = 0.0_sp
+      if (self%by_waves) then
+         call self%waves%apply(coarse, self%residual, self%search, self%image, self%blocks%pending, form, &
+            self%overlap)
+         return
+      end if
+      call self%blocks%image_parts(coarse, form, square)
       form = self%sums%form + form
       if (steps == 0 .or. .not. self%extends) return
       square = self%sums%square + square
@@ -370,7 +384,7 @@ contains
       class(schur_preconditioner_type), intent(in) :: self
       real(dp) :: count
 
-      count = self%blocks%transforms()
+      count = self%blocks%transforms() + self%waves%transforms()
    end function transforms
 
    !> Free plans and memory.
@@ -378,6 +392,7 @@ contains
       class(schur_preconditioner_type), intent(inout) :: self
 
       call self%blocks%destroy()
+      call self%waves%destroy()
       if (self%owns) deallocate (self%image, self%response)
       self%owns = .false.
       nullify (self%image, self%response)
