@@ -5,7 +5,7 @@ module test_schur
    use coarse_level, only : coarse_level_type, new_coarse_level
    use asperity_errors, only : error_type
    use normal_fixture, only : rough_problem, run_problem, solution_type
-   use normal_state, only : normal_problem_type
+   use normal_state, only : control_approach, normal_problem_type
    use kernels, only : normal_half_space
    use asperity_precision, only : dp, sp
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
@@ -42,6 +42,11 @@ contains
          call oblong_cells_take_few_iterations(90, 96, 1e4_dp, 36)
          call oblong_cells_take_few_iterations(96, 90, 1e-4_dp, 36)
          call oblong_cells_take_few_iterations(64, 12, 1e6_dp, 36)
+      end if
+      if (selected('approach_near_full_contact_takes_few_iterations')) then
+         call approach_near_full_contact_takes_few_iterations(48, 54, 3e-2_dp, 45)
+         call approach_near_full_contact_takes_few_iterations(48, 54, 1e-4_dp, 60)
+         call approach_near_full_contact_takes_few_iterations(80, 31, 1e-6_dp, 80)
       end if
       if (selected('waves_extend_the_residual_by_means')) then
          call waves_extend_the_residual_by_means(boundary_periodic, 20, 12, 100.0_dp)
@@ -98,6 +103,29 @@ contains
       call s%preconditioner%destroy()
       call s%coarse%destroy()
    end subroutine preconditioner_is_the_schur_complement
+
+   !> At an approach that leaves a small part of the gap at first touch, few cells are open, and they decide about the
+   !> mean pressure.
+   subroutine approach_near_full_contact_takes_few_iterations(nx, ny, open, most)
+      integer, intent(in) :: nx, ny
+      real(dp), intent(in) :: open                   !! part of the mean gap at first touch that is left
+      integer, intent(in) :: most
+      type(grid_type) :: grid
+      type(normal_problem_type) :: problem
+      type(solution_type) :: solution
+      real(dp), allocatable :: h(:, :)
+      real(dp) :: mean
+
+      grid = new_grid(nx, ny, 1.0_dp, real(ny, dp)/nx, boundary_periodic)
+      call rough_problem(grid, 6.0_dp, 0.0_dp, problem, h)
+      mean = sum(h)/size(h)
+      problem%control = control_approach
+      problem%target = -mean - open*(maxval(h) - mean)
+      call run_problem(grid, problem, h, solution)
+      call check_that(solution%outcome%converged, solution%outcome%reason)
+      call check_close(sum(solution%gap)/(size(h)*open*(maxval(h) - mean)), 1.0_dp, 1e-6_dp, 'the gap that is left')
+      call check_order(solution%outcome%iterations, '<=', most, 'few iterations near full contact')
+   end subroutine approach_near_full_contact_takes_few_iterations
 
    !> For very oblong cells M = E^T B E: E^T B E of the whole grid is B, and the same matrix with the rows and columns of
    !> N added to those of S in the same block is M for any S.

@@ -52,7 +52,7 @@ module normal_cg
    use kernels, only : kernel_type
    use asperity_precision, only : dp, int64
    use projection, only : project_simplex
-   use regular_grid, only : grid_type
+   use regular_grid, only : boundary_periodic, grid_type
    use solver_result, only : solver_result_type
    use stop_watch, only : stop_is_due
    implicit none
@@ -78,6 +78,8 @@ module normal_cg
    real(dp), parameter :: some_contact = 0.03_dp  !! part of the cells in contact from which the far rim pays,
    real(dp), parameter :: much_contact = 0.3_dp   !! and from which more steps pay
    real(dp), parameter :: large = 1.5e6_dp        !! cells from which they pay
+
+   real(dp), parameter :: most_contact = 0.5_dp   !! part of the cells in contact from which the mean needs more
 
    !> The solver with its operators and work fields, kept from step to step. A variable of this type must not be
    !> copied.
@@ -305,6 +307,8 @@ contains
       steps = few_steps
       if (measure%contact > much_contact) steps = merge(most_steps, more_steps, work%grid%cells() >= large)
       call work%preconditioner%extend(work%coarse, work%active, steps, rz)
+      if (.not. fixed_load .and. mostly_touches(work, measure%contact)) &
+         call work%preconditioner%blocks%shift_mean(work%coarse, work%grid%cells()*(1.0_dp - measure%contact), rz)
       beta = 0.0_dp
       if (now%phase == phase_conjugate .and. now%rz > 0.0_dp) &
          beta = max(rz - work%preconditioner%overlap, 0.0_dp)/now%rz
@@ -322,6 +326,16 @@ contains
       end if
       if (now%slope <= 0.0_dp) call end_loop(now, 'no direction of descent is left')
    end subroutine choose_direction
+
+   !> Do so many cells touch that the mean pressure at a given approach depends on the few open ones? Module
+   !> `wave_preconditioner` takes care of that itself.
+   pure logical function mostly_touches(work, contact)
+      type(normal_work_type), intent(in) :: work
+      real(dp), intent(in) :: contact                  !! part of the cells
+
+      mostly_touches = work%grid%boundary == boundary_periodic .and. .not. work%preconditioner%by_waves &
+         .and. contact > most_contact
+   end function mostly_touches
 
    !> Choose the step of an iteration: a trial along the direction, projected on the admissible pressures, and the
    !> part of it that is taken. A step that does not descend is rejected (alpha = 0), and the next trial is shorter.

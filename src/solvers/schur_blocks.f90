@@ -19,6 +19,9 @@ module schur_blocks
 
    public :: new_schur_blocks, schur_blocks_type
 
+   !> Compliance of an open cell among cells in contact, in the units of the model.
+   real(dp), parameter :: of_open_cell = 1.0_dp
+
    integer, parameter :: small = 16384         !! blocks below which one thread is faster
 
    !> The numbers per block. A variable of this type must not be copied.
@@ -35,6 +38,7 @@ module schur_blocks
       real(dp), allocatable, private :: search_off(:, :)   !! d
    contains
       procedure :: image_parts
+      procedure :: shift_mean
       procedure :: start
       procedure :: weigh
       procedure :: turn
@@ -64,6 +68,28 @@ contains
       end associate
       call new_schur_coarse(self%model, grid, c0, coarse%h, coarse%nx, coarse%sharing, threads, error)
    end subroutine new_schur_blocks
+
+   !> Add to M r the part that the model lacks at a given approach. If the pressure of all cells in contact changes by the
+   !> same amount, only the gaps of the open cells change, because the mean displacement is part of the approach. So
+   !>     1_S.A 1_S = 1_N.A 1_N ~ (number of open cells) (compliance of an open cell),
+   !> and M r lacks 1_S (1_S.r)/(1_S.A 1_S): near full contact a much larger change of the mean pressure than the model
+   !> gives. Collective.
+   subroutine shift_mean(self, coarse, open_cells, form)
+      class(schur_blocks_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse      !! with the means of the residual
+      real(dp), intent(in) :: open_cells                 !! their number
+      real(dp), intent(inout) :: form                    !! r.M r
+      real(dp) :: rows(1, coarse%held(1):coarse%held(2)), total(1), shift
+      integer :: j
+
+      do j = coarse%held(1), coarse%held(2)
+         rows(1, j) = sum(coarse%mean(:, j))
+      end do
+      total = coarse%cells*coarse%block_totals(rows)
+      shift = total(1)/(of_open_cell*max(1.0_dp, open_cells))
+      self%pending(:, :) = self%pending + shift
+      form = form + shift*total(1)
+   end subroutine shift_mean
 
    !> Compute the coarse part of the image of the residual, and its contribution to the sums. Collective.
    subroutine image_parts(self, coarse, form, square)
