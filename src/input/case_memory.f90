@@ -4,8 +4,9 @@
 !> steps if there are many passes, and that of steady sliding. For these parts measured values are used.
 !> `tools/bench/memory.py` compares the estimate with the peak of runs, which differs by less than a tenth.
 !> A dense system for few cells in contact (module `steady_active`) is not counted; it takes at most 20 fields
-!> while it is solved. A step that is solved all at once after its passes have stalled (module `joint_step`) is
-!> rare, and without its memory the passes go on; `joint_memory` therefore returns that memory separately.
+!> while it is solved. A step or a steady row may have to be solved all at once (modules `joint_step` and
+!> `steady_joint`). How much memory this takes depends on its course, and without this memory the passes go on;
+!> `joint_memory` therefore returns the most that it may take separately.
 module case_memory
    use asperity_precision, only : dp
    use asperity_schedule, only : count_rows
@@ -19,6 +20,8 @@ module case_memory
    !> Fields of a step that is solved all at once: the equations and four states; and the directions of GMRES, if
    !> all cells touch.
    real(dp), parameter :: joint_fields = 30.0_dp, joint_directions = 180.0_dp
+   !> Further fields of a steady row: the approximate inverse, and the last two states on a path of solutions.
+   real(dp), parameter :: path_fields = 15.0_dp
    real(dp), parameter :: most_kept = 64.0e6_dp       !! bytes of the copies of a row that is taken in parts
 
    real(dp), parameter :: program_itself = 26.0e6_dp  !! with its libraries, bytes
@@ -65,17 +68,21 @@ contains
       bytes = 8.0_dp*fields*cells + program_itself + merge(copies + buffers, max(copies, buffers), rubs)
    end function memory_needed
 
-   !> The most memory that a run takes beyond `memory_needed` if a step with friction is solved all at once, bytes.
-   !> It is 0 without steps in time and without friction.
+   !> The most memory that a run takes beyond `memory_needed` if a step or a steady row with friction is solved all at
+   !> once, bytes. It is 0 without friction.
    pure function joint_memory(case) result(bytes)
       type(case_type), intent(in) :: case
       real(dp) :: bytes
-      logical :: in_time
+      real(dp) :: fields
+      logical :: in_time, steady
 
       in_time = any(.not. case%phases%static .and. case%phases%steps > 0)
+      steady = any(case%phases%steady)
       bytes = 0.0_dp
-      if (.not. in_time .or. .not. road_moves(case%phases) .or. case%friction%law == 'none') return
-      bytes = 8.0_dp*(joint_fields + joint_directions)*real(case%grid%nx, dp)*real(case%grid%ny, dp)
+      if (.not. (in_time .or. steady) .or. .not. road_moves(case%phases) .or. case%friction%law == 'none') return
+      fields = joint_fields + joint_directions
+      if (steady) fields = fields + path_fields
+      bytes = 8.0_dp*fields*real(case%grid%nx, dp)*real(case%grid%ny, dp)
    end function joint_memory
 
    !> Copies of the arms, and with friction of the displacements, before a row that is taken in parts, bytes. They are
