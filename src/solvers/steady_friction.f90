@@ -131,7 +131,7 @@ contains
          if (rubbing%iterations >= doubtful .and. mod(rubbing%iterations, looks) == 0) &
             call keep_best(self, operator, task, road, pace, contact)
          call pace%choose_attempt(rubbing%iterations, max(change, measure%change/measure%size), task%tolerance, &
-            self%law%jumps_at_edge())
+            self%grid%cells(), self%law%jumps_at_edge())
          if (pace%attempt /= no_attempt) then
             call solve_at_once(self, operator, task, road, pace, contact, normal, rubbing)
             if (normal%stopped .or. (normal%converged .and. rubbing%converged)) exit

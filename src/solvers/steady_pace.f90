@@ -29,10 +29,12 @@ module steady_pace
    integer, parameter, public :: along_second_path = 4
    integer, parameter :: first_far = 150         !! rounds before the first attempt from afar; half as many before each of the next
    integer, parameter :: first_with_jump = 100   !! the same where the traction jumps at the edge
-   integer, parameter :: compared = 8            !! rounds by which their progress is measured
+   integer, parameter :: compared = 8            !! rounds whose least change is compared with that of as many before
    integer, parameter :: patience = 25           !! rounds after an attempt from here without another one
    real(dp), parameter :: within_reach = 1.0e-3_dp   !! change from which an attempt from here usually succeeds
-   real(dp), parameter :: price = 1000.0_dp      !! transforms of such an attempt
+   real(dp), parameter :: almost = 5.0_dp        !! tolerances from which rounds go on in any case
+   real(dp), parameter :: price = 1200.0_dp      !! transforms of such an attempt on a grid of ...
+   real(dp), parameter :: priced_cells = 16384.0_dp   !! ... this number of cells; it grows like the side of the grid
 
    !> The pace of the rounds.
    type :: pace_type
@@ -45,8 +47,8 @@ module steady_pace
       integer :: since = 0                       !! rounds since then
       real(dp) :: weights(components) = 0.0_dp   !! of the components in the acceleration
       integer :: attempt = no_attempt            !! to solve all cells at once, after this round
-      integer, private :: next_attempt = compared + 1     !! the round of the next one from here
-      real(dp), private :: recent(compared) = huge(1.0_dp)   !! changes of the last rounds
+      integer, private :: next_attempt = 2*compared     !! the round of the next one from here
+      real(dp), private :: recent(2*compared) = huge(1.0_dp)   !! changes of the last rounds
       real(dp) :: accepted = 0.0_dp              !! change below which a solution is checked
       real(dp) :: best = huge(1.0_dp)            !! largest error of the kept contact
    contains
@@ -76,28 +78,33 @@ contains
    end subroutine choose
 
    !> Decide whether all cells are to be solved at once after a round.
-   subroutine choose_attempt(self, rounds, change, tolerance, jumps)
+   subroutine choose_attempt(self, rounds, change, tolerance, cells, jumps)
       class(pace_type), intent(inout) :: self
       integer, intent(in) :: rounds              !! so far
       real(dp), intent(in) :: change             !! of the last round
       real(dp), intent(in) :: tolerance          !! of the change
+      real(dp), intent(in) :: cells              !! of the grid
       logical, intent(in) :: jumps               !! the traction jumps at the edge of the contact
-      real(dp) :: decades_left, decades_per_round, transforms
-      integer :: first, k
+      real(dp) :: decades_left, decades_per_round, least, least_before, transforms
+      integer :: first
 
       first = merge(first_with_jump, first_far, jumps)
-      k = 1 + mod(rounds, compared)
-      decades_per_round = log10(self%recent(k)/change)/compared
-      decades_left = log10(change/tolerance)
-      self%recent(k) = change
+      self%recent = [self%recent(2:), change]
       self%attempt = no_attempt
       if (rounds == first) self%attempt = from_best
       if (2*rounds == 3*first) self%attempt = along_path
       if (rounds == 2*first) self%attempt = along_second_path
-      if (self%attempt /= no_attempt .or. rounds < self%next_attempt .or. change > within_reach) return
+      if (self%attempt /= no_attempt .or. rounds < self%next_attempt) return
 
+      ! An accelerated round may be far off. The progress is that of the least changes, and an attempt starts from one of
+      ! them.
+      least = minval(self%recent(compared + 1:))
+      least_before = minval(self%recent(:compared))
+      if (least > within_reach .or. least < almost*tolerance .or. change > 2.0_dp*least) return
+      decades_per_round = log10(least_before/least)/compared
+      decades_left = log10(least/tolerance)
       transforms = 6.0_dp + 2.0_dp*self%inner
-      if (decades_left*transforms <= decades_per_round*price) return
+      if (decades_left*transforms <= decades_per_round*price*sqrt(cells/priced_cells)) return
       self%attempt = from_here
       self%next_attempt = rounds + max(patience, rounds/2)
    end subroutine choose_attempt
