@@ -1,6 +1,8 @@
 !> The innermost loops of module `normal_cg` over neighbouring cells of one row.
 !>
-!> Each is one loop without branches, so that it runs in vector registers. No masks are stored: a cell
+!> Each is one loop without branches, so that it runs in vector registers. Conditions are therefore expressed by
+!> `sign` and `max`. With `merge`, gfortran 12 finds control flow in the loop and does not vectorise it, and a solve
+!> of 1024 x 1024 cells takes 12 to 30 % more time. No masks are stored: a cell
 !> is in the contact set S if the residual is not 0, and the direction acts where it is not 0.
 !> The loops take many arguments because passing them costs less than looking them up in records.
 module normal_sweeps
