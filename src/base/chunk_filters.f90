@@ -8,7 +8,8 @@
 !> * Deflate: a stream of zlib. The lower planes of a field of reals are nearly random: deflate would spend
 !>   most of its time on them and save nothing. A plane of which deflate is expected to save less than the
 !>   fraction `worthwhile` is therefore stored without compression (level 0 of zlib), which is 10 times as
-!>   fast.
+!>   fast. If only shorter codes for frequent bytes save something, deflate does not search for references
+!>   (Huffman's codes only), which is 3 times as fast.
 !> * Fletcher: a checksum of 32 bits after the bytes, as the manual of HDF5 defines it: two sums modulo
 !>   65535 over words of 16 bits with the high byte first.
 !>
@@ -17,7 +18,7 @@ module chunk_filters
    use, intrinsic :: iso_c_binding, only : c_int, c_loc
    use asperity_precision, only : dp, int64, int8
    use zlib_library, only : deflate, deflate_end, deflate_params, start_deflate, stream_type, z_default_strategy, &
-      z_finish, z_no_flush, z_ok, z_stream_end
+      z_finish, z_huffman_only, z_no_flush, z_ok, z_stream_end
    implicit none
    private
 
@@ -99,7 +100,9 @@ contains
       integer, intent(out) :: length               !! length of the stream in bytes
       logical, intent(out) :: success
       type(stream_type), target :: stream
-      integer(c_int) :: status, ignored, wanted
+      integer(c_int) :: status, ignored, wanted, strategy
+      real(dp) :: gain
+      logical :: by_codes_alone
       integer :: b, last
 
       length = 0
@@ -109,10 +112,12 @@ contains
       stream%avail_out = int(size(stored), c_int)
       last = size(planes, 2)
       do b = 1, last
+         call expect_gain(planes(:, b), gain, by_codes_alone)
          wanted = 0
-         if (expected_gain(planes(:, b)) >= worthwhile) wanted = int(level, c_int)
+         if (gain >= worthwhile) wanted = int(level, c_int)
+         strategy = merge(z_huffman_only, z_default_strategy, by_codes_alone)
          ! deflateParams first completes what was added to the stream at the previous level.
-         status = deflate_params(stream, wanted, z_default_strategy)
+         status = deflate_params(stream, wanted, strategy)
          stream%next_in = c_loc(planes(1, b))
          stream%avail_in = int(size(planes, 1), c_int)
          if (status == z_ok) status = deflate(stream, merge(z_finish, z_no_flush, b == last))
@@ -123,11 +128,24 @@ contains
       ignored = deflate_end(stream)
    end subroutine deflate_planes
 
-   !> Estimate from a sample the fraction of a plane that deflate would save: by shorter codes for frequent
-   !> bytes (entropy), by runs of one byte, or by references to earlier bytes.
+   !> Estimate the fraction of a plane that deflate would save.
    pure function expected_gain(plane) result(gain)
       integer(int8), intent(in), contiguous :: plane(:)
       real(dp) :: gain
+      logical :: by_codes_alone
+
+      call expect_gain(plane, gain, by_codes_alone)
+   end function expected_gain
+
+   !> Estimate from a sample the fraction of a plane that deflate would save: by shorter codes for frequent
+   !> bytes (entropy), by runs of one byte, or by references to earlier bytes.
+   pure subroutine expect_gain(plane, gain, by_codes_alone)
+      integer(int8), intent(in), contiguous :: plane(:)
+      real(dp), intent(out) :: gain
+      !> Runs and references would save little, because equal bytes follow each other hardly more often than in
+      !> random order.
+      logical, intent(out) :: by_codes_alone
+      real(dp) :: alike, repeated
       integer :: counts(-128:127), i, n, rarest, runs, step
       real(dp) :: entropy
 
@@ -143,6 +161,7 @@ contains
          if (plane(i) == plane(i + 1)) runs = runs + 1
       end do
       gain = 1.0_dp
+      by_codes_alone = .false.
       if (n == 0) return
 
       entropy = 0.0_dp
@@ -150,10 +169,15 @@ contains
          if (counts(i) > 0) entropy = entropy + counts(i)*log(real(n, dp)/counts(i))
       end do
       gain = max(1.0_dp - entropy/(n*log(256.0_dp)), real(runs, dp)/n)
-      if (gain >= worthwhile) return
+
+      ! Huffman's codes have at least one bit for each byte, so that a plane of mostly one byte needs runs.
+      alike = sum((real(counts, dp)/n)**2)
+      if (alike > 0.5_dp .or. runs - alike*n > worthwhile*n) return
       rarest = minloc(counts, 1, counts > 0) - 129
-      gain = max(gain, repeated_part(plane, int(rarest, int8)))
-   end function expected_gain
+      repeated = repeated_part(plane, int(rarest, int8))
+      gain = max(gain, repeated)
+      by_codes_alone = repeated < worthwhile
+   end subroutine expect_gain
 
    !> Estimate the fraction of a plane that repeats earlier bytes within the window. Only the positions of
    !> one given byte are examined: in a repeated sequence they recur at the same distances.

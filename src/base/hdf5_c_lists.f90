@@ -11,9 +11,10 @@ module hdf5_c_lists
    private
 
    public :: h5p_cls_dataset_access_id_g, h5p_cls_dataset_create_id_g, h5p_cls_file_access_id_g, &
-      h5p_cls_file_create_id_g, h5p_cls_group_create_id_g, h5p_cls_link_create_id_g, h5pclose, &
+      h5p_cls_file_create_id_g, h5p_cls_group_create_id_g, h5p_cls_link_create_id_g, &
+      h5p_cls_object_copy_id_g, h5pclose, &
       h5pcreate, h5pget_chunk, h5pget_layout, h5pset_alignment, h5pset_attr_phase_change, h5pset_chunk, h5pset_chunk_cache, &
-      h5pset_create_intermediate_group, h5pset_deflate, h5pset_est_link_info, &
+      h5pset_copy_object, h5pset_create_intermediate_group, h5pset_deflate, h5pset_est_link_info, &
       h5pset_fclose_degree, h5pset_fill_time, h5pset_fletcher32, &
       h5pset_libver_bounds, h5pset_link_phase_change, &
       h5pset_meta_block_size, h5pset_shuffle, h5pset_small_data_block_size, h5pset_userblock, &
@@ -113,6 +114,13 @@ module hdf5_c_lists
          integer(c_int) :: status
       end function h5pset_create_intermediate_group
 
+      function h5pset_copy_object(list, options) bind(c, name='H5Pset_copy_object') result(status)
+         import :: c_int, hid_t
+         integer(hid_t), value :: list
+         integer(c_int), value :: options
+         integer(c_int) :: status
+      end function h5pset_copy_object
+
       function h5pset_fill_time(list, when) bind(c, name='H5Pset_fill_time') result(status)
          import :: c_int, hid_t
          integer(hid_t), value :: list
@@ -208,6 +216,9 @@ module hdf5_c_lists
 
       subroutine h5p_cls_link_create_id_g() bind(c, name='H5P_CLS_LINK_CREATE_ID_g')
       end subroutine h5p_cls_link_create_id_g
+
+      subroutine h5p_cls_object_copy_id_g() bind(c, name='H5P_CLS_OBJECT_COPY_ID_g')
+      end subroutine h5p_cls_object_copy_id_g
    end interface
 
 contains

@@ -16,7 +16,7 @@ module hdf5_c_objects
    public :: group_info_type, h5dont_atexit, h5eset_auto2, h5fclose, h5fcreate, h5fflush, &
       h5fget_filesize, h5fis_hdf5, h5fopen, h5gclose, h5gcreate2, h5gcreate_anon, &
       h5gget_info_by_name, h5iget_type, h5lcreate_external, h5ldelete, h5lexists, &
-      h5lget_name_by_idx, h5oclose, h5olink, h5oopen, h5open
+      h5lget_name_by_idx, h5oclose, h5ocopy, h5olink, h5oopen, h5open
 
    !> What HDF5 reports about a group.
    type, bind(c) :: group_info_type
@@ -172,6 +172,16 @@ module hdf5_c_objects
          integer(hid_t), value :: object
          integer(c_int) :: status
       end function h5oclose
+
+      function h5ocopy(source, name, location, copy, options, creation) bind(c, name='H5Ocopy') result(status)
+         import :: c_char, c_int, hid_t
+         integer(hid_t), value :: source
+         character(kind=c_char), intent(in) :: name(*)
+         integer(hid_t), value :: location
+         character(kind=c_char), intent(in) :: copy(*)
+         integer(hid_t), value :: options, creation
+         integer(c_int) :: status
+      end function h5ocopy
 
       function h5olink(object, location, name, creation, access) &
          bind(c, name='H5Olink') result(status)

@@ -7,8 +7,8 @@ module hdf5_library
    use, intrinsic :: iso_c_binding, only : c_char, c_funloc, c_loc, c_long, c_null_char, c_null_ptr
    use hdf5_c_lists, only : h5p_cls_dataset_access_id_g, h5p_cls_dataset_create_id_g, &
       h5p_cls_file_access_id_g, h5p_cls_file_create_id_g, h5p_cls_group_create_id_g, &
-      h5p_cls_link_create_id_g, h5pset_chunk, h5t_c_s1_g, h5t_ieee_f64le_g, h5t_native_double_g, &
-      h5t_native_int8_g, h5t_native_int_g, h5t_std_i32le_g, h5t_std_i8le_g, value_of
+      h5p_cls_link_create_id_g, h5p_cls_object_copy_id_g, h5pset_chunk, h5t_c_s1_g, h5t_ieee_f64le_g, &
+      h5t_native_double_g, h5t_native_int8_g, h5t_native_int_g, h5t_std_i32le_g, h5t_std_i8le_g, value_of
    use hdf5_c_objects, only : group_info_type, h5gget_info_by_name, h5lget_name_by_idx, h5open
    use hdf5_c_values, only : h5screate_simple, h5sget_simple_extent_dims, &
       h5sget_simple_extent_ndims, h5tcopy, h5tset_size
@@ -26,6 +26,7 @@ module hdf5_library
    integer, parameter, public :: h5f_libver_v18 = 1
    integer, parameter, public :: h5f_scope_local = 0
    integer, parameter, public :: h5i_dataset = 5
+   integer, parameter, public :: h5o_copy_without_attr = 16
    integer, parameter, public :: h5d_fill_time_never = 1
    integer, parameter, public :: h5s_scalar = 0
    integer, parameter, public :: h5s_select_set = 0
@@ -43,7 +44,7 @@ module hdf5_library
    integer(hid_t), public, protected :: h5t_string   !! text of variable length
    integer(hid_t), public, protected :: h5p_dataset_access, h5p_dataset_create
    integer(hid_t), public, protected :: h5p_file_access, h5p_file_create
-   integer(hid_t), public, protected :: h5p_group_create, h5p_link_create
+   integer(hid_t), public, protected :: h5p_group_create, h5p_link_create, h5p_object_copy
 
 contains
 
@@ -65,6 +66,7 @@ contains
       h5p_file_create = value_of(c_funloc(h5p_cls_file_create_id_g))
       h5p_group_create = value_of(c_funloc(h5p_cls_group_create_id_g))
       h5p_link_create = value_of(c_funloc(h5p_cls_link_create_id_g))
+      h5p_object_copy = value_of(c_funloc(h5p_cls_object_copy_id_g))
       h5t_string = h5tcopy(value_of(c_funloc(h5t_c_s1_g)))
       status = h5tset_size(h5t_string, -1_size_t)      ! H5T_VARIABLE
    end subroutine open_library

@@ -6,15 +6,18 @@ module hdf5_slabs
    use, intrinsic :: iso_c_binding, only : c_loc, c_null_ptr, c_ptr
    use asperity_errors, only : error_type
    use asperity_precision, only : dp, int64
+   use hdf5_c_lists, only : h5pclose, h5pcreate, h5pset_copy_object
+   use hdf5_c_objects, only : h5ocopy
    use hdf5_c_values, only : h5dclose, h5dget_space, h5dopen2, h5dread, h5dwrite, h5sclose, h5sselect_hyperslab
    use hdf5_file, only : hdf5_file_type
    use hdf5_kinds, only : hid_t, hsize_t
-   use hdf5_library, only : c_text, h5p_default, h5s_select_set, h5t_native_double, simple_space, status_of
+   use hdf5_library, only : c_text, h5o_copy_without_attr, h5p_default, h5p_object_copy, h5s_select_set, &
+      h5t_native_double, simple_space, status_of
    use hdf5_values, only : chunk_values, kind_int8, kind_real, new_dataset
    implicit none
    private
 
-   public :: create_field, read_part, slab_rows, write_part
+   public :: copy_field, create_field, read_part, slab_rows, write_part
 
 contains
 
@@ -53,6 +56,33 @@ contains
       if (.not. allocated(fault)) call file%write_attribute(path, 'long_name', long_name, fault)
       call file%settle(fault, error)
    end subroutine create_field
+
+   !> Copy a dataset whose values have been written. The stored bytes are copied, which takes much less time than
+   !> to filter the values again.
+   subroutine copy_field(file, path, copy, units, long_name, error)
+      class(hdf5_file_type), intent(inout) :: file
+      character(*), intent(in) :: path
+      character(*), intent(in) :: copy      !! path of the new dataset
+      character(*), intent(in) :: units
+      character(*), intent(in) :: long_name
+      type(error_type), allocatable, intent(out), optional :: error
+      type(error_type), allocatable :: fault
+      character(:), allocatable :: name, new_name
+      integer(hid_t) :: location, new_location, options
+      integer :: status, ignored
+
+      if (file%has_failed(error)) return
+      call file%resolve(path, location, name)
+      call file%resolve(copy, new_location, new_name)
+      options = h5pcreate(h5p_object_copy)
+      status = h5pset_copy_object(options, h5o_copy_without_attr)
+      if (status >= 0) status = h5ocopy(location, c_text(name), new_location, c_text(new_name), options, h5p_default)
+      ignored = h5pclose(options)
+      call file%checked(status, 'the dataset cannot be written', copy, fault)
+      if (.not. allocated(fault)) call file%write_attribute(copy, 'units', units, fault)
+      if (.not. allocated(fault)) call file%write_attribute(copy, 'long_name', long_name, fault)
+      call file%settle(fault, error)
+   end subroutine copy_field
 
    !> Write a part of a dataset of reals or of bytes.
    subroutine write_part(file, path, start, extent, values, error)

@@ -8,7 +8,7 @@ module zlib_library
 
    integer(c_int), parameter, public :: z_ok = 0, z_stream_end = 1
    integer(c_int), parameter, public :: z_no_flush = 0, z_finish = 4
-   integer(c_int), parameter, public :: z_default_strategy = 0
+   integer(c_int), parameter, public :: z_default_strategy = 0, z_huffman_only = 2
 
    !> C's `z_stream`.
    type, bind(c) :: stream_type

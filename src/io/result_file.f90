@@ -57,6 +57,7 @@ module result_file
       procedure :: append_row
       procedure :: begin_snapshot
       procedure :: start_field
+      procedure :: copy_height
       procedure, private :: write_real_rows, write_state_rows, write_material_value, &
          write_material_values
       !> Write rows of the field that was started last.
@@ -272,6 +273,16 @@ contains
       call self%snapshots%start_field(self%file, self%writer, name, self%grid, self%compression, fault)
       call self%file%settle(fault, error)
    end subroutine start_field
+
+   !> Add the height of a road that has not moved to the snapshot under construction.
+   subroutine copy_height(self, error)
+      class(result_file_type), intent(inout) :: self
+      type(error_type), allocatable, intent(out), optional :: error
+      type(error_type), allocatable :: fault
+
+      call self%snapshots%copy_height(self%file, self%writer, fault)
+      call self%file%settle(fault, error)
+   end subroutine copy_height
 
    !> Write a slab of the field that was started last.
    subroutine write_real_rows(self, first, values, error)

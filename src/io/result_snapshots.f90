@@ -7,9 +7,9 @@ module result_snapshots
    use asperity_precision, only : dp
    use hdf5_chunk_writer, only : chunk_writer_type
    use hdf5_file, only : hdf5_file_type
-   use hdf5_slabs, only : create_field
+   use hdf5_slabs, only : copy_field, create_field
    use regular_grid, only : grid_type
-   use result_frame, only : write_axes
+   use result_frame, only : height_path, write_axes
    use result_restart, only : stop_mark
    use snapshot_fields, only : field_type, find_field
    use xdmf, only : snapshot_name, snapshot_type
@@ -28,6 +28,7 @@ module result_snapshots
       procedure :: last
       procedure :: begin
       procedure :: start_field
+      procedure :: copy_height
       procedure :: finish
    end type result_snapshots_type
 
@@ -101,6 +102,22 @@ contains
       call writer%start(file, path, extent, states, compression)
       call file%report(error)
    end subroutine start_field
+
+   !> Add the height of a road that stands where it was at the start of the run: a copy of the map of the result.
+   subroutine copy_height(self, file, writer, error)
+      class(result_snapshots_type), intent(inout) :: self
+      type(hdf5_file_type), intent(inout) :: file
+      type(chunk_writer_type), intent(inout) :: writer
+      type(error_type), allocatable, intent(out) :: error
+      character(*), parameter :: name = 'road_height'
+      type(field_type) :: field
+
+      field = find_field(name)
+      self%current%fields = [character(24) :: self%current%fields, name]
+      call writer%finish(file)              ! the field before
+      call copy_field(file, height_path, self%group//'/'//name, trim(field%units), trim(field%long_name))
+      call file%report(error)
+   end subroutine copy_height
 
    !> Let the snapshot appear. Its last field has been written.
    subroutine finish(self, file, grid, compression, error)

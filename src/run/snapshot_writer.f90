@@ -30,6 +30,10 @@ contains
       associate (row => sim%state%row, names => sim%case%output%snapshot_fields)
          if (is_first_process()) call result%begin_snapshot(row%step, row%time, row%phase, at_stop=at_stop)
          do k = 1, size(names)
+            if (names(k) == 'road_height' .and. .not. sim%slides) then
+               if (is_first_process()) call result%copy_height()
+               cycle
+            end if
             if (is_first_process()) call result%start_field(trim(names(k)), slab)
             if (names(k) == 'contact') then
                call write_states(result, sim)

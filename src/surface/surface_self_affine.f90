@@ -111,12 +111,16 @@ contains
       type(surface_settings_type), intent(in) :: term
       integer, intent(in) :: i, j
       real(dp) :: a
+      real(dp) :: k_x, k_y
 
       a = 0.0_dp
       if (i == 1 .and. j == 1) return
       if (is_nyquist(i, grid%nx) .or. is_nyquist(j, grid%ny)) return
-      a = sqrt(self_affine_psd(term, hypot(wave_number(i, grid%nx, grid%lx), &
-         wave_number(j, grid%ny, grid%ly)), grid%ny == 1))
+      k_x = wave_number(i, grid%nx, grid%lx)
+      k_y = wave_number(j, grid%ny, grid%ly)
+      ! On fine grids most modes are far too short: they need no root.
+      if (max(abs(k_x), abs(k_y)) > 4.0_dp*pi/term%wavelength_short) return
+      a = sqrt(self_affine_psd(term, hypot(k_x, k_y), grid%ny == 1))
    end function amplitude
 
    !> White noise: standard normal numbers on all cells, transformed row by row.
