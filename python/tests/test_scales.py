@@ -108,3 +108,22 @@ def test_road_under_the_rubber(path: Path) -> None:
             snapshot.displacement_z - snapshot.road_height - level, 0.0), atol=1e-15)
     assert np.array_equal(run.snapshots[0].road_height, run.height)
     assert run.snapshots[1].plot("road_height").get_title().startswith("Height of the road")
+
+
+def test_road_that_stands(program: str, tmp_path: Path) -> None:
+    """The road of a snapshot is that of the result if the road never moves, with its own axes."""
+    case = tmp_path / "case.nml"
+    case.write_text("&grid nx = 48, ny = 32, lx = 1e-3 /\n"
+                    "&surface shape = 'self_affine', hurst = 0.8, rms_height = 1e-6,"
+                    " wavelength_long = 5e-4, wavelength_short = 1e-4 /\n"
+                    "&material shear_modulus = 1e6 /\n"
+                    "&phase pressure = 1e4 /\n&phase pressure = 2e4 /\n")
+    subprocess.run([program, "run", case, "--quiet"], check=True)
+    run = asperity.open(tmp_path / "case.h5")
+    for snapshot in run.snapshots:
+        assert np.array_equal(snapshot.road_height, run.height) and np.ptp(run.height) > 0.0
+        with h5py.File(tmp_path / "case.h5") as file:
+            field = file[f"snapshots/{snapshot.step:06d}/road_height"]
+            assert field.attrs["units"] == "m" and "present position" in field.attrs["long_name"]
+            assert [scale[0].name for scale in field.dims] == [
+                f"/snapshots/{snapshot.step:06d}/{axis}" for axis in "yx"]
