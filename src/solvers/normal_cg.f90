@@ -14,15 +14,8 @@
 !> The algorithm of the thesis (2.1.2) is in module `normal_cg_thesis`.
 !>
 !> An iteration measures the error, chooses a direction d, projects P + alpha d on the admissible pressures, which
-!> gives a step s, and adds the multiple of s to P that minimises the energy. The phase of the loop determines
-!> how the next direction is formed:
-!>
-!>     restart    d = M r, the preconditioned residual: at first, and if the last direction is of no more use
-!>                (little was taken of a clipped step, the gap has drifted, or the step was plain)
-!>     conjugate  d = M r + beta d: after every other step
-!>     plain      d = r: after several steps that did not descend after they were projected. M r may point uphill
-!>                once it is projected; r never does.
-!>     ended      the loop has ended
+!> gives a step s, and adds the multiple of s to P that minimises the energy. Module `normal_iteration` chooses the
+!> direction and the step.
 !>
 !> The solve has converged if the duality gap e1 = (mean gap under the pressure - least gap)/h_rms and the
 !> error of the load, both of a new product U = A P, are below the tolerance. If the contact is small on a tall
@@ -41,45 +34,25 @@ module normal_cg
    use contact_solver, only : contact_solver_type
    use asperity_errors, only : error_type
    use finite_fields, only : reject_overflow
-   use fft_conv, only : columns_apply, convolution_type, new_convolution
+   use fft_conv, only : convolution_type, new_convolution
    use gap_watch, only : gap_watch_type, new_gap_watch
-   use normal_passes, only : clip_step, clip_type, find_clip, keep_block_sums, longest_multiple, &
-      new_direction, new_normal_work, normal_work_type, survey, try_pressure, update_state
-   use normal_state, only : combine_measures, control_pressure, evaluate_gap, first_pressure, gap_measure_type, &
-      hand_out, narrow_scale, normal_problem_type, prepare_problem, reason_iterations, reason_undetermined
-   use normal_sums, only : state_sums_type, step_sums_type, total, trial_sums_type
+   use normal_iteration, only : choose_direction, choose_step, end_loop, far_rim_pays, iteration_type, &
+      phase_conjugate, phase_ended, phase_restart
+   use normal_passes, only : new_normal_work, normal_work_type, survey, update_state
+   use normal_state, only : combine_measures, evaluate_gap, first_pressure, gap_measure_type, hand_out, narrow_scale, &
+      normal_problem_type, prepare_problem, reason_undetermined
+   use normal_sums, only : state_sums_type, total
    use omp_lib, only : omp_get_wtime
    use kernels, only : kernel_type
    use asperity_precision, only : dp, int64
    use projection, only : project_simplex
-   use regular_grid, only : boundary_periodic, grid_type
+   use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
    use stop_watch, only : stop_is_due
    implicit none
    private
 
    public :: new_normal_solver, normal_solver_type
-
-   integer, parameter :: phase_restart = 1
-   integer, parameter :: phase_conjugate = 2
-   integer, parameter :: phase_plain = 3
-   integer, parameter :: phase_ended = 4
-
-   ! kappa is the ratio of the true d.A d to the predicted one. A step that does not descend, or hardly descends,
-   ! makes kappa four times larger and thus the next trial shorter.
-   real(dp), parameter :: often_bent = 1e3_dp  !! kappa from which the direction is the plain residual
-   real(dp), parameter :: hopeless = 1e9_dp    !! kappa from which no step is expected to descend
-   real(dp), parameter :: useless = 0.1_dp     !! largest part of a clipped step that counts as little
-   real(dp), parameter :: nothing = 1e-3_dp    !! largest part that counts as nothing
-
-   ! Steps by which the preconditioner extends the residual. More of them save iterations only where most
-   ! cells touch: the gaps between are then narrow, and the coarse level sees little of them.
-   integer, parameter :: few_steps = 2, more_steps = 3, most_steps = 4
-   real(dp), parameter :: some_contact = 0.03_dp  !! part of the cells in contact from which the far rim pays,
-   real(dp), parameter :: much_contact = 0.3_dp   !! and from which more steps pay
-   real(dp), parameter :: large = 1.5e6_dp        !! cells from which they pay
-
-   real(dp), parameter :: most_contact = 0.5_dp   !! part of the cells in contact from which the mean needs more
 
    !> The solver with its operators and work fields, kept from step to step. A variable of this type must not be
    !> copied.
@@ -91,17 +64,6 @@ module normal_cg
       procedure :: solve
       procedure :: destroy
    end type normal_solver_type
-
-   !> The numbers that an iteration passes to the next one.
-   type :: iteration_type
-      integer :: phase = phase_restart
-      real(dp) :: kappa = 1.0_dp            !! true d.A d over its prediction
-      real(dp) :: rz = 0.0_dp               !! r.M r of the last direction
-      real(dp) :: slope = 0.0_dp            !! r.d
-      real(dp) :: square = 0.0_dp           !! d.d
-      real(dp) :: alpha = 0.0_dp            !! multiple of the step that is taken; 0: rejected
-      character(64) :: reason = reason_iterations   !! why the loop ended
-   end type iteration_type
 
 contains
 
@@ -150,7 +112,7 @@ contains
          if (outcome%stopped) return
          outcome%iterations = outcome%iterations + 1
          call choose_direction(self%work, task, measure, pressure, gap, now)
-         call choose_step(self, product, task, measure%level, pressure, gap, now)
+         call choose_step(self%work, product, task, measure%level, pressure, gap, self%step, now)
          if (now%alpha > 0.0_dp) then
             call update_state(self%work, product, task%target, now%alpha/task%modulus, now%alpha, &
                self%step, pressure, gap)
@@ -208,7 +170,7 @@ contains
             if (work%scale <= 0.0_dp) work%scale = unit_of(measure%duality_gap, task%rms_height)
             call work%active%list_runs(measure%level, work%preconditioner%residual, work%direction, self%step)
             call work%active%list_wide_runs(work%preconditioner%search, &
-               far=cells >= large .and. measure%contact > some_contact)
+               far=far_rim_pays(cells, measure%contact))
          end associate
       end subroutine measure_state
 
@@ -279,144 +241,6 @@ contains
          unit = scale(1.0_dp, -exponent(other))
       end if
    end function unit_of
-
-   !> End the loop.
-   pure subroutine end_loop(now, reason)
-      type(iteration_type), intent(inout) :: now
-      character(*), intent(in) :: reason
-
-      now%phase = phase_ended
-      now%reason = reason
-   end subroutine end_loop
-
-   !> Choose the direction of an iteration according to the phase, and set the phase of the next one.
-   subroutine choose_direction(work, task, measure, pressure, gap, now)
-      type(normal_work_type), intent(inout) :: work
-      type(normal_problem_type), intent(in) :: task
-      type(gap_measure_type), intent(in) :: measure
-      real(dp), contiguous, intent(in) :: pressure(:, :), gap(:, :)
-      type(iteration_type), intent(inout) :: now
-      real(dp) :: rz, beta
-      integer :: steps
-      logical :: fixed_load
-
-      fixed_load = task%control == control_pressure
-      call work%preconditioner%set_residual(work%coarse, work%active, work%scale, measure%level, &
-         pressure, gap)
-      work%preconditioner%waves%fixed_load = fixed_load
-      steps = few_steps
-      if (measure%contact > much_contact) steps = merge(most_steps, more_steps, work%grid%cells() >= large)
-      call work%preconditioner%extend(work%coarse, work%active, steps, rz)
-      if (.not. fixed_load .and. mostly_touches(work, measure%contact)) &
-         call work%preconditioner%blocks%shift_mean(work%coarse, work%grid%cells()*(1.0_dp - measure%contact), rz)
-      beta = 0.0_dp
-      if (now%phase == phase_conjugate .and. now%rz > 0.0_dp) &
-         beta = max(rz - work%preconditioner%overlap, 0.0_dp)/now%rz
-      now%rz = rz
-      now%slope = 0.0_dp
-      if (now%phase /= phase_plain) then
-         now%phase = phase_conjugate
-         call new_direction(work, fixed_load, .true., beta, pressure, now%slope, now%square)
-         if (now%slope <= 0.0_dp .and. beta > 0.0_dp) &
-            call new_direction(work, fixed_load, .true., 0.0_dp, pressure, now%slope, now%square)
-      end if
-      if (now%slope <= 0.0_dp) then
-         now%phase = phase_restart
-         call new_direction(work, fixed_load, .false., 0.0_dp, pressure, now%slope, now%square)
-      end if
-      if (now%slope <= 0.0_dp) call end_loop(now, 'no direction of descent is left')
-   end subroutine choose_direction
-
-   !> Do so many cells touch that the mean pressure at a given approach depends on the few open ones? Module
-   !> `wave_preconditioner` takes care of that itself.
-   pure logical function mostly_touches(work, contact)
-      type(normal_work_type), intent(in) :: work
-      real(dp), intent(in) :: contact                  !! part of the cells
-
-      mostly_touches = work%grid%boundary == boundary_periodic .and. .not. work%preconditioner%by_waves &
-         .and. contact > most_contact
-   end function mostly_touches
-
-   !> Choose the step of an iteration: a trial along the direction, projected on the admissible pressures, and the
-   !> part of it that is taken. A step that does not descend is rejected (alpha = 0), and the next trial is shorter.
-   subroutine choose_step(self, product, task, level, pressure, gap, now)
-      class(normal_solver_type), intent(inout) :: self
-      type(convolution_type), intent(inout) :: product
-      type(normal_problem_type), intent(in) :: task
-      real(dp), intent(in) :: level                    !! m
-      real(dp), contiguous, intent(in) :: pressure(:, :), gap(:, :)
-      type(iteration_type), intent(inout) :: now
-      type(trial_sums_type) :: trial
-      type(step_sums_type) :: step
-      type(clip_type) :: clip
-      real(dp) :: predicted, alpha
-
-      now%alpha = 0.0_dp
-      if (now%phase == phase_ended) return
-      predicted = self%work%coarse%predict_form(now%square)/task%modulus
-      alpha = now%slope/max(now%kappa*predicted, tiny(1.0_dp))
-      call try_pressure(self%work, alpha, pressure, self%step, trial)
-      if (self%work%preconditioner%by_waves .and. now%phase == phase_conjugate) &
-         call keep_block_sums(self%work, self%step, trial)
-      call find_clip(self%work, task%control == control_pressure, &
-         task%target*self%grid%nx*self%grid%ny, self%step, trial, clip)
-      call clip_step(self%work, product, clip, level, pressure, gap, self%step, step)
-      if (step%slope > 0.0_dp) then
-         call choose_length(self, product, task%modulus, pressure, clip%clipped, step, now)
-      else
-         call shorten(now)
-      end if
-   end subroutine choose_step
-
-   !> Make the next trial shorter, and in the end plain.
-   subroutine shorten(now)
-      type(iteration_type), intent(inout) :: now
-
-      if (now%kappa > hopeless) then
-         call end_loop(now, 'no step lowers the energy')
-      else
-         now%kappa = 4.0_dp*now%kappa
-         now%phase = merge(phase_plain, phase_restart, now%kappa > often_bent)
-      end if
-   end subroutine shorten
-
-   !> Compute the part of the projected step that is taken, from the product of the operator with it.
-   subroutine choose_length(self, product, modulus, pressure, clipped, step, now)
-      class(normal_solver_type), intent(inout) :: self
-      type(convolution_type), intent(inout) :: product
-      real(dp), intent(in) :: modulus                  !! Pa
-      real(dp), contiguous, intent(in) :: pressure(:, :)
-      logical, intent(in) :: clipped
-      type(step_sums_type), intent(in) :: step
-      type(iteration_type), intent(inout) :: now
-      real(dp) :: form, predicted, before
-
-      call product%columns(columns_apply, form)
-      form = form/modulus
-      if (form <= 0.0_dp) then
-         call end_loop(now, 'no direction of descent is left')
-         return
-      end if
-      predicted = self%work%coarse%predict_form(step%square)/modulus
-      before = now%kappa
-      now%kappa = min(max(form/max(predicted, tiny(1.0_dp)), 0.1_dp), 10.0_dp)
-      now%alpha = step%slope/form
-      if (.not. now%alpha > 0.0_dp) then
-         call end_loop(now, 'no direction of descent is left')
-         return
-      end if
-      ! A direction that points out of the admissible pressures would only grow. Do not keep it.
-      if (clipped .and. now%alpha < useless) now%phase = phase_restart
-      if (clipped .and. now%alpha < nothing) then
-         now%kappa = max(before, now%kappa)
-         call shorten(now)
-      end if
-      if (clipped .and. now%alpha > 0.55_dp) then
-         now%alpha = 1.0_dp
-      else if (now%alpha > 1.0_dp) then
-         now%alpha = min(now%alpha, longest_multiple(self%work, pressure, self%step))
-      end if
-   end subroutine choose_length
 
    !> Free plans and memory.
    subroutine destroy(self)

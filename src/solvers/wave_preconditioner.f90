@@ -16,7 +16,7 @@
 !> S in the block, to each of these cells.
 !>
 !> For the same reason the solver keeps the sums of the blocks when it makes negative trial pressures 0
-!> (`keep_block_sums` of module `normal_passes`). The contact changes in almost every iteration, and the factor
+!> (`keep_block_sums` of module `normal_projection`). The contact changes in almost every iteration, and the factor
 !> of Fletcher and Reeves would then keep directions that are of no use any more. The one of Polak and Ribiere
 !> forgets them; it needs the residual before, which is kept in the field of the search direction.
 !>

@@ -1,0 +1,211 @@
+!> The choices of an iteration of module `normal_cg`: the direction, the step along it and the part of the step that
+!> is taken.
+!>
+!> A trial pressure P + alpha d is projected on the admissible pressures, which gives the clipped step s. The multiple
+!> of s that minimises the energy then follows from the product A s. alpha comes from a prediction of d.A d on the block
+!> means, which the ratio kappa of the last true product to its prediction corrects.
+!>
+!> The phase of the loop determines how the next direction is formed:
+!>
+!>     restart    d = M r, the preconditioned residual: at first, and if the last direction is of no more use
+!>                (little was taken of a clipped step, the gap has drifted, or the step was plain)
+!>     conjugate  d = M r + beta d: after every other step
+!>     plain      d = r: after several steps that did not descend after they were projected. M r may point uphill
+!>                once it is projected; r never does.
+!>     ended      the loop has ended
+module normal_iteration
+   use asperity_precision, only : dp
+   use fft_conv, only : columns_apply, convolution_type
+   use normal_passes, only : new_direction, normal_work_type
+   use normal_projection, only : clip_step, clip_type, find_clip, keep_block_sums, longest_multiple, try_pressure
+   use normal_state, only : control_pressure, gap_measure_type, normal_problem_type, reason_iterations
+   use normal_sums, only : step_sums_type, trial_sums_type
+   use regular_grid, only : boundary_periodic
+   implicit none
+   private
+
+   public :: choose_direction, choose_step, end_loop, far_rim_pays, iteration_type, phase_conjugate, phase_ended, &
+      phase_restart
+
+   integer, parameter :: phase_restart = 1
+   integer, parameter :: phase_conjugate = 2
+   integer, parameter :: phase_plain = 3
+   integer, parameter :: phase_ended = 4
+
+   ! kappa is the ratio of the true d.A d to the predicted one. A step that does not descend, or hardly descends,
+   ! makes kappa four times larger and thus the next trial shorter.
+   real(dp), parameter :: often_bent = 1e3_dp  !! kappa from which the direction is the plain residual
+   real(dp), parameter :: hopeless = 1e9_dp    !! kappa from which no step is expected to descend
+   real(dp), parameter :: useless = 0.1_dp     !! largest part of a clipped step that counts as little
+   real(dp), parameter :: nothing = 1e-3_dp    !! largest part that counts as nothing
+
+   ! Steps by which the preconditioner extends the residual. More of them save iterations only where most
+   ! cells touch: the gaps between are then narrow, and the coarse level sees little of them.
+   integer, parameter :: few_steps = 2, more_steps = 3, most_steps = 4
+   real(dp), parameter :: some_contact = 0.03_dp  !! part of the cells in contact from which the far rim pays,
+   real(dp), parameter :: much_contact = 0.3_dp   !! and from which more steps pay
+   real(dp), parameter :: large = 1.5e6_dp        !! cells from which they pay
+
+   real(dp), parameter :: most_contact = 0.5_dp   !! part of the cells in contact from which the mean needs more
+
+   !> The numbers that an iteration passes to the next one.
+   type :: iteration_type
+      integer :: phase = phase_restart
+      real(dp) :: kappa = 1.0_dp            !! true d.A d over its prediction
+      real(dp) :: rz = 0.0_dp               !! r.M r of the last direction
+      real(dp) :: slope = 0.0_dp            !! r.d
+      real(dp) :: square = 0.0_dp           !! d.d
+      real(dp) :: alpha = 0.0_dp            !! multiple of the step that is taken; 0: rejected
+      character(64) :: reason = reason_iterations   !! why the loop ended
+   end type iteration_type
+
+contains
+
+   !> End the loop.
+   pure subroutine end_loop(now, reason)
+      type(iteration_type), intent(inout) :: now
+      character(*), intent(in) :: reason
+
+      now%phase = phase_ended
+      now%reason = reason
+   end subroutine end_loop
+
+   !> Does it pay to extend the residual to a wider rim around the contact?
+   pure logical function far_rim_pays(cells, contact)
+      real(dp), intent(in) :: cells                    !! of the grid
+      real(dp), intent(in) :: contact                  !! part of the cells
+
+      far_rim_pays = cells >= large .and. contact > some_contact
+   end function far_rim_pays
+
+   !> Choose the direction of an iteration according to the phase, and set the phase of the next one.
+   subroutine choose_direction(work, task, measure, pressure, gap, now)
+      type(normal_work_type), intent(inout) :: work
+      type(normal_problem_type), intent(in) :: task
+      type(gap_measure_type), intent(in) :: measure
+      real(dp), contiguous, intent(in) :: pressure(:, :), gap(:, :)
+      type(iteration_type), intent(inout) :: now
+      real(dp) :: rz, beta
+      integer :: steps
+      logical :: fixed_load
+
+      fixed_load = task%control == control_pressure
+      call work%preconditioner%set_residual(work%coarse, work%active, work%scale, measure%level, &
+         pressure, gap)
+      work%preconditioner%waves%fixed_load = fixed_load
+      steps = few_steps
+      if (measure%contact > much_contact) steps = merge(most_steps, more_steps, work%grid%cells() >= large)
+      call work%preconditioner%extend(work%coarse, work%active, steps, rz)
+      if (.not. fixed_load .and. mostly_touches(work, measure%contact)) &
+         call work%preconditioner%blocks%shift_mean(work%coarse, work%grid%cells()*(1.0_dp - measure%contact), rz)
+      beta = 0.0_dp
+      if (now%phase == phase_conjugate .and. now%rz > 0.0_dp) &
+         beta = max(rz - work%preconditioner%overlap, 0.0_dp)/now%rz
+      now%rz = rz
+      now%slope = 0.0_dp
+      if (now%phase /= phase_plain) then
+         now%phase = phase_conjugate
+         call new_direction(work, fixed_load, .true., beta, pressure, now%slope, now%square)
+         if (now%slope <= 0.0_dp .and. beta > 0.0_dp) &
+            call new_direction(work, fixed_load, .true., 0.0_dp, pressure, now%slope, now%square)
+      end if
+      if (now%slope <= 0.0_dp) then
+         now%phase = phase_restart
+         call new_direction(work, fixed_load, .false., 0.0_dp, pressure, now%slope, now%square)
+      end if
+      if (now%slope <= 0.0_dp) call end_loop(now, 'no direction of descent is left')
+   end subroutine choose_direction
+
+   !> Do so many cells touch that the mean pressure at a given approach depends on the few open ones? Module
+   !> `wave_preconditioner` takes care of that itself.
+   pure logical function mostly_touches(work, contact)
+      type(normal_work_type), intent(in) :: work
+      real(dp), intent(in) :: contact                  !! part of the cells
+
+      mostly_touches = work%grid%boundary == boundary_periodic .and. .not. work%preconditioner%by_waves &
+         .and. contact > most_contact
+   end function mostly_touches
+
+   !> Choose the step of an iteration: a trial along the direction, projected on the admissible pressures, and the
+   !> part of it that is taken. A step that does not descend is rejected (alpha = 0), and the next trial is shorter.
+   subroutine choose_step(work, product, task, level, pressure, gap, step, now)
+      type(normal_work_type), intent(inout) :: work
+      type(convolution_type), intent(inout) :: product
+      type(normal_problem_type), intent(in) :: task
+      real(dp), intent(in) :: level                    !! m
+      real(dp), contiguous, intent(in) :: pressure(:, :), gap(:, :)
+      real(dp), contiguous, intent(inout) :: step(:, :)  !! s, Pa
+      type(iteration_type), intent(inout) :: now
+      type(trial_sums_type) :: trial
+      type(step_sums_type) :: sums
+      type(clip_type) :: clip
+      real(dp) :: predicted, alpha
+
+      now%alpha = 0.0_dp
+      if (now%phase == phase_ended) return
+      predicted = work%coarse%predict_form(now%square)/task%modulus
+      alpha = now%slope/max(now%kappa*predicted, tiny(1.0_dp))
+      call try_pressure(work, alpha, pressure, step, trial)
+      if (work%preconditioner%by_waves .and. now%phase == phase_conjugate) &
+         call keep_block_sums(work, step, trial)
+      call find_clip(work, task%control == control_pressure, &
+         task%target*work%grid%nx*work%grid%ny, step, trial, clip)
+      call clip_step(work, product, clip, level, pressure, gap, step, sums)
+      if (sums%slope > 0.0_dp) then
+         call choose_length(work, product, task%modulus, pressure, step, clip%clipped, sums, now)
+      else
+         call shorten(now)
+      end if
+   end subroutine choose_step
+
+   !> Make the next trial shorter, and in the end plain.
+   subroutine shorten(now)
+      type(iteration_type), intent(inout) :: now
+
+      if (now%kappa > hopeless) then
+         call end_loop(now, 'no step lowers the energy')
+      else
+         now%kappa = 4.0_dp*now%kappa
+         now%phase = merge(phase_plain, phase_restart, now%kappa > often_bent)
+      end if
+   end subroutine shorten
+
+   !> Compute the part of the projected step that is taken, from the product of the operator with it.
+   subroutine choose_length(work, product, modulus, pressure, step, clipped, sums, now)
+      type(normal_work_type), intent(inout) :: work
+      type(convolution_type), intent(inout) :: product
+      real(dp), intent(in) :: modulus                  !! Pa
+      real(dp), contiguous, intent(in) :: pressure(:, :), step(:, :)
+      logical, intent(in) :: clipped
+      type(step_sums_type), intent(in) :: sums         !! of the step
+      type(iteration_type), intent(inout) :: now
+      real(dp) :: form, predicted, before
+
+      call product%columns(columns_apply, form)
+      form = form/modulus
+      if (form <= 0.0_dp) then
+         call end_loop(now, 'no direction of descent is left')
+         return
+      end if
+      predicted = work%coarse%predict_form(sums%square)/modulus
+      before = now%kappa
+      now%kappa = min(max(form/max(predicted, tiny(1.0_dp)), 0.1_dp), 10.0_dp)
+      now%alpha = sums%slope/form
+      if (.not. now%alpha > 0.0_dp) then
+         call end_loop(now, 'no direction of descent is left')
+         return
+      end if
+      ! A direction that points out of the admissible pressures would only grow. Do not keep it.
+      if (clipped .and. now%alpha < useless) now%phase = phase_restart
+      if (clipped .and. now%alpha < nothing) then
+         now%kappa = max(before, now%kappa)
+         call shorten(now)
+      end if
+      if (clipped .and. now%alpha > 0.55_dp) then
+         now%alpha = 1.0_dp
+      else if (now%alpha > 1.0_dp) then
+         now%alpha = min(now%alpha, longest_multiple(work, pressure, step))
+      end if
+   end subroutine choose_length
+
+end module normal_iteration
