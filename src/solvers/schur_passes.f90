@@ -1,0 +1,247 @@
+!> The fields of module `schur_preconditioner`, and its passes over the cells of the active blocks.
+!>
+!> The first pass forms the residual r on the contact S and its image b = K r, where K is the stencil. The pass of each
+!> step of conjugate gradients adds the step before to the image, and forms the next search direction d on N, the cells
+!> off the contact, and its response e = K d. The passes return sums over the cells, and leave the sums of each block in
+!> `blocks`. The innermost loops are in module `schur_sweeps`.
+!>
+!> Rows of a block whose neighbours belong to the same block follow at once; those at its edges follow after all blocks,
+!> because they read rows that another thread or process forms.
+module schur_passes
+   use active_blocks, only : active_blocks_type
+   use asperity_precision, only : dp, sp
+   use coarse_level, only : coarse_level_type, edge_rows, inner_rows
+   use field_sums, only : row_totals
+   use normal_sweeps, only : residual_cells
+   use regular_grid, only : boundary_periodic, grid_type
+   use row_halo, only : row_halo_type
+   use schur_blocks, only : schur_blocks_type
+   use schur_coarse, only : om
+   use schur_sweeps, only : image_cells, image_sums_type, last_response_cells, response_cells, &
+      response_sums_type, search_cells, start_search_cells
+   implicit none
+   private
+
+   public :: residual_pass, schur_fields_type, search_pass, step_type
+
+   !> The fields of the preconditioner and its stencil.
+   type :: schur_fields_type
+      type(grid_type) :: grid
+      type(row_halo_type) :: rim                         !! rows of other processes that the stencil reads
+      integer :: threads = 1
+      real(sp) :: weights(3) = 0.0_sp                    !! of the stencil: centre, along x, along y
+      type(schur_blocks_type) :: blocks                  !! coarse parts and sums of each block
+      real(sp), allocatable :: residual(:, :)            !! (0:nx+1, 0:ny+1), v on S, 0 on N
+      real(sp), allocatable :: search(:, :)              !! (0:nx+1, 0:ny+1), d, 0 on S
+      real(sp), pointer, contiguous :: image(:, :) => null()      !! [nx, ny], b
+      real(sp), pointer, contiguous :: response(:, :) => null()   !! [nx, ny], e of the last step
+      real(sp) :: length = 0.0_sp                        !! multiple of e that is still to be added to b
+   end type schur_fields_type
+
+   !> The numbers of a step that a pass needs.
+   type :: step_type
+      logical :: first = .false., last = .false.
+      real(sp) :: beta = 0.0_sp                          !! multiple of the old direction
+   end type step_type
+
+contains
+
+   !> The residual scale (level - gap) on S = {P > 0 or gap < level}, its block means, and K of it.
+   subroutine residual_pass(self, coarse, active, scale, level, pressure, gap, sums)
+      class(schur_fields_type), intent(inout) :: self
+      type(coarse_level_type), intent(inout) :: coarse
+      type(active_blocks_type), intent(in) :: active
+      real(dp), intent(in) :: scale                      !! a power of two
+      real(dp), intent(in) :: level                      !! m
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows()), gap(self%grid%nx, self%grid%rows())
+      type(image_sums_type), intent(out) :: sums
+      type(image_sums_type), allocatable :: rows(:)
+      real(sp), allocatable :: column(:)
+      real(dp) :: totals(2)
+      integer :: j, k, jb
+
+      allocate (rows(self%grid%rows()))
+      !$omp parallel default(none) shared(self, coarse, active, scale, level, pressure, gap, rows) &
+      !$omp private(j, k, jb, column) num_threads(self%threads)
+      allocate (column(self%grid%nx))
+      !$omp do schedule(dynamic)
+      do jb = coarse%strips(1), coarse%strips(2)
+         column(:) = 0.0_sp
+         do j = coarse%first_y(jb), coarse%first_y(jb + 1) - 1
+            do k = 1, active%runs(j)
+               associate (first => active%first(k, j))
+                  call residual_cells(active%last(k, j) - first + 1, scale, level, pressure(first, j), &
+                     gap(first, j), self%residual(first, j), column(first))
+               end associate
+            end do
+            call close_row(self, self%residual(:, j))
+         end do
+         call coarse%sum_blocks(column, coarse%mean(:, jb))
+         coarse%mean(:, jb) = coarse%mean(:, jb)/coarse%cells
+         self%blocks%image_off(:, jb) = 0.0_dp
+         self%blocks%cells_off(:, jb) = 0.0_dp
+         call image_rows(self, coarse, active, jb, inner_rows(coarse, jb), rows)
+      end do
+      !$omp end do
+      !$omp single
+      call self%rim%close_rim(self%residual)
+      !$omp end single
+      ! The rows at the edges of blocks need rows that another thread may have formed.
+      !$omp do schedule(dynamic)
+      do jb = coarse%strips(1), coarse%strips(2)
+         call image_rows(self, coarse, active, jb, edge_rows(coarse, jb), rows)
+      end do
+      !$omp end parallel
+      call coarse%share_blocks(coarse%mean)
+      call coarse%share_blocks(self%blocks%image_off)
+      call coarse%share_blocks(self%blocks%cells_off)
+      totals = row_totals(transpose(reshape([rows%form, rows%square], [size(rows), 2])))
+      sums = image_sums_type(totals(1), totals(2))
+   end subroutine residual_pass
+
+   !> K of the residual in some rows of a block.
+   subroutine image_rows(self, coarse, active, jb, which, rows)
+      class(schur_fields_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      type(active_blocks_type), intent(in) :: active
+      integer, intent(in) :: jb                          !! row of blocks
+      integer, intent(in) :: which(3)                    !! first and last row, and their distance
+      type(image_sums_type), intent(inout) :: rows(:)
+      real(sp), allocatable :: column(:), count(:)
+      integer :: j, k
+
+      allocate (column(self%grid%nx), count(self%grid%nx), source=0.0_sp)
+      do j = which(1), which(2), which(3)
+         rows(j) = image_sums_type()
+         do k = 1, active%wide_runs(jb)
+            associate (first => active%wide_first(k, jb))
+               call image_cells(active%wide_last(k, jb) - first + 1, self%weights, &
+                  self%residual(first, j - 1), self%residual(first - 1, j), self%residual(first, j + 1), &
+                  self%image(first:, j), column(first), count(first), rows(j))
+            end associate
+         end do
+      end do
+      call add_blocks(coarse, column, self%blocks%image_off(:, jb))
+      call add_blocks(coarse, count, self%blocks%cells_off(:, jb))
+   end subroutine image_rows
+
+   !> The pass of a step: add the step before to the image, form the direction and its response.
+   subroutine search_pass(self, coarse, active, step, sums)
+      class(schur_fields_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      type(active_blocks_type), intent(in) :: active
+      type(step_type), intent(in) :: step
+      type(response_sums_type), intent(out) :: sums
+      type(response_sums_type), allocatable :: rows(:)
+      real(dp) :: totals(3)
+      integer :: j, jb
+
+      allocate (rows(self%grid%rows()))
+      !$omp parallel default(none) shared(self, coarse, active, step, rows) private(j, jb) &
+      !$omp num_threads(self%threads)
+      !$omp do schedule(dynamic)
+      do jb = coarse%strips(1), coarse%strips(2)
+         self%blocks%response_off(:, jb) = 0.0_dp
+         if (active%wide_runs(jb) == 0) cycle
+         call search_rows(self, coarse, active, jb, step)
+         call response_rows(self, coarse, active, jb, inner_rows(coarse, jb), step%last, rows)
+      end do
+      !$omp end do
+      !$omp single
+      call self%rim%close_rim(self%search)
+      !$omp end single
+      !$omp do schedule(dynamic)
+      do jb = coarse%strips(1), coarse%strips(2)
+         if (active%wide_runs(jb) == 0) cycle
+         call response_rows(self, coarse, active, jb, edge_rows(coarse, jb), step%last, rows)
+      end do
+      !$omp end parallel
+      call coarse%share_blocks(self%blocks%response_off)
+      totals = row_totals(transpose(reshape([rows%form, rows%cross, rows%square], [size(rows), 3])))
+      sums = response_sums_type(totals(1), totals(2), totals(3))
+   end subroutine search_pass
+
+   !> The image and the search direction in the rows of a block.
+   subroutine search_rows(self, coarse, active, jb, step)
+      class(schur_fields_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      type(active_blocks_type), intent(in) :: active
+      integer, intent(in) :: jb
+      type(step_type), intent(in) :: step
+      real(sp), allocatable :: added(:), corrected(:)
+      integer :: j, k, n
+
+      allocate (added(self%grid%nx), corrected(self%grid%nx))
+      added(:) = real(self%blocks%pending(coarse%block_x, jb), sp)
+      corrected(:) = real(self%blocks%correction(coarse%block_x, jb), sp)
+      do j = coarse%first_y(jb), coarse%first_y(jb + 1) - 1
+         do k = 1, active%wide_runs(jb)
+            associate (first => active%wide_first(k, jb))
+               n = active%wide_last(k, jb) - first + 1
+               if (step%first) then
+                  call start_search_cells(n, real(om, sp), added(first), corrected(first), &
+                     self%residual(first, j), self%image(first:, j), self%search(first, j))
+               else
+                  call search_cells(n, real(om, sp), self%length, step%beta, added(first), &
+                     corrected(first), self%residual(first, j), self%response(first:, j), &
+                     self%image(first:, j), self%search(first, j))
+               end if
+            end associate
+         end do
+         call close_row(self, self%search(:, j))
+      end do
+   end subroutine search_rows
+
+   !> K of the search direction in some rows of a block.
+   subroutine response_rows(self, coarse, active, jb, which, last, rows)
+      class(schur_fields_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      type(active_blocks_type), intent(in) :: active
+      integer, intent(in) :: jb
+      integer, intent(in) :: which(3)                    !! first and last row, and their distance
+      logical, intent(in) :: last
+      type(response_sums_type), intent(inout) :: rows(:)
+      real(sp), allocatable :: column(:)
+      integer :: j, k, n
+
+      allocate (column(self%grid%nx), source=0.0_sp)
+      do j = which(1), which(2), which(3)
+         do k = 1, active%wide_runs(jb)
+            associate (first => active%wide_first(k, jb))
+               n = active%wide_last(k, jb) - first + 1
+               if (last) then
+                  call last_response_cells(n, self%weights, self%search(first, j - 1), &
+                     self%search(first - 1, j), self%search(first, j + 1), self%response(first:, j), rows(j))
+               else
+                  call response_cells(n, self%weights, self%search(first, j - 1), &
+                     self%search(first - 1, j), self%search(first, j + 1), self%residual(first, j), &
+                     self%image(first:, j), self%response(first:, j), column(first), rows(j))
+               end if
+            end associate
+         end do
+      end do
+      if (.not. last) call add_blocks(coarse, column, self%blocks%response_off(:, jb))
+   end subroutine response_rows
+
+   !> Add sums over the blocks along x.
+   pure subroutine add_blocks(coarse, column, blocks)
+      type(coarse_level_type), intent(in) :: coarse
+      real(sp), intent(in) :: column(:)
+      real(dp), intent(inout) :: blocks(:)
+      real(dp) :: more(size(blocks))
+
+      call coarse%sum_blocks(column, more)
+      blocks = blocks + more
+   end subroutine add_blocks
+
+   !> Repeat the ends of a row of a periodic field in its rim.
+   pure subroutine close_row(self, row)
+      class(schur_fields_type), intent(in) :: self
+      real(sp), intent(inout) :: row(0:)
+
+      if (self%grid%boundary /= boundary_periodic) return
+      row(0) = row(self%grid%nx)
+      row(self%grid%nx + 1) = row(1)
+   end subroutine close_row
+
+end module schur_passes
