@@ -15,7 +15,7 @@
 !> of (z, u) finishes; r is carried along. From the start it diverges.
 !>
 !> Converged means: the duality gap of P under the road at x + u, u = A_T T of the traction handed out,
-!> and |bound(T + c_t r) - T|/|T|, all recomputed, are below the tolerance.
+!> and |bound(T + c_t r) - T|/|T|, all recomputed, are below the tolerance (module `steady_judge`).
 !>
 !> Where the rounds stall, all cells are solved at once from the contact of the least error (module
 !> `steady_joint`). If that fails, too, this contact is handed out.
@@ -23,18 +23,19 @@
 !> Memory beside the caller's: 19 fields, 50 for the acceleration in single precision, and 10 of doubles.
 module steady_friction
    use anderson, only : anderson_type, new_anderson
-   use field_sums, only : field_count, field_mean, field_sum, row_total, row_totals
+   use field_sums, only : field_count, field_mean, field_sum, row_total
    use friction_law, only : friction_law_type
    use asperity_interpolation, only : displaced, interpolation_type, shifted
-   use normal_state, only : normal_problem_type, prepare_problem, reason_converged, reason_iterations
+   use normal_state, only : normal_problem_type, prepare_problem, reason_iterations
    use asperity_precision, only : dp, int64
    use projection, only : project_simplex
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
    use stop_watch, only : stop_is_due
    use steady_bound, only : bound_tractions, compare_tractions, largest_force
-   use steady_contact, only : contact_mean, explain, judge_gap, read_road, steady_contact_type
+   use steady_contact, only : contact_mean, explain, steady_contact_type
    use steady_joint, only : steady_joint_type
+   use steady_judge, only : new_sliding, ratio_of_lengths, sliding_type
    use steady_normal, only : new_steady_normal, steady_measure_type, steady_normal_type
    use steady_operator, only : steady_operator_type
    use steady_start, only : contact_without_friction, full_sliding, ratio_of_sliding
@@ -49,17 +50,10 @@ module steady_friction
    integer, parameter :: looks = 25              !! rounds between two checks of it
 
    !> Work fields. A variable of this type must not be copied.
-   type :: steady_friction_type
-      type(grid_type) :: grid
-      type(friction_law_type) :: law
+   type, extends(sliding_type) :: steady_friction_type
       type(steady_normal_type) :: normal
-      real(dp) :: direction(2) = 0.0_dp                !! e
-      real(dp) :: base(2) = 0.0_dp                     !! displacement of the road, m
-      real(dp) :: c = 0.0_dp                           !! c_t, Pa
       real(dp), allocatable, private :: state(:, :, :)     !! z, u, r [nx, 5, rows]
       real(dp), allocatable, private :: residual(:, :, :)
-      real(dp), allocatable, private :: best(:, :, :)      !! P and T of the least error, Pa [nx, 3, rows]
-      real(dp), allocatable, private :: ratio(:, :, :)     !! T/P [nx, 2, rows]
       real(dp), allocatable, private :: place(:, :, :)     !! u+, m [nx, 2, rows]
       type(anderson_type), private :: memory
       type(steady_joint_type), private :: joint
@@ -76,12 +70,11 @@ contains
       type(friction_law_type), intent(in) :: law
       integer :: rows
 
-      self%grid = grid
-      self%law = law
+      call new_sliding(self%sliding_type, grid, law)
       call new_steady_normal(self%normal, grid)
       rows = grid%rows()
       allocate (self%state(grid%nx, components, rows), self%residual(grid%nx, components, rows), &
-         self%best(grid%nx, 3, rows), self%ratio(grid%nx, 2, rows), self%place(grid%nx, 2, rows), source=0.0_dp)
+         self%place(grid%nx, 2, rows), source=0.0_dp)
       call new_anderson(self%memory, grid%nx, components, rows, pairs)
    end subroutine new_steady_friction
 
@@ -124,7 +117,7 @@ contains
             normal%reason = reason_iterations
             rubbing%reason = reason_iterations
             call finish(self, operator, task, road, contact, normal, rubbing)
-            call return_to_best(self, operator, task, road, pace, contact, normal, rubbing)
+            call self%return_to_best(operator, task, road, pace%best, contact, normal, rubbing)
             call explain(contact, self%law, normal, rubbing)
             exit
          end if
@@ -232,10 +225,7 @@ contains
       allocate (ratio, source=self%ratio)
       call finish(self, operator, task, road, contact, normal, rubbing)
       self%ratio(:, :, :) = ratio
-      if (.not. max(normal%residual, rubbing%residual) < pace%best) return
-      pace%best = max(normal%residual, rubbing%residual)
-      self%best(:, 1, :) = contact%pressure
-      self%best(:, 2:3, :) = contact%traction
+      call self%keep(max(normal%residual, rubbing%residual), contact, pace%best)
    end subroutine keep_best
 
    !> Solve all cells at once, from the present contact, from the best one, or from that without friction: on steep
@@ -255,7 +245,7 @@ contains
       allocate (ratio, source=self%ratio)
       scale = self%normal%c
       call finish(self, operator, task, road, contact, normal, rubbing)
-      if (pace%attempt /= from_here) call return_to_best(self, operator, task, road, pace, contact, normal, rubbing)
+      if (pace%attempt /= from_here) call self%return_to_best(operator, task, road, pace%best, contact, normal, rubbing)
       if (pace%attempt == along_path .or. pace%attempt == along_second_path) then
          call shifted(road, self%base(1), self%base(2), contact%height, contact%slope_x, contact%slope_y)
          call contact_without_friction(self%normal, operator, task, contact, start)
@@ -278,23 +268,6 @@ contains
          contact%height, contact%slope_x, contact%slope_y)
    end subroutine solve_at_once
 
-   !> Return to the kept contact if it is better than the present one, because rounds that do not settle may
-   !> oscillate.
-   subroutine return_to_best(self, operator, task, road, pace, contact, normal, rubbing)
-      class(steady_friction_type), intent(inout) :: self
-      type(steady_operator_type), intent(inout) :: operator
-      type(normal_problem_type), intent(in) :: task
-      type(interpolation_type), intent(inout) :: road
-      type(pace_type), intent(in) :: pace
-      type(steady_contact_type), intent(inout) :: contact
-      type(solver_result_type), intent(inout) :: normal, rubbing
-
-      if (.not. pace%best < max(normal%residual, rubbing%residual)) return
-      contact%pressure(:, :) = self%best(:, 1, :)
-      contact%traction(:, :, :) = self%best(:, 2:3, :)
-      call judge(self, operator, task, road, contact, normal, rubbing)
-   end subroutine return_to_best
-
    !> |u' - u|/|u'|, from the relaxed change.
    function relative_change(self, beta) result(change)
       class(steady_friction_type), intent(in) :: self
@@ -310,16 +283,6 @@ contains
       end do
       change = ratio_of_lengths(rows)/beta
    end function relative_change
-
-   !> The length of one field over that of another, from the squares of both in each row.
-   function ratio_of_lengths(rows) result(ratio)
-      real(dp), intent(in) :: rows(:, :)             !! [2, rows of this process]
-      real(dp) :: ratio
-      real(dp) :: sums(2)
-
-      sums = row_totals(rows)
-      ratio = sqrt(sums(1)/max(sums(2), tiny(1.0_dp)))
-   end function ratio_of_lengths
 
    !> Compute the next state by a relaxed or an accelerated step, and decide how the rounds continue.
    subroutine advance(self, operator, task, pace, rounds, change, measure)
@@ -377,39 +340,7 @@ contains
       type(solver_result_type), intent(inout) :: normal, rubbing
 
       contact%pressure(:, :) = self%normal%pressure
-      call read_road(contact, road, self%base, self%direction)
-      call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio)
-      call bound_tractions(self%law, self%c, contact%pressure, contact%slope_x, contact%slope_y, &
-         self%ratio, contact%slip, contact%traction)
-      call judge(self, operator, task, road, contact, normal, rubbing)
+      call self%bound_and_judge(operator, task, road, contact, normal, rubbing)
    end subroutine finish
-
-   !> Complete a contact from its P and T: displacement, road, gap, and the errors of it all.
-   subroutine judge(self, operator, task, road, contact, normal, rubbing)
-      class(steady_friction_type), intent(inout) :: self
-      type(steady_operator_type), intent(inout) :: operator
-      type(normal_problem_type), intent(in) :: task
-      type(interpolation_type), intent(inout) :: road
-      type(steady_contact_type), intent(inout) :: contact
-      type(solver_result_type), intent(inout) :: normal, rubbing
-      real(dp), allocatable :: again(:, :, :), rows(:, :)
-      integer :: j
-
-      call operator%shear(contact%traction, contact%displacement, contact%slip)
-      call read_road(contact, road, self%base, self%direction)
-      call judge_gap(contact, operator, task, normal)
-      call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio)
-      allocate (again, mold=contact%traction)
-      call bound_tractions(self%law, self%c, contact%pressure, contact%slope_x, contact%slope_y, &
-         self%ratio, contact%slip, again)
-      allocate (rows(2, self%grid%rows()))
-      do j = 1, self%grid%rows()
-         rows(1, j) = sum((again(:, :, j) - contact%traction(:, :, j))**2)
-         rows(2, j) = sum(contact%traction(:, :, j)**2)
-      end do
-      rubbing%residual = ratio_of_lengths(rows)
-      rubbing%converged = rubbing%residual <= task%tolerance
-      if (rubbing%converged) rubbing%reason = reason_converged
-   end subroutine judge
 
 end module steady_friction
