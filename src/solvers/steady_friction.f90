@@ -210,8 +210,8 @@ contains
       self%residual(:, 1, :) = self%normal%z - self%state(:, 1, :)
    end subroutine round
 
-   !> Compute the error of the present contact, and keep the contact if it is the best so far. This does not affect
-   !> the rounds.
+   !> Compute the error of the present contact, and keep the contact if it is the best so far. The state of the rounds
+   !> does not change, but the next round begins with the slopes of the road under this contact.
    subroutine keep_best(self, operator, task, road, pace, contact)
       class(steady_friction_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
