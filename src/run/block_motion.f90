@@ -49,6 +49,7 @@ module block_motion
       procedure :: inert
       procedure :: resistance
       procedure :: known
+      procedure :: respond
       procedure :: finish
       procedure :: kinetic
    end type block_motion_type
@@ -93,6 +94,30 @@ contains
       if (.not. self%fresh) traction = traction &
          + self%mass*(leading(self)*(0.5_dp - beta) - alpha)*self%acceleration
    end function known
+
+   !> Describe how the mean displacement of the surface responds to the mean traction of a step: as that of a block
+   !> without mass, whose height is `height` and which the road moves by `shift`/Q. A mass makes the block stiffer,
+   !> like one of less height, and the known part of its motion adds to that of the road. In an instantaneous step a
+   !> mass cannot move, so that the mean displacement of the surface stays.
+   pure subroutine respond(self, q, displacement, motion, dt, height, shift)
+      class(block_motion_type), intent(in) :: self
+      real(dp), intent(in) :: q                !! Q of the step
+      real(dp), intent(in) :: displacement(2)  !! mean of U, m; counts with a mass only
+      real(dp), intent(in) :: motion(2)        !! D' - D, m
+      real(dp), intent(in) :: dt               !! s; 0: instantaneous
+      real(dp), intent(out) :: height          !! m
+      real(dp), intent(out) :: shift(2)        !! m
+
+      height = self%height
+      shift = q*motion
+      if (self%inert(dt)) then
+         height = q*height/(q + self%resistance(dt))
+         shift = shift - height*self%known(displacement, motion, dt)
+      else if (self%mass > 0.0_dp) then
+         height = 0.0_dp
+         shift = shift - q*displacement
+      end if
+   end subroutine respond
 
    !> End a step: the motion, and the energies.
    pure subroutine finish(self, advance, carried, dt)

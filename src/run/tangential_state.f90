@@ -35,6 +35,8 @@ module tangential_state
       type(energy_books_type) :: books                !! of the strain of the rubber
       real(dp) :: rate(2) = 0.0_dp                    !! mean speed of the surface in the contact, m/s
       real(dp) :: lost_friction = 0.0_dp              !! J
+   contains
+      procedure :: extrapolate
    end type tangential_state_type
 
 contains
@@ -58,5 +60,27 @@ contains
       if (allocated(error)) return
       call new_books(self%books, material, grid%cell_area())
    end subroutine new_tangential_state
+
+   !> Move the traction of cells that stick by the change of the last step, in proportion to the lengths of the steps,
+   !> and keep the traction as it was.
+   subroutine extrapolate(self, dt, changes)
+      class(tangential_state_type), intent(inout) :: self
+      real(dp), intent(in) :: dt                      !! length of the step that begins, s
+      logical, intent(in) :: changes                  !! otherwise the traction stays
+      real(dp) :: factor, t(2)
+      integer :: i, j
+
+      factor = 0.0_dp
+      if (changes) factor = dt/self%pace
+      !$omp parallel do default(none) shared(self, factor) private(i, j, t)
+      do j = 1, size(self%contact, 2)
+         do i = 1, size(self%contact, 1)
+            t = self%traction(i, :, j)
+            if (self%contact(i, j) == 1_int8) self%traction(i, :, j) = t + factor*(t - self%before(i, :, j))
+            self%before(i, :, j) = t
+         end do
+      end do
+      self%pace = dt
+   end subroutine extrapolate
 
 end module tangential_state

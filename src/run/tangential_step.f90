@@ -112,7 +112,7 @@ contains
       real(dp), intent(in) :: dt                      !! s; 0: instantaneous
       logical, intent(in) :: pulled(2)                !! the road hangs on a force along x, y
       real(dp), intent(in) :: pull(2)                 !! that force, over the cell, Pa
-      real(dp) :: height, shift(2)
+      real(dp) :: height, mean(2), shift(2)
       integer :: c, j
 
       self%motion = motion
@@ -132,18 +132,9 @@ contains
       if (.not. dt > 0.0_dp) state%pace = 0.0_dp
       call past_traction(state%arms, material, self%past)
       self%past_mean = means(self, self%past)
-      height = state%block%height
-      shift = self%q*motion
-      if (state%block%inert(dt)) then
-         ! A mass makes the mean mode stiffer, like a block of less height. The known part of its motion is
-         ! added to the displacement of the road.
-         height = self%q*height/(self%q + state%block%resistance(dt))
-         shift = shift - height*state%block%known(means(self, state%displacement), motion, dt)
-      else if (state%block%mass > 0.0_dp) then
-         ! A mass cannot move in an instantaneous step, so the mean displacement of the surface stays.
-         height = 0.0_dp
-         shift = shift - self%q*means(self, state%displacement)
-      end if
+      mean = 0.0_dp
+      if (state%block%mass > 0.0_dp) mean = means(self, state%displacement)
+      call state%block%respond(self%q, mean, motion, dt, height, shift)
       where (pulled) shift = 0.0_dp
       !$omp parallel do default(none) shared(self, state, shift) private(c, j)
       do j = 1, self%grid%rows()
@@ -153,7 +144,7 @@ contains
       end do
       call set_thickness(self, height)
       if (any(pulled) .and. state%block%mass > 0.0_dp) then
-         call self%road%place_mass(state%block, means(self, state%displacement), dt)
+         call self%road%place_mass(state%block, mean, dt)
          do c = 1, 2
             if (pulled(c)) call self%operator%symbols%set_mean_mode(c, 0.0_dp)
          end do
@@ -210,22 +201,9 @@ contains
       class(tangential_step_type), intent(inout) :: self
       type(tangential_state_type), intent(inout) :: state
       logical, intent(in) :: steady                   !! the road moves as in the step before
-      real(dp) :: factor, t(2)
-      integer :: i, j
 
-      factor = 0.0_dp
-      if (steady .and. state%pace > 0.0_dp) factor = self%dt/state%pace
-      !$omp parallel do default(none) shared(self, state, factor) private(i, j, t)
-      do j = 1, self%grid%rows()
-         do i = 1, self%grid%nx
-            t = state%traction(i, :, j)
-            if (state%contact(i, j) == 1_int8) &
-               state%traction(i, :, j) = t + factor*(t - state%before(i, :, j))
-            state%before(i, :, j) = t
-         end do
-      end do
-      state%pace = self%dt
-      self%solver%near = factor > 0.0_dp
+      self%solver%near = steady .and. state%pace > 0.0_dp .and. self%dt > 0.0_dp
+      call state%extrapolate(self%dt, self%solver%near)
    end subroutine extrapolate
 
    !> Expect the surface at a place at the end of the step. Cells that slip far start in the direction of the
