@@ -1,4 +1,4 @@
-"""Common parts of the studies: paths, the model compound, short forms, the style of pictures."""
+"""Parts that the studies share: paths, the model compound, expected warnings, style of pictures."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def material_group(rubber: asperity.material.Prony | None = None, **more: Any) -
 
 
 def run(case: asperity.Case, path: Path) -> asperity.Run:
-    """Return the result of a case; a complete result of the same input is reused."""
+    """Return the result of a case. A complete result of the same input is reused."""
     if path.exists():
         found = asperity.open(path)
         if found.finished and found.input == str(case):

@@ -1,4 +1,4 @@
-"""What the studies of the model compound on a self-affine road share."""
+"""Parts that the studies of the model compound on a self-affine road share."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Road:
 
     @property
     def spectrum(self) -> tuple[np.ndarray, np.ndarray]:
-        """Knots of the PSD that the maps are made of."""
+        """Return the points between which the PSD of the maps is interpolated."""
         return theory.self_affine_psd(self.hurst, self.long, self.long, self.short,
                                       rms_slope=self.rms_slope)
 
@@ -48,10 +48,11 @@ class Road:
 
 def sweep(case: asperity.Case, parameters: dict[Any, Any], folder: Any,
           *said: str) -> asperity.Sweep:
-    """Run a case with other values; results that are there are kept.
+    """Run a case with other values. Results that exist already are kept.
 
-    `said` are warnings that are expected beside that of long steps.
+    `said` are warnings that are expected in addition to the one on long steps.
     """
-    # At rest the steps grow with the time that has passed, and arm after arm falls still.
+    # At rest the steps grow with the elapsed time, so that they exceed the relaxation time of one
+    # arm after the other. These arms are then relaxed.
     with common.expected(common.LONG_STEPS, *said):
         return asperity.sweep(case, parameters, folder=folder, jobs=common.jobs, quiet=True)

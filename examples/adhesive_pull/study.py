@@ -1,7 +1,8 @@
 """Pulling off an adhesive viscoelastic sphere: the apparent adhesion grows with the speed.
 
-Loops of loading and unloading as in the thesis's figure 2.11, over seven decades of speed, between
-those of the relaxed and the glassy elastic solid; and a sphere that has rested before it is pulled.
+The study computes loops of loading and unloading as in the thesis's figure 2.11, over seven decades
+of speed, beside the loops of the relaxed and of the glassy elastic solid. A second sphere rests
+before it is pulled off.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 MINUTES = 5
 
 RADIUS, ENERGY, RANGE = 1e-4, 0.05, 0.4e-6     # m, J/m2, m
-RELAXED, GLASSY, TAU = 0.2e6, 2e6, 0.1         # Pa, Pa, s: E* is 0.8 MPa in the end, 8 MPa at once
+RELAXED, GLASSY, TAU = 0.2e6, 2e6, 0.1         # Pa, Pa, s: E* falls from 8 MPa to 0.8 MPa
 DEEP, HIGH = 2e-6, -3e-6                       # turning points of the displacement, m
 SIDE = 80e-6
 UNIT = math.pi * ENERGY * RADIUS               # pi w R, N
@@ -30,7 +31,7 @@ RESIDUAL = 1e-6
 
 
 def base(cells: int, phases: list[dict[str, Any]]) -> asperity.Case:
-    """Return a case of the sphere with so many cells a side."""
+    """Return a case of the sphere with this many cells per side."""
     return asperity.Case(
         grid=dict(nx=cells, ny=cells, lx=SIDE, boundary="free"),
         surface=dict(shape="paraboloid", radius=RADIUS),
@@ -40,7 +41,7 @@ def base(cells: int, phases: list[dict[str, Any]]) -> asperity.Case:
 
 
 def loop(steps: int) -> list[dict[str, Any]]:
-    """Return the phases of a loop from HIGH and back: the pull is half as fast as the push."""
+    """Return the phases of a loop from HIGH to DEEP and back; the pull takes twice the time."""
     return [dict(displacement=HIGH),
             dict(displacement=DEEP, duration=2.5, steps=round(1.5 * steps), ramp="linear"),
             dict(displacement=HIGH, duration=5.0, steps=round(2.5 * steps), ramp="linear")]
@@ -52,17 +53,18 @@ def measured(run: asperity.Run) -> dict[str, Any]:
         "displacement", "force", "work_load", "work_normal", "energy_elastic", "energy_adhesive",
         "dissipated_viscous")}
     stored = history["energy_elastic"] + history["energy_adhesive"]
-    books = history["work_normal"] - (stored - stored[0]) - history["dissipated_viscous"]
-    books -= books[0]
+    missing = history["work_normal"] - (stored - stored[0]) - history["dissipated_viscous"]
+    missing -= missing[0]
     outside = history["work_load"] - history["work_load"][0]
-    # where the surface jumps within a step much longer than tau, the solid's loss is that of
-    # a slow way there, and the rest shows in the work only
+    # If the surface jumps within a step that is much longer than tau, the computed loss is that of
+    # a slow motion over the same distance. The rest of the loss appears in the work only.
     return {
         "pull_off": -history["force"].min() / UNIT,
         "lost": history["dissipated_viscous"][-1],
-        # what the load has done and is not stored, at the end out of contact hardly anything
+        # work of the load that is not stored in the last row, when the sphere is almost out of
+        # contact
         "work": outside[-1] - (stored[-1] - stored[0]),
-        "books": np.abs(books).max() / max(np.abs(stored).max(), 1e-300),
+        "imbalance": np.abs(missing).max() / max(np.abs(stored).max(), 1e-300),
         "curve": np.stack([history["displacement"], history["force"]]),
     }
 
@@ -74,7 +76,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
                                            20.0, 100.0, 1e3)
     options: dict[str, Any] = dict(jobs=common.jobs, measure=measured, quiet=True)
     data: dict[str, Any] = {"rate": np.array(rates)}
-    # a rate is V tau/DEEP
+    # The rate is V tau/DEEP.
     loops = {("phase[2].duration", "phase[3].duration"): [
         (2.5 * TAU / r, 5 * TAU / r) for r in rates]}
     case = base(cells, loop(steps))
@@ -83,10 +85,12 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
     rested = base(cells, [dict(displacement=DEEP, relaxed=True),
                           dict(displacement=HIGH, duration=1.0, steps=round(2.5 * steps),
                                ramp="linear")])
-    # the fast limit of a pull after a rest: static solves, which respond with the glassy modulus
+    # The fast limit of a pull after a rest consists of static solves, which respond with the glassy
+    # modulus.
     sudden = base(cells, [dict(displacement=DEEP, relaxed=True)] + [
         dict(displacement=float(d)) for d in np.linspace(DEEP, HIGH, round(2.5 * steps) + 1)[1:]])
-    # The slow loops take steps much longer than the relaxation: the solid is relaxed, then.
+    # The slow loops take steps that are much longer than the relaxation time. This is intended: the
+    # solid is relaxed there.
     with common.expected(common.LONG_STEPS):
         for name, found in (
                 ("loop", asperity.sweep(case, loops, folder=folder / "loops", **options)),
@@ -100,9 +104,9 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
                     ("material.shear_modulus", "material.prony_g", "material.prony_tau"): [
                         (RELAXED, None, None), (GLASSY, None, None)]},
                     folder=folder / "elastic", **options))):
-            data[name] = {key: found[key] for key in ("pull_off", "lost", "work", "books")}
+            data[name] = {key: found[key] for key in ("pull_off", "lost", "work", "imbalance")}
             data[name]["curves"] = list(found["curve"])
-    # theory of the elastic limits: Maugis's, with the Tabor parameter of the exponential potential
+    # Theory of the elastic limits: Maugis's, with the Tabor parameter of the exponential potential.
     data["maugis"] = [theory.maugis(RADIUS, 4 * g, ENERGY, force=0.0, range=RANGE).pull_off_force
                       / -UNIT for g in (RELAXED, GLASSY)]
     return data
@@ -112,38 +116,42 @@ def check(data: dict[str, Any], quick: bool) -> None:
     """Assert limits, trends and energies."""
     loop_, rested, sudden, elastic = (data[name] for name in (
         "loop", "rested", "sudden", "elastic"))
-    # Each row's books close to the solver's tolerance of the gap's residual.
+    # The energies of each row balance within the solver's tolerance.
     for name in ("loop", "bare", "rested", "elastic"):
-        assert data[name]["books"].max() < 1e-4, f"{name}: books open by {data[name]['books']}"
-    # What the load did and is not stored is lost in the solid, where the steps resolve the
-    # relaxation: the load's work is a sum of steps.
+        assert data[name]["imbalance"].max() < 1e-4, \
+            f"{name}: relative errors of the energy balance {data[name]['imbalance']}"
+    # Where the steps resolve the relaxation, the work of the load that is not stored is lost in the
+    # solid. The tolerance is that of the work, which is a sum over steps.
     peak = int(loop_["work"].argmax())
     assert abs(loop_["work"][peak] / loop_["lost"][peak] - 1) < (0.1 if quick else 0.03), \
         f"work {loop_['work'][peak]}, lost {loop_['lost'][peak]}"
     if not quick:
-        # The jumps into contact and out of it lose energy of the slowest loop, as much as that of
-        # the elastic one, which has nothing else to lose. The sum of the work is right to some
-        # 0.05 pJ with these steps, and to 2 pJ with those of the short form.
+        # The jumps into and out of contact lose energy in the slowest loop. The loss is about that
+        # of the elastic loop, in which nothing else loses energy. The work is accurate to about
+        # 0.05 pJ with these steps, and to 2 pJ with those of the quick form.
         jumps = elastic["work"][0]
         assert 0 < jumps < 0.1 * loop_["work"][peak], f"jumps lose {jumps}"
         assert abs(elastic["work"][1]) < 0.1 * jumps, "the glassy loop has jumps"
         assert loop_["work"][0] > 0.7 * jumps, "the slow loop loses less than the jumps"
-    # Slow is relaxed, fast is glassy. The edge of the contact is much faster than the sphere, so
-    # that the slow limit is far away: 3 % at a rate of 1e-3. At 1e3 the loop has taken 6e-3 tau.
+    # A slow loop is that of the relaxed solid, a fast one that of the glassy solid. The edge of the
+    # contact moves much faster than the sphere, so that the slow limit is approached slowly: the
+    # error is 3 % at a rate of 1e-3. At a rate of 1e3 the loop takes 6e-3 tau.
     for index, limit, name in ((0, 0, "slow"), (-1, 1, "fast")):
         ratio = loop_["pull_off"][index] / elastic["pull_off"][limit]
         assert abs(ratio - 1) < (0.1 if quick else 0.03), f"{name} loop: {ratio:.3f} of elastic"
-    # The elastic limits against Maugis: the exponential potential has another shape, which finer
-    # meshes do not change: 3.4 % (Tabor parameter 1.8) and 4 % (0.4).
+    # The elastic limits differ from Maugis's theory because the exponential potential has another
+    # shape: by 3.4 % for the Tabor parameter 1.8 and by 4 % for 0.4. Finer meshes do not change
+    # this.
     for found, known in zip(elastic["pull_off"], data["maugis"], strict=True):
         assert abs(found / known - 1) < (0.08 if quick else 0.05), f"pull-off {found} of {known}"
-    # In between both the pull and the loss are larger.
+    # At speeds in between, the pull-off force and the loss are larger.
     assert loop_["pull_off"].max() > 2 * max(elastic["pull_off"])
     assert 0 < peak < data["rate"].size - 1, "no maximum of the loss"
     assert loop_["work"][peak] > 3 * max(loop_["work"][0], loop_["work"][-1])
     assert (loop_["work"] > data["bare"]["work"]).all(), "adhesion loses less"
-    # After a rest: slow is relaxed, fast the sudden pull, and always more with the speed; never
-    # more than G(0)/G_e times the relaxed one.
+    # After a rest the slowest pull is that of the relaxed solid, and the fastest one is the sudden
+    # pull. The force grows with the speed, and never exceeds G(0)/G_e times that of the relaxed
+    # solid.
     pulls = rested["pull_off"]
     assert abs(pulls[0] / elastic["pull_off"][0] - 1) < (0.1 if quick else 0.03)
     assert abs(pulls[-1] / sudden["pull_off"][0] - 1) < (0.1 if quick else 0.03), \
@@ -159,7 +167,8 @@ def picture(data: dict[str, Any]) -> Figure:
     for number, wanted in enumerate((1e-2, 0.5, 5.0, 100.0)):
         i = int(np.abs(np.log(rate / wanted)).argmin())
         curve = data["loop"]["curves"][i]
-        # the fast loop lies on the glassy curve: broad below it
+        # The fast loop coincides with the glassy curve, which is therefore drawn as a broad line
+        # below it.
         left.plot(curve[0] * 1e6, curve[1] / UNIT, color=common.COLOURS[number],
                   lw=4 if number == 3 else 1.5, alpha=0.6 if number == 3 else 1.0,
                   label=f"{rate[i]:g}")

@@ -1,8 +1,8 @@
 """Adhesion and friction on a wavy road of two scales.
 
-A rubber block with Coulomb friction, adhesive or not, is pressed for 1 ms and then set in motion:
-friction and contact in time, over the speed and over the energy of adhesion, beside the criteria
-of the thesis for when adhesion counts.
+A rubber block with Coulomb friction, with or without adhesion, is pressed for 1 ms and then set in
+motion. The study shows friction and contact over time, over the speed and over the energy of
+adhesion, beside the criteria of the thesis for when adhesion matters.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ TRAVEL = 60e-6                             # m, of the drive
 
 
 def _criteria(energy: float, frequency: np.ndarray | float) -> tuple[float, Any]:
-    """Return C1 and C2 of the shorter wave (eq. 4.9, with the summits' radius as corrected)."""
+    """Return C1 and C2 of the shorter wave (eq. 4.9 with the corrected radius of the summits)."""
     wave, amplitude = SHORT, SHORT / 50
     radius = wave**2 / (3 * math.sqrt(3) * math.pi**2 * amplitude)
-    area = wave**2 / (2 * math.sqrt(3))                     # of a summit
+    area = wave**2 / (2 * math.sqrt(3))                     # radius of a summit
     modulus = common.compound().storage_modulus(2 * math.pi * np.asarray(frequency))
     elastic = 3 * math.pi * modulus * amplitude**2 / (8 * wave)
     return 3 * math.pi * energy * radius / (PRESSURE * area), energy / elastic
@@ -41,7 +41,7 @@ def _criteria(energy: float, frequency: np.ndarray | float) -> tuple[float, Any]
 
 def _runs(folder: Path, long: float, cases: list[tuple[float, float]],
           cell: float = CELL) -> list[dict[str, Any]]:
-    """Return what happens at speeds and with energies of adhesion; `long`: the longer wave, m."""
+    """Return the results for some speeds and energies of adhesion; `long` is the longer wave, m."""
     if not cases:
         return []
     cells = round(long / cell)
@@ -77,7 +77,7 @@ def _runs(folder: Path, long: float, cases: list[tuple[float, float]],
 
 
 def compute(folder: Path, quick: bool) -> dict[str, Any]:
-    """Run the cases; the criteria beside them."""
+    """Run the cases, and evaluate the criteria."""
     long = 2 * SHORT if quick else LONG
     speeds = [1.0, 100.0] if quick else [0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0]
     energies = [] if quick else [1.25e-3, 2.5e-3, 5e-3, 10e-3]
@@ -100,36 +100,38 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Check what adhesion adds against trends, and the mesh against its criterion."""
-    # Wider cells let go and stick at the whim of the algorithm.
+    """Check the effect of adhesion against trends, and the cell size against its criterion."""
+    # In wider cells the state of a single cell would depend on the path of the solver.
     assert data["largest_cell"] > CELL, "cells too wide for the range of adhesion"
     gain = np.array([one["dyn"] - other["dyn"] for one, other in
                      zip(data["adhesive"], data["bare"], strict=True)])
-    assert (gain > 0).all(), f"adhesion takes friction away: {gain}"
-    assert (np.diff(gain) < 0).all(), f"adhesion does not fade with speed: {gain}"
+    assert (gain > 0).all(), f"adhesion reduces friction: {gain}"
+    assert (np.diff(gain) < 0).all(), f"the effect of adhesion does not decrease with speed: {gain}"
     for one, other in zip(data["adhesive"], data["bare"], strict=True):
         assert one["max"] > other["max"], "the maximum is not higher with adhesion"
-        # Coulomb's law on p + energy/range where there is contact, nothing else: an upper bound of
-        # what adhesion adds where contact is complete, with the slopes' few per cent.
+        # Coulomb's law for the pressure p + energy/range in the contact area is an upper bound of
+        # the friction with adhesion, up to a few per cent from the slopes, because the contact is
+        # complete.
         most = 1.0 + ENERGY / RANGE / PRESSURE
         assert one["max"] < 1.2 * most, f"friction {one['max']} above its bound {most}"
         assert one["slips"] and other["slips"], "a case still sticks at its end"
-        # contact is lost when sliding sets in: the maximum of static friction
+        # Contact is lost when sliding begins; this explains the maximum of static friction.
         assert one["dyn_area"] < one["loaded"], "no contact is lost"
     assert data["adhesive"][0]["loaded"] > data["bare"][0]["loaded"] + 0.1, "no adhesion at rest"
     if quick:
         return
-    # The first criterion compares forces: at high speed, where the second is small, each summit of
-    # radius R that touches is pulled by 1.5 pi (JKR) to 2 pi (DMT) times energy R; C1 has 3 pi and
-    # all summits, so that friction with the coefficient 1 gains less than 2/3 C1. (The quick
-    # road is so low that its valleys feel the range, too.)
+    # The first criterion compares forces. At high speed, where the second criterion is small, each
+    # touching summit of radius R is pulled with 1.5 pi (JKR) to 2 pi (DMT) times energy R. C1
+    # contains 3 pi and all summits, so that the gain of friction with the coefficient 1 is less
+    # than 2/3 C1. (The road of the quick form is so low that the attraction reaches its valleys,
+    # too.)
     assert data["c2"][-1] < 0.1, "the second criterion is not small at the highest speed"
     assert 0.2 < gain[-1] / data["c1"] < 0.7, f"gain {gain[-1]}, C1 = {data['c1']}"
     steady = [item["dyn"] for item in data["by_energy"]]
-    assert (np.diff(steady) > 0).all(), "more energy, less friction"
+    assert (np.diff(steady) > 0).all(), "friction falls with the energy of adhesion"
     area = [item["dyn_area"] for item in data["by_energy"]]
-    assert (np.diff(area) > 0).all(), "more energy, less contact"
-    # half the width of the cells
+    assert (np.diff(area) > 0).all(), "the contact area falls with the energy of adhesion"
+    # cells of half the width
     coarse, fine = data["adhesive"][data["at"]], data["fine"]
     assert abs(fine["dyn"] / coarse["dyn"] - 1) < 0.03, f"mesh: {fine['dyn']}, {coarse['dyn']}"
     assert abs(fine["max"] / coarse["max"] - 1) < 0.03, f"mesh: {fine['max']}, {coarse['max']}"

@@ -1,6 +1,6 @@
-"""Adhesive rough contact: pressed and released.
+"""Adhesive rough contact under a load that rises and falls.
 
-input.nml, and the same map without adhesion.
+The case is input.nml. It is compared with the same map without adhesion.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ MODULUS = 25e6  # Pa, E*
 def compute(folder: Path, quick: bool) -> dict[str, Any]:
     """Return loads (Pa), areas, gaps (m) with and without adhesion, and the last pressure (Pa)."""
     case = asperity.Case.read(HERE / "input.nml")
-    if quick:  # a part of the area, on the same cells, and every second load
+    if quick:  # a part of the area with cells of the same size, and every second load
         case.grid.update(nx=96, ny=96, lx=144e-9)
         case.surface[0].wavelength_long = 72e-9
         case.phase = case.phase[1::2]
@@ -44,23 +44,26 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Check the loop against what must be: monotone, with hysteresis, above the bare contact."""
+    """Check that the loop is monotone, has hysteresis, and exceeds the bare contact."""
     area, gap, load = data["area"], data["gap"], data["load"]
     turn = int(load.argmax())
     np.testing.assert_allclose(load[turn::-1], load[turn:], rtol=1e-9)
     assert (np.diff(area[:turn + 1]) > 0).all() and (np.diff(area[turn:]) < 0).all()
     assert (np.diff(gap[:turn + 1]) < 0).all() and (np.diff(gap[turn:]) > 0).all()
-    # Each summit that has snapped in must be pulled off: more contact on the way back.
+    # Summits that have jumped into contact must be pulled off, so that the contact area is larger
+    # on the way back.
     assert (area[turn + 1:] > area[turn - 1::-1]).all()
     assert (gap[turn + 1:] < gap[turn - 1::-1]).all()
     assert (area[:turn + 1] > data["bare_area"]).all()
     assert (gap[:turn + 1] < data["bare_gap"]).all()
-    # Without adhesion at the lightest load, between Persson's slope of the area and that of Bush,
-    # Gibson and Thomas; few summits scatter, and cells at the rim count in full.
+    # Without adhesion, the slope of the area at the smallest load lies between that of Persson and
+    # that of Bush, Gibson and Thomas. The bounds are wider because there are few summits, and
+    # because cells at the edge of the contact count in full.
     slope = data["bare_area"][0] * MODULUS * data["slope"] / load[0]
     assert 0.9 * np.sqrt(8 / np.pi) < slope < 1.3 * np.sqrt(2 * np.pi), f"slope of the area {slope}"
-    # After the release the summits are pressed by what pulls around them: with energy/range at
-    # most, and nearly that much where a contact is about to open. The sum is the load.
+    # After the release the summits are pressed by the attraction around them. The attraction is at
+    # most energy/range, and nearly that where a contact is about to open. The sum of both is the
+    # load.
     assert -1.0001 < data["pressure"].min() / data["strongest"] < -0.9
     assert abs(data["pressure"].mean() / load[-1] - 1) < 1e-5
 

@@ -1,6 +1,6 @@
-"""A viscoelastic adhesive sphere, pushed and pulled.
+"""A viscoelastic adhesive sphere that is pushed and pulled.
 
-input.nml with and without its &adhesion.
+The case is input.nml, with and without its &adhesion.
 """
 
 from __future__ import annotations
@@ -22,18 +22,19 @@ NAMES = {"adhesive": "with adhesion", "bare": "without"}
 
 
 def compute(folder: Path, quick: bool) -> dict[str, Any]:
-    """Return the histories with and without adhesion, and what is lost."""
+    """Return the histories with and without adhesion, and the lost energy."""
     case = asperity.Case.read(HERE / "input.nml")
     if quick:
         case.grid.update(nx=48, ny=48)
         case.phase[1].steps, case.phase[2].steps = 12, 30
     bare = case.copy()
     bare.adhesion = None
-    # Lee and Radok: while the contact grows the force is Hertz's, 4/3 E* sqrt(R) d^(3/2), with
-    # the relaxation of E* after each part of the push.
+    # Theory of Lee and Radok: while the contact grows, the force is that of Hertz, 4/3 E* sqrt(R)
+    # d^(3/2), with E* relaxed since each part of the push.
     solid, push, radius = case.material, case.phase[1], case.surface[0].radius
     after = (np.arange(2000) + 0.5) / 2000 * push.duration
-    depth = push.displacement * (1.0 - after / push.duration)         # when the part was pushed
+    # time since the part was pushed
+    depth = push.displacement * (1.0 - after / push.duration)
     modulus = 4.0 * (solid.shear_modulus
                      + solid.prony_g * np.exp(-after / solid.prony_tau))
     known = 2.0 * np.sqrt(radius) * push.displacement / 2000 * (modulus * np.sqrt(depth)).sum()
@@ -51,21 +52,24 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 def check(data: dict[str, Any], quick: bool) -> None:
     """Check the loops against the energy balance and the effects of adhesion."""
     for name, loop in data["loops"].items():
-        # What the load did is stored or lost; the load's work is a sum over the steps, of second
-        # order in them.
+        # The work of the load is stored or lost. It is a sum over the steps, with an error of
+        # second order.
         left = loop["energy_elastic"][-1] + loop["energy_adhesive"][-1]
         lost = loop["dissipated_viscous"][-1]
         error = abs(loop["work_load"][-1] - left - lost) / lost
-        assert error < (0.05 if quick else 0.02), f"{name}: the books are {error:.1%} open"
+        assert error < (0.05 if quick else 0.02), \
+            f"{name}: {error:.1%} of the work is neither stored nor lost"
         assert loop["contact_area"][-1] == 0, f"{name}: the sphere has not come off"
-    assert data["loops"]["bare"]["force"].min() > -1e-9, "without adhesion nothing pulls"
-    # Cells: 28 in the radius of the contact, 10 in the quick form, and steps of a twentieth of the
-    # relaxation, of a sixth there.
+    assert data["loops"]["bare"]["force"].min() > -1e-9, "a sphere without adhesion pulls"
+    # The radius of the contact has 28 cells (10 in the quick form), and a step is a twentieth (a
+    # sixth) of the relaxation time.
     ratio = data["pushed"] / data["pushed_known"]
     assert abs(ratio - 1.0) < (0.02 if quick else 0.005), f"push: {ratio} of Lee and Radok"
-    # Adhesion is conservative, yet more is lost: the edge is peeled faster than the solid relaxes.
+    # Adhesion is conservative, but more energy is lost with it, because the edge is peeled faster
+    # than the solid relaxes.
     assert data["lost_adhesive"] > 1.3 * data["lost_bare"] > 0
-    # The pull is larger than of the relaxed solid, and less than by the ratio of the moduli, 10.
+    # The pull-off force is larger than that of the relaxed solid, by less than the ratio of the
+    # moduli, 10.
     assert 2 < data["largest_pull"] / data["elastic_pull"] < 10
 
 

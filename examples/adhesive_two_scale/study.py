@@ -1,7 +1,7 @@
 """Two-scale road with adhesion: maximum and steady friction (thesis, figures 4.15 and 4.16).
 
-The default case of the thesis with adhesion and without, and, on waves twice as high, friction
-over the speed of the drive beside the criterion of adhesion.
+The study computes the default case of the thesis with and without adhesion. On waves twice as high
+it computes the friction over the speed of the drive, beside the criterion of adhesion.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 MINUTES = 15.0
 #: Energy of adhesion, J/m2, and its range, m: those of the thesis.
 ENERGY, RANGE = 20e-3, 63.5e-9
-#: Cells along x of the full form: 8 in the ripples of the short wave.
+#: Cells along x of the full form; the short wave has 8 cells.
 CELLS = 256
 HIGH = 2.0 * road.STEEPNESS
 
@@ -37,7 +37,9 @@ def _case(cells: int, short: float, steepness: float, speed: float, length: floa
                      grip=1.0 + 0.7 * ENERGY / length / road.PRESSURE if adhesive else 1.0,
                      **({"shear_steps": 10, "distance": 0.4 * road.LONG} if cells < CELLS else {}))
     if made.grid.ny == 148:
-        made.grid.ny = 150          # 148 = 4 x 37 rows would take much longer to transform
+        # With the factors 148 = 4 x 37, the transforms of this number of rows would take much
+        # longer.
+        made.grid.ny = 150
     made.solver.tolerance = 1e-4 if cells < CELLS else 1e-5
     if adhesive:
         made.adhesion.update(potential="exponential", energy=ENERGY, range=length)
@@ -45,13 +47,13 @@ def _case(cells: int, short: float, steepness: float, speed: float, length: floa
 
 
 def _found(data: dict[str, np.ndarray], period: float) -> dict[str, float]:
-    """Return maximum and mean of the friction, and what belongs to them.
+    """Return maximum and mean of the friction, and the state at these points.
 
     The mean is that over the last `period`, m, of the drive.
     """
     driven = data["road_x"] > 0.0
     friction = data["friction"]
-    late = data["road_x"] > data["road_x"][-1] - period     # steps of one length
+    late = data["road_x"] > data["road_x"][-1] - period     # all steps have the same length
     return {"maximum": float(friction[driven].max()), "steady": float(friction[late].mean()),
             "swing": float(np.ptp(friction[late])),
             "area": float(data["contact_area"][late].mean()),
@@ -63,8 +65,8 @@ def _found(data: dict[str, np.ndarray], period: float) -> dict[str, float]:
 
 
 def compute(folder: Path, quick: bool) -> dict[str, Any]:
-    """Run the default case, and the speeds on high waves, with adhesion and without."""
-    # The range asks for cells below 0.7 E* range^2/energy; the quick form takes a longer one.
+    """Run the default case, and the speeds on high waves, with and without adhesion."""
+    # Cells must be smaller than 0.7 E* range^2/energy. The quick form takes a longer range.
     cells, short, length = (road.QUICK, road.WIDER, 3.0 * RANGE) if quick else (
         CELLS, road.SHORT, RANGE)
     speeds = [1.0, 30.0] if quick else [0.01, 0.1, 1.0, 3.0, 10.0, 30.0, 100.0]
@@ -80,7 +82,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
     for name, adhesive in (("adhesive", True), ("bare", False)):
         cases = [_case(cells, short, road.STEEPNESS, road.SPEED, length, adhesive),
                  *(_case(cells, short, HIGH, speed, length, adhesive) for speed in speeds)]
-        # Below 0.1 m/s the rubber relaxes so far that the cells are too wide: see the README.
+        # Below 0.1 m/s the rubber relaxes so much that the cells are too wide; see the README.
         default, *high = road.histories(folder / name, cases, common.WIDE_CELLS)
         data[name] = {"curve": default, **_found(default, period)}
         found = [_found(case, period) for case in high]
@@ -89,10 +91,10 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Check what the thesis says of adhesion at the default and over the speed."""
+    """Check the statements of the thesis on adhesion in the default case and over the speed."""
     sticky, bare = data["adhesive"], data["bare"]
     high, high_bare = data["adhesive_high"], data["bare_high"]
-    # eq. 4.9 with the moduli of our compound: the numbers of the thesis, 0.9, 0.5 and 0.22
+    # Eq. 4.9 with the moduli of our compound gives the numbers of the thesis, 0.9, 0.5 and 0.22.
     if not quick:
         for name, value in (("c_loading", 0.9), ("c_sliding", 0.5), ("c_loading_high", 0.22)):
             assert abs(data[name] / value - 1.0) < 0.05, f"{name} is {data[name]}"
@@ -100,17 +102,18 @@ def check(data: dict[str, Any], quick: bool) -> None:
     assert sticky["loaded"] > bare["loaded"] + 0.05
     assert sticky["maximum"] > bare["maximum"] + 0.3 * data["bound"]
     assert sticky["steady"] > bare["steady"] + 0.1 * data["bound"]
-    # ... because the contact pulls: friction is that of the pressure and of energy/range on the
-    # area in contact, times what slopes and loss do without adhesion: within 0.05, and 0.1 on high
-    # waves, whose slopes weigh four times as much and are others where more is in contact.
+    # ... because the contact pulls. Friction is that of the pressure plus energy/range on the area
+    # in contact, multiplied by the effect of slopes and loss without adhesion. This holds within
+    # 0.05, and within 0.1 on high waves: their slopes count four times as much, and a larger
+    # contact area has other slopes.
     for case, other, slopes in ((sticky, bare, 0.05), (high, high_bare, 0.1)):
         for what, area in (("steady", "area"), ("maximum", "at_maximum")):
             grip = (1.0 + data["bound"] * np.asarray(case[area])) * np.asarray(other[what])
             np.testing.assert_allclose(case[what], grip, rtol=slopes, err_msg=what)
     # "The contact area shrinks during sliding."
     assert sticky["area"] < 0.8 * sticky["loaded"]
-    # On high waves the criterion falls with speed, and so does what adhesion adds to the steady
-    # friction; to the maximum it adds about the same at all speeds.
+    # On high waves the criterion falls with the speed, and so does the gain of the steady friction.
+    # The gain of the maximum is about the same at all speeds.
     gain = high["steady"] - high_bare["steady"]
     most = high["maximum"] - high_bare["maximum"]
     assert (np.diff(gain) < 0.01).all() and gain[-1] < (0.75 if quick else 0.5) * gain[0], \
@@ -121,7 +124,7 @@ def check(data: dict[str, Any], quick: bool) -> None:
 
 
 def picture(data: dict[str, Any]) -> Figure:
-    """Draw friction and areas in time, and friction and criterion over the speed."""
+    """Draw friction and areas over time, and friction and criterion over the speed."""
     figure = Figure(figsize=(12.5, 7.6), layout="constrained")
     (friction, over), (area, gain) = figure.subplots(2, 2)
     for name, label, colour in (("bare", "without adhesion", road.BLUE),

@@ -1,9 +1,9 @@
 """From a measured road and a rubber to friction: an asphalt, three temperatures, three loads.
 
-A road that looks like the scan of an asphalt is generated: broken stones side by side, rolled flat,
-with a fine texture on them. Patches are cut from it as from any measured map, and `friction_curve`
-finds friction and contact area of the model compound, beside Persson's theory for the same patches.
-Then shorter and shorter waves of the same patches are kept.
+The study generates a road that resembles the scan of an asphalt: broken stones side by side, rolled
+flat, with a fine texture. Patches are cut from it as from a measured map, and `friction_curve`
+computes friction and contact area of the model compound, beside Persson's theory for the same
+patches. Finally, shorter and shorter waves of the same patches are kept.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ MINUTES = 4
 STONE = 1.5e-3                            # mean distance of the stones, m
 STEEPNESS = 0.45                          # height of a stone over half its width
 TEXTURE = (0.8, 4e-4, 0.25)               # Hurst exponent, longest wave (m), rms slope
-WLF = (4.57, 113.6)                       # of the compound, at 25 C
+WLF = (4.57, 113.6)                       # temperature of the compound, C
 PRESSURES = (0.1e6, 0.2e6, 0.4e6)         # Pa
 TEMPERATURES = (0.0, 25.0, 60.0)          # C
 SPEEDS = np.geomspace(1e-4, 10.0, 11)     # m/s
@@ -39,13 +39,13 @@ def asphalt(cells: int, side: float, seed: int = 1) -> np.ndarray:
     """Return the heights (m) of a periodic square road: the upper envelope of broken stones.
 
     The stones are paraboloids of random place, width, direction and height. The roller has pressed
-    the highest ones in: heights above the bearing plane keep a tenth. The texture of the broken
-    faces is a self-affine map; polished tops keep half of it.
+    in the highest ones: only a tenth of the height above the bearing plane remains. The texture of
+    the broken faces is a self-affine map; polished tops keep half of it.
     """
     random = np.random.default_rng(seed)
     count = int(np.ceil(side / STONE)) ** 2
     step = side / cells
-    # Beyond two mean distances a stone is nowhere the highest.
+    # Farther away than twice the mean distance, a stone is nowhere the highest.
     near = np.arange(-round(2 * STONE / step), round(2 * STONE / step) + 1)
     height = np.full((cells, cells), -np.inf)
     for x, y, turn, width, shape, top in zip(
@@ -78,9 +78,10 @@ def _curve(road: Path, folder: Path, **settings: Any) -> Any:
 
 
 def _tops(height: np.ndarray, side: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the spectrum of the bearing plane's upper side alone: Persson's top spectrum.
+    """Return the spectrum of the upper part of the road alone: Persson's top spectrum.
 
-    What lies below the plane is put on it, and the density is that of the part above.
+    Heights below the bearing plane are replaced by the plane, and the density is divided by the
+    share of the area above it.
     """
     plane = np.quantile(height, 0.7)
     share = float((height > plane).mean())
@@ -89,7 +90,7 @@ def _tops(height: np.ndarray, side: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def compute(folder: Path, quick: bool) -> dict[str, Any]:
-    """Generate the road, and find the curves."""
+    """Generate the road, and compute the curves."""
     cells, side = (256, 10.24e-3) if quick else (2048, 20.48e-3)
     height = asphalt(cells, side)
     coarse = height.reshape(cells // 2, 2, cells // 2, 2).mean(axis=(1, 3))
@@ -137,7 +138,7 @@ def _sections(found: dict[str, Any]) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Check the curves against what is claimed."""
+    """Check the curves against the claims of the README."""
     friction, theory_ = data["friction_mean"], data["friction_persson"]
     area = data["contact_area_mean"]
     assert np.isfinite(friction).all(), "some point did not converge"
@@ -147,7 +148,8 @@ def check(data: dict[str, Any], quick: bool) -> None:
     np.testing.assert_allclose(rubbing, COEFFICIENT, rtol=0.05)
     if quick:
         return
-    # Temperature acts as a change of speed: what 0 and 60 C give at v, 25 C gives at a_T v.
+    # A change of temperature is equivalent to a change of speed: the friction at 0 or 60 C and the
+    # speed v is that at 25 C and a_T v.
     for j in (0, 2):
         shifted = np.interp(np.log(data["a_t"][j] * data["speed"]), np.log(data["speed"]),
                             friction[1, 1], left=np.nan, right=np.nan)
@@ -157,14 +159,15 @@ def check(data: dict[str, Any], quick: bool) -> None:
     assert ratio.min() > 0.2 and ratio.max() < 1.0, f"runs over theory: {ratio}"
     assert (ratio[:, :, -1] < 0.75).all(), "at high speed the theory is not far above"
     fine, expected = np.array(data["fine"]), np.array(data["fine_persson"])
-    # The first octave below the stones may take a little away: it parts the contact.
-    assert (np.diff(fine[1:], axis=0) > 0).all(), "a shorter wave takes friction away"
+    # The first octave below the size of the stones may reduce the friction a little, because it
+    # divides the contact.
+    assert (np.diff(fine[1:], axis=0) > 0).all(), "a shorter wave reduces friction"
     assert (np.diff(expected, axis=0) > 0).all()
-    assert (np.diff(data["fine_area"], axis=0)[2:] < 0).all(), "a shorter wave adds contact"
+    assert (np.diff(data["fine_area"], axis=0)[2:] < 0).all(), "a shorter wave adds area"
 
 
 def picture(data: dict[str, Any]) -> Figure:
-    """Draw the road, the curves beside the theory, and what shorter waves add."""
+    """Draw the road, the curves beside the theory, and the effect of shorter waves."""
     figure, axes = subplots(2, 2, width=5.6, height=4.0)
     road, loads, warmth, waves = axes.flat
     image = road.imshow(1e3 * data["height"], extent=(0, data["side"], 0, data["side"]),

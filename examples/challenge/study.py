@@ -1,7 +1,8 @@
-"""A contact like that of the Contact Mechanics Challenge: rough, adhesive, short-ranged.
+"""A contact like that of the Contact Mechanics Challenge: rough, with adhesion of short range.
 
-The solid, adhesion, slope, Hurst exponent and shortest wave of the challenge (thesis, section 4.2)
-on a map 65 times smaller, whose cells resolve the range; and the quantities that were asked for.
+Solid, adhesion, slope, Hurst exponent and shortest wave are those of the challenge (thesis, section
+4.2). The map is 65 times smaller, so that the cells resolve the range. The study computes the
+quantities of the challenge.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ def patches(contact: np.ndarray) -> np.ndarray:
 
 
 def histogram(values: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Return the density of values of the whole map over some of its range."""
+    """Return the density of values of the whole map over a part of its range."""
     return np.histogram(values, edges)[0] / (values.size * np.diff(edges))
 
 
@@ -63,7 +64,7 @@ def full_energy(long: float, rolloff: float) -> float:
 def compute(folder: Path, quick: bool) -> dict[str, Any]:
     """Press the map with and without adhesion, and with other ranges at the reference load."""
     asperity.set_threads(common.jobs)
-    # the quick form has a fourth of the cells, and a range that they resolve
+    # The quick form has a quarter of the cells per side, and a longer range, which they resolve.
     cells, cell, reach = (128, 6e-9, 4 * RANGE) if quick else (1024, 1.5e-9, RANGE)
     loads = (0.1e6, REFERENCE) if quick else (0.05e6, 0.1e6, REFERENCE, 0.5e6, 1e6, 2e6)
     factors = (1, 2) if quick else (1, 2, 4, 8)
@@ -109,7 +110,8 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
         row = int(np.count_nonzero(contact.gap <= 0, axis=1).argmax())
         data["line"] = {"x": np.arange(cells) * cell, "road": height[row],
                         "rubber": contact.displacement_z[row] - contact.displacement + height.max()}
-        # longer ranges of the same energy: from the contact without adhesion, as the first one
+        # Longer ranges of the same energy start from the contact without adhesion, as the first one
+        # does.
         ranges: dict[str, list[float]] = {"range": [], "area": [], "gap": []}
         for factor in factors:
             one = asperity.solve_adhesive(height, side, None, MODULUS, range=factor * reach,
@@ -135,33 +137,34 @@ def check(data: dict[str, Any], quick: bool) -> None:
         assert (np.diff(found["gap"]) < 0).all(), f"{kind}: the gap does not close"
     assert (adhesive["area"] > 1.5 * bare["area"]).all(), "adhesion does not enlarge the contact"
     assert (adhesive["gap"] < bare["gap"]).all(), "adhesion does not close the gap"
-    # Without adhesion, at low load, between the slopes of Persson, 1.60, and of Bush, Gibson and
-    # Thomas, 2.51;
-    # counted cells are too many by half the perimeter, and one small map scatters.
+    # Without adhesion and at low load, the slope lies between that of Persson, 1.60, and that of
+    # Bush, Gibson and Thomas, 2.51. The bounds are wider because counted cells overestimate the
+    # area by half the perimeter, and because a small map is a small sample.
     low, (least, most) = data["slope_of_area"][0], data["slope_of_theories"]
     assert least < low < 1.15 * most, f"slope of the area {low}"
-    # The attraction has a largest value w/z0; in a patch the pressure of the wall adds to it.
+    # The largest attraction is w/z0. Within a patch the pressure of the wall adds to it.
     sharp = data["adhesive_reference"]
     strongest = ENERGY / data["range"]
-    assert sharp["lowest"] >= -strongest * (1 + 1e-4), "more than the largest attraction"
-    assert sharp["lowest"] < -0.9 * strongest, "the attraction is not used"
+    assert sharp["lowest"] >= -strongest * (1 + 1e-4), "the attraction exceeds its maximum"
+    assert sharp["lowest"] < -0.9 * strongest, "the attraction does not reach its maximum"
     assert data["bare_reference"]["lowest"] == 0
-    # A histogram holds the map, the highest pressures (per mille) left out
+    # The histogram contains the map except the highest pressures (one per mille).
     width = np.diff(data["pressure_edges"])
     for kind in ("adhesive", "bare"):
         assert abs((data[f"{kind}_reference"]["pressures"] * width).sum() - 1) < 2e-3, kind
         sizes = data[f"{kind}_reference"]["patches"]
         area = data[kind]["area"][load == REFERENCE][0] * data["cells"] ** 2
         assert sizes.sum() == round(area), f"{kind}: patches {sizes.sum()}, contact {area}"
-    # Adhesion joins what it makes grow: more area in the largest patch.
+    # Patches that grow by adhesion join: the largest patch has a larger share of the area.
     assert sharp["patches"][0] > data["bare_reference"]["patches"][0]
-    # A longer range of the same energy attracts less: the contact shrinks towards the bare one.
+    # A longer range of the same energy attracts less: the contact area falls towards that without
+    # adhesion.
     area = data["ranges"]["area"]
     assert (np.diff(area) < 0).all(), f"areas of the ranges: {area}"
 
 
 def picture(data: dict[str, Any]) -> Figure:
-    """Draw the map, a section, curves of load, distributions."""
+    """Draw the map, a section, the curves over the load, and the distributions."""
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 

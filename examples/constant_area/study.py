@@ -81,7 +81,7 @@ def check(data: dict[str, Any], quick: bool) -> None:
     assert data["area_error_rest"] < (0.1 if quick else 0.03)
     assert data["approach_change"] < (0.03 if quick else 0.01)
     assert abs(data["load_after_rest"] / data["exact_after_rest"] - 1) < 0.01
-    # The controller is late by one row, and the rows of the quick form are twice as long.
+    # The controller is one row late, and the rows of the quick form are twice as long.
     assert data["load_error_late"] < (0.05 if quick else 0.015)
     assert data["area_after_rest"] > 2 * data["wanted"]
     slide = data["slide"]
@@ -91,7 +91,7 @@ def check(data: dict[str, Any], quick: bool) -> None:
 
 
 def picture(data: dict[str, Any]) -> Any:
-    """Draw load, area, approach and friction of both over time."""
+    """Draw load, area, approach and friction of both cases over time."""
     figure, axes = common.subplots(2, 2, width=4.4, height=2.7, sharex=True)
     area, load = data["constant_area"], data["constant_load"]
     for panel, column, factor, label in (

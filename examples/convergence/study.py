@@ -1,7 +1,7 @@
 """Errors in time and on the mesh: a sphere that sinks into a viscoelastic solid.
 
-The study of the thesis's figures 2.4 and 2.5 beside the theory of Lee and Radok, with the orders of
-the three time schemes and the bound of Gauss's circle problem.
+The study repeats the thesis's figures 2.4 and 2.5, beside the theory of Lee and Radok, with the
+orders of the three time schemes and the bound of Gauss's circle problem.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ MINUTES = 4
 
 RADIUS, FORCE = 1e-3, 2e-5
 SOLID = Prony.from_zener(0.0, [1e6], [1e5], [1e5])     # creep time 1 s
-LARGEST = 34.5516e-6            # contact radius in the end, m
+LARGEST = 34.5516e-6            # contact radius at the end, m
 SIDE = 2.3 * LARGEST
-END = 3.0                       # errors are means over the first 3 s, as in the thesis
+END = 3.0                       # Errors are means over the first 3 s, as in the thesis.
 SCHEMES = ("backward_euler", "exponential", "exponential2")
 ORDERS = {"backward_euler": 1, "exponential": 2, "exponential2": 3}
 
@@ -41,7 +41,8 @@ def _run(folder: Path, cells: int, steps: int, scheme: str) -> dict[str, np.ndar
 &phase force = {FORCE!r}, duration = {END!r}, steps = {steps} /
 &solver tolerance = 1e-9, time_scheme = '{scheme}' /
 """)
-    with common.expected(common.LONG_STEPS):  # their errors are what is looked at
+    # The errors of long steps are the subject of this study.
+    with common.expected(common.LONG_STEPS):
         history = asperity.run(case, output=folder / f"{name}.h5", threads=common.jobs).history
     return {"time": np.array(history["time"]),
             "radius": SIDE * np.sqrt(np.array(history["contact_area"]) / math.pi),
@@ -56,14 +57,14 @@ def gauss(radius: float) -> int:
 
 
 def _gauss_error(times: np.ndarray, cell: float) -> float:
-    """Return the mean error of a radius from counted cells, were the contact a perfect disc."""
+    """Return the mean error of a radius from counted cells if the contact were a perfect disc."""
     radii = theory.lee_radok(RADIUS, FORCE, SOLID, times).contact_radius
     counted = np.array([math.sqrt(gauss(a / cell) / math.pi) * cell for a in radii])
     return float(np.abs(counted / radii - 1).mean())
 
 
 def order(x: Any, error: Any) -> float:
-    """Return the exponent of an error."""
+    """Return the order: the exponent of an error."""
     return float(np.polyfit(np.log(x), np.log(error), 1)[0])
 
 
@@ -77,7 +78,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
     coarse_steps = (8, 16, 32) if quick else (8, 16, 32, 64, 128, 256)
     data: dict[str, Any] = {"cell": SIDE / cells / LARGEST, "series": [], "schemes": {}}
 
-    # figure 2.4, and the time convergence of 2.5: the thesis's own scheme
+    # Figure 2.4, and the convergence in time of figure 2.5, with the scheme of the thesis.
     for count in steps:
         found = _run(folder, cells, count, "backward_euler")
         known = theory.lee_radok(RADIUS, FORCE, SOLID, found["time"])
@@ -87,7 +88,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
                                "approach_error": deep,
                                "mean": float(np.abs(error[1:]).mean())})
 
-    # the mesh convergence of 2.5: exponential2, whose error in time is small
+    # The convergence on the mesh of figure 2.5, with exponential2, whose error in time is small.
     data["mesh"] = []
     for n in meshes:
         found = _run(folder, n, mesh_steps, "exponential2")
@@ -102,7 +103,8 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
     data["gauss"] = np.array([_gauss_error(times, c * LARGEST) for c in cell])
     data["gauss_at"] = [_gauss_error(times, m["cell"] * LARGEST) for m in data["mesh"]]
 
-    # orders in time, on one mesh against a fine step, so that the error of the mesh cancels
+    # Orders in time, from one mesh and a reference with fine steps, so that the error of the mesh
+    # cancels.
     fine = _run(folder, coarse, 16 * coarse_steps[-1] // (4 if quick else 1), "exponential2")
     for scheme in SCHEMES:
         errors = []
@@ -123,41 +125,44 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Assert the orders, the bell of figure 2.4, and that no error is below Gauss's bound."""
-    # Steps of tau'/2.7 to tau'/11 are long beside the relaxation time tau'/11, so that the orders
-    # of the quick form are not yet the asymptotic ones.
+    """Check the orders, the shape of figure 2.4, and that no error is below Gauss's bound."""
+    # Steps of tau'/2.7 to tau'/11 are long compared with the relaxation time tau'/11, so that the
+    # orders of the quick form are not yet the asymptotic ones.
     for scheme, wanted in ORDERS.items():
         last = data["schemes"][scheme]["order"]
         assert abs(last - wanted) < (0.75 if quick else 0.25), f"{scheme}: order {last:.2f}"
     at = [data["schemes"][scheme]["error"][-1] for scheme in SCHEMES]
     assert at[0] > 2 * at[1] > 4 * at[2], f"errors of the schemes: {at}"
 
-    # Backward Euler, at these long steps: the order of the approach tends to 1 from below.
+    # With these long steps the order of the approach by backward Euler tends to 1 from below.
     slope = data["orders"]["approach, time"]
     assert 0.7 < slope < 1.15, f"backward Euler, order of the approach: {slope:.2f}"
-    # The bell: no error at once, most in between, less at 3 s. Backward Euler's creep is
-    # 1 - (1 + dt)^-n for 1 - exp(-t), in units of tau': relative to the compliance 1.1 - exp(-t) it
-    # is off by dt/2 t exp(-t)/(1.1 - exp(-t)), most at t = 0.37.
+    # The error is zero at the start, largest in between, and smaller at 3 s. The creep by backward
+    # Euler is 1 - (1 + dt)^-n instead of 1 - exp(-t), in units of tau'. Relative to the compliance
+    # 1.1 - exp(-t), the error is dt/2 t exp(-t)/(1.1 - exp(-t)), which is largest at t = 0.37.
     for series in data["series"]:
         size = np.abs(series["approach_error"])
         assert size[-1] < 0.5 * size.max() and size[0] < 0.1 * size.max(), "no bell"
         if series["dt"] < 0.2:
             worst = series["time"][size.argmax()]
-            # the top is flat: 1 % lower 0.1 away, as much as the mesh of the short form
+            # The maximum is flat: the error is 1 % smaller 0.1 away from it, which is as much as
+            # the mesh of the quick form causes.
             assert 0.2 < worst < 0.6, f"largest error at {worst} tau'"
     mesh = data["mesh"]
     cells = [m["cell"] for m in mesh]
     radius, approach = [m["radius"] for m in mesh], [m["approach"] for m in mesh]
-    # The edge cell is counted when it is partly in contact: first order, and noisy as the circle's.
+    # A cell at the edge counts as soon as a part of it touches: the error is of first order, and
+    # irregular as in the circle problem.
     slope = data["orders"]["radius, mesh"]
     assert 0.7 < slope < 1.6, f"order of the radius on the mesh: {slope:.2f}"
-    # The approach needs no count: far better. Its error changes sign as the edge passes the cells,
-    # and on the coarse form that in time is as large.
+    # The approach does not depend on a count, so that its error is much smaller. It changes its
+    # sign as the edge passes over the cells; on the coarse mesh of the quick form the error in time
+    # is as large.
     assert all(a < 0.25 * r for a, r in zip(approach, radius, strict=True)), "approach"
     if not quick:
         slope = order(cells, approach)
         assert slope > 1.2, f"order of the approach on the mesh: {slope:.2f}"
-    # The bound is of a disc centred on a cell; the computed contact has other errors beside it.
+    # The bound is that of a disc centred on a cell. The computed contact also has other errors.
     for found, bound in zip(radius, data["gauss_at"], strict=True):
         assert found > 0.5 * bound, f"error {found:.1e} far below the bound {bound:.1e}"
     slope = order(data["gauss_cell"], data["gauss"])

@@ -1,6 +1,6 @@
-"""A sphere sinks into a viscoelastic solid: radius and pressure in time.
+"""A sphere sinks into a viscoelastic solid: radius and pressure over time.
 
-The case of the thesis's section 2.2.1 beside the theory of Lee and Radok.
+The study computes the case of the thesis's section 2.2.1, beside the theory of Lee and Radok.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
         text = text.replace("= 256", "= 48").replace("steps = 24", "steps = 9")
     case = folder / "creep.nml"
     case.write_text(text)
-    with common.expected(common.LONG_STEPS):  # of the short form
+    with common.expected(common.LONG_STEPS):  # cells of the quick form
         run = asperity.run(case, output=folder / "creep.h5", threads=common.jobs)
     history, grid = run.history, run.grid
     times = np.array(history["time"])
@@ -57,10 +57,10 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
             "time": t, "x": x, "contact_radius": radius,
             "pressure": snapshot.pressure[middle], "displacement": snapshot.displacement_z[middle],
             "known_pressure": known.pressure(np.abs(x), t),
-            # P = G(t) * S and S is the pressure of an elastic contact of this radius: the
-            # surface has the shape of Hertz at all times.
+            # P = G(t) * S, where S is the pressure of an elastic contact of this radius, because
+            # the surface has the shape of a Hertzian contact at all times.
             "known_displacement": disc.displacement(np.abs(x)),
-            # Hertz's pressure of the same radius and load
+            # Hertz's pressure for the same radius and load
             "hertz": 1.5 * FORCE / (np.pi * radius**2) * np.sqrt(
                 np.clip(1 - (x / radius) ** 2, 0, None)),
         })
@@ -70,11 +70,11 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 def check(data: dict[str, Any], quick: bool) -> None:
     """Check radius, approach, pressure and displacement against the theory."""
     cell, end = data["cell"], data["known_radius"][-1]
-    # The area is a count of cells: half a cell at the edge of the contact.
+    # The area is a count of cells, with an error of half a cell at the edge of the contact.
     error = np.abs(data["radius"] - data["known_radius"]).max()
     assert error < 0.5 * cell, f"contact radius off by {error / cell:.2f} cells"
-    # The approach converges as the square of the cell, that of the smallest contact worst
-    # (n = 48: some 19 cells over it), and as the cube of the step.
+    # The error of the approach falls with the square of the cell and the cube of the step. It is
+    # largest for the smallest contact, which has about 19 cells across if n = 48.
     error = np.abs(data["approach"] / data["known_approach"] - 1)
     assert error.max() < (3e-3 if quick else 2e-4), f"approach off by {error.max():.1e}"
     assert (np.diff(data["radius"][1:]) >= 0).all(), "the contact shrinks"
@@ -85,18 +85,20 @@ def check(data: dict[str, Any], quick: bool) -> None:
         scale = profile["known_pressure"].max()
         inner = np.abs(profile["x"]) < a - 2 * cell
         error = np.abs(profile["pressure"] - profile["known_pressure"])[inner].max() / scale
-        # the slope of the pressure is infinite at the edge: O(cell) there
+        # The slope of the pressure is infinite at the edge, so that the error is of the order of
+        # the cell there.
         assert error < (0.03 if quick else 0.015), f"pressure at {profile['time']} s: {error:.3f}"
         error = np.abs(profile["displacement"] - profile["known_displacement"]).max()
         assert error < (6e-3 if quick else 6e-4) * a * a / RADIUS, \
             f"displacement at {profile['time']} s: {error:.2e} m"
-    # Hertzian at once and in the end, spikes at the edge between, as the thesis says.
+    # The pressure is Hertzian immediately after loading and at the end. In between it has spikes at
+    # the edge, as the thesis says.
     unlike = [np.abs(p["known_pressure"] - p["hertz"]).max() / p["hertz"].max()
               for p in data["profiles"]]
     ours = [np.abs(p["pressure"] - p["hertz"])[np.abs(p["x"]) < p["contact_radius"] - 2 * cell
                                               ].max() / p["hertz"].max() for p in data["profiles"]]
-    assert ours[0] < 0.03, f"not Hertz's pressure at once: {ours[0]:.3f}"
-    assert ours[-1] < 0.03, f"not Hertz's pressure in the end: {ours[-1]:.3f}"
+    assert ours[0] < 0.03, f"not Hertz's pressure after loading: {ours[0]:.3f}"
+    assert ours[-1] < 0.03, f"not Hertz's pressure at the end: {ours[-1]:.3f}"
     assert max(unlike) > 0.3, "no transient"
     spikes = [p["pressure"].max() / p["pressure"][p["x"].size // 2] for p in data["profiles"]]
     assert max(spikes) > 1.2 > 1.01 > max(spikes[0], spikes[-1]), f"spikes at the edge: {spikes}"

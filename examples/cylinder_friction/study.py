@@ -1,6 +1,7 @@
-"""A cylinder slides with friction over a viscoelastic half-space: what the slope adds.
+"""A cylinder slides with friction over a viscoelastic half-space: the effect of the slope.
 
-The case of the thesis's section 3.5.1, without friction, with it, and with it on the true slope.
+The study computes the case of the thesis's section 3.5.1 without friction, with friction, and with
+friction on the true slope.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ THESIS = {"no friction": 4.5, "without slope": 154.0, "with slope": 165.0}
 
 
 def _slide(folder: Path, name: str, quick: bool) -> dict[str, Any]:
-    """Return force in time and tractions of one case."""
+    """Return the force over time and the tractions of one case."""
     case = asperity.Case.read(HERE / "input.nml")
     if quick:
         case.grid.nx = 512
@@ -48,12 +49,15 @@ def _slide(folder: Path, name: str, quick: bool) -> dict[str, Any]:
     }
     for snapshot in run.snapshots:
         if snapshot.time > 1.1 * AT:
-            continue                                            # the last one, of the steady state
+            # the last snapshot, in steady sliding
+            continue
         moved = float(np.interp(snapshot.time, time, history["road_x"]))
         place = grid.x - moved
         if name != "no friction":
-            place = place + snapshot.displacement_x[0]          # where the surface has been dragged
-        x = place % grid.lx - grid.lx / 2                        # from the middle of the cylinder
+            # at the place to which the surface has been dragged
+            place = place + snapshot.displacement_x[0]
+        # relative to the middle of the cylinder
+        x = place % grid.lx - grid.lx / 2
         order = np.argsort(x)
         profile = {"time": snapshot.time, "x": x[order], "pressure": snapshot.pressure[0][order]}
         if name != "no friction":
@@ -64,14 +68,14 @@ def _slide(folder: Path, name: str, quick: bool) -> dict[str, Any]:
 
 
 def compute(folder: Path, quick: bool) -> dict[str, Any]:
-    """Run the three cases; the theory is Hunter's."""
+    """Run the three cases. The theory is that of Hunter."""
     steady = theory.hunter(RADIUS, LOAD, SPEED, SOLID)
     known = {"no friction": steady.friction_force,
              "without slope": steady.total_friction_force(COEFFICIENT, slope_effect=False),
              "with slope": steady.total_friction_force(COEFFICIENT)}
     last = np.linspace(-0.7e-3, 0.9e-3, 400)
     cases = {name: _slide(folder, name, quick) for name in CASES}
-    # pressure is a force over the undeformed area; over the area as it has been dragged it is more
+    # The pressure is a force per undeformed area; per area of the dragged surface it is larger.
     late = cases["with slope"]["profiles"][-1]
     stretch = np.gradient(late["x"]) / (np.ptp(late["x"]) / (late["x"].size - 1))
     return {
@@ -92,15 +96,17 @@ def check(data: dict[str, Any], quick: bool) -> None:
     """Check the forces against Hunter and the thesis, and the tractions against the law."""
     for name, known in data["known"].items():
         end = data["end"][name]
-        # 0.2 % of the whole force. The viscous part takes 1 %: 24 mm and its images take 0.6 %, the
-        # mesh, 24 cells over the contact in the quick form, the rest.
+        # Tolerances: 0.2 % of the whole force, and 1 % of the viscous part, of which the period of
+        # 24 mm causes 0.6 % and the mesh the rest (24 cells across the contact in the quick form).
         close = 0.01 if name == "no friction" else 0.002
         assert abs(end / known - 1) < close, f"{name}: {end:.3f}, {known:.3f} N/m"
-        # the thesis has three digits at most, 1 % of its own mesh and time steps
+        # The numbers of the thesis have at most three digits, and an error of about 1 % from its
+        # own mesh and time steps.
         assert abs(data["at"][name] / THESIS[name] - 1) < 0.012, f"{name}: {data['at'][name]:.2f}"
         assert abs(data["viscous_end"][name] / data["known"]["no friction"] - 1) < 0.01, \
             f"{name}: viscous part {data['viscous_end'][name]:.3f} N/m"
-    # without slope the parts add up: each is its own run
+    # Without the effect of the slope, the viscous and the frictional part add up, and each is a run
+    # of its own.
     total = data["end"]["no friction"] + COEFFICIENT * LOAD
     assert abs(data["end"]["without slope"] - total) < 0.1, "the parts do not add up"
     for name in CASES[1:]:
@@ -111,22 +117,24 @@ def check(data: dict[str, Any], quick: bool) -> None:
             if name == "without slope":
                 bound = COEFFICIENT * p
             else:
-                # eq. 3.2 on the slope of the arc: more where the road, which moves to +x, falls
+                # Eq. 3.2 on the slope of the arc. The road moves to +x, so that the factor is
+                # larger where it falls.
                 tangent = x / np.sqrt(RADIUS**2 - np.clip(x, -RADIUS / 2, RADIUS / 2) ** 2)
                 bound = p * (COEFFICIENT + tangent) / (1 - COEFFICIENT * tangent)
-            # slopes between cells are interpolated: the arc's third derivative times dx²
+            # Slopes between cells are interpolated; the error is the arc's third derivative times
+            # dx².
             scale = COEFFICIENT * p.max()
             close = 1e-9 if name == "without slope" else 1e-4
             error = np.abs(t - bound)[slip].max() / scale
             assert error < close, f"{name}, {profile['time']}: {error:.1e} off the law"
             assert (t[profile["stick"]] <= bound[profile["stick"]] + close * scale).all()
-    # the start: a part of the contact still sticks, later all slips
-    assert data["stick_start"] > 0.0 or quick, "all slips at 0.14 ms"
-    assert data["cases"]["with slope"]["stick"][-1] == 0.0, "a part sticks to the end"
+    # At the start a part of the contact sticks; later all of it slips.
+    assert data["stick_start"] > 0.0 or quick, "the whole contact slips at 0.14 ms"
+    assert data["cases"]["with slope"]["stick"][-1] == 0.0, "a part sticks until the end"
 
 
 def picture(data: dict[str, Any]) -> Figure:
-    """Draw force in time without friction and with it, and the tractions."""
+    """Draw the force over time with and without friction, and the tractions."""
     figure, axes = common.subplots(2, 2, width=5.6)
     first, second, third, fourth = axes.flat
     for panel, names in ((first, CASES[:1]), (second, CASES[1:])):

@@ -16,7 +16,7 @@ PERIODS = 2
 
 
 def compute(folder: Path, quick: bool) -> dict[str, Any]:
-    """Run both speeds; the rubber's moduli go along."""
+    """Run both speeds, and compute the moduli of the rubber."""
     cells, short = (road.QUICK if quick else road.FULL), road.WIDER
     data: dict[str, Any] = {"short": short}
     cases = [road.case(cells, road.waves(short), speed=speed, distance=periods * road.LONG,
@@ -33,23 +33,24 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 def check(data: dict[str, Any], quick: bool) -> None:
     """Check that speed raises friction, and that both waves of the road show in it."""
     slow, fast = data["found"]["slow"], data["found"]["fast"]
-    # Both rise; the loss factor at the two frequencies of the road rises, too.
+    # Both friction maxima rise, and so does the loss factor at the two frequencies of the road.
     assert fast["maximum"] > slow["maximum"] + 0.015
     assert fast["plateau"] > slow["plateau"] + 0.01
     assert fast["viscous"] > 1.3 * slow["viscous"]
     assert fast["area"] < 0.6 * slow["area"]
     for found in (slow, fast):
         road.check_slope(found)
-    # The stiffer block slips after a shorter travel of the drive: that of plain shear up to the
-    # friction, 0.1 mm against 0.28 mm, but for the edges of the contacts, which slip before, and
-    # for a few cells, less than a hundredth of the grid, which hold longer.
+    # The stiffer block slips after a shorter travel of the drive. It is the travel that shears a
+    # sticking block up to the friction, 0.1 mm instead of 0.28 mm. The travel differs a little
+    # because the edges of the contacts slip earlier, and a few cells (less than a hundredth of the
+    # grid) later.
     travel = [data[name]["road_x"][(data[name]["stick_area"] < 1e-2)
                                    & (data[name]["road_x"] > 0.0)][0] for name in ("slow", "fast")]
     for way, speed, found in zip(travel, (SLOW, FAST), (slow, fast), strict=True):
         known = road.drive_to_slip(found["plateau"] * road.PRESSURE, speed)
         assert abs(way / known - 1.0) < 0.1, f"{speed} m/s: slips after {way}, plain shear {known}"
-    # The road repeats after the long wave: the components with a whole number of periods in it
-    # hold most of the oscillation, and the short wave stands out of its neighbours.
+    # The road repeats after the long wave. The components with a whole number of periods in it
+    # therefore contain most of the oscillation, and the short wave is larger than its neighbours.
     amplitude = data["amplitude"]
     order = np.arange(1, amplitude.size + 1)
     whole = order % PERIODS == 0
@@ -61,7 +62,7 @@ def check(data: dict[str, Any], quick: bool) -> None:
 
 
 def picture(data: dict[str, Any]) -> Figure:
-    """Draw friction over the way slid, its spectrum, and the rubber's moduli."""
+    """Draw friction over the sliding distance, its spectrum, and the moduli of the rubber."""
     figure = Figure(figsize=(12.0, 7.6), layout="constrained")
     (drive, way), (spectrum, moduli) = figure.subplots(2, 2)
     for name, speed, colour in (("slow", SLOW, road.BLUE), ("fast", FAST, road.RED)):

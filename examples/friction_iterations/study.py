@@ -1,6 +1,6 @@
-"""Iterations of the tangential solver against the number of unknowns, both methods.
+"""Iterations of the tangential solver against the number of unknowns, for both methods.
 
-The case of the thesis's figure 3.5: a sphere moved sideways from rest in one step.
+The case is that of the thesis's figure 3.5: a sphere that is moved sideways from rest in one step.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ if TYPE_CHECKING:
 MINUTES = 2
 
 MODULUS, POISSON, RADIUS, FORCE = 200e6, 0.42, 50e-3, 9.196
-#: Iterations depend on the slip ratio only. A small coefficient keeps the sphere in place, so that
-#: the pressure stays as it is and the count is that of the tangential problem alone.
+#: Iterations depend on the slip ratio only. With a small coefficient the sphere hardly moves, so
+#: that the pressure stays the same and the count is that of the tangential problem alone.
 COEFFICIENT = 1e-4
 SIDE, SPEED, TOLERANCE, LIMIT = 2.4e-3, 1e-3, 1e-5, 8000
-RATIOS = (0.1, 0.5, 0.9, 1.2)      # motion over that of full slip
+RATIOS = (0.1, 0.5, 0.9, 1.2)      # motion divided by that of full slip
 CELLS = {"fast": (32, 48, 64, 96, 128, 192, 256), "thesis": (32, 48, 64, 96, 128, 192, 256)}
-#: Where the summit lies in its cell: the pressure of the outermost cells depends on it.
+#: Position of the summit within its cell; the pressure of the outermost cells depends on it.
 PLACES = ((0.5, 0.5), (0.1, 0.3), (0.4, 0.2))
 
 
 def _one(folder: Path, method: str, cells: int, ratio: float, place: tuple[float, float]
          ) -> dict[str, Any]:
-    """Return what one solve took."""
+    """Return the work of one solve."""
     cell = SIDE / cells
     slide = theory.mindlin(RADIUS, MODULUS, POISSON, COEFFICIENT, FORCE, shift=0.0).slide_shift
     case = asperity.Case(
@@ -81,7 +81,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
         data[f"{method}_range"] = np.stack([data[f"{method}_iterations"].min(axis=(1, 2)),
                                             data[f"{method}_iterations"].max(axis=(1, 2))])
         data[f"{method}_unknowns_mean"] = data[f"{method}_unknowns"][0].mean(axis=1)
-        #: growth of the median of the iterations, exponent of the unknowns
+        #: Growth of the median of the iterations: the exponent of the number of unknowns.
         data[f"{method}_exponent"] = np.array([
             np.polyfit(np.log(unknowns.mean(axis=1)), np.log(median), 1)[0] for unknowns, median
             in zip(data[f"{method}_unknowns"], data[f"{method}_median"], strict=True)])
@@ -89,35 +89,38 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Check the counts of 'fast', their growth, and the areas that stick."""
+    """Check the counts of 'fast', their growth, and the stick areas."""
     assert data["fast_converged"].all(), "fast: not converged"
     for method in ("fast", "thesis"):
         good = data[f"{method}_converged"]
         assert data[f"{method}_residual"][good].max() <= TOLERANCE, f"{method}: residual"
-        # The pressure has hardly moved: the count is that of the tangential problem.
-        assert data[f"{method}_normal"].max() <= 6, f"{method}: the normal solve took part"
+        # The pressure has hardly changed, so that the count is that of the tangential problem.
+        assert data[f"{method}_normal"].max() <= 6, f"{method}: the normal solver iterated, too"
         for ratio, stick in zip(data["ratios"], data[f"{method}_stick"], strict=True):
             known = max(0.0, 1 - ratio)                 # (c/a)^2, Mindlin
-            # counted cells; at 24 cells a side the contact is 16 wide
+            # The area is a count of cells; with 24 cells per side the contact is 16 cells wide.
             assert np.abs(stick - known).max() < (0.06 if quick else 0.03), \
                 f"{method}: {ratio}: {np.abs(stick - known).max():.3f} of the area off"
-    # An iteration takes a product of the operator and a half and one of the preconditioner, four
-    # transforms each. Aimed at: 30 products at half of full slip.
+    # An iteration takes one and a half products of the operator and one of the preconditioner, with
+    # four transforms each. The aim was 30 products at half of full slip.
     half = data["fast_iterations"][list(data["ratios"]).index(0.5)]
     assert half.max() <= 20, f"fast: {half.max()} iterations at half of full slip"
     assert data["fast_iterations"].max() <= 22, f"fast: {data['fast_iterations'].max()} iterations"
     assert data["fast_ffts"].max() <= 240, f"fast: {data['fast_ffts'].max()} transforms"
     assert data["fast_exponent"].max() < 0.2, f"fast grows: {data['fast_exponent']}"
-    # 'thesis' has no preconditioner. The operator's symbol is 1/|q|, its condition number grows as
-    # the cells on a line, N^0.5, and iterations of conjugate gradients as its root at least,
-    # N^0.25; the thesis finds N^0.4. 'fast' removes that growth.
+    # 'thesis' has no preconditioner. The symbol of the operator is 1/|q|, so that its condition
+    # number grows with the number of cells along a line, N^0.5, and the iterations of conjugate
+    # gradients at least with its root, N^0.25. The thesis finds N^0.4. 'fast' does not have this
+    # growth.
     for number, ratio in enumerate(data["ratios"]):
         slow, fast = data["thesis_exponent"][number], data["fast_exponent"][number]
         assert slow > 0.25 and slow > fast + 0.2, f"{ratio}: exponents {slow:.2f} and {fast:.2f}"
         if not quick:
             assert slow < 0.65, f"{ratio}: 'thesis' grows with the power {slow:.2f}"
-        # So it falls behind as the mesh grows, in transforms, too, of which 'fast' takes 10 an
-        # iteration and 'thesis' six: with 48 cells 6 and 3 times, with 256 16 and 9 times here.
+        # Therefore 'thesis' takes more and more iterations than 'fast' as the mesh grows. It also
+        # takes more transforms, although an iteration of 'fast' takes ten and one of 'thesis' six.
+        # Here it takes 6 times the iterations and 3 times the transforms with 48 cells, and 16 and
+        # 9 times with 256 cells.
         for name, least in (("iterations", 4 if quick else 12), ("ffts", 2.5 if quick else 7)):
             behind = np.median(data[f"thesis_{name}"][number][-1]) / np.median(
                 data[f"fast_{name}"][number][-1])

@@ -1,7 +1,7 @@
-"""How long a sphere rested decides whether friction has a maximum at its start.
+"""Friction at the start of sliding after different times of rest.
 
-The study of the thesis's figures 2.8 and 2.9: the sphere of the sliding study rests under its load
-for a time T0, then slides at constant speed.
+The study repeats the thesis's figures 2.8 and 2.9: the sphere of the sliding study rests under its
+load for a time T0, then slides at constant speed. A long rest causes a maximum at the start.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ SHOWN = 0.8
 
 
 def base(cells: int, travel: float, across: float = 8.0) -> asperity.Case:
-    """Return a case with `cells` in a*, a way of `travel` a*, and a map `across` a* wide."""
+    """Return a case: `cells` in a*; `travel` and width of the map, `across`, in a*."""
     cell = WIDTH / cells
     nx, ny = (2 * round(length * cells / 2) for length in (travel + across, across))
     return asperity.Case(
@@ -42,15 +42,15 @@ def base(cells: int, travel: float, across: float = 8.0) -> asperity.Case:
 
 
 def rest(time: float) -> tuple[float | None, int | None, bool]:
-    """Return duration, steps and `relaxed` of the first phase; the time is in tau'."""
+    """Return duration, steps and `relaxed` of the first phase. The time is in tau'."""
     if time == 0 or math.isinf(time):
         return None, None, math.isinf(time)
-    # the relaxation time is tau'/10
+    # The relaxation time is tau'/10.
     return time * CREEP, max(6, math.ceil(12 * time)), False
 
 
 def compute(folder: Path, quick: bool) -> dict[str, Any]:
-    """Rest for all times, slide at all speeds."""
+    """Run all times of rest at all speeds."""
     cells, travel = (3, 7) if quick else (10, 12)
     speeds = (0.8, 3.2) if quick else (0.4, 0.8, 1.6, 3.2, 6.4)
     times = (0.0, 0.5, math.inf) if quick else (
@@ -80,7 +80,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def threshold(data: dict[str, Any]) -> np.ndarray:
-    """Return the loading time from which the maximum is 1 % above the steady value; inf if none."""
+    """Return the loading time from which on the maximum is 1 % above the steady value, or inf."""
     found = []
     for ratio in data["ratio"][:, :-1]:
         above = np.flatnonzero(ratio > 1.01)
@@ -91,18 +91,19 @@ def threshold(data: dict[str, Any]) -> np.ndarray:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Assert what the thesis says of the maximum."""
+    """Check the statements of the thesis on the maximum."""
     ratio = data["ratio"]
-    # 7 a* of the quick form leave at the higher speed a few per cent
+    # The travel of 7 a* in the quick form leaves a deviation of a few per cent at the higher speed.
     assert data["drift"] < (0.05 if quick else 0.01), f"not steady: {data['drift']:.3f}"
-    # the deeper dent leaves a wake, which the highest speed has the least time to forget
-    assert (data["spread"] < (0.05 if quick else 0.02)).all(), "the steady value remembers the rest"
-    # The steady values lie below the limit of slow sliding, the less the slower: by a fourth at
-    # V* = 0.8 (see the bell of the sliding sphere).
+    # The deeper dent leaves a wake behind. At the highest speed there is the least time for it to
+    # disappear.
+    assert (data["spread"] < (0.05 if quick else 0.02)).all(), "steady values depend on the rest"
+    # The steady values are below the limit of slow sliding, less so at low speed: by a quarter at
+    # V* = 0.8 (see the maximum in the study of the sliding sphere).
     part = data["mean"] / (RATIO / (1 + RATIO) * data["speed"] * WIDTH / RADIUS)
     assert (part < 1).all() and (np.diff(part) < 0).all(), f"of the slow limit: {part}"
     assert 0.65 < part[data["speed"] == SHOWN][0] < 0.85, f"of the slow limit: {part}"
-    # without rest no maximum, with a long one there is
+    # There is no maximum without rest, and there is one after a long rest.
     assert (ratio[:, 0] < (1.03 if quick else 1.01)).all(), f"a maximum without rest: {ratio[:, 0]}"
     moving = data["speed"] >= 0.8
     assert (ratio[moving, -1] > 1.01).all(), f"no maximum after a long rest: {ratio[:, -1]}"
@@ -110,14 +111,14 @@ def check(data: dict[str, Any], quick: bool) -> None:
     assert grows.all(), "the maximum does not grow with the rest"
     assert (np.diff(ratio[:, -1]) > 0).all(), "the maximum does not grow with the speed"
     if not quick:
-        # at higher speed it appears after a shorter rest
+        # At a higher speed a shorter rest is enough.
         assert (np.diff(data["threshold"]) < 0).all(), f"thresholds {data['threshold']}"
-        # four creep times are as good as for ever: exp(-4) of the creep is left
+        # Four creep times are as good as an infinite time: exp(-4) of the creep is left.
         assert np.allclose(ratio[:, -2], ratio[:, -1], rtol=0.02)
 
 
 def picture(data: dict[str, Any]) -> Figure:
-    """Draw friction against the way, and the maxima."""
+    """Draw the friction over the travel, and the maxima."""
     figure, (left, middle, right) = common.subplots(3)
     times = data["loading_time"]
     chosen = [i for i, t in enumerate(times) if t in (0.0, 0.1, 0.4, 1.0, 2.0) or math.isinf(t)]

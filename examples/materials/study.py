@@ -1,6 +1,7 @@
 """Model compounds.
 
-The Prony series of sbr.txt and tread.txt beside the master curves that make_sbr.py fits them to.
+The study compares the Prony series of sbr.txt and tread.txt with the master curves to which
+make_sbr.py fits them.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ HERE = Path(__file__).parent
 MAKER = runpy.run_path(str(HERE / "make_sbr.py"))
 LAWS = {"sbr": MAKER["SBR"], "tread": MAKER["TREAD"]}
 TEMPERATURES = (60.0, 25.0, 0.0, -20.0)
-#: What the thesis's numbers imply (section 4.5.1): frequency, Hz, and storage modulus, Pa.
+#: Values that follow from numbers in the thesis (section 4.5.1): frequency, Hz, and storage
+#: modulus, Pa.
 IMPLIED = {1e3: 6.0e6, 32e3: 10.9e6}
 
 
@@ -48,10 +50,11 @@ def check(data: dict[str, Any], quick: bool) -> None:
     """Check the series against the master curves, and the files against the script."""
     omega = data["omega"]
     middle = (omega >= 1.0) & (omega <= 1e10)
-    # One arm a decade ripples around a smooth curve, the more the steeper the transition is.
+    # With one arm per decade the moduli oscillate around a smooth curve, more so in a steep
+    # transition.
     for name, ripples in (("sbr", (0.09, 0.12)), ("tread", (0.11, 0.15))):
         one = data[name]
-        # The numbers of the files have three digits, and the last one of the fit may differ.
+        # The numbers of the files have three digits, and the last digit of the fit may differ.
         np.testing.assert_allclose(one["made_g"], one["g"], rtol=0.02)
         np.testing.assert_allclose(one["made_tau"], one["tau"], rtol=1e-12)
         for part, ripple in zip(("storage", "loss"), ripples, strict=True):
@@ -61,7 +64,7 @@ def check(data: dict[str, Any], quick: bool) -> None:
         assert 0.8e6 < one["rubbery"] < 1.7e6 and 300e6 < one["glassy"] < 500e6
         assert 1e5 < one["its_frequency_hz"] < 5e5, "the loss factor must be largest near 3e5 Hz"
     np.testing.assert_allclose(data["tread"]["implied"], list(IMPLIED.values()), rtol=0.015)
-    # Colder rubber is slower: the peak moves to lower frequencies.
+    # Colder rubber relaxes more slowly: the peak moves to lower frequencies.
     peaks = [omega[np.argmax(data["tan_delta"][f"{t:g}"])] for t in TEMPERATURES]
     assert (np.diff(peaks) < 0).all()
 

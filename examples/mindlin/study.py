@@ -1,6 +1,7 @@
-"""A sphere moved sideways: Cattaneo and Mindlin, there, back and there again.
+"""A sphere that is moved sideways, back and forth again: the theory of Cattaneo and Mindlin.
 
-Force, traction and stick radius for three Poisson ratios beside the theory, which is exact for 0.
+The study compares force, traction and stick radius at three Poisson ratios with the theory, which
+is exact for the ratio 0.
 """
 
 from __future__ import annotations
@@ -21,9 +22,11 @@ MINUTES = 0.3
 
 HERE = Path(__file__).resolve().parent
 MODULUS, RADIUS, CONTACT = 200e6, 50e-3, 1e-3   # G, Pa; sphere, m; contact radius, m
-RATIOS = (0.0, 0.42, 0.5)                       # Poisson's
-PATH = (0.9, 1.8, 1.8)                          # length of each phase, ways to full sliding
-#: Rows of which the traction is shown: 0.3, 0.6, 0.9 of the way, back to 0.45, -0.45, -0.9, again.
+RATIOS = (0.0, 0.42, 0.5)                       # Poisson ratios
+# length of each phase, over the motion of full sliding
+PATH = (0.9, 1.8, 1.8)
+#: Rows of which the traction is shown: at 0.3, 0.6 and 0.9 of the first phase, 0.45, -0.45 and -0.9
+#: of the way back, and in the last phase.
 SHOWN = (3, 6, 9, 12, 18, 21, 33)
 
 
@@ -42,7 +45,7 @@ def _case(poisson: float, quick: bool) -> asperity.Case:
 
 
 def _follow(folder: Path, poisson: float, quick: bool) -> dict[str, Any]:
-    """Return force, tractions and stick radii of one Poisson ratio, ours and the theory's."""
+    """Return force, tractions and stick radii of one Poisson ratio, computed and by the theory."""
     case = _case(poisson, quick)
     run = common.run(case, folder / f"poisson_{poisson:g}.h5")
     history, grid = run.history, run.grid
@@ -73,7 +76,7 @@ def _follow(folder: Path, poisson: float, quick: bool) -> dict[str, Any]:
 
 
 def compute(folder: Path, quick: bool) -> dict[str, Any]:
-    """Run the path for each Poisson ratio."""
+    """Run the motion for each Poisson ratio."""
     cases = [_follow(folder, poisson, quick) for poisson in RATIOS]
     return {
         "cases": cases, "ratios": np.array(RATIOS), "cell": 2.4 / (48 if quick else 128),
@@ -89,18 +92,19 @@ def check(data: dict[str, Any], quick: bool) -> None:
     """Check force, traction and stick radius against the theory, and the error of the theory."""
     cell = data["cell"]
     deviation = data["deviation"]
-    # nu = 0: the theory is exact; the grid's error is 5e-5 at 48 cells; the sphere's motion over
-    # the half-space, which the theory leaves out, makes as much.
+    # The theory is exact for nu = 0. The error of the grid is 5e-5 with 48 cells. The motion of the
+    # sphere over the half-space, which the theory neglects, causes about the same.
     assert deviation[0] < 2e-4, f"nu = 0: force off by {deviation[0]:.1e}"
-    # the theory's own error, whatever the mesh: 1.1e-3 at 0.42, 1.7e-3 at 0.5 (an independent code)
+    # The error of the theory itself, on any mesh: 1.1e-3 at 0.42 and 1.7e-3 at 0.5 (from an
+    # independent code).
     assert 7e-4 < deviation[1] < 1.2e-3, f"nu = 0.42: {deviation[1]:.1e}"
     assert 1.2e-3 < deviation[2] < 1.8e-3, f"nu = 0.5: {deviation[2]:.1e}"
-    # it is of second order in nu/(2 - nu), which couples both directions of the traction
+    # It is of second order in nu/(2 - nu), which couples both directions of the traction.
     order = (0.5 / 1.5 / (0.42 / 1.58)) ** 2
     assert abs(deviation[2] / deviation[1] / order - 1) < 0.15, "not of second order"
-    # a branch of the loop is the first one, doubled, from its end: so is its error
+    # A branch of the loop is the first branch, doubled, from its end. The same holds for its error.
     assert (data["deviation_loop"] < 2 * deviation + 2e-4).all(), f"loop: {data['deviation_loop']}"
-    # and traction across, of first order, is what the theory leaves out
+    # The traction across the motion, which is of first order, is neglected by the theory.
     assert data["across"][0] < 1e-6, f"nu = 0: traction across {data['across'][0]:.1e}"
     across = data["across"][2] / data["across"][1]
     assert abs(across / np.sqrt(order) - 1) < 0.15, f"traction across: ratio {across}"
@@ -108,22 +112,22 @@ def check(data: dict[str, Any], quick: bool) -> None:
         nu = case["poisson"]
         assert len(case["profiles"]) == len(SHOWN)
         for profile in case["profiles"]:
-            # slopes are infinite at the edges of contact and of stick, now and at the first turn:
-            # two cells are left out there
+            # Slopes are infinite at the edges of contact and stick, the present ones and those of
+            # the first turn. Two cells are left out there.
             edges = (1.0, profile["known_stick"], np.sqrt(1 - 0.9))
             away = np.min([np.abs(np.abs(profile["x"]) - edge) for edge in edges], axis=0)
             error = np.abs(profile["traction"] - profile["known"])[away > 2 * cell].max()
-            # 0.012 by the grid, beside the edge; 0.022 by the theory where nu = 0.5
+            # 0.012 is the error of the grid beside the edge, 0.022 that of the theory for nu = 0.5.
             assert error < 0.025, f"nu = {nu}, {profile['way']:.2f}: traction off by {error:.3f}"
             error = abs(profile["stick"] - profile["known_stick"])
-            # the area is a count of cells
+            # The area is a count of cells.
             assert error < 1.0 * cell, f"nu = {nu}: stick radius off by {error / cell:.2f} cells"
-        # the loop closes: the same force at the same place (to the error of the steps)
+        # The loop closes: the force at the same position is the same, up to the error of the steps.
         assert abs(case["force"][33] - case["force"][9]) < 2e-4, "the loop does not close"
 
 
 def picture(data: dict[str, Any]) -> Figure:
-    """Draw the loop, its deviation from the theory and the tractions."""
+    """Draw the loop, its deviation from the theory, and the tractions."""
     figure, (left, middle, right) = common.subplots(3)
     case = data["cases"][0]
     way = np.concatenate([np.linspace(0, 0.9, 60), np.linspace(0.9, -0.9, 90),

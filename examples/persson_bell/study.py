@@ -1,7 +1,7 @@
-"""Friction and contact area against speed: the bell curve of Persson's theory, and runs beside it.
+"""Friction and contact area over the speed: Persson's theory beside runs.
 
-First the theory alone for a road with waves from 1 mm to 0.1 um; then a road of three octaves of
-waves, for which the theory and runs of the program are set side by side.
+The first part is the theory alone, for a road with waves from 1 mm to 0.1 um. The second part
+compares the theory with runs of the program for a road with three octaves of waves.
 """
 
 from __future__ import annotations
@@ -24,10 +24,11 @@ MINUTES = 1
 
 PRESSURE = 0.1e6                          # Pa, 1 bar as in the thesis
 GAMMA = 0.45                              # Yang and Persson's factor as the thesis takes it
-#: The wide road: longest wave, shortest waves that are looked at, m; rms slope of the whole.
+#: The wide road: longest wave, shortest waves that are compared, m; rms slope with all waves.
 LONG, SHORT, WIDE_SLOPE = 1e-3, (1e-7, 1e-6, 1e-5, 1e-4), 0.5
 HURST = 0.8
-SIDE, WAVES, SLOPE = 1e-3, (4, 32), 0.2   # the road of the runs: eight cells in its shortest wave
+# The road of the runs has eight cells in its shortest wave.
+SIDE, WAVES, SLOPE = 1e-3, (4, 32), 0.2
 
 
 def _theory(spectrum: tuple[np.ndarray, np.ndarray], speed: np.ndarray,
@@ -45,10 +46,10 @@ def _cut(spectrum: tuple[np.ndarray, np.ndarray], short: float) -> tuple[np.ndar
 
 def _steady(folder: Path, road: Road, speeds: list[float], seeds: int = 1,
             pressure: float = PRESSURE, travel: float = 0.375) -> np.ndarray:
-    """Return mean friction and area of slides without their first third, (speeds, seeds, 2).
+    """Return mean friction and area without the first third of the slides, (speeds, seeds, 2).
 
-    The runs start unrelaxed: the slow arms are then as they are on average while sliding, and
-    steady state comes within a fraction of a wave.
+    The runs start unrelaxed. The slow arms are then in about the mean state of sliding, so that the
+    steady state is reached within a fraction of a wave.
     """
     table = sweep(
         road.case(dict(pressure=pressure), dict(velocity_x=1.0, duration=1.0)),
@@ -65,7 +66,7 @@ def _steady(folder: Path, road: Road, speeds: list[float], seeds: int = 1,
 
 
 def compute(folder: Path, quick: bool) -> dict[str, Any]:
-    """Evaluate the theory and run the slides."""
+    """Evaluate the theory, and run the slides."""
     wide = theory.self_affine_psd(HURST, LONG, LONG, SHORT[0], rms_slope=WIDE_SLOPE)
     line = np.geomspace(1e-6, 1e4, 41)
     data: dict[str, Any] = {"line": line, "wide": {
@@ -86,7 +87,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
         "theory_area": exact[1.0].contact_area,
         "curve_friction": {gamma: item.friction for gamma, item in curve.items()},
         "curve_area": curve[1.0].contact_area}
-    # full contact, where the theory is exact for the spectrum of the very map
+    # In full contact the theory is exact for the spectrum of this very map.
     smooth = Road(128, SIDE, HURST, (4, 8), SLOPE)
     high = 200e6
     spectrum = theory.surface_psd(smooth.map(1), SIDE)
@@ -109,37 +110,40 @@ def check(data: dict[str, Any], quick: bool) -> None:
     for number, (friction, area) in enumerate(zip(wide["cuts"], wide["areas"], strict=True)):
         peak = int(friction.argmax())
         assert 0 < peak < friction.size - 1, "no bell"
-        # Without the short waves the fast end lies in the glass only beyond 1e4 m/s.
-        assert friction[0] < 0.1 * friction[peak], "no bell: the slow end is high"
-        assert friction[-1] < (0.3 + 0.1 * number) * friction[peak], "the fast end is high"
+        # Without the short waves the rubber responds as a glass only above 1e4 m/s.
+        assert friction[0] < 0.1 * friction[peak], "friction at the lowest speed is not low"
+        assert friction[-1] < (0.3 + 0.1 * number) * friction[peak], \
+            "friction at the highest speed is not low"
         assert (np.diff(area) < 0).all(), "the area does not fall with speed"
         if number:
-            assert (friction < wide["cuts"][number - 1]).all(), "more scales, less friction"
-            assert (area > wide["areas"][number - 1]).all(), "more scales, more contact"
+            assert (friction < wide["cuts"][number - 1]).all(), "shorter waves reduce the friction"
+            assert (area > wide["areas"][number - 1]).all(), "shorter waves increase the area"
     assert (wide["uncorrected"] > wide["cuts"][0]).all(), "the factor S is not below 1"
     # The steady theory is exact in full contact. With eight cells in the shortest wave the friction
-    # is 2.9 % too high, because a step of one cell is then long for the arms that relax within it;
-    # with 16 cells 0.4 %, with 32 -0.2 %, which are the few directions of the waves.
+    # is 2.9 % too high, because a step of one cell is then long compared with the arms that relax
+    # within it. The deviation is 0.4 % with 16 cells and -0.2 % with 32; the latter is caused by
+    # the small number of directions of the waves.
     found, expected = data["full"]["found"], data["full"]["theory"]
     assert found[1] == 1.0, f"contact {found[1]}, not full"
     assert abs(found[0] / expected[0] - 1) < 0.01, f"full contact: {found[0]} for {expected[0]}"
-    # Partial contact: the theory is an estimate. At low load its slope is sqrt(8/pi), that of
-    # asperities that do not interact sqrt(2 pi), 57 % more: runs lie between. Eight cells in the
-    # shortest wave add 5 % (docs/choosing.md), more where a spot is but a few cells.
+    # In partial contact the theory is an estimate. At low load the slope of its area is sqrt(8/pi),
+    # and that of asperities without interaction sqrt(2 pi), which is 57 % more. The runs lie in
+    # between. Eight cells in the shortest wave add 5 % (docs/choosing.md), more if a patch of
+    # contact has only a few cells.
     ratio = data["mean_area"] / data["theory_area"]
     wide_contact = data["theory_area"] > 0.02
     assert (ratio > 1.0).all() and (ratio < 1.57 * 1.15).all(), f"area/theory {ratio}"
     assert (ratio[wide_contact] < 1.57).all(), f"area/theory {ratio}"
     friction = data["mean_friction"]
     low, high = data["theory_friction"][GAMMA], data["theory_friction"][1.0]
-    # The thesis finds friction within 30 % of gamma = 0.45, mostly above; the four roads scatter by
-    # 5 % (many spots) to 25 % (few).
+    # The friction of the thesis is within 30 % of the theory with gamma = 0.45, mostly above. The
+    # four roads scatter by 5 % (many patches) to 25 % (few patches).
     assert (friction > 0.8 * low).all(), f"friction {friction} far below gamma = 0.45, {low}"
     assert (friction < 1.0 * high).all(), f"friction {friction} above gamma = 1, {high}"
     assert (np.diff(data["mean_area"]) < 0).all(), "the area does not fall with speed"
-    assert 0 < int(friction.argmax()) < friction.size - 1, "the runs show no bell"
+    assert 0 < int(friction.argmax()) < friction.size - 1, "the friction of the runs has no maximum"
     if not quick:
-        # Half the width of the cells, the same road: what the mesh costs.
+        # The same road with cells of half the width shows the error of the mesh.
         change = data["fine"]["found"] / data["fine"]["coarse"] - 1
         assert np.abs(change).max() < 0.08, f"finer cells change friction, area by {change}"
         peak = data["speed"][friction.argmax()] / data["line"][data["curve_friction"][1.0].argmax()]
@@ -147,7 +151,7 @@ def check(data: dict[str, Any], quick: bool) -> None:
 
 
 def picture(data: dict[str, Any]) -> Figure:
-    """Draw friction and area against speed, theory and runs."""
+    """Draw friction and area over the speed, by theory and runs."""
     from matplotlib import pyplot
 
     figure, axes = pyplot.subplots(2, 2, figsize=(11, 7.4), sharex=True, layout="constrained")

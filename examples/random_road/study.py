@@ -1,4 +1,4 @@
-"""Random road: a rough road beside the wavy one of the same long wave (thesis, figure 4.14)."""
+"""Random road: a rough road beside the wavy one with the same long wave (thesis, figure 4.14)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ HURST = 0.8
 
 
 def first_octave(height: np.ndarray) -> float:
-    """Return the rms height, m, of the waves from the longest of the road to half of it."""
+    """Return the rms height, m, of the waves between the longest one of the road and half of it."""
     ny, nx = height.shape
     kx = np.fft.fftfreq(nx, 1.0 / nx)
     ky = np.fft.fftfreq(ny, 1.0 / ny) * np.sqrt(3.0)
@@ -28,11 +28,11 @@ def first_octave(height: np.ndarray) -> float:
 
 
 def rough(cells: int, short: float, seed: int) -> tuple[str, float]:
-    """Return the &surface group of a self-affine road as high as the long wave in its octave.
+    """Return the &surface group of a self-affine road, and the mean square of its slope.
 
-    And the mean square of its slope.
+    The first octave of the road is as high as the long wave of the wavy road.
     """
-    # The three waves of the product of sines have a quarter of its amplitude each.
+    # Each of the three waves of the product of sines has a quarter of its amplitude.
     wanted = road.STEEPNESS * road.LONG / 4.0 * np.sqrt(3.0 / 2.0)
     rows = 2 * round(cells / np.sqrt(12.0))
     height = asperity.surface.self_affine(
@@ -60,7 +60,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
             cells, surface, speed=speed, pressure=load, shear_steps=15 if quick else 30,
             distance=(0.8 if quick else 1.25 if speed < 5.0 else 2.0) * road.LONG)
             for speed, load in points]
-        # as in the thesis the longest wave of the road is as long as its cell
+        # As in the thesis, the longest wave of the road is as long as the cell.
         done = road.histories(folder / name, cases, common.LONG_WAVES)
         found = {point: road.measures(case) for point, case in zip(points, done, strict=True)}
         data[f"{name}_curve"] = {key: done[0][key] for key in ("road_x", "slid", "friction")}
@@ -74,7 +74,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def roughness(curve: dict[str, np.ndarray]) -> float:
-    """Return the rms of the fast part of the friction in sliding: what moves within 80 um."""
+    """Return the rms of the fast part of the friction in sliding: variations within 80 um."""
     late = curve["slid"] > 0.25 * curve["slid"][-1]
     x = np.linspace(curve["slid"][late][0], curve["slid"][-1], 512)
     y = np.interp(x, curve["slid"][late], curve["friction"][late])
@@ -85,11 +85,12 @@ def roughness(curve: dict[str, np.ndarray]) -> float:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Check that the rough road's friction is lower and smoother, with the same trends."""
+    """Check that the friction of the rough road is lower and smoother, with the same trends."""
     assert data["random_plateau"] < data["wavy_plateau"]
     assert data["random_maximum"] < data["wavy_maximum"]
     assert roughness(data["random_curve"]) < 0.7 * roughness(data["wavy_curve"])
-    # What the slopes leave above the viscous part, twice, is of their mean square: see check_slope.
+    # After twice the viscous part has been subtracted, the effect of the slopes is of the order of
+    # their mean square: see check_slope.
     for case in ("", "_speed", "_load"):
         road.check_slope({name: data[f"wavy_{name}{case}"] for name in ("plateau", "viscous")})
         rest = np.asarray(data[f"random_plateau{case}"]) - 1 - 2 * np.asarray(
@@ -107,7 +108,7 @@ def check(data: dict[str, Any], quick: bool) -> None:
 
 
 def picture(data: dict[str, Any]) -> Figure:
-    """Draw friction of both roads over the way, against speed and against load."""
+    """Draw the friction of both roads over the travel, the speed and the load."""
     figure = Figure(figsize=(13.0, 4.4), layout="constrained")
     curves, speed, load = figure.subplots(1, 3)
     for name, colour in (("wavy", road.BLUE), ("random", road.RED)):

@@ -1,4 +1,4 @@
-"""Road load: friction against the load on one and two scales (thesis, figures 4.11 and 4.12)."""
+"""Road load: friction over the load on one and two scales (thesis, figures 4.11 and 4.12)."""
 
 from __future__ import annotations
 
@@ -22,17 +22,19 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
     cells, short = (road.QUICK if quick else road.FULL), road.WIDER
     data: dict[str, Any] = {"load": np.array(loads)}
     for name, wave in (("two", short), ("one", None)):
-        # Under low loads contacts are small: twice the cells. Under the highest, contact is nearly
-        # full, and sticks and slips from step to step without shorter steps and more inertia.
+        # Contacts are small at low load, so that the grid has twice the cells. At the highest load
+        # the contact is nearly full. It would stick and slip from step to step without shorter
+        # steps and a larger mass.
         cases = [road.case(
             cells if quick or load > 50e3 else 2 * cells, road.waves(wave), pressure=load,
             distance=(0.6 if quick else 1.25) * road.LONG, shear_steps=10 if quick else 40,
             **({"fine": 0.5, "density": 100.0} if load > 1e6 else {})) for load in loads]
         for case in cases:
-            # 148 = 4 x 37 rows would take much longer to transform.
+            # With the factors 148 = 4 x 37, the transforms of this number of rows would take much
+            # longer.
             if case.grid.ny == 148:
                 case.grid.ny = 150
-        # Under the lowest loads a few summits touch, in contacts of few cells.
+        # At the lowest loads few summits touch, in contacts of few cells.
         done = road.histories(folder / name, cases, common.SMALL_CONTACTS)
         data[f"{name}_curve"] = {key: done[0][key] for key in ("slid", "friction")}
         found = [road.measures(case) for case in done]
@@ -41,48 +43,49 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Check the thesis's statements on load."""
+    """Check the statements of the thesis on the load."""
     two, one = data["two"], data["one"]
     for found, scales in ((two, 2), (one, 1)):
         # "Steady-state friction first increases along with the normal load", "goes through a
         # maximum before decreasing", and the mean gap tends to zero.
         top = int(found["plateau"].argmax())
         assert 0 < top < len(found["plateau"]) - 1, "no maximum against the load"
-        assert (np.diff(found["gap"]) < 1e-12).all()     # m: round-off where contact is full
+        assert (np.diff(found["gap"]) < 1e-12).all()     # m: round-off in full contact
         assert found["gap"][-1] < 0.03 * found["gap"][0]
         assert (np.diff(found["area_loaded"]) >= 0.0).all()
         # "Both the increase of viscoelastic loss and the increase in slope effect play an equally
         # important part."
         road.check_slope(found, scales)
-        # Where contact is full, the viscous part is known; the interface has slid once over the
-        # road, and its speed still rises: 5 %.
+        # In full contact the viscous part is known. The tolerance of 5 % is for a speed that still
+        # rises, because the interface has slid over the road only once.
         for number in np.flatnonzero(found["area"] > 0.999):
             known = road.viscous_in_full_contact(
                 found["speed"][number], data["load"][number],
                 (road.LONG, road.WIDER)[:scales])
             assert abs(found["viscous"][number] / known - 1.0) < 0.05, \
                 f"full contact: {found['viscous'][number]}, known {known}"
-    # The first summits are Hertz contacts, whose viscous coefficient grows with the load to the
-    # power 1/3; contact areas are too large for it, so that the power is lower.
+    # The first summits are Hertzian contacts, whose viscous coefficient grows with the load to the
+    # power 1/3. The computed contact areas are too large for this, so that the power is lower.
     low, high = one["viscous"][:2]
     power = np.log(high / low) / np.log(data["load"][1] / data["load"][0])
     assert 0.1 < power < 1 / 3
-    # The peak over the plateau falls with the load on two scales, as far as the swings of the
-    # friction, some 1e-3, tell ...
+    # On two scales the peak over the plateau falls with the load, up to oscillations of the
+    # friction of about 1e-3 ...
     rise = two["maximum"] - two["plateau"]
     assert (np.diff(rise) < 1e-3).all() and rise[-1] < 0.4 * rise[0]
-    # ... and not on one as long as the road is not full; at the lowest load it is much lower there.
+    # ... and not on one scale unless the contact is full. At the lowest load it is much lower
+    # there.
     single = one["maximum"] - one["plateau"]
     low = data["load"] < 0.15e6
     assert single[0] < 0.6 * rise[0] and np.ptp(single[low]) < 0.3 * single[low].max()
-    # That peak is narrow: the interface slides less than a fifth of the short wave to it
-    # (that is two cells of the quick form), and less far than to the peak of one scale.
+    # The peak is narrow: the interface slides less than a fifth of the short wave up to it (two
+    # cells in the quick form), and less than up to the peak on one scale.
     assert two["slid_to_maximum"][0] < 0.2 * road.WIDER
     assert two["slid_to_maximum"][0] < 0.7 * one["slid_to_maximum"][0]
 
 
 def picture(data: dict[str, Any]) -> Figure:
-    """Draw friction and gap against the load, and the start under the lowest load."""
+    """Draw friction and gap over the load, and the start at the lowest load."""
     figure = Figure(figsize=(12.5, 7.2), layout="constrained")
     (friction, rise), (gap, start) = figure.subplots(2, 2)
     load = data["load"] / 1e6

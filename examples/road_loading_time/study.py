@@ -1,4 +1,4 @@
-"""Loading time on the road: the longer the rest, the higher the peak (thesis, figure 4.13)."""
+"""Loading time on the road: a longer rest causes a higher peak (thesis, figure 4.13)."""
 
 from __future__ import annotations
 
@@ -30,27 +30,28 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Check the thesis's statements on loading time."""
-    # The maximum grows with the time; the plateau hardly depends on it (true steady sliding
-    # would not; the interface slides one period of the long wave).
+    """Check the statements of the thesis on the loading time."""
+    # The maximum grows with the time. The plateau hardly depends on it; in a truly steady state it
+    # would not, but the interface slides only one period of the long wave.
     rise = data["maximum"] - data["plateau"]
     assert (np.diff(data["maximum"]) > -2e-4).all()
     assert rise[-1] > 3.0 * rise[0]
     assert np.ptp(data["plateau"]) < 0.25 * rise[-1]
-    # The longer the rest, the more the friction swings as the road meets its footprint again.
+    # After a longer rest the friction oscillates more, because the road meets its own footprint
+    # again.
     assert (np.diff(data["swing"]) > -1e-4).all() and data["swing"][-1] > 2.5 * data["swing"][0]
-    # Contact grows with the time of rest, and the gap closes.
+    # The contact area grows with the time of rest, and the gap falls.
     assert (np.diff(data["area_loaded"]) > 0.0).all()
     assert (np.diff(data["gap_loaded"]) < 0.0).all()
     road.check_slope(data)
-    # After the shortest time the contact still grows and the gap still closes in sliding; after
-    # the longest it is the other way round.
+    # After the shortest time the contact area still grows and the gap still falls in sliding. After
+    # the longest time it is the opposite.
     assert data["area"][0] > data["area_loaded"][0] and data["gap"][0] < data["gap_loaded"][0]
     assert data["area"][-1] < data["area_loaded"][-1] and data["gap"][-1] > data["gap_loaded"][-1]
 
 
 def picture(data: dict[str, Any]) -> Figure:
-    """Draw maximum, plateau and gap against the loading time, and three of the starts."""
+    """Draw maximum, plateau and gap over the loading time, and three of the starts."""
     figure = Figure(figsize=(13.0, 4.4), layout="constrained")
     friction, gap, curves = figure.subplots(1, 3)
     time = data["loading"]

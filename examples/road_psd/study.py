@@ -1,7 +1,8 @@
 """The power spectral density of a road: the law, and maps that are generated from it.
 
-Self-affine maps of both generators, with and without roll-off, from the thesis's eq. 1.6, beside
-the law: power spectral density, that of a profile, statistics and the distribution of heights.
+The study generates self-affine maps with both generators, with and without roll-off, from the
+thesis's eq. 1.6. It compares the power spectral density, that of a profile, statistics and the
+distribution of heights with the law.
 """
 
 from __future__ import annotations
@@ -42,25 +43,25 @@ def _law(k: np.ndarray, cells: int, rolloff: float) -> np.ndarray:
 
 
 def _inside(k: np.ndarray, high: float) -> np.ndarray:
-    """Return the rings that lie in the band as a whole: they are as wide as the modes' spacing."""
+    """Return the rings entirely in the band; they are as wide as the spacing of the modes."""
     spacing = 2 * math.pi / SIDE
     return (k > 2 * math.pi / LONG) & (k < high - 0.5 * spacing)
 
 
 def _profile_psd(height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the density of lines along x, the mean over all lines, m3."""
+    """Return the density of lines along x, averaged over all lines, m3."""
     cells = height.shape[1]
     lines = np.abs(np.fft.rfft(height, axis=1) / cells) ** 2 * SIDE
     return 2 * math.pi / SIDE * np.arange(1, cells // 2), lines.mean(axis=0)[1:cells // 2]
 
 
 def _profile_law(k: np.ndarray, cells: int) -> np.ndarray:
-    """Return the density of a line that the law gives: its sum over all waves across."""
+    """Return the density of a line by the law: its sum over all waves across."""
     high = 2 * math.pi / (8 * SIDE / cells)
     law = np.zeros_like(k)
     for i, along in enumerate(k):
         if along < high:
-            # the midpoint rule: 2000 points, the law has a jump and a kink
+            # The midpoint rule has 2000 points, because the law has a jump and a kink.
             top = math.sqrt(high**2 - along**2)
             across = (np.arange(2000) + 0.5) * top / 2000
             total = np.hypot(along, across)
@@ -76,7 +77,7 @@ def _slope(k: np.ndarray, psd: np.ndarray, low: float, high: float) -> float:
 
 
 def compute(folder: Path, quick: bool) -> dict[str, Any]:
-    """Make the maps and measure them; no files."""
+    """Generate the maps and measure them, without files."""
     cells = 512 if quick else 2048
     seeds = 4 if quick else 8
     low, high = 2 * math.pi / ROLLOFF, 2 * math.pi / (8 * SIDE / cells)
@@ -90,7 +91,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
         line_k, line = _profile_psd(height)
         data[generator] = {
             "k": k, "psd": psd, "modes": modes, "law": _law(k, cells, ROLLOFF),
-            # beyond the short wave, with half a ring to spare
+            # beyond the short wave, with a margin of half a ring
             "outside": float(np.sum((rings.psd * rings.modes)[rings.wavenumber > high + spacing])
                              / np.sum(rings.psd * rings.modes)),
             "variance": float(np.sum(rings.psd * rings.modes)) / SIDE**2,
@@ -105,20 +106,21 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
         data[generator]["kurtosis_of_seeds"] = [s.kurtosis for s in kurtoses]
     noise = data["filtered_noise"]
     ratio = noise["psd"] / noise["law"]
-    # over that of rings of so many modes with exponentially distributed power, that of -k the same
+    # Relative to rings of this number of modes with exponentially distributed power. The power of
+    # -k is the same.
     data["scatter"] = float(((ratio / np.median(ratio) - 1) * np.sqrt(noise["modes"] / 2)).std())
     data["map"] = height[:: cells // 512, :: cells // 512]
-    # what the moments of the law say
+    # values by the moments of the law
     fine = np.geomspace(2 * math.pi / LONG, high, 20001)
     values = _law(fine, cells, ROLLOFF) * fine / (2 * math.pi)
-    # one-dimensional moments of an isotropic surface: m0 = <h2>, m2 = <|grad h|2>/2, ...
+    # The one-dimensional moments of an isotropic surface are m0 = <h2>, m2 = <|grad h|2>/2, ...
     m0 = float(np.trapezoid(values, fine))
     m2 = float(np.trapezoid(values * fine**2, fine)) / 2
     m4 = 3 * float(np.trapezoid(values * fine**4, fine)) / 8
     data["law_statistics"] = {
         "rms_height": math.sqrt(m0), "rms_slope": math.sqrt(2 * m2),
         "rms_curvature": math.sqrt(2 * m4 / 3), "nayak": m0 * m4 / m2**2}
-    # without roll-off: the waves fill the band from the longest on
+    # Without roll-off the waves fill the band from the longest one on.
     height = _map(cells, LONG, "random_phase")
     rings = asperity.surface.psd(height, SIDE)
     band = _inside(rings.wavenumber, high)
@@ -137,49 +139,51 @@ def check(data: dict[str, Any], quick: bool) -> None:
         assert found["outside"] < 1e-12, f"{generator}: power outside the band"
         ratio = found["psd"] / found["law"]
         if generator == "random_phase":
-            # The law at the mean wave number of a ring, and the integral instead of the sum over
-            # the modes of the scale: a ring is as wide as the spacing of the modes, so the mean
-            # of k^-3.6 over it deviates as (3.6 4.6/24) (dk/k)^2, 1 % at ten spacings; there
-            # the kink of the roll-off is, too.
+            # The law is taken at the mean wave number of a ring, and the scale from the integral
+            # instead of the sum over the modes. A ring is as wide as the spacing of the modes, so
+            # that the mean of k^-3.6 over it deviates by (3.6 4.6/24) (dk/k)^2, which is 1 % at ten
+            # spacings. The kink of the roll-off is there, too.
             inner = found["k"] > 1.2 * data["low"]
             spread = ratio[inner] / np.median(ratio[inner]) - 1
             assert np.abs(spread).max() < 0.02, f"random phase: off by {np.abs(spread).max():.3f}"
             assert abs(np.median(ratio[inner]) - 1) < 0.03, "random phase: scale"
         else:
-            # A mode's power is exponentially distributed, and that of -k the same: the mean of a
-            # ring of N modes scatters by sqrt(2/N).
+            # The power of a mode is exponentially distributed, and that of -k is the same. The mean
+            # of a ring of N modes therefore scatters by sqrt(2/N).
             assert 0.85 < data["scatter"] < 1.15, f"filtered noise: scatter {data['scatter']:.2f}"
             assert abs(np.average(ratio, weights=found["modes"]) - 1) < 0.1, "filtered: scale"
         assert abs(found["exponent"] + 2 * (1 + HURST)) < 0.03, f"exponent {found['exponent']}"
-        # A line sums the modes across: 1 % for the sum instead of the integral; noise scatters by
-        # 1/sqrt(modes across) a point, some 5 % here, and not in the mean.
+        # A line is a sum over the modes across. The tolerance is 1 % for the sum instead of the
+        # integral. The points of noise scatter by 1/sqrt(modes across), about 5 % here, but their
+        # mean does not.
         inner = (found["line_k"] > 0.3 * data["low"]) & (found["line_k"] < 0.9 * data["high"])
         ratio = found["line"][inner] / found["line_law"][inner]
         assert abs(ratio.mean() - 1) < 0.05, f"{generator}: lines off by {ratio.mean() - 1:+.3f}"
-        # Slope and curvature sit in the many short waves: sharp even with noise; rms height is set.
+        # Slope and curvature come from the many short waves, so that they are accurate even for
+        # noise. The rms height is prescribed.
         law, statistics = data["law_statistics"], found["statistics"]
         for name, tolerance in (("rms_height", 1e-6), ("rms_slope", 0.06), ("rms_curvature", 0.06),
                                 ("nayak", 0.25)):
             got = statistics[name] / law[name] - 1
             assert abs(got) < tolerance, f"{generator}: {name} off by {got:+.3f}"
-        # A Gaussian of some 50 independent hills of LONG/ROLLOFF a map: skewness 0 within the
-        # scatter of the seeds, kurtosis 3.
+        # A Gaussian map has about 50 independent hills of the length LONG/ROLLOFF. Its skewness is
+        # 0 and its kurtosis 3 within the scatter of the seeds.
         for name, wanted in (("skewness", 0.0), ("kurtosis", 3.0)):
             values = np.array(found[f"{name}_of_seeds"])
             assert abs(values.mean() - wanted) < 0.15, f"{generator}: {name} {values}"
     spread = data["no_rolloff"]["psd"] / data["no_rolloff"]["law"]
     inner = data["no_rolloff"]["k"] > 1.2 * data["low"]
     assert np.ptp(spread[inner]) < 0.05, "no roll-off: not the law"
-    # Most of its height is in the longest waves, of which the map holds few: the sum over them is a
-    # fifth off the integral of the law.
+    # Most of the height is in the longest waves, and the map contains few of them. The sum over
+    # them differs by a fifth from the integral of the law.
     assert abs(np.median(spread) - 1) < 0.25, f"no roll-off: scale {np.median(spread):.2f}"
-    # The same height in longer waves: a flatter surface.
+    # The same height in longer waves makes a surface with smaller slopes.
     assert data["no_rolloff"]["statistics"]["rms_slope"] < \
         0.7 * data["random_phase"]["statistics"]["rms_slope"]
 
 
 def picture(data: dict[str, Any]) -> Figure:
-    """Draw the map, the densities and the heights."""
+    """Draw the map, the densities and the distribution of heights."""
     figure, (left, middle, right) = common.subplots(3, width_ratios=(1, 1.3, 0.9))
     left.grid(False)
     image = left.imshow(data["map"] * 1e6, origin="lower", cmap="cividis",

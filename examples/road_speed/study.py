@@ -1,4 +1,4 @@
-"""Road speed: maximum and plateau of friction against the speed (thesis, figure 4.10)."""
+"""Road speed: maximum and plateau of friction over the speed (thesis, figure 4.10)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
     cells, short = (road.QUICK if quick else road.FULL), road.WIDER
     speeds = [0.3, 3.0, 30.0] if quick else [0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0]
     rubber = road.compound(0.1)
-    # Where the block has to be sped up, the drive travels farther until the speed is steady.
+    # At high speed the block must be accelerated, so that the drive travels farther until the speed
+    # is steady.
     cases = [road.case(
         cells, road.waves(short), speed=speed, rubber=rubber, shear_steps=20 if quick else 40,
         distance=(1.0 if quick else 1.25 if speed < 5.0 else 2.0) * road.LONG)
@@ -34,17 +35,18 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Check that the maximum grows with speed, and how the plateau does."""
+    """Check that the maximum grows with the speed, and the trend of the plateau."""
     # "mu_max keeps increasing with speed just as G' does with the frequency."
     assert (np.diff(data["maximum"]) > 0.0).all(), "the maximum does not grow with speed"
     assert (data["maximum"] - data["plateau"] > 2e-3).all()
-    # The plateau rises up to 30 m/s at least; above it flattens or falls.
+    # The plateau rises at least up to 30 m/s. Above, it becomes flat or falls.
     slow = data["driven"] <= 30.0
     assert (np.diff(data["plateau"][slow]) > 0.0).all(), "the plateau does not rise"
-    # Rubber stiffens: less contact, larger gap, and both differ more from those under load.
+    # The rubber stiffens: the contact area is smaller and the gap larger, and both differ more from
+    # those before motion.
     assert (np.diff(data["area"]) < 0.0).all()
     assert (np.diff(data["gap"]) > 0.0).all()
-    # The load came before the motion: the same for all.
+    # The state before the motion is the same for all speeds.
     assert np.ptp(data["area_loaded"]) < 1e-6
     road.check_slope(data)
     if not quick:
@@ -54,7 +56,7 @@ def check(data: dict[str, Any], quick: bool) -> None:
 
 
 def picture(data: dict[str, Any]) -> Figure:
-    """Draw maximum, plateau and their causes against the speed, beside area and modulus."""
+    """Draw maximum, plateau and their causes over the speed, beside area and modulus."""
     figure = Figure(figsize=(11.0, 4.6), layout="constrained")
     left, right = figure.subplots(1, 2)
     speed = data["driven"]

@@ -1,6 +1,6 @@
 """Rough contact: the growth of the real contact area.
 
-input.nml beside Persson's theory and that of Bush, Gibson and Thomas.
+The case is input.nml, beside the theories of Persson and of Bush, Gibson and Thomas.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ HERE = Path(__file__).parent
 
 
 def compute(folder: Path, quick: bool) -> dict[str, Any]:
-    """Return loads (Pa), areas, those of the theories, and the last pressure (Pa) and gap (m)."""
+    """Return loads (Pa), areas, areas of the theories, and the last pressure (Pa) and gap (m)."""
     case = asperity.Case.read(HERE / "input.nml")
-    if quick:  # the same waves on fewer cells each, then fewer waves
+    if quick:  # first the same waves with fewer cells each, then fewer waves
         case = common.shortened(case, cells=256)
     run = common.run(case, folder / "result.h5")
     modulus, slope = 4 * case.material.shear_modulus, case.surface[0].rms_slope
@@ -35,7 +35,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Check the area between the theories, and its growth below linear."""
+    """Check that the area lies between the theories and grows more slowly than the load."""
     load, area = data["load"], data["area"]
     assert data["residual"] < 1e-6
     assert (np.diff(area) > 0).all()

@@ -1,7 +1,8 @@
-"""Friction against temperature, scale of the road and thickness of the block.
+"""Friction over temperature, scale of the road and thickness of the block.
 
-A pressed block is set in motion on a wavy road of two scales. A change of temperature is a change
-of all times, a smaller road under a thinner block is a faster one: both hold exactly.
+A pressed block is set in motion on a wavy road of two scales. A change of temperature is equivalent
+to a change of all times, and a smaller road under a thinner block to a higher speed. Both hold
+exactly.
 """
 
 from __future__ import annotations
@@ -27,14 +28,14 @@ THICKNESS, TRAVEL = 1e-3, 1e-3                               # m, of the default
 TEMPERATURES = (-10.0, 0.0, 10.0, 25.0, 40.0, 60.0, 80.0)    # C
 SCALES = (1 / 16, 1 / 4, 1.0, 4.0, 16.0)
 THICKNESSES = (0.25e-3, 0.5e-3, 1e-3, 2e-3, 4e-3)
-#: Two equal problems differ by rounding, and one of them may need a pass more to come within the
-#: tolerance of a step: they differ by as much as the tolerance then, which is therefore ten times
-#: finer than the difference that the study allows.
+#: Two equivalent problems differ by rounding, and one of them may need one more pass to reach the
+#: tolerance of a step. They then differ by as much as the tolerance, which is therefore ten times
+#: smaller than the difference that the study allows.
 TOLERANCE, ALLOWED = 1e-7, 1e-6
-#: What keeps a thick block from numerical stick-slip.
+#: Mass that prevents numerical stick-slip of a thick block.
 HEAVY: dict[str, Any] = dict(density=100.0, passes=0)
 
-#: What a case is made of.
+#: Values that define a case.
 Values = tuple[float, ...]
 NAMES = ("grid.lx", "grid.ly", "surface[1].wavelength", "surface[1].amplitude",
          "surface[2].wavelength", "surface[2].amplitude", "material.thickness",
@@ -52,7 +53,7 @@ def _values(cells: int, *, temperature: float = 25.0, speed: float = SPEED,
 
 
 def _runs(folder: Path, cells: int, cases: list[dict[str, float]]) -> list[dict[str, Any]]:
-    """Return friction over the travel of the drive (of scale 1), its top and its end."""
+    """Return the friction over the travel of the drive (at scale 1), its maximum and last value."""
     wave = dict(shape="hexagonal_wave", wavelength=1.0, amplitude=1.0)
     case = asperity.Case(
         grid=dict(nx=cells, ny=-(-cells * 37 // 64), lx=1.0, ly=1.0), surface=[wave, wave],
@@ -70,7 +71,8 @@ def _runs(folder: Path, cells: int, cases: list[dict[str, float]]) -> list[dict[
         sliding = history["phase"] == 2
         friction = history["friction"][sliding]
         top = int(friction.argmax())
-        late = max(top, friction.size - cells)   # the last period, or what follows the top
+        # the last period, or the part after the maximum if it is shorter
+        late = max(top, friction.size - cells)
         found.append({
             "friction": friction, "area": history["contact_area"][sliding],
             "travel": history["road_x"][sliding] / one.get("scale", 1.0),
@@ -80,7 +82,7 @@ def _runs(folder: Path, cells: int, cases: list[dict[str, float]]) -> list[dict[
 
 
 def compute(folder: Path, quick: bool) -> dict[str, Any]:
-    """Run the cases, each temperature and scale also as a change of times alone."""
+    """Run the cases; each temperature and scale is also run as a change of times alone."""
     cells = 32 if quick else 64
     temperatures = (0.0, 60.0) if quick else TEMPERATURES
     scales = (1 / 4,) if quick else SCALES
@@ -91,8 +93,8 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
         "shifted": [dict(speed=SPEED * a, loading=LOADING / a) for a in shift],
         "scale": [dict(scale=s) for s in scales],
         "faster": [dict(speed=SPEED / s) for s in scales],
-        # some mass: with the 20 kg/m3 of the thesis a block of 4 mm sticks and slips numerically at
-        # steps of one cell, whatever the passes
+        # A larger mass: with the 20 kg/m3 of the thesis a block of 4 mm sticks and slips
+        # numerically at steps of one cell, with any number of passes.
         "same_block": [dict(scale=0.25, thickness=4 * THICKNESS, travel=2 * TRAVEL, **HEAVY)],
         "thickness": [dict(thickness=h, travel=0.6e-3 + 0.4 * h, **HEAVY) for h in thicknesses]}
     data: dict[str, Any] = {
@@ -112,17 +114,18 @@ def _change(one: dict[str, Any], other: dict[str, Any]) -> float:
 
 def check(data: dict[str, Any], quick: bool) -> None:
     """Check each temperature and scale against the equivalent change of times."""
-    # The same numbers but for rounding, and for what it makes of the iterations: see TOLERANCE.
-    # Cells of contact are whole: none may differ.
+    # The numbers are the same up to rounding and its effect on the iterations: see TOLERANCE. The
+    # numbers of cells in contact must be equal.
     differs = max(*data["temperature_differs"], *data["scale_differs"])
     assert differs < ALLOWED, f"equal problems differ by {differs:.2e}"
-    # powers of two change exponents only: no rounding at all
+    # Powers of two change exponents only, so that there is no rounding.
     assert max(data["scale_differs"]) == 0.0, f"scales differ: {data['scale_differs']}"
-    # warmer and larger are slower: less friction, on the slow side of the bell
+    # A higher temperature and a larger scale correspond to a lower speed, which reduces the
+    # friction below its maximum.
     for kind, least in (("temperature", 0.0), ("scale", 0.25)):
         steady = np.array([item["dyn"] for item in data[kind]])[data[f"{kind}s"] >= least]
         assert (np.diff(steady) < 0).all(), f"{kind}: steady friction does not fall, {steady}"
-    # a thicker block only takes longer to shear
+    # A thicker block only takes longer to shear.
     steady = np.array([item["dyn"] for item in data["thickness"]])
     allowed = 0.005 if quick else 0.001
     assert np.ptp(steady) < allowed, f"steady friction changes with thickness: {steady}"

@@ -1,6 +1,7 @@
-"""A sphere slides on a viscoelastic solid: pressure, and the bell curve of friction.
+"""A sphere slides on a viscoelastic solid: pressure, and friction over the speed.
 
-The case of the thesis's figures 2.6 and 2.7, beside the two limits of the friction in closed form.
+The study computes the case of the thesis's figures 2.6 and 2.7, beside the two limits of the
+friction in closed form.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ MINUTES = 3
 
 GLASSY, CREEP, RATIO = 2.75e6, 0.01, 9.0       # G0, Pa; eta/G1, s; G0/G1
 RADIUS, FORCE = 10e-3, 0.15                    # m, N
-#: Contact with the glassy modulus: the unit of lengths, as in the thesis.
+#: Contact radius with the glassy modulus: the unit of length, as in the thesis.
 UNIT = theory.hertz(RADIUS, 4 * GLASSY, force=FORCE)
 WIDTH = UNIT.contact_radius
 MEAN = FORCE / (np.pi * WIDTH**2)
@@ -30,14 +31,14 @@ PROFILES = (0.4, 0.8, 1.2)
 
 
 def base(cells: float, travel: float, across: float = 8.0) -> asperity.Case:
-    """Return a case: a jump of the load, and sliding at once; a step is a cell.
+    """Return a case: a jump of the load, and sliding immediately afterwards with steps of one cell.
 
     Parameters
     ----------
     cells : float
         Cells in a*.
     travel : float
-        Way to slide, a*.
+        Sliding distance, a*.
     across : float
         Width of the map, a*; the relaxed contact is 4.3 wide.
     """
@@ -87,12 +88,12 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
     bell = slide(folder / "bell", speeds, cells, 8 if quick else 14)
     for run in bell.runs:
         friction = np.array(run.history["friction"])
-        last = 2 * cells                                     # the last 2 a* of the way
+        last = 2 * cells                                     # the last 2 a* of the travel
         data["friction"].append(float(friction[-last:].mean()))
         data["drift"].append(float(np.ptp(friction[-last:]) / friction[-last:].mean()))
         area = np.array(run.history["contact_area"]) * run.grid.lx * run.grid.ly
         data["area"].append(float(area[-1]) / (np.pi * WIDTH**2))
-        # what the drive does is lost in the solid
+        # The work of the drive is lost in the solid.
         road, lost = np.array(run.history["road_x"]), np.array(run.history["dissipated_viscous"])
         data["lost"].append(float(lost[-1] - lost[-1 - last])
                             / (FORCE * float(road[-1] - road[-1 - last])))
@@ -115,35 +116,38 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Assert the limits, the bell, the energy and the shape of the profiles."""
+    """Check the limits, the maximum, the energy and the shape of the profiles."""
     speed, friction = data["speed"], data["friction"]
     top = int(friction.argmax())
     assert 0 < top < speed.size - 1, "no bell"
     rise = np.diff(friction)
     assert (rise[:top] > 0).all() and (rise[top:] < 0).all(), f"not one maximum: {friction}"
     assert 1 < speed[top] < 8, f"maximum at V* = {speed[top]}"
-    # the limits bound the curve, and are met to the next order in V*
+    # The limits bound the curve, which approaches them to the next order in V*.
     assert (friction < 1.03 * np.minimum(slow(speed), fast(speed))).all(), "above a limit"
     near = friction[0] / slow(speed[0])
     assert abs(near - 1) < (0.05 if quick else 0.03), f"slow limit: {near:.3f}"
     near = friction[-1] / fast(speed[-1])
     assert abs(near - 1) < (0.2 if quick else 0.1), f"fast limit: {near:.3f}"
-    # the contact shrinks from the relaxed one, 10^(2/3) times the glassy, to that
+    # The contact shrinks from the relaxed one, which is 10^(2/3) times the glassy one, to the
+    # glassy one.
     assert (np.diff(data["area"]) < 0).all(), f"areas {data['area']}"
     assert data["area"][0] < 1.1 * 10 ** (2 / 3) and data["area"][-1] > 0.95
     assert (data["drift"] < 0.05).all(), f"not steady: {data['drift']}"
-    # steady: the force lost in the solid is the friction; what still changes is stored
+    # In steady state the force that is lost in the solid is the friction. What still changes is
+    # stored.
     assert np.allclose(data["lost"], friction, rtol=0.1 if quick else 0.05), "energy"
     for profile in data["profiles"]:
         x, p = profile["x"], profile["pressure"]
         inside = x[p > 0]
-        # the road moves to +x: the leading edge is ahead of the summit, with the higher pressure
+        # The road moves to +x: the leading edge is ahead of the summit, and has the higher
+        # pressure.
         assert inside.max() > -inside.min(), "the contact is not shifted to the front"
         assert float((p * x).sum()) > 0, "the pressure is not higher in front"
 
 
 def picture(data: dict[str, Any]) -> Figure:
-    """Draw the profiles and the bell."""
+    """Draw the profiles, and the friction over the speed."""
     figure, (left, right) = common.subplots(2)
     for profile, colour in zip(data["profiles"], common.COLOURS, strict=False):
         left.plot(profile["x"], profile["pressure"], color=colour, label=f"V* = {profile['speed']}")

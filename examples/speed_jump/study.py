@@ -1,6 +1,6 @@
-"""Speed jump: friction of a tyre rubber whose sliding speed rises a hundredfold.
+"""Speed jump: friction of a tyre rubber whose sliding speed increases a hundredfold.
 
-input.nml beside Persson's theory.
+The case is input.nml, beside Persson's theory.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ GAMMA = 0.45  # Persson's correction for partial contact, as the thesis takes it
 
 
 def compute(folder: Path, quick: bool) -> dict[str, Any]:
-    """Return area and friction at both speeds, computed and of the theory, and the history."""
+    """Return area and friction at both speeds, computed and by the theory, and the history."""
     case = asperity.Case.read(HERE / "input.nml")
     if quick:
         case = common.shortened(case)
@@ -49,23 +49,23 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Check the jump against what Persson's theory says of it."""
+    """Check the jump against the predictions of Persson's theory."""
     history, slow, fast = data["history"], data["slow"], data["fast"]
-    # Friction shoots up within a few cells of sliding, then decays.
+    # Friction rises steeply within a few cells of sliding, then decays.
     assert data["rows_to_peak"] <= 4
     assert data["friction_peak"] > 1.15 * fast["friction"]
     assert fast["friction"] > 3 * slow["friction"] > 0
-    # Contact shrinks when sliding sets in, and again at the jump: the rubber rises.
+    # The contact area falls when sliding begins and again at the jump, because the rubber rises.
     assert data["area_at_rest"] > slow["area"] > 1.5 * fast["area"]
     gap = {phase: history["mean_gap"][history["phase"] == phase][-1] for phase in (2, 3)}
     assert gap[3] > gap[2]
-    # The pressure is held, and what is lost grows with every step of sliding.
+    # The pressure is prescribed, and the lost energy grows with every step of sliding.
     assert np.ptp(history["pressure"]) < 1e-4 * history["pressure"][0]
     assert (np.diff(history["dissipated_viscous"][1:]) > 0).all()
     if quick:
         return
-    # Persson's area lies 10 to 15 % low, as in the thesis; his friction with and without the
-    # correction brackets the computed one.
+    # Persson's area is 10 to 15 % too low, as in the thesis. The friction of his theory with and
+    # without the correction is above and below the computed one.
     for name in ("slow", "fast"):
         one = data[name]
         assert 0.8 < one["area_persson_1"] / one["area"] < 1.0, name

@@ -1,7 +1,8 @@
-"""Numerical stick-slip of a thick block, and its cures: more passes, or inertia.
+"""Numerical stick-slip of a thick block, and its remedies: more passes, or inertia.
 
-A sine road slides under a viscoelastic block without mass, as in the thesis's section 3.6. Then a
-cylinder is shown whose contact sticks and slips in places only where a step has a single pass.
+A sine road slides under a viscoelastic block without mass, as in the thesis's section 3.6. In
+addition, the contact of a cylinder is shown. Parts of it stick and slip from step to step if a step
+has a single pass.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ MINUTES = 0.5
 
 HERE = Path(__file__).resolve().parent
 SPEED = 1.0                       # m/s, of the top of the block against the road
-#: passes, density (kg/m3), steps a cell
+#: passes, density (kg/m3), steps per cell
 CASES = {
     "1 pass": (1, 0, 1), "1 pass, half the step": (1, 0, 2),
     "2 passes": (2, 0, 1), "4 passes": (4, 0, 1), "8 passes": (8, 0, 1),
@@ -32,15 +33,15 @@ CASES = {
 }
 SICK = "1 pass, half the step"
 CURED = ("4 passes", "8 passes", "1 kg/m³", "10 kg/m³")
-#: passes, steps a cell, friction coefficient
+#: passes, steps per cell, friction coefficient
 LOCAL = {"1 pass": (1, 1, 1.5), "8 passes": (8, 1, 1.5), "8 passes, half the step": (8, 2, 1.5),
          "half the friction, 1 pass": (1, 1, 0.75), "half the friction, 8 passes": (8, 1, 0.75)}
-LAST = 24                          # steps of the local cases that are looked at
+LAST = 24                          # steps of the local cases that are compared
 ELASTIC = "elastic, "              # the same block without the arm
 
 
 def _slide(folder: Path, name: str, quick: bool) -> dict[str, Any]:
-    """Return speed and friction of one case, their unrest, and what the program said."""
+    """Return speed and friction of one case, the oscillation, and the warnings of the program."""
     passes, density, finer = CASES[name]
     case = asperity.Case.read(HERE / "input.nml")
     if quick:
@@ -49,7 +50,7 @@ def _slide(folder: Path, name: str, quick: bool) -> dict[str, Any]:
     if name.startswith(ELASTIC):
         del case.material.prony_g, case.material.prony_tau
     case.solver.passes = passes
-    case.solver.coupling_tolerance = 100.0    # what too few passes leave is the subject
+    case.solver.coupling_tolerance = 100.0    # The study is about the effect of too few passes.
     case.material.density = density
     case.phase[1].steps *= finer
     with warnings.catch_warnings(record=True) as said:
@@ -57,7 +58,7 @@ def _slide(folder: Path, name: str, quick: bool) -> dict[str, Any]:
         history = asperity.run(case, output=folder / f"{list(CASES).index(name)}.h5",
                                threads=common.jobs).history
     speed, friction = np.array(history["sliding_speed"]), np.array(history["friction"])
-    late = slice(len(speed) // 2, None)           # the block has yielded at 2 ms
+    late = slice(len(speed) // 2, None)           # the block slides from 2 ms on
     change = np.diff(speed[late])
     told = [str(one.message) for one in said if "stick-slip" in str(one.message)]
     return {
@@ -71,20 +72,22 @@ def _slide(folder: Path, name: str, quick: bool) -> dict[str, Any]:
 
 
 def _creep(folder: Path, name: str) -> dict[str, Any]:
-    """Return what alternates from step to step in the contact of the cylinder."""
+    """Return the part of the cylinder's contact that alternates from step to step."""
     passes, finer, friction = LOCAL[name]
     case = asperity.Case.read(HERE / "local.nml")
     case.solver.passes = passes
-    case.solver.coupling_tolerance = 100.0    # what too few passes leave is the subject
+    case.solver.coupling_tolerance = 100.0    # The study is about the effect of too few passes.
     case.friction.coefficient = friction
     case.phase[1].steps *= finer
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)          # its passes do not settle
+        # the passes of this case do not settle
+        warnings.simplefilter("ignore", UserWarning)
         run = asperity.run(case, output=folder / f"local_{list(LOCAL).index(name)}.h5",
                            threads=common.jobs)
     last = run.snapshots[-LAST:]
     pressure = np.array([one.pressure[0] for one in last])
-    # moved to where the centre of the load is in the middle, the first by whole cells
+    # The fields are moved so that the centre of the load is in the middle, the first one by whole
+    # cells.
     n = pressure.shape[1]
     wave = np.fft.fft(pressure, axis=1)
     turn = np.unwrap(np.angle(wave[:, 1])) + np.pi
@@ -105,7 +108,7 @@ def _creep(folder: Path, name: str) -> dict[str, Any]:
 
 
 def compute(folder: Path, quick: bool) -> dict[str, Any]:
-    """Run all cases; the quick form takes half the cells, the worst and the best of them."""
+    """Run all cases. The quick form takes half the cells, and the worst and the best case only."""
     names = ("1 pass", "1 pass, half the step", "4 passes", "10 kg/m³") if quick else tuple(CASES)
     local = (*LOCAL,)[1::3] if quick else tuple(LOCAL)
     return {"cases": {name: _slide(folder, name, quick) for name in names},
@@ -113,36 +116,37 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Check which cases oscillate, and that the cures do not change the friction."""
+    """Check which cases oscillate, and that the remedies do not change the friction."""
     cases = data["cases"]
     sick = cases[SICK]
-    # each step turns the speed round
-    assert sick["turns"] > 0.9, f"{SICK}: only {sick['turns']:.2f} turn round"
+    # each step reverses the change of the speed
+    assert sick["turns"] > 0.9, f"{SICK}: only {sick['turns']:.2f} changes are reversed"
     assert sick["unrest"] > 0.02 * SPEED, f"{SICK}: unrest {sick['unrest']:.2g}"
     assert "stick-slip" in sick["warning"], f"{SICK}: the program does not warn"
-    assert "passes" in sick["warning"], "it does not say what helps"
-    assert "density" in sick["warning"], "it does not say what helps"
-    # a smaller step does not help
-    assert sick["unrest"] > 10 * cases["1 pass"]["unrest"], "half the step cures"
+    assert "passes" in sick["warning"], "it does not name the remedy"
+    assert "density" in sick["warning"], "it does not name the remedy"
+    # A smaller step is no remedy.
+    assert sick["unrest"] > 10 * cases["1 pass"]["unrest"], "half the step is a remedy"
     healthy = [name for name in CURED if name in cases]
     for name in healthy:
-        # a ripple of the mesh is left
+        # A ripple from the mesh remains.
         assert cases[name]["unrest"] < 0.01 * SPEED, f"{name}: unrest {cases[name]['unrest']:.2g}"
         assert abs(cases[name]["mean_speed"] / SPEED - 1) < 0.01, f"{name}: not steady"
     steady = [cases[name]["mean_friction"] for name in healthy]
-    # 48 or 96 cells a wave, one pass behind the pressure or not: 2e-4
-    assert np.ptp(steady) < 1e-3, f"the cures differ: {steady}"
-    # 0.8, and what the slopes and the rubber add
+    # The results with 48 and 96 cells per wave, with the friction one pass behind the pressure or
+    # not, differ by 2e-4.
+    assert np.ptp(steady) < 1e-3, f"the remedies differ: {steady}"
+    # The coefficient is 0.8, and slopes and rubber add to it.
     assert steady[0] > 0.8, f"friction {steady[0]}"
     for name, one in data["local"].items():
-        assert one["speed"] < 1e-6 * SPEED, f"local, {name}: the whole does not slide steadily"
+        assert one["speed"] < 1e-6 * SPEED, f"local, {name}: the cylinder does not slide steadily"
         if name != "1 pass":
-            # of the largest pressure, from step to step
+            # relative to the largest pressure, from step to step
             assert one["alternates"] < 0.02, f"local, {name}: alternates {one['alternates']:.2g}"
             assert one["sticks"] == 0, f"local, {name}: some cells stick"
     if quick:
         return
-    # the elastic block does not swing at all
+    # The elastic block does not oscillate at all.
     for name in CASES:
         if name.startswith(ELASTIC):
             assert cases[name]["unrest"] < 1e-3 * SPEED, f"{name}: {cases[name]['unrest']:.2g}"
@@ -151,7 +155,7 @@ def check(data: dict[str, Any], quick: bool) -> None:
     assert local["sticks"] > 0, "local, 1 pass: nothing sticks"
 
 def picture(data: dict[str, Any]) -> Figure:
-    """Draw the sliding speed in time and near the end, friction, and the unrest."""
+    """Draw the sliding speed over time and near the end, the friction, and the oscillation."""
     figure, ((first, second), (third, fourth), (fifth, sixth)) = common.subplots(2, 3, width=5.6)
     cases = data["cases"]
     shown = [name for name in ("1 pass", "4 passes", "10 kg/m³") if name in cases]

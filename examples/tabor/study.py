@@ -1,6 +1,6 @@
-"""Contact radius of an adhesive sphere against the Tabor parameter.
+"""Contact radius of an adhesive sphere over the Tabor parameter.
 
-The sphere of the thesis's figure 1.7: R = 1 m, F = 1e-5 N, w = 3.2e-5 J/m2, G = 0.37 Pa,
+The sphere is that of the thesis's figure 1.7: R = 1 m, F = 1e-5 N, w = 3.2e-5 J/m2, G = 0.37 Pa,
 incompressible.
 """
 
@@ -23,9 +23,9 @@ LENGTH = (RADIUS * (ENERGY / MODULUS) ** 2) ** (1 / 3)
 
 
 def contact_radius(tabor: float, potential: str, cells: int) -> float:
-    """Return the radius, m, of the area of contact on a map of `cells` a side."""
+    """Return the radius, m, of the contact area on a map of `cells` per side."""
     reach = LENGTH / tabor
-    # Twice the radius of JKR, and what the attraction reaches around it.
+    # Twice the JKR radius, and the reach of the attraction around the contact.
     side = 2.6 * np.hypot(0.075, np.sqrt((2.0 if potential != "exponential" else 5.0) * reach))
     sphere = asperity.surface.shape("paraboloid", cells, lx=side, radius=RADIUS, boundary="free")
     contact = asperity.solve_adhesive(
@@ -57,11 +57,12 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 def check(data: dict[str, Any], quick: bool) -> None:
     """Check both potentials against the theory."""
     exact = data["theory"]
-    # The area counts whole cells: at 96 per side, about 20 over the radius, that is 2 %; at 288
-    # it is less than 1 %.
+    # The area counts whole cells. With 96 per side, about 20 across the radius, the error is 2 %;
+    # with 288 it is less than 1 %.
     error = np.abs(data["maugis_dugdale"] / exact - 1).max()
     assert error < (0.02 if quick else 0.01), f"Maugis-Dugdale is {error:.2%} off its theory"
-    # Another shape of the attraction at the same energy and range: between DMT and JKR, 1.5 %.
+    # The attraction has another shape with the same energy and range. The radius between DMT and
+    # JKR differs by 1.5 %.
     error = np.abs(data["exponential"] / exact - 1).max()
     assert error < (0.03 if quick else 0.02), f"the exponential potential is {error:.2%} off"
     assert (np.diff(data["exponential"]) > 0).all(), "the contact must grow with the parameter"

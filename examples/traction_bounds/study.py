@@ -1,6 +1,7 @@
 """The bound of the traction on a slope, in closed form and in runs on a wavy road.
 
-Coulomb friction, constant shear stress and both together (Coulomb-Orowan); both laws of slip.
+The laws are Coulomb friction, constant shear stress, and both together (Coulomb-Orowan), each with
+both laws of slip.
 """
 
 from __future__ import annotations
@@ -25,21 +26,21 @@ TITLES = {"coulomb": "Coulomb", "constant_shear": "constant shear stress",
           "coulomb_orowan": "Coulomb-Orowan"}
 LAWS = tuple(TITLES)
 RUNS = {law: (law, "physical") for law in LAWS} | {"thesis": ("coulomb", "thesis")}
-SLOPE = 0.2                                        # of the points that are drawn into the bound
+SLOPE = 0.2                                        # points that are drawn beside the bound
 
 
 def reach(pressure: Any, slope: tuple[Any, Any], direction: tuple[Any, Any], *,
           mu: float = np.inf, shear: float = np.inf) -> Any:
     """Return how far T = T* + s d may go from the frictionless T* = -P grad H along d.
 
-    The traction (T_x, T_y, P) has the part mu*N.(T, P) or `shear` across the normal N at most.
+    The part of the traction (T_x, T_y, P) across the normal N is at most mu*N.(T, P), or `shear`.
     """
     nz = 1 / np.sqrt(1 + slope[0] ** 2 + slope[1] ** 2)
     along = -nz * (slope[0] * direction[0] + slope[1] * direction[1])      # n.d
     across = np.sqrt(direction[0] ** 2 + direction[1] ** 2 - along**2)
     s = shear / across
     if np.isfinite(mu):
-        # a denominator <= 0: the ray never leaves the cone
+        # If the denominator is <= 0, the ray never leaves the cone.
         room = across - mu * along
         s = np.minimum(s, np.where(room > 0, mu * pressure / nz / np.where(room > 0, room, 1),
                                    np.inf))
@@ -65,7 +66,7 @@ def ellipse(pressure: Any, slope: tuple[float, float], t: tuple[Any, Any], mu: f
 
 
 def _waves(path: Path) -> list[tuple[float, float, complex]]:
-    """Return the waves (q_x, q_y, amplitude) of which the road is made."""
+    """Return the waves (q_x, q_y, amplitude) of the road."""
     with h5py.File(path) as file:
         height = file["surface/height"][:]
         lx, ly = (float(file["grid"].attrs[name]) for name in ("lx", "ly"))
@@ -94,7 +95,7 @@ def _run(folder: Path, name: str, cells: int) -> list[dict[str, Any]]:
         friction=friction,
         phase=[{"pressure": 0.15e6},
                {"velocity_x": 0.1, "velocity_y": 0.03, "duration": 0.6e-3, "steps": 12}],
-        # With constant shear the shares of the cells at the edge take more passes.
+        # With constant shear, the shares of the cells at the edge need more passes.
         solver={"passes": 0 if law == "constant_shear" else 8, "interpolation": "cubic",
                 "tolerance": TOLERANCE, "slip_law": slip_law},
         output={"snapshot_every": 3})
@@ -105,13 +106,14 @@ def _run(folder: Path, name: str, cells: int) -> list[dict[str, Any]]:
     for snapshot in run.snapshots:
         if snapshot.step == 0:
             continue
-        # The slopes where the surface of the rubber is now, from the road's own waves.
+        # The slopes at the present position of the rubber's surface, from the waves of the road.
         x = x0 + snapshot.displacement_x - run.history["road_x"][snapshot.step]
         y = y0 + snapshot.displacement_y - run.history["road_y"][snapshot.step]
         phases = [1j * amplitude * np.exp(1j * (a * x + b * y)) for a, b, amplitude in waves]
         hx = sum((a * phase).real for (a, _, _), phase in zip(waves, phases, strict=True))
         hy = sum((b * phase).real for (_, b, _), phase in zip(waves, phases, strict=True))
-        # Partly sheared cells of constant shear have no pressure, to the tolerance of all cells.
+        # Under constant shear, partly sheared cells have no pressure, up to the tolerance of all
+        # cells.
         on = snapshot.pressure > TOLERANCE * snapshot.pressure.sum()
         p, hx, hy = snapshot.pressure[on], hx[on], hy[on]
         tx, ty = snapshot.traction_x[on], snapshot.traction_y[on]
@@ -132,10 +134,10 @@ def _run(folder: Path, name: str, cells: int) -> list[dict[str, Any]]:
         found.append({
             "step": int(snapshot.step), "slip": snapshot.contact[on] == 2,
             "pressure": p, "slope": np.hypot(hx, hy),
-            # with the slope turned to +x
+            # rotated so that the slope is along +x
             "up": (tx * hx + ty * hy) / np.hypot(hx, hy),
             "side": (ty * hx - tx * hy) / np.hypot(hx, hy),
-            "limit": reach(p, (hx, hy), (dx, dy), **limits),         # 1 on the bound, above inside
+            "limit": reach(p, (hx, hy), (dx, dy), **limits),         # 1 on the bound, larger inside
             "normal": normal, "shear": np.sqrt(np.maximum(tx**2 + ty**2 + p**2 - normal**2, 0)),
             "plane": angle(rx, ry), "space": angle(rx + hx * climb, ry + hy * climb),
         })
@@ -143,7 +145,7 @@ def _run(folder: Path, name: str, cells: int) -> list[dict[str, Any]]:
 
 
 def compute(folder: Path, quick: bool) -> dict[str, Any]:
-    """Run the laws; the closed form needs no run."""
+    """Run the laws. The closed form needs no run."""
     runs = {name: _run(folder, name, 72 if quick else 128) for name in RUNS}
     data: dict[str, Any] = {"runs": runs}
     for name, found in runs.items():
@@ -155,7 +157,7 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
         for law in ("plane", "space"):
             data[f"{name}_{law}"] = float(max(np.abs(one[law][slip]).max()
                                               for one, slip in zip(found, slips, strict=True)))
-    # eq. 3.2 along the slope, and eq. 3.4 all round, against the closed form
+    # Eq. 3.2 along the slope and eq. 3.4 in all directions, against the closed form.
     curve = bound(1.0, (-SLOPE, 0.0), mu=1.0)
     data["along"] = (float(curve[0].max()), (1 + SLOPE) / (1 - SLOPE))
     data["ellipse"] = float(np.abs(ellipse(1.0, (-SLOPE, 0.0), curve, 1.0)).max())
@@ -163,12 +165,12 @@ def compute(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], quick: bool) -> None:
-    """Check closed form against the thesis's equations, and the runs against the closed form."""
+    """Check the closed form against the thesis's equations, and the runs against it."""
     assert abs(data["along"][0] - data["along"][1]) < 1e-12, "not eq. 3.2"
     assert data["ellipse"] < 1e-12, "not on the ellipse of eq. 3.4"
-    # The runs interpolate height and slope by cubics. With 18 and 32 cells in the short wave that
-    # makes 7e-4 and 1.1e-4 of the bound; with a limit of the shear stress the pressure under it is
-    # larger beside the bound, and so is the error.
+    # The runs interpolate height and slope by cubic polynomials. With 18 and 32 cells in the short
+    # wave the error is 7e-4 and 1.1e-4 of the bound. If the shear stress is limited, the pressure
+    # is larger relative to the bound, and so is the error.
     cone, limited = (1e-3, 4e-3) if quick else (2e-4, 8e-4)
     close = {"coulomb": cone, "thesis": cone, "coulomb_orowan": limited, "constant_shear": limited}
     for name, most in close.items():
@@ -176,8 +178,8 @@ def check(data: dict[str, Any], quick: bool) -> None:
         assert data[f"{name}_inside"] > 1 - most, f"{name}: {data[f'{name}_inside']}: out of bounds"
         assert data[f"{name}_slips"][-1] == 1.0, f"{name}: not in full slip"
     assert data["coulomb_slips"][0] < 0.6, "nothing sticks at first"
-    # Slip lies along D = T - T* in space, the thesis's in the plane; the others are off by as much
-    # as the metric says, arctan(t²/(2 sqrt(1 + t²))) for a slope t.
+    # Slip is along D = T - T* in space; in the thesis it is so in the plane. The other laws differ
+    # by the effect of the metric, arctan(t²/(2 sqrt(1 + t²))) for a slope t.
     for name, law, other in (("coulomb", "space", "plane"), ("thesis", "plane", "space")):
         assert data[f"{name}_{law}"] < (0.1 if quick else 0.02), f"{name}: {data[f'{name}_{law}']}"
         steepest = max(one["slope"].max() for one in data["runs"][name])
@@ -186,7 +188,7 @@ def check(data: dict[str, Any], quick: bool) -> None:
 
 
 def picture(data: dict[str, Any]) -> Figure:
-    """Draw the bounds, the return of a traction, and the points of the runs."""
+    """Draw the bounds, the projection of a traction, and the points of the runs."""
     figure, axes = common.subplots(3, 2, height=4.0)
     first, second, third, fourth, fifth, sixth = axes.flat
     for number, slope in enumerate((0.0, 0.2, 0.5)):

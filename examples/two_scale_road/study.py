@@ -18,7 +18,7 @@ HERE = Path(__file__).resolve().parent
 
 
 def compute(folder: Path, quick: bool) -> dict[str, Any]:
-    """Run input.nml, or a short form of it, and return what happens in time."""
+    """Run input.nml, or its quick form, and return the quantities over time."""
     if quick:
         case = road.case(road.QUICK, road.waves(road.WIDER))
         result = folder / "quick.h5"
@@ -39,10 +39,10 @@ def check(data: dict[str, Any], quick: bool) -> None:
     found = data["found"]
     after = data["time"] - road.LOADING
     driven = after > 1e-9
-    # The block sticks at first, and its mean shear stress is that of plain shear: what slips at
-    # the edges of the contact moves less than 2 % of the drive until half of the area slips.
-    # The first step is left out: it is as short as the time that a shear wave takes through the
-    # block (0.9 us), whose mass is still being accelerated then.
+    # The block sticks at first, and its mean shear stress is that of plain shear. The slip at the
+    # edges of the contact is less than 2 % of the motion of the drive until half of the area slips.
+    # The first step is left out: it is as short as the time of a shear wave through the block (0.9
+    # us), so that the mass is still being accelerated.
     early = (after > 1.5e-6) & (data["stick_area"] > 0.5 * data["contact_area"])
     rubber = road.compound()
     time = after[early][:, None]
@@ -52,15 +52,16 @@ def check(data: dict[str, Any], quick: bool) -> None:
     assert early.sum() >= 10
     np.testing.assert_allclose(data["friction"][early], stress / road.PRESSURE, rtol=0.02,
                                err_msg="the sticking block is not in plain shear")
-    # All of it slips a quarter of a millisecond after the start, as in the thesis (0.25 ms).
+    # The whole contact slips a quarter of a millisecond after the start, as in the thesis (0.25
+    # ms).
     slips = after[driven & (data["stick_area"] < 1e-3)][0]
     assert 0.22e-3 < slips < 0.33e-3, f"full slip {slips:.3g} s after the start"
-    # Friction: above the Coulomb coefficient, highest within the first quarter of the long wave
-    # that the interface slides; the thesis has 1.06 and 1.05 with its own compound.
+    # The friction is above the Coulomb coefficient, and largest within the first quarter of the
+    # long wave over which the interface slides. The thesis has 1.06 and 1.05 with its own compound.
     assert 1.01 < found["plateau"] < found["maximum"] < 1.08
     assert found["slid_to_maximum"] < 0.3 * road.LONG
     road.check_slope(found)
-    # Rubber rises when it slides, and the drive shears it a little further.
+    # Rubber rises when it slides, and the drive shears it a little more.
     assert found["area"] < 0.8 * found["area_loaded"]
     assert found["gap"] > 1.5 * found["gap_loaded"]
     assert 0.85 < found["speed"] / road.SPEED < 1.0
@@ -69,7 +70,7 @@ def check(data: dict[str, Any], quick: bool) -> None:
 
 
 def picture(data: dict[str, Any]) -> Figure:
-    """Draw friction, areas and sliding speed in time, the whole and what matters."""
+    """Draw friction, areas and sliding speed over time, as a whole and in detail."""
     figure = Figure(figsize=(11.0, 6.4), layout="constrained")
     axes = figure.subplots(2, 2, sharex="col")
     time, found = 1e3 * data["time"], data["found"]
