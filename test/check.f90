@@ -1,4 +1,4 @@
-!> Counting checks for the one test driver.
+!> Checks that count, for the one test driver.
 module check
    use, intrinsic :: iso_fortran_env, only : error_unit, output_unit
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
@@ -22,7 +22,7 @@ module check
       end subroutine run_suite
    end interface
 
-   !> Pass if two numbers stand in the stated order; print both if they do not.
+   !> Pass if two numbers are in the stated order. Otherwise print both.
    interface check_order
       module procedure check_order_real
       module procedure check_order_integer
@@ -73,7 +73,7 @@ contains
       call finish()
    end subroutine run_suites
 
-   !> Shall the test of this name run? The prefix `test_` may be left out on the command line.
+   !> Should the test of this name run? The prefix `test_` may be left out on the command line.
    logical function selected(name)
       character(*), intent(in) :: name
       integer :: i
@@ -87,7 +87,7 @@ contains
       if (selected .and. size(chosen) > 0) write (output_unit, '(a)') 'test '//name
    end function selected
 
-   !> Name the suite that the next checks belong to.
+   !> Set the name of the suite that the next checks belong to.
    subroutine begin_suite(name)
       character(*), intent(in) :: name
 
@@ -116,7 +116,7 @@ contains
    subroutine check_close(value, reference, tolerance, what)
       real(dp), intent(in) :: value
       real(dp), intent(in) :: reference
-      real(dp), intent(in) :: tolerance     !! absolute
+      real(dp), intent(in) :: tolerance     !! absolute tolerance
       character(*), intent(in) :: what
       character(120) :: numbers
 
@@ -177,7 +177,7 @@ contains
       end if
    end subroutine check_no_error
 
-   !> Pass if there is an error whose message holds `fragment`.
+   !> Pass if there is an error whose message contains `fragment`.
    subroutine check_error(error, fragment, what)
       type(error_type), allocatable, intent(in) :: error
       character(*), intent(in) :: fragment
@@ -191,7 +191,7 @@ contains
       end if
    end subroutine check_error
 
-   !> Print the sum and stop with 1 if anything failed.
+   !> Print the numbers of checks, and stop with status 1 if any failed.
    subroutine finish()
       write (output_unit, '(i0, " passed, ", i0, " failed")') passed, failed
       if (failed > 0) error stop 1

@@ -9,7 +9,7 @@ module friction_bounds
 
 contains
 
-   !> By how much the tractions lie outside their bounds: the largest |T - returned T|, Pa.
+   !> How far the tractions are outside their bounds: the largest |T - returned T|, Pa.
    function largest_excess(law, p, slope_x, slope_y, contact, tx, ty) result(excess)
       type(friction_law_type), intent(in) :: law
       real(dp), intent(in) :: p(:, :)                       !! [nx, ny], Pa
@@ -38,8 +38,8 @@ contains
       end do
    end function largest_excess
 
-   !> Give tractions to a new pressure: return them to its bound, and clear them outside the
-   !> contact. Points that were returned become slip points.
+   !> Reduce tractions to the bound of a new pressure, and clear them outside the contact. Points whose
+   !> traction was reduced become slip points.
    subroutine return_tractions(law, p, slope_x, slope_y, contact, tx, ty)
       type(friction_law_type), intent(in) :: law
       real(dp), intent(in) :: p(:, :)                       !! [nx, ny], Pa

@@ -1,4 +1,4 @@
-!> What the tests of normal contact share: problems solved in one call, and errors recomputed.
+!> Parts that the tests of normal contact share: problems that are solved in one call, and recomputed errors.
 module normal_fixture
    use check, only : check_no_error, check_that
    use asperity_errors, only : error_type
@@ -23,7 +23,7 @@ module normal_fixture
    !> Shear modulus for which E* = 2G/(1 - nu) = 1 Pa.
    real(dp), parameter, public :: unit_modulus = (1.0_dp - poisson)/2.0_dp
 
-   !> All that a solve hands out.
+   !> All results of a solve.
    type :: solution_type
       real(dp), allocatable :: pressure(:, :), gap(:, :)
       real(dp) :: level = 0.0_dp
@@ -79,7 +79,7 @@ contains
       problem%target = pressure
    end subroutine rough_problem
 
-   !> One thread and two: the same bits.
+   !> Results with one thread and with two have the same bits.
    subroutine check_threads(grid, problem, height, thesis, mixed)
       type(grid_type), intent(in) :: grid
       type(normal_problem_type), intent(in) :: problem
@@ -153,9 +153,9 @@ contains
       e1 = sum(pressure*(g - minval(g)))/(sum(pressure)*rms(height))
    end subroutine duality_gap
 
-   !> Distance of two solutions of the same load as the duality gap bounds it. The energy lies at most
-   !> e1 (sum P h_rms) above its minimum, which is |P - P*|^2/2 in the norm of A/G; so this number,
-   !> |P - P'|^2 in that norm over (sum P h_rms), is at most 2 (sqrt(e1) + sqrt(e1'))^2.
+   !> Distance of two solutions of the same load, as bounded by the duality gap. The energy is at most e1 (sum
+   !> P h_rms) above its minimum, and the difference is |P - P*|^2/2 in the norm of A/G. Therefore this
+   !> number, |P - P'|^2 in that norm over (sum P h_rms), is at most 2 (sqrt(e1) + sqrt(e1'))^2.
    subroutine distance(grid, modulus, height, p, q, d)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: modulus

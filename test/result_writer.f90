@@ -1,4 +1,4 @@
-!> A small run that writes a result and nothing else: tests kill it, fill its disk, read it.
+!> A small run that only writes a result. Tests kill it, fill its disk, and read its files.
 module result_writer
    use, intrinsic :: iso_fortran_env, only : error_unit
    use asperity_checkpoint, only : checkpoint_reader_type, checkpoint_writer_type
@@ -17,7 +17,7 @@ module result_writer
 
 contains
 
-   !> Row of a step; all its numbers follow from the step.
+   !> Row of a step. All its numbers follow from the number of the step.
    pure function row_of(step) result(row)
       integer, intent(in) :: step
       type(history_row_type) :: row
@@ -42,7 +42,7 @@ contains
       end do
    end function pressure_of
 
-   !> Write what the command line asks for: writer FILE ROWS COMPRESSION [restart].
+   !> Write what the arguments ask for: writer FILE ROWS COMPRESSION [restart].
    subroutine run_writer()
       type(error_type), allocatable :: error
       character(1024) :: path, number
@@ -59,7 +59,7 @@ contains
       stop 3
    end subroutine run_writer
 
-   !> Write `rows` rows, a snapshot every third, a checkpoint every fourth step.
+   !> Write `rows` rows, with a snapshot of every third and a checkpoint of every fourth step.
    subroutine write_result(path, rows, compression, restart, error)
       character(*), intent(in) :: path
       integer, intent(in) :: rows

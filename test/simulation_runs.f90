@@ -1,4 +1,4 @@
-!> Runs in memory for the tests of the step loop: a case given as text, every row kept.
+!> Runs in memory for the tests of the step loop: a case is given as text, and every row is kept.
 module simulation_runs
    use case_input, only : parse_case
    use case_settings, only : case_type
@@ -17,9 +17,9 @@ module simulation_runs
 
    character, parameter, public :: nl = new_line('a')
 
-   !> What a run did.
+   !> The results of a run.
    type :: record_type
-      type(history_row_type), allocatable :: rows(:)   !! from 0
+      type(history_row_type), allocatable :: rows(:)   !! row number, from 0
       real(dp), allocatable :: drag(:, :)              !! horizontal force on the rubber, N [2, row from 0]
       real(dp), allocatable :: height(:, :)            !! of the original map, m
       real(dp), allocatable :: pressure(:, :)          !! of the last row, Pa
@@ -31,7 +31,7 @@ module simulation_runs
 
 contains
 
-   !> Run a case given as text to its end. Not converged is a failed check.
+   !> Run a case given as text to its end. A row that does not converge is a failed check.
    subroutine run_case(text, what, record)
       character(*), intent(in) :: text
       character(*), intent(in) :: what
@@ -83,11 +83,11 @@ contains
       last = ubound(record%rows, 1)
    end function last
 
-   !> The energy books close in each row, and nothing that is lost comes back.
+   !> The energy balance closes in each row, and the losses never decrease.
    subroutine check_books(record, what, tolerance)
       type(record_type), intent(in) :: record
       character(*), intent(in) :: what
-      real(dp), intent(in), optional :: tolerance      !! of the largest energies; round-off by default
+      real(dp), intent(in), optional :: tolerance      !! relative to the largest energies; round-off by default
       real(dp) :: worst, scale, allowed
       logical :: lost
       integer :: k
@@ -112,7 +112,7 @@ contains
       call check_that(lost, what//': what is lost does not come back')
    end subroutine check_books
 
-   !> Two runs have the same physical history, each column to a tolerance relative to its largest value.
+   !> Two runs have the same physical history: each column within a tolerance relative to its largest value.
    subroutine check_same_rows(a, b, tolerance, what)
       type(record_type), intent(in) :: a, b
       real(dp), intent(in) :: tolerance
@@ -133,7 +133,7 @@ contains
 
    contains
 
-      !> One column.
+      !> Compare one column.
       subroutine same(name, one, other)
          character(*), intent(in) :: name
          real(dp), intent(in) :: one(:), other(:)

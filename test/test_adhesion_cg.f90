@@ -61,7 +61,7 @@ contains
       if (selected('same_bits_on_two_threads')) call same_bits_on_two_threads()
    end subroutine run_adhesion_cg
 
-   !> Adhesive energy gamma_0 with the range z_0 in units of E* = 1 and of the length of the cell.
+   !> Energy of adhesion gamma_0 for the range z_0, in units of E* = 1 and of the length of the cell.
    function potential_of(name, energy, range) result(potential)
       character(*), intent(in) :: name
       real(dp), intent(in) :: energy, range
@@ -148,7 +148,8 @@ contains
          - past*gap + adhesive_energy(problem%potential, gap) + load*gap)
    end function energy_sum
 
-   !> The pressure of any state is the gradient of the energy, less e': central differences.
+   !> The pressure of any state is the gradient of the energy without e'. The gradient is computed by central
+   !> differences.
    subroutine pressure_is_gradient_of_energy(name)
       character(*), intent(in) :: name
       type(grid_type) :: grid
@@ -192,7 +193,8 @@ contains
       call solver%destroy()
    end subroutine pressure_is_gradient_of_energy
 
-   !> Conditions of a solution, recomputed; both controls, both starts of the control, a history.
+   !> The conditions of a solution hold when they are recomputed, for both controls, both starts, and with a
+   !> history.
    subroutine solution_meets_its_conditions(nx, ny, lx, ly, name)
       integer, intent(in) :: nx, ny
       real(dp), intent(in) :: lx, ly
@@ -239,7 +241,7 @@ contains
       call check_close(sum(pressure)/size(pressure), 0.05_dp, 1e-14_dp, name//': load')
       call check_close(sum(gap + height)/size(gap) + level, 0.0_dp, 1e-14_dp, name//': level')
 
-      ! The level prescribed, from that state, gives it back; and the pressure.
+      ! If the level of that state is prescribed, the solver returns the state and its pressure.
       problem%control = control_approach
       problem%target = level
       other = gap
@@ -250,7 +252,7 @@ contains
       call check_close(again, level, 1e-14_dp, name//': level kept')
       call check_close(maxval(abs(other - gap)), 0.0_dp, 1e-6_dp*range, name//': same gap')
 
-      ! A history is a change of the height, H' = H - A P_h/Q.
+      ! A history is equivalent to a change of the height, H' = H - A P_h/Q.
       allocate (symbol(0:nx/2, 0:ny/2), source=0.0_dp)
       do j = 0, ny/2
          do i = 0, nx/2
@@ -271,7 +273,7 @@ contains
       call solver%destroy()
    end subroutine solution_meets_its_conditions
 
-   !> The thesis's method finds the same where the minimum is unique, at prescribed load and level.
+   !> The thesis's method finds the same solution if the minimum is unique, at prescribed load and level.
    subroutine thesis_method_agrees(name)
       character(*), intent(in) :: name
       type(grid_type) :: grid
@@ -297,7 +299,8 @@ contains
       pressure = 0.0_dp*gap
       call fast%solve(problem, height, gap, pressure, level, outcome, past)
       call check_that(outcome%converged, name//': fast: '//trim(outcome%reason))
-      ! Cells beside the kink of Maugis-Dugdale make many minima, close together: begin near this one.
+      ! Cells beside the kink of Maugis-Dugdale cause many minima, close together. Therefore start near this
+      ! one.
       if (name == 'maugis_dugdale') other = max(gap - 1e-3_dp*0.02_dp, 0.0_dp)
       call thesis%solve(problem, height, other, pressure, again, outcome, past)
       call check_that(outcome%converged, name//': thesis: '//trim(outcome%reason))
@@ -316,7 +319,7 @@ contains
       call thesis%destroy()
    end subroutine thesis_method_agrees
 
-   !> The energy after k iterations falls with k.
+   !> The energy after k iterations decreases with k.
    subroutine energy_falls_with_the_iterations(name, method)
       character(*), intent(in) :: name, method
       type(grid_type) :: grid
@@ -381,7 +384,7 @@ contains
             energy(step) = energy_sum(grid, problem, height, gap, none, 0.0_dp)
             if (step == 0) load = sum(pressure)
          end do
-         ! The curvature of the energy changes where cells come into contact: h times that.
+         ! The curvature of the energy changes where cells come into contact; the error is h times the change.
          call check_close((energy(1) - energy(-1))/(2*h), load, 1e-4_dp, 'force from the energy')
       end do
       call solver%destroy()
@@ -414,7 +417,7 @@ contains
       call solver%solve(problem, height, gap, pressure, level, outcome)
       call check_that(outcome%converged, 'no adhesion: '//trim(outcome%reason))
       call check_order(abs(count(gap == 0.0_dp)/real(n, dp) - 0.4_dp), '<=', 1.01_dp/n*2, 'width')
-      ! p(0) = 2 p_mean/sin(psi_a): second order in the cell but for the edge.
+      ! p(0) = 2 p_mean/sin(psi_a); the error is of second order in the cell, apart from the edge.
       call check_close(maxval(pressure), 2*problem%target/sin(pi*0.2_dp), 1e-3_dp*peak, 'peak')
       problem%potential = potential_of('exponential', 0.0_dp, 1e-3_dp)
       other = maxval(height) - height
@@ -437,7 +440,7 @@ contains
 
    contains
 
-      !> Error of the load at the half-width found, in units of p*.
+      !> Error of the load for the half-width that was found, in units of p*.
       subroutine wave(n, range, error_of_load)
          integer, intent(in) :: n
          real(dp), intent(in) :: range
@@ -474,7 +477,7 @@ contains
 
    end subroutine johnson_adhesive_wave
 
-   !> Strong attraction of short range on a rough surface: the solver gets there.
+   !> Strong attraction of short range on a rough surface: the solver converges.
    subroutine strong_attraction_on_rough_surface()
       type(grid_type) :: grid
       type(adhesion_solver_type) :: solver
@@ -503,10 +506,10 @@ contains
       end do
    end subroutine strong_attraction_on_rough_surface
 
-   !> From a gap that is too wide everywhere the solution is the first that a slow closing motion meets, though the
-   !> energy has others with more contact. A motion so slow that it cannot miss it: the attraction of the
-   !> gap before, which is less than that of any solution below, against the wall, again and again. And
-   !> the transforms are few.
+   !> If the gap at the start is too wide everywhere, the solution is the first one that a slow closing motion
+   !> meets, although the energy has others with more contact. The test computes it by a motion so slow that
+   !> it cannot miss it: it solves again and again with the attraction of the gap before, which is less than
+   !> that of any solution below. The solver must also need few transforms.
    subroutine attraction_closes_as_in_a_slow_motion()
       type(grid_type) :: grid
       type(adhesion_solver_type) :: solver
@@ -530,7 +533,7 @@ contains
       gap = slow
       do k = 1, 400
          past = -energy/range*exp(-slow/range)
-         ! A traction of the past moves the mean, too, which does not matter there.
+         ! A traction from the past also moves the mean, which does not matter here.
          problem%target = 0.01_dp - sum(past)/size(past)
          change = sum(slow)
          call solver%solve(problem, height, slow, pressure, level, outcome, past)
@@ -548,8 +551,8 @@ contains
       call solver%destroy()
    end subroutine attraction_closes_as_in_a_slow_motion
 
-   !> In and out at prescribed level, each from the state before: attraction before contact, pull-off,
-   !> and the way out needs more work than the way in gives.
+   !> Approach and retreat at prescribed level, each solve from the state before: there is attraction before
+   !> contact, the surfaces separate at the end, and the retreat needs more work than the approach returns.
    subroutine pull_off_takes_more_work_than_approach()
       type(grid_type) :: grid
       type(adhesion_solver_type) :: solver
@@ -583,8 +586,8 @@ contains
       call solver%destroy()
    end subroutine pull_off_takes_more_work_than_approach
 
-   !> The form s.B_h s of the local model over s.B s, for single waves of all lengths and directions: the bounds
-   !> that the theory states.
+   !> The ratio of the form s.B_h s of the local model to s.B s, for single waves of all lengths and
+   !> directions, is within the bounds that the theory states.
    subroutine model_is_near_the_operator(ratio, least, most)
       real(dp), intent(in) :: ratio                !! length of a cell over its width
       real(dp), intent(in) :: least, most
@@ -626,7 +629,7 @@ contains
       call patch%destroy()
    end subroutine model_is_near_the_operator
 
-   !> Detachment, a closed gap, an unknown method.
+   !> Detachment, a closed gap, and an unknown method are reported.
    subroutine detached_closed_and_refused()
       type(grid_type) :: grid
       type(adhesion_solver_type) :: solver
@@ -672,7 +675,7 @@ contains
       call solver%destroy()
    end subroutine detached_closed_and_refused
 
-   !> The same bits with one and with two threads.
+   !> One and two threads give the same bits.
    subroutine same_bits_on_two_threads()
       type(grid_type) :: grid
       real(dp), allocatable :: height(:, :), first(:, :), second(:, :)

@@ -34,15 +34,15 @@ contains
       end if
       if (selected('hertz_jkr_and_dmt_limits')) call hertz_jkr_and_dmt_limits()
       if (selected('sphere_converges_with_the_mesh')) call sphere_converges_with_the_mesh()
-      ! Long range: a sharp minimum at first touch, where half a step of 0.02 costs 0.003; and a disc of
-      ! 25 cells' radius is full of cells to 0.6 %: 1 % in all.
+      ! Long range: a sharp minimum at first touch, where half a step of 0.02 costs 0.003. A disc with a
+      ! radius of 25 cells is represented by whole cells to 0.6 %. The tolerance is 1 % for both.
       if (selected('pull_off_force_of_maugis')) &
          call pull_off_force_of_maugis('maugis_dugdale', 0.1_dp, 32, -0.38_dp, 0.02_dp, 0.02_dp)
-      ! First order in the cell (pinned edge of the cohesive zone, see sphere_converges_with_the_mesh); the minimum
-      ! is smooth: steps of 0.1 miss it by less than 1e-3.
+      ! The error is of first order in the cell (the edge of the cohesive zone is pinned, see
+      ! sphere_converges_with_the_mesh). The minimum is smooth: steps of 0.1 miss it by less than 1e-3.
       if (selected('pull_off_force_of_maugis')) &
          call pull_off_force_of_maugis('maugis_dugdale', 1.0_dp, 40, 0.0_dp, 0.1_dp, 0.05_dp)
-      ! Another potential; beyond Tabor 1 its form matters little: 3 % of 1.5.
+      ! Another potential. Above a Tabor parameter of 1 its shape matters little: 3 % of 1.5.
       if (selected('pull_off_force_of_maugis')) &
          call pull_off_force_of_maugis('exponential', 3.5_dp, 40, 0.0_dp, 0.1_dp, 0.04_dp)
       if (selected('force_is_derivative_of_energy')) call force_is_derivative_of_energy()
@@ -51,7 +51,7 @@ contains
       if (selected('held_detached_and_refused')) call held_detached_and_refused()
    end subroutine run_adhesion_free
 
-   !> A paraboloid of radius 1 with its summit, height 0, on a cell.
+   !> A paraboloid of radius 1 whose summit, of height 0, is on a cell.
    function paraboloid(grid) result(height)
       type(grid_type), intent(in) :: grid
       real(dp) :: height(grid%nx, grid%ny)
@@ -65,7 +65,7 @@ contains
       end do
    end function paraboloid
 
-   !> Displacement by the sum over Love's coefficients.
+   !> Displacement as the sum over Love's coefficients.
    function displacement_sum(grid, pressure) result(u)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: pressure(:, :)
@@ -90,7 +90,8 @@ contains
       end do
    end function displacement_sum
 
-   !> Conditions of a solution by that sum; both controls; a history; from full contact.
+   !> The conditions of a solution hold with that sum, for both controls, with a history, and from full
+   !> contact.
    subroutine solution_meets_its_conditions(name)
       character(*), intent(in) :: name
       type(grid_type) :: grid
@@ -188,21 +189,21 @@ contains
       real(dp) :: radius, level, jkr
 
       call solve_sphere(64, 4.0_dp, 'none', 0.0_dp, 1.0_dp, radius, level)
-      ! A radius from a count of cells is good to a fraction of a cell, here 0.06.
+      ! A radius from a count of cells is accurate to a fraction of a cell, here 0.06.
       call check_close(radius, 1.0_dp, 0.03_dp, 'Hertz: radius')
       call check_close(level, 1.0_dp, 0.01_dp, 'Hertz: approach a^2/R')
-      ! Tabor 3.3 with the exponential: within 3 % of JKR at the load 2, a = 2.1.
+      ! Tabor parameter 3.3 with the exponential potential: within 3 % of JKR at the load 2, a = 2.1.
       jkr = ((sqrt(6.0_dp) + sqrt(6.0_dp + 8.0_dp))/2)**(2.0_dp/3.0_dp)
       call solve_sphere(96, 6.0_dp, 'exponential', 0.17_dp, 2.0_dp, radius, level)
       call check_close(radius, jkr, 0.03_dp*jkr, 'JKR: radius')
       call check_close(level, jkr**2 - 2*sqrt(6.0_dp)/3*sqrt(jkr), 0.05_dp, 'JKR: approach')
-      ! Long range: DMT. The attraction reaches as far as sqrt(2 z_0): a wide patch.
+      ! Long range: DMT. The attraction extends to sqrt(2 z_0), so that the patch must be wide.
       call solve_sphere(64, 24.0_dp, 'maugis_dugdale', 20.0_dp, 4.0_dp, radius, level)
       call check_close(radius, 6.0_dp**(1.0_dp/3.0_dp), 0.1_dp, 'DMT: radius')
    end subroutine hertz_jkr_and_dmt_limits
 
-   !> The approach converges with the mesh to Maugis's, lambda = 0.5. The cells pin the edge of the
-   !> cohesive zone: a cell that leaves it springs back by about 1.1 gamma_0/z_0 dx/E*, here 0.03 at the
+   !> The approach converges with the mesh to that of Maugis, lambda = 0.5. The cells pin the edge of the
+   !> cohesive zone: a cell that leaves it springs back by about 1.1 gamma_0/z_0 dx/E*, here 0.03 on the
    !> finest mesh.
    subroutine sphere_converges_with_the_mesh()
       real(dp) :: radius, a, m, load, lambda, approach, levels(3)
@@ -223,7 +224,7 @@ contains
       call check_close(radius, a, 0.05_dp, 'Maugis: radius')
    end subroutine sphere_converges_with_the_mesh
 
-   !> Maugis's condition for the outer radius c = m a of the cohesive zone, zero where it holds.
+   !> Maugis's condition for the outer radius c = m a of the cohesive zone; it is zero if the condition holds.
    pure function maugis_condition(a, m, lambda) result(value)
       real(dp), intent(in) :: a, m, lambda
       real(dp) :: value
@@ -234,7 +235,7 @@ contains
          + 4*lambda**2*a/3*(s*atan(s) - m + 1) - 1
    end function maugis_condition
 
-   !> m by bisection.
+   !> Find m by bisection.
    pure function maugis_ratio(a, lambda) result(m)
       real(dp), intent(in) :: a, lambda
       real(dp) :: m
@@ -262,12 +263,12 @@ contains
       load = a**3 - lambda*a**2*(s + m**2*atan(s))
    end function maugis_load
 
-   !> The least load while the sphere is drawn off, against Maugis's, from two meshes.
+   !> The smallest load while the sphere is pulled off, against that of Maugis, on two meshes.
    subroutine pull_off_force_of_maugis(name, lambda, n, first, step, tolerance)
       character(*), intent(in) :: name
       real(dp), intent(in) :: lambda
       integer, intent(in) :: n                     !! cells of the coarser mesh
-      real(dp), intent(in) :: first, step          !! levels: the first, and how far between two
+      real(dp), intent(in) :: first, step          !! levels: the first one, and the difference between two
       real(dp), intent(in) :: tolerance            !! in pi gamma_0 R
       real(dp) :: exact, loads(2)
       integer :: k
@@ -284,7 +285,7 @@ contains
          'pull-off '//name//': converges with the mesh')
    end subroutine pull_off_force_of_maugis
 
-   !> The least load on the way from contact to nothing, at prescribed level, in steps.
+   !> The smallest load between contact and separation, at prescribed levels in steps.
    subroutine draw_off(name, lambda, n, first, step, least)
       character(*), intent(in) :: name
       real(dp), intent(in) :: lambda
@@ -358,7 +359,7 @@ contains
       call solver%destroy()
    end subroutine force_is_derivative_of_energy
 
-   !> Tabor 5 and 8 on a mesh that is too coarse for them: the solver converges nevertheless.
+   !> Tabor parameters 5 and 8 on a mesh that is too coarse for them: the solver converges nevertheless.
    subroutine strong_attraction_on_coarse_mesh()
       real(dp) :: radius, level
 
@@ -370,7 +371,7 @@ contains
       call check_that(radius > 1.1_dp .and. radius < 2.1_dp, 'Tabor 5, Maugis', [radius])
    end subroutine strong_attraction_on_coarse_mesh
 
-   !> The same bits with one and with two threads.
+   !> One and two threads give the same bits.
    subroutine same_bits_on_two_threads()
       real(dp) :: radius(2), level(2)
       integer :: k
@@ -383,7 +384,7 @@ contains
       call check_that(level(1) == level(2), 'threads do not matter')
    end subroutine same_bits_on_two_threads
 
-   !> Held, and detached, under a prescribed pull; a line contact is refused.
+   !> Under a prescribed pull the contact holds or detaches. A line contact is refused.
    subroutine held_detached_and_refused()
       type(grid_type) :: grid
       type(adhesion_solver_type) :: solver

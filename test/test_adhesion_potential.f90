@@ -29,7 +29,7 @@ contains
       if (selected('table_of_a_line')) call table_of_a_line()
    end subroutine run_adhesion_potential
 
-   !> The attraction of Maugis-Dugdale ends at the range; wrong names and numbers are refused together.
+   !> The attraction of Maugis-Dugdale ends at the range. Wrong names and numbers are reported together.
    subroutine bounds_of_the_range()
       type(adhesion_potential_type) :: potential
       type(error_type), allocatable :: error
@@ -48,8 +48,8 @@ contains
       call check_error(error, 'range', 'range of zero, in the same message')
    end subroutine bounds_of_the_range
 
-   !> A table of another potential is that potential, to the order of cubic interpolation; its energy, slope
-   !> and curvature belong together exactly.
+   !> A table of the values of another potential reproduces it to the order of cubic interpolation. Its
+   !> energy, slope and curvature are exactly consistent.
    subroutine table()
       type(adhesion_potential_type) :: exact, made
       type(error_type), allocatable :: error
@@ -74,7 +74,7 @@ contains
          end do
          call check_that(miss(2) < 1e-6_dp*energy/range .and. miss(2) < miss(1)/12.0_dp, &
             trim(names(which))//': fourth order', miss)
-         ! What the table leaves out beyond its end is exp(-10) of the exponential.
+         ! The table neglects exp(-10) of the exponential beyond its end.
          call check_close(made%energy, energy, 1e-4_dp*energy, trim(names(which))//': work of separation')
          h = 1e-3_dp*reach/n
          do k = 1, 20
@@ -92,7 +92,7 @@ contains
       call check_close(made%range, sqrt(0.5_dp*exp(1.0_dp))*range, 2e-3_dp*range, 'unit of length of gauss')
    end subroutine table
 
-   !> One interval with an attraction that falls linearly, by hand; wrong tables are refused.
+   !> One interval with an attraction that falls linearly, computed by hand. Wrong tables are refused.
    subroutine table_of_a_line()
       type(adhesion_potential_type) :: made
       type(error_type), allocatable :: error
@@ -142,7 +142,7 @@ contains
       call check_close(-adhesive_slope(potential, 0.0_dp), release, 1e-6_dp, name//': release')
       call check_close(adhesive_slope(potential, 0.0_dp), -release, 1e-6_dp, name//': slope there')
       call check_close(adhesive_energy(potential, 50*range), 0.0_dp, 0.0_dp, name//': far away')
-      ! The work of separation is gamma_0: midpoint rule.
+      ! The work of separation is gamma_0, by the midpoint rule.
       work = 0.0_dp
       n = 4000
       do k = 1, n

@@ -1,5 +1,6 @@
-!> Tests of the motion of a block with mass: its rule alone, and a flat block on a flat road in a run, whose
-!> mean motion is exactly that of one mass on a spring with arms, held by Coulomb's friction.
+!> Tests of the motion of a block with mass: the integration rule alone, and a flat block on a flat road in a
+!> run. The mean motion of this block is exactly that of one mass on a spring with arms, held by Coulomb
+!> friction.
 module test_block_motion
    use block_motion, only : block_motion_type
    use case_input, only : parse_case
@@ -17,10 +18,11 @@ module test_block_motion
 
    real(dp), parameter :: height = 1e-3_dp, density = 2000.0_dp, mass = 0.5_dp*height*density
    real(dp), parameter :: g_e = 1e6_dp, g(2) = [0.3e6_dp, 0.2e6_dp]
-   real(dp), parameter :: period = 2.0_dp*pi*height*3.1622776601683794e-2_dp   !! of the mass on g_e, s
+   real(dp), parameter :: period = 2.0_dp*pi*height*3.1622776601683794e-2_dp   !! period of the mass on g_e, s
    real(dp), parameter :: tau(2) = [0.05_dp, 0.5_dp]*period
    real(dp), parameter :: speed = 0.3_dp                    !! of the road, m/s
-   !> Friction in three phases of four periods: the block is drawn along, slips, springs back, is caught.
+   !> Friction in three phases of four periods: the block is dragged along, slips, springs back, and sticks
+   !> again.
    real(dp), parameter :: friction(3) = [4e4_dp, 1.2e4_dp, 3e4_dp]   !! Pa
    real(dp), parameter :: length = 4.0_dp*period            !! of a phase, s
 
@@ -41,8 +43,8 @@ contains
       if (selected('books_of_a_flat_block_close')) call books_of_a_flat_block_close()
    end subroutine run_block_motion
 
-   !> The rule against a given force m a(t), a = cos(w t): second order through steps of two lengths; work =
-   !> kinetic energy + loss, exactly.
+   !> The rule under a given force m a(t), a = cos(w t): it is of second order for steps of two lengths, and
+   !> the work equals kinetic energy plus loss exactly.
    subroutine rule_of_motion_is_second_order()
       type(block_motion_type) :: block
       real(dp) :: errors(3), t, dt, advance, known(2), force
@@ -68,7 +70,7 @@ contains
          to_text(errors(1))//', '//to_text(errors(2))//', '//to_text(errors(3)), errors)
    end subroutine rule_of_motion_is_second_order
 
-   !> A block that is held comes to rest: the remaining speed and force are halved from step to step.
+   !> A block that is held comes to rest: each step halves the remaining speed and force.
    subroutine held_block_comes_to_rest()
       type(block_motion_type) :: block
       real(dp) :: known(2), force
@@ -86,7 +88,8 @@ contains
       call check_order(block%lost, '>=', 0.0_dp, 'stuck: the loss is positive')
    end subroutine held_block_comes_to_rest
 
-   !> Stick, slip, a drop and a rise of the load: displacement and speed of second order, rms over all rows.
+   !> Stick, slip, a fall and a rise of the load: displacement and speed are of second order, rms over all
+   !> rows.
    subroutine motion_of_a_block_is_second_order()
       integer, parameter :: steps(3) = [40, 80, 160]        !! per period
       real(dp) :: error_u(3), error_v(3), lost, viscous
@@ -107,7 +110,7 @@ contains
       call check_close(error_v(3), 0.0_dp, 2e-3_dp, 'speed at 160 steps per period')
    end subroutine motion_of_a_block_is_second_order
 
-   !> Run the flat block beside the exact one: rms errors over the largest values.
+   !> Run the flat block and the exact one; return rms errors relative to the largest values.
    subroutine compare(steps, error_u, error_v, lost, viscous)
       integer, intent(in) :: steps
       real(dp), intent(out) :: error_u, error_v, lost, viscous
@@ -144,8 +147,8 @@ contains
       call sim%destroy()
    end subroutine compare
 
-   !> The exact motion over a time that lies in one phase, by Runge-Kutta in short steps with the turns of
-   !> stick and slip found by halving.
+   !> The exact motion over a time within one phase, by Runge-Kutta in short steps. Changes between stick and
+   !> slip are found by bisection.
    subroutine move(self, start, time)
       type(motion_type), intent(inout) :: self
       real(dp), intent(in) :: start, time
@@ -191,7 +194,7 @@ contains
       end do
    end subroutine move
 
-   !> Does stick end, or slip come to a stop?
+   !> Does stick end, or does slip stop?
    pure function turns(before, after, bound) result(yes)
       type(motion_type), intent(in) :: before, after
       real(dp), intent(in) :: bound
@@ -200,12 +203,12 @@ contains
       if (before%sticks) then
          yes = abs(stress(after)) > bound
       else
-         ! Slip of the road over the rubber has the sign of the friction: v has the other one.
+         ! The slip of the road over the rubber has the sign of the friction; v has the opposite sign.
          yes = after%y(2)*before%sign > 0.0_dp
       end if
    end function turns
 
-   !> Traction that strains the block, Pa.
+   !> Traction that deforms the block, Pa.
    pure function stress(self) result(traction)
       type(motion_type), intent(in) :: self
       real(dp) :: traction
@@ -234,7 +237,7 @@ contains
          real(dp), intent(in) :: y(4)
          real(dp) :: rates(4), u_rate
 
-         u_rate = y(2) + speed                              ! v is the speed over the road
+         u_rate = y(2) + speed                              ! v is the speed relative to the road
          rates(1) = u_rate
          rates(2) = 0.0_dp
          if (.not. self%sticks) rates(2) = (self%sign*bound - g_e*y(1)/height - sum(y(3:)))/mass
@@ -243,7 +246,8 @@ contains
 
    end function step
 
-   !> Both books of the flat block: the fields' to round-off, work of the drive to the step's error.
+   !> Both energy balances of the flat block: that of the fields closes to round-off, the work of the drive to
+   !> the error of the steps.
    subroutine books_of_a_flat_block_close()
       type(record_type) :: record
       real(dp) :: missing(2)
@@ -255,11 +259,11 @@ contains
          missing(k) = maxval(abs(record%rows%work_missing))/maxval(record%rows%work_drive)
       end do
       call check_order(maxval(record%rows%energy_kinetic), '>', 0.05_dp*maxval(record%rows%energy_elastic), &
-         'the block swings')
+         'the block oscillates')
       call check_close(missing(2), 0.0_dp, 0.01_dp, 'flat block: missing work')
    end subroutine books_of_a_flat_block_close
 
-   !> The case: pressure so that the friction is that of the phase at a coefficient of 0.5.
+   !> The case. The pressure is such that the friction is that of the phase for a coefficient of 0.5.
    function flat(steps) result(text)
       integer, intent(in) :: steps                          !! per period
       character(:), allocatable :: text

@@ -40,13 +40,13 @@ contains
       if (selected('every_template_is_a_good_input')) call every_template_is_a_good_input()
    end subroutine run_case_input
 
-   !> What is not given.
+   !> Default values.
    subroutine defaults_of_a_short_input()
       type(case_type) :: case
       type(error_type), allocatable :: error
 
       call parse_case(body, 'folder/road.nml', case, error)
-      call check_no_error(error, 'a small case')
+      call check_no_error(error, 'a case with defaults')
       if (allocated(error)) return
       call check_close(case%grid%ly, 1.0e-3_dp, 1.0e-18_dp, 'ly makes square cells')
       call check_close(case%surfaces(1)%centre_x, 1.0e-3_dp, 1.0e-18_dp, 'centre_x')
@@ -67,11 +67,11 @@ contains
       call check_close(case%solver%coupling_tolerance, 0.0_dp, 0.0_dp, 'coupling tolerance')
       call check_that(case%solver%slip_law == 'physical' .and. case%solver%interpolation == 'cubic', &
          'slip_law, interpolation')
-      call check_that(case%output%file == 'folder/road.h5', 'the result lies beside the input')
+      call check_that(case%output%file == 'folder/road.h5', 'the result is in the folder of the input')
       call check_that(size(case%output%snapshot_fields) == 5, 'snapshot_fields')
       call check_that(case%input == body, 'the text is kept')
 
-      ! an odd number of cells, and an input without an ending
+      ! An odd number of cells, and an input whose name has no ending.
       call parse_case('&grid nx=5 ny=3 lx=5.0 ly=6.0/'//sphere//steel//press, 'road', case, error)
       call check_no_error(error, 'odd numbers')
       if (allocated(error)) return
@@ -100,9 +100,9 @@ contains
       call check_close(case%solver%tolerance, 1.0e-8_dp, 1.0e-22_dp, 'tolerance')
       call check_that(case%solver%threads == 2 .and. case%solver%method == 'thesis', 'solver')
       call check_that(size(case%surfaces) == 2, 'two surfaces')
-      call check_that(case%surfaces(2)%file == 'in/maps/a.h5', 'a path counts from the input')
+      call check_that(case%surfaces(2)%file == 'in/maps/a.h5', 'a path is relative to the input')
       call check_close(case%surfaces(2)%scale, -2.0_dp, 0.0_dp, 'scale')
-      call check_that(case%output%file == '/tmp/x.h5', 'an absolute path stays')
+      call check_that(case%output%file == '/tmp/x.h5', 'an absolute path is kept')
       call check_that(all(case%output%snapshot_fields == ['gap     ', 'pressure']), 'snapshot_fields')
       call check_that(case%output%compression == 0 .and. case%output%snapshot_every == 3, 'output')
 
@@ -117,7 +117,7 @@ contains
       call check_close(case%surfaces(1)%rms_height, 0.0_dp, 0.0_dp, 'no rms_height')
    end subroutine values_in_all_forms_of_fortran
 
-   !> Phases that inherit and derive.
+   !> Phases that inherit values, and values that are derived.
    subroutine phases_inherit_from_earlier_ones()
       type(case_type) :: case
       type(error_type), allocatable :: error
@@ -135,14 +135,14 @@ contains
       call check_close(case%phases(4)%target, -1.0e-6_dp, 0.0_dp, 'a negative displacement')
    end subroutine phases_inherit_from_earlier_ones
 
-   !> Time steps, given and derived. Cells are 2e-3/64 m.
+   !> Time steps that are given or derived. Cells are 2e-3/64 m long.
    subroutine time_steps_given_and_derived()
       type(case_type) :: case
       type(error_type), allocatable :: error
       real(dp), parameter :: dx = 2.0e-3_dp/64
       character(*), parameter :: arms = '&material shear_modulus=1e6, prony_g=3*1e6, prony_tau=1e-6, 0.4, 9.0 /'
 
-      ! 2 cells in 0.3 s are no whole number of 0.07 s: 4 steps of 0.075 s
+      ! 2 cells in 0.3 s would take 4.3 steps of 0.07 s, hence 4 steps of 0.075 s
       call parse_case(body//'&phase duration = 0.3, dt = 0.07 /&phase duration = 0.3, steps = 7 /'// &
          '&phase duration = 0.3, dt = 0.1, steps = 3, ramp = ''linear'', force = 1.0 /'// &
          '&phase duration = 8.0 /', 'a', case, error)
@@ -152,14 +152,14 @@ contains
       call check_steps(5, 20, 0.4_dp, 'elastic at rest')
       call check_that(case%phases(4)%linear .and. .not. case%phases(4)%static, 'a ramp')
 
-      ! an arm of 1e-6 s relaxes at once in a second: 0.4 s counts; 8 s take at least 20 steps
+      ! An arm of 1e-6 s relaxes at once in a second, so that 0.4 s counts. 8 s take at least 20 steps.
       call parse_case(grid//sphere//arms//press//'&phase duration = 1.0 /&phase duration = 8.0 /'// &
          '&phase duration = 0.5e-6 /', 'a', case, error)
       call check_steps(2, 20, 0.05_dp, 'an eighth of the shortest active time')
       call check_steps(3, 160, 0.05_dp, 'the same in a longer phase')
       call check_steps(4, 20, 0.025e-6_dp, 'a phase shorter than every time')
 
-      ! one cell a step, along x, along y with other cells, and obliquely
+      ! one cell per step along x, along y with other cells, and obliquely
       call parse_case('&grid nx=64, ny=32, lx=2e-3, ly=3e-3 /'//sphere//arms//press// &
          '&phase duration = 1.0, velocity_x = -1e-3 /&phase duration = 1.0, velocity_y = 3e-3 /'// &
          '&phase duration = 1.0, velocity_x = 1e-3, velocity_y = 3e-3 /'// &
@@ -170,7 +170,7 @@ contains
       call check_that(case%phases(2)%dt_reason == 'for one cell per step', &
          'why: '//case%phases(2)%dt_reason)
       call check_order(index(case%warnings, '&phase 5: a step moves the road by 8 cells'), '>', 0, &
-         'a coarse step is warned of: '//case%warnings)
+         'there is a warning about a coarse step: '//case%warnings)
 
    contains
 
@@ -180,7 +180,7 @@ contains
          character(*), intent(in) :: what
 
          if (size(case%phases) < i) then
-            call check_that(.false., what//': the phase is not there')
+            call check_that(.false., what//': the phase does not exist')
             return
          end if
          call check_that(case%phases(i)%steps == steps, what//': steps')
@@ -189,7 +189,7 @@ contains
 
    end subroutine time_steps_given_and_derived
 
-   !> Adhesion allows pulling; mixed precision goes with the fast method alone.
+   !> Adhesion allows a pull. Mixed precision is for the fast method only.
    subroutine options_that_exclude_each_other()
       type(case_type) :: case
       type(error_type), allocatable :: error
@@ -200,7 +200,7 @@ contains
       call check_close(case%phases(2)%target, -1.0_dp, 0.0_dp, 'a pulling pressure')
       call parse_case(body//'&solver precision = ''mixed'' /', 'a', case, error)
       call check_no_error(error, 'mixed precision')
-      call check_that(case%solver%precision == 'mixed', 'mixed precision is kept')
+      call check_that(case%solver%precision == 'mixed', 'mixed precision is accepted')
       call parse_case(body//'&solver precision = ''mixed'', method = ''thesis'' /', 'a', case, error)
       call check_error(error, 'precision', 'mixed precision of the thesis''s method')
       call check_error(error, 'thesis', 'mixed precision of the thesis''s method')
@@ -252,7 +252,8 @@ contains
          'summary: '//case_summary(case))
    end subroutine resolved_settings_give_the_same_case
 
-   !> Every template is a good input, or waits for a feature; those of the elastic spine are there.
+   !> Every template is a valid input, or needs a feature that is not available; those of elastic contact must
+   !> exist.
    subroutine every_template_is_a_good_input()
       type(case_type) :: case
       type(error_type), allocatable :: error
@@ -280,7 +281,7 @@ contains
       call check_that(template_text('nothing') == '', 'no such template')
    end subroutine every_template_is_a_good_input
 
-   !> How often a piece occurs in a text.
+   !> The number of occurrences of a piece in a text.
    pure integer function occurrences(text, piece)
       character(*), intent(in) :: text, piece
       integer :: i
@@ -291,7 +292,7 @@ contains
       end do
    end function occurrences
 
-   !> Arms are parsed and checked, and then refused as long as they are not available.
+   !> Arms are read, and their times are shifted to the temperature.
    subroutine materials_of_arms_and_branches()
       type(case_type) :: case
       type(error_type), allocatable :: error
@@ -315,7 +316,7 @@ contains
       end if
    end subroutine materials_of_arms_and_branches
 
-   !> Each of these is one fault with a known message.
+   !> Each of these inputs has one fault, with a known message.
    subroutine each_fault_has_its_message()
       character(*), parameter :: no_grid = sphere//steel//press
       character(*), parameter :: no_surface = grid//steel//press

@@ -174,7 +174,7 @@ contains
       call reader%close()
    end subroutine state_comes_back
 
-   !> Every setting that differs is named.
+   !> Every setting that differs is named in the message.
    subroutine other_cases_are_refused()
       type(checkpoint_reader_type) :: reader
       type(error_type), allocatable :: error
@@ -194,7 +194,7 @@ contains
       call reader%close()
    end subroutine other_cases_are_refused
 
-   !> A checkpoint that is not finished takes nothing away.
+   !> A checkpoint that is not finished does not replace the one before.
    subroutine old_one_stays_until_commit()
       type(checkpoint_writer_type) :: writer
       type(checkpoint_reader_type) :: reader
@@ -216,7 +216,7 @@ contains
       call check_error(error, 'there is no folder', 'missing folder')
    end subroutine old_one_stays_until_commit
 
-   !> One bit, wherever it is, and a cut or longer file: HDF5 does not get to see it.
+   !> A flipped bit anywhere, and a shorter or longer file, are found before HDF5 reads the file.
    subroutine damage_is_found()
       type(checkpoint_reader_type) :: reader
       type(error_type), allocatable :: error
@@ -241,7 +241,7 @@ contains
          end if
          write (unit, pos=place) bytes(place)
       end do
-      call check_that(refused == tried .and. tried > 100, 'every flipped bit is found', &
+      call check_that(refused == tried .and. tried > 100, 'each flipped bit is found', &
          [real(refused, dp), real(tried, dp)])
       write (unit, pos=length + 1) 0_int8
       flush (unit)

@@ -1,4 +1,4 @@
-!> Tests of fields that threads compress: HDF5 reads them, and the bytes do not depend on the threads.
+!> Tests of fields that threads compress: HDF5 can read them, and the bytes do not depend on the threads.
 module test_chunk_writer
    use asperity_errors, only : error_type
    use asperity_threads, only : set_threads, thread_count
@@ -57,7 +57,7 @@ contains
       end subroutine check_sum
    end subroutine sums_of_fletcher
 
-   !> A rough field with a part that is zero; the numbers depend on the place alone.
+   !> A rough field, a part of which is zero. The numbers depend on the place only.
    pure function value_at(i, j) result(value)
       integer, intent(in) :: i, j
       real(dp) :: value
@@ -94,7 +94,7 @@ contains
       call file%close(error)
    end subroutine write_fields
 
-   !> A state of contact.
+   !> A contact state.
    pure function state_at(i, j) result(state)
       integer, intent(in) :: i, j
       integer(int8) :: state
@@ -102,7 +102,7 @@ contains
       state = int(mod(i/7 + j, 3) - 1, int8)
    end function state_at
 
-   !> HDF5 reads what was written, with every filter: chunks of many rows, of a single row, a last one that
+   !> HDF5 can read the fields with every filter: chunks of many rows and of a single row, a last chunk that
    !> is not full, and fields smaller than a chunk.
    subroutine fields_come_back()
       integer, parameter :: nx(4) = [700, 131073, 5, 1], ny(4) = [1200, 3, 3, 1], levels(3) = [0, 1, 9]
@@ -131,8 +131,8 @@ contains
       end do
    end subroutine fields_come_back
 
-   !> The file is the same for one thread, and for more threads than chunks. HDF5 puts four times and a checksum,
-   !> of four bytes each, into the header of a dataset.
+   !> The file is the same for one thread and for more threads than chunks. HDF5 writes four times and a
+   !> checksum, of four bytes each, into the header of a dataset.
    subroutine bytes_for_any_number_of_threads()
       integer, parameter :: threads(3) = [1, 2, 7]
       type(error_type), allocatable :: error
@@ -152,7 +152,7 @@ contains
       call set_threads(before)
    end subroutine bytes_for_any_number_of_threads
 
-   !> The bytes of the file.
+   !> Bytes of the file.
    subroutine bytes_of_file(bytes)
       integer(int8), allocatable, intent(out) :: bytes(:)
       integer :: length, unit
@@ -164,7 +164,8 @@ contains
       close (unit)
    end subroutine bytes_of_file
 
-   !> A random plane promises nothing; frequent bytes, runs, and what is repeated do.
+   !> The estimate expects nothing of a plane of random bytes, but expects frequent bytes, runs and
+   !> repetitions to be compressed.
    subroutine planes_worth_compressing()
       integer, parameter :: n = 2**17
       integer(int8), allocatable :: plane(:)
@@ -188,8 +189,8 @@ contains
       call check_close(expected_gain(plane(:1)), 1.0_dp, 0.0_dp, 'a plane of one byte')
    end subroutine planes_worth_compressing
 
-   !> Of random reals between 1 and 2, six bytes are stored as they are, and two are compressed to less
-   !> than one. So many zeros as here take next to nothing.
+   !> Of random reals between 1 and 2, six bytes are stored unchanged, and two are compressed to less than
+   !> one. The many zeros of this field need almost no space.
    subroutine random_planes_are_stored()
       integer, parameter :: n = 131072
       real(dp), allocatable :: x(:)
@@ -209,7 +210,7 @@ contains
       call check_order(10*length, '<', n, 'zeros')
    end subroutine random_planes_are_stored
 
-   !> A write that fails, here because the rows are not those of a chunk, is reported at the end; the file is
+   !> A failed write (here because the rows are not those of a chunk) is reported at the end. The file is
    !> closed and can be read.
    subroutine first_fault_ends_a_field()
       type(hdf5_file_type) :: file

@@ -1,4 +1,4 @@
-!> Tests of the passes of a row with friction: acceleration, control, and what they settle.
+!> Tests of the passes of a row with friction: acceleration, control, and the states that they reach.
 module test_coupled_passes
    use anderson, only : anderson_type, new_anderson
    use check, only : begin_suite, check_close, check_order, check_that, selected
@@ -33,7 +33,8 @@ contains
       if (selected('steep_road_settles_and_books_close')) call steep_road_settles_and_books_close()
    end subroutine run_coupled_passes
 
-   !> Whole cells exactly, parts bilinearly, round a periodic map and on to the rim of a free one.
+   !> A field moves exactly by whole cells, and bilinearly by parts of a cell. It continues periodically, or
+   !> constantly beyond the rim of a free map.
    subroutine carried_fields_move_with_the_contact()
       integer, parameter :: nx = 9, ny = 5
       real(dp), parameter :: cell(2) = [0.5_dp, 0.3_dp]
@@ -59,8 +60,8 @@ contains
       call check_close(moved(nx, 2), field(nx, 2), 1.0e-14_dp, 'free, at the rim')
    end subroutine carried_fields_move_with_the_contact
 
-   !> Five cells: in contact, open, open with a pressure of round-off, one whose gap is meant to be 0, and one
-   !> that overlaps with the road.
+   !> Five cells: in contact, open, open with a pressure of round-off, with a gap that is 0 to the tolerance,
+   !> and one that overlaps with the road.
    subroutine edge_cells_are_judged_one_by_one()
       real(dp), parameter :: soft = 1.0e-12_dp, reach = 2.0e-6_dp
       real(dp), parameter :: pressure(5, 1) = reshape([3.0e6_dp, 0.0_dp, 1.0e-8_dp, 1.0e6_dp, 0.0_dp], [5, 1])
@@ -86,7 +87,7 @@ contains
       expected = [1.0_dp, 0.0_dp, 0.0_dp, 0.5_dp + 0.4995_dp, 1.0_dp]
       call check_close(maxval(abs(share(:, 1) - expected)), 0.0_dp, 1.0e-9_dp, 'shares that have moved')
 
-      ! The pressures press the cells in by 4 um in all.
+      ! The pressures correspond to an indentation of 4 um in all.
       share(:, 1) = [1.0_dp, 0.0_dp, 0.0_dp, 1.0_dp, 1.0_dp]
       call check_close(rule%error(share, pressure, gap), 3.001_dp/4.0_dp, 1.0e-9_dp, 'gap and overlap with traction')
       share(:, 1) = [0.5_dp, 0.0_dp, 0.5_dp, 0.0_dp, 0.0_dp]
@@ -94,8 +95,8 @@ contains
          'pressure without the whole traction, gap and overlap')
    end subroutine edge_cells_are_judged_one_by_one
 
-   !> A displacement that moves along by a cell a step and grows with the square of the time is forecast
-   !> exactly after four steps; after a step of another length nothing is taken for granted.
+   !> A displacement that moves by one cell per step and grows with the square of the time is forecast exactly
+   !> after four steps. After a step of another length there is no extrapolation.
    subroutine forecast_finds_quadratic_changes()
       integer, parameter :: nx = 12, ny = 5
       real(dp), parameter :: motion(2) = [0.5_dp, 0.0_dp]
@@ -121,8 +122,8 @@ contains
       end do
    end subroutine forecast_finds_quadratic_changes
 
-   !> Changes that alternate make differences larger with each order: the displacement of the row before
-   !> remains the forecast. Outside the contact nothing counts.
+   !> Changes that alternate make differences of higher order larger. The forecast is then the displacement of
+   !> the row before. Cells outside the contact are ignored.
    subroutine forecast_leaves_erratic_changes_alone()
       integer, parameter :: nx = 8, ny = 6
       type(place_forecast_type) :: forecast
@@ -148,8 +149,8 @@ contains
       end do
    end subroutine forecast_leaves_erratic_changes_alone
 
-   !> A block that is sheared while it sticks: after some steps one pass is enough, with a spare one
-   !> allowed here. Without a forecast each of these steps takes three.
+   !> A block that is sheared while it sticks: after some steps one pass is enough (the test allows two).
+   !> Without a forecast each of these steps takes three.
    subroutine forecast_saves_passes()
       type(record_type) :: record
 
@@ -165,8 +166,8 @@ contains
       end associate
    end subroutine forecast_saves_passes
 
-   !> Maps that plain iteration does not settle: with gains of -2.5 and 1.5 in six directions, and
-   !> one that depends on a field nonlinearly.
+   !> Maps for which plain iteration does not converge: one with gains of -2.5 and 1.5 in six directions, and
+   !> one that depends nonlinearly on a field.
    subroutine mixing_settles_where_plain_passes_fail()
       integer, parameter :: nx = 8, ny = 5
       type(anderson_type) :: mixing
@@ -190,7 +191,7 @@ contains
       end do
       call check_order(norm2(f), '<', 1.0e-9_dp*first, 'a linear map')
       z = 0.7_dp*answer
-      gain = min(gain, 0.5_dp)                  ! as those of roads: plain iteration flips
+      gain = min(gain, 0.5_dp)                  ! Gains like those of roads, for which plain iteration alternates.
       call mixing%forget()
       do pass = 1, 60
          f = (gain - 1.0_dp)*(z - answer) + 0.3_dp*sin(z - answer)*cos(cshift(z, 1) - cshift(answer, 1))
@@ -201,10 +202,10 @@ contains
       call mixing%step(even, 0.0_dp*f, z, plain=.false.)
       f = z
       call mixing%step(even, 0.0_dp*f, z, plain=.false.)
-      call check_close(maxval(abs(z - f)), 0.0_dp, 0.0_dp, 'a place that is found stays')
+      call check_close(maxval(abs(z - f)), 0.0_dp, 0.0_dp, 'the solution is kept')
    end subroutine mixing_settles_where_plain_passes_fail
 
-   !> The accuracy follows the mismatch, and becomes finer where it does not fall.
+   !> The accuracy follows the mismatch, and is increased if the mismatch does not fall.
    subroutine accuracy_follows_the_mismatch()
       type(pass_control_type) :: control
       integer :: i
@@ -233,9 +234,9 @@ contains
       call check_order(control%damping, '<', 0.5_dp, 'shorter steps from there')
    end subroutine accuracy_follows_the_mismatch
 
-   !> A steep wave under a massless block of forty wavelengths, once sheared: with the strains read
-   !> one pass behind the contact no number of passes ended its jumps (mean change of the speed above
-   !> 1 m/s with 2 passes as with 30).
+   !> A steep wave under a block without mass of forty wavelengths, which has been sheared. When the strains
+   !> were read one pass behind the contact, it jumped with any number of passes (mean change of the speed
+   !> above 1 m/s with 2 passes as with 30).
    subroutine thick_block_on_steep_wave_settles()
       type(record_type) :: record
       real(dp) :: swing
@@ -256,7 +257,8 @@ contains
       end associate
    end subroutine thick_block_on_steep_wave_settles
 
-   !> rms slope 0.45 and coefficient 0.8, on which plain passes flip: settled, and the books close.
+   !> On a road of rms slope 0.45 with a coefficient of 0.8 plain passes alternate. The passes settle, and the
+   !> energy balance closes.
    subroutine steep_road_settles_and_books_close()
       type(record_type) :: record
 
@@ -270,10 +272,10 @@ contains
          '&phase pressure = 0.2e6, duration = 0.6e-3, steps = 2 /'//nl// &
          '&solver tolerance = 1e-7, interpolation = ''cubic'' /', 'steep road', record)
       call check_order(maxval(record%rows%residual_coupling), '<=', 1.0e-7_dp, 'the passes settle')
-      call check_order(maxval(record%rows%passes), '>', 3, 'it is a hard case')
+      call check_order(maxval(record%rows%passes), '>', 3, 'the case needs several passes')
       call check_books(record, 'steep road', 1.0e-6_dp)
       associate (lost => record%rows%dissipated_friction)
-         call check_that(all(lost(2:) >= lost(:size(lost) - 1)), 'friction takes energy, in the jump, too', &
+         call check_that(all(lost(2:) >= lost(:size(lost) - 1)), 'friction loses energy, also in the jump', &
             lost)
       end associate
    end subroutine steep_road_settles_and_books_close

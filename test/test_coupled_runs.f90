@@ -1,5 +1,5 @@
-!> Tests of whole runs with many passes, and of a block in mid-swing: threads, restarts, order in time,
-!> and what the flat friction law leaves out of the balance of energy.
+!> Tests of whole runs with many passes, and of an oscillating block: threads, restarts, order in time, and
+!> the error of the energy balance without the slope effect.
 module test_coupled_runs
    use asperity_checkpoint, only : checkpoint_reader_type, checkpoint_writer_type, remove_checkpoint
    use asperity_errors, only : error_type
@@ -33,7 +33,7 @@ contains
       if (selected('constant_shear_settles_and_books_close')) call constant_shear_settles_and_books_close()
    end subroutine run_coupled_runs
 
-   !> A steep road under a viscoelastic block, with a drop of the load: rows of many passes.
+   !> A steep road under a viscoelastic block, with a drop of the load. Its rows need many passes.
    function steep() result(text)
       character(:), allocatable :: text
 
@@ -48,7 +48,7 @@ contains
          '&solver tolerance = 1e-7 /'
    end function steep
 
-   !> A block with a mass on a rough road, that sticks, slips and swings: twelve steps per period.
+   !> A block with a mass on a rough road that sticks, slips and oscillates, with twelve steps per period.
    function swinging() result(text)
       character(:), allocatable :: text
 
@@ -63,7 +63,7 @@ contains
          '&solver tolerance = 1e-7 /'
    end function swinging
 
-   !> One and two threads give the same bits; so does a run that is taken up from a checkpoint in its middle.
+   !> One and two threads give the same bits, and so does a run that is continued from a checkpoint.
    subroutine same_bits_on_threads_and_after_restart(text, what)
       character(*), intent(in) :: text
       character(*), intent(in) :: what
@@ -78,7 +78,7 @@ contains
       call check_same_bits(one, two, what//': threads')
    end subroutine same_bits_on_threads_and_after_restart
 
-   !> All rows of a run, [column, row]; it is stopped and taken up again after a number of rows.
+   !> All rows of a run, [column, row]. The run is stopped and continued after a number of rows.
    subroutine run_rows(text, what, stop_after, values)
       character(*), intent(in) :: text
       character(*), intent(in) :: what
@@ -110,7 +110,7 @@ contains
       call sim%destroy()
    end subroutine run_rows
 
-   !> Replace a simulation by a new one that takes its state from a checkpoint.
+   !> Replace a simulation by a new one that reads its state from a checkpoint.
    subroutine through_checkpoint(case, what, sim)
       type(case_type), intent(in) :: case
       character(*), intent(in) :: what
@@ -132,7 +132,7 @@ contains
       call remove_checkpoint(path)
    end subroutine through_checkpoint
 
-   !> Two runs have the same rows, but for the time that they took.
+   !> Two runs have the same rows, except for the wall time.
    subroutine check_same_bits(one, other, what)
       real(dp), intent(in) :: one(:, :), other(:, :)
       character(*), intent(in) :: what
@@ -151,9 +151,9 @@ contains
    end subroutine check_same_bits
 
    !> The order in time with friction (docs/theory.md). On a profile the surface slips along one line, and
-   !> friction, approach and losses are of second order. On a map each point slips in its own direction,
-   !> which the mean slip of a step knows half a step late: the traction across the motion is of first order,
-   !> and with it, by a small factor, all else.
+   !> friction, approach and losses are of second order. On a map each point slips in its own direction, for
+   !> which the mean slip of a step is late by half a step. The traction across the motion is therefore of
+   !> first order, and all other quantities by a small part.
    subroutine orders_in_time_with_friction()
       integer, parameter :: steps(3) = [16, 64, 256]
       type(record_type) :: record
@@ -199,9 +199,9 @@ contains
          '&solver tolerance = 1e-9 /'
    end function order_case
 
-   !> Without `slope_effect` the road also pushes the rubber with -P grad H, whose work on the motion of the
-   !> rubber's surface is in no book. The work missing is then of second order in the slope, however short
-   !> the steps; with `slope_effect` it falls with them.
+   !> Without `slope_effect` the road also pushes the rubber with -P grad H. No column contains the work of
+   !> this force on the motion of the rubber's surface. The missing work is then of second order in the slope
+   !> for any length of the steps. With `slope_effect` it falls with the steps.
    subroutine missing_work_of_the_flat_law()
       type(record_type) :: record
       real(dp) :: missing(2), steeper
@@ -238,7 +238,7 @@ contains
    !> A rough road under a viscoelastic block.
    function flat_case(effect, slope, steps) result(text)
       character(*), intent(in) :: effect
-      real(dp), intent(in) :: slope             !! rms; the load goes with it
+      real(dp), intent(in) :: slope             !! rms slope; the load is proportional to it
       integer, intent(in) :: steps
       character(:), allocatable :: text
 
@@ -251,8 +251,8 @@ contains
          to_text(steps)//' /'//nl//'&solver tolerance = 1e-7 /'
    end function flat_case
 
-   !> A steep road with a constant shear stress, where cells at the edge are partly sheared: passes without the
-   !> shares of the cells leave 1e-4 or more in its steps.
+   !> A steep road with a constant shear stress, where cells at the edge are partly sheared. Without the
+   !> shares of the cells, the passes of its steps would end with an error of 1e-4 or more.
    subroutine constant_shear_settles_and_books_close()
       type(record_type) :: record
 

@@ -1,4 +1,4 @@
-!> The library as another program sees it: everything through the one module.
+!> The library as another program uses it: everything through one module.
 module test_facade
    use asperity, only : version_number, boundary_free, dp, default_surface, error_type, grid_type, &
       new_grid, new_height, new_normal_solver, normal_half_space, normal_problem_type, normal_solver_type, &
@@ -11,13 +11,13 @@ module test_facade
 
 contains
 
-   !> A Hertz contact in the few lines that the developer guide shows.
+   !> A Hertzian contact in the few lines that the developer guide shows.
    subroutine run_facade()
       call begin_suite('facade')
       if (selected('hertz_through_the_facade')) call hertz_through_the_facade()
    end subroutine run_facade
 
-   !> The public module alone is enough to solve Hertz's contact.
+   !> The public module alone is enough to solve a Hertzian contact.
    subroutine hertz_through_the_facade()
       type(grid_type) :: grid
       type(surface_settings_type) :: term

@@ -45,13 +45,14 @@ contains
       if (selected('transform_lengths_of_grids')) call transform_lengths_of_grids()
    end subroutine run_fft_conv
 
-   !> A periodic grid is not padded; a free one is padded to small factors.
+   !> A periodic grid is not padded. A free grid is padded to a length with small factors.
    subroutine transform_lengths_of_grids()
       call check_that(transform_length(7, boundary_periodic) == 7, 'no padding where periodic')
       call check_that(transform_length(509, boundary_free) == 1024, 'padding to small factors')
    end subroutine transform_lengths_of_grids
 
-   !> Good lengths divide a power of 60, and none is passed over; a warning names the two next to a bad one.
+   !> Good lengths divide a power of 60, and every such length is found. A warning names the two good lengths
+   !> next to a bad one.
    subroutine good_lengths()
       integer :: n, up, down, k
 
@@ -100,7 +101,7 @@ contains
       end do
       r = dx*dy/(2.0_dp*pi*real(m, dp)**2)
       call love_tangential(x, y, dx, dy, nu, l_xx, l_xy, l_yy)
-      ! The midpoint rule with 400 x 400 points is good to about (dx/m)^2/24 = 1e-7 of the value.
+      ! The midpoint rule with 400 x 400 points is accurate to about (dx/m)^2/24 = 1e-7 of the value.
       call check_close(love_normal(x, y, dx, dy, nu), zz*r, 1e-7_dp*zz*r, 'a_zz by quadrature')
       call check_close(l_xx, xx*r, 1e-7_dp*xx*r, 'a_xx by quadrature')
       call check_close(l_yy, yy*r, 1e-7_dp*yy*r, 'a_yy by quadrature')
@@ -115,7 +116,7 @@ contains
       integer, intent(in) :: nx, ny
       real(dp), intent(in) :: lx, ly
       real(dp), parameter :: nu = 0.3_dp, h = 0.25_dp
-      logical, intent(in) :: single            !! in single precision: to 1e-6 of the values
+      logical, intent(in) :: single            !! 1 or 2; in single precision the tolerance is 1e-6 of the values
       type(grid_type) :: grid
       type(convolution_type) :: normal, tangential
       type(error_type), allocatable :: error
@@ -153,7 +154,7 @@ contains
             p = 2.0_dp*w
             py = -3.0_dp*w
             call tangential%apply_vector(p, py, u, uy, form)
-            ! A plain sum of n equal terms errs by up to n epsilon.
+            ! The error of a plain sum of n equal terms is up to n epsilon.
             call check_close(form, sum(p*u + py*uy), (3e-16_dp*nx*ny + loose)*sum(abs(p*u + py*uy)) + 1e-12_dp, &
                'Parseval of a vector')
             if (q > 0.0_dp) then
@@ -171,7 +172,7 @@ contains
       call tangential%destroy()
    end subroutine oblique_waves_are_eigenfunctions
 
-   !> The free operators against the double sum.
+   !> The free operators agree with the double sum.
    subroutine free_operator_is_the_double_sum(nx, ny, single)
       integer, intent(in) :: nx, ny
       real(dp), parameter :: nu = 0.4_dp
@@ -222,7 +223,7 @@ contains
       call tangential%destroy()
    end subroutine free_operator_is_the_double_sum
 
-   !> The inverse undoes the periodic operator on what has no mean, and a symbol of one is the identity.
+   !> The inverse of the periodic operator returns a field without its mean. A symbol of one is the identity.
    subroutine inverse_undoes_the_operator(single)
       logical, intent(in) :: single            !! in single precision: to 1e-6 of the values
       type(grid_type) :: grid
@@ -255,7 +256,7 @@ contains
       call identity%destroy()
    end subroutine inverse_undoes_the_operator
 
-   !> Values whose squares leave the range of single precision, in their unit.
+   !> Values whose squares exceed the range of single precision are scaled by a unit.
    subroutine units_beyond_single_precision()
       type(grid_type) :: grid
       type(convolution_type) :: exact, single
@@ -286,7 +287,7 @@ contains
       call single%destroy()
    end subroutine units_beyond_single_precision
 
-   !> An operator without a table, and one in the memory of another, give the same to the last bit.
+   !> An operator without a table, and one that shares the memory of another, give the same bits.
    subroutine lean_operators_are_the_same()
       type(grid_type) :: grid
       type(convolution_type) :: plain, lean, shared
@@ -319,7 +320,7 @@ contains
       call lean%destroy()
    end subroutine lean_operators_are_the_same
 
-   !> In a large cell the periodic operator gives the free one's displacement differences.
+   !> In a large periodic cell, differences of displacements are those of the free operator.
    subroutine large_periodic_cell_is_like_free()
       integer, parameter :: n = 512, m = 9
       type(grid_type) :: large, small
@@ -334,7 +335,7 @@ contains
       call new_convolution(periodic, large, normal_half_space(0.2_dp), error)
       call new_convolution(free, small, normal_half_space(0.2_dp), error)
       allocate (p(n, n), u(n, n), source=0.0_dp)
-      ! Smooth, so that the discretisation matters little, and small beside the period.
+      ! The field is smooth, so that the discretisation matters little, and small compared with the period.
       do j = 1, m
          do i = 1, m
             q(i, j) = cos(2.0_dp*pi*(i - 5)/8.0_dp)*bump(i)*bump(j)
@@ -344,7 +345,8 @@ contains
       call periodic%apply(p, u)
       call free%apply(q, w)
       w = w - w(1, 1) - (u(1:m, 1:m) - u(1, 1))
-      ! The cell average of the free kernel against the symbol cut at Nyquist: 1 % of the displacement.
+      ! The cell average of the free kernel and the symbol that ends at the Nyquist number differ by 1 % of
+      ! the displacement.
       call check_close(maxval(abs(w)), 0.0_dp, 0.02_dp, 'periodic against free')
       call periodic%destroy()
       call free%destroy()

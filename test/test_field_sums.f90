@@ -25,7 +25,7 @@ contains
       if (selected('returned_fields_are_lent_again')) call returned_fields_are_lent_again()
    end subroutine run_field_sums
 
-   !> Counts per row add up, and the magnitude of a field is that of its least value where that is larger.
+   !> Counts of the rows add up. The magnitude of a field is that of its smallest value if this is larger.
    subroutine counts_and_magnitudes()
       real(dp) :: field(3, 2)
 
@@ -36,7 +36,8 @@ contains
       call check_close(field_magnitude(field), tiny(1.0_dp), 0.0_dp, 'magnitude of zero')
    end subroutine counts_and_magnitudes
 
-   !> Two fields that are lent at once are different memory; one that was given back serves again.
+   !> Two fields that are borrowed at the same time have different memory. A field that was returned is used
+   !> again.
    subroutine returned_fields_are_lent_again()
       type(workspace_type) :: work
       real(dp), pointer, contiguous :: one(:, :), other(:, :), third(:, :)
@@ -49,11 +50,11 @@ contains
       other = 2.0_dp
       call check_close(maxval(abs(one - 1.0_dp)), 0.0_dp, 0.0_dp, 'fields of their own')
       call work%take_back(one)
-      call check_that(.not. associated(one), 'the borrower has it no more')
+      call check_that(.not. associated(one), 'the borrower no longer has it')
       call work%lend('third', third)
       call check_close(real(work%most_lent(), dp), 2.0_dp, 0.0_dp, 'no more memory than is needed at once')
       third = 3.0_dp
-      call check_close(maxval(abs(other - 2.0_dp)), 0.0_dp, 0.0_dp, 'a field in use is left alone')
+      call check_close(maxval(abs(other - 2.0_dp)), 0.0_dp, 0.0_dp, 'a field in use is not given away')
       call work%take_back(third)
       call check_close(real(work%lent(), dp), 1.0_dp, 0.0_dp, 'still lent')
       call work%take_back(other)
@@ -75,7 +76,7 @@ contains
       call check_close(grid%cells(), 5e9_dp, 0.0_dp, 'more cells than integers')
    end subroutine the_grid_counts
 
-   !> Row sums are added one after the other: with 1, 2^60 and -2^60 in this order nothing is left.
+   !> Sums of rows are added in their order: of 1, 2^60 and -2^60 nothing is left in this order.
    subroutine totals_of_rows()
       real(dp), parameter :: large = 2.0_dp**60
       real(dp) :: rows(2, 3), totals(2), largest
@@ -114,14 +115,14 @@ contains
       call check_close(field_maximum(field), 35.0_dp, 0.0_dp, 'maximum')
       call check_close(field_minimum(field), 11.0_dp, 0.0_dp, 'minimum')
       call check_close(field_count(field > 30.0_dp), 5.0_dp, 0.0_dp, 'count')
-      ! Clipping at 30.5 leaves 0.5, 1.5, ... in the last row alone.
+      ! Clipping at 30.5 leaves 0.5, 1.5, ... in the last row only.
       call project_simplex(field, 12.5_dp)
       call check_close(field(1, ny), 0.5_dp, 1e-14_dp, 'the projection clips at the level of the sum')
       call check_close(field_sum(field), 12.5_dp, 1e-13_dp, 'the projection keeps the sum')
       call check_close(field_count(field > 0.0_dp), 5.0_dp, 0.0_dp, 'the projection leaves one row')
    end subroutine known_fields
 
-   !> All results are the same to the last bit with one thread and with three.
+   !> All results are the same to the last bit with one and with three threads.
    subroutine threads_do_not_matter()
       integer, parameter :: nx = 257, ny = 131
       real(dp), allocatable :: field(:, :), other(:, :)

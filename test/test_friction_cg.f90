@@ -32,7 +32,7 @@ module test_friction_cg
       integer(int8), allocatable :: contact(:, :)
    end type case_type
 
-   integer :: questions = 0        !! that `asked` will still answer with no
+   integer :: questions = 0        !! times that `asked` still answers with no
 
 contains
 
@@ -64,7 +64,7 @@ contains
       if (selected('two_threads_agree_to_round_off')) call two_threads_agree_to_round_off()
    end subroutine run_friction_cg
 
-   !> Fields, operator and solver.
+   !> Prepare fields, operator and solver.
    subroutine new_case(self, nx, ny, lx, ly, boundary, poisson, thickness)
       type(case_type), intent(out) :: self
       integer, intent(in) :: nx, ny, boundary
@@ -93,7 +93,7 @@ contains
    !> Solve.
    subroutine solve_case(self, past, slip_unit)
       type(case_type), intent(inout), target :: self
-      real(dp), intent(in), optional :: slip_unit       !! rx and ry times this are the slip that is expected
+      real(dp), intent(in), optional :: slip_unit       !! rx and ry times this are the expected slip
       real(dp), intent(in), contiguous, target, optional :: past(:, :, :)   !! T_h, [nx, 2, ny]
       type(friction_fields_type) :: fields
       real(dp), allocatable, target :: drive(:, :, :), traction(:, :, :), slip(:, :, :)
@@ -124,12 +124,12 @@ contains
       self%ry = slip(:, 2, :)
    end subroutine solve_case
 
-   !> Solve, and prove the result without the solver: bound, stick, direction, no reversed slip, and
-   !> the slip itself from another product.
+   !> Solve, and check the result without the solver: bound, stick, direction, no reversed slip, and the slip
+   !> from another product.
    subroutine run_case(self, what, accuracy)
       type(case_type), intent(inout) :: self
       character(*), intent(in) :: what
-      real(dp), intent(in) :: accuracy       !! of the law of slip, over the displacements
+      real(dp), intent(in) :: accuracy       !! error of the law of slip, relative to the displacements
 
       where (self%contact /= contact_open) self%contact = contact_stick
       call solve_case(self)
@@ -137,7 +137,7 @@ contains
       call prove(self, what, accuracy)
    end subroutine run_case
 
-   !> The proof of `run_case`.
+   !> The checks of `run_case`.
    subroutine prove(self, what, accuracy)
       type(case_type), intent(inout) :: self
       character(*), intent(in) :: what
@@ -182,7 +182,7 @@ contains
       call check_order(-wrong, '<=', accuracy*scale, what//': no slip against the traction')
    end subroutine prove
 
-   !> Free plans.
+   !> Release the transforms.
    subroutine end_case(self)
       type(case_type), intent(inout) :: self
 
@@ -190,7 +190,7 @@ contains
       call self%solver%destroy()
    end subroutine end_case
 
-   !> Hertz's pressure of radius 1 and maximum 1 at the centres of cells, G = 1.
+   !> Hertz's pressure of radius 1 and maximum 1 at the centres of the cells, G = 1.
    subroutine set_hertz(self)
       type(case_type), intent(inout) :: self
       real(dp) :: x, y
@@ -215,7 +215,8 @@ contains
       if (size(self%p) == 0) shift = 0.0_dp
    end function full_slip
 
-   !> Cattaneo (1938), Mindlin (1949): exact for nu = 0. Force, traction, radius of stick; oblique.
+   !> Cattaneo (1938) and Mindlin (1949), exact for nu = 0: force, traction, and stick radius, in an oblique
+   !> direction.
    subroutine mindlin_sphere_without_poisson_effect()
       type(case_type) :: self
       real(dp), parameter :: mu = 0.4_dp, angle = 0.7_dp
@@ -227,7 +228,7 @@ contains
       self%law = new_friction_law('coulomb', mu, 0.0_dp, 0.0_dp, .false., .true.)
       load = sum(self%p)
       do k = 1, 9, 2
-         ! A slip of k/10 of that of full slip.
+         ! A shift of k/10 of that of full slip.
          delta = 0.1_dp*k*full_slip(self, mu, 0.0_dp)
          ratio = 1.0_dp - (1.0_dp - 0.1_dp*k)**1.5_dp
          self%drive_x = delta*cos(angle)
@@ -237,7 +238,7 @@ contains
          call check_close(force, ratio, 3e-5_dp, 'Mindlin, force')
          call check_close(sum(self%ty)/sum(self%tx), tan(angle), 1e-8_dp, 'Mindlin, direction')
       end do
-      ! The last one, slip 0.9: stick inside c = (1 - Q/mu F)^(1/3) = sqrt(0.1).
+      ! At the last shift, 0.9, the stick radius is c = (1 - Q/mu F)^(1/3) = sqrt(0.1).
       stick = sqrt(0.1_dp)
       error = 0.0_dp
       q = 0.0_dp
@@ -251,15 +252,15 @@ contains
             q = q + (mu*expected)**2
          end do
       end do
-      ! Cells at the edge of stick, of size 0.06 c, are the error.
+      ! The error comes from cells at the edge of the stick area, whose size is 0.06 c.
       call check_order(sqrt(error/q), '<', 5e-3_dp, 'Mindlin, traction')
       area = count(self%contact == contact_stick)*self%grid%dx*self%grid%dy
       call check_close(sqrt(area/pi), stick, 0.5_dp*self%grid%dx, 'Mindlin, radius of stick')
       call end_case(self)
    end subroutine mindlin_sphere_without_poisson_effect
 
-   !> Mindlin's sphere under a prescribed total force, oblique, from rest each time: the total to the
-   !> tolerance, the place of the road, the radius of stick; nu = 0, so that the solution is exact.
+   !> Mindlin's sphere under a prescribed force, oblique, each time from rest. The force is met to the
+   !> tolerance. Motion and stick radius are exact for nu = 0.
    subroutine pulled_sphere_meets_its_force()
       type(case_type) :: self
       real(dp), parameter :: mu = 0.4_dp, angle = 0.7_dp
@@ -292,7 +293,7 @@ contains
       call end_case(self)
    end subroutine pulled_sphere_meets_its_force
 
-   !> Solve with a prescribed total, and prove the result as that of a road at the place found.
+   !> Solve with a prescribed force, and check the result as that of a road at the place found.
    subroutine run_pulled(self, what, accuracy)
       type(case_type), intent(inout) :: self
       character(*), intent(in) :: what
@@ -308,8 +309,8 @@ contains
       self%drive_y = self%drive_y - self%solver%pull%offset(2)
    end subroutine run_pulled
 
-   !> Rough roads, flat and with slope, thin and thick blocks and half-spaces, periodic and free: the
-   !> place found by a pull is that whose road pulls so; also with one direction pulled only.
+   !> Rough roads, flat and with slope, thin and thick blocks and half-spaces, periodic and free. A road at
+   !> the place found exerts the prescribed force. One direction may be pulled alone.
    subroutine pulled_rough_road_finds_its_place()
       type(case_type) :: self
       real(dp), parameter :: thickness(4) = [0.0_dp, 0.05_dp, 2.0_dp, 50.0_dp]
@@ -331,7 +332,7 @@ contains
          self%solver%tolerance = 1e-8_dp
          iterations = 0
          do k = 1, 5
-            ! forth, nearly off, and back
+            ! forward, nearly to full slip, and back
             self%solver%pull%traction = limit*min(0.2_dp*k, 1.1_dp - 0.2_dp*k)*[0.8_dp, 0.3_dp]
             self%drive_y = merge(0.0_dp, 1e-3_dp*k, both(2))
             call run_pulled(self, 'pulled rough', 1e-6_dp)
@@ -339,7 +340,7 @@ contains
             call check_close(sum(self%tx)/(48*40)/self%solver%pull%traction(1), 1.0_dp, 1e-6_dp, &
                'pulled rough, force')
          end do
-         ! The same by the place.
+         ! The same problem with the place prescribed.
          allocate (tx, ty, source=self%tx)
          tx = self%tx
          ty = self%ty
@@ -355,7 +356,7 @@ contains
       end do
    end subroutine pulled_rough_road_finds_its_place
 
-   !> A pull beyond the friction is reported, with all contact at its limit.
+   !> A pull above the friction is reported. The whole contact is then at its limit.
    subroutine pull_beyond_friction_is_reported()
       type(case_type) :: self
       integer :: boundary
@@ -375,9 +376,9 @@ contains
       end do
    end subroutine pull_beyond_friction_is_reported
 
-   !> nu = 0.42 and 0.5: Mindlin's solution leaves out the slip across the load. That is an effect
-   !> of second order in nu/(2-nu), the ratio of the two kernels: 1.05e-3 of full slip for 0.42 and
-   !> 1.66e-3 for 0.5, at n = 128 and 256 alike.
+   !> nu = 0.42 and 0.5: Mindlin's solution neglects the slip across the load. The error is of second order in
+   !> nu/(2-nu), the ratio of the two kernels: 1.05e-3 of full slip for 0.42 and 1.66e-3 for 0.5, for n = 128
+   !> and 256 alike.
    subroutine mindlin_sphere_with_poisson_effect()
       type(case_type) :: self
       real(dp), parameter :: mu = 0.4_dp, poisson(2) = [0.42_dp, 0.5_dp]
@@ -399,9 +400,9 @@ contains
       end do
    end subroutine mindlin_sphere_with_poisson_effect
 
-   !> Loading, unloading and reloading (Mindlin and Deresiewicz, 1953), nu = 0: with the curve of
-   !> loading Q = f(u), unloading from u1 follows Q1 - 2 f((u1 - u)/2), reloading from u2 goes back
-   !> up by Q2 + 2 f((u - u2)/2), and closes the loop at u1.
+   !> Loading, unloading and reloading (Mindlin and Deresiewicz, 1953), nu = 0. With the curve of loading Q =
+   !> f(u), unloading from u1 follows Q1 - 2 f((u1 - u)/2). Reloading from u2 follows Q2 + 2 f((u - u2)/2),
+   !> and closes the loop at u1.
    subroutine mindlin_unloading_and_reloading()
       type(case_type) :: self
       real(dp), parameter :: mu = 0.4_dp
@@ -421,7 +422,7 @@ contains
       before = 0.0_dp
       self%drive_x = 0.0_dp
       do k = 1, 6
-         ! DX = U of the step before + step of the road; U = DX - slip.
+         ! DX = U of the step before plus the step of the road; U = DX - slip.
          self%drive_x = self%drive_x + (path(k) - before)*full_slip(self, mu, 0.0_dp)
          before = path(k)
          call run_case(self, 'loading and unloading', 1e-8_dp)
@@ -433,7 +434,7 @@ contains
       call end_case(self)
    end subroutine mindlin_unloading_and_reloading
 
-   !> Q/(mu F) of first loading by u of full slip.
+   !> Q/(mu F) at first loading by u, relative to full slip.
    pure function loading(u) result(q)
       real(dp), intent(in) :: u
       real(dp) :: q
@@ -441,7 +442,7 @@ contains
       q = 1.0_dp - (1.0_dp - u)**1.5_dp
    end function loading
 
-   !> Products of the operator (4 transforms each) for a sphere at half of full slip.
+   !> The number of products of the operator (4 transforms each) for a sphere at half of full slip.
    subroutine number_of_products_is_bounded()
       type(case_type) :: self
       integer, parameter :: sizes(3) = [64, 128, 256]
@@ -495,8 +496,8 @@ contains
       call end_case(self)
    end subroutine full_stick_and_full_slip
 
-   !> A rough problem: waves of wave numbers 2 to 6, its pressure where it stands out by
-   !> `threshold`.
+   !> A rough problem with waves of the wave numbers 2 to 6. The pressure is positive where the road is higher
+   !> than `threshold`.
    subroutine set_rough(self, seed, slope, threshold)
       type(case_type), intent(inout) :: self
       integer, intent(in) :: seed
@@ -533,7 +534,7 @@ contains
       end associate
    end subroutine set_rough
 
-   !> Rough, periodic and free, flat and sloping, both laws of slip, weak and strong friction.
+   !> Rough roads, periodic and free, flat and sloping, both laws of slip, weak and strong friction.
    subroutine rough_contacts_meet_the_law()
       type(case_type) :: self
       real(dp), parameter :: mu(4) = [0.05_dp, 0.2_dp, 0.7_dp, 1.5_dp]
@@ -563,7 +564,7 @@ contains
       end do
    end subroutine rough_contacts_meet_the_law
 
-   !> The methods agree.
+   !> Both methods give the same result.
    subroutine methods_agree()
       type(case_type) :: self
       real(dp), allocatable :: tx(:, :), ty(:, :)
@@ -605,8 +606,8 @@ contains
       end do
    end subroutine methods_agree
 
-   !> Where a stop is asked for, each method returns within an iteration, with and without a pull. The solver and the
-   !> operator are then as they were: the next solve gives the same bits.
+   !> If a stop is requested, each method returns within one iteration, with and without a pull. Solver and
+   !> operator are then unchanged: the next solve gives the same bits.
    subroutine a_stop_ends_the_solve()
       type(case_type) :: self
       real(dp), allocatable :: tx(:, :)
@@ -644,7 +645,7 @@ contains
       call end_case(self)
    end subroutine a_stop_ends_the_solve
 
-   !> Solve from no traction, with the road driven or pulled.
+   !> Solve from zero traction, with the road driven or pulled.
    subroutine solve_from_zero(self, pulled)
       type(case_type), intent(inout) :: self
       logical, intent(in) :: pulled
@@ -658,7 +659,7 @@ contains
       call solve_case(self)
    end subroutine solve_from_zero
 
-   !> Is a stop asked for? No, as often as `questions` says, then yes.
+   !> Is a stop requested? The answer is no as often as `questions` says, then yes.
    function asked() bind(c, name='asked_of_friction_cg') result(yes)
       integer(c_int) :: yes
 
@@ -666,7 +667,7 @@ contains
       questions = questions - 1
    end function asked
 
-   !> A turn by 90 degrees and a mirror, on a grid with nx /= ny, dx /= dy.
+   !> Rotation by 90 degrees and reflection, on a grid with nx /= ny and dx /= dy.
    subroutine turned_and_mirrored_contacts_agree()
       type(case_type) :: self, turned
       integer, parameter :: nx = 36, ny = 27
@@ -721,7 +722,7 @@ contains
       end do
    end subroutine turned_and_mirrored_contacts_agree
 
-   !> mu = 0 with slope: the traction of a frictionless contact, whatever the motion.
+   !> With mu = 0 and slope, the traction is that of a frictionless contact for any motion.
    subroutine frictionless_traction_on_slopes()
       type(case_type) :: self
 
@@ -736,7 +737,7 @@ contains
       call end_case(self)
    end subroutine frictionless_traction_on_slopes
 
-   !> Constant shear: sigma_max up to the edge of the contact where P goes to 0, nothing outside.
+   !> Constant shear: sigma_max up to the edge of the contact, where P goes to 0, and no traction outside.
    subroutine constant_shear_up_to_the_edge()
       type(case_type) :: self
       real(dp), parameter :: strength = 0.3_dp
@@ -745,7 +746,7 @@ contains
       call set_hertz(self)
       self%law = new_friction_law('constant_shear', 0.0_dp, strength, 0.0_dp, .false., .true.)
       self%drive_x = 2.0_dp
-      self%tx = 7.0_dp                 ! a start outside every bound, in the open too
+      self%tx = 7.0_dp                 ! a start outside every bound, also in open cells
       call run_case(self, 'constant shear', 1e-8_dp)
       call check_close(sum(self%tx), strength*count(self%p > 0.0_dp), &
          1e-3_dp*strength*count(self%p > 0.0_dp), 'constant shear times the area of contact')
@@ -757,7 +758,7 @@ contains
       call end_case(self)
    end subroutine constant_shear_up_to_the_edge
 
-   !> Adhesion: the bound is mu (P + p_a), where the pressure is negative too; no load needed.
+   !> Adhesion: the bound is mu (P + p_a), also where the pressure is negative. No load is needed.
    subroutine adhesion_widens_the_bound()
       type(case_type) :: self
       real(dp), parameter :: mu = 0.5_dp, pa = 0.3_dp
@@ -778,7 +779,7 @@ contains
       call end_case(self)
    end subroutine adhesion_widens_the_bound
 
-   !> One row along x or along y: the same problem, the line contact.
+   !> One row along x or along y is the same problem, the line contact.
    subroutine line_contacts_along_x_and_y_agree()
       type(case_type) :: self, other
       integer, parameter :: n = 60
@@ -808,7 +809,7 @@ contains
       call end_case(other)
    end subroutine line_contacts_along_x_and_y_agree
 
-   !> A uniform contact in full stick moves by the mean mode alone: T = DX/compliance.
+   !> A uniform contact in full stick moves by the mean mode only: T = DX/compliance.
    subroutine uniform_contact_moves_by_mean_mode()
       type(case_type) :: self
       real(dp) :: measured
@@ -836,8 +837,8 @@ contains
       call end_case(self)
    end subroutine uniform_contact_moves_by_mean_mode
 
-   !> From its own solution it comes back at once; a return to a lower pressure stays within the
-   !> bound.
+   !> The solver returns at once if it starts from the solution. Tractions from a higher pressure are reduced
+   !> to the bound.
    subroutine own_solution_is_kept()
       type(case_type) :: self
 
@@ -857,8 +858,8 @@ contains
       call end_case(self)
    end subroutine own_solution_is_kept
 
-   !> Where all points slip far, the direction of the slip alone makes the start: after the solution's own slip
-   !> there is nothing left to do, whatever the points knew of their tractions.
+   !> If all points slip far, the direction of the slip alone determines the start: after the slip of the
+   !> solution itself no iteration is left, whatever the tractions of the points were.
    subroutine expected_slip_is_a_good_start()
       type(case_type) :: self
       real(dp), allocatable :: tx(:, :), ty(:, :)
@@ -877,7 +878,7 @@ contains
             tx = self%tx
             ty = self%ty
 
-            ! Half of the points forget their traction, as if they had just come into contact.
+            ! Half of the points lose their traction, as if they had just come into contact.
             self%tx(::2, :) = 0.0_dp
             self%ty(::2, :) = 0.0_dp
             where (self%contact /= contact_open) self%contact = contact_stick
@@ -891,7 +892,7 @@ contains
             call check_order(maxval(hypot(self%tx - tx, self%ty - ty)), '<=', 1e-6_dp*maxval(hypot(tx, ty)), &
                'the same tractions')
 
-            ! A slip that is expected to go the other way is only a bad start.
+            ! An expected slip in the opposite direction is only a bad start.
             self%rx = -self%rx
             self%ry = -self%ry
             call solve_case(self, slip_unit=1.0_dp)
@@ -902,7 +903,7 @@ contains
       end do
    end subroutine expected_slip_is_a_good_start
 
-   !> A given traction T_h of the memory is the same as -A T_h in the drive.
+   !> A traction T_h from the memory is equivalent to -A T_h in the motion.
    subroutine past_traction_is_like_a_drive()
       type(case_type) :: self
       real(dp), allocatable :: past_x(:, :), past_y(:, :), ux(:, :), uy(:, :), tx(:, :), ty(:, :)
@@ -919,7 +920,7 @@ contains
       call check_that(self%result%converged, 'memory: converged')
       tx = self%tx
       ty = self%ty
-      ! U = A (T + T_h) = DX - r, with no product of the caller's.
+      ! U = A (T + T_h) = DX - r, without a product by the caller.
       call self%operator%apply_vector(tx + past_x, ty + past_y, ux, uy)
       largest = maxval(hypot(self%drive_x - self%rx - ux, self%drive_y - self%ry - uy))
       call check_order(largest, '<', 1e-13_dp, 'memory: slip = DX - A (T + T_h)')
@@ -934,8 +935,8 @@ contains
       call end_case(self)
    end subroutine past_traction_is_like_a_drive
 
-   !> A block dragged over a moving pressure in small steps, from rest into full slip and back: each
-   !> step proved, and the total traction of full slip, without slope, mu times the load.
+   !> A block is dragged over a moving pressure in small steps, from rest into full slip and back. Each step
+   !> is checked, and the traction of full slip without slope is mu times the load.
    subroutine block_dragged_into_full_slip_and_back()
       type(case_type) :: self
       real(dp), parameter :: mu = 0.5_dp, step = 0.02_dp
@@ -968,7 +969,7 @@ contains
       call end_case(self)
    end subroutine block_dragged_into_full_slip_and_back
 
-   !> One thread and two give the same results, to round-off, because FFTW may choose other plans.
+   !> One and two threads give the same results up to round-off, because FFTW may choose other plans.
    subroutine two_threads_agree_to_round_off()
       type(case_type) :: self
       real(dp), allocatable :: tx(:, :)

@@ -27,10 +27,10 @@ contains
       if (selected('fields_return_to_a_new_pressure')) call fields_return_to_a_new_pressure()
    end subroutine run_friction_law
 
-   !> Without slope: |T| <= mu P, sigma_max, or the smaller; adhesion adds p_a to P.
+   !> Without slope the bound is mu P, sigma_max, or the smaller of both; adhesion adds p_a to P.
    subroutine bounds_without_slope()
       type(friction_law_type) :: law
-      real(dp), parameter :: none(2) = [5.0_dp, -3.0_dp]     ! a slope that must not count
+      real(dp), parameter :: none(2) = [5.0_dp, -3.0_dp]     ! a slope that must have no effect
       real(dp) :: t(2)
       logical :: returned
 
@@ -63,8 +63,8 @@ contains
       call check_close(hypot(t(1), t(2)), 0.0_dp, 0.0_dp, 'no traction below -gamma_0/z_0')
    end subroutine bounds_without_slope
 
-   !> With slope: the returned traction meets the law for the force (T_x, T_y, P) split by the true
-   !> normal, lies on the right nappe, and on the ray from T*.
+   !> With slope, the returned traction fulfils the law for the force (T_x, T_y, P), resolved along the true
+   !> normal. It is on the right nappe, and on the ray from T*.
    subroutine returned_traction_lies_on_the_cone()
       type(friction_law_type) :: law
       real(dp) :: u(8), slope(2), p, pa, mu, strength, star(2), d(2), t(2), s
@@ -109,7 +109,7 @@ contains
       call check_order(hits, '>', 1000, 'most rays meet the bound')
    end subroutine returned_traction_lies_on_the_cone
 
-   !> A table: on its lines and beyond both kinds of ends, the same for a cell and a row.
+   !> A table is exact on its lines and beyond both kinds of ends, the same for a cell and a row.
    subroutine table_of_bounds()
       type(friction_law_type) :: law
       real(dp), parameter :: pressures(5) = [0.0_dp, 0.5_dp, 1.0_dp, 2.5_dp, 9.0_dp]
@@ -133,7 +133,7 @@ contains
       call check_order(merge(1, 0, law%jumps_at_edge()), '<', 1, 'no jump without a bare strength')
    end subroutine table_of_bounds
 
-   !> `bound_ratio` from what the loops over rows have: F and N_z of a cell, mu, and a strength beside.
+   !> `bound_ratio` from the values that loops over rows have: F and N_z of a cell, mu, and a strength.
    function row_ratio(law, p, slope, d) result(s)
       type(friction_law_type), intent(in) :: law
       real(dp), intent(in) :: p, slope(2), d(2)
@@ -149,8 +149,8 @@ contains
       if (law%strength_beside() >= 0.0_dp) s = min(s, law%strength_beside()/m)
    end function row_ratio
 
-   !> One slope in the direction of the traction: P (mu + tan)/(1 - mu tan) (thesis, eq. 3.2),
-   !> uphill and downhill; no bound above mu tan = 1.
+   !> A slope in the direction of the traction: P (mu + tan)/(1 - mu tan) (thesis, eq. 3.2), uphill and
+   !> downhill. There is no bound if mu tan > 1.
    subroutine friction_uphill_and_downhill()
       type(friction_law_type) :: law
       real(dp), parameter :: mu = 0.7_dp, h = 0.3_dp, p = 2.0_dp
@@ -175,7 +175,7 @@ contains
       call check_close(t(2), -0.4_dp, 1e-15_dp, 'no friction: T* = -P H_y')
    end subroutine friction_uphill_and_downhill
 
-   !> The slip of the physical law, seen along the slope, is parallel to the force along it.
+   !> The slip of the physical law, along the slope, is parallel to the force along the slope.
    subroutine slip_is_along_the_force_on_the_slope()
       type(friction_law_type) :: law
       real(dp), parameter :: slope(2) = [0.4_dp, -0.25_dp], d(2) = [0.3_dp, 0.9_dp]
@@ -183,7 +183,7 @@ contains
 
       law = new_friction_law('coulomb', 0.5_dp, 0.0_dp, 0.0_dp, .true., .true.)
       normal = [-slope(1), -slope(2), 1.0_dp]/sqrt(1.0_dp + sum(slope**2))
-      force = [d(1), d(2), 0.0_dp]           ! T - T*: the rest is along the normal
+      force = [d(1), d(2), 0.0_dp]           ! T - T*; the rest is along the normal
       force = force - dot_product(force, normal)*normal
       r = 2.5_dp*force(:2)
       slip = [r(1), r(2), dot_product(slope, r)]
@@ -194,7 +194,7 @@ contains
       call check_close(norm2(law%slip_along_slope(slope, d) - d), 0.0_dp, 0.0_dp, 'thesis: r itself')
    end subroutine slip_is_along_the_force_on_the_slope
 
-   !> First and second derivative of s against differences.
+   !> First and second derivative of s against finite differences.
    subroutine derivatives_of_the_bound()
       type(friction_law_type) :: law
       real(dp), parameter :: a = 1e-4_dp
@@ -235,7 +235,7 @@ contains
          'a denormal')
    end subroutine zero_traction_and_zero_strength
 
-   !> Returning fields to a new pressure.
+   !> Reduction of fields to the bound of a new pressure.
    subroutine fields_return_to_a_new_pressure()
       type(friction_law_type) :: law
       real(dp) :: p(3, 2), tx(3, 2), ty(3, 2), none(0, 0)
@@ -260,7 +260,7 @@ contains
          'excess after')
    end subroutine fields_return_to_a_new_pressure
 
-   !> Numbers in [0, 1) that are the same everywhere.
+   !> Numbers in [0, 1) that are the same on every machine.
    subroutine sequence(k, u)
       integer, intent(in) :: k
       real(dp), intent(out) :: u(:)

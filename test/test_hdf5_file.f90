@@ -1,4 +1,5 @@
-!> Tests of the HDF5 files: what is written is read back, and every failure says what it is.
+!> Tests of the HDF5 files: the values that are read are those that were written, and every failure has its
+!> message.
 module test_hdf5_file
    use check, only : begin_suite, check_close, check_error, check_no_error, check_that, selected
    use asperity_errors, only : error_file, error_input, error_type
@@ -108,7 +109,7 @@ contains
       call file%close(error)
    end subroutine values_come_back
 
-   !> Height maps: the named dataset, or the usual names.
+   !> Height maps are read from the named dataset, or from one of the usual names.
    subroutine fields_are_read()
       type(hdf5_file_type) :: file
       type(error_type), allocatable :: error
@@ -149,7 +150,7 @@ contains
       call reader%close()
    end subroutine fields_are_read
 
-   !> Columns grow over their first chunk, and after the file was closed.
+   !> Columns grow beyond their first chunk, and after the file was closed.
    subroutine columns_grow()
       type(hdf5_file_type) :: file
       type(error_type), allocatable :: error
@@ -184,7 +185,7 @@ contains
       call file%close(error)
    end subroutine columns_grow
 
-   !> A group under construction is not there, then it is.
+   !> A group is not visible while it is written, and then it is.
    subroutine staged_groups_appear_whole()
       type(hdf5_file_type) :: file
       type(error_type), allocatable :: error
@@ -223,7 +224,7 @@ contains
       call file%close(error)
    end subroutine staged_groups_appear_whole
 
-   !> Every failure is an error of its own.
+   !> Every failure has its own error.
    subroutine failures_are_explained()
       type(hdf5_file_type) :: file
       type(error_type), allocatable :: error
@@ -262,8 +263,8 @@ contains
       call check_no_error(error, 'close after a failure')
    end subroutine failures_are_explained
 
-   !> In a chain of calls without an error, the first fault ends the chain: later writes do nothing,
-   !> and this fault is the one that is reported, however many follow.
+   !> In a chain of calls without an error argument, the first fault ends the chain. Later writes have no
+   !> effect, and this fault is reported, however many follow.
    subroutine first_fault_of_a_chain_is_reported()
       character(*), parameter :: other_path = 'build/first_fault.h5'
       type(hdf5_file_type) :: file
@@ -297,7 +298,7 @@ contains
       call check_that(n == 0, 'a value that was not read is 0')
       call file%read_attribute('/x', 'second', n)
       call file%close(error)
-      call check_error(error, '/x has no attribute "first"', 'closing reports what nobody has asked for')
+      call check_error(error, '/x has no attribute "first"', 'closing reports a fault that was not asked for')
 
       call file%open('no_such_file.h5', 'read')
       call file%read_attribute('/', 'n', n)
@@ -309,7 +310,7 @@ contains
       call file%close(error)
    end subroutine first_fault_of_a_chain_is_reported
 
-   !> Not a bit differs.
+   !> Two arrays have the same bits.
    elemental logical function same(a, b)
       real(dp), intent(in) :: a, b
 

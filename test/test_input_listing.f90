@@ -24,7 +24,7 @@ contains
       if (selected('faults_are_those_of_the_reader')) call faults_are_those_of_the_reader()
    end subroutine run_input_listing
 
-   !> A line for each group and each variable.
+   !> There is one line for each group and each variable.
    subroutine every_group_and_variable_is_listed()
       character(:), allocatable :: text
       integer :: i, lines
@@ -41,7 +41,7 @@ contains
          field_separator//'yes'//field_separator) > 0, 'a phase is required and repeatable')
    end subroutine every_group_and_variable_is_listed
 
-   !> Values of all kinds, in the order of the table, groups in that of the text.
+   !> Values of all kinds are listed, variables in the order of the table and groups in that of the text.
    subroutine values_come_in_order()
       character(:), allocatable :: listing
       type(error_type), allocatable :: error
@@ -59,7 +59,7 @@ contains
       call check_that(len(listing) == 0, 'an empty text lists nothing')
    end subroutine values_come_in_order
 
-   !> Reals come back to the same bits.
+   !> Reals are read back with the same bits.
    subroutine reals_come_back_to_the_bit()
       real(dp), parameter :: numbers(6) = [0.1_dp, 1.0_dp/3.0_dp, -4.9406564584124654e-324_dp, huge(1.0_dp), &
          2.2250738585072014e-308_dp, -0.0_dp]
@@ -80,7 +80,7 @@ contains
       end do
    end subroutine reals_come_back_to_the_bit
 
-   !> Long lists are kept whole.
+   !> Long lists are not shortened.
    subroutine long_lists_are_kept()
       character(:), allocatable :: listing
       type(error_type), allocatable :: error
@@ -96,7 +96,7 @@ contains
       call check_that(n == 5000, 'all values of a long list')
    end subroutine long_lists_are_kept
 
-   !> Faults are those of the input's reader.
+   !> Faults are those of the reader of the input.
    subroutine faults_are_those_of_the_reader()
       character(:), allocatable :: listing
       type(error_type), allocatable :: error

@@ -50,7 +50,8 @@ contains
       end do
    end subroutine noise
 
-   !> Whole cells move a periodic map bit for bit, far shifts and shifts with round-off, too.
+   !> A shift by whole cells moves a periodic map without a change of any bit, also if it is large or has
+   !> round-off.
    subroutine periodic_map_moves_by_whole_cells()
       type(grid_type) :: grid
       type(interpolation_type) :: map
@@ -81,13 +82,13 @@ contains
          call displaced(map, grid%dx, 2*grid%dy, zero, zero, h)
          call check_close(maxval(abs(h - cshift(cshift(h_0, -1, 1), -2, 2))), 0.0_dp, 2.0e-17_dp, &
             methods(m)//': whole cells and a field of zeros')
-         ! one cell past the edge by next to nothing: no jump
+         ! A shift of one cell past the edge, plus a very small part of a cell, causes no jump.
          call shifted(map, -13*grid%dx - 1.0e-8_dp*grid%dx, 0.0_dp, h)
          call check_close(maxval(abs(h - h_0)), 0.0_dp, 1.0e-10_dp, methods(m)//': just past a wrap')
       end do
    end subroutine periodic_map_moves_by_whole_cells
 
-   !> On a free map whole cells move the map and leave its lowest value behind.
+   !> On a free map a shift by whole cells moves the map, and the cells that it leaves get the lowest height.
    subroutine free_map_moves_by_whole_cells()
       type(grid_type) :: grid
       type(interpolation_type) :: map
@@ -115,8 +116,8 @@ contains
       end do
    end subroutine free_map_moves_by_whole_cells
 
-   !> Bounded maps: 'linear' is exact for planes (slopes for quadratics), 'cubic' for bicubics, height
-   !> and slope, up to the rim.
+   !> On bounded maps 'linear' is exact for planes (its slopes for quadratics), and 'cubic' for bicubics, in
+   !> height and slope up to the rim.
    subroutine exact_for_polynomials_on_free_maps()
       type(grid_type) :: grid
       type(interpolation_type) :: map
@@ -163,7 +164,8 @@ contains
          1.0e-13_dp, 'cubic: its slope along y')
    end subroutine exact_for_polynomials_on_free_maps
 
-   !> Errors on an oblique wave under an oblique shift fall with the orders 2 and 4; slopes 2 and 3.
+   !> Errors for an oblique wave under an oblique shift decrease with the orders 2 and 4, those of the slopes
+   !> with 2 and 3.
    subroutine orders_of_heights_and_slopes()
       real(dp) :: coarse(2), fine(2)
 
@@ -175,12 +177,12 @@ contains
       call wave_error('cubic', 64, 54, fine)
       call check_close(log(coarse(1)/fine(1))/log(2.0_dp), 4.0_dp, 0.2_dp, 'cubic: order')
       call check_order(log(coarse(2)/fine(2))/log(2.0_dp), '>', 2.9_dp, 'cubic: order of the slope')
-      ! the spline's leading error, h^4 f'''' u^2 (1 - u)^2/24 a direction
+      ! The leading error of the spline is h^4 f'''' u^2 (1 - u)^2/24 along each direction.
       call check_close(fine(1), ((2.0_dp*pi*3/64)**4*(0.4_dp*0.6_dp)**2 &
          + (2.0_dp*pi*2/54)**4*(0.3_dp*0.7_dp)**2)/24.0_dp, 1.0e-6_dp, 'cubic: its error')
    end subroutine orders_of_heights_and_slopes
 
-   !> Largest error of height and slope of a wave of amplitude 1, by shift and by fields.
+   !> Largest errors of height and slope of a wave of amplitude 1, for a shift and for fields.
    subroutine wave_error(method, nx, ny, errors)
       character(*), intent(in) :: method
       integer, intent(in) :: nx, ny
@@ -218,7 +220,7 @@ contains
       end do
    end subroutine wave_error
 
-   !> Fields of displacement: the sign, the place, and agreement with a uniform shift.
+   !> Fields of displacements: the sign, the place, and agreement with a uniform shift.
    subroutine displaced_reading_has_the_right_sign()
       type(grid_type) :: grid
       type(interpolation_type) :: map
@@ -268,7 +270,7 @@ contains
       end do
    end subroutine displaced_reading_has_the_right_sign
 
-   !> The spline's slope is the derivative of its height, and continuous across a cell.
+   !> The slope of the spline is the derivative of its height, and is continuous from cell to cell.
    subroutine slope_is_derivative_of_height()
       type(grid_type) :: grid
       type(interpolation_type) :: map
@@ -297,7 +299,7 @@ contains
          'the slope is continuous across a cell')
    end subroutine slope_is_derivative_of_height
 
-   !> Beyond a free rim the height falls over one cell, continuously, and makes no summit.
+   !> Beyond a free rim the height falls continuously over one cell, and has no summit there.
    subroutine height_falls_beyond_a_free_rim()
       type(grid_type) :: grid
       type(interpolation_type) :: map
@@ -323,7 +325,7 @@ contains
       end do
    end subroutine height_falls_beyond_a_free_rim
 
-   !> A profile, and grids of a few cells: the map is met at the cells, and moves as it should.
+   !> For a profile and for grids of a few cells, the heights at the cells are exact, and shifts are correct.
    subroutine maps_of_few_cells()
       integer, parameter :: sizes(2, 7) = reshape([7, 1, 1, 1, 2, 1, 2, 3, 3, 2, 3, 5, 4, 4], [2, 7])
       type(grid_type) :: grid
@@ -348,7 +350,7 @@ contains
                call check_close(maxval(abs(h - h_0)), 0.0_dp, 2.0e-17_dp, methods(m)//': small, a period')
                if (grid%ny > 1) cycle
                call shifted(map, 0.0_dp, 0.13_dp, h)
-               call check_close(maxval(abs(h - h_0)), 0.0_dp, 2.0e-17_dp, 'a profile knows no y')
+               call check_close(maxval(abs(h - h_0)), 0.0_dp, 2.0e-17_dp, 'a profile does not depend on y')
             end do
             deallocate (h, h_x, h_y, zero)
          end do
@@ -385,8 +387,8 @@ contains
          'a free plane has its slope up to the rim')
    end subroutine slopes_of_waves
 
-   !> The slope at the cells of a wave with 8 cells is too low by a factor that is known for both
-   !> methods, along x and along y, and of the spline only by 0.2 %.
+   !> The slope at the cells of a wave with 8 cells is too low by a known factor for both methods, along x and
+   !> along y. For the spline the error is only 0.2 %.
    subroutine slope_factor_of_a_coarse_wave()
       type(grid_type) :: grid
       type(interpolation_type) :: map
@@ -423,7 +425,7 @@ contains
       end do
    end subroutine slope_factor_of_a_coarse_wave
 
-   !> Beside a jump of the map the spline overshoots by 11 % of it, by 0.1 % three cells farther;
+   !> Beside a jump of the map the spline overshoots by 11 % of the jump, and by 0.1 % three cells farther.
    !> 'linear' stays between the heights of the cells.
    subroutine overshoot_beside_a_jump()
       type(grid_type) :: grid
@@ -457,7 +459,7 @@ contains
       end do
    end subroutine overshoot_beside_a_jump
 
-   !> The same numbers on one and two threads, bit for bit.
+   !> One and two threads give the same bits.
    subroutine same_bits_on_two_threads()
       type(grid_type) :: grid
       type(interpolation_type) :: map

@@ -1,5 +1,5 @@
-!> Tests of what solves a step with friction all at once: GMRES, and the states of a cell. Runs with such steps
-!> are in python/tests/test_hard_steps.py and test_constant_shear.py.
+!> Tests of the solver that solves a step with friction all at once: GMRES, and the states of a cell. Runs
+!> with such steps are in python/tests/test_hard_steps.py and test_constant_shear.py.
 module test_joint_step
    use adhesion_potential, only : new_adhesion_potential
    use asperity_errors, only : error_type
@@ -21,7 +21,7 @@ contains
       if (selected('states_join_without_a_jump')) call states_join_without_a_jump()
    end subroutine run_joint_step
 
-   !> A matrix without symmetry, with the number beside the cells; against its known solution.
+   !> A matrix without symmetry with an additional unknown, against its known solution.
    subroutine gmres_solves_a_system()
       integer, parameter :: cells = 7, n = 3*cells + 1
       type(gmres_type) :: krylov
@@ -51,8 +51,8 @@ contains
       call check_close(maxval(abs([reshape(v%cells, [n - 1]), v%beside] - x)), 0.0_dp, 3.0e-6_dp, 'solution')
    end subroutine gmres_solves_a_system
 
-   !> Gap, pressure and share are continuous from open to pressed; a partly sheared cell slips at its share
-   !> of the strength.
+   !> Gap, pressure and share are continuous from open to pressed cells. A partly sheared cell slips at its
+   !> share of the strength.
    subroutine states_join_without_a_jump()
       real(dp), parameter :: width = 2.0e-6_dp, little = 1.0e-16_dp
       type(cell_rules_type) :: rules
@@ -74,8 +74,8 @@ contains
       call check_close(maxval(abs(ends - [0.25_dp, 1.0_dp])), 0.0_dp, 1.0e-12_dp, 'shares')
       left = rules%lacking(0.25_dp, 0.0_dp, [0.0_dp, 0.0_dp], [1.0e-6_dp, 0.0_dp], [0.75e5_dp, 0.0_dp])
       call check_close(norm2(left), 0.0_dp, 1.0e-6_dp, 'slips at its share of the strength')
-      call check_that(rules%slips(0.25_dp, 0.0_dp, [0.0_dp, 0.0_dp], [0.75e5_dp, 0.0_dp]), 'known to slip')
-      call check_that(.not. rules%slips(0.5_dp, 0.0_dp, [0.0_dp, 0.0_dp], [0.75e5_dp, 0.0_dp]), 'or to stick')
+      call check_that(rules%slips(0.25_dp, 0.0_dp, [0.0_dp, 0.0_dp], [0.75e5_dp, 0.0_dp]), 'it counts as slip')
+      call check_that(.not. rules%slips(0.5_dp, 0.0_dp, [0.0_dp, 0.0_dp], [0.75e5_dp, 0.0_dp]), 'it counts as stick')
    end subroutine states_join_without_a_jump
 
 end module test_joint_step

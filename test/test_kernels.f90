@@ -1,4 +1,4 @@
-!> Tests of the kernels: what a solid is, and how a new one is added.
+!> Tests of the kernels: the definition of a solid, and how to add a new one.
 module test_kernels
    use asperity_errors, only : error_type
    use asperity_precision, only : dp, pi
@@ -16,7 +16,7 @@ module test_kernels
 
    public :: run_kernels
 
-   real(dp), parameter :: bedding = 40.0_dp          !! traction over displacement of the springs, Pa/m
+   real(dp), parameter :: bedding = 40.0_dp          !! stiffness of the springs: traction over displacement, Pa/m
 
 contains
 
@@ -29,18 +29,18 @@ contains
       if (selected('mean_mode_of_an_operator')) call mean_mode_of_an_operator()
    end subroutine run_kernels
 
-   !> A solid of springs side by side: every cell moves by its own traction. This function is all that
-   !> such a solid needs.
+   !> A solid of independent springs: every cell moves by its own traction. A solid of this kind needs no more
+   !> than this function.
    pure function spring_wave(self, qx, qy) result(a)
       class(kernel_type), intent(in) :: self
       real(dp), intent(in) :: qx, qy
       real(dp) :: a(3)
 
-      a = 0.0_dp*(qx + qy)                            ! all waves are alike
+      a = 0.0_dp*(qx + qy)                            ! all waves have the same stiffness
       a(:self%components) = 1.0_dp/bedding
    end function spring_wave
 
-   !> The kernel of the springs, whose mean displacement counts like any other.
+   !> The kernel of the springs. Their mean displacement is determined like any other.
    function winkler() result(kernel)
       type(kernel_type) :: kernel
 
@@ -48,7 +48,7 @@ contains
       kernel%mean_mode = 1.0_dp/bedding
    end function winkler
 
-   !> Springs: the displacement is the traction over the bedding, cell by cell.
+   !> On springs the displacement is the traction over the stiffness, cell by cell.
    subroutine a_winkler_foundation()
       type(convolution_type) :: operator
       type(error_type), allocatable :: error
@@ -64,8 +64,8 @@ contains
       call check_error(error, 'periodic boundaries only', 'a solid without a cell function')
    end subroutine a_winkler_foundation
 
-   !> Contact on springs: the pressure is the bedding times the depth below one level, so it is the
-   !> projection of bedding times height on the pressures of the given mean.
+   !> Contact on springs: the pressure is the stiffness times the depth below one level. It is therefore the
+   !> projection of stiffness times height on the pressures with the given mean.
    subroutine contact_on_a_winkler_foundation()
       integer, parameter :: nx = 24, ny = 20
       real(dp), parameter :: modulus = 3.0_dp
@@ -99,7 +99,7 @@ contains
       call solver%destroy()
    end subroutine contact_on_a_winkler_foundation
 
-   !> A displacement of zero mean comes back from the operator and its inverse.
+   !> A displacement with zero mean is unchanged by the inverse and the operator.
    subroutine inverses_of_the_half_space()
       type(convolution_type) :: operator, inverse
       type(grid_type) :: grid
@@ -145,7 +145,7 @@ contains
       call check_close(kernel%largest_stiffness(grid), 128.0_dp*pi, 1e-12_dp, 'largest stiffness of a line')
    end subroutine extreme_stiffness_of_a_grid
 
-   !> The operator returns the mean compliance that was set when it was made or later.
+   !> The operator returns the mean compliance that was set when it was created or later.
    subroutine mean_mode_of_an_operator()
       type(convolution_type) :: operator
       type(error_type), allocatable :: error

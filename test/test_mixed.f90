@@ -29,7 +29,8 @@ contains
          call case_with_sliding_in_both_precisions()
    end subroutine run_mixed
 
-   !> Every tolerance that double precision reaches, in about as many iterations; the error is true.
+   !> Mixed precision reaches every tolerance that double precision reaches, in about as many iterations, and
+   !> the reported error is the true one.
    subroutine all_tolerances_are_reached(boundary, nx, ny)
       integer, intent(in) :: boundary, nx, ny
       type(grid_type) :: grid
@@ -56,11 +57,11 @@ contains
             call check_order(5*t%outcome%iterations, '<=', 6*s%outcome%iterations + 10, &
                what//': '// to_text(t%outcome%iterations)//' iterations for '//to_text(s%outcome%iterations))
             call duality_gap(grid, problem%modulus, h, t%pressure, e1)
-            ! The operator's own round-off, against e1 of 1e-10.
+            ! The round-off of the operator itself, compared with e1 of 1e-10.
             if (k == 1) call check_order(e1, '<=', 1.01_dp*problem%tolerance, &
                what//': error recomputed')
             call distance(grid, problem%modulus, h, s%pressure, t%pressure, d)
-            ! By approach the error of the load comes on top of the gap's.
+            ! If the approach is prescribed, the error of the load adds to that of the gap.
             call check_order(d, '<=', merge(8.0_dp, 16.0_dp, k == 1)*problem%tolerance, &
                what//': the same state')
             call check_order(minval(t%pressure), '>=', 0.0_dp, what//': nothing pulls')
@@ -71,7 +72,7 @@ contains
          [maxval(abs(s%pressure - t%pressure))])
    end subroutine all_tolerances_are_reached
 
-   !> Units that single precision does not know: the same steps.
+   !> Values in units beyond the range of single precision need the same steps.
    subroutine units_change_no_step()
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
@@ -85,7 +86,7 @@ contains
       problem%tolerance = 1e-8_dp
       call run_problem(grid, problem, h, s, mixed=.true.)
       do k = -120, 120, 240
-         ! Lengths in another unit, and the modulus in one far from it.
+         ! Lengths in another unit, and the modulus in a unit far from it.
          unit = 2.0_dp**k
          grid = new_grid(72, 90, unit, 1.2_dp*unit, boundary_periodic)
          allocate (small, source=unit*h)
@@ -100,7 +101,7 @@ contains
       end do
    end subroutine units_change_no_step
 
-   !> One thread and two: the same bits.
+   !> One and two threads give the same bits.
    subroutine same_bits_on_two_threads(boundary)
       integer, intent(in) :: boundary
       type(grid_type) :: grid

@@ -1,4 +1,4 @@
-!> Tests of the scanner of namelists, the reference table and the words and numbers of messages.
+!> Tests of the scanner of namelists, the reference table, and the words and numbers in messages.
 module test_namelist
    use check, only : begin_suite, check_close, check_error, check_order, check_that, selected
    use input_faults, only : faults_type
@@ -29,7 +29,7 @@ contains
       if (selected('texts_of_numbers')) call texts_of_numbers()
    end subroutine run_namelist
 
-   !> Groups and assignments, whatever the layout.
+   !> Groups and assignments are found in any layout.
    subroutine any_layout_is_read()
       type(namelists_type) :: file
       type(faults_type) :: faults
@@ -66,7 +66,7 @@ contains
 
    end subroutine any_layout_is_read
 
-   !> What is wrong with the form is found, and the rest is still read.
+   !> Faults of the form are found, and the rest is still read.
    subroutine broken_form_is_found_and_the_rest_read()
       call broken('&a x = 1'//nl//'&b /', 1, 'f: &a: the group that starts in line 1 is not closed')
       call broken('&a x = 1', 1, 'is missing before the end of the file')
@@ -80,7 +80,7 @@ contains
       call broken(repeat('&a x'//nl, 500), 100, 'there are more faults')
    end subroutine broken_form_is_found_and_the_rest_read
 
-   !> A text has so many faults, one of them with this fragment.
+   !> A text has this number of faults, one of which contains this fragment.
    subroutine broken(text, count, fragment)
       character(*), intent(in) :: text
       integer, intent(in) :: count
@@ -94,7 +94,7 @@ contains
       call check_error(faults%error, fragment, fragment)
    end subroutine broken
 
-   !> Every entry of the table makes sense; defaults are allowed values.
+   !> Every entry of the table is complete, and defaults are allowed values.
    subroutine table_of_the_input_is_consistent()
       type(variable_entry_type), allocatable :: entries(:)
       type(group_values_type) :: group
@@ -117,7 +117,7 @@ contains
             call check_order(index(allowed_phrase(entries(i)), 'must be'), '>', 0, &
                name//': its phrase')
             call check_that(count(entries%group == entries(i)%group .and. entries%name == entries(i)%name) &
-               == 1, name//': stands once')
+               == 1, name//': occurs once')
             call default_group(entries(i)%group, group)
             do j = 1, size(group%values)
                if (group%values(j)%entry%name /= entries(i)%name) cycle

@@ -42,7 +42,7 @@ contains
       if (selected('area_at_small_loads_in_its_bracket')) call area_at_small_loads_in_its_bracket()
    end subroutine run_normal_cg
 
-   !> The projection against a search over all numbers of positive cells.
+   !> The projection agrees with a search over all numbers of positive cells.
    subroutine projection_is_the_nearest_field()
       real(dp) :: x(13, 9), y(13, 9), best(13, 9), level, total, least
       integer :: k, trial, n
@@ -100,7 +100,7 @@ contains
       end do
    end function descending
 
-   !> Paraboloid, free, by approach and by load; the error falls with the mesh.
+   !> A paraboloid on a free grid, by approach and by load. The error decreases with the mesh.
    subroutine hertz_sphere_on_a_free_grid()
       real(dp), parameter :: radius = 10.0_dp, a = 1.0_dp
       real(dp), parameter :: force = 4.0_dp*a**3/(3.0_dp*radius), delta = a**2/radius
@@ -133,8 +133,8 @@ contains
          call check_that(s%outcome%converged, 'Hertz by load: '//s%outcome%reason)
          error(3) = abs(s%level/delta - 1.0_dp)
          error(4) = abs(count(s%pressure > 0.0_dp)*grid%dx*grid%dy/(pi*a**2) - 1.0_dp)
-         ! A strip of about half a cell along the contact's edge is in error: its share of the area is
-         ! dx/a, of the force (there P ~ sqrt) (dx/a)^(3/2).
+         ! The error comes from a strip of about half a cell along the edge of the contact. Its share of the
+         ! area is dx/a, and that of the force, where P ~ sqrt, is (dx/a)^(3/2).
          call check_that(all(error(1:3) <= 0.35_dp*ratio**1.5_dp), 'Hertz: error of order dx^(3/2)', &
             error)
          call check_order(error(4), '<=', 1.2_dp*ratio, 'Hertz: area')
@@ -146,8 +146,8 @@ contains
       call check_close(s%level, delta, 2e-3_dp*delta, 'Hertz: approach at dx = a/24')
    end subroutine hertz_sphere_on_a_free_grid
 
-   !> Paraboloid in a big periodic square: the images and the background move the summit by
-   !> -3.900265 F/(pi E* L) (the potential of a square lattice in a uniform background).
+   !> A paraboloid in a large periodic square. The images and the background move the summit by -3.900265
+   !> F/(pi E* L) (the potential of a square lattice in a uniform background).
    subroutine hertz_sphere_in_a_periodic_square()
       real(dp), parameter :: radius = 10.0_dp, a = 1.0_dp, length = 12.0_dp*a
       real(dp), parameter :: force = 4.0_dp*a**3/(3.0_dp*radius), delta = a**2/radius
@@ -165,13 +165,13 @@ contains
       call run_problem(grid, problem, h, s)
       call check_that(s%outcome%converged, s%outcome%reason)
       shift = 3.900265_dp*force/(pi*length)
-      ! Discretisation as in free mode: (dx/a)^(3/2)/3 = 1e-2 of delta.
+      ! The error of the discretisation is as in free mode: (dx/a)^(3/2)/3 = 1e-2 of delta.
       call check_close(s%level, delta - shift, 1e-2_dp*delta, 'Hertz, periodic: approach')
       call check_close(maxval(s%pressure), 2.0_dp*a/(pi*radius), 2e-2_dp*2.0_dp*a/(pi*radius), &
          'Hertz, periodic: greatest pressure')
       call check_close(count(s%pressure > 0.0_dp)*grid%dx*grid%dy, pi*a**2, &
          pi*a**2*1.2_dp*grid%dy/a, 'Hertz, periodic: area')
-      ! By that approach, back to the load.
+      ! From this approach back to the load.
       problem%control = control_approach
       problem%target = s%level
       call run_problem(grid, problem, h, s)
@@ -179,7 +179,7 @@ contains
          'Hertz, periodic: load from approach')
    end subroutine hertz_sphere_in_a_periodic_square
 
-   !> Cylinder in plane strain, L = 64 a: images change the curvature by pi^2/6 (a/L)^2 = 4e-4.
+   !> A cylinder in plane strain with L = 64 a. The images change the curvature by pi^2/6 (a/L)^2 = 4e-4.
    subroutine hertz_cylinder_in_plane_strain()
       real(dp), parameter :: radius = 10.0_dp, a = 1.0_dp, length = 64.0_dp*a
       real(dp), parameter :: load = pi*a**2/(4.0_dp*radius)
@@ -207,7 +207,7 @@ contains
          5e-3_dp*2.0_dp*load/(pi*a), 'line: pressure at a/2')
    end subroutine hertz_cylinder_in_plane_strain
 
-   !> A wave with kx and ky periods along the sides: Westergaard's pressure and mean gap.
+   !> A wave with kx and ky periods along the sides has Westergaard's pressure and mean gap.
    subroutine westergaard_wave(nx, ny, lx, ly, kx, ky)
       integer, intent(in) :: nx, ny
       real(dp), intent(in) :: lx, ly
@@ -223,7 +223,7 @@ contains
 
       grid = new_grid(nx, ny, lx, ly, boundary_periodic)
       length = 1.0_dp/hypot(kx/lx, ky/ly)
-      ! Cells in a wavelength, across the crests.
+      ! Cells per wavelength, across the crests.
       cells = 1.0_dp/(abs(kx)/real(nx, dp) + abs(ky)/real(ny, dp))
       write (name, '("wave ", i0, " x ", i0, " (", i0, ", ", i0, "): ")') nx, ny, kx, ky
       edge = sin(pi*half_width)
@@ -241,8 +241,8 @@ contains
       problem%tolerance = 1e-9_dp
       call run_problem(grid, problem, h, s)
       call check_that(s%outcome%converged, trim(name)//s%outcome%reason)
-      ! Near the edge the pressure ~ sqrt(distance): a cell there errs by ~ sqrt(1/cells), the sum of
-      ! the squares over the cells is dominated by it: rms ~ 1/cells.
+      ! Near the edge the pressure is ~ sqrt(distance), so that the error of a cell there is ~ sqrt(1/cells).
+      ! It dominates the sum of the squares, so that the rms error is ~ 1/cells.
       error = sqrt(sum((s%pressure - p)**2)/size(p))/mean
       call check_order(error, '<=', 1.5_dp/cells, trim(name)//' pressure')
       gap = 2.0_dp*d*(cos(pi*half_width)**2/2.0_dp + edge**2*log(edge))
@@ -251,7 +251,7 @@ contains
          2.0_dp/cells, trim(name)//' contact')
    end subroutine westergaard_wave
 
-   !> Above the pressure that closes it, the pressure is p + A^-1 H, to round-off, at once.
+   !> Above the pressure that closes the gap, the pressure is p + A^-1 H to round-off, without iterations.
    subroutine full_contact_is_exact()
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
@@ -263,7 +263,7 @@ contains
       integer :: k
 
       grid = new_grid(63, 40, 1.0_dp, 0.9_dp, boundary_periodic)
-      ! No wave at the Nyquist number, which a real transform cannot tell apart.
+      ! There is no wave at the Nyquist number, because a real transform cannot represent its phase.
       call rough_height(grid, 4.0_dp, h)
       allocate (p(63, 40))
       call new_convolution(operator, grid, normal_half_space(poisson), error)
@@ -282,14 +282,14 @@ contains
          call check_close(maxval(abs(s%gap)), 0.0_dp, 1e-12_dp*rms(h), 'full contact: gap')
          call check_order(s%outcome%iterations, '<=', 1, 'full contact: at once')
       end do
-      ! Just below, a little is open.
+      ! Slightly below this pressure a small part is open.
       problem%target = 0.9_dp*maxval(-p)
       call run_problem(grid, problem, h, s)
       call check_that(s%outcome%converged, s%outcome%reason)
       call check_order(minval(s%pressure), '<=', 0.0_dp, 'not quite full contact')
    end subroutine full_contact_is_exact
 
-   !> Load to approach and back.
+   !> From a load to the approach and back.
    subroutine load_to_approach_and_back(boundary, nx, ny)
       integer, intent(in) :: boundary, nx, ny
       type(grid_type) :: grid
@@ -314,7 +314,7 @@ contains
          problem%target = s%level
          call run_problem(grid, problem, h, t)
          call check_that(t%outcome%converged, t%outcome%reason)
-         ! The load's error is the stiffness times the approach's error, ~ e1 h_rms.
+         ! The error of the load is the stiffness times the error of the approach, ~ e1 h_rms.
          d = sum(t%pressure)/size(h)
          call check_close(d/load, 1.0_dp, 1e-5_dp, 'load, approach, load')
          call check_close(sum(abs(s%pressure - t%pressure))/sum(s%pressure), 0.0_dp, 1e-4_dp, &
@@ -325,7 +325,7 @@ contains
       end do
    end subroutine load_to_approach_and_back
 
-   !> The error handed out is that of the definition; all tolerances are reached.
+   !> The reported error is that of the definition, and all tolerances are reached.
    subroutine error_is_that_of_the_definition(boundary, nx, ny)
       integer, intent(in) :: boundary, nx, ny
       type(grid_type) :: grid
@@ -358,9 +358,9 @@ contains
       call check_close(s%outcome%residual, max(e1, s%outcome%load_error), 1e-13_dp, 'thesis: e1')
    end subroutine error_is_that_of_the_definition
 
-   !> Small loads: A/A0 = kappa p/(E* h'rms), kappa between Persson's sqrt(8/pi) and Bush, Gibson and
-   !> Thomas's sqrt(2 pi), once the strip of cells along the contact's edge is taken off: the part
-   !> (pi - 1 + ln 2)/24 of the perimeter times dx (Yastrebov, Anciaux, Molinari 2017).
+   !> At small loads A/A0 = kappa p/(E* h'rms), with kappa between Persson's sqrt(8/pi) and sqrt(2 pi) of
+   !> Bush, Gibson and Thomas. The strip of cells along the edge of the contact is subtracted: (pi - 1 + ln
+   !> 2)/24 of the perimeter times dx (Yastrebov, Anciaux, Molinari 2017).
    subroutine area_at_small_loads_in_its_bracket()
       type(grid_type) :: grid
       type(normal_problem_type) :: problem

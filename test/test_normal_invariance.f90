@@ -1,4 +1,5 @@
-!> Tests of normal contact: what must not change a solution, or changes it in a known way.
+!> Tests of normal contact: changes of a problem that leave the solution unchanged, or change it in a known
+!> way.
 module test_normal_invariance
    use check, only : begin_suite, check_close, check_no_error, check_order, check_that, selected
    use asperity_errors, only : error_type
@@ -14,7 +15,7 @@ module test_normal_invariance
 
    public :: run_normal_invariance
 
-   !> Twice (2 sqrt(tolerance))^2: see `distance`.
+   !> Twice (2 sqrt(tolerance))^2, see `distance`.
    real(dp), parameter :: tolerance = 1e-9_dp
    real(dp), parameter :: bound = 8.0_dp*tolerance
 
@@ -37,7 +38,7 @@ contains
       end do
    end subroutine run_normal_invariance
 
-   !> A problem in the middle of things.
+   !> A problem with a medium load.
    subroutine set_problem(boundary, nx, ny, grid, problem, h)
       integer, intent(in) :: boundary, nx, ny
       type(grid_type), intent(out) :: grid
@@ -50,7 +51,7 @@ contains
       problem%rms_height = rms(h)
    end subroutine set_problem
 
-   !> Shift by whole cells, mirror, transpose.
+   !> Shifts by whole cells, reflection and transposition.
    subroutine shifted_mirrored_and_transposed_agree(boundary)
       integer, intent(in) :: boundary
       type(grid_type) :: grid, turned
@@ -79,7 +80,7 @@ contains
       call check_close(t%level, s%level, 1e-6_dp*rms(h), 'transposed: the level')
    end subroutine shifted_mirrored_and_transposed_agree
 
-   !> Lengths by 4, moduli by 8: the same bits but for these factors.
+   !> Lengths times 4 and moduli times 8 give the same bits up to these factors.
    subroutine scaled_units_give_the_same_bits(boundary)
       integer, intent(in) :: boundary
       type(grid_type) :: grid, large
@@ -109,7 +110,7 @@ contains
       end do
    end subroutine scaled_units_give_the_same_bits
 
-   !> One thread and two: the same bits.
+   !> One and two threads give the same bits.
    subroutine same_bits_on_two_threads(boundary)
       integer, intent(in) :: boundary
       type(grid_type) :: grid
@@ -124,7 +125,7 @@ contains
       end do
    end subroutine same_bits_on_two_threads
 
-   !> 'fast' against 'thesis', from few to many contacts.
+   !> 'fast' agrees with 'thesis', from few to many contacts.
    subroutine fast_and_thesis_agree(boundary)
       integer, intent(in) :: boundary
       type(grid_type) :: grid
@@ -148,7 +149,7 @@ contains
       end do
    end subroutine fast_and_thesis_agree
 
-   !> Warm starts: from the solution, from another load, from another place.
+   !> Starts from the solution, from another load, and from another place.
    subroutine warm_starts_reach_the_same(boundary)
       integer, intent(in) :: boundary
       type(grid_type) :: grid
@@ -183,7 +184,7 @@ contains
          'a little more load: fewer iterations')
    end subroutine warm_starts_reach_the_same
 
-   !> A memory P_h acts as a change of height A P_h/Q.
+   !> A memory P_h is equivalent to a change A P_h/Q of the height.
    subroutine past_traction_is_like_a_height(boundary)
       integer, intent(in) :: boundary
       type(grid_type) :: grid
@@ -217,7 +218,8 @@ contains
          call run_problem(grid, problem, h - u/unit_modulus, t)
          call check_that(s%outcome%converged, 'memory: '//s%outcome%reason)
          call distance(grid, unit_modulus, h, s%pressure, t%pressure, d)
-         ! The bound is for a fixed load; by approach the load is free, within the same energy.
+         ! The bound is for a fixed load. If the approach is prescribed the load is free, within the same
+         ! energy.
          call check_close(d, 0.0_dp, bound, 'memory: the pressure')
          call check_close(s%level, t%level, 1e-6_dp*rms(h), 'memory: the level')
       end do

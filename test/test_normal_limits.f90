@@ -1,4 +1,4 @@
-!> Tests of normal contact where it is hardest or degenerate: few cells, flat, no load, odd shapes.
+!> Tests of normal contact in hard or degenerate cases: few cells, flat roads, no load, unusual grids.
 module test_normal_limits
    use check, only : begin_suite, check_close, check_no_error, check_order, check_that, selected
    use asperity_errors, only : error_type
@@ -49,7 +49,7 @@ contains
       end if
    end subroutine run_normal_limits
 
-   !> A spike: one cell carries the load, with its own influence coefficient as the compliance.
+   !> One cell carries the load, with its own influence coefficient as the compliance.
    subroutine spike_carries_load_on_one_cell(thesis)
       logical, intent(in) :: thesis
       type(grid_type) :: grid
@@ -79,11 +79,13 @@ contains
          call check_that(s%outcome%converged, 'a spike by approach: '//s%outcome%reason)
          call check_close(sum(s%pressure)/size(h), 2e-4_dp, 1e-8_dp, 'twice as far, twice the load')
       end do
-      ! In free mode it is Love's 4 (asinh(r) + r asinh(1/r)) of sides, here by the test of the operator.
+      ! In free mode this is Love's 4 (asinh(r) + r asinh(1/r)) of the sides; here it is taken from the
+      ! operator.
       call check_order(own, '>', 0.0_dp, 'the compliance of a cell')
    end subroutine spike_carries_load_on_one_cell
 
-   !> A flat surface: uniform pressure where periodic, a punch with its singular edge where free.
+   !> On a flat surface the pressure is uniform if the grid is periodic. On a free grid it is that of a punch
+   !> with its singular edge.
    subroutine flat_surface_and_flat_punch(thesis)
       logical, intent(in) :: thesis
       type(grid_type) :: grid
@@ -101,7 +103,7 @@ contains
       call check_close(maxval(abs(s%pressure - 0.02_dp)), 0.0_dp, 1e-12_dp*0.02_dp, 'flat: uniform')
       call check_close(s%level, -0.1_dp, 1e-14_dp, 'flat: no approach')
 
-      ! A square punch: F = 1.153 E* L delta (Borodachev; Sneddon's 2 a delta E* for a disc).
+      ! A square punch: F = 1.153 E* L delta (Borodachev). Sneddon's formula for a disc is 2 a delta E*.
       deallocate (h)
       allocate (h(48, 48), source=-2.0_dp)
       grid = new_grid(48, 48, 1.0_dp, 1.0_dp, boundary_free)
@@ -109,7 +111,8 @@ contains
       call run_problem(grid, problem, h, s, thesis)
       call check_that(s%outcome%converged, 'punch: '//s%outcome%reason)
       call check_that(all(s%pressure > 0.0_dp), 'punch: all in contact', [minval(s%pressure)])
-      ! The map is one cell wider than its centres; the singular edge errs by ~ dx/L.
+      ! The map is one cell wider than the distance of its outer centres. The error of the singular edge is ~
+      ! dx/L.
       call check_close(0.02_dp/(s%level - 2.0_dp), 1.153_dp, 0.03_dp, 'punch: stiffness')
       force = sum(s%pressure)
       problem%control = control_approach
@@ -119,7 +122,7 @@ contains
       call check_close(sum(s%pressure)/force, 1.0_dp, 1e-5_dp, 'punch: the load again')
    end subroutine flat_surface_and_flat_punch
 
-   !> Two equal summits share the load.
+   !> Two equal summits carry half of the load each.
    subroutine two_summits_share_the_load(thesis)
       logical, intent(in) :: thesis
       type(grid_type) :: grid
@@ -145,7 +148,7 @@ contains
       end do
    end subroutine two_summits_share_the_load
 
-   !> A load of zero: first touch.
+   !> A load of zero is first touch.
    subroutine zero_load_just_touches(thesis)
       logical, intent(in) :: thesis
       type(grid_type) :: grid
@@ -166,7 +169,7 @@ contains
       end do
    end subroutine zero_load_just_touches
 
-   !> An approach that does not reach.
+   !> An approach without contact.
    subroutine approach_that_does_not_reach(thesis)
       logical, intent(in) :: thesis
       type(grid_type) :: grid
@@ -188,7 +191,7 @@ contains
       end do
    end subroutine approach_that_does_not_reach
 
-   !> An approach that would leave no gap: nothing to be solved in periodic mode, and it says so.
+   !> An approach that would leave no gap cannot be solved on a periodic grid. The solver says so.
    subroutine approach_that_closes_the_gap(thesis)
       logical, intent(in) :: thesis
       type(grid_type) :: grid
@@ -204,10 +207,10 @@ contains
       call check_that(.not. s%outcome%converged, 'a closed gap has no pressure')
       call check_order(index(s%outcome%reason, 'full contact'), '>', 0, &
          'it says why: '//s%outcome%reason)
-      call check_that(s%outcome%iterations == 0, 'it does not try')
+      call check_that(s%outcome%iterations == 0, 'it does not iterate')
       call check_that(all(s%pressure >= 0.0_dp) .and. all(abs(s%gap) < 1.0_dp), 'a usable state', &
          [minval(s%pressure), maxval(abs(s%gap))])
-      ! A gap that is nearly closed has one. (The mean gap is 1 % of the rms height.)
+      ! A small gap has a solution. (The mean gap is 1 % of the rms height.)
       problem%target = -sum(h)/size(h) - 1e-2_dp*rms(h)
       problem%tolerance = 1e-8_dp
       call run_problem(grid, problem, h, s, thesis)
@@ -215,7 +218,8 @@ contains
       call check_close(sum(s%gap)/size(h), 1e-2_dp*rms(h), 1e-12_dp*rms(h), 'the mean gap')
    end subroutine approach_that_closes_the_gap
 
-   !> Two iterations are not enough: the state is usable, better than the start, and honest.
+   !> Two iterations are not enough. The state is usable, better than the start, and its error is the true
+   !> one.
    subroutine two_iterations_leave_a_usable_state(thesis)
       logical, intent(in) :: thesis
       type(grid_type) :: grid
@@ -237,7 +241,7 @@ contains
       call check_order(e1, '>', problem%tolerance, 'which is larger than wanted')
       call check_close(sum(s%pressure)/size(h), 0.005_dp, 1e-15_dp, 'the load is kept')
       call check_that(all(s%pressure >= 0.0_dp), 'no tension', [minval(s%pressure)])
-      ! It is a start for going on.
+      ! The solver can continue from this state.
       problem%max_iterations = 500
       call run_problem(grid, problem, h, t, thesis, start=s%pressure)
       call check_that(t%outcome%converged, 'going on: '//t%outcome%reason)
@@ -247,7 +251,7 @@ contains
       call check_close(sum(t%pressure)/size(h), 0.005_dp, 1e-15_dp, 'the load of the start')
    end subroutine two_iterations_leave_a_usable_state
 
-   !> Loads down to nothing end on the highest cell.
+   !> Very small loads are carried by the highest cell.
    subroutine tiny_loads_end_on_the_highest_cell()
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
@@ -291,11 +295,11 @@ contains
          do k = 1, size(loads)
             problem%target = loads(k)
             call run_problem(grid, problem, h, s)
-            call check_that(s%outcome%converged, 'a drowned load: '//s%outcome%reason)
-            call check_close(sum(s%pressure)/(loads(k)*size(h)), 1.0_dp, 1e-6_dp, 'a drowned load is met')
+            call check_that(s%outcome%converged, 'a load below round-off: '//s%outcome%reason)
+            call check_close(sum(s%pressure)/(loads(k)*size(h)), 1.0_dp, 1e-6_dp, 'a load below round-off is met')
             if (k > 1) then
                call run_problem(grid, problem, h, s, start=start)
-               call check_that(s%outcome%converged, 'a drowned load after another: '//s%outcome%reason)
+               call check_that(s%outcome%converged, 'a load below round-off after another: '//s%outcome%reason)
                call check_close(sum(s%pressure)/(loads(k)*size(h)), 1.0_dp, 1e-6_dp, 'it is met')
             end if
             start = s%pressure
@@ -303,7 +307,8 @@ contains
       end do
    end subroutine load_below_round_off_is_met
 
-   !> A small contact on a tall map is as exact as on a small map: of a paraboloid, five cells of radius.
+   !> A small contact on a high map is as accurate as on a small map. The contact of a paraboloid has a radius
+   !> of five cells.
    subroutine small_contact_on_a_tall_map()
       integer, parameter :: sides(3) = [50, 160, 400]
       type(grid_type) :: grid
@@ -368,7 +373,7 @@ contains
       end do
    end subroutine zero_of_heights_does_not_matter
 
-   !> A free patch that touches at its edge and corner, by load and approach.
+   !> A free patch that touches at its edge and corner, by load and by approach.
    subroutine contact_at_the_edge_of_a_free_patch()
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
@@ -391,13 +396,13 @@ contains
       call check_that(s%outcome%converged, 'contact at the corner: '//s%outcome%reason)
       call check_order(s%pressure(33, 20), '>', 0.0_dp, 'the corner carries')
       call check_order(s%pressure(1, 1), '<=', 0.0_dp, 'the other does not')
-      ! Complementarity by an operator of its own.
+      ! The complementarity is checked with a separate operator.
       call new_convolution(operator, grid, normal_half_space(poisson), error)
       call operator%apply(s%pressure, u)
       call operator%destroy()
       u = u/unit_modulus - h - s%level
       call check_close(minval(u), 0.0_dp, 1e-8_dp*rms(h), 'no overlap')
-      call check_close(maxval(abs(u - s%gap)), 0.0_dp, 1e-13_dp, 'the gap handed out')
+      call check_close(maxval(abs(u - s%gap)), 0.0_dp, 1e-13_dp, 'the gap that is returned')
       force = sum(s%pressure)
       problem%control = control_approach
       problem%target = s%level
@@ -406,7 +411,7 @@ contains
       call check_close(sum(t%pressure)/force, 1.0_dp, 1e-5_dp, 'corner: the load again')
    end subroutine contact_at_the_edge_of_a_free_patch
 
-   !> Odd, prime, thin and stretched grids converge as the others do.
+   !> Odd, prime, thin and stretched grids converge like others.
    subroutine odd_prime_thin_and_stretched_grids()
       integer, parameter :: shapes(2, 13) = reshape([ &
          1, 1, 2, 1, 1, 2, 2, 2, 3, 5, 97, 61, 64, 64, 127, 1, 1, 127, 512, 8, 8, 512, 257, 3, &
@@ -448,7 +453,7 @@ contains
          write (name, '(a, i0, " x ", i0, ", 1 : ", f4.2, ", load ", i0, ": ")') &
             merge('periodic ', 'free     ', boundary == boundary_periodic), nx, ny, ratio, k
          call check_that(s%outcome%converged, trim(name)//' '//s%outcome%reason)
-         ! In strips of stretched cells the preconditioner is of little use, but does no harm.
+         ! On strips of stretched cells the preconditioner has little effect, but does no harm.
          if (s%outcome%iterations > 60) then
             call run_problem(grid, problem, h, t, .true.)
             call check_order(real(s%outcome%iterations, dp), '<=', 1.1_dp*t%outcome%iterations, &
@@ -460,7 +465,7 @@ contains
       end do
    end subroutine solve_shape
 
-   !> A solver that is used again starts afresh.
+   !> A solver that is used again starts from nothing.
    subroutine used_solver_starts_afresh()
       type(grid_type) :: grid
       type(normal_solver_type) :: solver
@@ -491,9 +496,9 @@ contains
       call solver%destroy()
    end subroutine used_solver_starts_afresh
 
-   !> A road that changes a little, as from pass to pass of a step. The solve that goes on from the
-   !> displacement before spares a product at the start and one at the end, and the gap that it hands out
-   !> is still that of its pressure.
+   !> A road that changes a little, as from pass to pass of a step. A solve that continues from the
+   !> displacement before saves a product at the start and one at the end. The gap that it returns is still
+   !> that of its pressure.
    subroutine solves_of_one_step_spare_products(boundary, control)
       integer, intent(in) :: boundary, control
       type(grid_type) :: grid
@@ -537,7 +542,7 @@ contains
       call check_close(levels(1), levels(2), 1e-11_dp*problem%rms_height, 'the same level')
       if (boundary == boundary_periodic .and. control == control_pressure) then
          call duality_gap(grid, problem%modulus, changed, p, e1)
-         call check_order(e1, '<=', 1.01e-8_dp, 'the error by an operator of its own')
+         call check_order(e1, '<=', 1.01e-8_dp, 'the error by a separate operator')
       end if
       call solver%destroy()
    end subroutine solves_of_one_step_spare_products

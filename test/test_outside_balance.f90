@@ -1,4 +1,4 @@
-!> Tests of the balance of energy seen from outside: friction, steps that are too coarse, pull-off.
+!> Tests of the energy balance seen from outside: friction, steps that are too coarse, pull-off.
 module test_outside_balance
    use check, only : begin_suite, check_close, check_order, check_that, selected
    use history_row, only : history_row_type
@@ -23,7 +23,7 @@ contains
          call pull_off_radiates_the_stored_energy()
    end subroutine run_outside_balance
 
-   !> One row: what is excess, what is radiated, what a jump does.
+   !> One row: energy in excess, radiated energy, and a jump.
    subroutine excess_and_radiation_of_one_row()
       type(history_row_type) :: before, row
 
@@ -37,7 +37,7 @@ contains
       call book_outside(before, [1.0_dp, 0.0_dp], [2.0_dp, 7.0_dp], [0.0_dp, 0.0_dp], .false., .true., row)
       call check_close(row%work_load, 13.0_dp, 1e-14_dp, 'work of the load')
       call check_close(row%work_drive, 3.0_dp, 1e-14_dp, 'work of the drive')
-      ! 3 + 3 - 2.5 = 3.5 lies above (2*1 + 1*2)/2 = 2
+      ! 3 + 3 - 2.5 = 3.5 is above (2*1 + 1*2)/2 = 2.
       call check_close(row%energy_radiated, 3.5_dp, 1e-14_dp, 'more than a path can explain')
       call check_close(row%work_missing, 0.0_dp, 0.0_dp, 'all of it is radiated')
       row%work_normal = 4.5_dp
@@ -53,11 +53,12 @@ contains
       call check_close(row%work_load, 12.5_dp, 1e-14_dp, 'a jump works what it stores')
    end subroutine excess_and_radiation_of_one_row
 
-   !> Mindlin's sphere to and fro, nu = 0: the energy lost in a loop is the area of the exact loop of the
-   !> force over the motion (Mindlin and Deresiewicz 1953), however coarse the steps; the rest is the mesh's.
+   !> Mindlin's sphere moved back and forth, nu = 0. The energy lost in a loop is the area of the exact loop
+   !> of the force (Mindlin and Deresiewicz 1953), however coarse the steps are. The rest is the error of the
+   !> mesh.
    subroutine loss_of_a_mindlin_loop()
       real(dp), parameter :: g = 1e6_dp, radius = 10e-3_dp, a = 1e-3_dp, mu = 0.01_dp
-      real(dp), parameter :: full = mu*a**2/radius     !! road's motion to full slip, m
+      real(dp), parameter :: full = mu*a**2/radius     !! motion of the road up to full slip, m
       integer, parameter :: steps(3) = [2, 4, 8]
       type(record_type) :: record
       real(dp) :: load, exact, errors(3)
@@ -99,7 +100,7 @@ contains
 
    end subroutine loss_of_a_mindlin_loop
 
-   !> A rough viscoelastic road with friction in steady sliding at one cell a step.
+   !> A rough viscoelastic road with friction in steady sliding at one cell per step.
    subroutine balance_on_a_rough_road()
       type(record_type) :: record
       real(dp) :: lost, missing
@@ -117,8 +118,8 @@ contains
       end associate
    end subroutine balance_on_a_rough_road
 
-   !> What friction has lost never comes back: not where the load drops or rises while the road slides, nor
-   !> where it turns.
+   !> Friction losses never decrease: neither where the load falls or rises while the road slides, nor where
+   !> the road turns back.
    subroutine friction_loss_never_falls()
       type(record_type) :: record
       integer :: k
@@ -136,9 +137,10 @@ contains
       end do
    end subroutine friction_loss_never_falls
 
-   !> A sphere pulled off by its displacement radiates what it has stored at the point of instability less
-   !> the work of adhesion. Reference: JKR, with E = E* (a d^2 - 2 a^3 d/(3 R) + a^5/(5 R^2)) - pi w a^2 at
-   !> the largest stretch, where d d/d a = 0; Tabor's parameter 3, so that JKR is met to some per cent.
+   !> A sphere that is pulled off by its displacement radiates the energy stored at the point of instability
+   !> minus the work of adhesion. The reference is JKR with E = E* (a d^2 - 2 a^3 d/(3 R) + a^5/(5 R^2)) - pi
+   !> w a^2 at the largest stretch, where d d/d a = 0. The Tabor parameter is 3, so that JKR holds to some per
+   !> cent.
    subroutine pull_off_radiates_the_stored_energy()
       real(dp), parameter :: radius = 20e-6_dp, w = 0.05_dp, e_star = 4e6_dp, tabor = 3.0_dp
       type(record_type) :: record

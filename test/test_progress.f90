@@ -1,4 +1,4 @@
-!> Tests of the words of a run's progress.
+!> Tests of the lines about the progress of a run.
 module test_progress
    use check, only : begin_suite, check_order, check_that, selected
    use history_row, only : history_row_type
@@ -16,7 +16,7 @@ contains
       if (selected('texts_of_progress')) call texts_of_progress()
    end subroutine run_progress
 
-   !> Durations and progress lines are written as people read them.
+   !> Durations and progress lines are written for people to read.
    subroutine texts_of_progress()
       type(history_row_type) :: row
 

@@ -20,7 +20,7 @@ contains
       if (selected('shift')) call shift()
    end subroutine run_prony
 
-   !> A Zener branch: creep and relaxation functions of the thesis, eq. 2.15 and 2.16.
+   !> A Zener branch has the creep and relaxation functions of the thesis, eq. 2.15 and 2.16.
    subroutine branches()
       real(dp), parameter :: g0 = 1.0e6_dp, g1 = 1.0e5_dp, eta = 1.0e5_dp
       real(dp) :: g_e, g(1), tau(1), two_g(2), two_tau(2), t
@@ -47,7 +47,7 @@ contains
          1.0e-14_dp, 'impedances of two branches add up')
    end subroutine branches
 
-   !> One arm on a spring, and one arm alone (a Maxwell fluid).
+   !> One arm with a spring, and one arm alone (a Maxwell fluid).
    subroutine one_arm()
       real(dp) :: t
       complex(dp) :: modulus
@@ -63,7 +63,7 @@ contains
       call check_close(aimag(modulus), 1.0_dp, 1.0e-15_dp, 'peak of the loss')
    end subroutine one_arm
 
-   !> J* G* = 1 at any frequency: 6 unordered arms, two of equal time, one empty, one nearly absent.
+   !> J* G* = 1 at any frequency, for 6 arms in any order, two with equal times, one empty, one nearly empty.
    subroutine duality()
       real(dp), parameter :: g(6) = [3.0_dp, 1.0_dp, 0.0_dp, 2.0_dp, 1.0e-9_dp, 0.5_dp]
       real(dp), parameter :: tau(6) = [1.0_dp, 1.0e-3_dp, 5.0_dp, 1.0_dp, 7.0_dp, 1.1_dp]
@@ -132,7 +132,7 @@ contains
       call check_close(wlf_shift(30.0_dp, 20.0_dp, 17.44_dp, 51.6_dp), &
          exp(-log(10.0_dp)*174.4_dp/61.6_dp), 1.0e-16_dp, 'WLF above the reference')
       call check_order(wlf_shift(10.0_dp, 20.0_dp, 17.44_dp, 51.6_dp), '>', 1.0_dp, &
-         'colder is slower')
+         'cold rubber is slower')
       call check_close(wlf_shift(10.0_dp, 20.0_dp, 0.0_dp, 0.0_dp), 1.0_dp, 0.0_dp, 'no shift')
       call check_close(wlf_shift(20.0_dp, 20.0_dp, 17.0_dp, 0.0_dp), 1.0_dp, 0.0_dp, 'at reference')
    end subroutine shift

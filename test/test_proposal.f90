@@ -27,7 +27,7 @@ module test_proposal
       '&phase velocity_x = 0.3, velocity_y = 0.1, duration = 6e-3, steps = 3 /'//nl// &
       '&phase pressure = 1.5e5, velocity_x = 0.3, velocity_y = 0.1, duration = 4e-3, steps = 2 /'
 
-   integer :: questions = 0        !! that `asked` will still answer with no
+   integer :: questions = 0        !! times that `asked` still answers with no
 
 contains
 
@@ -37,9 +37,9 @@ contains
       if (selected('give_up_advance')) call give_up_advance()
    end subroutine run_proposal
 
-   !> A row that was rejected leaves no trace, whatever acts.
+   !> A rejected row changes nothing, for all kinds of physics.
    subroutine propose_reject_advance()
-      ! The first row in time of each case is taken in three parts.
+      ! The first row in time of each case is solved in three parts.
       call try_case(grid//rubber//' /'//nl//'&phase pressure = 1e5 /'//nl// &
          '&phase pressure = 2e5, ramp = ''linear'', duration = 4e-3, steps = 2 /', 'load')
       call try_case(slides, 'friction, with a jump of the load')
@@ -50,7 +50,7 @@ contains
          '&phase pressure = 2e4, velocity_x = 0.3, duration = 4e-3, steps = 2 /', 'adhesion')
    end subroutine propose_reject_advance
 
-   !> Rows are given up whatever acts, those with friction between passes and within them.
+   !> Rows are given up in all kinds of physics; rows with friction between passes and within them.
    subroutine give_up_advance()
       call give_up_case(slides, 3, 'friction')
       call give_up_case(slides//nl//'&solver method = ''thesis'' /', 29, 'friction by the method of the thesis')
@@ -75,10 +75,10 @@ contains
    end subroutine give_up_advance
 
    !> A row that is given up at any iteration or pass, in any part of its step, leaves the state of the row
-   !> before, and the run continues to the same numbers.
+   !> before, and the run continues with the same numbers.
    subroutine give_up_case(text, every, what)
       character(*), intent(in) :: text, what
-      integer, intent(in) :: every                  !! of the places to give up that are tried
+      integer, intent(in) :: every                  !! number of places at which the row is given up
       type(simulation_type) :: plain, hesitant
       type(state_type) :: before
       type(case_type) :: case
@@ -114,7 +114,7 @@ contains
       call hesitant%destroy()
    end subroutine give_up_case
 
-   !> Is a stop asked for? No, as often as `questions` says, then yes.
+   !> Is a stop requested? The answer is no as often as `questions` says, then yes.
    function asked() bind(c) result(yes)
       integer(c_int) :: yes
 
@@ -144,9 +144,9 @@ contains
          call hesitant%propose(error)
          call check_no_error(error, what//': propose')
          call check_that(same(hesitant%state, before), what//': a proposal changes no state')
-         call check_that(same(hesitant%proposed, plain%state), what//': it is the next state')
+         call check_that(same(hesitant%proposed, plain%state), what//': the proposed state is the next state')
          call hesitant%reject()
-         call check_that(.not. allocated(hesitant%proposed), what//': nothing is left of it')
+         call check_that(.not. allocated(hesitant%proposed), what//': nothing is left of the proposal')
          call hesitant%advance(error)
          call check_that(same(hesitant%state, plain%state), what//': advance after reject')
          call formal%propose(error)
@@ -161,7 +161,7 @@ contains
       call formal%destroy()
    end subroutine try_case
 
-   !> Are two states the same to the last bit, but for the seconds that the row took?
+   !> Are two states the same to the last bit, except for the wall time of the row?
    function same(one, other) result(yes)
       type(state_type), intent(in), target :: one, other
       logical :: yes

@@ -1,4 +1,4 @@
-!> Tests of the result: the layout, rows and snapshots, going on after a given row, a full disk.
+!> Tests of the result: the layout, rows and snapshots, continuation after a given row, a full disk.
 module test_result_file
    use check, only : begin_suite, check_close, check_error, check_no_error, check_order, &
       check_that, selected
@@ -32,7 +32,7 @@ contains
       call remove_file(sibling_path(path, '.xdmf'))
    end subroutine run_result_file
 
-   !> What is in a whole result.
+   !> The content of a complete result.
    subroutine layout_is_kept()
       type(hdf5_file_type) :: file
       type(error_type), allocatable :: error
@@ -100,7 +100,7 @@ contains
       call file%close(error)
    end subroutine layout_is_kept
 
-   !> A run that continues from its checkpoint drops later rows, and ends with the same result.
+   !> A run that continues from its checkpoint removes later rows, and ends with the same result.
    subroutine run_goes_on()
       type(hdf5_file_type) :: file
       type(error_type), allocatable :: error
@@ -157,8 +157,8 @@ contains
       call file%close(error)
    end function id_of
 
-   !> A result that cannot be created leaves no file. A field that does not exist and a second snapshot
-   !> before the first one is finished are refused.
+   !> A result that cannot be created leaves no file. A field that does not exist is refused, and so is a
+   !> second snapshot before the first one is finished.
    subroutine wrong_use_is_refused()
       type(result_file_type) :: output
       type(result_plan_type) :: plan

@@ -23,7 +23,7 @@ contains
          call free_map_has_no_differences_across_edges()
    end subroutine run_roughness
 
-   !> One oblique wave: every measure in closed form.
+   !> For one oblique wave every measure is known in closed form.
    subroutine measures_of_one_oblique_wave()
       type(grid_type) :: grid
       type(roughness_type) :: s
@@ -89,7 +89,7 @@ contains
       call check_close(mean_psd(4), psd(5, 1), 1.0e-15_dp, 'psd of a profile by rings')
    end subroutine measures_of_a_profile
 
-   !> Parseval, on white noise, with Nyquist modes and without: all power is counted once.
+   !> Parseval's sum for white noise, with and without Nyquist modes: each power is counted once.
    subroutine parseval_counts_all_power_once()
       integer, parameter :: sizes(2, 4) = reshape([16, 12, 15, 12, 16, 9, 21, 15], [2, 4])
       type(grid_type) :: grid
@@ -132,8 +132,8 @@ contains
       end do
    end subroutine parseval_counts_all_power_once
 
-   !> Three waves at 120 degrees are isotropic to fourth order: Nayak's parameter of a single |k|
-   !> is 3/2, and two such shells give the closed form of their moments.
+   !> Three waves at 120 degrees are isotropic to fourth order. Nayak's parameter is 3/2 for a single |k|, and
+   !> known in closed form for the moments of two such rings.
    subroutine nayak_parameter_of_isotropic_waves()
       type(grid_type) :: grid
       type(roughness_type) :: s
@@ -162,7 +162,7 @@ contains
       call check_close(s%nayak + s%kurtosis + s%rms_slope, 0.0_dp, 0.0_dp, 'a flat map')
    end subroutine nayak_parameter_of_isotropic_waves
 
-   !> A free map's differences do not reach across its edges; a wrong shape is refused.
+   !> Differences on a free map do not extend across its edges. A wrong shape is refused.
    subroutine free_map_has_no_differences_across_edges()
       type(grid_type) :: grid
       type(roughness_type) :: s

@@ -1,4 +1,5 @@
-!> Tests of the normal solver's preconditioner: against a dense matrix, and by what it saves.
+!> Tests of the preconditioner of the normal solver: against a dense matrix, and by the iterations that it
+!> saves.
 module test_schur
    use active_blocks, only : active_blocks_type, new_active_blocks
    use check, only : begin_suite, check_close, check_no_error, check_order, check_that, selected
@@ -15,7 +16,7 @@ module test_schur
 
    public :: run_schur
 
-   !> A preconditioner and what it needs.
+   !> A preconditioner and its arguments.
    type :: setting_type
       type(grid_type) :: grid
       type(coarse_level_type) :: coarse
@@ -99,7 +100,7 @@ contains
       found = z(on)
       call check_order(norm2(found - exact), '<=', 1e-3_dp*norm2(exact), &
          'many steps give the Schur complement')
-      call check_close(form, dot_product(r(on), exact), 1e-4_dp*form, 'and its form')
+      call check_close(form, dot_product(r(on), exact), 1e-4_dp*form, 'and its energy')
       call s%preconditioner%destroy()
       call s%coarse%destroy()
    end subroutine preconditioner_is_the_schur_complement
@@ -175,7 +176,7 @@ contains
       call s%coarse%destroy()
    end subroutine waves_extend_the_residual_by_means
 
-   !> z = M r for a residual on a contact set; z is B v elsewhere.
+   !> z = M r for a residual on a contact set; elsewhere z is B v.
    subroutine apply(s, r, inside, steps, z, form)
       type(setting_type), intent(inout) :: s
       real(dp), intent(in) :: r(:)
@@ -235,7 +236,7 @@ contains
       end do
    end function solved
 
-   !> Few iterations at every load, where the residual is extended.
+   !> With an extended residual there are few iterations at every load.
    subroutine iterations_stay_few_at_every_load()
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
@@ -253,7 +254,7 @@ contains
       end do
    end subroutine iterations_stay_few_at_every_load
 
-   !> Oblong cells: the stencil fits them, and the residual is extended where that helps.
+   !> On oblong cells the stencil is adapted, and the residual is extended where that is an advantage.
    subroutine oblong_cells_take_few_iterations(nx, ny, aspect, most)
       integer, intent(in) :: nx, ny
       real(dp), intent(in) :: aspect                 !! dy/dx

@@ -1,4 +1,5 @@
-!> Tests of what crosses the rows that processes share: rows fetched from their owners, shifts, carried fields.
+!> Tests of exchanges between the rows that processes share: rows fetched from their owners, shifts, carried
+!> fields.
 !>
 !> The tests hold for any number of processes: built with MPI and started by mpirun, they share the rows.
 module test_shared_rows
@@ -27,7 +28,7 @@ contains
       if (selected('roads_are_read_across_rows')) call roads_are_read_across_rows()
    end subroutine run_shared_rows
 
-   !> Any number, another one in each cell.
+   !> A number that differs from cell to cell.
    elemental function value(i, j)
       integer, intent(in) :: i, j
       real(dp) :: value
@@ -35,7 +36,7 @@ contains
       value = modulo(7919*i + 1049*j*j, 10007)/1024.0_dp - 4.0_dp
    end function value
 
-   !> The value in a cell of an unbounded field: of its image, or 0 beyond a free grid.
+   !> The value in a cell of an unbounded field: that of its image, or 0 beyond a free grid.
    elemental function image(grid, i, j)
       type(grid_type), intent(in) :: grid
       integer, intent(in) :: i, j
@@ -80,7 +81,7 @@ contains
       end do
    end function difference
 
-   !> A halo, a slab elsewhere, all rows and more, nothing: each process gets the rows that it asks for.
+   !> A halo, a slab elsewhere, more than all rows, and none: each process gets the rows that it requests.
    subroutine rows_come_from_their_owners()
       integer, parameter :: boundaries(2) = [boundary_periodic, boundary_free]
       type(grid_type) :: grid
@@ -121,7 +122,7 @@ contains
       end do
    end subroutine rows_come_from_their_owners
 
-   !> Small integers travel as well.
+   !> Small integers are exchanged as well.
    subroutine bytes_come_from_their_owners()
       type(grid_type) :: grid
       real(dp), allocatable :: field(:, :)
@@ -144,7 +145,7 @@ contains
       call check_close(real(worst, dp), 0.0_dp, 0.0_dp, 'bytes of the range')
    end subroutine bytes_come_from_their_owners
 
-   !> Round a periodic grid, and out of a free one, of which zeros take the place.
+   !> A field moves around a periodic grid, and out of a free one, where zeros take its place.
    subroutine fields_shift_by_whole_cells()
       integer, parameter :: boundaries(2) = [boundary_periodic, boundary_free]
       integer, parameter :: shifts(2, 4) = reshape([0, 0, 3, -4, -20, 11, 1, 1000003], [2, 4])
@@ -171,7 +172,8 @@ contains
       end do
    end subroutine fields_shift_by_whole_cells
 
-   !> A field is carried by whole cells without a change of any bit; beyond a free grid its rim is continued.
+   !> A field is carried by whole cells without a change of any bit. Beyond a free grid the values at its rim
+   !> continue.
    subroutine fields_are_carried()
       type(grid_type) :: grid
       real(dp), allocatable :: field(:, :), moved(:, :)
@@ -181,7 +183,7 @@ contains
          call new_field(k, boundary_periodic, grid, field)
          allocate (moved, source=field)
          call carry(grid, field, [-3*grid%dx, 50002*grid%dy], moved)
-         ! The motion in cells has round-off; so has the result.
+         ! The motion in cells has round-off, and so has the result.
          call check_close(difference(grid, moved, grid%first_row + 50002, -2), 0.0_dp, 1.0e-6_dp*grid%ny, &
             'carried round')
          call carry(grid, field, [0.0_dp, 0.25_dp*grid%dy], moved)
@@ -197,8 +199,8 @@ contains
       end do
    end subroutine fields_are_carried
 
-   !> The road read on shared rows is that of a grid that every process holds whole, to the last bit: near and
-   !> far away, at rest and displaced, step after step.
+   !> The road read on shared rows is that of a grid that every process holds completely, to the last bit:
+   !> near and far, at rest and displaced, in every step.
    subroutine roads_are_read_across_rows()
       character(6), parameter :: methods(2) = ['linear', 'cubic ']
       integer, parameter :: boundaries(2) = [boundary_periodic, boundary_free]
