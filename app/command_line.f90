@@ -127,6 +127,7 @@ contains
             end if
          else if (.not. allocated(command%path)) then
             command%path = argument
+            if (argument == '') call refuse(command%verb//': the name that follows it is empty')
          else
             call refuse(''''//ordinary(argument, 60)//''' is one argument too many')
          end if

@@ -133,8 +133,13 @@ def test_missing_files(program, folder):
         assert "not_there" in done.err
     done = call(program, "check", folder)
     assert done.returncode == 3
-    done = call(program, "check", "")
-    assert done.returncode in (2, 3)
+
+
+@pytest.mark.parametrize("verb", ["run", "check", "info", "template"])
+def test_an_empty_name_of_a_file(program, folder, verb):
+    done = call(program, verb, "", cwd=folder)
+    assert done.returncode == 2
+    assert done.err == f"asperity: {verb}: the name that follows it is empty\n"
 
 
 def test_full_device(program, folder):
