@@ -6,6 +6,7 @@ module flat_contact
    use asperity_precision, only : dp
    use case_settings, only : adhesion_settings_type, solver_settings_type
    use contact_rule, only : touches
+   use contact_size, only : measured_patches, size_warning
    use contact_solver, only : contact_solver_type
    use fft_conv, only : new_convolution
    use field_sums, only : field_count, field_mean, field_rms
@@ -20,8 +21,8 @@ module flat_contact
    implicit none
    private
 
-   public :: contact_adhesive, contact_normal, operator_apply, operator_close, operator_open, &
-      operator_symbol
+   public :: contact_adhesive, contact_normal, contact_width, operator_apply, operator_close, &
+      operator_open, operator_symbol
 
 contains
 
@@ -159,6 +160,25 @@ contains
       call tell(outcome, iterations, ffts, residual, seconds, converged, reason)
       call report(error, status, message)
    end subroutine contact_adhesive
+
+   !> A warning if the patches of a contact are too few cells across, as at the end of a run; otherwise a blank.
+   subroutine contact_width(pressure, gap, nx, ny, lx, ly, is_free, adhesive, warning, status, message)
+      integer(c_int), intent(in) :: nx, ny
+      real(c_double), intent(in) :: pressure(nx, ny)           !! Pa
+      real(c_double), intent(in) :: gap(nx, ny)                !! m
+      real(c_double), intent(in) :: lx, ly
+      integer(c_int), intent(in) :: is_free                    !! 1: free boundary, 0: periodic
+      integer(c_int), intent(in) :: adhesive                   !! 1: the contact has a potential
+      character(len=400), intent(out) :: warning
+      integer(c_int), intent(out) :: status
+      character(len=2000), intent(out) :: message
+      type(error_type), allocatable :: error
+      type(grid_type) :: grid
+
+      grid = grid_of(nx, ny, lx, ly, is_free)
+      warning = size_warning(grid, measured_patches(grid, adhesive == 1, pressure, gap))
+      call report(error, status, message)
+   end subroutine contact_width
 
    !> Prepare an operator: the displacements that tractions cause.
    subroutine operator_open(tangential, nx, ny, lx, ly, is_free, modulus, poisson, thickness, handle, &

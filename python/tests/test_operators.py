@@ -90,6 +90,24 @@ def test_wrong_shapes_and_values():
     op = asperity.operators.normal(8, 4, 1.0, 1.0, modulus=1.0)
     with pytest.raises(ValueError, match=r"must be \(4, 8\)"):
         op.apply(np.zeros((8, 4)))
+    for wrong in (np.nan, np.inf):
+        field = np.zeros((4, 8))
+        field[2, 5] = wrong
+        with pytest.raises(ValueError, match=rf"^pressure\[2, 5\] = {wrong}: must be finite$"):
+            op.apply(field)
+        with pytest.raises(ValueError, match=r"^displacement\[2, 5\] = .*: must be finite$"):
+            op.inverse(field)
+    with pytest.raises(ValueError, match="must be real numbers"):
+        op.apply(np.full((4, 8), 1j))
+    with pytest.raises(ValueError, match="1 of 32 points masked"):
+        op.apply(np.ma.masked_equal(np.arange(32.0).reshape(4, 8), 3.0))
+    along = asperity.operators.tangential(8, 4, 1.0, modulus=1.0)
+    field = np.zeros((2, 4, 8))
+    field[1, 2, 5] = np.nan
+    with pytest.raises(ValueError, match=r"^traction\[1, 2, 5\] = nan: must be finite$"):
+        along.apply(field)
+    with pytest.raises(ValueError, match=r"^displacement\[1, 2, 5\] = nan: must be finite$"):
+        along.inverse(field)
     with pytest.raises(ValueError, match="boundary"):
         asperity.operators.normal(8, 4, 1.0, modulus=1.0, boundary="open")
     with pytest.raises(ValueError, match="modulus"):

@@ -1,5 +1,7 @@
 """Contacts of too few cells are warned of, once a run; others are not."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -52,6 +54,34 @@ def test_approach_that_is_not_warned_of_is_right(part):
         assert all("use cells at most 1/" in line for line in told)
         silent += not told
     assert silent >= 4
+
+
+def hertzian(across):
+    """A map of the same sphere, and its mean pressure for E* = 1 Pa."""
+    x = (np.arange(32) - 16) / 32
+    return -(x[None, :] ** 2 + x[:, None] ** 2) / 2, 4 / 3 * (0.5 * across / 32) ** 3
+
+
+@pytest.mark.parametrize("across", [0.6, 3.0, 8.0])
+def test_a_contact_on_arrays_warns_in_the_words_of_the_program(across):
+    height, pressure = hertzian(across)
+    lines = [line for line in asperity.run(sphere(across), output="case.h5").warnings
+             if WORDS in line]
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        asperity.solve_normal(height, 1.0, None, 1.0, pressure=pressure, boundary="free")
+    told = [str(each.message) for each in caught]
+    assert len(told) == (across < 5)
+    assert len(lines) == len(told)
+    assert all(mine in line for line, mine in zip(lines, told, strict=True))
+    assert all(each.filename == __file__ for each in caught)
+
+
+def test_an_adhesive_contact_on_arrays_warns_too():
+    height, pressure = hertzian(3.0)
+    with pytest.warns(UserWarning, match=WORDS):
+        asperity.solve_adhesive(height, 1.0, None, 1.0, pressure=pressure, boundary="free",
+                                energy=1e-9, range=1e-3)
 
 
 def test_single_lines():

@@ -22,7 +22,7 @@ module contact_size
    implicit none
    private
 
-   public :: measured_patches, watch_contact_size
+   public :: measured_patches, size_warning, watch_contact_size
 
    !> Mean size of the patches of a contact.
    type, public :: patch_size_type
@@ -44,22 +44,32 @@ contains
       logical, intent(in) :: ends                    !! the run ends here
       type(patch_size_type), intent(inout) :: widest !! the best resolved ones so far
       character(:), allocatable, intent(out) :: message
-      character(:), allocatable :: consequence
 
       message = ''
       if (patches%across/patches%needed > widest%across/widest%needed) widest = patches
-      if (.not. ends .or. widest%across >= widest%needed .or. .not. widest%across > 0.0_dp) return
+      if (ends) message = size_warning(grid, widest)
+   end subroutine watch_contact_size
+
+   !> A warning if the patches are not wide enough; '' otherwise, and if nothing touches.
+   function size_warning(grid, patches) result(message)
+      type(grid_type), intent(in) :: grid
+      type(patch_size_type), intent(in) :: patches
+      character(:), allocatable :: message
+      character(:), allocatable :: consequence
+
+      message = ''
+      if (patches%across >= patches%needed .or. .not. patches%across > 0.0_dp) return
       if (nint(min(grid%cells(), 2.0_dp)) == 1) return
 
       consequence = 'the approach can be more than 1 % wrong, and area and pressures depend on the cells'
-      if (.not. widest%needed > needed_by_many) &
+      if (.not. patches%needed > needed_by_many) &
          consequence = 'the contact area is more than 10 % too large, and approach and pressures depend on the cells'
       ! The cells are counted in tenths, the factor is rounded up.
-      message = 'patches of contact are only '//tenths(widest%across)//' cells across on average: below '// &
-         tenths(widest%needed)//' '//consequence//'; use cells at most 1/'// &
-         tenths(widest%needed/widest%across + 0.05_dp)// &
+      message = 'patches of contact are only '//tenths(patches%across)//' cells across on average: below '// &
+         tenths(patches%needed)//' '//consequence//'; use cells at most 1/'// &
+         tenths(patches%needed/patches%across + 0.05_dp)// &
          ' as wide for the same road, if need be on a smaller map around the contact'
-   end subroutine watch_contact_size
+   end function size_warning
 
    !> Convert a number to a text with one decimal place.
    pure function tenths(number) result(text)

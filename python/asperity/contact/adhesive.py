@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..base import library
 from ..base.check import choice, exactly_one, number, positive, stresses_of, whole
 from ..base.errors import NotConverged
-from .normal import FloatArray, NormalContact
+from .normal import FloatArray, NormalContact, warn_of_few_cells
 
 __all__ = ["AdhesiveNormalContact", "solve_adhesive"]
 
@@ -131,7 +131,8 @@ def solve_adhesive(
     Warns
     -----
     UserWarning
-        If the cells are too large for the range of the attraction.
+        If the cells are too large for the range of the attraction, or if the patches of contact are
+        too few cells across.
 
     Examples
     --------
@@ -188,6 +189,7 @@ def solve_adhesive(
             f"the adhesive contact did not converge: {result.reason}; residual"
             f" {result.residual:.2e} after {result.iterations} iterations, tolerance"
             f" {tolerance:.2e}", result)
+    warn_of_few_cells(traction, gap, lx, ly, free, adhesive=True)
     return result
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,6 +18,7 @@ __all__ = ["NormalContact", "solve_normal"]
 FloatArray = NDArray[np.float64]
 
 _solve = library.call("contact_normal", interruptible=True)
+_width = library.call("contact_width")
 
 
 @dataclass(frozen=True)
@@ -135,6 +137,11 @@ def solve_normal(
     MemoryError
         If there is not enough memory.
 
+    Warns
+    -----
+    UserWarning
+        If the patches of contact are too few cells across.
+
     Examples
     --------
     >>> import asperity
@@ -183,4 +190,14 @@ def solve_normal(
         raise NotConverged(
             f"the normal contact did not converge: residual {result.residual:.2e} after"
             f" {result.iterations} iterations, tolerance {tolerance:.2e}: {result.reason}", result)
+    warn_of_few_cells(traction, gap, lx, ly, free, adhesive=False)
     return result
+
+
+def warn_of_few_cells(pressure: FloatArray, gap: FloatArray, lx: float, ly: float, free: int, *,
+                      adhesive: bool) -> None:
+    """Warn if the patches of contact are too few cells across, in the words of the program."""
+    (warning,) = _width(pressure.T, gap.T, lx, ly, free, int(adhesive))
+    text = warning.decode().strip()
+    if text:
+        warnings.warn(text, UserWarning, stacklevel=3)

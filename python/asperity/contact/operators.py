@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import library
-from ..base.check import poisson_ratio, positive
+from ..base.check import array_of, poisson_ratio, positive
 from ..base.check import whole as whole_number
 from ..base.errors import NotConverged
 
@@ -57,7 +57,7 @@ class _Operator:
         return (self.ny, self.nx) if self._components == 1 else (2, self.ny, self.nx)
 
     def _field(self, name: str, field: ArrayLike) -> FloatArray:
-        array = np.ascontiguousarray(field, dtype=np.float64)
+        array = np.ascontiguousarray(array_of(name, field))
         if array.shape != self.shape:
             raise ValueError(f"{name}: has shape {array.shape}: must be {self.shape}")
         return array
@@ -146,7 +146,7 @@ class NormalOperator(_Operator):
         Raises
         ------
         ValueError
-            If the shape is wrong.
+            If the shape is wrong, or the values are not finite real numbers.
         """
         return self._applied(self._field("pressure", pressure))
 
@@ -174,7 +174,7 @@ class NormalOperator(_Operator):
         Raises
         ------
         ValueError
-            If the shape is wrong.
+            If the shape is wrong, or the values are not finite real numbers.
         NotConverged
             If the tolerance is not reached. Its ``result`` are the tractions found so far.
         """
@@ -217,7 +217,7 @@ class TangentialOperator(_Operator):
         Raises
         ------
         ValueError
-            If the shape is wrong.
+            If the shape is wrong, or the values are not finite real numbers.
         """
         return self._applied(self._field("traction", traction))
 
@@ -244,7 +244,7 @@ class TangentialOperator(_Operator):
         Raises
         ------
         ValueError
-            If the shape is wrong.
+            If the shape is wrong, or the values are not finite real numbers.
         NotConverged
             If the tolerance is not reached. Its ``result`` are the tractions found so far.
         """
