@@ -252,7 +252,7 @@ def test_line_contact_has_profiles(tmp_path):
     field = data["snapshots"][-1]["fields"]["traction_x"]
     np.testing.assert_allclose(unpack(field, (1, 24)), run.snapshots[-1].traction_x,
                                atol=(field["high"] - field["low"]) / 65535)
-    assert data["spectrum_units"] == "m3"
+    assert data["spectrum_units"] == "m³"
 
 
 def test_large_grids_are_downsampled_and_it_says_so(tmp_path):

@@ -14,6 +14,7 @@ from ..base.library import version
 from ..results import open_result
 from .page_parts import colour_scales, fill_page, page_file, page_json
 from .report_data import blocks, now, packed
+from .style import typeset
 
 if TYPE_CHECKING:
     from ..results.friction_curve import FrictionCurve
@@ -159,7 +160,7 @@ def _notes(curve: FrictionCurve) -> str:
     """Return the box of notes, empty without notes."""
     if not curve.notes:
         return ""
-    lines = "".join(f"<li>{escape(note)}</li>" for note in curve.notes)
+    lines = "".join(f"<li>{escape(typeset(note))}</li>" for note in curve.notes)
     return f'<div class="note"><p><strong>Notes</strong></p><ul>{lines}</ul></div>'
 
 
@@ -181,9 +182,10 @@ def _cell(value: float) -> str:
 
 def _settings(curve: FrictionCurve) -> str:
     """Return the settings of the curve and the list of its patches."""
-    rows = "".join(f"<tr><th>{escape(name.replace('_', ' '))}</th><td>{escape(value)}</td></tr>"
+    rows = "".join(f"<tr><th>{escape(name.replace('_', ' '))}</th>"
+                   f"<td>{escape(typeset(value))}</td></tr>"
                    for name, value in curve.settings_text().items())
-    patches = "".join(f"<li>{escape(label)}</li>" for label in curve.patches)
+    patches = "".join(f"<li>{escape(typeset(label))}</li>" for label in curve.patches)
     left = np.asarray(curve.theory["friction_left_out"])
     more = ""
     if np.any(left > 1e-4):

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..results.standing import note_of, rows_of
-from .style import si_scale
+from .style import si_scale, typeset
 
 if TYPE_CHECKING:
     from ..results import History, Run, Snapshot
@@ -35,7 +35,7 @@ def shown(value: Any, units: str) -> str:
     """Return a value with its prefixed unit."""
     number = float(value)
     factor, unit = si_scale(number, units)
-    return escape(f"{number * factor:.4g}{' ' + unit if unit else ''}")
+    return escape(f"{number * factor:.4g}{' ' + typeset(unit) if unit else ''}")
 
 
 def curve(values: NDArray[Any]) -> str:
@@ -81,7 +81,7 @@ def snapshot_html(snapshot: Snapshot) -> str:
     """Return the snapshot as a table of its fields."""
     grid = snapshot.run.grid
     rows = [(f"<code>{escape(name)}</code>",
-             "" if snapshot.units(name) == "1" else escape(snapshot.units(name)),
+             "" if snapshot.units(name) == "1" else escape(typeset(snapshot.units(name))),
              escape(snapshot.long_name(name))) for name in snapshot.fields]
     return table_html(("field", "unit", "meaning"), rows,
                       f"<b>Snapshot</b> of step {snapshot.step}, t = {shown(snapshot.time, 's')},"
@@ -105,7 +105,7 @@ def run_html(run: Run) -> str:
              for name in ("time", "pressure", "contact_area", "friction")
              if name in history and history.rows]
     if run.warnings:
-        rows.append(("warnings", "<br>".join(map(escape, run.warnings))))
+        rows.append(("warnings", "<br>".join(escape(typeset(line)) for line in run.warnings)))
     return table_html((), rows, f"<b>{escape(run.title or 'untitled run')}</b>"
                                 f" <code>{escape(str(run.path))}</code>")
 
@@ -127,7 +127,7 @@ def contact_html(contact: Any) -> str:
 def road_html(road: Any) -> str:
     """Return a measured road as a table of its properties and processing steps."""
     lines = [line.partition("  ") for line in road.summary().splitlines()]
-    rows = [(escape(name), escape(rest.strip())) for name, _, rest in lines]
+    rows = [(escape(name), escape(typeset(rest.strip()))) for name, _, rest in lines]
     return table_html((), rows, "<b>Road</b>")
 
 
@@ -136,7 +136,7 @@ def fit_html(fit: Any) -> str:
     material = fit.material
     rows = [(str(number), shown(g, "Pa"), escape(f"{tau:.4g} s"))
             for number, (g, tau) in enumerate(zip(material.g, material.tau, strict=True), 1)]
-    summary = "<br>".join(map(escape, fit.summary().splitlines()))
+    summary = "<br>".join(escape(typeset(line)) for line in fit.summary().splitlines())
     return table_html(("arm", "modulus", "relaxation time"), rows, f"<b>Fit</b><br>{summary}")
 
 

@@ -28,7 +28,7 @@ from ..results.standing import (
 from ..results.steady import steady_mean
 from .page_parts import PAGE, colour_scales, fill_page, page_file, page_json
 from .report_data import faulty, now, page_data, phase_names
-from .style import si_scale
+from .style import si_scale, typeset
 
 if TYPE_CHECKING:
     from ..results import Run
@@ -108,7 +108,7 @@ def report_page(run: Run) -> str:
 def _number(value: float, units: str) -> str:
     """Return a value in four digits with its prefixed unit."""
     factor, unit = si_scale(float(f"{value:.4g}"), units)
-    return escape(f"{value * factor:.4g}{' ' + unit if unit else ''}".replace("-", "−"))
+    return escape(f"{value * factor:.4g}{' ' + typeset(unit) if unit else ''}".replace("-", "−"))
 
 
 def _subtitle(run: Run) -> str:
@@ -143,7 +143,7 @@ def _notes(run: Run) -> str:
     if not len(run.snapshots):
         notes.append("the result holds no snapshots: there are no maps")
     if notes:
-        lines = "".join(f"<li>{escape(line)}</li>" for line in notes)
+        lines = "".join(f"<li>{escape(typeset(line))}</li>" for line in notes)
         parts.append(f"<p><strong>Warnings</strong></p><ul>{lines}</ul>")
     return "\n".join(f'<div class="note">{part}</div>' for part in parts)
 
@@ -246,7 +246,7 @@ def settings_groups(run: Run) -> list[tuple[str, list[tuple[str, str]]]]:
                 value, comment = found[2].strip("'"), found[3] or ""
                 if comment:
                     value += f" ({comment})" if "=" in comment else f" {comment}"
-                variables.append((found[1], value))
+                variables.append((found[1], typeset(value)))
         groups.append((name, variables))
     return groups
 

@@ -65,7 +65,7 @@ def page_data(run: Run) -> dict[str, Any]:
         "snapshots": snapshots,
         "stored": len(run.snapshots),
         "spectrum": _spectrum(run, run.height) if _has_height(run) else None,
-        "spectrum_units": "m3" if run.grid.ny == 1 else "m4",
+        "spectrum_units": "m³" if run.grid.ny == 1 else "m⁴",
         "modulus": _modulus(run),
     }
 

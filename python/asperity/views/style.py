@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["COLOURS", "DOUBLE_COLUMN", "LABELS", "NO_CONTACT", "PRINT", "SINGLE_COLUMN", "SLIP",
            "STICK", "axis_text", "check_picture", "label_of", "print_style", "save_picture",
-           "scale_limit", "sentence", "si_scale", "typical_value", "when"]
+           "scale_limit", "sentence", "si_scale", "typeset", "typical_value", "when"]
 
 # Okabe and Ito's palette: blue, vermilion, green, purple, orange, sky blue, black.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -165,6 +165,19 @@ def axis_text(label: str, unit: str) -> str:
     """
     text = label[:1].lower() + label[1:]
     return f"{text} ({unit})" if unit else text
+
+
+def typeset(text: str) -> str:
+    """Return a text for a page, with the units that files and terminals have in plain ASCII.
+
+    Examples
+    --------
+    >>> typeset("now 20 kg/m3, at -20 C"), typeset("m/s2"), typeset("C1 = 14 in m2.h5")
+    ('now 20 kg/m³, at -20 °C', 'm/s²', 'C1 = 14 in m2.h5')
+    """
+    text = re.sub(r"(?<=\d) C\b", " °C", text)
+    return re.sub(r"\b(kg/m|[JW]/m|m/s)([23])\b",
+                  lambda found: found[1] + "²³"[int(found[2]) - 2], text)
 
 
 def sentence(text: str) -> str:

@@ -30,6 +30,11 @@ function shown(value, unit) {
   return digits(value * factor) + (name ? " " + name : "");
 }
 
+/** The text of an axis, which begins with a small letter, as in the pictures of the package. */
+function axisText(label, unit) {
+  return label.charAt(0).toLowerCase() + label.slice(1) + (unit ? ` (${unit})` : "");
+}
+
 /** Round values between two ends, about `count` of them. */
 function ticks(low, high, count) {
   if (!(high > low)) return [low];
@@ -315,10 +320,10 @@ class Chart {
     root.append(svg("rect", {x: box.left, y: box.top, width: Math.max(box.right - box.left, 1),
       height: box.bottom - box.top, class: "frame"}));
     root.append(svg("text", {x: (box.left + box.right) / 2, y: height - 6, "text-anchor": "middle",
-      class: "axis"}, options.xLabel + (unitX ? ` (${unitX})` : "")));
+      class: "axis"}, axisText(options.xLabel, unitX)));
     root.append(svg("text", {x: 0, y: 0, "text-anchor": "middle", class: "axis", transform:
       `translate(12 ${(box.top + box.bottom) / 2}) rotate(-90)`},
-    options.label + (unitY ? ` (${unitY})` : "")));
+    axisText(options.label, unitY)));
     root.append(inside);
     for (const level of options.levels || []) {
       const y = py(this.toY(level.value));
