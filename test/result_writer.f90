@@ -88,17 +88,15 @@ contains
          plan%title = 'a small run'
          plan%input = '&case title = ''a small run'' /'
          plan%settings = 'nx = 7'
+         plan%material%poisson = 0.5_dp
+         plan%material%prony_g = [1.0_dp, 2.0_dp]
+         plan%material%prony_tau = [0.1_dp, 10.0_dp]
          plan%rows = rows
          plan%snapshots = rows/3 + 1
          plan%compression = compression
          call output%create(path, grid, plan, error)
          if (.not. allocated(error)) call output%write_height_rows(1, pressure_of(0), error)
          if (.not. allocated(error)) call output%publish(error)
-         if (.not. allocated(error)) then
-            call output%write_material('prony_g', [1.0_dp, 2.0_dp], 'Pa', 'moduli of the arms')
-            call output%write_material('poisson', 0.5_dp, '1', 'Poisson''s ratio')
-            call output%report(error)
-         end if
       end if
       do step = first, rows - 1
          if (allocated(error)) exit

@@ -169,6 +169,7 @@ contains
       plan%title = 't'
       plan%input = 'i'
       plan%settings = 's'
+      allocate (plan%material%prony_g(0), plan%material%prony_tau(0))
       plan%rows = 1
       plan%snapshots = 1
       grid = new_grid(nx, ny, 1.0_dp, 1.0_dp, boundary_free)

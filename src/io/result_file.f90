@@ -53,17 +53,13 @@ module result_file
       procedure :: write_text
       procedure :: write_number
       procedure :: read_text
-      procedure :: pair_arms
       procedure :: append_row
       procedure :: begin_snapshot
       procedure :: start_field
       procedure :: copy_height
-      procedure, private :: write_real_rows, write_state_rows, write_material_value, &
-         write_material_values
+      procedure, private :: write_real_rows, write_state_rows
       !> Write rows of the field that was started last.
       generic :: write_rows => write_real_rows, write_state_rows
-      !> Write a number or numbers into /material.
-      generic :: write_material => write_material_value, write_material_values
       procedure :: end_snapshot
       procedure :: write_losses
       procedure :: last_snapshot
@@ -190,38 +186,6 @@ contains
       value = ''
       if (self%file%has_attribute('/', name)) call self%file%read_attribute('/', name, value, error)
    end subroutine read_text
-
-   !> Write a number of the material; before the first row.
-   subroutine write_material_value(self, name, value, units, long_name, error)
-      class(result_file_type), intent(inout) :: self
-      character(*), intent(in) :: name      !! such as 'poisson'
-      real(dp), intent(in) :: value
-      character(*), intent(in) :: units
-      character(*), intent(in) :: long_name
-      type(error_type), allocatable, intent(out), optional :: error
-
-      call self%file%write('/material/'//name, value, units, long_name, error)
-   end subroutine write_material_value
-
-   !> Write numbers of the material, such as the moduli of its arms; before the first row.
-   subroutine write_material_values(self, name, values, units, long_name, error)
-      class(result_file_type), intent(inout) :: self
-      character(*), intent(in) :: name      !! such as 'prony_g'
-      real(dp), intent(in), contiguous :: values(:)
-      character(*), intent(in) :: units
-      character(*), intent(in) :: long_name
-      type(error_type), allocatable, intent(out), optional :: error
-
-      call self%file%write('/material/'//name, values, units, long_name, error, self%compression)
-   end subroutine write_material_values
-
-   !> Name the relaxation times of the arms as the axis of their moduli. Both have been written.
-   subroutine pair_arms(self, error)
-      class(result_file_type), intent(inout) :: self
-      type(error_type), allocatable, intent(out), optional :: error
-
-      call self%file%name_axes('/material', ['prony_tau'], ['prony_g'], error)
-   end subroutine pair_arms
 
    !> Add a row to the history, and flush it: a run that is killed later keeps it.
    subroutine append_row(self, row, error)

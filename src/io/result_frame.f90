@@ -1,4 +1,4 @@
-!> Writes the parts of a result that are known before the first row: its origin, the grid and axes.
+!> Writes the parts of a result that are known before the first row: its origin, the grid, its axes and the material.
 !>
 !> The file remembers the first fault of these calls, and the caller checks it once at the end
 !> (see `hdf5_handle`).
@@ -10,6 +10,7 @@ module result_frame
    use history_table, only : history_columns
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use result_history, only : create_history_columns
+   use result_material, only : material_record_type, put_material
    use utc_clock, only : utc_time
    implicit none
    private
@@ -24,6 +25,7 @@ module result_frame
       character(:), allocatable :: title
       character(:), allocatable :: input             !! the namelists, verbatim
       character(:), allocatable :: settings          !! every resolved setting, one per line
+      type(material_record_type) :: material
       integer :: rows = 0                            !! of the history
       integer :: snapshots = 0
       integer :: losses = 0                          !! rows of steady sliding
@@ -32,8 +34,8 @@ module result_frame
 
 contains
 
-   !> Write everything that is known before the first row, except for the numbers of the material.
-   !> The height of the road gets no values yet: they follow in slabs of rows.
+   !> Write everything that is known before the first row. The height of the road gets no values yet: they
+   !> follow in slabs of rows.
    subroutine write_frame(file, path, id, grid, plan)
       type(hdf5_file_type), intent(inout) :: file
       character(*), intent(in) :: path                 !! name of the file
@@ -55,7 +57,7 @@ contains
       call create_field(file, height_path, [grid%nx, grid%ny], .false., 'm', 'height of the road', &
          plan%compression)
       call write_axes(file, '/surface', grid, ['height'], plan%compression)
-      call file%create_group('/material')
+      call put_material(file, plan%material, plan%compression)
       call file%create_group('/history', expected=size(history_columns()) + 1)
       call create_history_columns(file, plan%rows)
    end subroutine write_frame

@@ -4,30 +4,23 @@ module case_record
    use asperity_checksum, only : hexadecimal
    use asperity_simulation, only : simulation_type
    use case_settings, only : material_settings_type
-   use result_file, only : result_file_type
+   use result_material, only : material_record_type
    use text_tools, only : to_text
    implicit none
    private
 
-   public :: checksums_of_maps, map_lines, write_material
+   public :: checksums_of_maps, map_lines, material_record
 
 contains
 
-   !> Write the properties of the material at the temperature of the case.
-   subroutine write_material(result, m)
-      type(result_file_type), intent(inout) :: result
+   !> The properties of the material at the temperature of the case.
+   pure function material_record(m) result(record)
       type(material_settings_type), intent(in) :: m
+      type(material_record_type) :: record
 
-      call result%write_material('shear_modulus', m%shear_modulus, 'Pa', 'long-term shear modulus')
-      call result%write_material('poisson', m%poisson, '1', 'Poisson ratio')
-      call result%write_material('prony_g', m%prony_g, 'Pa', 'moduli of the arms')
-      call result%write_material('prony_tau', m%prony_tau, 's', &
-         'relaxation times of the arms at the temperature of the case')
-      call result%pair_arms()
-      call result%write_material('thickness', m%thickness, 'm', 'thickness of the block')
-      call result%write_material('density', m%density, 'kg/m3', 'density')
-      call result%write_material('temperature', m%temperature, 'C', 'temperature')
-   end subroutine write_material
+      record = material_record_type(m%shear_modulus, m%poisson, m%prony_g, m%prony_tau, m%thickness, &
+         m%density, m%temperature)
+   end function material_record
 
    !> The checksums of height maps from files, as lines of the identity of the case.
    function map_lines(sim) result(lines)

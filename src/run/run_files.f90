@@ -13,7 +13,7 @@ module run_files
    use asperity_precision, only : dp
    use asperity_simulation, only : simulation_type
    use case_identity, only : identity_of
-   use case_record, only : checksums_of_maps, map_lines, write_material
+   use case_record, only : checksums_of_maps, map_lines, material_record
    use case_report, only : resolved_input
    use file_lock, only : file_lock_type
    use path_identity, only : real_path
@@ -101,6 +101,7 @@ contains
          plan%title = trim(case%title)
          plan%input = case%input
          plan%settings = self%settings
+         plan%material = material_record(case%material)
          plan%rows = rows
          plan%snapshots = size(case%output%snapshot_times) + 1
          if (case%output%snapshot_every > 0) &
@@ -116,7 +117,6 @@ contains
          if (is_first_process()) then
             call self%result%publish(error)
             if (.not. allocated(error)) then
-               call write_material(self%result, case%material)
                call self%result%write_text('height_maps', checksums_of_maps(sim))
                call self%result%write_text('warnings', case%warnings)
                call self%result%write_text('outcome', 'running')
