@@ -18,7 +18,7 @@ module flat_simulations
    use run_handles, only : driven_of, driven_type, find_driven, free_handle, new_driven
    use simulation_state, only : load_state, save_state
    use steering, only : steer_load, steer_temperature, steer_velocity
-   use text_tools, only : to_text
+   use text_tools, only : next_line, to_text
    implicit none
    private
 
@@ -85,15 +85,12 @@ contains
    function without_files(settings) result(kept)
       character(len=*), intent(in) :: settings             !! lines 'group: name = value'
       character(:), allocatable :: kept, line
-      integer :: at, next
+      integer :: at
 
       kept = ''
       at = 1
       do while (at <= len(settings))
-         next = index(settings(at:), new_line('a'))
-         if (next == 0) next = len(settings) - at + 2
-         line = settings(at:at + next - 2)
-         at = at + next
+         call next_line(settings, at, line)
          if (index(line, ': file = ') == 0) kept = kept//line//new_line('a')
       end do
    end function without_files

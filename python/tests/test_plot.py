@@ -367,11 +367,6 @@ def test_key_of_the_arrows_stands_above_a_flat_map(tmp_path):
     assert key.text.get_window_extent().y0 > axes.get_window_extent().y1
 
 
-def colour_scale(axes):
-    (image,) = axes.images
-    return image.get_clim(), image.get_cmap().name
-
-
 def test_data_of_one_sign_have_a_scale_of_one_sign(frictional):
     snapshot = asperity.open(frictional).snapshots[-1]
     for sign in (1.0, -1.0):

@@ -4,7 +4,7 @@ module text_tools
    implicit none
    private
 
-   public :: add_line, exact_text, lower, nearest_name, ordinary, to_text
+   public :: add_line, exact_text, lower, nearest_name, next_line, ordinary, to_text
 
    !> Convert a number to a short text.
    interface to_text
@@ -21,6 +21,19 @@ contains
       if (len(text) > 0) text = text//new_line('a')
       text = text//line
    end subroutine add_line
+
+   !> Take the next line of a text that has one; the text has another one as long as `at` is not beyond its end.
+   pure subroutine next_line(text, at, line)
+      character(*), intent(in) :: text
+      integer, intent(inout) :: at          !! where the line starts; afterwards, where the one after it does
+      character(:), allocatable, intent(out) :: line
+      integer :: length
+
+      length = index(text(at:), new_line('a')) - 1
+      if (length < 0) length = len(text) - at + 1
+      line = text(at:at + length - 1)
+      at = at + length + 1
+   end subroutine next_line
 
    !> The word with its ASCII letters in lower case.
    pure function lower(word) result(lowered)

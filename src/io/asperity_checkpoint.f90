@@ -16,7 +16,7 @@ module asperity_checkpoint
    use process_agreement, only : agree
    use result_names, only : checkpoint_path
    use state_table, only : state_table_type
-   use text_tools, only : to_text
+   use text_tools, only : next_line, to_text
    implicit none
    private
 
@@ -186,17 +186,14 @@ contains
       character(*), intent(in) :: settings           !! of the case: lines 'name = value'
       type(error_type), allocatable, intent(out) :: error
       character(:), allocatable :: stored, name, value, line
-      integer :: at, next, equals
+      integer :: at, equals
 
       call self%file%read_attribute('/', 'settings', stored, error)
       if (allocated(error)) return
       if (stored == settings) return
       at = 1
       do while (at <= len(settings))
-         next = index(settings(at:), new_line('a'))
-         if (next == 0) next = len(settings) - at + 2
-         line = settings(at:at + next - 2)
-         at = at + next
+         call next_line(settings, at, line)
          equals = index(line, ' = ')
          if (equals == 0) cycle
          name = line(:equals - 1)
@@ -234,12 +231,13 @@ contains
       value = settings(first:first + length - 1)
    end subroutine find_setting
 
-   !> Get a number that is not part of the state.
+   !> Get a number that is not part of the state. Without `error` the reader remembers a fault, and the next call
+   !> that has one returns it.
    subroutine get_number(self, name, value, error)
       class(checkpoint_reader_type), intent(inout) :: self
       character(*), intent(in) :: name
       real(dp), intent(out) :: value
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(out), optional :: error
 
       call self%file%read_attribute('/', name, value, error)
    end subroutine get_number

@@ -129,8 +129,7 @@ contains
       call remove_file(checkpoint_path(self%path))
       call remove_file(self%xdmf_path)
       call rename_file(new_path(self), self%path, error)
-      if (allocated(error)) return
-      self%file%path = self%path
+      if (.not. allocated(error)) self%file%path = self%path
    end subroutine publish_result
 
    !> Remove a new result that cannot be written. The message gives the final name of the file, because the user

@@ -24,7 +24,7 @@ module run_files
    use simulation_state, only : load_state, save_state
    use snapshot_writer, only : write_height, write_snapshot
    use steady_losses, only : longest_wave
-   use text_tools, only : add_line, to_text
+   use text_tools, only : add_line, next_line, to_text
    implicit none
    private
 
@@ -197,8 +197,7 @@ contains
       real(dp), parameter :: rounding = 1e-9_dp
       real(dp) :: rms_height, summit, allowed
 
-      call reader%get_number('rms_height', rms_height, error)
-      if (allocated(error)) return
+      call reader%get_number('rms_height', rms_height)
       call reader%get_number('summit', summit, error)
       if (allocated(error)) return
       allowed = rounding*max(sim%rms_height, abs(sim%summit))
@@ -215,16 +214,13 @@ contains
       type(simulation_type), intent(in) :: sim
       type(error_type), allocatable, intent(out) :: error
       character(:), allocatable :: left, line
-      integer :: at, next, step, status
+      integer :: at, step, status
 
       call self%result%read_text('run_warnings', left, error)
       if (allocated(error)) return
       at = 1
       do while (at <= len(left))
-         next = index(left(at:), new_line('a'))
-         if (next == 0) next = len(left) - at + 2
-         line = left(at:at + next - 2)
-         at = at + next
+         call next_line(left, at, line)
          read (line(min(6, len(line)):max(5, index(line, ',') - 1)), *, iostat=status) step
          if (status == 0 .and. step > sim%state%row%step) cycle
          call add_line(self%warnings, line)

@@ -57,7 +57,6 @@ contains
       allocate (self%contact(grid%nx, grid%rows()), self%rubbed(grid%nx, grid%rows()), source=0_int8)
       call new_place_forecast(self%forecast, grid%nx, grid%rows())
       call new_arm_state(self%arms, material, grid%nx, grid%rows(), 2, error)
-      if (allocated(error)) return
       call new_books(self%books, material, grid%cell_area())
    end subroutine new_tangential_state
 

@@ -142,7 +142,8 @@ contains
             self%drive(:, c, j) = self%q*state%displacement(:, c, j) + shift(c)
          end do
       end do
-      call set_thickness(self, height)
+      ! On a free grid there is no mean mode to set.
+      if (self%grid%boundary == boundary_periodic) call self%operator%symbols%set_mean_compliance(height)
       if (any(pulled) .and. state%block%mass > 0.0_dp) then
          call self%road%place_mass(state%block, mean, dt)
          do c = 1, 2
@@ -222,14 +223,6 @@ contains
          end do
       end do
    end subroutine expect
-
-   !> Set the compliance of the mean mode. On a free grid there is no mean mode to set.
-   subroutine set_thickness(self, thickness)
-      type(tangential_step_type), intent(inout) :: self
-      real(dp), intent(in) :: thickness
-
-      if (self%grid%boundary == boundary_periodic) call self%operator%symbols%set_mean_compliance(thickness)
-   end subroutine set_thickness
 
    !> Means of a vector field over the grid.
    function means(self, field) result(mean)
