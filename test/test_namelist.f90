@@ -9,7 +9,7 @@ module test_namelist
    use namelist_file, only : namelists_type, scan_namelists, shown_tokens
    use asperity_precision, only : dp
    use reference_page, only : reference_markdown
-   use text_tools, only : exact_text, lower, nearest_name, ordinary, to_text
+   use text_tools, only : exact_text, lower, nearest_name, next_line, ordinary, to_text
    implicit none
    private
 
@@ -26,6 +26,7 @@ contains
          call broken_form_is_found_and_the_rest_read()
       if (selected('table_of_the_input_is_consistent')) call table_of_the_input_is_consistent()
       if (selected('words_and_their_nearest_names')) call words_and_their_nearest_names()
+      if (selected('lines_are_taken_one_by_one')) call lines_are_taken_one_by_one()
       if (selected('texts_of_numbers')) call texts_of_numbers()
    end subroutine run_namelist
 
@@ -174,6 +175,24 @@ contains
       call check_that(ordinary('abcdefghijk', 10) == 'abcdefg...', 'a long text is cut')
       call check_that(ordinary('abcdefghij', 10) == 'abcdefghij', 'a text of full length is not')
    end subroutine words_and_their_nearest_names
+
+   !> Lines are taken in order, empty ones too. The last one may end with the text.
+   subroutine lines_are_taken_one_by_one()
+      character(*), parameter :: text = 'one'//nl//nl//'three'
+      character(:), allocatable :: line
+      integer :: at
+
+      at = 1
+      call next_line(text, at, line)
+      call check_that(line == 'one' .and. at == 5, 'the first line: '//line)
+      call next_line(text, at, line)
+      call check_that(len(line) == 0 .and. at == 6, 'an empty line: '//line)
+      call next_line(text, at, line)
+      call check_that(line == 'three' .and. at > len(text), 'a line without an end: '//line)
+      at = 1
+      call next_line('one'//nl, at, line)
+      call check_that(line == 'one' .and. at > len('one'//nl), 'no line follows the last end: '//line)
+   end subroutine lines_are_taken_one_by_one
 
    !> Numbers.
    subroutine texts_of_numbers()
