@@ -22,7 +22,7 @@ module chunk_filters
    implicit none
    private
 
-   public :: expected_gain, filter_chunk, fletcher32
+   public :: expect_gain, filter_chunk, fletcher32
 
    real(dp), parameter :: worthwhile = 1.0_dp/16.0_dp  !! fraction of a plane that deflate must save
    integer, parameter :: samples = 16384               !! bytes of a plane that are examined
@@ -127,15 +127,6 @@ contains
       length = int(stream%total_out)
       ignored = deflate_end(stream)
    end subroutine deflate_planes
-
-   !> Estimate the fraction of a plane that deflate would save.
-   pure function expected_gain(plane) result(gain)
-      integer(int8), intent(in), contiguous :: plane(:)
-      real(dp) :: gain
-      logical :: by_codes_alone
-
-      call expect_gain(plane, gain, by_codes_alone)
-   end function expected_gain
 
    !> Estimate from a sample the fraction of a plane that deflate would save: by shorter codes for frequent
    !> bytes (entropy), by runs of one byte, or by references to earlier bytes.
