@@ -32,6 +32,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import warnings
 from collections import Counter
 from pathlib import Path
 
@@ -359,9 +360,9 @@ def try_flip(chance, folder):
             raise Wrong("the result was changed by a restart that was refused")
         return f"checkpoint, {kind}: {'refused' if changed else 'not changed'}"
     kind, _ = damage(chance, result)
-    told = call("info", "case.h5", cwd=folder, statuses=(0, 3))
+    shown = call("info", "case.h5", cwd=folder, statuses=(0, 3))
     done = call("run", "case.nml", "--quiet", "--restart", cwd=folder)
-    return f"result, {kind}: info {told.returncode}, restart {done.returncode}"
+    return f"result, {kind}: info {shown.returncode}, restart {done.returncode}"
 
 
 def try_kill(chance, folder):
@@ -408,21 +409,21 @@ def try_twins(chance, folder):
             [program(), "run", "case.nml", "--quiet", *word], cwd=folder,
             stdout=subprocess.DEVNULL, stderr=subprocess.PIPE))
         time.sleep(chance.choice([0.0, 0.0, 0.02, 0.1]))
-    told = []
+    codes = []
     for process in processes:
         message = process.communicate(timeout=PATIENCE)[1].decode(errors="replace")
-        told.append(process.returncode)
+        codes.append(process.returncode)
         if process.returncode not in (0, 3, 4):
             raise Wrong(f"status {process.returncode}: {message[-300:]}")
     result = folder / "case.h5"
-    if 0 in told or 4 in told:
+    if 0 in codes or 4 in codes:
         found = contents(result)
         lengths = {len(values) for name, values in found.items() if name.startswith("history/")}
-        if len(lengths) != 1 or found["finished"] != (0 if 0 not in told else found["finished"]):
+        if len(lengths) != 1 or found["finished"] != (0 if 0 not in codes else found["finished"]):
             raise Wrong("the result is not that of one run")
         if not np.array_equal(found["history/step"], np.arange(lengths.pop())):
             raise Wrong("rows of two runs in one result")
-    return f"{told.count(3)} of {len(told)} refused"
+    return f"{codes.count(3)} of {len(codes)} refused"
 
 
 def try_memory(chance, folder):
@@ -445,6 +446,7 @@ KINDS = {"problems": try_problem, "runs": try_run, "inputs": try_input, "flips":
 
 def main():
     """Try until the time is over; return the exit status."""
+    warnings.simplefilter("ignore", UserWarning)       # the problems are small on purpose
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("kinds", nargs="*", metavar="KIND", help=", ".join(KINDS))
     parser.add_argument("--minutes", type=float, default=60.0)

@@ -16,7 +16,7 @@ that is known.
 The tool then examines the first step with partly sheared cells, or the last one if the program did
 not settle it. The step is solved from the state that the program left it in or, if Newton's method
 fails there, from the row before, or by way of a bound that grows with a little pressure, less and
-less. With --thorough all these ways are gone (which takes several times as long): the column
+less. With --thorough all of these ways are tried, which takes several times as long: the column
 "partial" then has a number for each solution that differs from those before, and the trees count
 together.
 

@@ -6,7 +6,7 @@ periodic or free, square or oblong; the road moves along an axis or obliquely. T
 so that 500 cases take some minutes. A case ends in one of three ways:
 
 settled    exit status 0, and `residual_coupling` of all rows is within the tolerance
-told       exit status 4: the run says that a solver or the passes did not converge
+reported   exit status 4: the run says that a solver or the passes did not converge
 silent     anything else, which is a fault of the program
 
 usage: python tools/coupled_campaign.py [--count 500] [--seed 1] [--jobs 1] [--program asperity]
@@ -142,7 +142,7 @@ def try_case(job: tuple[int, str]) -> dict[str, Any]:
                 if "passes" in history:
                     about["passes"] = history["passes"][2:].tolist()
     settled = done.returncode == 0 and about.get("left", 0.0) <= TOLERANCE
-    about["end"] = "settled" if settled else "told" if done.returncode == 4 else "silent"
+    about["end"] = "settled" if settled else "reported" if done.returncode == 4 else "silent"
     return about
 
 

@@ -13,6 +13,7 @@ area, rms slope and rms height over those of the whole road.
 from __future__ import annotations
 
 import argparse
+import warnings
 
 import numpy as np
 
@@ -76,6 +77,7 @@ def solve(height: np.ndarray, lx: float, ly: float, pressure: float) -> asperity
 
 def main() -> None:
     """Solve the contacts and print the table."""
+    warnings.simplefilter("ignore", UserWarning)       # the patches of contact are small on purpose
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--cells", type=int, default=128, help="of a side of a patch")
     parser.add_argument("--patches", type=int, default=24, help="of each kind of road")

@@ -22,9 +22,9 @@ friction   the difference of the friction coefficient from the exact one
 power      power_viscous and power_friction from the modes and the slip, and the balance with force
            times speed, relative to the greater of both powers
 
-A row ends in one of four ways: right; told (status 4: the row did not converge); wrong (the program
-says that the row has converged, but a measure is above its limit); open (gap and bound are right,
-but the reference found no solution nearby or, with friction, went to another one).
+A row ends in one of four ways: right; reported (status 4: the row did not converge); wrong (the
+program says that the row has converged, but a measure is above its limit); open (gap and bound are
+right, but the reference found no solution nearby or, with friction, went to another one).
 
 usage: python tools/steady_campaign.py [--count 200] [--seed 1] [--jobs 1] [--program asperity]
        [--laws none coulomb ...] [--tolerance 1e-8] [--verbose]
@@ -458,7 +458,7 @@ def try_case(job: tuple[int, tuple[str, ...], float, str]) -> list[dict[str, Any
             for number in range(count):
                 row = about | dict(row=number, ffts=int(ffts[number]), message="")
                 if status == 4 and number == count - 1:
-                    rows.append(row | dict(end="told", message=message[-120:]))
+                    rows.append(row | dict(end="reported", message=message[-120:]))
                 else:
                     rows.append(row | judge(case, file, number, tolerance))
         if status == 0 and count != len(case["rows"]):

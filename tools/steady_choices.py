@@ -103,8 +103,8 @@ def main() -> None:
         for cells, (losses, slopes, area) in zip(meshes[:-1], found[:-1], strict=True):
             parts = [100 * (x / y - 1) for x, y in zip((losses, slopes, area), (
                 finest[0], finest[0], finest[2]), strict=True)]
-            told = [", ".join(f"{value:+.1f} %" for value in part) for part in parts]
-            print(f"| {cells // 2 // 2**OCTAVES} | {' | '.join(told)} |")
+            texts = [", ".join(f"{value:+.1f} %" for value in part) for part in parts]
+            print(f"| {cells // 2 // 2**OCTAVES} | {' | '.join(texts)} |")
         draws = np.array([solve(folder, 128, seed)[0] for seed in range(1, 17)])
         scatter = draws.std(axis=0, ddof=1) / draws.mean(axis=0)
         patches = np.ceil((1.96 * scatter / 0.05) ** 2)

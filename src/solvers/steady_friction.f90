@@ -109,7 +109,7 @@ contains
          if (normal%stopped) return
          if (max(change, measure%change/measure%size) <= pace%accepted .and. &
             measure%error <= task%tolerance) then
-            call finish(self, operator, task, road, contact, normal, rubbing)
+            call examine(self, operator, task, road, contact, normal, rubbing)
             if (normal%converged .and. rubbing%converged) exit
             pace%accepted = 0.5_dp*pace%accepted
          end if
@@ -199,8 +199,7 @@ contains
          end do
       end do
       change = relative_change(self, pace%beta)
-      call displaced(road, self%base(1), self%base(2), self%place(:, 1, :), self%place(:, 2, :), &
-         contact%height, contact%slope_x, contact%slope_y)
+      call read_place(self, road, contact)
       mean = field_mean(contact%height)
       self%normal%z(:, :) = self%state(:, 1, :)
       do k = 1, pace%inner
@@ -210,8 +209,35 @@ contains
       self%residual(:, 1, :) = self%normal%z - self%state(:, 1, :)
    end subroutine round
 
-   !> Compute the error of the present contact, and keep the contact if it is the best so far. The state of the rounds
-   !> does not change, but the next round begins with the slopes of the road under this contact.
+   !> Read the road at u+.
+   subroutine read_place(self, road, contact)
+      class(steady_friction_type), intent(in) :: self
+      type(interpolation_type), intent(inout) :: road
+      type(steady_contact_type), intent(inout) :: contact
+
+      call displaced(road, self%base(1), self%base(2), self%place(:, 1, :), self%place(:, 2, :), &
+         contact%height, contact%slope_x, contact%slope_y)
+   end subroutine read_place
+
+   !> Complete the present contact and compute its errors. If it has not converged, the road and T/P are what they were
+   !> before, so that the rounds go on as if nobody had looked.
+   subroutine examine(self, operator, task, road, contact, normal, rubbing)
+      class(steady_friction_type), intent(inout) :: self
+      type(steady_operator_type), intent(inout) :: operator
+      type(normal_problem_type), intent(in) :: task
+      type(interpolation_type), intent(inout) :: road
+      type(steady_contact_type), intent(inout) :: contact
+      type(solver_result_type), intent(inout) :: normal, rubbing
+      real(dp), allocatable :: ratio(:, :, :)
+
+      allocate (ratio, source=self%ratio)
+      call finish(self, operator, task, road, contact, normal, rubbing)
+      if (normal%converged .and. rubbing%converged) return
+      self%ratio(:, :, :) = ratio
+      call read_place(self, road, contact)
+   end subroutine examine
+
+   !> Compute the error of the present contact, and keep the contact if it is the best so far.
    subroutine keep_best(self, operator, task, road, pace, contact)
       class(steady_friction_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
@@ -220,11 +246,8 @@ contains
       type(pace_type), intent(inout) :: pace
       type(steady_contact_type), intent(inout) :: contact
       type(solver_result_type) :: normal, rubbing
-      real(dp), allocatable :: ratio(:, :, :)
 
-      allocate (ratio, source=self%ratio)
-      call finish(self, operator, task, road, contact, normal, rubbing)
-      self%ratio(:, :, :) = ratio
+      call examine(self, operator, task, road, contact, normal, rubbing)
       call self%keep(max(normal%residual, rubbing%residual), contact, pace%best)
    end subroutine keep_best
 
@@ -264,8 +287,7 @@ contains
       self%normal%c = scale
       call operator%set_scale(scale)
       self%ratio(:, :, :) = ratio
-      call displaced(road, self%base(1), self%base(2), self%place(:, 1, :), self%place(:, 2, :), &
-         contact%height, contact%slope_x, contact%slope_y)
+      call read_place(self, road, contact)
    end subroutine solve_at_once
 
    !> |u' - u|/|u'|, from the relaxed change.
