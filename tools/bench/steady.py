@@ -17,6 +17,7 @@ from __future__ import annotations
 import argparse
 import resource
 import tempfile
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -75,6 +76,7 @@ def count(folder: Path, text: str) -> tuple[list[int], list[float], bool]:
 
 def main() -> None:
     """Count and print."""
+    warnings.simplefilter("ignore", UserWarning)       # some contacts have patches of few cells
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--cells", type=int, default=128, help="cells along a side")
     parser.add_argument("--speeds", type=int, default=7, help="speeds of a curve")
