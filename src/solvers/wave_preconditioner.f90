@@ -74,8 +74,9 @@ contains
       allocate (symbol(modes(1):modes(2), 0:grid%ny/2))
       call stiffness_symbols(grid, coarse%h, coarse%kernel, modes(1), symbol)
       call self%stiffness%set_symbol(symbol)
-      ! The mean of the residual changes hardly anything under a given load, which it must not change. At a given approach
-      ! it decides about the load, and a stiffness like that along the long side would take many iterations.
+      ! Under a given load the mean of the direction is removed, so that the factor of the mean hardly matters. At a
+      ! given approach it decides about the load, and a stiffness like that along the long side would take many
+      ! iterations.
       self%of_mean = coarse%kernel%compliance(2.0_dp*pi/coarse%h) &
          /[coarse%kernel%compliance(pi/max(grid%lx, grid%ly)), coarse%kernel%compliance(pi/min(grid%lx, grid%ly))]
    end subroutine new_wave_preconditioner
