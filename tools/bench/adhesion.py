@@ -17,13 +17,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from pathlib import Path
+
+from benchmark_page import write_part
 
 import asperity
-
-ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs" / "benchmarks.md"
-START, END = "<!-- adhesion: begin -->", "<!-- adhesion: end -->"
 
 TAMAAS = r"""
 import json, sys, time
@@ -131,7 +128,7 @@ def main() -> None:
     asperity.set_threads(1)
     cases = [sphere(tabor, boundary) for boundary in ("free", "periodic")
              for tabor in (0.3, 1.0, 3.0)] + [rough(256), rough(512)]
-    lines = [START, "", "## Adhesion, one thread", "",
+    lines = ["## Adhesion, one thread", "",
              "Measured by `python tools/bench/adhesion.py`. All cases have the exponential",
              "potential and start from about the contact without adhesion; they end at a natural",
              "residual max|min(g/z0, G z0/w)| of 1e-6. The spheres have n = 128 and no load. The",
@@ -168,17 +165,8 @@ def main() -> None:
                 f"{other['seconds']:.3f}", f"{other['residual']:.1e}", f"{other['area']:.3f}"]
             note = other.get("failed", f"{other.get('seconds', 0) / ours['seconds']:.1f} times")
             lines.append(f"| {case['name']} | {' | '.join(values)} | {note} |")
-        lines += ["", "Of the times only the ratios mean something: the machine may be shared.", "",
-                  END]
-        write_page(lines)
-
-
-def write_page(lines: list[str]) -> None:
-    """Put the tables in the place of those on the page."""
-    text = PAGE.read_text()
-    if START in text:
-        text = text[:text.index(START)].rstrip() + "\n" + text[text.index(END) + len(END):]
-    PAGE.write_text(text.rstrip() + "\n\n" + "\n".join(lines) + "\n")
+        lines += ["", "Of the times only the ratios mean something: the machine may be shared."]
+        write_part("adhesion", lines)
 
 
 if __name__ == "__main__":
