@@ -18,7 +18,7 @@ DRIVER = shutil.which("chromedriver")
 
 
 def _browser():
-    """Return the browser of the driver's version: a machine may have several."""
+    """Return the browser with the version of chromedriver: a machine may have several browsers."""
     if DRIVER is None:
         return None
     found = [path for name in ("chromium", "google-chrome", "chromium-browser")
@@ -36,13 +36,13 @@ BROWSER = _browser()
 
 
 class Browser:
-    """A browser of one window; use it in a `with` statement."""
+    """A browser with one window, for use in a `with` statement."""
 
     def __init__(self, folder):
-        self.told = Path(folder, "driver.log")
-        with self.told.open("w") as told:
+        self.log = Path(folder, "driver.log")
+        with self.log.open("w") as log:
             self.driver = subprocess.Popen(
-                [DRIVER, "--port=0"], stdout=told, stderr=subprocess.DEVNULL,
+                [DRIVER, "--port=0"], stdout=log, stderr=subprocess.DEVNULL,
                 env={**os.environ, "HOME": str(folder)})
         try:
             self._wait()
@@ -70,7 +70,7 @@ class Browser:
     def _wait(self):
         until = time.monotonic() + PATIENCE
         while time.monotonic() < until:
-            if port := re.search(r"successfully on port (\d+)", self.told.read_text()):
+            if port := re.search(r"successfully on port (\d+)", self.log.read_text()):
                 self.root = f"http://127.0.0.1:{port[1]}"
                 with suppress(OSError):
                     if self._send("GET", "/status")["ready"]:
@@ -110,7 +110,7 @@ class Browser:
         self.call("POST", "/url", {"url": path.resolve().as_uri()})
 
     def run(self, script, *arguments):
-        """Run a script, return what it returns."""
+        """Run a script and return its result."""
         return self.call("POST", "/execute/sync", {"script": script, "args": list(arguments)})
 
     def actions(self, *sources):
@@ -119,12 +119,12 @@ class Browser:
         self.call("DELETE", "/actions")
 
     def press(self, *keys):
-        """Press keys one after the other where the focus is."""
+        """Press keys one after the other in the element that has the focus."""
         self.actions({"type": "key", "id": "keys", "actions": [
             {"type": kind, "value": key} for key in keys for kind in ("keyDown", "keyUp")]})
 
     def drag(self, start, end, kind="mouse"):
-        """Press a pointer at a point of the window, move and release it."""
+        """Press a pointer at a point of the window, move it and release it."""
         self.actions({"type": "pointer", "id": "pointer", "parameters": {"pointerType": kind},
                       "actions": [
             {"type": "pointerMove", "duration": 0, "x": round(start[0]), "y": round(start[1])},

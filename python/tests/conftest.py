@@ -15,12 +15,12 @@ from hypothesis import settings
 
 matplotlib.use("Agg")
 
-# The same examples every time: what passes once passes again.
+# Hypothesis generates the same examples every time, so that a test that passed passes again.
 settings.register_profile("repeatable", derandomize=True)
 settings.load_profile("repeatable")
 
 ROOT = Path(__file__).resolve().parents[2]
-# Seconds after which a test gives up waiting: a busy machine may be a hundred times slower.
+# Seconds after which a test stops waiting. It is long because a busy machine may be slow.
 PATIENCE = 300
 
 
@@ -65,7 +65,7 @@ def road(program, tmp_path_factory):
 
 def write_result(path, *, nx=24, ny=16, lx=2.4e-3, ly=1.6e-3, rows=6, moving=False,
                  finished=1, boundary="periodic"):
-    """Write a file laid out as results are, with fields that a formula gives."""
+    """Write a file with the layout of a result, whose fields are given by formulas."""
     x = np.arange(nx) * lx / nx
     y = np.arange(ny) * ly / ny
     height = 2e-6 * np.cos(2 * np.pi * x / lx) * np.cos(2 * np.pi * y / ly)[:, None]
@@ -92,7 +92,7 @@ def write_result(path, *, nx=24, ny=16, lx=2.4e-3, ly=1.6e-3, rows=6, moving=Fal
             "work_normal": (1e-9 * np.arange(rows), "J", "work of the normal traction"),
         }
         for name, (values, units, long_name) in columns.items():
-            # The last column lags a row behind: the run is caught in the middle of a step.
+            # The last column is one row short, as if the run were writing a row at this moment.
             kept = values[:-1] if name == "work_normal" and not finished else values
             item = history.create_dataset(name, data=kept, maxshape=(None,), chunks=(64,))
             item.attrs.update(units=units, long_name=long_name)
@@ -113,12 +113,12 @@ def write_result(path, *, nx=24, ny=16, lx=2.4e-3, ly=1.6e-3, rows=6, moving=Fal
 
 @pytest.fixture
 def result(tmp_path):
-    """Return the path of a result of an elastic contact at growing load."""
+    """Return the path of a result of an elastic contact under a growing load."""
     return write_result(tmp_path / "rough.h5")
 
 
 def frictional_result(path, **options):
-    """Write a result of sliding with friction: `write_result` with what friction adds."""
+    """Write a result of sliding with friction: `write_result` and the columns of friction."""
     write_result(path, moving=True, **options)
     with h5py.File(path, "a") as file:
         history = file["history"]
@@ -126,7 +126,7 @@ def frictional_result(path, **options):
         part = np.linspace(0, 1, rows)
         lost, rubbed, stored = 4e-9 * part**2, 9e-9 * part**2, 2e-9 * part
         work = stored + lost + rubbed
-        work[-1] *= 1.001  # books that miss a thousandth
+        work[-1] *= 1.001  # the energy balance has an error of a thousandth
         del history["work_normal"]
         columns = {
             "friction_viscous": (0.08 * part, "1"),

@@ -1,9 +1,10 @@
-"""A whole step of a coupled run solved densely at once, without any part of the program.
+"""A dense solution of a whole step with friction, which uses no part of the program.
 
-Unknowns are the pressures, the two components of the tractions and the level of all cells. Newton's
-method with a Jacobian by differences solves, for all of them together: no pull and no overlap, the
-load, Coulomb's bound on the slope of the road where the surface is, slip along friction on that
-slope. Arms follow the displacement-like form of the exponential scheme. Periodic cells only.
+The unknowns are the pressures and both components of the tractions of all cells, and the level.
+Newton's method, with a Jacobian by differences, solves all conditions at once: the pressure is
+nowhere negative, no surfaces overlap, the load is carried, the traction keeps within Coulomb's
+bound on the local slope of the road, and slip has the direction of friction on that slope. The arms
+use the scheme of the program's exponential method. The boundary is periodic.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ class Spline:
     """The periodic cubic B-spline surface through a map of shape (ny, nx)."""
 
     def __init__(self, height: np.ndarray, dx: float, dy: float) -> None:
-        """Find the coefficients with transforms."""
+        """Find the coefficients of the spline by Fourier transforms."""
         self.dx, self.dy = dx, dy
         self.ny, self.nx = height.shape
         symbols = [(4 + 2 * np.cos(2 * np.pi * np.fft.fftfreq(n))) / 6
@@ -23,7 +24,7 @@ class Spline:
         self.c = np.fft.ifft2(np.fft.fft2(height) / np.outer(*symbols)).real
 
     def read(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the height and both slopes at places in m from the first cell."""
+        """Return the height and both slopes at places x, y, in m from the first cell."""
         u, v = x / self.dx, y / self.dy
         i, j = np.floor(u).astype(int), np.floor(v).astype(int)
         (wu, du), (wv, dv) = weights(u - i), weights(v - j)
@@ -37,14 +38,14 @@ class Spline:
 
 
 def weights(t: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Return the four cubic B-splines and their derivatives at a part of a cell."""
+    """Return the four cubic B-splines and their derivatives at the fraction t of a cell."""
     return ([(1 - t)**3 / 6, (3 * t**3 - 6 * t**2 + 4) / 6,
              (-3 * t**3 + 3 * t**2 + 3 * t + 1) / 6, t**3 / 6],
             [-(1 - t)**2 / 2, (3 * t**2 - 4 * t) / 2, (-3 * t**2 + 2 * t + 1) / 2, t**2 / 2])
 
 
 def compliances(nx: int, ny: int, dx: float, poisson: float, thickness: float) -> list[np.ndarray]:
-    """Return the dense matrices A_zz, A_xx, A_yy, A_xy of unit shear modulus."""
+    """Return the dense matrices A_zz, A_xx, A_yy, A_xy for a shear modulus of 1."""
     qx = 2 * np.pi * np.fft.fftfreq(nx, dx)[None, :]
     qy = 2 * np.pi * np.fft.fftfreq(ny, dx)[:, None]
     q = np.hypot(qx, qy)
@@ -66,7 +67,7 @@ def compliances(nx: int, ny: int, dx: float, poisson: float, thickness: float) -
 
 
 class Block:
-    """A rubber block on its road, and its state after the rows solved so far."""
+    """A rubber block on its road, with its state after the last row that was solved."""
 
     def __init__(self, height: np.ndarray, dx: float, *, poisson: float, thickness: float,
                  long_term: float, arms: list[tuple[float, float]], coefficient: float) -> None:
@@ -85,7 +86,7 @@ class Block:
         self.level, self.rubs = 0.0, False
 
     def coefficients(self, dt: float) -> list[tuple[float, float, float]]:
-        """Return alpha, b1 and b2 of each arm (exponential, or a jump)."""
+        """Return alpha, b1 and b2 of each arm for the exponential scheme; dt = 0 is a jump."""
         found = []
         for g, tau in self.arms:
             x = dt / tau
@@ -97,7 +98,7 @@ class Block:
 
     def step(self, pressure: float, motion: tuple[float, float], dt: float,
              start: tuple[np.ndarray, np.ndarray, float] | None = None) -> float:
-        """Solve a row; dt = 0 is a jump. Returns the largest residual, relative."""
+        """Solve a row, where dt = 0 is a jump, and return the largest relative residual."""
         table = self.coefficients(dt)
         q = self.long_term + sum(b1 for _, b1, _ in table)
         past = sum((b1 * self.u - alpha * m - b2 * self.before
@@ -145,11 +146,11 @@ class Block:
 
     def friction(self, p: np.ndarray, hx: np.ndarray, hy: np.ndarray, t: np.ndarray,
                  slip: np.ndarray) -> np.ndarray:
-        """Return the traction nearest along friction that T plus the slip may have."""
+        """Return the traction that the friction law allows after the trial T + slip."""
         grad = np.array([hx, hy])
         slip = slip + grad * (grad * slip).sum(0)
         nz = 1 / np.sqrt(1 + hx**2 + hy**2)
-        # D - n (n.D) is parallel to the slip: the step is made in D - n (n.D) and turned back.
+        # D - n (n.D) is parallel to the slip, so the step is made in it and then transformed back.
         d = t + p * grad
         n = -grad * nz
         along = d - n * (n * d).sum(0) + project(n, slip, nz)
@@ -161,12 +162,12 @@ class Block:
 
 
 def project(n: np.ndarray, slip: np.ndarray, nz: np.ndarray) -> np.ndarray:
-    """Return the slip in the space of D - n (n.D): the slip in the plane of the grid."""
+    """Return the change of D - n (n.D) for a slip in the plane of the grid."""
     return slip - n * (n * slip).sum(0)
 
 
 def newton(residual, z: np.ndarray, most: int = 400) -> tuple[np.ndarray, float]:
-    """Solve by Newton's method with differences and steps that lower the residual."""
+    """Solve by Newton's method; a line search makes each step lower the residual."""
     f = residual(z)
     for _ in range(most):
         if np.abs(f).max() < 1e-11:

@@ -1,6 +1,6 @@
-"""A Slurm of one node on this machine, started by hand for a test and ended after it.
+"""A Slurm of one node on this machine, which a test starts and ends.
 
-Needs Debian's packages slurm-wlm and munge, and the rights of root; no systemd.
+It needs Debian's packages slurm-wlm and munge, and runs as root without systemd.
 """
 
 import os
@@ -18,7 +18,7 @@ _DAEMONS = ("munged", "slurmctld", "slurmd")
 
 
 def _daemon(name):
-    """Return the path of a daemon, which a user's PATH may lack."""
+    """Return the path of a daemon, which may be in a folder that a user's PATH lacks."""
     return shutil.which(name, path=f"{os.environ.get('PATH', '')}:/usr/sbin:/usr/local/sbin")
 
 
@@ -56,10 +56,10 @@ PartitionName=short Nodes=ALL Default=YES MaxTime=INFINITE State=UP
 
 
 class Slurm:
-    """A running Slurm; use it in a `with` statement. SLURM_CONF is set within."""
+    """A running Slurm, for use in a `with` statement, which also sets SLURM_CONF."""
 
     def __enter__(self):
-        # The path of a socket may have some hundred characters only: not in pytest's folder.
+        # Not in pytest's folder: the path of a socket may have about a hundred characters only.
         self.folder = Path(tempfile.mkdtemp(prefix="slurm-"))
         self.processes = []
         try:
@@ -99,7 +99,7 @@ class Slurm:
         while not reached():
             if time.monotonic() > end:
                 said = "\n".join(path.read_text() for path in self.folder.glob("*.log"))
-                raise TimeoutError(f"Slurm does not get ready:\n{said}")
+                raise TimeoutError(f"Slurm is not ready:\n{said}")
             time.sleep(0.2)
 
     def call(self, *words):
@@ -126,7 +126,7 @@ class Slurm:
 
 
 def _free_ports(count):
-    """Return ports that nobody uses."""
+    """Return ports that are not in use."""
     sockets = [socket.socket() for _ in range(count)]
     for one in sockets:
         one.bind(("127.0.0.1", 0))

@@ -13,7 +13,7 @@ import asperity
 from asperity.theory import dmt, jkr, maugis
 
 RADIUS, MODULUS, ENERGY = 1e-4, 4e6, 0.05
-#: (R w^2/E*^2)^(1/3): the range of Tabor parameter 1
+#: (R w^2/E*^2)^(1/3), the range at which the Tabor parameter is 1
 LENGTH = (RADIUS * ENERGY**2 / MODULUS**2) ** (1 / 3)
 SIDE = 40e-6
 
@@ -40,7 +40,7 @@ def radius_of(contact, lx=SIDE):
 def test_maugis(tabor, side):
     contact = press(128, side, range=LENGTH / tabor, force=2e-5)
     exact = maugis(RADIUS, MODULUS, ENERGY, force=2e-5, range=LENGTH / tabor)
-    # Some 20 cells a radius; the count of cells is good to a third of one.
+    # The radius has some 20 cells; counting cells gives it to a third of a cell.
     assert radius_of(contact, side) == pytest.approx(exact.contact_radius, rel=0.015)
     assert contact.force == pytest.approx(2e-5, rel=1e-5)
     assert contact.displacement == pytest.approx(exact.approach, abs=0.03 * LENGTH)
@@ -50,7 +50,7 @@ def test_long_range_is_dmt():
     side, length = 130e-6, LENGTH / 0.02
     contact = press(180, side, range=length, force=2e-5)
     exact = dmt(RADIUS, MODULUS, ENERGY, force=2e-5)
-    # Tabor 0.02: Maugis's radius is 1.5 % above DMT's.
+    # The Tabor parameter is 0.02, where Maugis's radius is 1.5 % above DMT's.
     assert radius_of(contact, side) == pytest.approx(exact.contact_radius, rel=0.03)
 
 
@@ -84,7 +84,7 @@ def test_conditions_recomputed(potential, boundary):
     assert 0.0 < contact.contact_area < 1.0
     assert contact.contact_area == np.mean(contact.gap == 0.0)
     assert contact.mean_pressure == pytest.approx(2e4, rel=1e-6)
-    # The displacement is that of the pressure.
+    # The displacement must be the response to the pressure.
     if boundary == "periodic":
         ny, nx = height.shape
         q = 2 * np.pi * np.hypot(np.fft.fftfreq(ny, 33e-6 / ny)[:, None],
@@ -128,7 +128,7 @@ def test_attraction_that_is_a_function(potential, boundary, method):
 def test_jump_of_a_function_is_the_jump_of_maugis():
     given = {"range": LENGTH / 0.3, "force": 2e-5, "boundary": "free"}
     exact = maugis(RADIUS, MODULUS, ENERGY, force=2e-5, range=LENGTH / 0.3)
-    # The attraction drops to zero at the range by itself.
+    # The attraction of this function ends with a jump at the range.
     with pytest.warns(UserWarning, match="steepest fall of the attraction"):
         found = asperity.solve_adhesive(sphere(96, 44e-6), 44e-6, None, MODULUS, **given,
                                         potential=lambda gap: 0 * gap + ENERGY / given["range"])
@@ -171,7 +171,7 @@ def test_controls_agree_and_force_is_the_derivative_of_the_energy():
     assert (energies[1] - energies[0]) / (2 * step) == pytest.approx(driven.force, rel=2e-3)
 
 
-def test_start_matters():
+def test_the_solution_depends_on_the_start():
     height = asperity.surface.shape("hexagonal_wave", 48, 27, lx=40e-6, ly=40e-6 / 3**0.5,
                                     amplitude=1e-6, wavelength=40e-6)
     given = {"energy": ENERGY, "range": 0.1e-6, "pressure": 0.0}
@@ -241,7 +241,7 @@ DETACHES = """
 """
 
 
-def test_program_tells_detachment(program, tmp_path):
+def test_program_reports_detachment(program, tmp_path):
     case = tmp_path / "pulled.nml"
     case.write_text(DETACHES)
     done = subprocess.run([program, "run", str(case), "--quiet"], capture_output=True, text=True)
@@ -252,7 +252,7 @@ def test_program_tells_detachment(program, tmp_path):
     assert list(result.history["force"][:2]) == pytest.approx([1e-5, -1e-5], rel=1e-5)
     assert (result.history["contact_area"][:2] > 0).all()
     assert len(result.history["force"]) <= 3
-    # The same state through the library.
+    # The library must find the same state.
     first = asperity.solve_adhesive(sphere_map(), 40e-6, 38e-6, MODULUS, energy=ENERGY,
                                     range=0.3e-6, force=1e-5, boundary="free")
     assert first.displacement == pytest.approx(result.history["displacement"][0], rel=1e-9)
@@ -265,7 +265,7 @@ def sphere_map():
 
 @pytest.mark.parametrize(("potential", "share"), [("exponential", 0.7), ("maugis_dugdale", 1.0)])
 def test_cells_too_coarse_for_the_range_are_reported(potential, share):
-    """In the words and by the bounds of the program: 0.7 E* range^2/energy, or the whole of it."""
+    """The warning has the words and the bounds of the program: 0.7 or 1 times E* range^2/energy."""
     bound = share * MODULUS * 0.1e-6**2 / ENERGY
     n = round(SIDE / bound)
     with warnings.catch_warnings():
@@ -280,10 +280,11 @@ def test_cells_too_coarse_for_the_range_are_reported(potential, share):
     (2.0, 64, (0.0, 0.0), -1.53460), (2.0, 64, (0.3, 0.1), -1.53460),
     (5.0, 96, (0.5, 0.5), -1.50635)])
 def test_pull_off_of_maugis_is_not_pinned_by_the_grid(parameter, n, shift, exact):
-    """Cells of 0.26 and of 1.09 E* range^2/energy; the sphere anywhere between the cells.
+    """Cells have sides of 0.26 or 1.09 E* range^2/energy; the sphere is anywhere between the cells.
 
-    In Maugis's units, where lambda = 2/(pi range); the exact pull-off is the least load of his
-    equations. With a jump at the end of the range the pull was 17 % and more than 40 % too large.
+    The test uses Maugis's units, where lambda = 2/(pi range). The exact pull-off is the least load
+    of his equations. An attraction with a jump at the end of the range made the pull-off too
+    large, by 17 % on the smaller cells and by more than 40 % on the larger ones.
     """
     reach, side = 2 / (np.pi * parameter), 4.0
     x = (np.arange(n) + 0.5) / n * side - side / 2
@@ -302,7 +303,7 @@ def test_pull_off_of_maugis_is_not_pinned_by_the_grid(parameter, n, shift, exact
         if contact.contact_area == 0.0:
             break
     assert least == pytest.approx(exact, rel=0.02)
-    # The force is the derivative of the energy all the way to the pull-off.
+    # The force must be the derivative of the energy all the way to the pull-off.
     held = int(np.argmin(loads))
     work = np.sum(0.5 * (np.array(loads[1:held]) + loads[:held - 1])) * (
         approaches[1] - approaches[0])

@@ -1,4 +1,4 @@
-"""Height maps as arrays and topographies, everywhere where a map is taken."""
+"""Height maps may be arrays or topographies wherever the package takes a map."""
 
 import subprocess
 from pathlib import Path
@@ -64,7 +64,7 @@ def test_a_written_case_is_complete_without_this_process(tmp_path, program):
 
 @pytest.mark.parametrize("value", [
     np.array([1.0, np.nan]), np.zeros((2, 2, 2)), np.array([["a"]])])
-def test_what_is_no_map(value):
+def test_wrong_kinds_of_maps_are_refused(value):
     with pytest.raises(ValueError, match="surface"):
         asperity.Case(surface=value)
 
@@ -103,9 +103,9 @@ def test_saved_arrays(tmp_path, program):
     (tmp_path / "case.nml").write_text(
         "&grid nx=24, ny=20, lx=1e-3, ly=0.9e-3 / &surface shape='file', file='road.h5' /"
         "&material shear_modulus=1e6 / &phase pressure=1e3 /")
-    told = subprocess.run([program, "check", "case.nml"], cwd=tmp_path, capture_output=True,
+    done = subprocess.run([program, "check", "case.nml"], cwd=tmp_path, capture_output=True,
                           text=True, check=True)
-    assert told.stderr == "" and "warning" not in told.stdout.replace("! warning: &surface", "")
+    assert done.stderr == "" and "warning" not in done.stdout.replace("! warning: &surface", "")
     with pytest.raises(ValueError, match="lx: must be given"):
         asperity.surface.save(path, wave())
     with pytest.raises(OSError, match="there is no folder"):

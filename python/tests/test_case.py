@@ -1,4 +1,4 @@
-"""Cases built in Python: the same names, values and messages as the program's."""
+"""Cases built in Python have the same names, values and messages as those of the program."""
 
 import copy
 import math
@@ -32,17 +32,17 @@ def elastic():
 
 
 def bits(value):
-    """Return a value so that equal means the same bits."""
+    """Return a form of a value that is equal for two values only if all their bits agree."""
     if isinstance(value, float):
         return struct.pack("<d", value)
     return [bits(one) for one in value] if isinstance(value, list) else value
 
 
-# ---- any case reads back to the same bits ------------------------------------------------------
+# ---- every case is read back with the same bits ------------------------------------------------
 
 
 def interval(allowed):
-    """Return the bounds of the table's phrase for what is allowed."""
+    """Return the bounds that the table's words for the allowed values express."""
     if allowed == "positive":
         return 0.0, math.inf, True, False
     if allowed == "not negative":
@@ -66,7 +66,7 @@ def values_of(variable):
         words = st.sampled_from([word.strip("' ") for word in variable.allowed.split("|")])
         return words if variable.kind == "word" else st.lists(words, min_size=1, max_size=4)
     if variable.kind == "text":
-        # Characters that a text file of namelists holds; blanks at the end do not count.
+        # Characters that a namelist file may contain. Blanks at the end of a text do not count.
         return st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs")),
                        max_size=40).map(str.rstrip)
     if variable.kind == "integer":
@@ -99,7 +99,7 @@ def cases(draw):
 @settings(max_examples=40)
 @given(cases())
 @example({"material": {"reference_temperature": sys.float_info.max}})
-def test_what_is_written_reads_back_to_the_same_bits(groups):
+def test_a_written_case_is_read_back_with_the_same_bits(groups):
     case = asperity.Case(**groups)
     again = asperity.Case.read(str(case) + "\n")
     assert str(again) == str(case)
@@ -117,7 +117,7 @@ def test_what_is_written_reads_back_to_the_same_bits(groups):
         assert twin == case and str(twin) == str(case)
 
 
-# ---- what stands in the program stands here ----------------------------------------------------
+# ---- the package and the program have the same table ------------------------------------------
 
 
 def test_the_table_is_that_of_the_program(program):
@@ -144,31 +144,31 @@ def test_no_name_of_the_input_is_hidden_by_a_method():
 
 
 def without_time(text):
-    """Return what `check` prints but for the time of a run, which is measured each time."""
+    """Return what `check` prints, without the predicted time of a run, which varies."""
     assert text.count("\n! time: ") == 1
     return re.sub(r"\n! time: .*", "", text)
 
 
 @pytest.mark.parametrize("path", INPUTS, ids=lambda path: path.parent.name)
-def test_check_tells_what_the_command_tells(path, program):
+def test_check_prints_what_the_command_prints(path, program):
     case = asperity.Case.read(path)
-    told = subprocess.run([program, "check", str(path)], capture_output=True, text=True, check=True)
-    assert without_time(case.check()) == without_time(told.stdout)
+    done = subprocess.run([program, "check", str(path)], capture_output=True, text=True, check=True)
+    assert without_time(case.check()) == without_time(done.stdout)
     assert case.path == path
-    # The values are the same ones, however they are written.
+    # The values must be the same, however they are written.
     again = asperity.Case.read(str(case))
     again.path = path
-    assert without_time(again.check()) == without_time(told.stdout)
+    assert without_time(again.check()) == without_time(done.stdout)
 
 
-@pytest.mark.parametrize(("change", "told"), [
+@pytest.mark.parametrize(("change", "message"), [
     (lambda case: case.phase[0].update(pressure=-1.0), "adhesion"),
     (lambda case: case.grid.update(ny=4, boundary="free", nx=1), "nx = 1: must be at least 2"),
     (lambda case: case.material.update(prony_g=[1e6]), "prony"),
     (lambda case: case.phase.clear(), "&phase: the group is missing"),
     (lambda case: case.surface.__setitem__(
         0, dict(shape="file", file="none.h5")), "none.h5")])
-def test_the_same_messages(change, told, program, tmp_path):
+def test_the_same_messages(change, message, program, tmp_path):
     case = elastic()
     change(case)
     path = case.write(tmp_path / "road.nml")
@@ -178,7 +178,7 @@ def test_the_same_messages(change, told, program, tmp_path):
     with pytest.raises(ValueError if command.returncode == 2 else OSError) as caught:
         case.check()
     assert str(caught.value) == command.stderr.rstrip("\n")
-    assert told in str(caught.value)
+    assert message in str(caught.value)
     if command.returncode == 2:
         with pytest.raises(ValueError, match=r"road\.nml"):
             case.run(output=tmp_path / "road.h5")
@@ -191,7 +191,7 @@ def test_the_same_messages(change, told, program, tmp_path):
 # ---- wrong names and values --------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("build", "told"), [
+@pytest.mark.parametrize(("build", "message"), [
     (lambda: asperity.Case(grdi={}), "'grdi': did you mean 'grid'"),
     (lambda: asperity.Case(grid=dict(nxx=4)), "&grid: no variable is named 'nxx'.*'nx'"),
     (lambda: asperity.Case(phase=[dict(presure=1.0)]), "did you mean 'pressure'"),
@@ -202,15 +202,15 @@ def test_the_same_messages(change, told, program, tmp_path):
     (lambda: elastic()["grdi"], "did you mean 'grid'"),
     (lambda: elastic().grid["nxx"], "did you mean 'nx'"),
     (lambda: asperity.Case.help("phase.presure"), "did you mean 'pressure'")])
-def test_misspelt_names_are_refused_at_once(build, told):
-    with pytest.raises(UnknownVariableError, match=told):
+def test_misspelt_names_are_refused_immediately(build, message):
+    with pytest.raises(UnknownVariableError, match=message):
         build()
     for kind in (ValueError, AttributeError, KeyError):
         with pytest.raises(kind):
             build()
 
 
-@pytest.mark.parametrize(("name", "value", "told"), [
+@pytest.mark.parametrize(("name", "value", "message"), [
     ("grid.nx", -4, "&grid: nx = -4: must be a positive integer$"),
     ("grid.nx", 4.5, "nx = 4.5: must be a positive integer$"),
     ("grid.nx", True, "must be a positive integer$"),
@@ -231,17 +231,17 @@ def test_misspelt_names_are_refused_at_once(build, told):
     ("material.prony_g", [[1.0]], "must be a number, a logical"),
     ("material.poisson", 0.6, "poisson = 0.6: must be a number above -1 and at most 0.5$"),
     ("friction.slope_effect", 1, "must be .true. or .false.")])
-def test_wrong_values_are_refused_at_once(name, value, told):
+def test_wrong_values_are_refused_immediately(name, value, message):
     case = elastic()
     before = str(case)
     group, variable = name.split(".")
-    with pytest.raises(ValueError, match=told) as caught:
+    with pytest.raises(ValueError, match=message) as caught:
         case[group][variable] = value
     assert not str(caught.value).startswith(":") and "(line" not in str(caught.value)
     assert str(case) == before
 
 
-def test_quotes_do_not_break_out():
+def test_quotes_in_values_stay_inside_the_text():
     case = elastic()
     case.title = "it's / &grid nx = 3 / 'x"
     assert asperity.Case.read(str(case)).title == case.title
@@ -305,7 +305,7 @@ def test_repeated_groups_are_a_list():
         case.phase[2]
     case.phase += [dict(pressure=5.0)]
     assert len(asperity.Case.read(str(case)).phase) == 3
-    # A group that is appended twice is two groups.
+    # A group that is appended twice makes two groups.
     first = case.phase[0]
     case.phase.append(first)
     case.phase[-1].pressure = 7.0
@@ -354,7 +354,7 @@ def test_read_and_write(tmp_path, monkeypatch):
     assert path.read_text() == str(case)
     run = read.run(threads=1)
     assert run.path == Path("cases/road.h5") and run.input == str(case)
-    # In a folder without the file the same name is another file.
+    # In a folder without the file, the same name means another file.
     with pytest.raises(OSError, match="lost"):
         asperity.Case.read(tmp_path / "lost.nml")
     with pytest.raises(OSError, match="lost"):

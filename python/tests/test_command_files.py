@@ -1,4 +1,4 @@
-"""The man page and the completions of the shells know the commands that the program has."""
+"""The man page and the shell completions agree with the commands of the program."""
 
 import os
 import re
@@ -85,7 +85,7 @@ def test_python_does_its_commands(program):
                               text=True).stdout == text
 
 
-def test_statuses_come_back_from_python(program, tmp_path):
+def test_exit_statuses_of_python_are_returned(program, tmp_path):
     done = subprocess.run([program, "plot", "not_there.h5"], cwd=tmp_path, capture_output=True,
                           text=True)
     assert done.returncode == 3 and done.stderr.startswith("asperity: not_there.h5")
@@ -108,7 +108,7 @@ def test_without_the_package_it_says_how_to_get_it(program, tmp_path):
     assert done.returncode == 0 and "RESULT.h5" in done.stdout
 
 
-def test_words_reach_python_as_they_are(program, tmp_path):
+def test_arguments_reach_python_unchanged(program, tmp_path):
     name = "a b'c\"d$HOME;*.h5"
     done = subprocess.run([program, "plot", name], cwd=tmp_path, capture_output=True, text=True,
                           env=os.environ)
@@ -129,9 +129,9 @@ SLIDING = """&grid nx = 64, ny = 64, lx = 1e-3 /
 def estimated(program, folder, text):
     """Return the seconds that `check` expects."""
     (folder / "case.nml").write_text(text)
-    told = subprocess.run([program, "check", "case.nml"], cwd=folder, check=True,
+    message = subprocess.run([program, "check", "case.nml"], cwd=folder, check=True,
                           capture_output=True, text=True).stdout
-    number, unit = re.search(r"^! time: about (\d+) (\w+?)s? on this machine", told,
+    number, unit = re.search(r"^! time: about (\d+) (\w+?)s? on this machine", message,
                              flags=re.M).groups()
     return int(number) * {"second": 1, "minute": 60, "hour": 3600, "day": 86400}[unit]
 
@@ -143,5 +143,5 @@ def test_check_estimates_the_time_of_a_run(program, tmp_path):
     taken = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
     assert taken / 6 < expected < 6 * taken
     large = SLIDING.replace("64", "1024")
-    # Rows of 256 times as many cells; on the small grid, writing a row counts as well.
+    # The rows have 256 times as many cells; on the small grid, writing a row takes a large share.
     assert 30 * expected < estimated(program, tmp_path, large) < 1000 * expected

@@ -1,4 +1,4 @@
-"""The program as a user meets it: commands, messages, exit statuses, and inputs that are broken."""
+"""The program as a user meets it: commands, messages, exit statuses and faulty inputs."""
 
 import re
 import subprocess
@@ -20,7 +20,7 @@ VERBS = ["run", "check", "template", "info"]
 
 
 def call(program, *arguments, cwd=None):
-    """Run the program; whatever happens, it must not crash."""
+    """Run the program, which must not crash whatever the input is."""
     done = subprocess.run([program, *map(str, arguments)], capture_output=True, cwd=cwd,
                           timeout=PATIENCE)
     done.out = done.stdout.decode(errors="replace")
@@ -33,7 +33,7 @@ def call(program, *arguments, cwd=None):
 
 
 def check(program, folder, text):
-    """Check an input given as text or bytes."""
+    """Check an input that is given as text or bytes."""
     path = folder / "case.nml"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
     return call(program, "check", "case.nml", cwd=folder)
@@ -44,7 +44,7 @@ def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("case")
 
 
-@pytest.mark.parametrize(("old", "new", "told"), [
+@pytest.mark.parametrize(("old", "new", "printed"), [
     ("/\n&p", "/\n&friction law = 'coulomb', coefficient = 0.5, shear_strength = 3e5 /\n&p",
      "&friction: shear_strength = 300000 has no effect"),
     ("/\n&p", "/\n&friction law = 'constant_shear', coefficient = 0.5, shear_strength = 1 /\n&p",
@@ -53,11 +53,11 @@ def folder(tmp_path_factory):
     ("1e6 /", "1e6, temperature = 50, wlf_c1 = 5, wlf_c2 = 100 /", ""),
     ("1e6 /", "1e6, temperature = 20 /", ""),
 ])
-def test_values_without_effect_are_reported(program, folder, old, new, told):
+def test_values_without_effect_are_reported(program, folder, old, new, printed):
     done = check(program, folder, GOOD.replace(old, new, 1))
     assert done.returncode == 0
-    assert done.out.count("has no effect") == (1 if told else 0)
-    assert f"! warning: {told}" in done.out or not told
+    assert done.out.count("has no effect") == (1 if printed else 0)
+    assert f"! warning: {printed}" in done.out or not printed
 
 
 def test_version(program, root):
@@ -73,7 +73,7 @@ def test_version(program, root):
 
 
 @pytest.mark.parametrize("variable", ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MV2_COMM_WORLD_SIZE"])
-def test_copies_side_by_side_are_refused(program, tmp_path, variable, monkeypatch):
+def test_copies_without_mpi_are_refused(program, tmp_path, variable, monkeypatch):
     (tmp_path / "case.nml").write_text(GOOD)
     monkeypatch.setenv(variable, "4")
     done = call(program, "run", "case.nml", cwd=tmp_path)
@@ -178,8 +178,8 @@ def test_templates_run(program, tmp_path):
         path.write_text(call(program, "template", name).out)
         done = call(program, "run", path, "--threads", "1")
         assert done.returncode == 0, done.err
-        told = call(program, "info", tmp_path / f"{name}.h5").out
-        assert re.search(r"finished +yes", told)
+        printed = call(program, "info", tmp_path / f"{name}.h5").out
+        assert re.search(r"finished +yes", printed)
         with h5py.File(tmp_path / f"{name}.h5") as file:
             assert file.attrs["finished"] == 1
             assert file["history/contact_area"][0] > 0
@@ -317,9 +317,9 @@ def test_info(program, tmp_path):
     with h5py.File(path, "a") as file:
         for name, value in (("friction", 0.25), ("stick_area", 0.0), ("residual_tangential", 2e-9)):
             file[f"history/{name}"] = np.array([value])
-    told = call(program, "info", path).out
-    assert "  friction            0.25\n" in told and "stick_area" not in told
-    assert "largest residual_tangential of all rows: 2e-9" in told
+    printed = call(program, "info", path).out
+    assert "  friction            0.25\n" in printed and "stick_area" not in printed
+    assert "largest residual_tangential of all rows: 2e-9" in printed
     with h5py.File(path, "a") as file:
         del file.attrs["title"]
     assert call(program, "info", path).returncode == 3
@@ -327,7 +327,7 @@ def test_info(program, tmp_path):
     assert call(program, "info", path).returncode == 3
 
 
-# Inputs that hypothesis makes. The program may accept what is right; it must never crash.
+# Hypothesis makes these inputs. The program may accept one that is right; it must never crash.
 
 lines = settings(
     max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
@@ -389,12 +389,12 @@ pieces = st.sampled_from(
 
 
 def without_comments(text):
-    """Drop the comments: they say where a value comes from, which changes once it is given."""
+    """Drop the comments, which say where a value comes from and change when the value is given."""
     return re.sub(r" *!.*", "", text)
 
 
 def judge(done):
-    """Whatever the input was, the answer is orderly."""
+    """Check that the exit status and the message are proper ones, whatever the input was."""
     assert done.returncode in (0, 2)
     if done.returncode == 2:
         messages = done.err.strip("\n").split("\n")
@@ -425,7 +425,7 @@ def test_pieces_in_a_good_input(program, folder, data, at):
 
 @lines
 @given(first=st.integers(0, len(GOOD)), last=st.integers(0, len(GOOD)))
-def test_holes_in_a_good_input(program, folder, first, last):
+def test_good_inputs_with_parts_removed(program, folder, first, last):
     judge(check(program, folder, GOOD[: min(first, last)] + GOOD[max(first, last) :]))
 
 

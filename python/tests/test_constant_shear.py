@@ -1,4 +1,4 @@
-"""The dense steps of the tools against the program, and a step without a plain solution."""
+"""Runs with constant shear against the dense steps of the tools; a step without plain solution."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from constant_shear import (
 )
 
 
-# A half-space with two arms (its first step is taken in parts), a free patch with an arm, and a
-# block with mass and an arm; the load jumps in all of them.
+# A half-space with two arms, whose first step is taken in parts, a free patch with an arm, and a
+# block with mass and an arm. The load jumps in all of them.
 @pytest.mark.parametrize(("seed", "allowed"), [
     (774100078, 1e-4), (774100254, 1e-4), (774100248, 1e-4)])
 def test_settled_rows(program, tmp_path, seed, allowed):
-    """Every row of a run that settles is the solution of the dense step, without partial cells."""
+    """Every row of a run whose passes settle is the dense solution, with no cell partly sheared."""
     text, status = run_case(seed, tmp_path, program)
     assert status == 0
     if "prony" in text:
@@ -42,12 +42,12 @@ def test_settled_rows(program, tmp_path, seed, allowed):
     assert look_for_plain(step, found, cut=False)["plain"]
 
 
-# When the passes did not look at single cells, cells at the edge overlapped with the road (first
-# case, differences of 4e-5). The second case was right before, too: on a free patch with adhesion,
-# the rim is attracted.
+# Before the passes looked at single cells, cells at the edge overlapped with the road in the first
+# case, which made differences of 4e-5. The second case, a free patch with adhesion whose rim is
+# attracted, was right even then.
 @pytest.mark.parametrize("seed", [774100367, 774100124])
 def test_cells_at_the_edge(program, tmp_path, seed):
-    """Every row agrees with the dense step where cells at the edge of the contact decide."""
+    """Every row agrees with the dense step where the states of cells at the edge are decisive."""
     text, status = run_case(seed, tmp_path, program, scheme="exponential")
     assert status == 0
     end = replay(tmp_path, text, settled=True)
@@ -58,8 +58,8 @@ def test_cells_at_the_edge(program, tmp_path, seed):
 def test_rows_with_several_solutions(program, tmp_path):
     """Every row solves the dense equations where a dense solver may find another solution.
 
-    In row 9 there are two solutions that differ by 9e-3 of the load, in row 10 two that differ by
-    6e-4. When the passes did not look at single cells, cells with a gap carried the whole strength.
+    Row 9 has two solutions that differ by 9e-3 of the load, and row 10 two that differ by 6e-4.
+    Before the passes looked at single cells, cells with a gap carried the whole strength.
     """
     text, status = run_case(774100294, tmp_path, program, scheme="exponential", tolerance=1e-10)
     assert status == 0
@@ -69,7 +69,7 @@ def test_rows_with_several_solutions(program, tmp_path):
 
 
 def test_step_without_plain_solution(program, tmp_path):
-    """Two cells are partly sheared; whatever is forced on them breaks the law somewhere."""
+    """Two cells are partly sheared, because with any plain state some cell violates the law."""
     text, status = run_case(774100058, tmp_path, program)
     assert status == 0
     end = replay(tmp_path, text, settled=True)
@@ -84,7 +84,7 @@ def test_step_without_plain_solution(program, tmp_path):
     pressure, traction, gap = step.fields(found)
     assert np.abs(pressure[partial]).max() < 1e-9 * pressure.max()
     assert np.abs(gap[partial]).max() < 1e-9 * np.ptp(gap)
-    # The limit that the law of the other cells approaches: the same traction, cell by cell.
+    # The reference is the limit in which the law of the other cells is approached from smooth laws.
     size = np.linalg.norm(traction, axis=0) / step.case.strength
     assert (size[pressure > 0] > 0.9).any()
     assert (size[pressure == 0] < 1).all()

@@ -1,7 +1,7 @@
 """Programs of other people that use the Fortran library, built as they would build them.
 
-One is an fpm project whose manifest names the library and nothing else, one is compiled by hand
-with what ``meson install`` leaves and pkg-config says of it.
+One is an fpm project whose manifest names nothing but the library. The other is compiled by hand,
+with the files that ``meson install`` installs and the flags that pkg-config prints.
 """
 
 import os
@@ -11,7 +11,7 @@ import subprocess
 import pytest
 from conftest import ROOT
 
-# A sphere on an elastic half-space, in force control: by Hertz it comes down by a^2/R.
+# A sphere on an elastic half-space under a given load: by Hertz the approach is a^2/R.
 PROGRAM = """\
 program consumer
    use asperity, only : case_type, dp, error_type, new_simulation, parse_case, simulation_type
@@ -34,7 +34,7 @@ end program consumer
 
 
 def done(command, cwd, **surroundings):
-    """Return what a command prints; a failure shows its messages."""
+    """Return what a command prints; if it fails, show its messages."""
     result = subprocess.run([str(word) for word in command], cwd=cwd, capture_output=True,
                             text=True, env=os.environ | surroundings)
     assert result.returncode == 0, result.stdout[-3000:] + result.stderr[-3000:]
@@ -51,7 +51,7 @@ def test_an_fpm_project_that_names_nothing_but_the_library(tmp_path):
         pytest.skip("fpm is not installed")
     (tmp_path / "app").mkdir()
     (tmp_path / "app" / "main.f90").write_text(PROGRAM)
-    # fpm takes paths of dependencies as relative ones.
+    # fpm takes the paths of dependencies as relative to the manifest.
     path = os.path.relpath(ROOT, tmp_path.resolve())
     (tmp_path / "fpm.toml").write_text(
         f'name = "consumer"\n[dependencies]\nasperity = {{ path = "{path}" }}\n')

@@ -26,13 +26,13 @@ def test_hertz():
                                     tolerance=1e-9)
     radius = (3 * 9.1954 * 0.05 / (4 * MODULUS)) ** (1 / 3)
     assert contact.force == pytest.approx(9.1954, rel=1e-8)
-    # 32 cells a radius: the displacement is good to some 1e-4, the peak likewise.
+    # With 32 cells per radius the displacement and the peak are correct to about 1e-4.
     assert contact.displacement == pytest.approx(radius**2 / 0.05, rel=1e-3)
     assert contact.pressure.max() == pytest.approx(2 * MODULUS * radius / (np.pi * 0.05), rel=2e-3)
     assert contact.contact_area * 16e-6 == pytest.approx(np.pi * radius**2, rel=2e-2)
     summit = np.unravel_index(contact.pressure.argmax(), contact.pressure.shape)
     assert summit == (64, 64)
-    # Far gap: the displacement dies out, gap -> approach below the road, less the surface's drop.
+    # Far away the displacement vanishes: there the gap is the approach less the height of the road.
     np.testing.assert_allclose(
         contact.gap, contact.displacement_z - height - contact.displacement, atol=1e-15)
 
@@ -44,7 +44,7 @@ def test_westergaard(area):
     load = np.pi * modulus * amplitude / length * np.sin(np.pi * area / 2) ** 2
     contact = asperity.solve_normal(height, length, None, modulus, pressure=load, tolerance=1e-9)
     assert contact.pressure.shape == (n,)
-    # Exact within a cell at each edge.
+    # The width is exact to one cell at each edge.
     assert contact.contact_area == pytest.approx(area, abs=3 / n)
     psi = np.pi * np.arange(n) / n
     sine = np.sin(np.pi * area / 2)
@@ -64,7 +64,7 @@ def test_rough_contact_is_complementary_and_balanced():
     assert contact.gap.min() > -1e-6 * np.ptp(height)
     duality = np.sum(contact.pressure * np.abs(contact.gap)) / np.sum(contact.pressure)
     assert duality < 1e-6 * height.std()
-    # U is the response to P: per wave vector 2 P/(E* q).
+    # U must be the response to P: 2 P/(E* q) for each wave vector.
     qx = 2 * np.pi * np.fft.rfftfreq(96, 1.5e-3 / 96)
     qy = 2 * np.pi * np.fft.fftfreq(64, 1e-3 / 64)
     q = np.hypot(qx, qy[:, None])
@@ -104,7 +104,7 @@ def test_any_memory_order_and_type():
         contact = asperity.solve_normal(given, 1.5e-3, 1e-3, 1e6, pressure=2e4)
         np.testing.assert_allclose(contact.pressure, expected.pressure,
                                    atol=1e-9 * expected.pressure.max())
-    # Mirrored and turned maps, too: strides may be negative.
+    # Mirrored and transposed maps count too: strides may be negative.
     mirrored = asperity.solve_normal(height[:, ::-1], 1.5e-3, 1e-3, 1e6, pressure=2e4,
                                      tolerance=1e-9)
     straight = asperity.solve_normal(height, 1.5e-3, 1e-3, 1e6, pressure=2e4, tolerance=1e-9)
@@ -174,7 +174,7 @@ def test_wrong_values(changes, message):
 
 
 def test_masked_points_are_refused():
-    """Values below a mask are not heights."""
+    """Values under a mask are not heights, so a masked map is refused."""
     height = np.ma.masked_array(np.ones((4, 6)), False)
     height[1, 2] = np.ma.masked
     for call in (lambda: asperity.solve_normal(height, 1.0, 1.0, 1e6, pressure=1.0),
@@ -187,8 +187,8 @@ def test_masked_points_are_refused():
 
 
 def test_steps_that_end_on_the_bound_at_once():
-    # The preconditioned directions of this wave of 13 cells leave what is allowed at once: trials
-    # that hardly descend have to become shorter, like those that do not descend at all.
+    # The preconditioned directions of this wave of 13 cells violate the constraints at once. Trials
+    # that hardly descend must become shorter, as those that do not descend at all.
     heights = """
         0x1.b13bcfe194112p-8 0x1.86e62bc5f1e3cp-8 0x1.5c1b8a5e8baa1p-13 -0x1.7a8a356c0cee1p-8
         -0x1.b8f2dcc7ab5d8p-8 -0x1.e9bd5ccc7b64cp-10 0x1.2dd8c4ca88328p-8 0x1.d15f3652ecd66p-8
@@ -205,12 +205,12 @@ def test_steps_that_end_on_the_bound_at_once():
 
 
 def test_contact_of_one_cell_grows():
-    # The first state touches in one cell, where the residual and so the direction are exactly 0:
-    # that cell was taken for one outside the contact, and the step did not keep the load.
+    # The first state touches in one cell, where the residual and thus the direction are exactly 0.
+    # An earlier version took that cell for one outside the contact, and the step changed the load.
     height = [[0.002, 0.0, 0.002, 0.002, 0.0]]
     contact = asperity.solve_normal(height, 1, 1, 1, pressure=1.543077062748773e-05)
     assert contact.mean_pressure == pytest.approx(1.543077062748773e-05, rel=1e-9)
-    # By symmetry two pressures, p1 and p2 twice; their displacements are equal. Plane waves:
+    # By symmetry there are two pressures: p1, and p2 twice. Their displacements are equal.
     k = np.arange(1, 5)
     q = 2 * np.pi * np.minimum(k, 5 - k)
     kernel = np.array([(2 / q * np.cos(2 * np.pi * k * j / 5)).sum() / 5 for j in range(5)])

@@ -1,4 +1,4 @@
-"""Which cells touch an adhesive surface, by dense algebra that shares nothing with the solver."""
+"""Which cells touch an adhesive surface, by dense algebra independent of the solver."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ MODULUS = 1.0
 
 
 def stiffness(nx, ny, lx, ly):
-    """Dense matrix of the half-space, traction from displacement, as a sum over plane waves."""
+    """Return the dense matrix from displacement to traction of a half-space, a sum over waves."""
     qx = 2 * np.pi * np.fft.fftfreq(nx, lx / nx)
     qy = 2 * np.pi * np.fft.fftfreq(ny, ly / ny)
     half = 0.5 * MODULUS * np.hypot(qy[:, None], qx[None, :])
@@ -25,7 +25,7 @@ def stiffness(nx, ny, lx, ly):
 
 
 def attraction(potential, energy, length, gap, cell):
-    """Slope and curvature of the potential, written down once more."""
+    """Return the slope and curvature of the potential, by formulas that are written here again."""
     x = gap / length
     if potential == "exponential":
         return energy / length * np.exp(-x), -energy / length**2 * np.exp(-x)
@@ -39,10 +39,10 @@ def attraction(potential, energy, length, gap, cell):
 
 
 def certified(matrix, height, start, pressure, potential, energy, length, cell):
-    """Is there an exact solution that touches just where ``start`` does? (None: undecided.)
+    """Return whether an exact solution touches exactly where ``start`` does (None: undecided).
 
-    Newton's method on the open cells alone, to round-off; then gaps must be positive in all of
-    them and the wall must press in all others.
+    Newton's method solves the open cells alone, to round-off. There is a solution if then all
+    their gaps are positive and the wall presses in all other cells.
     """
     height = height.ravel()
     gap = start.ravel().copy()
@@ -79,7 +79,7 @@ def problem(rng, rough):
                 2 * np.pi * (kx * x / nx + ky * y / ny) + rng.uniform(0, 7))
     potential = str(rng.choice(["maugis_dugdale", "maugis_dugdale", "exponential", "gauss"]))
     length = 0.01 * np.exp(rng.uniform(-2.5, 0.5))
-    # E* range^2/energy over the cell
+    # E* range^2/energy over the side of a cell
     energy = length**2 * nx / np.exp(rng.uniform(-0.5, 4))
     pressure = 0.03 * np.exp(rng.uniform(-2, 1))
     return height.reshape(ny, nx), potential, energy, length, pressure

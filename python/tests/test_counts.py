@@ -15,7 +15,7 @@ def test_the_table_has_all_cases():
 
 
 @pytest.mark.parametrize("case", counts.CASES)
-def test_no_case_takes_more_or_less_work(program, case):
+def test_each_case_takes_the_counts_of_the_table(program, case):
     found, expected = counts.count(counts.CASES[case], program), counts.stored()[case]
     changed = {key: (found[key], expected[key]) for key in found
                if not counts.agrees(found[key], expected[key])}

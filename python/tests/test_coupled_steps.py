@@ -1,4 +1,4 @@
-"""Steps and jumps with friction against solutions found without the program."""
+"""Steps and jumps with friction against solutions that do not use the program."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NX, NY, LENGTH = 9, 6, 1e-3
 
 
 def steep_map(seed: int, slope: float) -> np.ndarray:
-    """Return a map of three waves with an rms slope."""
+    """Return a map of three waves with the given rms slope."""
     rng = np.random.default_rng(seed)
     dx = LENGTH / NX
     x, y = np.meshgrid(np.arange(NX) * dx, np.arange(NY) * dx)
@@ -34,7 +34,7 @@ def steep_map(seed: int, slope: float) -> np.ndarray:
     (2, 0.5, 0.6, 0.05, []),
     (3, 0.3, 0.4, 3.0, [(4e6, 1e-3)])])
 def test_whole_step_against_dense_solution(tmp_path, seed, slope, mu, thickness, arms):
-    """Steep roads under thin and thick blocks, driven obliquely, then half the load at once."""
+    """Roads are driven obliquely under thin and thick blocks, then half the load is taken off."""
     height, dx = steep_map(seed, slope), LENGTH / NX
     with h5py.File(tmp_path / "road.h5", "w") as file:
         file["surface"] = height
@@ -68,7 +68,7 @@ def test_whole_step_against_dense_solution(tmp_path, seed, slope, mu, thickness,
 
 
 def held_sphere(tmp_path, factor: float) -> tuple[asperity.Run, float, float]:
-    """Shift a sphere in partial slip, change the load at once, move on; the load, the shift."""
+    """Shift a sphere into partial slip, change its load at once, move on; return load and shift."""
     radius, modulus, mu = 10e-3, 1e6, 0.01
     load = 8 * modulus * 1e-9 / (3 * radius)
     shift = 0.4 * mu * 1e-6 / radius
@@ -86,7 +86,7 @@ def held_sphere(tmp_path, factor: float) -> tuple[asperity.Run, float, float]:
 
 
 def test_load_drop_in_partial_slip(tmp_path):
-    """Points slip on as the load falls: Cattaneo and Mindlin under the new load (nu = 0)."""
+    """Points slip on while the load falls: Cattaneo and Mindlin for the new load (nu = 0)."""
     for factor in (0.5, 0.9):
         run, load, shift = held_sphere(tmp_path, factor)
         history, area = run.history, 2.7e-3**2
@@ -107,7 +107,7 @@ def test_load_drop_in_partial_slip(tmp_path):
 
 
 def test_load_rise_sticks(tmp_path):
-    """Under a load that rises, all sticks and the traction stays (nu = 0)."""
+    """Under a growing load all points stick and the traction does not change (nu = 0)."""
     run, _, _ = held_sphere(tmp_path, 1.5)
     history = run.history
     assert history["stick_area"][5] == history["contact_area"][5]
@@ -117,7 +117,7 @@ def test_load_rise_sticks(tmp_path):
 
 
 def test_mass_moves_on_through_a_jump(tmp_path):
-    """In no time a mass keeps its place and its speed, whatever the traction does."""
+    """A jump takes no time, so a mass keeps its place and speed whatever the traction does."""
     (tmp_path / "case.nml").write_text(
         "&grid nx = 24, ny = 16, lx = 1e-3, ly = 0.7e-3 /\n"
         "&surface shape = 'paraboloid', radius = 5e-3 /\n"
@@ -133,14 +133,14 @@ def test_mass_moves_on_through_a_jump(tmp_path):
     before, after = (run.snapshots[k].displacement_x.mean() for k in (10, 11))
     assert after == pytest.approx(before, rel=1e-9)
     assert history["energy_kinetic"][11] == history["energy_kinetic"][10] > 0
-    # The speed of a step is its mean, that of the jump is the block's own: m v^2/2 per area.
+    # A step's speed is its mean; the jump's is that of the block itself: m v^2/2 per area.
     speed = np.sqrt(2 * history["energy_kinetic"][11] / (0.5 * 1e4 * 1e-3 * 0.7e-6))
     assert history["sliding_speed"][11] == pytest.approx(speed, rel=1e-6)
     assert (np.diff(history["dissipated_friction"]) >= 0).all()
 
 
 def test_slow_sliding_under_a_pull(tmp_path):
-    """A wavy road on lossy rubber, pulled by its friction at a speed, slides at that speed."""
+    """A wavy road on lossy rubber, pulled by its friction at some speed, slides at that speed."""
     speed = 2e-3
     start = ("&grid nx = 32, ny = 1, lx = 1e-3 /\n"
              "&surface shape = 'sine', amplitude = 8e-6, wavelength = 1e-3 /\n"

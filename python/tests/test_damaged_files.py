@@ -1,4 +1,4 @@
-"""Files that are damaged, crafted or changed meanwhile: an error in words, never a crash."""
+"""Files that are damaged, forged or changed meanwhile cause an error message, never a crash."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ELASTIC = """
 
 @pytest.fixture
 def case(tmp_path: Path) -> Path:
-    """Return the input of a static contact with a map from a file, which is not there yet."""
+    """Return the input of a static contact whose map is in a file that does not exist yet."""
     path = tmp_path / "y.nml"
     path.write_text(ELASTIC)
     return path
@@ -37,7 +37,7 @@ def call(program: str, *words: str | Path) -> subprocess.CompletedProcess[str]:
 
 
 def test_declared_size_beyond_32_bits(program: str, case: Path, tmp_path: Path) -> None:
-    """A map whose declared size is that of the grid modulo 2^32 is not taken for one that fits."""
+    """A map is refused although its declared size modulo 2^32 is that of the grid."""
     for shape in ((16, 2**32 + 12), (2**32 + 16, 12), (2**32 + 16, 2**32 + 12)):
         with h5py.File(tmp_path / "map.h5", "w") as file:
             file.create_dataset("surface/height", shape, dtype="f8", chunks=(16, 12))
@@ -48,7 +48,7 @@ def test_declared_size_beyond_32_bits(program: str, case: Path, tmp_path: Path) 
 
 
 def test_virtual_map_without_its_source(program: str, case: Path, tmp_path: Path) -> None:
-    """A virtual dataset without its source reads as zeros, which must not pass for a flat road."""
+    """A virtual dataset without its source reads as zeros; it must not be taken for a flat road."""
     heights = np.random.default_rng(2).standard_normal((16, 12)) * 1e-4
     (tmp_path / "part").mkdir()
 
@@ -83,7 +83,7 @@ def test_virtual_map_without_its_source(program: str, case: Path, tmp_path: Path
 
 
 def test_dangling_links_are_named(program: str, case: Path, tmp_path: Path) -> None:
-    """The list of what a file holds has whole names where links lead nowhere."""
+    """The list of what a file contains has whole names, also where a link leads nowhere."""
     with h5py.File(tmp_path / "map.h5", "w") as file:
         file["group/gone"] = h5py.SoftLink("/nowhere")
         file["group/far"] = h5py.ExternalLink("missing.h5", "/x")
@@ -95,7 +95,7 @@ def test_dangling_links_are_named(program: str, case: Path, tmp_path: Path) -> N
 
 
 def test_too_many_rows(program: str, tmp_path: Path) -> None:
-    """Numbers of rows beyond 32 bits are an error, not negative."""
+    """Numbers of rows beyond 32 bits are an error and do not become negative."""
     case = tmp_path / "y.nml"
     phase = "&phase pressure = 1e3, duration = 1, steps = 900000000 /\n"
     case.write_text("&grid nx = 8, ny = 8, lx = 1 /\n&surface shape = 'flat' /\n"
@@ -119,7 +119,7 @@ def test_spectrum_of_a_tiny_map() -> None:
                                                           (1e150, 1e200, 1e200)])
 def test_overflow_is_status_4(program: str, tmp_path: Path, length: float, modulus: float,
                               pressure: float) -> None:
-    """Energies or fields that overflow end a run with status 4; the result says why."""
+    """Energies or fields that overflow end a run with status 4, and the result gives the reason."""
     case = tmp_path / "y.nml"
     case.write_text(
         f"&grid nx = 16, ny = 16, lx = {length} /\n"
@@ -136,7 +136,7 @@ def test_overflow_is_status_4(program: str, tmp_path: Path, length: float, modul
 
 
 def test_damaged_results(program: str, tmp_path: Path) -> None:
-    """Flipped bits and zeroed blocks in a result: `info` and a restart end with a status."""
+    """With flipped bits and zeroed blocks in a result, `info` and a restart end with a status."""
     case = tmp_path / "y.nml"
     case.write_text(vc.text(size=24, steps=4, output="checkpoint_every = 4, snapshot_every = 3"))
     done = subprocess.run([program, "run", case, "--quiet"], check=False, capture_output=True,
@@ -159,7 +159,7 @@ def test_damaged_results(program: str, tmp_path: Path) -> None:
 
 
 def test_sweep_sees_a_changed_map(tmp_path: Path) -> None:
-    """A result that was computed with another map of the same name is not taken again."""
+    """A sweep does not reuse a result that was computed with another map of the same name."""
     case = asperity.Case.read(ELASTIC)
     heights = np.random.default_rng(3).standard_normal((16, 12)) * 1e-4
 
@@ -223,7 +223,7 @@ def test_damaged_values_are_named(program: str, tmp_path: Path, compression: int
 
 
 def test_damaged_field_in_python(program: str, tmp_path: Path) -> None:
-    """A damaged field is an error where it is read, the others are not lost."""
+    """Reading a damaged field is an error; the other fields can still be read."""
     case = tmp_path / "y.nml"
     case.write_text(vc.text(size=24, steps=2))
     assert vc.run(program, case).returncode == 0
@@ -241,7 +241,7 @@ def test_damaged_field_in_python(program: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("compression", [0, 1, 9])
 def test_chunks_are_as_the_filters_of_the_file_say(program: str, tmp_path: Path, compression: int
                                                    ) -> None:
-    """Programs other than HDF5 undo the filters of a chunk; threads do not change a byte."""
+    """Programs without our filters can read a chunk, and its bytes do not depend on threads."""
     chunks = {}
     for threads in (1, 3):
         case = tmp_path / f"case{threads}.nml"
@@ -273,7 +273,7 @@ def test_chunks_are_as_the_filters_of_the_file_say(program: str, tmp_path: Path,
 
 
 def undone(stored: bytes, dtype: np.dtype, compression: int) -> np.ndarray:
-    """Return the values of a chunk from what is stored, without HDF5."""
+    """Return the values of a stored chunk, unpacked without HDF5."""
     body = stored[:-4]
     if not compression:
         return np.frombuffer(body, dtype)

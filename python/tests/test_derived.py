@@ -1,4 +1,4 @@
-"""Numbers that follow from results."""
+"""Quantities that are derived from results."""
 
 import h5py
 import numpy as np
@@ -20,7 +20,7 @@ from asperity.results.derived import (
 
 
 def with_text(path, name, text):
-    """Write an attribute of the file; return the run."""
+    """Write an attribute of the file and return the run."""
     with h5py.File(path, "a") as file:
         file.attrs[name] = text
     return asperity.open(path)
@@ -78,7 +78,7 @@ def test_direction_of_the_road(frictional):
 @pytest.mark.parametrize(("boundary", "interpolation"), [
     ("periodic", "cubic"), ("periodic", "linear"), ("free", "cubic"), ("free", "linear")])
 def test_friction_of_the_pressure_is_the_program_s(program, tmp_path, boundary, interpolation):
-    """Without friction the whole of it lies where the slopes of the moved road say, obliquely."""
+    """Without friction the pressure causes all of it, by the slopes of the road that has moved."""
     shape = "" if boundary == "periodic" else "&surface shape = 'sphere', radius = 4e-3 /"
     load = "pressure = 0.1e6" if boundary == "periodic" else "force = 0.02"
     (tmp_path / "case.nml").write_text(f"""
@@ -107,7 +107,7 @@ def test_friction_of_the_pressure_is_the_program_s(program, tmp_path, boundary, 
         force = pressure * (along[0] * slope_x + along[1] * slope_y)
         assert -force.mean() / pressure.mean() == pytest.approx(
             run.history["friction_viscous"][row], rel=1e-6)
-        # The parts in and outside the contact make the whole; neither is nothing.
+        # The parts inside and outside the contact add up to the whole, and neither vanishes.
         inside = -np.mean(force * (snapshot.contact > 0)) / pressure.mean()
         assert inside + part == pytest.approx(run.history["friction_viscous"][row], rel=1e-6)
         assert abs(part) > 1e-6

@@ -1,4 +1,4 @@
-"""DMA tables become materials: known series come back, units and mistakes are seen."""
+"""DMA tables become materials: known series are recovered, units and mistakes are recognised."""
 
 import re
 import subprocess
@@ -12,7 +12,7 @@ from asperity.__main__ import main
 from asperity.dma import DmaTable, fit_dma, read_dma
 from asperity.material import WLF, Prony
 
-# A model rubber with a broad spectrum: 0.6 MPa at rest, about 13.5 MPa at once.
+# A model rubber with a broad spectrum: 0.6 MPa in the long term, about 13.5 MPa in a jump.
 TAU = np.logspace(-7, 2, 37)
 RUBBER = Prony(6e5, 0.8e6 * np.exp(-(((np.log10(TAU) + 4) / 2.2) ** 2)) + 2e4, TAU)
 SHIFT = WLF(8.86, 101.6, 20.0)
@@ -45,8 +45,8 @@ def sweeps(temperatures, frequencies, amount=0.0):
 # ---- the fit -------------------------------------------------------------------------------
 
 
-# Arms at distances of h = ln(10)/arms cannot do better than a ripple of 2/cosh(pi^2/h) in the loss
-# of a flat spectrum: 5.5 %, 0.08 %, 1e-5; the ends of the range are up to twice as far off.
+# Arms at distances of h = ln(10)/arms leave a ripple of at least 2/cosh(pi^2/h) in the loss of a
+# flat spectrum: 5.5 %, 0.08 %, 1e-5. At the ends of the range the error is up to twice that.
 @pytest.mark.parametrize("arms, bound, loss_bound",
                          [(1.0, 0.04, 0.13), (2.0, 2e-3, 6e-3), (3.0, 1e-3, 3e-3)])
 def test_known_modulus_comes_back(arms, bound, loss_bound):
@@ -64,14 +64,14 @@ def test_known_modulus_comes_back(arms, bound, loss_bound):
     assert fit.valid_range == pytest.approx((0.1, 1e7))
     found = fit.material.complex_modulus(omega)
     errors = [np.log10(found.real / modulus.real), np.log10(found.imag / modulus.imag)]
-    for told, error in ((fit.error_storage, errors[0]), (fit.error_loss, errors[1]),
+    for stated, error in ((fit.error_storage, errors[0]), (fit.error_loss, errors[1]),
                         (fit.error_tan_delta, errors[1] - errors[0])):
-        assert told == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-9)
+        assert stated == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-9)
     assert fit.largest_error == pytest.approx(np.abs(errors).max())
 
 
 def test_noise_is_smoothed():
-    """5 % of scatter on each point: the fit is nearer to the truth than the data."""
+    """With 5 % of scatter in each point, the fit is nearer to the truth than the data are."""
     omega = np.logspace(-1, 7, 120)
     modulus = RUBBER.complex_modulus(omega)
     for seed in range(3):
@@ -97,7 +97,7 @@ def test_rows_in_any_order():
 
 
 def test_the_plateau_is_positive_where_the_data_do_not_reach_it():
-    """A Maxwell fluid within the range: the plateau is held above zero, and that is said."""
+    """For a Maxwell fluid the plateau is kept above zero, and a note says so."""
     fluid = Prony(0.0, [1e6, 1e6], [1e-2, 1.0])
     omega = np.logspace(-2, 3, 40)
     modulus = fluid.complex_modulus(omega)
@@ -251,7 +251,7 @@ def test_other_orders_separators_and_commas(tmp_path):
         np.testing.assert_allclose(table.loss, 1e6 * b, rtol=1e-12)
 
 
-def test_what_is_said_in_the_call_counts(tmp_path):
+def test_arguments_of_the_call_override_the_header(tmp_path):
     f, a, b = np.array(ROWS).T
     path = write(tmp_path / "dma.csv", "run,x (Hz),A,B,E' (MPa),E'' (MPa)",
                  [(9, *row, 7 * row[1], 7 * row[2]) for row in ROWS])
@@ -520,7 +520,7 @@ def test_one_unit_counts_for_both_moduli(tmp_path):
         np.testing.assert_allclose(table.loss, [5e5, 6e5, 8e5])
 
 
-def test_a_column_that_is_asked_for_is_taken(tmp_path):
+def test_a_column_named_in_the_call_is_used(tmp_path):
     path = write(tmp_path / "a.csv", "f (Hz),G' (Pa),G'' (Pa),x",
                  [(1, 2e6, 1.0, 0.3), (10, 3e6, 1.0, 0.2), (100, 4e6, 1.0, 0.1)])
     np.testing.assert_allclose(read_dma(path, columns={"tan_delta": "x"}).loss, [6e5, 6e5, 4e5])
@@ -583,7 +583,7 @@ def test_a_fit_that_fails_is_status_4(tmp_path, monkeypatch, capsys):
 
     monkeypatch.setattr("asperity.rubber.prony_fit.nnls", fail)
     assert main(["fit", str(path), "-o", str(tmp_path / "x.nml")]) == 4
-    assert "the fit of" in (told := capsys.readouterr().err) and "found no solution" in told
+    assert "the fit of" in (message := capsys.readouterr().err) and "found no solution" in message
     assert not (tmp_path / "x.nml").exists()
     with pytest.raises(NotConverged, match="Maximum number of iterations"):
         fit_dma(read_dma(path))

@@ -1,8 +1,8 @@
-"""Every block of README.md and docs runs: commands, Python, inputs, Fortran programs.
+"""Every block of README.md and docs is run: commands, Python, inputs, Fortran programs.
 
-The blocks of a page run in its order, in an empty folder; comments before a block say where it is
-written to, where else its commands are run, or that it is what the block before it prints
-(docs/developer.md lists them).
+The blocks of a page are run in their order, in an empty folder. A comment before a block says to
+which file it is written, which file repeats its commands, or that it is the output of the block
+before it (docs/developer.md lists these comments).
 """
 
 import os
@@ -18,7 +18,7 @@ from conftest import ROOT
 
 import asperity
 
-# Pages whose blocks have tests of their own, with their outcome.
+# Pages whose blocks have tests of their own, which also check the outcome.
 ELSEWHERE = {"docs/long_runs.md": "test_long_runs_page.py",
              "docs/measured_data.md": "test_measured_page.py",
              "docs/results.md": "test_results_page.py",
@@ -107,7 +107,7 @@ def test_blocks_run(page, program, tmp_path, monkeypatch, capsys):
 
 
 def run_fortran(path, build):
-    """Compile a program with the library as the build left it, and run it."""
+    """Compile a program with the library in the build folder, and run it."""
     modules, library = build / "libasperity.a.p", build / "libasperity.a"
     compiler = os.environ.get("FC") or shutil.which("gfortran")
     if not library.is_file() or compiler is None:
@@ -139,7 +139,7 @@ def check_first_run(folder, out):
 
 
 def check_coming_from(folder, out):
-    # The numbers that the page prints, and says others print, too.
+    # The numbers that the page prints, including those that it quotes from other programs.
     page = (ROOT / "docs" / "coming_from.md").read_text()
     for number in out.split():
         assert f"{float(number):.6f}" in page
@@ -155,7 +155,7 @@ def check_driving(folder, out):
     areas = re.findall(r"row +(\d+): contact area (\S+),", out)
     assert float(areas[-1][1]) == pytest.approx(0.25, abs=0.003)
     assert (folder / "constant_area.png").stat().st_size > 5000
-    # What is printed is what the page shows, and the page shows all that is printed.
+    # The page must show all that is printed, and nothing else.
     outputs = [block.text for block in blocks("docs/driving.md") if block.mark == "output"]
     assert len(outputs) == 7 and "".join(outputs) == out
 
@@ -173,19 +173,20 @@ def test_no_page_is_left_out():
 
 @pytest.mark.parametrize("page", [page for page in pages() if page not in ELSEWHERE])
 def test_commands_stand_in_blocks(page):
-    """A command in an indented block would run nowhere."""
+    """A command in an indented block would not be run by any test."""
     text = re.sub(r"(?s)^```.*?^```", "", (ROOT / page).read_text(), flags=re.MULTILINE)
     assert not re.search(r"^(<{7}|>{7}) ", text, flags=re.MULTILINE), "a merge was left half done"
     for line in text.splitlines():
         assert not re.match(r"    " + COMMAND.pattern, line), line
 
 
-def test_nobody_is_told_to_install_a_package_that_is_not_ours():
-    """On PyPI the name asperity belongs to nobody here: whoever installs it gets a stranger's."""
-    told = re.compile(r"pip install (?:-\S+ )*[\"']?asperity\b")
+def test_no_page_recommends_the_package_on_pypi():
+    """The name asperity on PyPI is not ours: whoever installs it gets somebody else's package."""
+    pattern = re.compile(r"pip install (?:-\S+ )*[\"']?asperity\b")
     files = [ROOT / page for page in PAGES] + list((ROOT / "python" / "asperity").rglob("*.py")) + \
         list((ROOT / "app").glob("*.f90")) + list((ROOT / "tools").glob("*"))
-    assert [str(file) for file in files if file.is_file() and told.search(file.read_text())] == []
+    found = [str(file) for file in files if file.is_file() and pattern.search(file.read_text())]
+    assert found == []
 
 
 def test_namelist_of_the_readme_is_ten_lines():
@@ -209,7 +210,7 @@ def test_messages_of_the_troubleshooting_page_exist():
 
 
 def test_python_interface_is_documented_whole():
-    """The public names, each under its task; docs/conf.py appends modules that are new."""
+    """Each public name is listed under its task; docs/conf.py appends modules that are new."""
     folder = ROOT / "docs" / "api"
     pages = {path.stem: path.read_text() for path in folder.glob("python_*.rst")}
     text = "".join(pages.values())

@@ -1,4 +1,4 @@
-"""The inputs of the examples hold the model compounds."""
+"""The inputs of the examples contain the model compounds."""
 
 import re
 import runpy
@@ -41,8 +41,8 @@ def test_the_two_scale_road_holds_the_tread(compound):
     assert material.shear_modulus == pytest.approx(rubber.g_inf + rubber.g[slow].sum(), rel=1e-12)
     assert np.array_equal(material.prony_g, rubber.g[kept])
     assert np.array_equal(material.prony_tau, rubber.tau[kept])
-    # What the ten arms leave out does not count at what the case excites: its length, and the
-    # frequency at which the drive crosses a cell.
+    # The relaxation times that the ten arms leave out do not matter at the frequencies of the case,
+    # which lie between that of its length and that at which the drive crosses a cell.
     ten = asperity.material.Prony(material.shear_modulus, material.prony_g, material.prony_tau)
     omega = 2 * np.pi * np.geomspace(1 / 2e-3, 1e6, 31)
     np.testing.assert_allclose(ten.complex_modulus(omega), rubber.complex_modulus(omega), rtol=2e-3)

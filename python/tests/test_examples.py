@@ -1,4 +1,4 @@
-"""Each study holds in its quick form, is explained, and stands in the gallery."""
+"""Each study passes its checks in its quick form, has an explanation and is in the gallery."""
 
 import json
 import re
@@ -62,13 +62,13 @@ def test_the_gallery_is_that_of_the_studies():
 
 def test_make_lists_and_refuses(capsys):
     assert gallery.main(["--list"]) == 0
-    told = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in told] == [study.name for study in STUDIES]
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == [study.name for study in STUDIES]
     with pytest.raises(SystemExit, match="there is no study tabr"):
         gallery.main(["tabr"])
 
 
-def test_a_study_that_does_not_hold_fails(tmp_path, monkeypatch, capsys):
+def test_a_study_whose_check_fails_is_reported(tmp_path, monkeypatch, capsys):
     folder = tmp_path / "wrong"
     folder.mkdir()
     (folder / "README.md").write_text("# Wrong\n\nNothing.\n")
@@ -109,15 +109,15 @@ def test_numbers_that_are_kept():
 
 
 def values(kept):
-    """Return all numbers of a numbers.json."""
+    """Return all numbers of a file numbers.json."""
     if isinstance(kept, dict | list):
         inner = kept.values() if isinstance(kept, dict) else kept
         return [number for one in inner for number in values(one)]
     return [] if isinstance(kept, bool | str | None) else [abs(float(kept))]
 
 
-def told(text, known):
-    """Return whether a number as it is printed is one that is known, but for a power of ten."""
+def is_known(text, known):
+    """Return whether a printed number is a known one, apart from a power of ten."""
     half = 0.5001 * 10.0 ** -len(text.partition(".")[2])
     return any(abs(value * 10.0**power - float(text)) <= half
                for value in known for power in range(-12, 13))
@@ -126,7 +126,7 @@ def told(text, known):
 @pytest.mark.parametrize("study", [one for one in STUDIES if one.module is not None],
                          ids=named)
 def test_numbers_of_the_text_are_kept(study):
-    """Numbers of the tables, and those of three digits in what is seen, are those of the run."""
+    """The numbers in the tables, and those of three digits in the text, come from the run."""
     known = values(json.loads((study.folder / "numbers.json").read_text()))
     seen = gallery.part(study.readme, "What is seen")
     rows = [line.strip().strip("|").split("|") for line in seen.splitlines()
@@ -136,8 +136,8 @@ def test_numbers_of_the_text_are_kept(study):
             continue
         for cell in row:
             number = re.fullmatch(r"[-−]?(\d+(?:\.\d+)?)(?: %)?", cell.strip())
-            assert number is None or told(number[1], known), f"{cell} is not in numbers.json"
-    # Inputs, too, may be named: what the study's sources and its first paragraph hold.
+            assert number is None or is_known(number[1], known), f"{cell} is not in numbers.json"
+    # A text may also quote inputs: numbers in the study's sources or in its first paragraph.
     sources = [*study.folder.glob("*.py"), *study.folder.glob("*.nml"),
                *(ROOT / "examples").glob("*.py")]
     inputs = " ".join([study.readme.partition("\n## ")[0], *(path.read_text() for path in sources)])
@@ -146,11 +146,11 @@ def test_numbers_of_the_text_are_kept(study):
                   r"|^    .*$", "", seen, flags=re.MULTILINE)
     for number in re.findall(r"(?<![\w.,^])\d+(?:\.\d+)?(?![\w]|\.\d)", text):
         if len(number.replace(".", "").lstrip("0")) >= 3:
-            assert told(number, known), f"{number} is not in numbers.json"
+            assert is_known(number, known), f"{number} is not in numbers.json"
 
 
 def table_of(name):
-    """Return the rows of the first table of a README, and the kept numbers of the study."""
+    """Return the rows of the first table of a README, and the numbers that the study has kept."""
     folder = ROOT / "examples" / name
     rows = [[cell.strip() for cell in line.strip("|").split("|")]
             for line in (folder / "README.md").read_text().splitlines()

@@ -1,4 +1,4 @@
-"""Snapshots for other programs, and how results show themselves."""
+"""Snapshots are exported to other programs, and results have readable representations."""
 
 import sys
 from html.parser import HTMLParser
@@ -27,7 +27,7 @@ def test_to_xarray(frictional):
     assert data.x.attrs["units"] == data.y.attrs["units"] == "m"
     assert (float(data.time), int(data.step)) == (snapshot.time, 5)
     assert (data.attrs["title"], data.attrs["lx"]) == ("Sample", 2.4e-3)
-    # What it is for: look up by place, join in time.
+    # Typical uses must work: selecting by place, and joining in time.
     assert float(data.pressure.sel(x=2.31e-3, y=0.0, method="nearest")) == snapshot.pressure[0, 23]
     import xarray
     joined = xarray.concat([each.to_xarray() for each in run.snapshots], dim="time",
@@ -97,7 +97,7 @@ def test_to_vtk_errors(result, tmp_path):
 
 
 class Cells(HTMLParser):
-    """Gathers the cells of a table and checks that elements are closed in order."""
+    """Collects the cells of a table and checks that elements are closed in order."""
 
     def __init__(self, text):
         super().__init__()
@@ -152,7 +152,7 @@ def test_notebooks_show_tables(frictional):
     assert "step 5, t = 5 ms" in run.snapshots[-1]._repr_html_()
 
 
-def test_shows_of_an_empty_history(tmp_path):
+def test_an_empty_history_can_be_shown(tmp_path):
     path = write_result(tmp_path / "early.h5", finished=0)
     with h5py.File(path, "a") as file:
         file.attrs["expected_rows"] = np.int32(9)

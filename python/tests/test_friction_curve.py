@@ -1,4 +1,4 @@
-"""Friction curves: points equal single runs, intervals cover, nothing depends on how it was run."""
+"""Friction curves: points equal single runs, intervals cover the mean, ways of running agree."""
 
 import csv
 import json
@@ -37,7 +37,7 @@ NAMELIST = """&material shear_modulus = 1e6, prony_g = 3e6, 5e6, 8e6, prony_tau 
 
 
 def small_plan(cells=32, **options):
-    """Return a plan of few points."""
+    """Return a plan with few points."""
     given = dict(speeds=[1e-3, 1e-2, 1e-1], pressures=[2e5], patches=2) | options
     return plan_curve(road_of([ROAD], cells=cells), COMPOUND, **given)
 
@@ -53,7 +53,7 @@ def curve_of(plan, folder, jobs=1, **options):
 @pytest.mark.parametrize("law", [{}, dict(coefficient=0.5),
                                  dict(coefficient=0.5, slope_effect=True)])
 def test_the_plan_knows_the_number_of_transforms(ratio, law, tmp_path):
-    """Within a factor of 2.5, for a rubber and a road that its figures were not measured on."""
+    """The prediction is within a factor of 2.5 for a rubber and a road that it was not made for."""
     arms = 5
     series = Prony(1e6, [1e6 * (ratio - 1.0) / arms] * arms, np.geomspace(1e-6, 1e-2, arms))
     road = "self_affine:hurst=0.7,wavelength_long=5e-4,wavelength_short=1.2e-4,rms_slope=0.2"
@@ -68,7 +68,7 @@ def test_the_plan_knows_the_number_of_transforms(ratio, law, tmp_path):
 
 
 def test_the_interval_covers_the_mean():
-    """In 95 % of repeated draws, of patches whose friction is normal, and nearly of skewed ones."""
+    """95 % of the intervals of repeated draws do if the friction is normal; nearly so if skewed."""
     random = np.random.default_rng(1)
     for count in (3, 8):
         draws = random.normal(0.3, 0.04, size=(20000, count))
@@ -88,11 +88,11 @@ def test_intervals_leave_out_what_did_not_converge():
 
 
 def test_the_interval_covers_the_mean_of_64_patches(tmp_path):
-    """Of real ones: 64 patches stand for the road, draws of 8 of them for what a user runs."""
+    """64 patches represent the road, and draws of 8 of them what a user would compute."""
     plan = small_plan(cells=24, speeds=[1e-2], pressures=[1e4, 2e5], patches=64)
     curve = curve_of(plan, tmp_path, jobs=2)
     area = curve.values["contact_area"].mean(axis=-1).ravel()
-    assert area[0] < 0.03 and area[1] > 0.1  # few cells touch: values are skewed
+    assert area[0] < 0.03 and area[1] > 0.1  # few cells touch, so the values are skewed
     random = np.random.default_rng(2)
     for friction in curve.values["friction"][:, 0, 0]:
         assert np.isfinite(friction).all() and np.std(friction) > 0.01 * friction.mean()
@@ -106,7 +106,7 @@ def test_the_interval_covers_the_mean_of_64_patches(tmp_path):
 
 
 def test_points_are_single_runs(tmp_path):
-    """With friction in the interface, obliquely, at another temperature."""
+    """Compared with friction in the interface, an oblique velocity and another temperature."""
     plan = small_plan(temperatures=[20.0, 40.0], coefficient=0.3, tolerance=1e-8)
     curve = curve_of(plan, tmp_path / "curve")
     assert curve.values["friction"].shape == (1, 2, 3, 2)
@@ -139,7 +139,7 @@ def test_a_shift_of_temperature_is_one_of_speed(tmp_path):
 
 
 def test_a_vertical_shift_is_one_of_pressure(tmp_path):
-    """With all moduli doubled, twice the pressure makes the same contact."""
+    """If all moduli double, twice the pressure makes the same contact."""
     stiff = Compound(RUBBER, 20.0, LAW, vertical_shifts={20.0: 0.0, 40.0: np.log10(2.0)})
     road = road_of([ROAD], cells=32)
     factor = float(LAW.shift_factor(40.0))
@@ -153,7 +153,7 @@ def test_a_vertical_shift_is_one_of_pressure(tmp_path):
 
 @dataclass(frozen=True)
 class HardPlan(CurvePlan):
-    """A plan whose solver may not iterate enough at one speed."""
+    """A plan whose solver has too few iterations at one speed."""
 
     def case(self, patch, file, i, j, first=0):
         case = super().case(patch, file, i, j, first)
@@ -162,8 +162,8 @@ class HardPlan(CurvePlan):
         return case
 
 
-def test_points_without_an_interval_ask_for_no_patches(curve):
-    """A speed at which no patch converges must not lead to ever more patches."""
+def test_points_without_an_interval_add_no_patches(curve):
+    """A speed at which no patch converges must not make the curve compute ever more patches."""
     values = {name: array.copy() for name, array in curve.values.items()}
     values["friction"][:, :, 1] = np.nan
     assert 0.0 < replace(curve, values=values).largest_error <= curve.largest_error
@@ -178,16 +178,16 @@ def test_points_that_do_not_converge_are_left_out(tmp_path):
     assert np.isnan(curve.values["friction"]).all()
     assert any("3 points did not converge and are left out" in note for note in curve.notes)
     before = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5")}
-    assert len(before) == 4  # a map, and a run for each speed
+    assert len(before) == 4  # one for a map, and a run for each speed
     curve_of(hard, tmp_path)
     assert before == {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5")}
 
 
-# ---- however it is run -----------------------------------------------------------------------
+# ---- ways of running -------------------------------------------------------------------------
 
 
 def same(one, other):
-    """Whether two curves agree to the last bit."""
+    """Return whether two curves agree in every bit."""
     for name in one.values:
         np.testing.assert_array_equal(one.values[name], other.values[name], err_msg=name)
     assert one.rows() == other.rows()
@@ -202,13 +202,13 @@ def test_the_same_however_it_is_run(tmp_path):
     with ProcessPoolExecutor(2) as executor:
         same(alone, run_curve(plan, tmp_path / "processes", Means(1, executor=executor),
                               quiet=True))
-    # more patches later keep those that are there
+    # patches that are added later leave the others as they are
     more = curve_of(replace(plan, patches=3), tmp_path / "alone")
     np.testing.assert_array_equal(more.values["friction"][..., :2], alone.values["friction"])
 
 
 def test_no_patch_of_one_seed_is_one_of_another():
-    """Not even of the next seed: repeated draws must be independent."""
+    """The patches of one seed and of the next differ, so that repeated draws are independent."""
     codes = [road_of([ROAD], cells=32, seed=seed).patch(number).code
              for seed in (1, 2, 3) for number in range(8)]
     assert len(set(codes)) == len(codes)
@@ -226,7 +226,7 @@ def test_the_same_through_dask(tmp_path):
     same(found, curve_of(plan, tmp_path / "alone"))
 
 
-def test_the_same_after_a_loss(tmp_path):
+def test_the_same_after_results_are_lost(tmp_path):
     plan = small_plan()
     whole = curve_of(plan, tmp_path)
     results = sorted(path for path in tmp_path.glob("*.h5") if "-p" in path.name)
@@ -250,7 +250,7 @@ def test_the_same_after_a_stop(tmp_path, number):
     process.stderr.close()
     assert process.wait(PATIENCE) in (143, -number)
     assert not (tmp_path / "curve.csv").exists()
-    time.sleep(1.0)  # a killed command leaves the run in hand to itself
+    time.sleep(1.0)  # a killed command does not end the run that it started
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)
     assert "results are there already" in done.stderr
     stopped = (tmp_path / "curve.csv").read_text()
@@ -289,14 +289,14 @@ def test_a_job_array_fills_the_folder(tmp_path, monkeypatch):
     assert "--array=0-1" in call and "--time=1:00:00" in call and "--partition=short jobs" in call
     assert json.loads((tmp_path / "runs" / "slurm.json").read_text())["job"] == "4711"
     gathered = run_curve(plan, tmp_path / "runs", slurm, quiet=True)
-    assert (tmp_path / "calls").read_text() == call  # nothing was submitted again
+    assert (tmp_path / "calls").read_text() == call  # nothing was submitted a second time
     same(gathered, curve_of(plan, tmp_path / "here"))
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not HAS_SLURM, reason="no Slurm that this user may start")
 def test_the_same_through_slurm(tmp_path):
-    """A real one, of this machine: submitted, waited for, gathered."""
+    """The Slurm of this machine takes the job; the command waits for it and gathers the results."""
     plan = small_plan()
     with Slurm() as slurm:
         means = Means(1, slurm="--time=10 --partition=short")
@@ -372,10 +372,10 @@ def test_data_set_and_netcdf(curve, tmp_path):
 
 
 def test_losses_are_the_power(curve, tmp_path):
-    """By octaves and by arms the same; without friction that is the whole loss."""
+    """By octaves and by arms the sum is the same; without friction it is the whole loss."""
     octave = curve.losses["loss_octave"].sum(axis=-1)
     np.testing.assert_allclose(octave, curve.losses["loss_arm"].sum(axis=-1), rtol=1e-9)
-    # With friction the tangential waves lose energy, too, which no friction_viscous counts.
+    # With friction, tangential waves lose energy, too, which friction_viscous does not contain.
     curve = curve_of(small_plan(coefficient=0.0), tmp_path)
     octave = curve.losses["loss_octave"].sum(axis=-1)
     power = (curve.values["friction_viscous"].mean(axis=3) * curve.pressure[:, None, None]
@@ -383,8 +383,8 @@ def test_losses_are_the_power(curve, tmp_path):
     np.testing.assert_allclose(octave, power, rtol=1e-9)
 
 
-def test_what_left_out_waves_add(curve):
-    """The spectrum, thought to go on to shorter waves, adds friction; Persson's area is less."""
+def test_contribution_of_waves_that_are_left_out(curve):
+    """With the spectrum continued to shorter waves friction grows and Persson's area decreases."""
     assert (curve.theory["friction_left_out"] > 0.0).all()
     assert curve.settings["extended_to"] == 5e-5
     ratio = curve.values["contact_area"].mean(axis=3) / curve.theory["area_persson"]
@@ -396,7 +396,7 @@ def test_picture(curve, tmp_path):
     labels = [panel.get_ylabel() for panel in figure.axes]
     assert labels == ["friction coefficient", "viscous friction coefficient",
                       "contact area fraction"]
-    # The legend stands beside the panels, where it hides nothing.
+    # The legend must be beside the panels, where it hides no curve.
     assert not any(panel.get_legend() for panel in figure.axes)
     figure.savefig(tmp_path / "curve.png")
     legend = figure.legends[0].get_window_extent()
@@ -445,7 +445,7 @@ def test_page_in_a_browser(curve, tmp_path):
             browser.window(*size, touch=size[0] < 500)
             wide = browser.run("return document.documentElement.scrollWidth")
             assert wide <= size[0] + 1
-            # A number is on one line: a narrow table is moved sideways, not broken within words.
+            # A number stays on one line: a narrow table scrolls sideways and breaks no words.
             lines = browser.run("return [...document.querySelectorAll('table.points tr')].map((row)"
                                 " => row.getBoundingClientRect().height)")
             assert len(lines) == 13 and max(lines) < 40
@@ -463,7 +463,7 @@ def test_from_an_instrument_and_a_messy_table_to_numbers(tmp_path, monkeypatch, 
     monkeypatch.chdir(tmp_path)
     road = asperity.surface.self_affine(
         128, lx=4e-3, wavelength_long=1e-3, wavelength_short=2.5e-4, rms_slope=0.15, seed=3)
-    height = road + 1e-5 * np.linspace(0, 1, 128)        # the instrument stood askew
+    height = road + 1e-5 * np.linspace(0, 1, 128)  # the instrument was tilted
     height[40, 50] += 1e-3                               # a speck of dust
     text = "\n".join(";".join(f"{value * 1e6:.4f}".replace(".", ",") for value in row)
                      for row in height)
@@ -484,19 +484,19 @@ def test_from_an_instrument_and_a_messy_table_to_numbers(tmp_path, monkeypatch, 
              "--temperatures", "20,30", "--cells", "48", "--patches", "9", "--quiet", "-o",
              "curve.csv", "-o", "curve.html"]
     assert main([*words, "--plan"]) == 0
-    told = capsys.readouterr().out
-    assert "solves     16 steady states in 8 runs" in told
-    assert "the maps have room for 4 patches that do not overlap, not for 9" in told
-    assert "1 of 16384 cells lie far off their neighbours" in told
-    assert "1 of 39 points have no value" in told
+    printed = capsys.readouterr().out
+    assert "solves     16 steady states in 8 runs" in printed
+    assert "the maps have room for 4 patches that do not overlap, not for 9" in printed
+    assert "1 of 16384 cells lie far off their neighbours" in printed
+    assert "1 of 39 points have no value" in printed
     assert not (tmp_path / "curve_runs").exists()
     assert main(words) == 0
-    told = capsys.readouterr().out
-    assert "of the load lies at the join" in told
+    printed = capsys.readouterr().out
+    assert "of the load lies at the join" in printed
     with (tmp_path / "curve.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 4 and {row["patches"] for row in rows} == {"4"}
-    # the same road and the very rubber that the files hold
+    # the files contain the same road and the same rubber
     exact = asperity.theory.persson(
         *asperity.theory.surface_psd(road, 4e-3), RUBBER.shifted(30.0, LAW), 2e5, 1e-2,
         gamma=0.45)
@@ -558,7 +558,7 @@ def test_wrong_arguments(tmp_path, monkeypatch, capsys, words, message):
     (np.random.default_rng(1).normal(0.0, 1e-6, (12, 14)), "cells = 16: the maps have 12 cells"),
     (np.random.default_rng(1).normal(0.0, 1e-6, (20, 20)), "road.h5: is too small for a spectrum"),
 ])
-def test_roads_that_are_none(tmp_path, monkeypatch, capsys, height, message):
+def test_roads_that_are_refused(tmp_path, monkeypatch, capsys, height, message):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "r.nml").write_text(NAMELIST)
     asperity.surface.save("road.h5", height, 1e-3, 1e-3)
@@ -567,7 +567,7 @@ def test_roads_that_are_none(tmp_path, monkeypatch, capsys, height, message):
 
 
 def test_missing_points_are_noted(tmp_path):
-    """They are filled when a map is read; the plan says so."""
+    """They are filled when a map is read, and the plan reports how many."""
     height = asperity.surface.self_affine(64, lx=1e-3, wavelength_long=5e-4, wavelength_short=1e-4,
                                           rms_slope=0.1, seed=3)
     np.savetxt(tmp_path / "road.txt", np.where(np.arange(64) == 9, np.nan, height))
@@ -579,7 +579,7 @@ def test_missing_points_are_noted(tmp_path):
     ("&material prony_g = 1e6, prony_tau = 1 /", [], "shear_modulus = 0"),
     ("&material shear_modulus = 1e6 /", ["--temperatures", "20,60"], "r.nml gives no a_T"),
 ])
-def test_rubbers_that_cannot_slide_so(tmp_path, monkeypatch, capsys, material, words, message):
+def test_rubbers_that_are_refused(tmp_path, monkeypatch, capsys, material, words, message):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "r.nml").write_text(material)
     assert main(["friction", ROAD, "--material", "r.nml", "--cells", "32", *words]) == 2

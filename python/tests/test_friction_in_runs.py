@@ -1,9 +1,9 @@
-"""The bound and the law of slip, recomputed from the fields that a run has written.
+"""The friction law of a run, recomputed from the fields that the run has written.
 
-Nothing of the program is used: the slope of the road under each point is read from the map by the
-rule of the manual (cubic spline, or bilinear between central differences), and the bound follows
-from the law in three dimensions: |F_t| <= mu (F_n + p_a N_z) with F the force of the road on an
-area of its own.
+The tests use nothing of the program. They read the slope of the road under each point from the map
+by the rule of the manual (a cubic spline, or bilinear between central differences). The bound
+follows from the law in three dimensions, |F_t| <= mu (F_n + p_a N_z), where F is the force of the
+road per area of the road.
 """
 
 from __future__ import annotations
@@ -46,10 +46,10 @@ def read_map(field: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 def read_spline(field: np.ndarray, x: np.ndarray, y: np.ndarray, nu: tuple[int, int] = (0, 0),
                 ) -> np.ndarray:
-    """Read the cubic spline through a periodic map, or a derivative of it, at places in cells.
+    """Return the cubic spline through a periodic map, or a derivative of it, at places in cells.
 
-    The map is repeated over 30 cells around it, where what the ends of FITPACK's spline do has
-    died out: 0.27 to the 30th power.
+    The map is repeated over 30 cells on each side, so that the influence of the ends of FITPACK's
+    spline has decayed to 0.27 to the 30th power.
     """
     ny, nx = field.shape
     spline = RectBivariateSpline(np.arange(-30, ny + 30), np.arange(-30, nx + 30),
@@ -58,7 +58,7 @@ def read_spline(field: np.ndarray, x: np.ndarray, y: np.ndarray, nu: tuple[int, 
 
 
 def slopes_under(run: asperity.Run, snapshot, interpolation: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return both slopes of the road where each point of the rubber is."""
+    """Return both slopes of the road under each point of the rubber."""
     height = run.height
     ny, nx = height.shape
     dx, dy = 1.0e-3 / nx, 0.7e-3 / ny
@@ -81,8 +81,8 @@ def slopes_under(run: asperity.Run, snapshot, interpolation: str) -> tuple[np.nd
 def test_law_in_three_dimensions(tmp_path, law, slope, slip_law, seed, interpolation):
     """The force of the road lies in the cone of its normal, and slip is along its tangential part.
 
-    There are enough passes that slopes, pressure and traction belong together. Constant shear is
-    tested without the slope; tools/constant_shear.py and its tests compare it on slopes.
+    There are enough passes for slopes, pressure and traction to agree with each other. Constant
+    shear is tested without the slope; tools/constant_shear.py and its tests compare it on slopes.
     """
     case = tmp_path / "case.nml"
     mu = MU if law != "constant_shear" else 0.0
@@ -91,7 +91,7 @@ def test_law_in_three_dimensions(tmp_path, law, slope, slip_law, seed, interpola
                         slip_law=slip_law, seed=seed, interpolation=interpolation,
                         file=tmp_path / "case.h5")
     if law == "constant_shear":
-        # The gaps of partly sheared cells are as small as the mismatch of the passes.
+        # The gaps of partly sheared cells are as small as the mismatch that the passes leave.
         text = text.replace("coefficient = 0.0, ", "").replace("tolerance = 1e-8, passes = 30",
                                                                "tolerance = 1e-10")
     if law == "coulomb":
@@ -103,8 +103,8 @@ def test_law_in_three_dimensions(tmp_path, law, slope, slip_law, seed, interpola
     for snapshot in run.snapshots[1:]:
         state = np.asarray(snapshot.contact)
         assert (state[snapshot.pressure > 0] > 0).all() or law == "constant_shear"
-        # With constant shear a cell that touches without pressure carries a part of the strength.
-        # Its pressure is zero to the tolerance.
+        # With constant shear, a cell that touches without pressure carries a part of the strength.
+        # Its pressure is zero only to within the tolerance.
         little = 1e-8 * snapshot.pressure.max() if law == "constant_shear" else 0.0
         touching = snapshot.pressure > little
         assert (state[touching] > 0).all()
@@ -117,7 +117,7 @@ def test_law_in_three_dimensions(tmp_path, law, slope, slip_law, seed, interpola
             hx, hy = slopes_under(run, snapshot, interpolation)
         nz = 1 / np.sqrt(1 + hx**2 + hy**2)
         normal = np.stack([-hx, -hy, np.ones_like(hx)]) * nz
-        # The force on the rubber an area of the grid.
+        # The force on the rubber per area of the grid.
         force = np.stack([snapshot.traction_x, snapshot.traction_y, snapshot.pressure])
         push = (force * normal).sum(0)
         tangential = force - push * normal
@@ -135,13 +135,13 @@ def test_law_in_three_dimensions(tmp_path, law, slope, slip_law, seed, interpola
         stick, slips = state == 1, (state == 2) & touching
         slip = np.stack([snapshot.slip_x, snapshot.slip_y])
         far = np.hypot(*slip).max()
-        # The tolerance, 1e-8, is one of displacements.
+        # The tolerance, 1e-8, refers to displacements.
         reach = np.hypot(snapshot.displacement_x, snapshot.displacement_y).max()
         assert np.hypot(*slip)[stick].max(initial=0) < 2e-8 * reach, "a sticking point slips"
         if not slips.any():
             continue
         assert np.abs(size - limit)[slips].max() < 1e-5 * top, "slip inside the bound"
-        # The slip in space: along the road, so its height is slope times its plane components.
+        # The slip in space is along the road: its vertical part is its plane part times the slope.
         space = np.stack([slip[0], slip[1], hx * slip[0] + hy * slip[1]])
         if slip_law == "thesis":
             space[2] = 0
@@ -172,7 +172,7 @@ ELASTIC = """&grid nx = 36, ny = 25, lx = 1.0e-3, ly = 0.7e-3 /
 
 
 def cyclic_run(tmp_path, *, mu: float, slope: str, time: float, cycles: int) -> asperity.Run:
-    """Run a rough elastic contact to and fro."""
+    """Run a rough elastic contact that moves forwards and backwards."""
     case = tmp_path / "cycle.nml"
     case.write_text(ELASTIC.format(mu=mu, slope=slope, cycles=CYCLE.format(time=time) * cycles,
                                    file=tmp_path / "cycle.h5"))
@@ -180,8 +180,8 @@ def cyclic_run(tmp_path, *, mu: float, slope: str, time: float, cycles: int) -> 
 
 
 @pytest.mark.filterwarnings("ignore:&surface")
-def test_stick_returns_to_nothing(tmp_path):
-    """An elastic contact that sticks is as it was when the road is back where it began."""
+def test_stick_leaves_no_trace_after_a_return(tmp_path):
+    """An elastic contact that sticks is as before when the road is back at its start."""
     run = cyclic_run(tmp_path, mu=30.0, slope=".false.", time=1e-3, cycles=1)
     out, back = run.snapshots[1].pressure, run.snapshots[-1]
     history = run.history
@@ -191,14 +191,14 @@ def test_stick_returns_to_nothing(tmp_path):
     assert abs(history["traction_x"][-1]) < 1e-5 * top
     assert history["dissipated_friction"][-1] < 1e-5 * history["work_tangential"].max()
     assert np.abs(back.pressure - run.snapshots[0].pressure).max() < 1e-5 * out.max()
-    # and halfway back it passes where it was
+    # halfway back the road passes the place of the first half
     np.testing.assert_allclose(history["traction_x"][1:9][::-1][1:], history["traction_x"][9:16],
                                atol=1e-4 * top)
 
 
 @pytest.mark.filterwarnings("ignore:&surface")
 def test_cycles_repeat(tmp_path):
-    """A rough elastic contact driven to and fro with slip goes through the same loop each time."""
+    """A rough elastic contact that slips forwards and backwards repeats the same loop."""
     run = cyclic_run(tmp_path, mu=0.3, slope=".true.", time=8e-3, cycles=3)
     history = run.history
     second, third = slice(17, 33), slice(33, 49)
@@ -206,7 +206,7 @@ def test_cycles_repeat(tmp_path):
         scale = np.abs(history[name]).max()
         np.testing.assert_allclose(history[name][third], history[name][second], atol=2e-3 * scale,
                                    err_msg=name)
-    # a count of cells, of which some are on the verge
+    # a count of cells, some of which are nearly in contact
     assert np.abs(history["stick_area"][third] - history["stick_area"][second]).max() < 0.02
     lost = np.diff(history["dissipated_friction"][[16, 32, 48]])
     assert lost[0] > 0
@@ -215,11 +215,11 @@ def test_cycles_repeat(tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore:&surface")
-def test_road_goes_with_the_rubber_at_a_jump(tmp_path):
-    """Where half the load is taken away friction lets go at once: the road under each point counts.
+def test_a_jump_reads_the_road_under_the_moved_rubber(tmp_path):
+    """A jump to half the load lets points slip at once, so the jump must read the moved road.
 
-    The height that the normal contact has seen, U_z - gap - level, is that of the map where the
-    rubber then is, in the row of the jump as in the steps.
+    The height that the normal contact has used, U_z - gap - level, must be that of the map under
+    the moved rubber, in the row of the jump as in the steps.
     """
     case = tmp_path / "jump.nml"
     cycles = ("&phase velocity_x = 1e-3, velocity_y = -0.6e-3, duration = 2e-3, steps = 4 /\n"
@@ -241,17 +241,17 @@ def test_road_goes_with_the_rubber_at_a_jump(tmp_path):
         level = history["displacement"][row] - height.max()
         seen = snapshot.displacement_z - snapshot.gap - level
         assert np.abs(seen - read_spline(height, x, y)).max() < 1e-5 * np.ptp(height), row
-        # The road is stored as it stands there; gaps below zero are stored as zero.
+        # The stored road is the one at this row; negative gaps are stored as zero.
         parted = snapshot.gap > 0.0
         error = np.abs(seen - snapshot.road_height)
         assert error[parted].max() < 1e-12 * np.ptp(height), row
         assert error.max() < 1e-5 * np.ptp(height), row
 
 
-def test_road_that_returns_under_stick(tmp_path):
-    """Where the road is back nothing is left to be found, to a small tolerance, too.
+def test_a_returned_road_under_stick_converges(tmp_path):
+    """When the road is back at its start the tangential solve still converges to a small tolerance.
 
-    The rubber has been sheared for a while: tractions of the arms remain.
+    The rubber has been sheared for a while, so that the arms still carry tractions.
     """
     case = tmp_path / "back.nml"
     case.write_text(f"""&grid nx = 15, ny = 18, lx = 1e-3, ly = 1.4e-3, boundary = 'free' /
@@ -264,7 +264,7 @@ def test_road_that_returns_under_stick(tmp_path):
 &solver threads = 1, tolerance = 1e-9, passes = 8, max_iterations = 300 /
 &output file = '{tmp_path / "back.h5"}', snapshot_every = 1 /
 """)
-    run = asperity.run(case, quiet=True)                  # raises where a step is not solved
+    run = asperity.run(case, quiet=True)  # raises an exception if a step is not solved
     history = run.history
     assert abs(history["road_x"][-1]) < 1e-20
     assert history["iterations_tangential"].max() < 60

@@ -1,4 +1,4 @@
-"""A friction law as a Python function: equal to the laws of the program, and to dense matrices."""
+"""A friction law given as a Python function equals the program's laws and dense matrices."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ TAU, MU = 4e4, 0.6
 
 
 def saturating(pressure):
-    """Return the bound of a law that the program does not have."""
+    """Return the bound of a law that the program does not contain."""
     return -TAU * np.expm1(-MU * pressure / TAU)
 
 
@@ -27,7 +27,7 @@ def case(law, phases, seed=1, **groups):
 
 
 def sliding(pressure, steps=6, angle=0.4):
-    """Return phases: a load, then steps of half a cell."""
+    """Return phases: a load, then steps in which the road moves by half a cell."""
     step = 0.5 * LENGTH / N / SPEED
     return [dict(pressure=pressure),
             dict(velocity_x=SPEED * np.cos(angle), velocity_y=SPEED * np.sin(angle),
@@ -35,12 +35,12 @@ def sliding(pressure, steps=6, angle=0.4):
 
 
 def columns(run):
-    """Return the history without the times that the solvers took."""
+    """Return the history without the times that the solves took."""
     return {name: run.history[name] for name in run.history if name != "seconds"}
 
 
 def same(one, other, tolerance):
-    """Compare two runs: histories and last snapshots."""
+    """Check that two runs agree in their histories and last snapshots."""
     old, new = columns(one), columns(other)
     for name in ("traction_x", "traction_y", "friction", "contact_area", "mean_gap"):
         assert np.allclose(new[name], old[name], rtol=tolerance,
@@ -66,7 +66,7 @@ BUILT_IN = {
     {"adhesion": dict(potential="exponential", energy=0.1, range=5e-6)}])
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_equals_the_law_of_the_program(tmp_path, name, groups):
-    """What the program has is met to round-off, through all solvers."""
+    """A function with a law of the program gives its results to round-off, in all solvers."""
     law, function = BUILT_IN[name]
     old, new = (case(one, sliding(1.5e5), seed=3, **groups).run(output=tmp_path / f"{k}.h5")
                 for k, one in enumerate((law, function)))
@@ -76,7 +76,7 @@ def test_equals_the_law_of_the_program(tmp_path, name, groups):
 
 @pytest.mark.parametrize("name", ["coulomb", "coulomb_orowan"])
 def test_steady_sliding(tmp_path, name):
-    """A steady state under a table is that of the same law of the program."""
+    """A steady state with a table is that of the same law of the program."""
     phase = [dict(steady=True, pressure=1.5e5, velocity_x=SPEED)]
     rubber = dict(shear_modulus=MODULUS, prony_g=[2e6], prony_tau=[1e-3])
     old, new = (case(one, phase, seed=3, material=rubber, solver=dict(tolerance=1e-8)).run(
@@ -118,7 +118,7 @@ def test_partial_slip_against_dense_matrices(tmp_path, seed):
     matrix = dense_shear()
     drive = np.repeat(motion, N * N)
 
-    # The accelerated projected gradient method; it restarts where it would go uphill.
+    # The reference is the accelerated projected gradient method, restarted where it goes uphill.
     length = 1 / np.linalg.eigvalsh(matrix)[-1]
     t = ahead = np.zeros(2 * N * N)
     weight = 1.0
@@ -150,7 +150,7 @@ def test_full_slip(tmp_path):
 
 
 def test_a_case_keeps_the_law(tmp_path):
-    """The text of a case, a simulation, a saved state and a restart have the same law."""
+    """The text of a case, a simulation, a saved state and a restart all use the same law."""
     one = case(saturating, sliding(2e5))
     one.write(tmp_path / "case.nml")
     whole = asperity.run(tmp_path / "case.nml", output=tmp_path / "out.h5")
@@ -172,13 +172,13 @@ def test_a_case_keeps_the_law(tmp_path):
     (lambda pressure: 1 + np.sin(pressure), "changes too often"),
 ])
 def test_faults_of_a_function(function, message):
-    """A wrong answer is reported, with the place, the value and what is allowed."""
+    """A wrong answer of the function is reported with the place, the value and what is allowed."""
     with pytest.raises(ValueError, match=message):
         case(function, sliding(1e5))
 
 
 def test_an_exception_ends_the_call():
-    """An exception of the function comes through, and the group stays as it was."""
+    """An exception of the function reaches the caller, and the operator is as before the call."""
     def fails(pressure):
         raise ZeroDivisionError("no data")
 
@@ -198,7 +198,7 @@ def test_an_exception_ends_the_call():
      "must have as many values as table_pressure: 3 here, 2 there"),
 ])
 def test_faults_of_a_table(variables, message):
-    """The program reports tables that are none."""
+    """The program reports tables that are not valid."""
     text = (f"&grid nx = 8, ny = 8, lx = 1 /\n&surface shape = 'flat' /\n"
             f"&material shear_modulus = 1 /\n&friction law = 'table', {variables} /\n"
             "&phase pressure = 1 /\n")

@@ -1,4 +1,4 @@
-"""Surfaces made and measured through the Fortran library."""
+"""Generated height maps and statistics of maps, computed by the Fortran library."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ import asperity
 
 
 def gradient_mean_square(height, lx, ly):
-    """Return mean(|grad h|^2) of the interpolating Fourier sum, by numpy."""
+    """Return mean(|grad h|^2) of the interpolating Fourier sum, computed with numpy."""
     ny, nx = height.shape
     kx = 2 * np.pi * np.fft.fftfreq(nx, lx / nx)
     ky = 2 * np.pi * np.fft.fftfreq(ny, ly / ny)
@@ -16,7 +16,7 @@ def gradient_mean_square(height, lx, ly):
 
 
 @pytest.mark.parametrize("generator", ["random_phase", "filtered_noise"])
-def test_self_affine_has_the_slope_asked_for(generator):
+def test_self_affine_has_the_given_slope(generator):
     height = asperity.surface.self_affine(
         90, 64, 1.5, 1.0, wavelength_long=0.5, wavelength_short=0.1, rms_slope=0.3, seed=5,
         generator=generator)
@@ -98,7 +98,7 @@ def test_wrong_values(changes, message):
     arguments = {"nx": 16, "lx": 1.0, "wavelength_short": 0.2, "rms_slope": 0.1}
     with pytest.raises(ValueError, match=message) as caught:
         asperity.surface.self_affine(**(arguments | changes))
-    assert "&" not in str(caught.value)  # it speaks of arguments, not of the input's groups
+    assert "&" not in str(caught.value)  # it names arguments, not groups
 
 
 def test_wrong_shapes():

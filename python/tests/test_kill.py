@@ -1,4 +1,4 @@
-"""A result opens, and holds all that was flushed, whenever the run that writes it is killed."""
+"""A killed run leaves a result that can be opened and holds all that was flushed."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="us
 
 @pytest.fixture(scope="module")
 def writer() -> str:
-    """Return the driver of the Fortran tests, which also writes small results."""
+    """Return the driver of the Fortran tests, which can also write small results."""
     if named := os.environ.get("ASPERITY_CHECK"):
         return named
     found = sorted(ROOT.glob("build/gfortran_*/test/check"), key=lambda path: path.stat().st_mtime)
@@ -36,7 +36,7 @@ def writer() -> str:
 
 @pytest.fixture(scope="module")
 def shim(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Compile what looks at the files, or kills, between two calls that write."""
+    """Compile a library that inspects the files, or kills the run, between two calls that write."""
     library = tmp_path_factory.mktemp("shim") / "kill_after.so"
     subprocess.run(["gcc", "-O1", "-shared", "-fPIC", "-o", library,
                     Path(__file__).with_name("kill_after.c"), "-ldl"], check=True)
@@ -44,10 +44,10 @@ def shim(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 def inspect(path: Path, live: bool = False) -> tuple[int, int]:
-    """Check all that a result holds; return the numbers of rows and of snapshots.
+    """Check everything that a result contains; return its numbers of rows and snapshots.
 
-    In a run that is going on, snapshots come up after the file was opened and its end noted: those
-    cannot be read before it is opened again.
+    While a run is writing, snapshots may appear after this process opened the file and read its
+    length. These can only be read after the file is opened again.
     """
     with h5py.File(path, "r") as file:
         columns = {name: file["history"][name][:] for name in file["history"]}
@@ -75,7 +75,7 @@ def inspect(path: Path, live: bool = False) -> tuple[int, int]:
 
 
 def inspect_snapshot(name: str, group: h5py.Group) -> int:
-    """Check all that a snapshot holds; return its step."""
+    """Check everything that a snapshot contains, and return its step."""
     step = group.attrs["step"]
     assert int(name) == step
     pressure = 1000 * step + 10 * np.arange(4)[:, None] + np.arange(7)
@@ -89,7 +89,7 @@ def inspect_snapshot(name: str, group: h5py.Group) -> int:
 
 
 def inspect_live(path: Path) -> tuple[int, int]:
-    """Inspect a result while it is written; it may grow between two looks at its length."""
+    """Inspect a result during the run, when it may grow between two readings of its length."""
     for _ in range(20):
         try:
             return inspect(path, live=True)
@@ -100,7 +100,7 @@ def inspect_live(path: Path) -> tuple[int, int]:
 
 @pytest.mark.parametrize("compression", ["0", "4"])
 def test_every_moment(tmp_path: Path, writer: str, shim: str, compression: str) -> None:
-    """Look at the files before every single call that changes one: a kill leaves just that."""
+    """Inspect the files before every call that changes one, because a kill leaves this state."""
     result = tmp_path / "x.h5"
     shots = tmp_path / "shots"
     for restart in ([], ["restart"]):
@@ -140,7 +140,7 @@ def test_every_moment(tmp_path: Path, writer: str, shim: str, compression: str) 
 
 
 def test_killed(tmp_path: Path, writer: str) -> None:
-    """Kill a long run at chance moments, look, and let it go on from its checkpoint."""
+    """Kill a long run at random times, inspect the result, and continue from the checkpoint."""
     result = tmp_path / "x.h5"
     random = np.random.default_rng(1)
     rows = []
@@ -168,7 +168,7 @@ def test_killed(tmp_path: Path, writer: str) -> None:
 
 @pytest.mark.parametrize("compression", ["0", "4"])
 def test_full_disk(tmp_path: Path, writer: str, compression: str) -> None:
-    """Files that may not grow: an error with the reason, and all rows so far are there."""
+    """If files may not grow, the run ends with an error that says why, and all rows are kept."""
     result = tmp_path / "x.h5"
     subprocess.run([writer, "writer", str(result), "60", compression], check=True)
     size = result.stat().st_size
@@ -190,7 +190,7 @@ def test_full_disk(tmp_path: Path, writer: str, compression: str) -> None:
 
 
 def test_a_result_that_cannot_be_begun(tmp_path: Path, program: str) -> None:
-    """Not even the first pages fit: one message, status 3, and nothing is left behind."""
+    """If not even the first pages fit there is one message, status 3, and no file remains."""
     case = tmp_path / "case.nml"
     case.write_text("&grid nx = 64, ny = 64, lx = 1. /\n&surface shape = 'sphere', radius = 2. /\n"
                     "&material shear_modulus = 1. /\n&phase pressure = 1e-3 /\n")

@@ -1,4 +1,4 @@
-"""The page on long runs: its commands, its snippet and its jobs for a cluster do what it says."""
+"""The commands, the snippet and the cluster jobs of the page on long runs do what it says."""
 
 import os
 import re
@@ -18,7 +18,7 @@ BLOCKS = re.findall(r"```(\w+)\n(.*?)```", PAGE, flags=re.DOTALL)
 
 @pytest.fixture
 def shell(program, tmp_path, monkeypatch):
-    """Return the environment of a node with the program, in a folder of its own."""
+    """Return the environment of a node with the program, in a separate folder."""
     monkeypatch.chdir(tmp_path)
     scontrol = tmp_path / "scontrol"
     scontrol.write_text('#!/bin/sh\necho "$@" >requeued\n')
@@ -30,7 +30,7 @@ def shell(program, tmp_path, monkeypatch):
 
 
 def stop_after(process, result, rows):
-    """Send SIGTERM once a run has written some rows; return the exit status."""
+    """Send SIGTERM after a run has written some rows, and return the exit status."""
     for _ in range(2000):
         if result.exists():
             try:

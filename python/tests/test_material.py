@@ -107,7 +107,7 @@ def test_wlf_shift_moves_the_curves_along_the_frequency_axis():
 
 
 def fractional_solid(omega, low=1e6, high=1e9, exponent=0.4, time=1e-6):
-    """Fractional Zener (Cole-Cole) solid: a smooth, broad spectrum that no Prony series equals."""
+    """Return the fractional Zener (Cole-Cole) modulus, a broad spectrum that no series equals."""
     z = (1j * omega * time) ** exponent
     return low + (high - low) * z / (1 + z)
 
@@ -119,7 +119,7 @@ def test_fit_of_a_broad_spectrum():
     assert coarse.fit_errors.rms_storage < 0.02 and coarse.fit_errors.rms_loss < 0.04
     material = Prony.fit(omega, data.real, data.imag, arms_per_decade=2.0)
     assert material.fit_errors.rms_storage < 3e-4 and material.fit_errors.rms_loss < 7e-4
-    # it predicts between the points, too
+    # the fit is right between the points, too
     between = np.sqrt(omega[10:-11] * omega[11:-10])
     found, wanted = material.complex_modulus(between), fractional_solid(between)
     assert np.max(np.abs(found.real / wanted.real - 1)) < 2e-3
@@ -135,12 +135,12 @@ def test_fit_of_noisy_data_is_smooth_and_positive():
     )
     rough = Prony.fit(omega, noisy.real, noisy.imag, arms_per_decade=2.0, slack=0.0)
     smooth = Prony.fit(omega, noisy.real, noisy.imag, arms_per_decade=2.0)
-    assert np.all(smooth.g > 0) and smooth.tau.size == 21  # no arm has vanished
+    assert np.all(smooth.g > 0) and smooth.tau.size == 21  # all arms have a positive modulus
     assert rough.tau.size < 21
     assert np.abs(np.diff(np.log(smooth.g), 2)).max() < 0.5
     assert np.abs(np.diff(np.log(rough.g), 2)).max() > 1.0
     assert smooth.fit_errors.rms_storage < 0.04 and smooth.fit_errors.rms_loss < 0.04
-    # and it is nearer to the truth than the rough one
+    # and it is nearer to the truth than a fit without smoothing
     for name, true in (("loss_modulus", data.imag), ("storage_modulus", data.real)):
         errors = [
             np.sqrt(np.mean((getattr(series, name)(omega) / true - 1) ** 2))

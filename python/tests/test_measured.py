@@ -1,4 +1,4 @@
-"""Measured topographies: what an instrument wrote is what the program gets, in metres."""
+"""Measured topographies reach the program as the instrument wrote them, in metres."""
 
 import hashlib
 import json
@@ -24,13 +24,13 @@ LX, LY = 46.0, 21.0  # um: cells of 2 um x 1.5 um
 
 
 def sample(nx=NX, ny=NY):
-    """Return an uneven map (ny, nx), um, that no turn or mirror brings to itself."""
+    """Return an uneven map (ny, nx), in um, that differs from all its mirror and rotated images."""
     j, i = np.mgrid[0:ny, 0:nx]
     return 0.3 * np.sin(0.7 * i) + 0.05 * j**1.5 + 0.01 * i * j + 0.2 * (i == 3) * (j == 10)
 
 
 def topography(height, sizes=(LX, LY), unit="um", missing=None, **options):
-    """Return SurfaceTopography's object: its arrays have x first."""
+    """Return SurfaceTopography's object, whose arrays have x as the first index."""
     array = height.T
     if missing is not None:
         array = np.ma.masked_array(array, missing.T)
@@ -38,7 +38,7 @@ def topography(height, sizes=(LX, LY), unit="um", missing=None, **options):
 
 
 def write_sdf(path, height):
-    """Write an ISO 25178-71 text file: profiles along x, one after the other, in m."""
+    """Write an ISO 25178-71 text file: one profile along x after the other, in m."""
     text = ["aISO-1.0", "ManufacID = tests", "CreateDate = 010120261200",
             "ModDate = 010120261200", f"NumPoints = {NX}", f"NumProfiles = {NY}",
             f"Xscale = {LX / NX * 1e-6!r}", f"Yscale = {LY / NY * 1e-6!r}", "Zscale = 1e-9",
@@ -81,7 +81,7 @@ EXACT = {"map.bcr": 0.26e-9}  # m: half a bit
 
 @pytest.mark.parametrize("name", WRITERS)
 def test_formats_bring_heights_lengths_and_orientation(tmp_path, name):
-    """Row j of the file's map is row j of the dataset: a transpose or a mirror would show."""
+    """Row j of the file's map is row j of the dataset, so a transpose or a mirror would be seen."""
     height = sample()
     WRITERS[name](tmp_path / name, height)
     surface = import_topography(tmp_path / name, tmp_path / "s.h5", level="none",
@@ -106,7 +106,7 @@ def test_formats_bring_heights_lengths_and_orientation(tmp_path, name):
 
 
 def matrix(height, separator=";", decimal=","):
-    """Return heights as a spreadsheet writes them, a row of the file a row along x."""
+    """Return heights as a spreadsheet writes them: one row of the file per row along x."""
     return "\n".join(separator.join("" if np.isnan(z) else f"{z:.9f}".replace(".", decimal)
                                     for z in row) for row in height) + "\n"
 
@@ -115,7 +115,7 @@ def matrix(height, separator=";", decimal=","):
     (";", ",", "utf-8", ""), (",", ".", "utf-8", "Probe 7\nDatum, 12.3.2026\n"),
     (" ", ",", "utf-8", ""), (";", ".", "utf-16", "Instrument;A\nUnit;um\n")])
 def test_matrices_of_spreadsheets(tmp_path, separator, decimal, encoding, head):
-    """Separators, decimal commas, lines above the numbers, missing cells."""
+    """Separators, decimal commas, lines above the numbers and missing cells are understood."""
     height = sample()
     (tmp_path / "map.csv").write_text(head + matrix(height, separator, decimal), encoding=encoding)
     given = {"unit": "um", "size": (LX, LY), "level": "none"}
@@ -137,7 +137,7 @@ def test_matrices_of_spreadsheets(tmp_path, separator, decimal, encoding, head):
 
 
 def test_a_text_of_any_length_is_no_binary_map(tmp_path):
-    """A format without a mark takes any file of 2 n^2 bytes for its own: 36 x 36 here."""
+    """A text of 2 n^2 bytes (here 36 x 36) is not read as a binary format that has no signature."""
     text = matrix(sample()[:, :18])
     path = tmp_path / "map.csv"
     path.write_text(text + "#" * (2 * 72**2 - len(text)))
@@ -152,7 +152,7 @@ def test_a_text_of_any_length_is_no_binary_map(tmp_path):
 
 
 def test_points_on_a_grid_with_holes(tmp_path):
-    """Points that were not measured are left out of a list: their places are found and filled."""
+    """A list of points leaves out those that were not measured; their places are filled."""
     y, x = np.mgrid[0:NY, 0:NX]
     plane = 0.5 * x - 0.25 * y
     rows = np.column_stack([x.ravel() * LX / NX, y.ravel() * LY / NY, plane.ravel()])
@@ -177,8 +177,8 @@ def test_points_on_a_grid_with_holes(tmp_path):
         load(tmp_path / "points.xyz", unit="um")
 
 
-def test_own_files_come_back_as_they_are(tmp_path):
-    """What `import` has written, and the road of a result, have rows along x and know all."""
+def test_own_files_are_imported_unchanged(tmp_path):
+    """Files that `import` wrote and roads of results have rows along x, units and lengths."""
     topography(sample()).to_netcdf(str(tmp_path / "map.nc"))
     first = import_topography(tmp_path / "map.nc", tmp_path / "s.h5", level="tilt")
     again = load(tmp_path / "s.h5", level="none")
@@ -197,20 +197,20 @@ def test_own_files_come_back_as_they_are(tmp_path):
     np.testing.assert_allclose(other.height, 1e-6 * sample(), rtol=1e-14)
 
 
-def test_readers_that_try_a_file_are_not_heard(tmp_path, capfd):
-    """What a reader prints before it gives up says nothing to the user."""
+def test_readers_that_try_a_file_print_nothing(tmp_path, capfd):
+    """The messages of a reader that tries a file in vain are not shown to the user."""
     (tmp_path / "any.bin").write_bytes(bytes(range(256)) * 4 + b"1")
     topography(sample()).to_netcdf(str(tmp_path / "map.nc"))
     assert main(["import", str(tmp_path / "any.bin")]) == 3
-    told = capfd.readouterr()
-    assert told.out == ""
-    assert told.err == (f"asperity: {tmp_path / 'any.bin'}: is of no format that SurfaceTopography"
-                        " knows\n")
+    printed = capfd.readouterr()
+    assert printed.out == ""
+    assert printed.err == (f"asperity: {tmp_path / 'any.bin'}: is of no format that"
+                           " SurfaceTopography knows\n")
     assert main(["import", str(tmp_path / "map.nc"), "--list"]) == 0
     assert capfd.readouterr().err == ""
 
 
-def test_what_the_instrument_said_is_kept(tmp_path):
+def test_metadata_of_the_instrument_are_kept(tmp_path):
     topography(sample()).to_x3p(str(tmp_path / "map.x3p"), manufacturer="Zeta and Sons")
     import_topography(tmp_path / "map.x3p", tmp_path / "s.h5")
     with h5py.File(tmp_path / "s.h5") as file:
@@ -260,7 +260,7 @@ def test_transpose_takes_arrays_as_images_have_them(tmp_path):
 
 
 def test_levelling(tmp_path):
-    """An exact plane is taken off to round-off, a paraboloid by 'curvature' only."""
+    """An exact plane is removed to round-off, a paraboloid only by 'curvature'."""
     j, i = np.mgrid[0:NY, 0:NX]
     plane = 3.0 + 0.5 * i - 0.25 * j
     bowl = plane + 0.01 * i**2 - 0.02 * i * j + 0.03 * j**2
@@ -277,8 +277,8 @@ def test_levelling(tmp_path):
     assert not any("tilt" in note for note in load(tmp_path / "plane.nc", level="tilt").notes)
 
 
-def test_levelling_does_not_see_missing_points(tmp_path):
-    """The plane is that of the valid points, wherever the others are."""
+def test_levelling_ignores_missing_points(tmp_path):
+    """The plane is fitted to the valid points, wherever the others are."""
     j, i = np.mgrid[0:NY, 0:NX]
     plane = 1.0 + 0.5 * i - 0.25 * j
     missing = (i < 4) & (j < 5)
@@ -288,7 +288,7 @@ def test_levelling_does_not_see_missing_points(tmp_path):
 
 
 def test_missing_points_are_filled_and_counted(tmp_path):
-    """Holes in a plane come back on the plane; the share has a bound."""
+    """Missing points in a plane are filled with the plane; the fraction of them has a bound."""
     j, i = np.mgrid[0:NY, 0:NX]
     plane = 0.5 * i - 0.25 * j
     hole = plane.copy()
@@ -325,7 +325,7 @@ def test_crop_keeps_whole_cells(tmp_path):
 
 
 def test_resampling(tmp_path):
-    """Fewer cells: means over them. More: a smooth wave stays what it is."""
+    """Fewer cells are means over the old ones; with more cells a smooth wave keeps its shape."""
     nx, ny = 48, 36
     x, y = (np.arange(nx) + 0.5) / nx, (np.arange(ny) + 0.5) / ny
 
@@ -341,7 +341,7 @@ def test_resampling(tmp_path):
     assert odd.height.mean() == pytest.approx(1e-6 * wave(x, y).mean(), abs=1e-20)
     fine = load(tmp_path / "map.nc", level="none", resample=(100, 90))
     exact = wave((np.arange(100) + 0.5) / 100, (np.arange(90) + 0.5) / 90)
-    # cubic splines: (2 pi/18)^4/384 of a wave of 18 cells, and as much again
+    # the error of cubic splines is (2 pi/18)^4/384 for a wave of 18 cells; twice that is allowed
     np.testing.assert_allclose(fine.height, 1e-6 * exact, atol=1e-10)
     assert (fine.lx, fine.ly) == (LX * 1e-6, LY * 1e-6)
     plane = np.arange(nx) + 2.0 * np.arange(ny)[:, None]
@@ -358,7 +358,7 @@ def test_window_brings_the_edges_to_the_mean(tmp_path):
     assert not plain.periodic
     tukey = load(tmp_path / "map.nc", periodic="tukey", taper=0.4)
     assert tukey.periodic
-    inside = (slice(3, 11), slice(5, 18))  # beyond a fifth of each length from the edges
+    inside = (slice(3, 11), slice(5, 18))  # farther than a fifth of each length from the edges
     np.testing.assert_allclose(tukey.height[inside], plain.height[inside], rtol=1e-12)
     hann = load(tmp_path / "map.nc", periodic="hann")
     for height in (tukey.height, hann.height):
@@ -390,7 +390,7 @@ def test_invert_and_scale(tmp_path):
 
 
 def test_line_scans(tmp_path):
-    """Even ones become profiles; uneven ones are refused."""
+    """Scans with even distances become profiles; others are refused."""
     line = np.sin(np.arange(30.0))
     SurfaceTopography.UniformLineScan(line, 15.0, unit="nm").to_netcdf(str(tmp_path / "line.nc"))
     surface = load(tmp_path / "line.nc", level="none", periodic=None)
@@ -406,7 +406,7 @@ def test_line_scans(tmp_path):
 
 
 def gwy_with_channels(path, first, second):
-    """Write a Gwyddion file of a phase image and two maps of heights."""
+    """Write a Gwyddion file with a phase image and two maps of heights."""
     def name(text):
         return text.encode() + b"\0"
 
@@ -483,7 +483,7 @@ def command(*words, folder=None):
 
 
 def test_from_the_instrument_s_file_to_a_run(tmp_path, program):
-    """The lines that `import` prints are a case's, and its road is the measured one."""
+    """The lines that `import` prints make a case, whose road is the measured one."""
     topography(0.1 * sample()).to_x3p(str(tmp_path / "plate.x3p"))
     done = command("import", "plate.x3p", "-o", "surface.h5", "--level", "tilt", "--periodic",
                    "--resample", 20, 12, folder=tmp_path)
@@ -507,13 +507,13 @@ def test_from_the_instrument_s_file_to_a_run(tmp_path, program):
     touching = run.snapshots[-1].pressure > 0
     assert 0 < touching.sum() < touching.size
     assert road[touching].mean() > road[~touching].mean()
-    told = {line[:12].strip(): line[12:] for line in done.stdout.splitlines()}
-    assert told["nx, ny"] == "20, 12"
-    assert float(told["rms slope"]) == pytest.approx(slope, rel=1e-5)
-    assert float(told["rms height"].split()[0]) == pytest.approx(road.std(), rel=1e-5)
+    shown = {line[:12].strip(): line[12:] for line in done.stdout.splitlines()}
+    assert shown["nx, ny"] == "20, 12"
+    assert float(shown["rms slope"]) == pytest.approx(slope, rel=1e-5)
+    assert float(shown["rms height"].split()[0]) == pytest.approx(road.std(), rel=1e-5)
 
 
-def test_every_option_of_the_command_arrives(tmp_path, monkeypatch):
+def test_every_option_of_the_command_takes_effect(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     np.save("map.npy", sample())
     assert main(["import", "map.npy", "-o", "a.h5", "--unit", "um", "--size", "46", "21",

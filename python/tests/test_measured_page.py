@@ -1,4 +1,4 @@
-"""The page on measured data: its snippets and commands run, in their order."""
+"""The snippets and commands of the page on measured data are run in their order."""
 
 import os
 import re
@@ -31,23 +31,23 @@ def test_from_measurements_to_friction(program, tmp_path, monkeypatch, capsys):
     lines, case = blocks("fortran")
     to_road, to_rubber, to_run = blocks("sh")
     exec(compile(make, "measured_data.md", "exec"), {})
-    told = ""
+    printed = ""
     for commands in (to_road, to_rubber, to_run):
         if commands is to_run:
             Path("slide.nml").write_text(case)
         done = subprocess.run(["sh", "-ec", commands], capture_output=True, text=True, check=False,
                               timeout=PATIENCE)
         assert done.returncode == 0, done.stderr
-        told += done.stdout
-    assert lines in told  # the page shows what the command prints
+        printed += done.stdout
+    assert lines in printed  # the page must show what the command prints
     assert case.endswith(lines)
-    assert "'Default': map of heights, 200 x 150 points, unit m" in told
-    assert "filled 286 of 30000 points" in told
+    assert "'Default': map of heights, 200 x 150 points, unit m" in printed
+    assert "filled 286 of 30000 points" in printed
     run = asperity.open("slide.h5")
     assert run.finished
     friction = run.history["friction"][-1]
-    assert 0.02 < friction < 0.3  # the loss of the rubber; there is no other
-    # The same force over the same load, divided by the area and not: equal but for rounding.
+    assert 0.02 < friction < 0.3  # the loss in the rubber is the only cause
+    # Both are the same force over the same load, but only one is divided by the area: round-off.
     assert run.history["friction_viscous"][-1] == pytest.approx(friction, rel=1e-14)
     for picture in ("rubber.png", "slide.png"):
         assert Path(picture).stat().st_size > 20000

@@ -1,4 +1,4 @@
-"""The program with the transforms of MKL finds what the program with FFTW finds."""
+"""The program with the transforms of MKL gives the results of the program with FFTW."""
 
 import subprocess
 from pathlib import Path
@@ -47,7 +47,7 @@ def test_same_result_as_with_fftw(name, program, tmp_path):
             found.append({key: history[key][()] for key in
                           ("contact_area", "displacement", "friction", "force")})
     for key, expected in found[0].items():
-        # Both solve to 1e-6; the number of cells in contact may differ by a few at the edges.
+        # Both solve to 1e-6, so a few cells at the edges may differ in their state.
         np.testing.assert_allclose(found[1][key], expected, rtol=1e-4 if key == "contact_area" else
                                    1e-5, atol=1e-9, err_msg=key)
 

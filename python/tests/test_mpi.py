@@ -1,4 +1,4 @@
-"""One run on several processes: the same numbers, files and exit statuses as on one."""
+"""A run on several processes has the numbers, files and exit statuses of a run on one."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ pytestmark = pytest.mark.skipif(
     reason="the program with MPI is not built: run tools/build_mpi.sh",
 )
 
-# 37 rows do not divide, and few strips of rows leave some of five processes without any.
+# 37 rows cannot be divided evenly, and a few rows of strips leave some processes without any.
 ROUGH = """&grid nx = 40, ny = 37, lx = 1e-3, boundary = '{boundary}' /
 &surface shape = 'self_affine', hurst = 0.8, wavelength_long = 0.5e-3,
    wavelength_short = 0.1e-3, rms_slope = 0.2, seed = 3 /
@@ -69,7 +69,7 @@ CASES = {
     + "&friction law = 'coulomb', coefficient = 0.4 /\n"
     "&phase steady = .true., pressure = 3e4, velocity_x = 1e-2, velocity_y = 3e-3 /\n"
     "&phase steady = .true., velocity_x = 3e-2, velocity_y = 9e-3 /\n",
-    # cells at the edge are partly sheared: Newton's method for all cells at once
+    # Cells at the edge are partly sheared, so that Newton's method solves for all cells at once.
     "steady constant shear": ROUGH.format(boundary="periodic")
     + VISCOELASTIC
     + "&friction law = 'constant_shear', shear_strength = 2e5 /\n"
@@ -85,20 +85,20 @@ def write(folder: Path, text: str, name: str = "case.nml") -> Path:
 
 
 def words(processes: int, case: Path, *more: str) -> list[str]:
-    """Return the command line of a run on some processes."""
+    """Return the command line of a run on a number of processes."""
     return ["mpirun", "--allow-run-as-root", "--oversubscribe", "--bind-to", "none", "-q",
             "-n", str(processes), str(PROGRAM), "run", str(case), "--quiet", *more]
 
 
 def run(processes: int, case: Path, *more: str) -> subprocess.CompletedProcess:
-    """Run a case on some processes, with one thread each unless `more` says otherwise."""
+    """Run a case on a number of processes, with one thread each unless `more` says otherwise."""
     threads = [] if "--threads" in more else ["--threads", "1"]
     return subprocess.run(words(processes, case, *threads, *more), capture_output=True, text=True,
                           timeout=PATIENCE, check=False)
 
 
 def contents(path: Path) -> dict[str, bytes]:
-    """Return all values of a result but the wall times."""
+    """Return all values of a result except the wall times."""
     values = {}
     with h5py.File(path) as file:
         file.visititems(lambda name, item: values.update({name: item[()].tobytes()})
@@ -109,7 +109,7 @@ def contents(path: Path) -> dict[str, bytes]:
 
 
 def assert_same(path: Path, reference: Path) -> None:
-    """All values agree in every bit."""
+    """Check that all values agree in every bit."""
     found, expected = contents(path), contents(reference)
     assert found.keys() == expected.keys()
     assert not [name for name in expected if found[name] != expected[name]]
@@ -132,7 +132,7 @@ def test_results_do_not_depend_on_the_number_of_processes(tmp_path: Path, name: 
 
 
 def test_large_grids_share_the_coarse_level(tmp_path: Path) -> None:
-    """From 16 384 blocks on each process has a part of the preconditioner's coarse level."""
+    """From 16 384 blocks on, each process holds a part of the preconditioner's coarse level."""
     case = write(tmp_path, CASES["elastic"].replace("nx = 40, ny = 37", "nx = 1100, ny = 957")
                  + "&solver tolerance = 1e-4 /\n&output snapshot_fields = 'pressure' /\n")
     sent = []
@@ -176,7 +176,7 @@ def test_westergaard_on_three_processes(tmp_path: Path) -> None:
 
 
 def test_a_sliding_viscoelastic_wave_on_three_processes(tmp_path: Path) -> None:
-    """Full contact from rest: the road crosses the rows of all processes by one cell per step."""
+    """A wave in full contact moves from rest, one cell per step, over the rows of all processes."""
     rows, steps, speed, amplitude = 128, 64, 0.05, 1e-6
     rubber = Prony(1e6, [2e6, 4e6], [1e-3, 1e-2])
     duration = steps * 1e-3 / rows / speed
@@ -242,7 +242,7 @@ def test_errors_end_all_processes_with_one_message(tmp_path: Path) -> None:
 
 
 def test_too_little_memory_for_one_process_ends_all(tmp_path: Path) -> None:
-    """One of them has a limit on its address space, which it finds out before the run begins."""
+    """One process has a limit on its address space, which it notices before the run begins."""
     limited = write(tmp_path, "#!/bin/sh\n[ \"$OMPI_COMM_WORLD_RANK\" = 1 ] && ulimit -v 400000\n"
                     f"exec {PROGRAM} \"$@\"\n", "limited.sh")
     limited.chmod(0o700)
@@ -261,7 +261,7 @@ LONG = ROUGH.format(boundary="periodic") + VISCOELASTIC + (
 
 
 def start(processes: int, case: Path, rows: int) -> tuple[subprocess.Popen, Path]:
-    """Start a run and wait until it has some rows."""
+    """Start a run and wait until it has written some rows."""
     result = case.with_suffix(".h5")
     process = subprocess.Popen(words(processes, case, "--threads", "1"), stderr=subprocess.PIPE,
                                stdout=subprocess.DEVNULL, text=True)
@@ -275,11 +275,11 @@ def start(processes: int, case: Path, rows: int) -> tuple[subprocess.Popen, Path
             pass
         time.sleep(0.02)
     process.kill()
-    pytest.fail("the run did not get as far as that")
+    pytest.fail("the run ended before it had written the rows")
 
 
 def children(process: subprocess.Popen) -> list[int]:
-    """Return the processes that mpirun has started; the run must still be going on."""
+    """Return the processes that mpirun has started; the run must not have ended."""
     assert process.poll() is None, "the run has ended"
     done = subprocess.run(["ps", "-o", "pid=,args=", "--ppid", str(process.pid)],
                           capture_output=True, text=True, check=False)
@@ -290,10 +290,10 @@ def children(process: subprocess.Popen) -> list[int]:
     return pids
 
 
-def test_a_stopped_run_goes_on_with_another_number_of_processes(tmp_path: Path) -> None:
+def test_a_stopped_run_continues_with_another_number_of_processes(tmp_path: Path) -> None:
     case = write(tmp_path, LONG.format(steps=120))
     process, result = start(4, case, 3)
-    process.send_signal(signal.SIGXCPU)  # mpirun hands this one on
+    process.send_signal(signal.SIGXCPU)  # a signal that mpirun passes on
     _, message = process.communicate(timeout=PATIENCE)
     assert process.returncode == 128 + signal.SIGXCPU, message
     assert message.count("stopped by SIGXCPU after step") == 1
@@ -312,7 +312,7 @@ def test_the_time_limit_stops_all(tmp_path: Path) -> None:
     assert case.with_suffix(".checkpoint.h5").exists()
 
 
-# With a constant shear stress the passes of a pulled road may not settle: they go on for hours.
+# With constant shear the passes of a pulled road may not settle, so the run takes hours.
 STUCK = """&grid nx = 48, ny = 41, lx = 1e-3, ly = 0.9e-3 /
 &surface shape = 'self_affine', hurst = 0.8, wavelength_long = 0.5e-3,
    wavelength_short = 0.15e-3, rms_slope = 0.5, seed = 3 /
@@ -328,7 +328,7 @@ STUCK = """&grid nx = 48, ny = 41, lx = 1e-3, ly = 0.9e-3 /
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 def test_a_row_is_given_up_together_though_clocks_differ(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The time limit of the present row ends on one process long before it ends on the others."""
+    """The time limit of a row passes on one process long before it passes on the others."""
     library = tmp_path / "other_clock.so"
     subprocess.run(["gcc", "-O1", "-shared", "-fPIC", "-o", library,
                     Path(__file__).with_name("other_clock.c")], check=True)
@@ -355,7 +355,7 @@ def test_sigterm_to_mpirun_leaves_a_checkpoint(tmp_path: Path) -> None:
 
 
 def test_sigterm_within_a_solve_stops_all(tmp_path: Path) -> None:
-    """Processes give up a solve together that would go on for ever."""
+    """All processes leave a solve that would not end by itself."""
     case = write(tmp_path, """
         &grid nx = 2048, ny = 2048, lx = 1e-3 /
         &surface shape = 'self_affine', rms_slope = 0.2, hurst = 0.8, wavelength_long = 5e-4,
@@ -384,7 +384,7 @@ def test_sigterm_to_one_process_stops_all(tmp_path: Path) -> None:
     assert result.with_suffix(".checkpoint.h5").exists()
 
 
-def test_a_process_that_dies_takes_the_others_with_it(tmp_path: Path) -> None:
+def test_a_process_that_dies_ends_the_others(tmp_path: Path) -> None:
     case = write(tmp_path, LONG.format(steps=20000))
     process, result = start(3, case, 8)
     os.kill(children(process)[-1], signal.SIGKILL)
@@ -408,7 +408,7 @@ def test_the_program_without_mpi_is_refused_under_mpirun(tmp_path: Path, program
 @pytest.mark.skipif(not HAS_SLURM, reason="no Slurm that this user may start")
 @pytest.mark.parametrize("launcher", ["mpirun --allow-run-as-root", "srun --mpi=pmix"])
 def test_two_processes_in_a_job_of_slurm(tmp_path: Path, launcher: str) -> None:
-    """A real Slurm, of this machine, starts both processes of a job."""
+    """The Slurm of this machine starts both processes of a job."""
     case = write(tmp_path, CASES["sliding"] + OUTPUT)
     assert run(1, case, "--output", str(tmp_path / "one.h5")).returncode == 0
     script = write(tmp_path, "#!/bin/sh\n#SBATCH --ntasks=2 --time=5 --output=job.log\n"

@@ -1,4 +1,4 @@
-"""The operators for method developers: against closed forms, the solvers, and numpy's FFT."""
+"""The operators for method developers against closed forms, the solvers, and numpy's FFT."""
 
 import numpy as np
 import pytest
@@ -76,7 +76,7 @@ def test_the_tangential_operator(boundary, poisson):
 def test_the_tangential_symbol_of_a_half_space():
     n, length, shear, poisson = 12, 1e-3, 1e6, 0.3
     op = asperity.operators.tangential(n, n, length, modulus=shear, poisson=poisson)
-    q = 2 * np.pi * 2 / length                       # a wave along x: in line, and across
+    q = 2 * np.pi * 2 / length  # waves along x with tractions along and across them
     assert op.symbol[0, 0, 0, 2] == pytest.approx((1 - poisson) / (shear * q), rel=1e-12)
     assert op.symbol[1, 1, 0, 2] == pytest.approx(1 / (shear * q), rel=1e-12)
     assert op.symbol[0, 1, 0, 2] == pytest.approx(0.0, abs=1e-25)

@@ -1,4 +1,4 @@
-"""The package as it is installed."""
+"""The package after its installation."""
 
 import json
 import re
@@ -34,7 +34,7 @@ def test_the_version_is_written_once(root):
 def test_what_an_installation_holds(root):
     files = {str(path) for path in distribution("asperity").files or []}
     if not any(name.endswith("asperity/results/run.py") for name in files):
-        # Installed in place: the plan of the build says what a wheel would hold.
+        # For an editable installation, the plan of the build lists what a wheel would contain.
         plan = json.loads((root / ".venv" / "python" / "meson-info" / "intro-install_plan.json")
                           .read_text())
         files = {entry["destination"].replace("{bindir}", "bin")
@@ -48,9 +48,9 @@ def test_what_an_installation_holds(root):
 
 
 def test_headers_of_our_numpy_come_before_those_of_the_system(root, tmp_path):
-    """Debian keeps headers of its own NumPy in the folder of Python's headers.
+    """Debian keeps the headers of its own NumPy in the folder of Python's headers.
 
-    With them the extension was compiled for another NumPy than it runs with, and failed on import.
+    With those the extension was compiled for another NumPy than it ran with, and its import failed.
     """
     subprocess.run(["meson", "setup", str(tmp_path), "-Dpython=true", "-Dapp=false",
                     "-Dlibrary=false"], cwd=root, check=True, capture_output=True)

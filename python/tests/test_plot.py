@@ -1,4 +1,4 @@
-"""Pictures: what they show, and that they are written."""
+"""Pictures are written and show what they should."""
 
 import errno
 import subprocess
@@ -27,7 +27,7 @@ def close_figures():
 
 
 def is_picture(path):
-    """Return whether a file is a PNG that is not of one colour."""
+    """Return whether a file is a PNG of more than one colour."""
     return path.read_bytes().startswith(b"\x89PNG") and np.ptp(plt.imread(path)[..., :3]) > 0.5
 
 
@@ -57,7 +57,7 @@ def test_map(result):
     bar = next(other for other in axes.figure.axes if other is not axes)
     assert bar.get_ylabel() == "pressure (kPa)"
     image = axes.images[0]
-    # Shown in kPa; cells without contact are masked, not coloured as zero.
+    # The pressure is in kPa; cells without contact are masked and not coloured as zero.
     assert image.get_array().max() == pytest.approx(200.0)
     assert image.get_array().mask.any()
     np.testing.assert_allclose(image.get_extent(), [-0.05, 2.35, -0.05, 1.55], atol=1e-12)
@@ -70,7 +70,7 @@ def test_signed_fields_have_a_symmetric_scale(result):
 
 
 def legend_of(axes):
-    """Return the texts of a legend."""
+    """Return the texts of the legend."""
     return [text.get_text() for text in axes.get_legend().get_texts()]
 
 
@@ -98,13 +98,13 @@ def test_traction_arrows_stand_in_contact(frictional):
     assert np.all(snapshot.contact[j, i] > 0)
     np.testing.assert_allclose(arrows.U, snapshot.traction_x[j, i])
     np.testing.assert_allclose(arrows.V, snapshot.traction_y[j, i])
-    # The key has a round length that is not longer than the longest arrow, and says its unit.
+    # The key shows a round length, at most that of the longest arrow, with its unit.
     (key,) = (item for item in axes.get_children() if isinstance(item, QuiverKey))
     assert f"{key.U:g}"[0] in "125"
     assert 0.4 * np.hypot(arrows.U, arrows.V).max() < key.U
     assert np.hypot(arrows.U, arrows.V).max() >= key.U
     assert key.text.get_text() == "traction 50 kPa"
-    # The longest arrow is somewhat longer than the squares that the map is cut into.
+    # The longest arrow may be somewhat longer than the squares into which the map is divided.
     longest = np.hypot(arrows.U, arrows.V).max() / arrows.scale
     assert longest == pytest.approx(1.5 * 2.4 / 22)
     assert not any(isinstance(item, Quiver)
@@ -146,7 +146,7 @@ def test_friction_is_split_into_its_causes(frictional):
 
 
 def test_attraction_outside_the_contact(tmp_path):
-    # One wave along x, moved by a known way; uniform attraction where the gap is open.
+    # One wave along x that has moved by a known distance; uniform attraction in open cells.
     path = frictional_result(tmp_path / "adhesive.h5", nx=64, ny=4)
     with h5py.File(path, "a") as file:
         file.attrs["settings"] = "&adhesion\n  potential = 'gauss'\n/\n"
@@ -163,7 +163,7 @@ def test_attraction_outside_the_contact(tmp_path):
     (line,) = (line for line in axes.lines if line.get_label().startswith("attraction"))
     k = 2 * np.pi / lx
     dx = lx / 64
-    slope = -1e-6 * np.sin(k * (x - way)) * np.sin(k * dx) / dx  # of central differences
+    slope = -1e-6 * np.sin(k * (x - way)) * np.sin(k * dx) / dx  # the factor of central differences
     expected = 1e3 * np.mean(slope * (x < lx / 4)) / pressure.mean()
     assert line.get_ydata()[-1] == pytest.approx(expected, rel=5e-3)
     assert line.get_xdata()[-1] == pytest.approx(5.0)  # ms
@@ -174,19 +174,19 @@ def test_stick_area_and_sliding_speed(frictional):
     lines = {line.get_label(): line.get_ydata() for line in run.plot("contact_area").lines}
     np.testing.assert_allclose(lines["sticking"], run.history["stick_area"])
     lines = {line.get_label(): line.get_ydata() for line in run.plot("sliding_speed").lines}
-    # The road does 20 um in each millisecond.
+    # The road moves by 20 um in each millisecond.
     np.testing.assert_allclose(lines["road against the block's top"][1:], 20.0)
     np.testing.assert_allclose(lines["mean of the interface"],
                                1e3 * run.history["sliding_speed"])
 
 
-def test_energy_tells_how_well_the_books_close(frictional):
+def test_energy_picture_shows_the_error_of_the_balance(frictional):
     axes = asperity.open(frictional).plot("energy")
     lines = {line.get_label(): line.get_ydata() for line in axes.lines}
     assert set(lines) == {"work put in", "stored", "lost in the rubber", "lost by friction"}
     total = lines["stored"] + lines["lost in the rubber"] + lines["lost by friction"]
     np.testing.assert_allclose(lines["work put in"][:-1], total[:-1], rtol=1e-12)
-    # The sample's last row misses a thousandth of the largest term.
+    # The sample's last row has an error of a thousandth of the largest term.
     assert "balance closes to 0.001" in [text.get_text() for text in axes.texts]
     assert axes.get_ylabel() == "energy (nJ)"
 
@@ -267,7 +267,7 @@ def test_overview_shows_persson_for_elastic_rough_contact(result):
     area = next(axes for axes in figure.axes if axes.get_legend())
     lines = {line.get_label(): line for line in area.lines}
     assert set(lines) == {"Persson (2001)", "this run"}
-    # A cosine product of amplitude a has the mean square slope a^2 (kx^2 + ky^2)/4.
+    # A product of cosines of amplitude a has the mean square slope a^2 (kx^2 + ky^2)/4.
     kx, ky = 2 * np.pi / 2.4e-3, 2 * np.pi / 1.6e-3
     slope = 2e-6 * np.sqrt((kx**2 + ky**2) / 4)
     line = lines["Persson (2001)"]
@@ -330,7 +330,7 @@ def test_a_jump_of_speed_is_drawn_over_the_travel(tmp_path):
     assert panel.lines[0].get_xdata()[-1] == pytest.approx(500.0)
 
 
-def test_titles_are_no_formulas(result, tmp_path):
+def test_titles_are_not_read_as_formulas(result, tmp_path):
     with h5py.File(result, "a") as file:
         file.attrs["title"] = "5 $ and $_ more"
     run = asperity.open(result)
@@ -339,7 +339,7 @@ def test_titles_are_no_formulas(result, tmp_path):
     assert is_picture(tmp_path / "overview.png")
 
 
-def test_a_small_contact_of_a_free_map_is_seen_from_near(tmp_path):
+def test_a_small_contact_of_a_free_map_is_enlarged(tmp_path):
     path = frictional_result(tmp_path / "sphere.h5", nx=64, ny=48, ly=1.8e-3, boundary="free")
     with h5py.File(path, "a") as file:
         contact = np.zeros((48, 64), np.int8)
@@ -359,7 +359,7 @@ def test_a_small_contact_of_a_free_map_is_seen_from_near(tmp_path):
     np.testing.assert_allclose(axes.get_xlim(), [-0.5 * 37.5e-3, 63.5 * 37.5e-3])
 
 
-def test_key_of_the_arrows_stands_above_a_flat_map(tmp_path):
+def test_key_of_the_arrows_is_above_a_flat_map(tmp_path):
     path = frictional_result(tmp_path / "flat.h5", nx=96, ny=6, ly=0.15e-3)
     axes = asperity.open(path).snapshots[-1].plot("contact")
     axes.figure.canvas.draw()
@@ -427,7 +427,7 @@ def test_a_film_has_a_frame_for_each_snapshot(road, tmp_path, monkeypatch, capsy
     assert "must be .gif or .mp4" in capsys.readouterr().err
 
 
-def test_a_full_disk_is_told_with_the_name_of_the_picture(tmp_path, monkeypatch, capsys):
+def test_a_full_disk_is_reported_with_the_name_of_the_picture(tmp_path, monkeypatch, capsys):
     from matplotlib.figure import Figure
 
     def full(figure, path, **options):
@@ -436,5 +436,5 @@ def test_a_full_disk_is_told_with_the_name_of_the_picture(tmp_path, monkeypatch,
     frictional_result(tmp_path / "road.h5")
     monkeypatch.setattr(Figure, "savefig", full)
     assert main(["plot", str(tmp_path / "road.h5")]) == 3
-    told = f"asperity: {tmp_path / 'road.png'}: No space left on device\n"
-    assert capsys.readouterr().err == told
+    printed = f"asperity: {tmp_path / 'road.png'}: No space left on device\n"
+    assert capsys.readouterr().err == printed

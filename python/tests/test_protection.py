@@ -1,4 +1,4 @@
-"""What a run leaves alone: inputs, other files, unfinished runs, and results that others write."""
+"""A run does not touch inputs, other files, unfinished runs, or results that others write."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ import asperity
 
 @pytest.fixture
 def case(tmp_path: Path) -> Path:
-    """Return the input of a run of some rows."""
+    """Return the input of a run with the given number of rows."""
     path = tmp_path / "y.nml"
     path.write_text(vc.text(size=24, steps=400))
     return path
 
 
 def stopped(program: str, case: Path, rows: int = 3) -> Path:
-    """Stop a run after some rows; return its result."""
+    """Stop a run after some rows and return its result."""
     result = case.with_suffix(".h5")
     process = vc.start(program, case)
     vc.wait_for_rows(process, result, rows, signal.SIGTERM)
@@ -38,7 +38,7 @@ def stopped(program: str, case: Path, rows: int = 3) -> Path:
 
 
 def test_unfinished_run_is_kept(program: str, case: Path) -> None:
-    """Without --restart or --overwrite an unfinished run, or its checkpoint alone, stays."""
+    """An unfinished run, or its checkpoint alone, is kept without --restart or --overwrite."""
     result = stopped(program, case)
     before = result.read_bytes()
     done = vc.run(program, case)
@@ -62,7 +62,7 @@ def test_unfinished_run_is_kept(program: str, case: Path) -> None:
 
 
 def test_overwrite_in_python(program: str, case: Path) -> None:
-    """`asperity.run` has the same switch."""
+    """`asperity.run` has the same option."""
     result = stopped(program, case)
     case.write_text(vc.text(size=24, steps=2))
     assert asperity.run(case, overwrite=True).finished
@@ -70,7 +70,7 @@ def test_overwrite_in_python(program: str, case: Path) -> None:
 
 
 def test_result_in_use(program: str, case: Path) -> None:
-    """A second run on the same result ends at once and names the first, which continues."""
+    """A second run on the same result ends at once and names the first one, which continues."""
     result = case.with_suffix(".h5")
     process = vc.start(program, case)
     vc.wait_for_rows(process, result, 2)
@@ -90,8 +90,8 @@ def test_result_in_use(program: str, case: Path) -> None:
     assert asperity.open(result).history["step"].tolist() == list(range(vc.count(result)))
 
 
-def test_dead_process_has_no_lock(program: str, case: Path) -> None:
-    """What a killed run leaves of its lock does not stop the next one."""
+def test_lock_of_a_dead_process_is_ignored(program: str, case: Path) -> None:
+    """The lock that a killed run leaves behind does not prevent the next run."""
     result = case.with_suffix(".h5")
     process = vc.start(program, case)
     vc.wait_for_rows(process, result, 2, signal.SIGKILL)
@@ -104,7 +104,7 @@ def test_dead_process_has_no_lock(program: str, case: Path) -> None:
 
 
 def test_many_at_once(program: str, case: Path) -> None:
-    """Of several runs that start together one writes the result, and the others say so."""
+    """Of several runs that start together, one writes the result and the others report it."""
     case.write_text(vc.text(size=24, steps=10))
     processes = [vc.start(program, case) for _ in range(6)]
     messages = [process.communicate(timeout=PATIENCE)[1] for process in processes]
@@ -117,7 +117,7 @@ def test_many_at_once(program: str, case: Path) -> None:
 
 @pytest.mark.parametrize("name", ["y.checkpoint.h5", "y.xdmf", "y.h5.new", "y.checkpoint.h5.new",
                                   "y.xdmf.new", "y.lock"])
-def test_files_of_others_stay(program: str, case: Path, name: str) -> None:
+def test_files_of_others_are_kept(program: str, case: Path, name: str) -> None:
     """A file that a run would write beside its result is replaced only if Asperity wrote it."""
     other = case.with_name(name)
     other.write_text("a diary, four years long")
@@ -133,7 +133,7 @@ def test_files_of_others_stay(program: str, case: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["y.checkpoint.h5", "y.xdmf", "y.h5.new", "y.lock", "y.h5"])
-def test_height_map_stays(program: str, tmp_path: Path, name: str) -> None:
+def test_height_map_is_kept(program: str, tmp_path: Path, name: str) -> None:
     """A height map with the name of a file of the run is an error of the input."""
     with h5py.File(tmp_path / name, "w") as file:
         file["surface/height"] = np.zeros((8, 8))
@@ -147,8 +147,8 @@ def test_height_map_stays(program: str, tmp_path: Path, name: str) -> None:
     assert (tmp_path / name).read_bytes() == before
 
 
-def test_other_hdf5_file_stays(program: str, case: Path) -> None:
-    """A file that is not a result is never replaced, whether it is an HDF5 file or not."""
+def test_other_hdf5_file_is_kept(program: str, case: Path) -> None:
+    """A file that is not a result is never replaced, whether it is in HDF5's format or not."""
     result = case.with_suffix(".h5")
     with h5py.File(result, "w") as file:
         file["precious"] = 1.0
@@ -161,8 +161,8 @@ def test_other_hdf5_file_stays(program: str, case: Path) -> None:
         result.write_text("a letter")
 
 
-def test_devices_and_pipes_stay(program: str, case: Path, tmp_path: Path) -> None:
-    """What is not a regular file is not replaced by one."""
+def test_devices_and_pipes_are_kept(program: str, case: Path, tmp_path: Path) -> None:
+    """A device, a pipe or a link to nothing is not replaced by a regular file."""
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     dangling = tmp_path / "dangling.h5"
@@ -180,8 +180,8 @@ def test_devices_and_pipes_stay(program: str, case: Path, tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGXCPU])
 def test_other_signals_leave_a_checkpoint(program: str, case: Path, number: signal.Signals) -> None:
-    """A terminal that is gone and a batch system's warning stop a run as SIGTERM does."""
-    # The shell that runs the tests may ignore the signal, and a run inherits that.
+    """The signal of a closed terminal and that of a batch system stop a run as SIGTERM does."""
+    # The shell that runs the tests may ignore the signal; a run would inherit this.
     process = vc.start(program, case,
                        preexec_fn=lambda: signal.signal(number, signal.SIG_DFL))
     vc.wait_for_rows(process, case.with_suffix(".h5"), 3, number)
@@ -192,7 +192,7 @@ def test_other_signals_leave_a_checkpoint(program: str, case: Path, number: sign
 
 
 def test_nohup(program: str, case: Path) -> None:
-    """A hang-up that is ignored at the start stays ignored."""
+    """A hang-up signal that is ignored at the start remains ignored."""
     case.write_text(vc.text(size=24, steps=30))
     process = vc.start(program, case,
                        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
@@ -202,14 +202,14 @@ def test_nohup(program: str, case: Path) -> None:
 
 
 def test_time_limit(program: str, tmp_path: Path) -> None:
-    """A run stops before its limit, given or of the Slurm job, with a checkpoint to go on from."""
+    """A run stops before its limit (an option, or Slurm's) and writes a checkpoint to continue."""
     case = tmp_path / "y.nml"
     case.write_text(vc.text(size=96, steps=20000))
     result = case.with_suffix(".h5")
     start = time.monotonic()
     done = vc.run(program, case, "--time-limit", "0:03")
     assert done.returncode == 124, done.stderr
-    assert time.monotonic() - start < 30.0  # the whole run takes minutes
+    assert time.monotonic() - start < 30.0  # the whole run would take minutes
     assert "the time limit is near: stopped after step" in done.stderr
     rows = vc.count(result)
     environment = dict(os.environ, SLURM_JOB_END_TIME=str(int(time.time()) + 5))
@@ -220,19 +220,19 @@ def test_time_limit(program: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("text", ["", "x", "1:2:3:4", "0", "-1", "1-", "1.5", ":", "99999999999"])
 def test_time_limit_is_checked(program: str, case: Path, text: str) -> None:
-    """A text that is not a duration is an error of the command line."""
+    """A text that is not a duration is an error in the command line."""
     done = vc.run(program, case, f"--time-limit={text}")
     assert done.returncode == 2, done.stderr
     assert "--time-limit" in done.stderr
 
 
 def test_stop_before_the_first_row_promises_nothing(program: str, tmp_path: Path) -> None:
-    """Without a row there is no checkpoint, and the message says so; the run can start again."""
+    """Without a row there is no checkpoint; the message says so, and the run can start again."""
     case = tmp_path / "y.nml"
     case.write_text(vc.text(size=24))
     done = vc.run(program, case, "--time-limit", "1",
                   env=dict(os.environ, SLURM_JOB_END_TIME="1"))
-    assert done.returncode == 0  # what is given counts
+    assert done.returncode == 0  # the option has priority
     case.with_suffix(".h5").unlink()
     done = vc.run(program, case, env=dict(os.environ, SLURM_JOB_END_TIME="1"))
     assert done.returncode == 124
@@ -242,7 +242,7 @@ def test_stop_before_the_first_row_promises_nothing(program: str, tmp_path: Path
 
 
 def test_python_stops_as_the_program_does(case: Path) -> None:
-    """SIGTERM to a script that runs a case leaves a checkpoint and ends the script."""
+    """A script that runs a case and gets SIGTERM leaves a checkpoint and ends."""
     script = f"import asperity; asperity.run({str(case)!r}, threads=1)"
     process = subprocess.Popen([os.sys.executable, "-c", script], stderr=subprocess.PIPE, text=True)
     vc.wait_for_rows(process, case.with_suffix(".h5"), 3, signal.SIGTERM)
@@ -253,15 +253,15 @@ def test_python_stops_as_the_program_does(case: Path) -> None:
 
 
 def test_threads_of_the_environment() -> None:
-    """Where no number is given, OMP_NUM_THREADS counts, then Slurm's, then the processors."""
+    """Without a given number OMP_NUM_THREADS counts, then Slurm's, then that of processors."""
     script = "import asperity; print(asperity.set_threads(0))"
 
     def used(**variables: str) -> int:
         environment = {name: value for name, value in os.environ.items()
                        if name not in ("OMP_NUM_THREADS", "SLURM_CPUS_PER_TASK")}
-        told = subprocess.run([os.sys.executable, "-c", script], env=environment | variables,
+        printed = subprocess.run([os.sys.executable, "-c", script], env=environment | variables,
                               capture_output=True, text=True, check=True)
-        return int(told.stdout)
+        return int(printed.stdout)
 
     processors = len(os.sched_getaffinity(0))
     assert used() == processors
@@ -289,7 +289,7 @@ print("done")
 
 
 def test_fork_after_a_call() -> None:
-    """Copies of a process that has used threads can use the library."""
+    """Forked copies of a process that has used threads can use the library."""
     done = subprocess.run([os.sys.executable, "-c", FORK], capture_output=True, text=True,
                           timeout=PATIENCE, check=False)
     assert done.stdout == "done\n", done.stderr
@@ -318,7 +318,7 @@ print("done")
 
 
 def test_memory_error(tmp_path: Path) -> None:
-    """Too little memory is MemoryError, and the interpreter lives."""
+    """If there is too little memory, MemoryError is raised and the interpreter continues."""
     case = tmp_path / "y.nml"
     case.write_text(LARGE.replace("20000", "2500"))
     done = subprocess.run([os.sys.executable, "-c", MEMORY.replace("CASE", repr(str(case)))],
@@ -367,7 +367,7 @@ except (MemoryError, OSError) as error:
 @pytest.mark.parametrize("what", ["normal", "free", "adhesive", "adhesive, free", "operator",
                                   "run"])
 def test_no_limit_of_memory_ends_the_interpreter(tmp_path: Path, what: str) -> None:
-    """From a limit that allows nothing to one that allows all: an exception, then the result."""
+    """For limits from nothing to enough there is an exception, then the result."""
     case = tmp_path / "y.nml"
     case.write_text("""
 &grid nx = 500, ny = 480, lx = 1 /
@@ -425,7 +425,7 @@ def set_address_space(limit: int) -> None:
 
 
 def test_check_knows_the_machine(program: str, tmp_path: Path) -> None:
-    """`asperity check` warns of a case that is larger than the machine."""
+    """`asperity check` warns of a case that needs more memory than the machine has."""
     case = tmp_path / "y.nml"
     case.write_text(LARGE.replace("20000", "40000"))
     done = subprocess.run([program, "check", str(case)], capture_output=True, text=True, check=True)

@@ -1,4 +1,4 @@
-"""The texts hold: tables agree with what the program and the validation give."""
+"""Tables and links of the pages agree with the program and the validation."""
 
 import re
 import runpy
@@ -98,9 +98,9 @@ def test_the_advice_on_the_mesh_is_measured():
     text, _ = runpy.run_path(str(ROOT / "tools" / "choosing.py"))["mesh"]()
     page = (ROOT / "docs" / "choosing.md").read_text()
     kept = page.split("<!-- mesh: begin -->")[1].split("<!-- mesh: end -->")[0]
-    measured, told = rows(text)[1:], rows(kept)[1:]
+    measured, computed = rows(text)[1:], rows(kept)[1:]
     assert len(measured) == 5
-    for row, line in zip(measured, told, strict=True):
+    for row, line in zip(measured, computed, strict=True):
         assert [float(cell) for cell in line] == pytest.approx([float(cell) for cell in row],
                                                               abs=2e-4)
 

@@ -1,4 +1,4 @@
-"""The page about a result: what it holds, and how it behaves in a browser."""
+"""The page about a result: its contents and its behaviour in a browser."""
 
 import base64
 import json
@@ -24,7 +24,7 @@ VOID = {"area", "base", "br", "col", "hr", "img", "input", "link", "meta", "sour
 
 
 class Page(HTMLParser):
-    """Checks that elements are closed in order, and gathers what a test asks for."""
+    """Checks that elements are closed in order, and collects the parts that the tests examine."""
 
     def __init__(self, text):
         super().__init__()
@@ -60,19 +60,19 @@ class Page(HTMLParser):
 
     @property
     def data(self):
-        """The data that the page carries."""
+        """Return the data that the page contains."""
         return json.loads(self.text["data"])
 
 
 def unpack(field, shape):
-    """Return a packed field as numbers."""
+    """Return the numbers of a packed field."""
     whole = np.frombuffer(base64.b64decode(field["data"]), "<u2").astype(float)
     return (field["low"] + whole * (field["high"] - field["low"]) / 65535).reshape(shape)
 
 
 @pytest.fixture(scope="module")
 def sliding(program, tmp_path_factory):
-    """Return the result of a short run with friction on a block."""
+    """Return the result of a short run of a block with friction."""
     folder = tmp_path_factory.mktemp("report")
     case = subprocess.run([program, "template", "friction"], capture_output=True, text=True,
                           check=True).stdout
@@ -88,16 +88,16 @@ def sliding(program, tmp_path_factory):
 
 
 def check_page(text):
-    """Check what holds of every page; return it parsed."""
+    """Check what must hold for every page, and return it parsed."""
     page = Page(text)
     assert page.faults == []
     assert len(set(page.ids)) == len(page.ids)
     assert text.startswith("<!DOCTYPE html>")
-    # Nothing is fetched: all links lead to places in the page.
+    # Nothing is loaded: all links lead to places in the page.
     assert all(link.startswith("#") and link[1:] in page.ids for link in page.links)
     assert not re.search(r"(?i)\burl\((?!#)|@import|fetch\(|XMLHttpRequest|\bimport\s*\(", text)
     hosts = set(re.findall(r"https?://([\w.]+)", text))
-    assert hosts <= {"www.w3.org"}  # the names of SVG
+    assert hosts <= {"www.w3.org"}  # identifiers of SVG
     policy = [given["content"] for tag, given in page.tags
               if given.get("http-equiv") == "Content-Security-Policy"]
     assert policy and policy[0].startswith("default-src 'none'")
@@ -110,7 +110,7 @@ def test_page_holds_the_result(sliding):
     text = report_page(run)
     page = check_page(text)
     data = page.data
-    # The title and the input as they are, neither cut nor taken for parts of the page.
+    # The title and the input appear unchanged: not cut, and not read as parts of the page.
     assert page.text["h1"] == "Rubber <block> & {{title}} on a wavy road"
     assert "title = 'Rubber <block> & {{title}} on a wavy road'" in page.text["pre"]
     for name in ("friction", "friction_viscous", "contact_area", "stick_area", "time",
@@ -140,7 +140,7 @@ def test_page_holds_the_result(sliding):
         np.testing.assert_allclose(along, snapshot.traction_x[j, i], rtol=1e-9)
         np.testing.assert_allclose(across, snapshot.traction_y[j, i], rtol=1e-9)
         assert each["time"] == snapshot.time
-    # The road's spectrum: modes of one length, each of the same strength.
+    # The spectrum of the road has modes of one length and equal strength.
     spectrum = asperity.surface.psd(run.height, run.grid.lx, run.grid.ly)
     strongest = int(np.argmax(spectrum.psd))
     road = data["spectrum"]
@@ -148,7 +148,7 @@ def test_page_holds_the_result(sliding):
     assert road["k"][int(np.argmax(road["psd"]))] == pytest.approx(
         spectrum.wavenumber[strongest], rel=0.1)
     assert data["modulus"]["storage"][-1] == pytest.approx(4e6, rel=1e-3)
-    # What the sections say.
+    # The headings of the sections.
     for words in ("Friction and contact area", "Maps", "Case and material", "Convergence",
                   "Energies", "Spectra of road and rubber", "How it was made", "coulomb"):
         assert words in text
@@ -187,7 +187,7 @@ def test_an_unfinished_run_says_so(tmp_path):
 def test_a_killed_run_and_one_without_rows(tmp_path):
     path = frictional_result(tmp_path / "killed.h5", finished=0)
     with h5py.File(path, "a") as file:
-        # Columns of different lengths: the rows that all have are shown.
+        # The columns have different lengths; the page shows the rows that all of them have.
         for number, column in enumerate(file["history"].values()):
             column.resize((4 + number % 2,))
     assert len(check_page(report_page(asperity.open(path))).data["columns"]["time"]) == 4
@@ -275,7 +275,7 @@ def test_blocks_and_states():
     field = np.arange(15.0).reshape(3, 5)
     np.testing.assert_allclose(blocks(field, 2), [[3, 5, 6.5], [10.5, 12.5, 14]])
     contact = np.array([[0, 0, 1, 1, 2], [0, 2, 2, 2, 2]], dtype=np.int8)
-    np.testing.assert_array_equal(states(contact, 2), [[0, 2, 2]])  # of equals the higher
+    np.testing.assert_array_equal(states(contact, 2), [[0, 2, 2]])  # the higher of equals
     flat = packed(np.full((2, 2), 3.0))
     np.testing.assert_array_equal(unpack(flat, (2, 2)), 3.0)
 
@@ -323,7 +323,7 @@ def browser(tmp_path_factory):
 
 
 def wait_for(browser, script, *arguments):
-    """Wait until a script returns something true; return it."""
+    """Wait until the script returns something true, and return it."""
     until = time.monotonic() + PATIENCE
     while time.monotonic() < until:
         found = browser.run(script, *arguments)
@@ -334,14 +334,14 @@ def wait_for(browser, script, *arguments):
 
 
 READY = "return document.documentElement.dataset.ready === 'yes'"
-# What reaches out of the page to the right, or out of its own box.
+# Elements that reach beyond the right edge of the page, or out of their own box.
 CUT = """
 return [...document.querySelectorAll('main *, header *')].filter((e) => {
   if (e.closest('pre, .wide, nav')) return false;
   const box = e.getBoundingClientRect();
   return box.width > 0 && (box.right > innerWidth + 1 || box.left < -1);
 }).map((e) => e.tagName + '.' + e.getAttribute('class'))"""
-# Texts of a chart or map that lie on one another.
+# Texts of a chart or map that overlap.
 OVERLAPS = """
 const found = [];
 for (const root of document.querySelectorAll('figure svg')) {
@@ -452,12 +452,12 @@ def test_zoom_slider_and_switch_work(browser, tmp_path, sliding):
     browser.drag((x + 0.5 * width, y + 0.5 * height), (x + 0.75 * width, y + 0.5 * height))
     zoomed = wait_for(browser, f"const t = (() => {{ {ticks} }})();"
                                " return t[0] !== arguments[0] && t", before[0])
-    # The charts zoom together, and a double click shows all.
+    # All charts zoom together, and a double click shows everything again.
     assert all(one != two for one, two in zip(before, zoomed, strict=True))
     browser.run("document.querySelector('#charts-time svg[role=img]').dispatchEvent("
                 "new MouseEvent('dblclick', {bubbles: true}))")
     assert browser.run(ticks) == before
-    # By keyboard: zoom in, show all; read the last value.
+    # The same by keyboard: zoom in, show everything, read the last value.
     browser.run("document.querySelector('#charts-time svg[role=img]').focus()")
     browser.press("+")
     assert browser.run(ticks)[0] != before[0]
@@ -467,42 +467,42 @@ def test_zoom_slider_and_switch_work(browser, tmp_path, sliding):
     readout = browser.run("return document.querySelector('#charts-time .readout').textContent")
     assert f"whole {run.history['friction'][-1]:.4g}" in readout
     assert "Time 1.5 ms" in readout
-    # Under the mouse stands the value of the nearest row.
+    # The value next to the mouse is that of the nearest row.
     browser.drag((x + 0.4 * width, y + 20), (x + 0.4 * width + 2, y + 20))
     readout = browser.run("return document.querySelector('#charts-time .readout').textContent")
     shown = float(re.search(r"whole ([\d.e−]+)", readout)[1].replace("−", "-"))
     assert np.abs(run.history["friction"] - shown).min() < 1e-3 * max(shown, 1e-3)
 
-    # The slider by keyboard: other maps, other words.
+    # The slider by keyboard shows other maps with other captions.
     maps = ("return [...document.querySelectorAll('canvas')].map((c) => {"
             " const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
             " let s = 0; for (let i = 0; i < d.length; i++) s = (31 * s + d[i]) % 1000003;"
             " return s; })")
     last = browser.run(maps)
-    assert len(last) == 4          # the road, and the three maps of the slider
-    told = "return document.getElementById('step-shown').textContent"
-    assert browser.run(told).startswith(f"step {run.snapshots.steps[-1]},")
+    assert len(last) == 4  # the road, and the three maps of the slider
+    caption = "return document.getElementById('step-shown').textContent"
+    assert browser.run(caption).startswith(f"step {run.snapshots.steps[-1]},")
     browser.run("document.getElementById('step').focus()")
     browser.press("\ue011")  # Home
-    assert browser.run(told).startswith(f"step {run.snapshots.steps[0]},")
+    assert browser.run(caption).startswith(f"step {run.snapshots.steps[0]},")
     assert browser.run(maps)[0] != last[0]
     browser.press("\ue014")  # right
-    assert browser.run(told).startswith(f"step {run.snapshots.steps[1]},")
-    # The map's values by keyboard: the cell right of the middle.
+    assert browser.run(caption).startswith(f"step {run.snapshots.steps[1]},")
+    # The map's values by keyboard: the cell to the right of the centre.
     browser.run("document.querySelector('canvas').focus()")
     browser.press("\ue014")
     word = browser.run("return document.querySelector('.map .readout').textContent")
     pressure = run.snapshots[1].pressure
-    told = float(re.search(r": ([\d.]+) kPa", word)[1])
-    assert told == pytest.approx(pressure[14, 25] / 1e3, rel=2e-3)
+    shown = float(re.search(r": ([\d.]+) kPa", word)[1])
+    assert shown == pytest.approx(pressure[14, 25] / 1e3, rel=2e-3)
 
-    # Light and dark by the switch, whatever the system says.
+    # The switch selects light or dark, whatever the system's setting is.
     papers = []
     for _ in range(3):
         browser.run("document.getElementById('theme').click()")
         papers.append(browser.run("return getComputedStyle(document.body).backgroundColor"))
     assert papers == ["rgb(255, 255, 255)", "rgb(20, 24, 28)", "rgb(255, 255, 255)"]
-    # This test reads the canvases, the page does not.
+    # The test reads the canvases; the page itself does not.
     assert [text for text in browser.console() if "getImageData" not in text] == []
 
 

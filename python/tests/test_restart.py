@@ -1,4 +1,4 @@
-"""A run that stops and continues gives the same numbers as one that never stopped."""
+"""A run that stops and continues has the same numbers as one without a stop."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def reference(program: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def case(tmp_path: Path) -> Path:
-    """Return the input of the same run."""
+    """Return the input of the run of `reference`."""
     path = tmp_path / "case.nml"
     path.write_text(vc.text())
     return path
@@ -69,10 +69,10 @@ def test_a_finished_run_leaves_no_checkpoint(program: str, reference: Path) -> N
 
 
 def test_killed_before_the_root_group_was_written(program: str, tmp_path: Path) -> None:
-    """HDF5 writes the superblock first: what a kill then leaves is replaced like any beginning."""
+    """HDF5 writes the superblock first: the file that a kill then leaves is replaced."""
     case = tmp_path / "case.nml"
     case.write_text(vc.text())
-    # Version 2, base 0, no extension, end of file 0x13ec, root group at 0x1000, checksum.
+    # Version 2, base 0, no extension, end of file at 0x13ec, root group at 0x1000, checksum.
     superblock = ("894844460d0a1a0a 02080801 0000000000000000 ffffffffffffffff ec13000000000000"
                   "0010000000000000 b398dd51")
     beginning = tmp_path / "case.h5.new"
@@ -84,7 +84,7 @@ def test_killed_before_the_root_group_was_written(program: str, tmp_path: Path) 
 
 
 def test_killed_at_any_moment(program: str, tmp_path: Path, reference: Path) -> None:
-    """kill -9 again and again: the result opens each time, and going on gives the same numbers."""
+    """After each kill -9 the result can be opened, and the continued run has the same numbers."""
     case = tmp_path / "case.nml"
     case.write_text(vc.text(output="checkpoint_every = 3, checkpoint_minutes = 0"))
     result = case.with_suffix(".h5")
@@ -116,7 +116,7 @@ def test_killed_at_any_moment(program: str, tmp_path: Path, reference: Path) -> 
 
 
 def test_other_case(program: str, case: Path) -> None:
-    """A checkpoint of another case is refused; the message says what differs."""
+    """A checkpoint of another case is refused, and the message says what differs."""
     stop(program, case, 5)
     rows = vc.count(case.with_suffix(".h5"))
     for old, new, names in (
@@ -135,13 +135,13 @@ def test_other_case(program: str, case: Path) -> None:
         for name in names:
             assert name in done.stderr, done.stderr
         assert vc.count(case.with_suffix(".h5")) == rows
-    # what the numbers do not depend on may change
+    # settings that do not affect the numbers may change
     case.write_text(vc.text(output="checkpoint_every = 7").replace("threads = 1", "threads = 2"))
     assert vc.run(program, case, "--restart").returncode == 0
 
 
 def write_map(folder: Path, heights: np.ndarray) -> None:
-    """Write the height map that the cases below read."""
+    """Write the height map of the cases below."""
     with h5py.File(folder / "map.h5", "w") as file:
         file["surface/height"] = heights
 
@@ -162,7 +162,7 @@ def stopped_case(program: str, folder: Path, name: str, extra: str = "") -> Path
 
 
 def test_other_height_map(program: str, tmp_path: Path) -> None:
-    """A map with the same values at other places has the same rms height and summit."""
+    """A map with the same values in other places, so the same rms height and summit, is refused."""
     heights = 4e-6 * np.random.default_rng(1).standard_normal((17, 24))
     write_map(tmp_path, heights)
     case = stopped_case(program, tmp_path, "case")
@@ -175,7 +175,7 @@ def test_other_height_map(program: str, tmp_path: Path) -> None:
 
 
 def test_result_of_another_run(program: str, tmp_path: Path) -> None:
-    """A checkpoint continues only the result that it was written with."""
+    """A checkpoint continues only the result that it was written for."""
     heights = 4e-6 * np.random.default_rng(1).standard_normal((17, 24))
     write_map(tmp_path, heights)
     case = stopped_case(program, tmp_path, "case")
@@ -218,7 +218,7 @@ def test_checkpoint_without_its_result(program: str, case: Path) -> None:
 
 
 def test_output_elsewhere(program: str, case: Path, tmp_path: Path, reference: Path) -> None:
-    """--restart continues the result that --output names."""
+    """--restart continues the result given by --output."""
     elsewhere = tmp_path / "folder"
     elsewhere.mkdir()
     process = vc.start(program, case, "--output", str(elsewhere / "road.h5"))
@@ -262,7 +262,7 @@ def test_nowhere_to_write(program: str, case: Path, tmp_path: Path) -> None:
 
 
 def test_no_convergence(program: str, tmp_path: Path) -> None:
-    """Exit 4 keeps all there is, and the file says that the run is not finished."""
+    """The run ends with status 4, keeps its rows, and its file says that it is not finished."""
     case = tmp_path / "case.nml"
     case.write_text(vc.text(extra=", max_iterations = 1, tolerance = 1e-9"))
     done = vc.run(program, case)
@@ -277,7 +277,7 @@ def test_no_convergence(program: str, tmp_path: Path) -> None:
 
 def test_checkpoint_is_not_touched_by_a_failing_write(program: str, case: Path,
                                                       tmp_path: Path) -> None:
-    """A checkpoint that cannot be written leaves the old one."""
+    """If a checkpoint cannot be written, the previous one is kept."""
     stop(program, case, 5)
     checkpoint = case.with_suffix(".checkpoint.h5")
     kept = tmp_path / "kept.h5"
@@ -303,7 +303,7 @@ EVERYTHING = """
 
 
 def test_friction_adhesion_and_inertia(program: str, tmp_path: Path) -> None:
-    """All that a state can hold survives a kill, to the last bit."""
+    """Every part of the state survives a kill, in all bits."""
     whole, parts = tmp_path / "whole.nml", tmp_path / "parts.nml"
     for path in (whole, parts):
         path.write_text(EVERYTHING)
@@ -318,5 +318,5 @@ def test_friction_adhesion_and_inertia(program: str, tmp_path: Path) -> None:
     kept = h["energy_elastic"] + h["energy_adhesive"] + h["energy_kinetic"]
     lost = h["dissipated_viscous"] + h["dissipated_friction"]
     balance = h["work_normal"] + h["work_tangential"] - kept - lost
-    # To round-off, or to the tolerance of the tangential solver where its last return is felt.
+    # To round-off, or to the tangential solver's tolerance if its last return map has an effect.
     assert abs(balance).max() < 1e-6 * abs(kept).max()

@@ -1,4 +1,4 @@
-"""The page on looking at results: its commands and snippets run."""
+"""The commands and snippets of the page on looking at results are run."""
 
 import os
 import re
@@ -22,16 +22,16 @@ def test_commands_of_the_page(program, road):
     assert len(commands) == 3
     path = os.pathsep.join([str(Path(program).parent), str(Path(sys.executable).parent),
                             os.environ["PATH"]])
-    told = ""
+    printed = ""
     for block in commands:
         done = subprocess.run(["sh", "-ec", block], cwd=road, capture_output=True, text=True,
                               check=False, timeout=PATIENCE, env={**os.environ, "PATH": path})
         assert done.returncode == 0, done.stderr
-        told += done.stdout
+        printed += done.stdout
     for name in ("road.png", "friction.pdf", "contact.png", "report.html"):
         assert (road / name).stat().st_size > 5000
-        assert f"wrote {name}" in told
-    assert "finished, 65 of 65 rows" in told
+        assert f"wrote {name}" in printed
+    assert "finished, 65 of 65 rows" in printed
 
 
 def test_snippets_of_the_page(road, monkeypatch, capsys):
@@ -42,7 +42,7 @@ def test_snippets_of_the_page(road, monkeypatch, capsys):
     plt.close("all")
     friction, pressure = capsys.readouterr().out.splitlines()
     whole, part = map(float, re.findall(r"\d+\.\d+", friction))
-    assert 0.45 < part < whole < 0.65  # a coefficient of 0.5 and the loss in the rubber
+    assert 0.45 < part < whole < 0.65  # the coefficient 0.5, and the loss
     assert pressure.endswith(" Pa") and float(pressure.split()[0]) > 1e6
     rows = (road / "road.csv").read_text().splitlines()
     assert len(rows) == 66 and "friction" in rows[0]

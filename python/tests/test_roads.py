@@ -1,4 +1,4 @@
-"""Roads: joins, outliers, spectra and patches, against closed forms and roads that are known."""
+"""Roads: joins, outliers, spectra and patches, against closed forms and known roads."""
 
 import h5py
 import numpy as np
@@ -22,13 +22,13 @@ from asperity.roads.spectra import Spectrum, isotropic_of_profile, join_spectra,
 
 
 def road(cells=256, long=0.25, short=8 / 256, seed=1):
-    """Return a periodic road of side 1 and its spectrum, rms slope 0.1."""
+    """Return a periodic road of side 1 with an rms slope of 0.1, and its spectrum."""
     spectrum = Spectrum(*theory.self_affine_psd(0.8, long, long, short, rms_slope=0.1))
     return spectrum.draw(cells, cells, 1.0, 1.0, seed), spectrum
 
 
 def jump(height):
-    """Return the largest step across the opposite edges over the largest one inside."""
+    """Return the largest step across opposite edges over the largest step inside."""
     inside = max(np.abs(np.diff(height, axis=axis)).max() for axis in (0, 1))
     across = max(np.abs(height[0] - height[-1]).max(), np.abs(height[:, 0] - height[:, -1]).max())
     return across / inside
@@ -43,7 +43,7 @@ def test_joined_patches_are_periodic(method):
     joined = join(part, method, (96, 96))
     assert joined.shape == ((192, 192) if method == "mirror" else (96, 96))
     assert jump(joined) < 1.3
-    # the inside is that of the road, but for what carries the jumps
+    # inside, only the smooth part that carries the jumps has been taken off
     inner = slice(24, 72)
     change = joined[inner, inner] - part[inner, inner]
     if method in ("seam", "blend", "mirror"):
@@ -52,7 +52,7 @@ def test_joined_patches_are_periodic(method):
 
 
 def test_the_smooth_part_has_the_laplacian_of_the_jumps():
-    """Periodic plus smooth: inside, both have the Laplacian of the map, and 0."""
+    """Inside, the periodic part has the Laplacian of the map, and the smooth part has 0."""
     height, _ = road(64, short=0.125)
     part = height[:48, :40]
     smooth = smooth_part(part)
@@ -68,7 +68,7 @@ def test_the_smooth_part_has_the_laplacian_of_the_jumps():
 
 
 def test_blending_keeps_the_roughness():
-    """The weights' squares sum to 1: where parts are independent the variance stays."""
+    """The squares of the weights sum to 1, which keeps the variance of independent parts."""
     heights = []
     for seed in range(6):
         height, spectrum = road(seed=seed, long=0.1)
@@ -80,7 +80,7 @@ def test_blending_keeps_the_roughness():
 
 
 def test_load_at_the_join():
-    """A uniform pressure has equal shares; a frame that carries all is seen."""
+    """A uniform pressure has equal shares; a frame that carries the whole load is recognised."""
     even = np.ones((64, 64))
     for method in JOINS[:5]:
         load, area = load_at_join(even, method)
@@ -90,7 +90,7 @@ def test_load_at_the_join():
 
 
 def test_the_window_unloads_its_frame_and_the_default_does_not():
-    """What tools/joins.py measures on larger maps, for one map of short waves."""
+    """This repeats, for one map of short waves, what tools/joins.py measures on larger maps."""
     shares = {}
     for method in ("seam", "blend", "window"):
         found = []
@@ -121,7 +121,7 @@ def stones(cells=288, seed=1):
 
 
 def test_the_seam_makes_no_summits_that_the_road_lacks():
-    """Tops on both sides of a join stay in their plane; blending lifts them above it."""
+    """Tops on both sides of a seam stay in their plane, while blending raises them above it."""
     height = stones()
     for method, low, high in (("seam", 0.0, 0.05), ("blend", 0.2, 1.0)):
         need = 96 + margin_of(96, method)
@@ -135,7 +135,7 @@ def test_the_seam_makes_no_summits_that_the_road_lacks():
 
 
 def test_the_line_of_a_seam_is_the_cheapest_and_closed():
-    """Where both sides agree in a winding valley, the line follows it."""
+    """If both sides agree along a winding valley, the seam follows it."""
     rows = np.arange(96)
     valley = np.round(12 + 4 * np.sin(2 * np.pi * rows / 96)).astype(int)
     cost = np.ones((96, 24))
@@ -151,7 +151,7 @@ def test_the_line_of_a_seam_is_the_cheapest_and_closed():
 
 
 def _closed_paths(cost):
-    """Yield, for each start, the best path by another program: relaxation until it settles."""
+    """Yield the best path for each start, found by another method: relaxation until it settles."""
     rows, columns = cost.shape
     for start in range(columns):
         best = {(0, start): (cost[0, start], [start])}
@@ -167,7 +167,7 @@ def _closed_paths(cost):
 
 
 def test_patches_rest_on_their_tops():
-    """Valleys on one side only do not tilt a road whose tops lie in a plane."""
+    """Valleys on one side only do not tilt a road whose summits lie in a plane."""
     x = np.linspace(0.0, 1.0, 96)
     road_ = np.where(np.arange(96) % 12 < 6, 0.0, -0.2 * x) + np.zeros((96, 1))
     def tilt(map_):
@@ -184,7 +184,7 @@ def test_outliers_are_single_cells_and_not_steep_edges():
     assert find_outliers(height).count == 0
     y, x = np.mgrid[0:256, 0:256] / 256
     stones = np.cos(8 * np.pi * x + 1) * np.cos(6 * np.pi * y) > 0.2
-    steps = height + 0.5 * stones                       # with vertical sides
+    steps = height + 0.5 * stones  # pillars with vertical sides
     assert find_outliers(steps).count == 0
     dusty = height.copy()
     dusty[100, 31] += 1.0
@@ -201,7 +201,7 @@ def test_outliers_are_single_cells_and_not_steep_edges():
 def test_drawn_maps_have_the_spectrum():
     height, spectrum = road()
     found = spectrum_of_map(height, 1.0, 1.0, periodic=True)
-    # the band in which the spectrum ends is filled in part
+    # the band at the end of the spectrum is only partly filled
     inside = found.wavenumber < 0.95 * spectrum.wavenumber[-1]
     assert inside.sum() >= len(inside) - 1
     np.testing.assert_allclose(found.psd[inside], spectrum.at(found.wavenumber[inside]), rtol=0.05)
@@ -209,8 +209,8 @@ def test_drawn_maps_have_the_spectrum():
     assert np.any(height != road(seed=2)[0])
 
 
-def test_a_profile_stands_for_its_isotropic_road():
-    """Abel's transform, closed form: Phi = (1 + k^2)^-2 has the profile (1 + k^2)^-1.5 / 4."""
+def test_a_profile_has_the_spectrum_of_its_isotropic_road():
+    """By Abel's transform Phi = (1 + k^2)^-2 has the profile (1 + k^2)^-1.5 / 4."""
     k = np.geomspace(1e-2, 1e3, 400)
     found = isotropic_of_profile(k, 0.25 * (1 + k**2) ** -1.5)
     inner = (found.wavenumber > 0.05) & (found.wavenumber < 300.0)
@@ -239,7 +239,7 @@ def test_scans_are_joined_within_their_ranges():
     ratio = joined.at(k) / whole.at(k)
     assert (ratio > 1.0 - 1e-9).all() and (ratio < 1.21 + 1e-9).all()
     assert ratio[0] == pytest.approx(1.0) and ratio[-1] == pytest.approx(1.21)
-    assert np.abs(np.diff(np.log(ratio))).max() < 0.12    # no step
+    assert np.abs(np.diff(np.log(ratio))).max() < 0.12  # the joined spectrum has no step
     apart = join_spectra([whole.cut(short=2 * np.pi / 1e3), whole.cut(long=2 * np.pi / 1e5)])
     assert any("no scan tells of waves" in note for note in apart.notes)
     np.testing.assert_allclose(apart.at(k), whole.at(k), rtol=1e-6)
@@ -251,7 +251,7 @@ def measured(cells=256, periodic=False, seed=1):
                            source={"name": f"scan {seed}", "format": "x", "metadata": {}})
 
 
-def test_patches_are_apart_and_the_same_again(tmp_path):
+def test_patches_do_not_overlap_and_are_reproducible(tmp_path):
     made = MeasuredRoad([measured()], 64)
     assert made.join == "seam" and made.count == 9
     codes = [made.patch(number).code for number in range(9)]
@@ -263,7 +263,7 @@ def test_patches_are_apart_and_the_same_again(tmp_path):
     patch = made.patch(0)
     assert patch.height.shape == (64, 64) and patch.lx == pytest.approx(1e-3 / 4)
     assert abs(patch.height.mean()) < 1e-18
-    # no waves below six cells
+    # the spectrum ends at waves of six cells
     modes = np.abs(np.fft.rfft2(patch.height))
     k = np.hypot(np.fft.rfftfreq(64), np.fft.fftfreq(64)[:, None])
     assert modes[k > 1 / 5.9].max() < 1e-12 * modes.max()

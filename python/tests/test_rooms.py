@@ -1,4 +1,4 @@
-"""The rooms of the package: imports run one way, and the addresses that users know stay."""
+"""The rooms of the package import in one direction, and public module names stay the same."""
 
 import ast
 import importlib
@@ -12,7 +12,7 @@ from conftest import ROOT
 import asperity
 
 PACKAGE = ROOT / "python" / "asperity"
-# From the ground floor up: a room may use what stands before it.
+# From the bottom up: a room may use those before it in the list.
 FLOORS = ("base", "roads", "rubber", "contact", "results", "theory", "views", "runs", "curves",
           "commands")
 ADDRESSES = ("adhesive_contact", "case", "contact", "dma", "errors", "export", "material",
@@ -21,7 +21,7 @@ ADDRESSES = ("adhesive_contact", "case", "contact", "dma", "errors", "export", "
 
 
 def name_of(path):
-    """Return the name of a module within the package, '' for that of the package itself."""
+    """Return the name of a module within the package; '' stands for the package itself."""
     parts = path.relative_to(PACKAGE).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
@@ -30,7 +30,7 @@ MODULES = {name_of(path): path for path in sorted(PACKAGE.rglob("*.py"))}
 
 
 def imported(name, path):
-    """Return the modules of the package that a file imports, wherever in it."""
+    """Return the modules of the package that a file imports, also within functions."""
     folder = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
     folder = [part for part in folder if part]
     found = set()
@@ -53,7 +53,7 @@ GRAPH = {name: imported(name, path) for name, path in MODULES.items()}
 
 
 def circle_in(graph):
-    """Return modules that import each other in a circle, [] if there are none."""
+    """Return modules that import each other in a circle, or [] if there are none."""
     done, way = set(), []
 
     def visit(name):
@@ -81,12 +81,12 @@ def test_the_search_finds_a_circle():
 
 
 def test_no_circle_between_files():
-    # the package itself imports its rooms; what a room imports of the package is not that file
+    # The package itself imports its rooms, but an import of the package does not make a circle.
     assert circle_in({name: others - {""} for name, others in GRAPH.items()}) == []
 
 
 @pytest.mark.parametrize("room", FLOORS)
-def test_rooms_use_what_stands_below_them(room):
+def test_rooms_use_only_rooms_below_them(room):
     allowed = {*FLOORS[: FLOORS.index(room) + 1], ""}
     for name, others in GRAPH.items():
         if name.split(".")[0] == room:
@@ -94,13 +94,13 @@ def test_rooms_use_what_stands_below_them(room):
             assert not above, f"{name} imports {', '.join(sorted(above))}"
 
 
-def test_every_module_stands_in_a_room():
+def test_every_module_is_in_a_room():
     flat = {path.name for path in PACKAGE.glob("*.py")}
     assert flat == {"__init__.py", "__main__.py", "_addresses.py"}
     assert {name.split(".")[0] for name in MODULES} - {"", "__main__", "_addresses"} == set(FLOORS)
 
 
-def test_data_know_nothing_of_drawing():
+def test_modules_of_data_do_not_import_drawing():
     for name, path in MODULES.items():
         if name.split(".")[0] in ("base", "roads", "rubber", "contact", "results", "theory"):
             for node in ast.walk(ast.parse(path.read_text())):
@@ -112,14 +112,14 @@ def test_functions_are_short():
     for name, path in MODULES.items():
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.FunctionDef):
-                told = node.body[0]
-                words = told.end_lineno - told.lineno + 1 if ast.get_docstring(node) else 0
+                first = node.body[0]
+                words = first.end_lineno - first.lineno + 1 if ast.get_docstring(node) else 0
                 lines = node.end_lineno - node.lineno + 1 - words
                 assert lines <= 60, f"{name}: {node.name} has {lines} lines"
 
 
 @pytest.mark.parametrize("address", ADDRESSES)
-def test_addresses_that_users_know(address):
+def test_public_modules_have_their_names(address):
     module = importlib.import_module(f"asperity.{address}")
     assert getattr(asperity, address) is module
     assert sys.modules[module.__name__] is module
@@ -127,7 +127,7 @@ def test_addresses_that_users_know(address):
     assert module.__all__
 
 
-def test_addresses_are_imported_directly():
+def test_public_modules_are_imported_by_name():
     code = "\n".join(f"import asperity.{address} as m; print(m.__name__)" for address in ADDRESSES)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == [importlib.import_module(f"asperity.{address}").__name__
@@ -152,7 +152,7 @@ def test_import_is_quick():
         subprocess.run([sys.executable, "-c", code], check=True)
         return time.perf_counter() - start
 
-    # the least of some tries: other processes only add to it
+    # the shortest of several tries, because other processes can only add to the time
     assert min(seconds("import asperity") - seconds("pass") for _ in range(5)) <= 0.3
     done = subprocess.run(
         [sys.executable, "-c", "import sys, asperity;"

@@ -1,4 +1,4 @@
-"""Runs in process, and that they are those of the program."""
+"""Runs within Python have the numbers of the program's runs."""
 
 import signal
 import subprocess
@@ -29,7 +29,7 @@ def case(tmp_path):
 
 
 def columns(run):
-    """Return the history but for the wall time."""
+    """Return the columns of the history, without the wall time."""
     return {name: run.history[name] for name in run.history if name != "seconds"}
 
 
@@ -65,7 +65,7 @@ def test_ctrl_c_and_restart(case, tmp_path, monkeypatch):
         return outputs
 
     monkeypatch.setattr(runner, "_step", step_with_signal)
-    # A shell starts background jobs with Ctrl-C ignored, and then Python does not raise.
+    # A shell starts background jobs with Ctrl-C ignored; then Python would not raise.
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt):
@@ -86,7 +86,7 @@ def test_ctrl_c_and_restart(case, tmp_path, monkeypatch):
         asperity.run(case, output=tmp_path / "none.h5", restart=True)
 
 
-def test_a_look_at_a_run_that_goes_on(case, monkeypatch):
+def test_a_running_result_can_be_read(case, monkeypatch):
     rows = []
     step = runner._step
 
@@ -118,7 +118,7 @@ def test_no_convergence_keeps_the_result(case):
 
 
 def test_a_run_that_fails_closes_no_other_run(case, tmp_path, monkeypatch):
-    """Each handle is closed once, and handles are not given to later runs."""
+    """Each handle is closed once, and a handle that was closed is not given to a later run."""
     closed, opened = [], []
     close, begin = runner._close, runner._open
 
@@ -139,7 +139,7 @@ def test_a_run_that_fails_closes_no_other_run(case, tmp_path, monkeypatch):
     asperity.run(case, threads=1)
     assert len(opened) == 2 and opened[0] != opened[1]
     assert closed == opened
-    # an old handle means no run, also while another one is open
+    # a closed handle names no run, even while another run is open
     handle = begin(b"case.nml", SLIDING.encode(), bytes(tmp_path / "a.h5"), 1, 0, 0)[0]
     close(opened[0])
     assert runner._step(handle, np.zeros(0, np.int32))[1] == 0
@@ -165,13 +165,13 @@ def test_many_runs_one_after_the_other(case):
 
 def test_progress_goes_to_stderr(case, capsys):
     asperity.run(case, quiet=False)
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert told.err.splitlines()[-1].startswith("step 8 of 8, t = 0.004 s, contact area ")
+    message = capsys.readouterr()
+    assert message.out == ""
+    assert message.err.splitlines()[-1].startswith("step 8 of 8, t = 0.004 s, contact area ")
 
 
-def test_a_run_leaves_numpy_threads_alone():
-    # The library's OpenMP and HDF5 live beside h5py's in one process.
+def test_a_run_does_not_disturb_numpy_threads():
+    # The OpenMP and HDF5 of the library share a process with those of h5py.
     done = subprocess.run(
         [sys.executable, "-c", "import h5py, asperity, io; f = h5py.File(io.BytesIO(), 'w');"
          "f['x'] = 1; print(asperity.set_threads(1), f['x'][()])"],

@@ -1,4 +1,4 @@
-"""Results as netCDF's readers see them: every axis has its coordinates, none is made up."""
+"""For readers of netCDF every axis of a result has its coordinates, and none is invented."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ CASE = """
 
 @pytest.fixture(params=["free of friction", "with friction"])
 def path(request: pytest.FixtureRequest, program: str, tmp_path: Path) -> Path:
-    """Return the result of a run that slides, then for ever."""
+    """Return the result of a run that slides in steps of time and then steadily."""
     rubs = request.param == "with friction"
     case = tmp_path / "y.nml"
     case.write_text(CASE.format(
@@ -40,7 +40,7 @@ def path(request: pytest.FixtureRequest, program: str, tmp_path: Path) -> Path:
 
 
 def test_every_axis_has_a_scale(path: Path) -> None:
-    """Both ends of each link agree, as HDF5's own library wants it."""
+    """Both ends of each link agree, as HDF5's own library requires."""
     links = 0
     with h5py.File(path) as file:
         def look(name: str, item: h5py.Dataset | h5py.Group) -> None:
@@ -64,7 +64,7 @@ def test_every_axis_has_a_scale(path: Path) -> None:
 
 @pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
 def test_xarray_opens_groups(path: Path, engine: str) -> None:
-    """Fields along y and x in metres, columns along the step."""
+    """Fields have axes y and x in metres, and columns have the axis step."""
     run = asperity.open(path)
     snapshot = run.snapshots[-1]
     with xarray.open_dataset(path, group=f"snapshots/{snapshot.step:06d}", engine=engine) as data:
@@ -84,7 +84,7 @@ def test_xarray_opens_groups(path: Path, engine: str) -> None:
     assert sizes == {"x", "y", "step", "prony_tau", "wavelength"}
 
 
-def test_axes_are_no_fields(path: Path) -> None:
+def test_axes_are_not_fields(path: Path) -> None:
     """Snapshots list fields only."""
     snapshot = asperity.open(path).snapshots[0]
     assert "x" not in snapshot and "y" not in snapshot.fields
@@ -92,7 +92,7 @@ def test_axes_are_no_fields(path: Path) -> None:
 
 
 def test_road_under_the_rubber(path: Path) -> None:
-    """The road has moved by as much as the history says."""
+    """The road of a snapshot has moved by the distance that the history gives."""
     run = asperity.open(path)
     wave = 2 * np.pi / 0.8e-3
     for snapshot in run.snapshots[1:-1]:
@@ -100,7 +100,7 @@ def test_road_under_the_rubber(path: Path) -> None:
         x = run.grid.x - run.history["road_x"][row]
         if "displacement_x" in snapshot:
             x = x + snapshot.displacement_x
-        # Linear interpolation between eight cells of a wave.
+        # The reference is linear between eight cells of a wave.
         error = snapshot.road_height - 1e-5 * np.cos(wave * (x - 0.8e-3))
         assert np.abs(error).max() < 1e-5 * (np.pi / 8)**2 / 2
         level = run.history["displacement"][row] - run.height.max()
@@ -110,8 +110,8 @@ def test_road_under_the_rubber(path: Path) -> None:
     assert run.snapshots[1].plot("road_height").get_title().startswith("Height of the road")
 
 
-def test_road_that_stands(program: str, tmp_path: Path) -> None:
-    """The road of a snapshot is that of the result if the road never moves, with its own axes."""
+def test_road_that_never_moves(program: str, tmp_path: Path) -> None:
+    """If the road never moves, a snapshot has the road of the result, with its own axes."""
     case = tmp_path / "case.nml"
     case.write_text("&grid nx = 48, ny = 32, lx = 1e-3 /\n"
                     "&surface shape = 'self_affine', hurst = 0.8, rms_height = 1e-6,"

@@ -1,4 +1,4 @@
-"""Signals to a run, and readings of its result while it runs."""
+"""Signals to a run, and readers of its result while it runs."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def case(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_stop(program: str, case: Path, number: signal.Signals) -> None:
-    """The step in hand is finished, a checkpoint written, and the exit status names the signal."""
+    """The run finishes its step, writes a checkpoint, and its exit status names the signal."""
     result = case.with_suffix(".h5")
     process = vc.start(program, case)
     vc.wait_for_rows(process, result, 7, number)
@@ -44,7 +44,7 @@ def test_stop(program: str, case: Path, number: signal.Signals) -> None:
     assert {len(column) for column in history.values()} == {rows}
     assert f"step {rows - 1}" in message
     run = asperity.open(result)
-    assert run.snapshots[-1].step == rows - 1  # the state at the stop is there to look at
+    assert run.snapshots[-1].step == rows - 1  # the state at the stop
     assert np.all(np.isfinite(fields["pressure"]))
     whole = case.with_name("whole.nml")
     whole.write_text(case.read_text())
@@ -53,7 +53,7 @@ def test_stop(program: str, case: Path, number: signal.Signals) -> None:
     vc.assert_same(result, whole.with_suffix(".h5"))
 
 
-# With a constant shear stress the passes of a pulled road may not settle: they go on for hours.
+# With constant shear the passes of a pulled road may not settle, so the run takes hours.
 STUCK = """
 &grid nx = 48, ny = 41, lx = 1e-3, ly = 0.9e-3 /
 &surface shape = 'self_affine', hurst = 0.8, wavelength_long = 0.5e-3,
@@ -69,14 +69,14 @@ STUCK = """
 
 @pytest.fixture
 def stuck(tmp_path: Path) -> Path:
-    """Return the input of a run whose row 3 does not come to an end."""
+    """Return the input of a run whose row 3 takes hours."""
     path = tmp_path / "stuck.nml"
     path.write_text(STUCK)
     return path
 
 
 def test_stop_within_a_row(program: str, stuck: Path) -> None:
-    """A stop abandons a long row; a restart continues from the row before."""
+    """A stop gives up a long row; a restart continues from the row before it."""
     result = stuck.with_suffix(".h5")
     for restart in ([], ["--restart"]):
         process = vc.start(program, stuck, *restart)
@@ -95,8 +95,8 @@ def test_stop_within_a_row(program: str, stuck: Path) -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_stop_within_a_row_of_python(stuck: Path, number: signal.Signals) -> None:
-    """The same in Python, which then acts on the signal as it would have without the run."""
-    # A shell starts background jobs with Ctrl-C ignored, and then Python does not raise.
+    """A run in Python stops as well; then Python handles the signal as it would without a run."""
+    # A shell starts background jobs with Ctrl-C ignored; then Python would not raise.
     script = ("import signal, asperity\n"
               "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
               "try:\n"
@@ -108,18 +108,18 @@ def test_stop_within_a_row_of_python(stuck: Path, number: signal.Signals) -> Non
     vc.wait_for_rows(process, stuck.with_suffix(".h5"), 3)
     time.sleep(1.0)
     process.send_signal(number)
-    told, message = process.communicate(timeout=PATIENCE)
+    printed, message = process.communicate(timeout=PATIENCE)
     if number == signal.SIGINT:
-        assert (process.returncode, told) == (0, "interrupted\n"), message
+        assert (process.returncode, printed) == (0, "interrupted\n"), message
     else:
         assert process.returncode == -signal.SIGTERM, message
     assert asperity.open(stuck.with_suffix(".h5")).outcome == "stopped after step 2"
     assert stuck.with_suffix(".checkpoint.h5").exists()
 
 
-def test_whether_a_run_goes_on_is_seen_from_its_lock(program: str, stuck: Path,
+def test_lock_shows_whether_a_run_continues(program: str, stuck: Path,
                                                      monkeypatch: pytest.MonkeyPatch) -> None:
-    """A slow row is not taken for a dead run, and a killed run is known at once."""
+    """The lock shows at once that a run was killed, and that a slow run was not."""
     result = stuck.with_suffix(".h5")
     process = vc.start(program, stuck)
     vc.wait_for_rows(process, result, 3)
@@ -131,7 +131,7 @@ def test_whether_a_run_goes_on_is_seen_from_its_lock(program: str, stuck: Path,
     assert asperity.open(result).state.endswith("its process has ended")
     lines = io.StringIO()
     watch(result, once=True, stream=lines)
-    text = " ".join(lines.getvalue().split())            # lines end where the window does
+    text = " ".join(lines.getvalue().split())            # lines are cut to the window
     assert "ended (there is no checkpoint: --overwrite starts again)" in text
     result.with_suffix(".checkpoint.h5").touch()
     watch(result, once=True, stream=lines)
@@ -151,7 +151,7 @@ ENDLESS = """
 
 
 def wait_for_work(process: subprocess.Popen, seconds: float = 1.0) -> None:
-    """Wait until a process has used so much processor time, in which it has surely begun."""
+    """Wait until a process has used some processor time, so that its work must have begun."""
     clock = os.sysconf("SC_CLK_TCK")
     while process.poll() is None:
         words = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
@@ -165,7 +165,7 @@ def wait_for_work(process: subprocess.Popen, seconds: float = 1.0) -> None:
     (("--time-limit", "0:03"), 124, "the time limit is near: stopped before the first row")])
 def test_stop_within_a_solve(program: str, tmp_path: Path, more: tuple[str, ...], status: int,
                              reason: str) -> None:
-    """A row without friction is abandoned as well, for a signal and for the time limit."""
+    """A row without friction is given up as well, after a signal or at the time limit."""
     case = tmp_path / "endless.nml"
     case.write_text(ENDLESS)
     process = vc.start(program, case, *more)
@@ -181,7 +181,7 @@ def test_stop_within_a_solve(program: str, tmp_path: Path, more: tuple[str, ...]
 
 @pytest.mark.parametrize("what", ["solve", "simulation"])
 def test_interrupt_within_a_solve_of_python(tmp_path: Path, what: str) -> None:
-    """Ctrl-C ends a call that would go on for ever; a simulation is where it was."""
+    """Ctrl-C ends a call that would take hours, and the simulation is as it was before."""
     case = tmp_path / "endless.nml"
     case.write_text(ENDLESS)
     script = ("import signal, asperity\n"
@@ -200,23 +200,23 @@ def test_interrupt_within_a_solve_of_python(tmp_path: Path, what: str) -> None:
                                stderr=subprocess.PIPE, text=True)
     wait_for_work(process, 4.0)
     process.send_signal(signal.SIGINT)
-    told, message = process.communicate(timeout=PATIENCE)
-    assert (process.returncode, told) == (0, "interrupted None 0.0\nTrue\n"), message
+    printed, message = process.communicate(timeout=PATIENCE)
+    assert (process.returncode, printed) == (0, "interrupted None 0.0\nTrue\n"), message
 
 
 def test_stop_before_the_first_row(program: str, case: Path) -> None:
-    """A signal at any time at the start ends the run with the status of the signal."""
+    """A signal during the start ends the run with the exit status of the signal."""
     for delay in (0.0, 0.005, 0.01, 0.02, 0.04):
         process = vc.start(program, case)
         time.sleep(delay)
         process.terminate()
         _, message = process.communicate(timeout=PATIENCE)
-        # before the handler is in place the system itself ends the run
+        # before the run handles signals, the system itself ends it
         assert process.returncode in (143, -signal.SIGTERM), (process.returncode, message)
 
 
 def test_checkpoint_on_demand(program: str, case: Path) -> None:
-    """SIGUSR1 writes a checkpoint, and the run continues to its end."""
+    """SIGUSR1 makes the run write a checkpoint, and the run continues to its end."""
     result, checkpoint = case.with_suffix(".h5"), case.with_suffix(".checkpoint.h5")
     process = vc.start(program, case)
     assert not checkpoint.exists()
@@ -233,13 +233,13 @@ def test_checkpoint_on_demand(program: str, case: Path) -> None:
     assert vc.run(program, case, "--restart").returncode == 0
     process = vc.start(program, whole)
     vc.wait_for_rows(process, whole.with_suffix(".h5"), 5, signal.SIGUSR1)
-    assert process.wait(PATIENCE) == 0  # goes on
+    assert process.wait(PATIENCE) == 0  # the run continues
     process.communicate()
     vc.assert_same(result, whole.with_suffix(".h5"))
 
 
-def test_look_at_a_run_that_goes_on(program: str, case: Path) -> None:
-    """h5py and asperity.open read the rows there are, as often as asked."""
+def test_a_running_result_can_be_read(program: str, case: Path) -> None:
+    """h5py and asperity.open can read all complete rows, any number of times."""
     result = case.with_suffix(".h5")
     process = vc.start(program, case)
     vc.wait_for_rows(process, result, 3)

@@ -1,4 +1,4 @@
-"""Simulations that Python drives: the program's numbers, steering, saved states, callbacks."""
+"""Simulations driven by Python: the program's numbers, steering, saved states, callbacks."""
 
 import gc
 
@@ -132,7 +132,7 @@ def test_a_temperature_that_is_set_shifts_the_relaxation_times(tmp_path):
     assert cold[-1].displacement < 0.999 * warm[-1].displacement
 
 
-def test_a_saved_state_goes_on_to_the_same_numbers(tmp_path):
+def test_a_saved_state_continues_with_the_same_numbers(tmp_path):
     def new():
         sim = asperity.Simulation(BASE + FRICTION + SLIDE)
         rows = [sim.advance() for _ in range(5)]
@@ -175,19 +175,19 @@ def test_a_damaged_state_is_refused(tmp_path):
         sim.save(tmp_path / "nowhere" / "state.h5")
 
 
-@pytest.mark.parametrize(("what", "value", "told"), [
+@pytest.mark.parametrize(("what", "value", "message"), [
     ("pressure", -1.0, "must be positive without adhesion"),
     ("pressure", np.nan, "must be a finite number"),
     ("velocity", (1.0, np.inf), "must be two finite numbers"),
     ("velocity", 1.0, "must be two finite numbers"),
     ("temperature", -150.0, "must be above reference_temperature - wlf_c2 = -100")])
-def test_what_cannot_be_set(what, value, told):
+def test_what_cannot_be_set(what, value, message):
     sim = asperity.Simulation(BASE + SLIDE)
-    with pytest.raises(ValueError, match=told):
+    with pytest.raises(ValueError, match=message):
         setattr(sim, what, value)
 
 
-def test_what_a_case_has_not():
+def test_set_what_the_case_does_not_have():
     elastic = BASE.replace("prony_g = 2e6, 1e6, prony_tau = 1e-5, 1e-3, ", "")
     sim = asperity.Simulation(elastic + "&phase pressure = 1e5 /\n")
     with pytest.raises(ValueError, match="the material is elastic"):
@@ -199,7 +199,7 @@ def test_what_a_case_has_not():
                             ).temperature = 30.0
 
 
-def test_the_end_and_what_comes_after_it():
+def test_advance_after_the_last_row():
     with asperity.Simulation(BASE + "&phase pressure = 1e5 /\n") as sim:
         sim.advance()
         assert sim.finished
@@ -261,7 +261,7 @@ def test_a_callback_sees_each_row_and_may_end_the_run(tmp_path):
 
 
 def test_what_is_set_must_exist_and_be_a_number():
-    """A misspelt load would be ignored without a word."""
+    """Without the check, a misspelt variable of the load would be ignored silently."""
     sim = asperity.Simulation(BASE + SLIDE)
     for name, near in (("presure", "'pressure'"), ("velocity_x", "'velocity'")):
         with pytest.raises(AttributeError, match=f"named '{name}': did you mean {near}"):

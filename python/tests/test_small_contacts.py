@@ -1,4 +1,4 @@
-"""Contacts of too few cells are warned of, once a run; others are not."""
+"""Contacts of too few cells cause one warning per run; other contacts cause none."""
 
 import warnings
 
@@ -16,7 +16,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def sphere(across, phases="&phase force = {force} /", more=""):
-    """A sphere of radius 1 m under the load for a Hertzian contact of so many cells across."""
+    """Return a sphere of radius 1 m under the load of a Hertzian contact `across` cells wide."""
     radius = 0.5 * across / 32
     return f"""
 &grid nx = 32, ny = 32, lx = 1., boundary = 'free' /
@@ -37,8 +37,8 @@ def test_single_contact(across, times):
 
 
 @pytest.mark.parametrize("part", [(0.0, 0.0), (0.5, 0.5), (0.2, 0.35)])
-def test_approach_that_is_not_warned_of_is_right(part):
-    """Hertz's approach within about 1 % wherever the summit lies, or a warning with its remedy."""
+def test_an_approach_without_a_warning_is_right(part):
+    """Hertz's approach is right to about 1 % wherever the summit is, or a warning has a remedy."""
     silent = 0
     for across in np.arange(2.0, 8.0, 0.5):
         radius = 0.5 * across / 32
@@ -46,18 +46,18 @@ def test_approach_that_is_not_warned_of_is_right(part):
         case = sphere(across).replace("radius = 1.", "radius = 1., centre_x = {}, centre_y = {}"
                                       .format(*place))
         run = asperity.run(case, output=f"case{across}.h5")
-        # The displacement counts from the highest cell, which lies below the summit.
+        # The displacement is counted from the highest cell, which is lower than the summit.
         below = sum((shift / 32) ** 2 for shift in part) / 2
         error = (run.history["displacement"][-1] + below) / radius**2 - 1
-        told = [line for line in run.warnings if WORDS in line]
-        assert abs(error) < 0.011 or told, (across, error)
-        assert all("use cells at most 1/" in line for line in told)
-        silent += not told
+        printed = [line for line in run.warnings if WORDS in line]
+        assert abs(error) < 0.011 or printed, (across, error)
+        assert all("use cells at most 1/" in line for line in printed)
+        silent += not printed
     assert silent >= 4
 
 
 def hertzian(across):
-    """A map of the same sphere, and its mean pressure for E* = 1 Pa."""
+    """Return a map of the same sphere, and its mean pressure for E* = 1 Pa."""
     x = (np.arange(32) - 16) / 32
     return -(x[None, :] ** 2 + x[:, None] ** 2) / 2, 4 / 3 * (0.5 * across / 32) ** 3
 
@@ -70,10 +70,10 @@ def test_a_contact_on_arrays_warns_in_the_words_of_the_program(across):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         asperity.solve_normal(height, 1.0, None, 1.0, pressure=pressure, boundary="free")
-    told = [str(each.message) for each in caught]
-    assert len(told) == (across < 5)
-    assert len(lines) == len(told)
-    assert all(mine in line for line, mine in zip(lines, told, strict=True))
+    printed = [str(each.message) for each in caught]
+    assert len(printed) == (across < 5)
+    assert len(lines) == len(printed)
+    assert all(mine in line for line, mine in zip(lines, printed, strict=True))
     assert all(each.filename == __file__ for each in caught)
 
 
@@ -85,25 +85,25 @@ def test_an_adhesive_contact_on_arrays_warns_too():
 
 
 def test_single_lines():
-    """A single line of contact needs five cells."""
-    told = []
+    """A single line of contact must be five cells wide."""
+    printed = []
     for across in (2.5, 3.0, 5.0, 7.0):
         pressure = np.pi / 64 * np.sin(np.pi * across / 128) ** 2
-        told.append(warned(f"""
+        printed.append(warned(f"""
 &grid nx = 64, ny = 1, lx = 64. /
 &surface shape = 'sine', amplitude = 1., wavelength = 64. /
 &material shear_modulus = 0.25, poisson = 0.5 /
 &phase pressure = {pressure} /
 """))
-    assert told == [1, 1, 0, 0]
+    assert printed == [1, 1, 0, 0]
 
 
-def test_small_on_the_way_to_large_is_no_fault():
+def test_a_contact_that_is_small_only_at_first_gives_no_warning():
     ramp = "&phase force = {force}, duration = 1., steps = 64, ramp = 'linear' /"
     assert warned(sphere(8.0, ramp)) == 0
 
 
-def test_once_a_run():
+def test_the_warning_comes_once_per_run():
     twice = "&phase force = {force} /\n&phase force = {force}, duration = 1., steps = 2 /"
     assert warned(sphere(1.0, twice)) == 1
 
@@ -131,7 +131,7 @@ def test_line_and_full_contact():
 &material shear_modulus = 0.25, poisson = 0.5 /
 &phase pressure = {} /
 """
-    # A third of the wave, and all of it.
+    # A contact over a third of the wave, and one over all of it.
     assert warned(case.format(0.01)) == 0
     assert warned(case.format(1.0)) == 0
     assert warned(case.format(1e-6)) == 1

@@ -20,7 +20,7 @@ PRESSURE = 6e4
 
 
 def waves() -> tuple[np.ndarray, np.ndarray]:
-    """Return the wave vectors of the grid but zero, with both signs of Nyquist, and weights."""
+    """Return all wave vectors of the grid except zero, Nyquist's with both signs, and weights."""
     vectors, weights = [], []
     for i in range(-NX // 2, NX // 2 + 1):
         for j in range(-NY // 2, NY // 2 + 1):
@@ -38,7 +38,7 @@ def modulus(omega: np.ndarray) -> np.ndarray:
 
 
 def matrices() -> dict[str, np.ndarray]:
-    """Return dense matrices of the displacements and of their d/ds, by plain sums."""
+    """Return dense matrices of the displacements and of their d/ds, as plain sums over waves."""
     q, weight = waves()
     x, y = np.meshgrid(np.arange(NX) * LX / NX, np.arange(NY) * LY / NY)
     place = np.column_stack([x.ravel(), y.ravel()])
@@ -76,7 +76,7 @@ def text(law: str = "", more: str = "") -> str:
 
 
 def road(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return a road of a few waves, m."""
+    """Return a road of a few waves, in m."""
     a, b = 2 * np.pi * x / LX, 2 * np.pi * y / LY
     return 2e-4 * (np.cos(a + 0.4) + 0.7 * np.cos(b) + 0.4 * np.cos(a + 2 * b + 1))
 
@@ -93,7 +93,7 @@ def solve(program: str, folder: Path, law: str = "") -> asperity.Run:
 
 
 def test_dense_reference(program: str, tmp_path: Path) -> None:
-    """Pressure, gap, losses against dense matrices made by plain sums over the waves."""
+    """Pressure, gap and losses agree with dense matrices made by plain sums over the waves."""
     run = solve(program, tmp_path)
     found = run.snapshots[-1]
     k = matrices()["zz"]
@@ -110,7 +110,7 @@ def test_dense_reference(program: str, tmp_path: Path) -> None:
     exact = np.linalg.solve(system, np.append(height[touching], PRESSURE * NX * NY))
     np.testing.assert_allclose(p[touching], exact[:-1], rtol=0, atol=1e-6 * p.max())
     gap = k @ p - height - exact[-1]
-    assert gap[~touching].min() > 0  # with P > 0 elsewhere: the solution, and there is but one
+    assert gap[~touching].min() > 0  # with P > 0 elsewhere this is the solution
     np.testing.assert_allclose(
         found.gap.ravel(), np.where(touching, 0, gap), rtol=0, atol=1e-6 * gap.max()
     )
@@ -134,7 +134,7 @@ def test_dense_reference(program: str, tmp_path: Path) -> None:
 
 
 def test_dense_friction(program: str, tmp_path: Path) -> None:
-    """Tractions lie on the bound along the dense slip; the road is read at x + u."""
+    """Tractions are on the bound, along the dense slip; the road is read at x + u."""
     run = solve(
         program, tmp_path, "&friction law = 'coulomb', coefficient = 0.5, slope_effect = F /"
     )
@@ -165,7 +165,7 @@ def test_dense_friction(program: str, tmp_path: Path) -> None:
 
 
 def curve(speeds: int = 8) -> str:
-    """Return the input of a curve that ends with some steps in time."""
+    """Return the input of a friction curve followed by some steps in time."""
     phases = "\n".join(
         f"&phase steady = T, {'pressure = 2e5, ' if not k else ''}velocity_x = {0.02 * 2**k} /"
         for k in range(speeds)
@@ -183,7 +183,7 @@ def curve(speeds: int = 8) -> str:
 
 
 def test_restart(program: str, tmp_path: Path) -> None:
-    """A curve that is stopped and continued has the same bits, with the losses of every row."""
+    """A curve that is stopped and continued has the same bits and losses in every row."""
     whole, parts = tmp_path / "whole.nml", tmp_path / "parts.nml"
     for path in (whole, parts):
         path.write_text(curve())
@@ -242,11 +242,11 @@ def test_check_lists_it(program: str, tmp_path: Path) -> None:
     assert "steady = .true." in done.stdout
 
 
-@pytest.mark.parametrize(("velocity", "told"), [("velocity_x = 0.5", True),
+@pytest.mark.parametrize(("velocity", "printed"), [("velocity_x = 0.5", True),
                                                 ("velocity_x = 0.5, velocity_y = 0.2", False),
                                                 ("velocity_x = 1e-4", False)])
-def test_check_notes_footprints(program: str, tmp_path: Path, velocity: str, told: bool) -> None:
-    """Along an axis the rubber meets its own footprint, unless it has recovered by then."""
+def test_check_notes_footprints(program: str, tmp_path: Path, velocity: str, printed: bool) -> None:
+    """Along an axis the rubber meets its own footprint, unless it recovers before that."""
     case = tmp_path / "case.nml"
     case.write_text(
         "&grid nx = 32, ny = 32, lx = 0.01 / &surface shape = 'sine', amplitude = 1e-4,"
@@ -254,13 +254,14 @@ def test_check_notes_footprints(program: str, tmp_path: Path, velocity: str, tol
         f"&phase steady = T, pressure = 1e5, {velocity} /\n"
     )
     done = subprocess.run([program, "check", str(case)], capture_output=True, text=True, check=True)
-    assert ("meets its own footprint" in done.stdout) == told, done.stdout
+    assert ("meets its own footprint" in done.stdout) == printed, done.stdout
 
 
 @pytest.mark.parametrize("laws", [("constant_shear",), ("coulomb", "coulomb_orowan", "none")])
 def test_random_rows_against_dense_matrices(program: str, laws: tuple[str, ...]) -> None:
-    """Pressures, tractions and powers of the tool's random cases; with constant shear in the closed
-    form of the law, in which cells may be partly sheared.
+    """The tool's random cases have the pressures, tractions and powers of dense matrices.
+
+    With constant shear the closed form of the law counts, in which cells may be partly sheared.
     """
     tool = Path(__file__).parents[2] / "tools" / "steady_campaign.py"
     done = subprocess.run(

@@ -1,4 +1,4 @@
-"""Means over whole laps: exact for what repeats, warned of for parts."""
+"""Means over whole laps: exact for periodic histories, with a warning for parts of laps."""
 
 import math
 from types import SimpleNamespace
@@ -13,7 +13,7 @@ LX, LY = 1e-3, 0.5e-3
 
 
 def run_of(travel, friction, angle=0.0, settings=""):
-    """Return the parts of a run that steady_mean needs: a slide of 0.1 m/s after a row at rest."""
+    """Return the parts of a run that steady_mean needs: a row at rest, then sliding at 0.1 m/s."""
     along = np.concatenate([[0.0], np.asarray(travel)])
     columns = {"time": along / 0.1, "road_x": along * math.cos(angle),
                "road_y": along * math.sin(angle), "phase": np.full(along.size, 1),
@@ -27,7 +27,7 @@ def run_of(travel, friction, angle=0.0, settings=""):
 
 
 def waves(laps, per_lap=200, drift=0.0):
-    """Return a slide whose friction swings once a lap about 0.3, and settles within the first."""
+    """Return a slide that settles in the first lap; its friction varies about 0.3 once per lap."""
     travel = np.arange(1, round(laps * per_lap) + 1) * LX / per_lap
     phase = 2 * np.pi * travel / LX
     return travel, 0.3 + 0.2 * np.sin(phase) - 0.3 * np.exp(-8 * travel / LX) + drift * phase
@@ -39,7 +39,7 @@ def test_whole_laps_give_the_mean_and_parts_do_not():
         assert found.laps == math.floor(laps) - 1
         assert found.mean == pytest.approx(0.3, abs=2e-4)
     _, friction = waves(3.75)
-    assert abs(friction[len(friction) // 2:].mean() - 0.3) > 0.01  # which the second half is not
+    assert abs(friction[len(friction) // 2:].mean() - 0.3) > 0.01  # unlike the half
 
 
 def test_part_of_a_lap_is_reported():
@@ -51,7 +51,7 @@ def test_part_of_a_lap_is_reported():
 
 
 def test_the_error_is_that_of_the_laps():
-    """Laps that scatter independently: as of their mean; laps that drift have a larger one."""
+    """It is that of the mean of independent laps; laps that drift have a larger one."""
     random = np.random.default_rng(3)
     covered = []
     for _ in range(300):
@@ -76,7 +76,7 @@ def test_laps_of_oblique_slides():
 
 
 def test_real_runs(tmp_path):
-    """A sine wave along the sliding direction: the history is flat once it is steady."""
+    """For a sine wave along the sliding direction the history is constant once it is steady."""
     case = asperity.Case(
         grid=dict(nx=32, ny=1, lx=1e-3),
         surface=dict(shape="sine", amplitude=2e-6, wavelength=1e-3),

@@ -1,4 +1,4 @@
-"""A run with stops leaves the snapshots and warnings of one that went through."""
+"""A run with stops leaves the snapshots and warnings of a run without them."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from asperity import runner
 
 
 def go(case: Path, rows: int | None = None, *, restart: bool = False) -> list[str]:
-    """Do so many rows and stop as a signal does, or go to the end; return the warnings."""
-    handle, _, _, _, told = runner._open(os.fsencode(case), b"", b"", 1, int(restart), 0)
-    lines = [told]
+    """Run some rows and stop as after a signal, or run to the end; return the warnings."""
+    handle, _, _, _, message = runner._open(os.fsencode(case), b"", b"", 1, int(restart), 0)
+    lines = [message]
     finished, done = False, 0
     while not finished and done != rows:
-        finished, *_, told = runner._step(handle, np.zeros(0, np.int32))
-        lines.append(told)
+        finished, *_, message = runner._step(handle, np.zeros(0, np.int32))
+        lines.append(message)
         done += 1
     if not finished:
         runner._interrupt(handle)
@@ -30,12 +30,12 @@ def go(case: Path, rows: int | None = None, *, restart: bool = False) -> list[st
 
 
 def snapshots(case: Path) -> list[str]:
-    """Return the names of a result's snapshots; the XDMF file has the same."""
+    """Return the names of a result's snapshots, which the XDMF file must have as well."""
     with h5py.File(case.with_suffix(".h5")) as file:
         names = sorted(file["snapshots"])
-    told = case.with_suffix(".xdmf").read_text()
-    assert [name for name in names if f"/snapshots/{name}/" in told] == names
-    assert told.count("<Time ") == len(names)
+    message = case.with_suffix(".xdmf").read_text()
+    assert [name for name in names if f"/snapshots/{name}/" in message] == names
+    assert message.count("<Time ") == len(names)
     return names
 
 
@@ -50,7 +50,7 @@ def test_snapshots_after_stops(tmp_path: Path, output: str) -> None:
         case.write_text(vc.text(steps=8, size=24, output=output or "compression = 0"))
     go(whole)
     row = 0
-    for rows in (3, 3, 0, 5, 0, 0, 1, 4):  # rows 5 and 10 among the stops; twice without a row
+    for rows in (3, 3, 0, 5, 0, 0, 1, 4):  # some at rows 5 and 10, some without a row
         go(parts, rows, restart=row > 0)
         row += rows
         names = snapshots(parts)
@@ -101,7 +101,7 @@ def test_warnings_after_stops(tmp_path: Path, text: str, word: str) -> None:
 
 
 def test_a_checkpoint_that_was_changed_is_refused(tmp_path: Path) -> None:
-    """Whatever else writes into a checkpoint makes it another one than the run wrote."""
+    """A program that writes into a checkpoint makes it differ from the one that the run wrote."""
     case = tmp_path / "case.nml"
     case.write_text(vc.text(steps=4, size=24))
     go(case, 3)
@@ -113,7 +113,7 @@ def test_a_checkpoint_that_was_changed_is_refused(tmp_path: Path) -> None:
 
 
 def test_contact_before_the_road_moves(tmp_path: Path) -> None:
-    """With friction all contact sticks until the road moves; without, all slips."""
+    """With friction all cells in contact stick until the road moves; without it all slip."""
     case = tmp_path / "case.nml"
     for law, state in (("&friction law = 'coulomb', coefficient = 0.5 /", 1), ("", 2)):
         case.write_text(SWINGING.replace("&friction law = 'coulomb', coefficient = 0.5 /", law)
@@ -125,8 +125,8 @@ def test_contact_before_the_road_moves(tmp_path: Path) -> None:
         assert (run.history["stick_area"][0] == run.history["contact_area"][0]) == (state == 1)
 
 
-def test_outcome_and_warnings_stay(tmp_path: Path) -> None:
-    """The result says how the run ended and what it warned of, the same with a stop on the way."""
+def test_outcome_and_warnings_are_kept(tmp_path: Path) -> None:
+    """The result says how the run ended and what it warned of, also after a stop on the way."""
     whole, parts = tmp_path / "whole.nml", tmp_path / "parts.nml"
     for case in (whole, parts):
         case.write_text(SWINGING)
@@ -147,7 +147,7 @@ def test_outcome_and_warnings_stay(tmp_path: Path) -> None:
 
 
 def test_outcome_of_a_failure(tmp_path: Path) -> None:
-    """A run that does not converge says at which step and why."""
+    """The result of a run that does not converge says at which step, and why."""
     case = tmp_path / "case.nml"
     case.write_text(SWINGING.replace("passes = 1", "passes = 1, max_iterations = 6"))
     with pytest.raises(asperity.NotConverged, match="did not converge"):

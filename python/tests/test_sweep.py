@@ -23,7 +23,7 @@ FULL = np.pi * MODULUS * AMPLITUDE / LENGTH  # Pa, the pressure of full contact 
 
 
 def wave(**changes):
-    """Return a line contact of an elastic solid with a wave: Westergaard's."""
+    """Return Westergaard's problem: a line contact of an elastic solid with one wave."""
     case = asperity.Case(
         title="wave", grid=dict(nx=256, ny=1, lx=LENGTH),
         surface=dict(shape="sine", amplitude=AMPLITUDE, wavelength=LENGTH),
@@ -44,7 +44,7 @@ def sliding():
 
 
 def sweep(*arguments, **options):
-    """Sweep without telling the progress."""
+    """Run a sweep without showing its progress."""
     return asperity.sweep(*arguments, **{"quiet": True, **options})
 
 
@@ -55,7 +55,7 @@ def test_areas_are_those_of_westergaard(tmp_path):
     assert table.shape == (3, 2) and table.rows == 6
     np.testing.assert_array_equal(table["phase.pressure"], np.repeat(loads, 2))
     np.testing.assert_array_equal(table["material.shear_modulus"], [1e6, 2e6] * 3)
-    # 2/pi asin sqrt(p/p_full); two half cells on each rim are counted whole or not at all
+    # 2/pi asin sqrt(p/p_full); each edge has a half cell that counts as a whole one or not at all
     exact = 2 / np.pi * np.arcsin(np.sqrt(loads[:, None] / (FULL * np.array([1, 2]))))
     np.testing.assert_allclose(table.contact_area.reshape(table.shape), exact, atol=2 / 256)
     np.testing.assert_allclose(table["pressure"], table["phase.pressure"], rtol=1e-6)
@@ -94,13 +94,13 @@ def test_the_same_as_a_run_in_process(tmp_path):
 
 
 def test_which_groups_are_set(tmp_path):
-    # Without a number all phases that name the variable are set.
+    # Without an index, every phase that has the variable is set.
     table = sweep(sliding(), {"phase.velocity_x": [0.025]}, folder=tmp_path)
     inputs = asperity.Case.read(table.runs[0].input)
     assert [phase.velocity_x for phase in inputs.phase] == [0.0, 0.025, 0.025]
     case = sliding()
     case.surface.append(shape="flat")
-    for name, told in [
+    for name, words in [
             ("phase.velocity_y", r"3 &phase and none names velocity_y.*phase\[3\]"),
             ("phase[4].pressure", "there are 3 &phase, counted from 1"),
             ("phase[0].pressure", "counted from 1"),
@@ -109,7 +109,7 @@ def test_which_groups_are_set(tmp_path):
             ("grid.nxx", "did you mean 'nx'"),
             ("grd.nx", "did you mean 'grid'"),
             ("nx", "must be a name such as")]:
-        with pytest.raises(ValueError, match=told):
+        with pytest.raises(ValueError, match=words):
             sweep(case, {name: [1]}, folder=tmp_path)
 
 
@@ -123,11 +123,12 @@ def test_parallel_and_linked_lists(tmp_path):
     assert [run.grid.nx for run in table.runs] == [64, 128]
     with pytest.raises(ValueError, match=r"one length, but grid.nx: 2, grid.lx: 1"):
         sweep(wave(), {"grid.nx": [8, 16], "grid.lx": [1.0]}, zip=True, folder=tmp_path)
-    for parameters, told in [({"grid.nx": []}, "has no values"), ({"grid.nx": 8}, "list of values"),
-                             ({"grid.nx": [8, 8]}, "stands twice"), ({}, "must be a dict"),
-                             ({("grid.nx", "grid.ny"): [(1, 2, 3)]}, "must be 2 values"),
-                             ({"grid.nx": [8], ("grid.nx", "grid.ny"): [(1, 2)]}, "given twice")]:
-        with pytest.raises(ValueError, match=told):
+    for parameters, words in [
+            ({"grid.nx": []}, "has no values"), ({"grid.nx": 8}, "list of values"),
+            ({"grid.nx": [8, 8]}, "stands twice"), ({}, "must be a dict"),
+            ({("grid.nx", "grid.ny"): [(1, 2, 3)]}, "must be 2 values"),
+            ({"grid.nx": [8], ("grid.nx", "grid.ny"): [(1, 2)]}, "given twice")]:
+        with pytest.raises(ValueError, match=words):
             sweep(wave(), parameters, folder=tmp_path)
     assert not list(tmp_path.glob("*grid.lx*"))
 
@@ -137,7 +138,7 @@ def test_lists_and_strings_as_values(tmp_path):
     table = sweep(case, {("material.prony_g", "material.prony_tau"):
                          [([1e6], [1.0]), (np.array([1e6, 2e6]), [1.0, 2.0])],
                          "grid.boundary": ["periodic"]}, folder=tmp_path)
-    # Pressed at once: the area is that of G(0) = G + sum g.
+    # Pressed in a jump, the area is that of G(0) = G + sum g.
     stiff = np.array([2.0, 4.0]) * MODULUS
     exact = 2 / np.pi * np.arcsin(np.sqrt(1e3 / (np.pi * stiff * AMPLITUDE / LENGTH)))
     np.testing.assert_allclose(table.contact_area, exact, atol=2 / 256)
@@ -154,7 +155,7 @@ def test_measure(tmp_path):
     table = sweep(wave(), {"phase.pressure": [0.2 * FULL, 2 * FULL]}, folder=tmp_path,
                   measure=measure)
     assert table.results == ("peak", "rows")
-    # Full contact: p + p_full cos(kx); in partial contact 2 p/sin(a) at the middle.
+    # Full contact: p + p_full cos(kx); in partial contact 2 p/sin(a) in the middle.
     exact = [2 * 0.2 * FULL / np.sqrt(0.2), 2 * FULL + FULL]
     np.testing.assert_allclose(table.peak, exact, rtol=2e-3)
     assert table.rows == 2 and table["rows"].tolist() == [1, 1]
@@ -173,15 +174,15 @@ def test_measure(tmp_path):
 def test_finished_results_are_kept(tmp_path, capsys):
     case = wave()
     first = asperity.sweep(case, {"phase.pressure": [1e3, 2e3]}, folder=tmp_path)
-    told = capsys.readouterr()
-    assert told.out == "" and len(told.err.splitlines()) == 2
-    assert "2 of 2 done: phase.pressure=2000.0: done in" in told.err.splitlines()[1]
+    printed = capsys.readouterr()
+    assert printed.out == "" and len(printed.err.splitlines()) == 2
+    assert "2 of 2 done: phase.pressure=2000.0: done in" in printed.err.splitlines()[1]
     stamps = [path.stat().st_mtime_ns for path in first.paths]
     more = asperity.sweep(case, {"phase.pressure": [1e3, 2e3, 3e3]}, folder=tmp_path)
     assert capsys.readouterr().err.startswith("sweep: 2 of 3 results are there already\n")
     assert [path.stat().st_mtime_ns for path in more.paths[:2]] == stamps
     np.testing.assert_array_equal(more.contact_area[:2], first.contact_area)
-    # Another input of the same name is run anew, and so is everything on request.
+    # Another input with the same name is run again, and so is everything if asked for.
     case.grid.nx = 128
     other = sweep(case, {"phase.pressure": [1e3]}, folder=tmp_path)
     assert other.runs[0].grid.nx == 128
@@ -217,9 +218,9 @@ def test_wrong_inputs_are_reported_before_anything_runs(tmp_path):
     table = sweep(wave(), parameters, folder=tmp_path, errors="keep")
     assert table.contact_area[0] > 0 and np.isnan(table.contact_area[1])
     assert table.failed[0].status == 2
-    for options, told in [(dict(jobs=0), "jobs = 0"), (dict(threads=0), "threads = 0"),
+    for options, words in [(dict(jobs=0), "jobs = 0"), (dict(threads=0), "threads = 0"),
                           (dict(threads=4096), "at most the"), (dict(errors="x"), "errors")]:
-        with pytest.raises(ValueError, match=told):
+        with pytest.raises(ValueError, match=words):
             sweep(wave(), {"grid.nx": [8]}, folder=tmp_path, **options)
 
 
@@ -241,7 +242,7 @@ def test_maps_and_default_folders(tmp_path, monkeypatch):
     assert not (tmp_path / "base" / "elsewhere.h5").exists()
     text = sweep(str(wave()), {"phase.pressure": [5 * FULL]})
     assert text.paths[0].parent.name == "sweep" and text.contact_area[0] == 1.0
-    # What is written beside a result runs by itself.
+    # The input that is written beside a result runs by itself.
     alone = asperity.run(table.paths[0].with_suffix(".nml"), output="alone.h5")
     assert alone.history["contact_area"][-1] == 1.0
 
@@ -264,14 +265,14 @@ asperity.sweep(case, {"phase[1].pressure": [1e3, 2e3, 3e3]}, jobs=2, folder=sys.
 
 
 def hear_ctrl_c():
-    """Take Ctrl-C as in the foreground: a shell starts background jobs with it ignored."""
+    """Do not ignore Ctrl-C, which background jobs inherit from the shell as ignored."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 @pytest.mark.parametrize("moment", ["start", "poll"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_cuts_no_call_in_two(tmp_path, monkeypatch, number, moment):
-    """A signal while a process is being started, or looked at, stops that one, too."""
+def test_a_signal_does_not_interrupt_the_start_of_a_process(tmp_path, monkeypatch, number, moment):
+    """A signal while a process is being started or waited for stops this process, too."""
     started = []
 
     class Process(subprocess.Popen):
@@ -310,17 +311,17 @@ def test_a_signal_cuts_no_call_in_two(tmp_path, monkeypatch, number, moment):
 
 
 def processes_in(folder):
-    """Return the numbers of the processes that work in a folder, where the system tells."""
+    """Return the numbers of the processes that work in a folder, if the system shows them."""
     found = []
     for entry in Path("/proc").glob("[0-9]*/cwd"):
-        with suppress(OSError):  # ended since, or another user's
+        with suppress(OSError):  # it has ended, or is another user's
             if entry.resolve() == folder.resolve():
                 found.append(int(entry.parent.name))
     return found
 
 
 def rows_of(path):
-    """Return how many rows a growing result holds."""
+    """Return how many rows a growing result contains."""
     try:
         return asperity.open(path).history.rows
     except OSError:
@@ -328,7 +329,7 @@ def rows_of(path):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_stop_is_clean_and_is_taken_up(tmp_path, number):
+def test_a_stopped_sweep_leaves_checkpoints_and_continues(tmp_path, number):
     process = subprocess.Popen([sys.executable, "-c", SCRIPT, str(tmp_path)],
                                stderr=subprocess.PIPE, start_new_session=True,
                                preexec_fn=hear_ctrl_c)
@@ -340,9 +341,9 @@ def test_a_stop_is_clean_and_is_taken_up(tmp_path, number):
         assert time.monotonic() < end, "no rows come up"
         time.sleep(0.02)
     process.send_signal(number)
-    _, told = process.communicate(timeout=PATIENCE)
-    assert process.returncode in (-signal.SIGINT, 128 + signal.SIGTERM, 130), told
-    # No child goes on, and each has left a checkpoint.
+    _, printed = process.communicate(timeout=PATIENCE)
+    assert process.returncode in (-signal.SIGINT, 128 + signal.SIGTERM, 130), printed
+    # No child process continues, and each has left a checkpoint.
     assert processes_in(tmp_path) == []
     for load in ("1000.0", "2000.0"):
         assert (tmp_path / f"phase1.pressure={load}.checkpoint.h5").exists()
@@ -352,14 +353,14 @@ def test_a_stop_is_clean_and_is_taken_up(tmp_path, number):
     before = stopped.history["contact_area"]
     case = asperity.Case.read(stopped.input)
     case.phase[1].duration = None
-    with pytest.raises(subprocess.CalledProcessError):  # the checkpoint is of the whole case
+    with pytest.raises(subprocess.CalledProcessError):  # the checkpoint is that of the whole case
         case.write(tmp_path / "other.nml")
         subprocess.run([asperity.runs.program.program(), "run", "other.nml", "--output", first.name,
                         "--restart", "--quiet"], cwd=tmp_path, check=True, capture_output=True)
     assert rows_of(first) == len(before)
 
 
-def test_a_stopped_case_goes_on_from_its_checkpoint(tmp_path, program):
+def test_a_stopped_case_continues_from_its_checkpoint(tmp_path, program):
     case = sliding()
     whole = sweep(case, {"phase[1].pressure": [1e3]}, folder=tmp_path / "whole")
     case.phase[2].steps = 600
@@ -380,17 +381,17 @@ def test_a_stopped_case_goes_on_from_its_checkpoint(tmp_path, program):
     table = sweep(case, parameters, folder=job.parent)
     run = table.runs[0]
     assert run.finished and run.history.rows == 605 > done
-    # The rows that were there are the same ones: their times to the last digit.
+    # The earlier rows are kept: their times agree to the last digit.
     np.testing.assert_array_equal(run.history["seconds"][:done], seconds)
 
 
-def test_broken_results_are_run_anew(tmp_path):
+def test_broken_results_are_run_again(tmp_path):
     parameters = {"phase.pressure": [1e3, 2e3, 3e3]}
     whole = sweep(wave(), parameters, folder=tmp_path)
     with h5py.File(whole.paths[0], "r+") as file:  # as after a kill before the first checkpoint
         file.attrs["finished"] = np.int32(0)
     whole.paths[1].write_bytes(b"no result")
-    with h5py.File(whole.paths[2], "r+") as file:  # of an older version
+    with h5py.File(whole.paths[2], "r+") as file:  # from an older version
         file.attrs["version"] = "0.0.1"
     again = sweep(wave(), parameters, folder=tmp_path)
     np.testing.assert_array_equal(again.contact_area, whole.contact_area)

@@ -1,4 +1,4 @@
-"""The page on cases and sweeps: its snippets run, and what it says of them holds."""
+"""The snippets of the page on cases and sweeps run, and the page is right about them."""
 
 import re
 
@@ -13,9 +13,9 @@ def test_snippets(tmp_path, monkeypatch, capsys):
     case, sweep, measure = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
     names = {}
     exec(compile(case, "sweeps.md", "exec"), names)
-    told = capsys.readouterr().out
-    assert told.startswith("&case") and "2 phases" in told
-    friction = float(told.splitlines()[-1])
+    printed = capsys.readouterr().out
+    assert printed.startswith("&case") and "2 phases" in printed
+    friction = float(printed.splitlines()[-1])
     assert 0 < friction < 1
     assert (tmp_path / "wave.h5").exists()
     exec(compile(sweep, "sweeps.md", "exec"), names)

@@ -14,12 +14,12 @@ import asperity
 from asperity import theory
 from asperity.material import Prony
 
-# near round-off the quadratures warn that they cannot do better
+# near round-off the quadratures warn that they cannot be more exact
 pytestmark = pytest.mark.filterwarnings("ignore::scipy.integrate.IntegrationWarning")
 
 
 def boussinesq(stress, end, r, modulus, breaks=()):
-    """u_z at r of an axisymmetric stress on [0, end]: 4/(pi E*) int s/(r+s) K p ds.
+    """Return u_z at r of an axisymmetric stress on [0, end]: 4/(pi E*) int s/(r+s) K p ds.
 
     The integral runs over the angle of s = end sin(angle), which tames edge singularities.
     """
@@ -211,7 +211,7 @@ def test_maugis_between_its_limits():
 
 
 @pytest.mark.parametrize("lam", 10.0 ** np.arange(-9, 10, 3))
-def test_maugis_there_and_back(lam):
+def test_maugis_force_and_displacement_are_inverse(lam):
     unit = math.pi * 0.05 * 2e-3
     for force in (-1.4999, -1.2, 0.0, 1.0, 1e6):
         c = theory.maugis(2e-3, 3e6, 0.05, force=force * unit, maugis_parameter=lam)
@@ -274,7 +274,7 @@ def test_mindlin_traction_makes_force_and_shift(path):
 @settings(max_examples=40, deadline=None)
 @given(st.lists(st.floats(-2.5, 2.5), min_size=1, max_size=12))
 def test_mindlin_history_against_sliding_elements(path):
-    """Iwan's model: springs with sliders whose strengths follow from the first loading curve."""
+    """Iwan's model has sliding springs whose strengths follow from the first loading curve."""
     bound = SPHERE["coefficient"] * SPHERE["force"]
     c = theory.mindlin(**SPHERE, shift=0.0)
     result = theory.mindlin(**SPHERE, shift=np.array(path) * c.slide_shift)
@@ -388,7 +388,7 @@ def test_hunter_pressure_flattens_the_solid(velocity, poisson):
     nodes, weights = np.polynomial.legendre.leggauss(80)
 
     def strain(x):
-        """int J dp at the point that was at x + V t a time t ago."""
+        """Return int J dp at the point that was at x + V t a time t ago."""
         low = max(x, c.trailing_edge)
         if low >= c.leading_edge:
             return 0.0
@@ -468,7 +468,7 @@ def test_full_contact_steady_friction():
 
 @pytest.mark.parametrize("start", ["relaxed", "glassy"])
 def test_full_contact_start_up_against_integration_in_time(start):
-    """Two oblique waves on a grid; each arm integrated as an ordinary differential equation."""
+    """Two oblique waves on a grid; the reference integrates each arm's differential equation."""
     solid = Prony(1e6, [2e6, 5e6], [1e-3, 2e-2])
     q = np.array([[2e4, 1e4], [-1e4, 3e4]])
     d, phase, v, nu = np.array([1e-6, 4e-7]), np.array([0.0, 1.0]), np.array([0.02, 0.01]), 0.5
@@ -563,12 +563,12 @@ def test_persson_against_direct_quadrature(velocity, gamma):
     k, phi = PSD
     p, nu = 3e5, 0.45
     found = theory.persson(k, phi, WIDE, p, velocity, poisson=nu, gamma=gamma)
-    # crowded near the first wavenumber, where the area may fall steeply
+    # the nodes are dense near the first wave number, where the area may decrease steeply
     x = np.log(k[0]) + np.log(k[-1] / k[0]) * np.linspace(0, 1, 6001) ** 4
     q = np.exp(x)
     step = np.diff(x)
     c = np.exp(np.interp(x, np.log(k), np.log(phi))) / (4 * np.pi**2)
-    # phi from 0 to pi/2 four times; crowded where cos vanishes
+    # phi passes from 0 to pi/2 four times; the nodes are dense where cos vanishes
     z, w = np.polynomial.legendre.leggauss(400)
     z, w = (z + 1) / 2, w / 2
     cosine, w = np.sin(np.pi / 2 * z**4), 4 * np.pi / 2 * 4 * z**3 * w
@@ -593,7 +593,7 @@ def ring_of_waves(k0, count=720):
 
 @pytest.mark.parametrize("times", [None, [0.0, 1e-5, 1e-4, 1e-2]])
 def test_persson_at_high_pressure_is_full_contact(times):
-    """A narrow band of waves in all directions, steady or started from rest."""
+    """The road is a narrow band of waves in all directions; steady or started from rest."""
     k0, width, v, p = 1e5, 1e-7, 0.3, 1e12
     k = np.array([k0, k0 * (1 + width)])
     psd = np.full(2, 1e-18 / width)
@@ -677,7 +677,7 @@ def test_spectrum_of_a_given_surface(generator):
 
 
 def test_full_contact_friction_of_a_given_surface():
-    """The bands against the sum over the modes of the map, each in full contact."""
+    """The bands must agree with the sum over the modes of the map, each in full contact."""
     n, lx, speed, pressure = 48, 1e-3, 0.3, 1e12
     height = asperity.surface.self_affine(n, lx=lx, hurst=0.8, wavelength_long=3e-4,
                                           wavelength_short=6e-5, rms_slope=0.2, seed=3)

@@ -16,7 +16,7 @@ from asperity.runs import namelists
 from asperity.runs.row import Column, Field, columns, fields
 from asperity.runs.simulation import FIELDS
 
-# A comment `E: text` is an error that mypy must report in that line, `N: text` a type it reveals;
+# A comment `E: text` is an error that mypy must report in its line, and `N: text` a type that it
 # there must be no others.
 SAMPLE = '''
 import numpy as np
@@ -72,7 +72,7 @@ def test_mypy_knows_names_and_types(tmp_path: Path) -> None:
     sample = tmp_path / "sample.py"
     sample.write_text(SAMPLE)
     settings = tmp_path / "mypy.ini"
-    # Other packages are not looked into: they take long and do not matter here.
+    # Other packages are left out: checking them takes long and does not matter here.
     left_out = ("h5py", "matplotlib", "pandas", "scipy", "xarray", "SurfaceTopography")
     settings.write_text(
         f"[mypy]\nfollow_imports = silent\nmypy_path = {ROOT / 'python'}\n"
@@ -83,13 +83,13 @@ def test_mypy_knows_names_and_types(tmp_path: Path) -> None:
         capture_output=True, text=True, check=False)
     found = [re.fullmatch(r".*sample\.py:(\d+): (error|note): (.*)", line)
              for line in done.stdout.splitlines()]
-    told: dict[int, list[str]] = {}
+    reports: dict[int, list[str]] = {}
     for line in found:
         assert line is not None, done.stdout + done.stderr
-        told.setdefault(int(line[1]), []).append(line[3])
+        reports.setdefault(int(line[1]), []).append(line[3])
     for number, line in enumerate(SAMPLE.splitlines(), 1):
         wanted = re.search(r"# [EN]: (.*)", line)
-        messages = "\n".join(told.get(number, []))
+        messages = "\n".join(reports.get(number, []))
         if wanted:
             assert wanted[1] in messages, f"{line}\n{messages}"
         else:
@@ -97,7 +97,7 @@ def test_mypy_knows_names_and_types(tmp_path: Path) -> None:
 
 
 def test_types_are_those_of_the_program() -> None:
-    """The modules for type checkers and the page's table are what the program's tables give."""
+    """The modules for type checkers and the page's table follow from the program's tables."""
     done = subprocess.run([sys.executable, ROOT / "tools" / "make_types.py", "--check"],
                           check=False)
     assert done.returncode == 0, "python tools/make_types.py writes them again"

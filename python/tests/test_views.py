@@ -1,4 +1,4 @@
-"""How data show themselves: in notebooks, as data sets, in messages, in a plain terminal."""
+"""How objects are shown in notebooks, as data sets, in messages and in a plain terminal."""
 
 import io
 import os
@@ -118,19 +118,20 @@ def test_watch_in_the_posix_locale_writes_ascii(road, tmp_path, name):
     assert done.stdout.isascii() and b"Stra?e" in done.stdout and b"us," in done.stdout
 
 
-def test_info_tells_of_a_height_map(program, tmp_path):
+def test_info_describes_a_height_map(program, tmp_path):
     asperity.surface.save(tmp_path / "map.h5", 1e-6 * np.eye(8, 6), 1e-3, 2e-3, title="diagonal",
                           boundary="free")
     done = subprocess.run([program, "info", "map.h5"], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    for told in ("a height map", "diagonal", "6 x 8 cells", "m, free", "heights     0 m to",
+    for message in ("a height map", "diagonal", "6 x 8 cells", "m, free", "heights     0 m to",
                  "file = 'map.h5'"):
-        assert told in done.stdout, done.stdout
+        assert message in done.stdout, done.stdout
 
 
 def test_import_of_a_picture_says_what_was_found(tmp_path, capsys):
     image = pytest.importorskip("PIL.Image")
     image.fromarray(np.arange(48, dtype=np.uint8).reshape(6, 8)).save(tmp_path / "h.tif")
     assert main(["import", str(tmp_path / "h.tif"), "-o", str(tmp_path / "x.h5")]) == 3
-    told = capsys.readouterr().err
-    assert "h.tif" in told and "holds no heights" in told and "index out of range" not in told
+    message = capsys.readouterr().err
+    assert "h.tif" in message and "holds no heights" in message
+    assert "index out of range" not in message

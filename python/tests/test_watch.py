@@ -25,7 +25,7 @@ def test_sparklines():
     assert sparkline([1.0, np.nan, 3.0]) == "▁ █"
     assert sparkline([]) == ""
     assert sparkline([np.nan, np.nan]) == "  "
-    # More values than letters: means of stretches, so a peak of half a stretch is half as high.
+    # With more values than characters, each shows a mean: a peak of half a range is half as high.
     assert sparkline([0, 0, 0, 2, 2, 2, 0, 0], 4) == "▁▅█▁"
 
 
@@ -46,7 +46,7 @@ def test_pace_and_time_left():
 
 
 def test_view_of_a_run_that_is_going(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)  # a long path would take lines of the view
+    monkeypatch.chdir(tmp_path)  # a long path would take several lines
     path = frictional_result(Path("going.h5"), finished=0)
     with h5py.File(path, "a") as file:
         file.attrs["expected_rows"] = np.int32(25)
@@ -73,7 +73,7 @@ def test_plain_lines_where_there_is_no_terminal(tmp_path, monkeypatch):
     def grow(seconds):
         looks.append(seconds)
         with h5py.File(path, "a") as file:
-            if len(looks) == 2:  # nothing new the first time
+            if len(looks) == 2:  # nothing is new at the first look
                 for column in file["history"].values():
                     column.resize((7,))
                 file["history/step"][-1] = 6
@@ -92,7 +92,7 @@ def test_plain_lines_where_there_is_no_terminal(tmp_path, monkeypatch):
 
 
 def test_a_run_that_was_killed_or_stopped(tmp_path, monkeypatch):
-    """The view reports once that a silent run may be dead, and ends for a stopped run."""
+    """The view reports once that a silent run may have been killed, and ends if a run stopped."""
     path = frictional_result(tmp_path / "silent.h5", finished=0)
     looks = []
 
@@ -165,7 +165,7 @@ def test_follows_a_run_on_a_terminal_until_interrupted(program, tmp_path):
     assert status == 130
     assert b"Traceback" not in errors
     text = seen.decode()
-    # Each look goes up over the lines of the last one.
+    # Each update overwrites the lines of the previous one.
     lines = text.split("\x1b[J")[0].count("\n")
     assert f"\x1b[{lines}A" in text
     assert "Viscoelastic friction of a cylinder" in text

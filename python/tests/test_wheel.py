@@ -43,7 +43,7 @@ def empty(built, tmp_path_factory):
 
 
 def run(empty, *words, cwd):
-    """Run a command of the empty environment, knowing nothing of this one."""
+    """Run a command of the empty environment, which knows nothing of the test's environment."""
     command = [str(empty / "bin" / words[0]), *words[1:]]
     surroundings = {"PATH": f"{empty / 'bin'}:/usr/bin:/bin", "HOME": str(cwd),
                     "MPLBACKEND": "Agg"}
@@ -111,8 +111,8 @@ def test_libraries_come_from_inside_the_wheel(empty):
 
 def test_versions_agree(empty, tmp_path):
     assert run(empty, "asperity", "--version", cwd=tmp_path).split()[:2] == ["asperity", VERSION]
-    told = run(empty, "python", "-c", "import asperity; print(asperity.__version__)", cwd=tmp_path)
-    assert told.strip() == VERSION
+    shown = run(empty, "python", "-c", "import asperity; print(asperity.__version__)", cwd=tmp_path)
+    assert shown.strip() == VERSION
 
 
 def test_a_case_and_its_picture(empty, tmp_path):
@@ -121,8 +121,8 @@ def test_a_case_and_its_picture(empty, tmp_path):
     run(empty, "asperity", "run", "hertz.nml", "--quiet", cwd=tmp_path)
     run(empty, "python", "-m", "asperity", "plot", "hertz.h5", cwd=tmp_path)
     assert (tmp_path / "hertz.png").stat().st_size > 10000
-    told = run(empty, "python", "-c", "import asperity; run = asperity.run('hertz.nml');"
+    shown = run(empty, "python", "-c", "import asperity; run = asperity.run('hertz.nml');"
                " print(run.history['displacement'][-1], asperity.__file__)", cwd=tmp_path)
-    approach, path = told.split()
+    approach, path = shown.split()
     assert float(approach) == pytest.approx(1e-4, rel=1e-3)
     assert str(empty) in path and sys.prefix not in path

@@ -1,4 +1,4 @@
-"""What FFTW learnt is kept between runs: written where there is something new, and never lost."""
+"""FFTW's plans are kept between runs: written if there are new ones, and never lost."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ CASE = """&grid nx = {n}, ny = {n}, lx = 1.0 /
 
 
 def state(path: Path) -> tuple[int, int]:
-    """Return the state of a file that changes when it is written again."""
+    """Return numbers that change whenever the file is written."""
     status = path.stat()
     return status.st_ino, status.st_mtime_ns
 
@@ -34,9 +34,9 @@ def test_wisdom_is_kept(program: Path, tmp_path: Path) -> None:
     solve(20, "mixed")
     kept = state(double), state(single)
     solve(20, "mixed")
-    assert (state(double), state(single)) == kept, "files are written where nothing was learnt"
+    assert (state(double), state(single)) == kept, "the files were written without anything new"
 
-    # A process that read the files before another learnt something keeps that, too.
+    # Another process learnt something after this one read the files; that must be kept, too.
     script = (
         "import sys, numpy as np, asperity\n"
         "def solve(n):\n"
@@ -55,5 +55,5 @@ def test_wisdom_is_kept(program: Path, tmp_path: Path) -> None:
     kept = state(double), state(single)
     for n in (20, 24, 28):
         solve(n)
-    assert (state(double), state(single)) == kept, "what another process learnt was lost"
+    assert (state(double), state(single)) == kept, "the plans of another process were lost"
     assert sorted(path.name for path in double.parent.iterdir()) == ["fftw", "fftwf"]

@@ -14,7 +14,7 @@ xdmf = pytest.importorskip("vtkmodules.vtkIOXdmf2")
 
 
 def test_snapshots(tmp_path: Path, writer: str) -> None:  # noqa: F811
-    """Times, grid and fields are those of the result; x runs along the rows of the arrays."""
+    """Times, grid and fields are those of the result; x varies along the rows of the arrays."""
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline as Pipeline
 

@@ -1,4 +1,4 @@
-"""A small run with everything a restart must carry, for tests that stop it and go on."""
+"""A small run whose state has all the parts that a restart must restore."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 from conftest import PATIENCE
 
-# Columns that say how long a run took, not what came out.
+# Columns that say how long a run took, not what it computed.
 TIMES = {"seconds"}
 
 
@@ -32,7 +32,7 @@ def text(*, steps: int = 24, size: int = 48, scheme: str = "exponential2", extra
 
 
 def rows(steps: int = 24) -> int:
-    """Return how many rows the run has: a jump, then the steps."""
+    """Return the number of rows of the run: a jump, then the steps."""
     return 1 + 3 * steps
 
 
@@ -43,13 +43,13 @@ def start(program: str, case: Path, *arguments: str, **keywords) -> subprocess.P
 
 
 def run(program: str, case: Path, *arguments: str, **keywords) -> subprocess.CompletedProcess:
-    """Run to the end."""
+    """Run the case to its end."""
     return subprocess.run([program, "run", str(case), "--quiet", *arguments], text=True,
                           capture_output=True, timeout=PATIENCE, check=False, **keywords)
 
 
 def count(path: Path) -> int:
-    """Return the number of whole rows in a result, -1 where it cannot be opened yet."""
+    """Return the number of complete rows in a result, or -1 if it cannot be opened yet."""
     try:
         with h5py.File(path, "r") as file:
             return min(len(file["history"][name]) for name in file["history"])
@@ -59,9 +59,9 @@ def count(path: Path) -> int:
 
 def wait_for_rows(process: subprocess.Popen, path: Path, wanted: int,
                   number: signal.Signals | None = None) -> None:
-    """Wait until a run has written so many rows; then send it a signal, if one is named.
+    """Wait until a run has written so many rows; then send it the signal that `number` gives.
 
-    The run stands still while its file is looked at: however slow the look, it is not late.
+    The run is suspended while its file is read, so that the signal comes in time on a slow machine.
     """
     end = time.monotonic() + PATIENCE
     there = False
@@ -88,7 +88,7 @@ def contents(path: Path) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], 
 
 
 def assert_same(path: Path, reference: Path, tolerance: float = 0.0) -> None:
-    """Both results hold the same numbers; with no tolerance, bit for bit."""
+    """Check that both results have the same numbers: with no tolerance, in every bit."""
     history, fields, finished = contents(path)
     wanted_history, wanted_fields, _ = contents(reference)
     assert finished == 1
