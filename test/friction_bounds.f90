@@ -9,7 +9,7 @@ module friction_bounds
 
 contains
 
-   !> How far the tractions are outside their bounds: the largest |T - returned T|, Pa.
+   !> Return how far the tractions are outside their bounds: the largest |T - returned T|, Pa.
    function largest_excess(law, p, slope_x, slope_y, contact, tx, ty) result(excess)
       type(friction_law_type), intent(in) :: law
       real(dp), intent(in) :: p(:, :)                       !! [nx, ny], Pa

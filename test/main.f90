@@ -52,7 +52,7 @@ program main
 
    character(64) :: verb
 
-   ! `check writer FILE ROWS COMPRESSION [restart]` is not a test, but a run that tests of Python kill.
+   ! `check writer FILE ROWS COMPRESSION [restart]` is not a test but a run, which Python tests kill.
    call get_command_argument(1, verb)
    if (verb == 'writer') then
       call run_writer()

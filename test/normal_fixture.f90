@@ -79,7 +79,7 @@ contains
       problem%target = pressure
    end subroutine rough_problem
 
-   !> Results with one thread and with two have the same bits.
+   !> Check that results with one thread and with two have the same bits.
    subroutine check_threads(grid, problem, height, thesis, mixed)
       type(grid_type), intent(in) :: grid
       type(normal_problem_type), intent(in) :: problem
@@ -126,7 +126,7 @@ contains
       call check_no_error(error, 'a rough surface')
    end subroutine rough_height
 
-   !> Root mean square about the mean.
+   !> Return the root mean square about the mean.
    pure function rms(field)
       real(dp), intent(in) :: field(:, :)
       real(dp) :: rms
@@ -134,7 +134,7 @@ contains
       rms = sqrt(sum((field - sum(field)/size(field))**2)/size(field))
    end function rms
 
-   !> e1 from its definition, with an operator of its own: sum P (g - min g)/(sum P h_rms).
+   !> Compute e1 from its definition, with a separate operator: sum P (g - min g)/(sum P h_rms).
    subroutine duality_gap(grid, modulus, height, pressure, e1)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: modulus

@@ -17,7 +17,7 @@ module result_writer
 
 contains
 
-   !> Row of a step. All its numbers follow from the number of the step.
+   !> Return the row of a step, all of whose numbers follow from the number of the step.
    pure function row_of(step) result(row)
       integer, intent(in) :: step
       type(history_row_type) :: row
@@ -29,7 +29,7 @@ contains
       row%seconds = 2.0_dp*step
    end function row_of
 
-   !> Pressure of a step, larger along y than along x.
+   !> Return the pressure of a step, which is larger along y than along x.
    pure function pressure_of(step) result(pressure)
       integer, intent(in) :: step
       real(dp) :: pressure(nx, ny)
@@ -42,7 +42,7 @@ contains
       end do
    end function pressure_of
 
-   !> Write what the arguments ask for: writer FILE ROWS COMPRESSION [restart].
+   !> Write the result that the arguments describe: writer FILE ROWS COMPRESSION [restart].
    subroutine run_writer()
       type(error_type), allocatable :: error
       character(1024) :: path, number
@@ -59,7 +59,7 @@ contains
       stop 3
    end subroutine run_writer
 
-   !> Write `rows` rows, with a snapshot of every third and a checkpoint of every fourth step.
+   !> Write `rows` rows, with a snapshot for every third and a checkpoint for every fourth step.
    subroutine write_result(path, rows, compression, restart, error)
       character(*), intent(in) :: path
       integer, intent(in) :: rows

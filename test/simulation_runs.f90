@@ -76,7 +76,7 @@ contains
       call sim%destroy()
    end subroutine run_case
 
-   !> The number of the last row.
+   !> Return the number of the last row.
    pure integer function last(record)
       type(record_type), intent(in) :: record
 
@@ -108,11 +108,11 @@ contains
                row%dissipated_viscous >= record%rows(k - 1)%dissipated_viscous - 1e-15_dp*scale
          end associate
       end do
-      call check_close(worst/scale, 0.0_dp, allowed, what//': energy books')
-      call check_that(lost, what//': what is lost does not come back')
+      call check_close(worst/scale, 0.0_dp, allowed, what//': energy balance')
+      call check_that(lost, what//': losses never decrease')
    end subroutine check_books
 
-   !> Two runs have the same physical history: each column within a tolerance relative to its largest value.
+   !> Check that two runs agree: each column within a tolerance relative to its largest value.
    subroutine check_same_rows(a, b, tolerance, what)
       type(record_type), intent(in) :: a, b
       real(dp), intent(in) :: tolerance
@@ -143,9 +143,8 @@ contains
 
    end subroutine check_same_rows
 
-   !> Creep compliance J(t) of a Prony series, from the zeros and residues of its transform:
-   !> s G(s) = G_e + sum g s/(s + 1/tau) vanishes once between two of the relaxation rates and once
-   !> below the lowest.
+   !> Return the creep compliance J(t) of a Prony series, from the zeros and residues of its transform: s G(s) = G_e +
+   !! sum g s/(s + 1/tau) has one zero between any two neighbouring relaxation rates, and one below the lowest rate.
    pure function creep_compliance(g_e, g, tau, t) result(compliance)
       real(dp), intent(in) :: g_e            !! > 0, Pa
       real(dp), intent(in) :: g(:), tau(:)   !! Pa and s; tau ascending

@@ -56,7 +56,7 @@ contains
       do k = 0, last(record)
          a = (3.0_dp/16.0_dp*radius*force*creep_compliance(1.0e6_dp/11.0_dp, [1.0e6_dp/1.1_dp], &
             [1.0_dp/11.0_dp], record%rows(k)%time))**(1.0_dp/3.0_dp)
-         ! the area is a count of cells: half a cell along the edge of the contact
+         ! The area is a count of cells, with an error of half a cell along the edge of the contact.
          if (k <= 24) then
             call check_close(record%rows(k)%displacement*radius/a**2, 1.0_dp, 1e-3_dp, 'Lee-Radok: approach')
             call check_close(sqrt(record%rows(k)%contact_area*1e-8_dp/pi)/a, 1.0_dp, 1.6e-2_dp, &
@@ -67,11 +67,11 @@ contains
          if (k == 44) call check_close(a, thesis(3), 1e-9_dp, 'a(inf) of the thesis')
       end do
       call check_close(record%rows(last(record))%displacement*radius/a**2, 1.0_dp, 2e-4_dp, &
-         'Lee-Radok: approach in the end')
+         'Lee-Radok: final approach')
       call check_books(record, 'Lee-Radok')
    end subroutine lee_radok_sphere
 
-   !> Lee-Radok with arms from 1 ms to 1 s, in steps that grow from phase to phase.
+   !> Lee-Radok for arms from 1 ms to 1 s, with steps that are longer in each phase.
    subroutine lee_radok_with_several_arms()
       type(record_type) :: record
       real(dp), parameter :: g(4) = [0.4e6_dp, 0.3e6_dp, 0.2e6_dp, 0.1e6_dp]
@@ -98,7 +98,7 @@ contains
       call check_books(record, 'four arms')
    end subroutine lee_radok_with_several_arms
 
-   !> The approach of a sphere against the number of cells over the contact.
+   !> The error of a sphere's approach decreases with the number of cells over the contact.
    subroutine order_in_the_mesh()
       type(record_type) :: record
       integer, parameter :: cells(3) = [24, 48, 96]
@@ -119,7 +119,7 @@ contains
       call check_close(errors(3), 0.0_dp, 2e-4_dp, 'approach with 75 cells over the contact')
    end subroutine order_in_the_mesh
 
-   !> Orders in time on one mesh, against a run with fine steps: the error of the mesh cancels.
+   !> Orders in time on one mesh. The reference is a run with fine steps, so that the error of the mesh cancels.
    subroutine orders_in_time_of_the_schemes()
       type(record_type) :: record
       real(dp) :: reference, errors(3)
@@ -142,7 +142,7 @@ contains
 
    contains
 
-      !> The approach at the end.
+      !> Return the approach of the last row.
       real(dp) function displacement(scheme, n)
          character(*), intent(in) :: scheme
          integer, intent(in) :: n
@@ -178,7 +178,7 @@ contains
       call check_books(record, 'ramp')
    end subroutine sphere_under_a_growing_force
 
-   !> Twenty arms over 15 decades, in steps far longer than most relaxation times: no ringing.
+   !> Twenty arms over 15 decades, with steps far longer than most relaxation times, cause no ringing.
    subroutine many_decades_do_not_ring()
       type(record_type) :: record
       integer, parameter :: arms = 20
@@ -209,7 +209,7 @@ contains
             before = growth
             reference = (3.0_dp/16.0_dp*radius*force*creep_compliance(0.2e6_dp, g, tau, &
                record%rows(k)%time))**(2.0_dp/3.0_dp)/radius
-            ! the first steps hold most of the spectrum
+            ! The first steps contain most of the spectrum.
             if (k == 1) call check_close(record%rows(k)%displacement/reference, 1.0_dp, 0.08_dp, &
                '20 arms, '//trim(schemes(s))//': first step')
             if (k > 4) worst = max(worst, abs(record%rows(k)%displacement/reference - 1.0_dp))
@@ -220,7 +220,7 @@ contains
       end do
    end subroutine many_decades_do_not_ring
 
-   !> After a drop of load the contact area never falls again (arXiv 2511.19402).
+   !> After a drop of the load the contact area never decreases (arXiv 2511.19402).
    subroutine area_never_falls_after_a_drop()
       type(record_type) :: record
       integer :: k, s, fallen
@@ -238,13 +238,14 @@ contains
          call check_order(least, '<', 0.9_dp*record%rows(10)%contact_area, &
             'a drop of load opens contact')
          call check_order(record%rows(last(record))%contact_area, '>', 1.04_dp*least, &
-            'then contact grows')
-         call check_that(fallen == 0, 'and never falls, '//trim(schemes(s)))
+            'the contact area grows after the drop')
+         call check_that(fallen == 0, 'the contact area never decreases after the drop, '//trim(schemes(s)))
          call check_books(record, 'drop of load, '//trim(schemes(s)))
       end do
    end subroutine area_never_falls_after_a_drop
 
-   !> Work against the load's own: equal as the steps shrink; numerical loss only of backward Euler.
+   !> The work of the traction and that of the load agree as the steps become shorter. Only backward Euler has a
+   !! numerical loss.
    subroutine work_agrees_with_that_of_the_load()
       type(record_type) :: record
       real(dp) :: difference(2), numerical(2)
@@ -260,10 +261,10 @@ contains
                difference(n) = abs(end%work_load - end%work_normal)/end%work_normal
                numerical(n) = end%dissipated_numerical/end%dissipated_viscous
             end associate
-            call check_books(record, 'works')
+            call check_books(record, 'work of the load')
          end do
          call check_that(difference(2) < 0.6_dp*difference(1) .and. difference(2) < 0.01_dp, &
-            'work of the load and of the traction, '//trim(schemes(s))//': '//to_text(difference(1))// &
+            'the works of the load and of the traction agree, '//trim(schemes(s))//': '//to_text(difference(1))// &
             ', '//to_text(difference(2)), difference)
          if (s == 1) then
             call check_that(numerical(1) > 0.0_dp .and. numerical(2) < 0.7_dp*numerical(1), &
@@ -274,7 +275,7 @@ contains
       end do
    end subroutine work_agrees_with_that_of_the_load
 
-   !> One arm and the same arm in two; Zener branches and their Prony arms; the order of the arms.
+   !> An arm and the same arm split in two, Zener branches and their arms, and any order of the arms, agree.
    subroutine split_and_reordered_arms_agree()
       type(record_type) :: one, two
       character(*), parameter :: phases = '&phase pressure = 40e3, duration = 0.1, steps = 10 /'//nl// &
@@ -295,7 +296,7 @@ contains
       call check_same_rows(one, two, 1e-9_dp, 'arms in another order')
    end subroutine split_and_reordered_arms_agree
 
-   !> A block long at rest holds its load without creep, like an elastic one of the long-term modulus.
+   !> A block that has long been at rest holds its load without creep, like an elastic block of the long-term modulus.
    subroutine relaxed_block_does_not_creep()
       type(record_type) :: rested, elastic
       integer :: k
@@ -316,7 +317,7 @@ contains
       call check_books(rested, 'relaxed')
    end subroutine relaxed_block_does_not_creep
 
-   !> Loads as prescribed: ramps in each control, changes of control, phases that inherit.
+   !> Loads follow the input: ramps in each control, changes of the control, and phases that inherit a load.
    subroutine loads_are_as_prescribed()
       type(record_type) :: record
       real(dp), parameter :: area = 1.2e-6_dp
@@ -333,7 +334,7 @@ contains
          '&phase duration = 0.1, steps = 2 /'//nl// &                                        ! 20-21
          '&phase displacement = 12.2e-6, duration = 0.1, steps = 2 /'//nl// &                   ! 22-24
          '&solver tolerance = 1e-9 /', 'loads', record)
-      call check_that(last(record) == 24, 'loads: rows')
+      call check_that(last(record) == 24, 'loads: the run has 24 rows after the first')
       if (last(record) /= 24) return
       associate (rows => record%rows)
          do k = 0, 4

@@ -29,7 +29,7 @@ module test_simulation_adhesion
    character(*), parameter :: soft = '&material shear_modulus = 0.5e6, prony_g = 1e6, 0.7e6, '// &
       'prony_tau = 0.02, 0.2 /'//nl
    character(*), parameter :: sharp = '&solver tolerance = 1e-8, max_iterations = 4000 /'//nl
-   !> Without the parts of a first step: within these, each control goes its own way.
+   !> Takes the first step as a whole, because its parts differ between the kinds of control.
    character(*), parameter :: one_step = '&solver tolerance = 1e-8, max_iterations = 4000, '// &
       'time_scheme = ''exponential'' /'//nl
    character(14), parameter :: potentials(3) = [character(14) :: 'exponential', 'gauss', 'maugis_dugdale']
@@ -75,9 +75,9 @@ contains
       text = text//' /'//nl
    end function sticky
 
-   !> Pressure, force and displacement control go through the same states, elastic and viscoelastic, with
-   !> closed books: to 1e-10 of the energies at a tolerance of 1e-8 (in periodic mode to round-off, in
-   !> free mode the displacement of the pressure is within the tolerance of that handed out).
+   !> Control by pressure, force and displacement gives the same states, elastic and viscoelastic. The energy balance
+   !! closes to 1e-10 of the energies at a tolerance of 1e-8: to round-off in a periodic cell; on a free map the
+   !! displacement of the pressure differs from the stored one by the tolerance.
    subroutine controls_go_through_the_same_states(what, place, gamma, low, high)
       character(*), intent(in) :: what, place, gamma, low, high
       type(record_type) :: led, pressed, pushed
@@ -96,7 +96,7 @@ contains
                '&phase displacement = '//high//', duration = 0.1, steps = 4, ramp = ''linear'' /', &
                trim(name)//': displacement', led)
             call check_books(led, trim(name)//': displacement', 1e-10_dp)
-            ! the kink of this potential pins cells: other ways lead to other states near by
+            ! The kink of this potential pins cells, so that another control leads to a slightly different state.
             if (p == 3) cycle
             call run_case(text//loads('pressure', led%rows%pressure), trim(name)//': pressure', pressed)
             call check_books(pressed, trim(name)//': pressure', 1e-10_dp)
@@ -108,11 +108,11 @@ contains
       end do
       k = last(led)
       call check_that(led%rows(k)%contact_area > led%rows(0)%contact_area .and. &
-         led%rows(k)%contact_area < 1.0_dp, what//': a contact that grows')
+         led%rows(k)%contact_area < 1.0_dp, what//': the contact grows and stays partial')
 
    contains
 
-      !> The same rows by their loads.
+      !> Return phases that apply the loads of the rows one after the other.
       function loads(control, values)
          character(*), intent(in) :: control
          real(dp), intent(in) :: values(0:)
@@ -128,8 +128,8 @@ contains
 
    end subroutine controls_go_through_the_same_states
 
-   !> Elastic: the force is the derivative of the energy, adhesion included. The error of the trapezoidal
-   !> work falls with the square of the step.
+   !> Without loss the force is the derivative of the energy, which includes that of adhesion. The error of the work
+   !! by the trapezoidal rule decreases with the square of the step.
    subroutine force_is_derivative_of_energy()
       type(record_type) :: record
       real(dp) :: errors(2), change
@@ -144,18 +144,18 @@ contains
                - rows(0)%energy_adhesive
             errors(k) = abs((rows(n)%work_load - rows(0)%work_load)/change - 1.0_dp)
             call check_close((rows(n)%work_normal - rows(0)%work_normal)/change, 1.0_dp, 1e-9_dp, &
-               'work of P and change of the energies')
+               'the work of the pressure is the change of the energies')
          end associate
       end do
-      ! the contact edge jumps from cell to cell: not a smooth second order
-      call check_order(errors(2), '<', errors(1)/2.5_dp, 'work of the load converges')
+      ! The edge of the contact moves from cell to cell, so that the second order is not smooth.
+      call check_order(errors(2), '<', errors(1)/2.5_dp, 'the work of the load converges')
       call check_close(errors(2), 0.0_dp, 4e-3_dp, 'work of the load with 16 steps')
    end subroutine force_is_derivative_of_energy
 
-   !> A Maugis-Dugdale sphere pulled off by its displacement: smooth, and the largest pull is that of
-   !> theory, -1.95059 pi gamma_0 R for lambda = 0.1 and -1.60073 for 1 (lambda = sigma_0
-   !> (9 R/(2 pi gamma_0 E*^2))^(1/3)), to 2 % with cells of 0.13 E* range^2/energy and to 3 % with cells
-   !> of twice that: the width of the edge of the attraction frees it from the grid.
+   !> A Maugis-Dugdale sphere is pulled off by its displacement. The largest pull is that of theory, -1.95059 pi gamma_0 R
+   !! for lambda = 0.1 and -1.60073 for lambda = 1 (lambda = sigma_0 (9 R/(2 pi gamma_0 E*^2))^(1/3)), to 2 % with cells
+   !! of 0.13 E* range^2/energy and to 3 % with cells of twice that size. The attraction ends over a finite width, which
+   !! keeps its edge from sticking to the grid.
    subroutine pull_off_force_in_a_run()
       real(dp) :: pulls(3)
 
@@ -167,7 +167,7 @@ contains
       call check_close(pulls(2), -1.60073_dp, 0.03_dp*1.6_dp, 'pull-off force, lambda = 1, coarse')
    end subroutine pull_off_force_in_a_run
 
-   !> Pull a sphere off; the largest pull in pi gamma_0 R.
+   !> Pull a sphere off and return the largest pull, in pi gamma_0 R.
    subroutine pull_off(n, side, lambda, first, middle, final, pull)
       character(*), intent(in) :: n, side, first, middle, final
       real(dp), intent(in) :: lambda
@@ -187,11 +187,11 @@ contains
       call check_that(low > 0 .and. low < last(record), 'the largest pull is within the path', &
          [real(low, dp)])
       call check_that(record%rows(0)%contact_area > 0.0_dp .and. &
-         record%rows(last(record))%contact_area <= 0.0_dp, 'the sphere lets go')
-      call check_close(record%rows(last(record))%force, 0.0_dp, 1e-6_dp*unit_force, 'and is free')
+         record%rows(last(record))%contact_area <= 0.0_dp, 'the sphere detaches')
+      call check_close(record%rows(last(record))%force, 0.0_dp, 1e-6_dp*unit_force, 'no force acts after the detachment')
    end subroutine pull_off
 
-   !> Under a prescribed pull the contact ends with its own reason, and the rows before are not changed.
+   !> A pull that is too large ends the contact; the run names this reason and does not change the earlier rows.
    subroutine detachment_is_reported()
       character(*), parameter :: pulls(5) = [character(8) :: '1e-5', '-1e-5', '-2e-5', '-2.9e-5', '-3e-5']
       type(case_type) :: case
@@ -222,13 +222,13 @@ contains
          end do
          ! JKR holds 1.5 pi gamma_0 R = 2.36e-5 N, DMT 3.14e-5 N
          call check_that(held >= 3 .and. held < 5 .or. m == 2 .and. held >= 2 .and. held < 5, &
-            'held up to a pull between JKR and DMT: '//to_text(held), [real(held, dp)])
-         call check_that(sim%reason == 'detached', 'detached: '//trim(sim%reason))
+            'the contact holds pulls up to one between JKR and DMT; rows held: '//to_text(held), [real(held, dp)])
+         call check_that(sim%reason == 'detached', 'the reason is detached, not '//trim(sim%reason))
          call sim%destroy()
       end do
    end subroutine detachment_is_reported
 
-   !> A wave at no load: the state depends on where it comes from, and both are minima.
+   !> A wave without a load has two states, which depend on the start, and both are minima of the energy.
    subroutine wave_at_no_load_has_two_states()
       type(record_type) :: apart, whole, thesis
       character(:), allocatable :: text
@@ -246,7 +246,7 @@ contains
          [apart%rows(0)%contact_area])
       call check_close(whole%rows(0)%contact_area, 1.0_dp, 0.0_dp, 'from full contact: it stays full')
       call check_close(whole%rows(0)%mean_gap, 0.0_dp, 0.0_dp, 'from full contact: no gap')
-      ! what full contact stores: 3 pi E* A^2/(32 wavelength) an area (thesis, 4.5.1)
+      ! The energy of full contact is 3 pi E* A^2/(32 wavelength) per area (thesis, 4.5.1).
       call check_close(whole%rows(0)%energy_elastic/(40e-6_dp*23.0940107675850e-6_dp* &
          3.0_dp*pi*e_star*1.0e-6_dp**2/(32.0_dp*40e-6_dp)), 1.0_dp, 1e-9_dp, &
          'elastic energy of full contact')
@@ -255,8 +255,8 @@ contains
       call check_same_rows(whole, thesis, 1e-6_dp, 'from full contact, both methods')
    end subroutine wave_at_no_load_has_two_states
 
-   !> A viscoelastic sphere pressed and pulled off at a constant speed, twice as slow: energy is lost with
-   !> and without adhesion, more with it, and more at the slower parting than an elastic one.
+   !> A viscoelastic sphere is pressed on and pulled off at half the speed. It loses energy without adhesion, and more than
+   !! twice as much with it.
    subroutine loss_of_a_viscoelastic_pull_off()
       type(record_type) :: bare, adhesive
       character(:), allocatable :: text
@@ -275,15 +275,15 @@ contains
          loss = [b(n)%dissipated_viscous, a(n)%dissipated_viscous]
          call check_that(loss(1) > 0.0_dp .and. loss(2) > 2.0_dp*loss(1), 'adhesion loses more: '// &
             to_text(loss(2)/loss(1)))
-         call check_close(b(n)%force, 0.0_dp, 1e-6_dp*maxval(b%force), 'without adhesion it lifts off')
-         call check_order(minval(a%force), '<', -1.3_dp*unit_force, 'with adhesion it pulls')
+         call check_close(b(n)%force, 0.0_dp, 1e-6_dp*maxval(b%force), 'without adhesion the sphere lifts off')
+         call check_order(minval(a%force), '<', -1.3_dp*unit_force, 'with adhesion the sphere is pulled')
          call check_close(a(n)%contact_area, 0.0_dp, 0.0_dp, 'in the end there is no contact')
-         ! the force at the same displacement is lower on the way back
+         ! At the same displacement the force is lower on the way back.
          do k = 13, 20
             call check_order(a(k)%force, '<', at(a(0:12), a(k)%displacement), &
-               'the way back lies below')
+               'the force is lower on the way back')
          end do
-         ! the outside view of the closed path: what the load did, less what is still in there
+         ! Seen from outside, the loss of the loop is the work of the load less the energy that is still stored.
          call check_close((a(n)%work_load - a(n)%energy_elastic - a(n)%energy_adhesive)/loss(2), 1.0_dp, &
             0.03_dp, 'work of the load around the loop')
          call check_close((b(n)%work_load - b(n)%energy_elastic)/loss(1), 1.0_dp, 0.05_dp, &
@@ -292,7 +292,7 @@ contains
 
    contains
 
-      !> The force on a path up, between rows.
+      !> Return the force at a displacement on a rising path, by interpolation between rows.
       real(dp) function at(rows, displacement)
          type(history_row_type), intent(in) :: rows(:)
          real(dp), intent(in) :: displacement
@@ -309,7 +309,7 @@ contains
 
    end subroutine loss_of_a_viscoelastic_pull_off
 
-   !> Elastic, without friction, oblique, whole cells: the state moves with the road.
+   !> An elastic contact without friction moves with the road, obliquely and by whole cells.
    subroutine elastic_state_moves_with_the_road()
       type(record_type) :: record
       integer :: k
@@ -324,7 +324,7 @@ contains
             call check_close(rows(k)%contact_area, rows(0)%contact_area, 0.0_dp, 'sliding, elastic: area')
             call check_close(rows(k)%displacement/rows(0)%displacement, 1.0_dp, 1e-7_dp, &
                'sliding, elastic: displacement')
-            ! the slopes are not quite those of the discrete energy
+            ! The slopes of the road differ slightly from those of the discrete energy.
             call check_close(rows(k)%friction, 0.0_dp, 1e-3_dp, 'sliding, elastic: no friction')
             call check_close(rows(k)%friction, rows(1)%friction, 1e-8_dp, 'sliding, elastic: same friction')
             call check_order(rows(k)%iterations_normal, '<=', 2, &
@@ -333,7 +333,7 @@ contains
       end associate
    end subroutine elastic_state_moves_with_the_road
 
-   !> Viscoelastic, without friction, oblique: what drives is lost in the solid; adhesion makes it more.
+   !> A viscoelastic contact without friction loses the work of the drive in the solid, and more with adhesion.
    subroutine drive_is_lost_in_the_solid()
       type(record_type) :: adhesive, bare
       character(:), allocatable :: text, phases
@@ -348,7 +348,7 @@ contains
             ', velocity_x = 4e-4, velocity_y = 1.65e-4 /'//nl
          call run_case(text//sticky('exponential', '0.4e-6')//phases, 'sliding, viscoelastic', adhesive)
          call check_books(adhesive, 'sliding, viscoelastic')
-         ! work from outside: the drive, and the load that sinks
+         ! The work from outside is that of the drive and that of the load that sinks.
          associate (a => adhesive%rows, n => last(adhesive))
             errors(k) = abs((a(n)%work_drive + a(n)%work_load - a(0)%work_load) &
                /(a(n)%work_normal - a(0)%work_normal) - 1.0_dp)
@@ -363,8 +363,8 @@ contains
          'sliding, viscoelastic: friction with and without adhesion')
    end subroutine drive_is_lost_in_the_solid
 
-   !> In full sliding without slope the traction is mu (P - P_adh) (thesis, 4.5.1): the attraction P_adh in
-   !> a closed cell, which differs between the potentials, presses it on the wall.
+   !> In full sliding without the slope effect the traction is mu (P - P_adh) (thesis, 4.5.1). The attraction P_adh in a
+   !! closed cell, which depends on the potential, presses the surfaces together.
    subroutine friction_by_the_pressure_of_the_wall(potential, attraction)
       character(*), intent(in) :: potential
       real(dp), intent(in) :: attraction           !! at touch, Pa
@@ -385,8 +385,8 @@ contains
       end associate
    end subroutine friction_by_the_pressure_of_the_wall
 
-   !> The bound of the friction must not jump where a cell opens: the passes of the step would not settle.
-   !> With Gauss a cell opens at the pressure 0.
+   !> The bound of the friction must not jump where a cell opens, or the passes of the step would not settle. With the
+   !! potential gauss a cell opens at zero pressure.
    subroutine passes_settle_with_gauss()
       type(record_type) :: record
 
@@ -397,7 +397,7 @@ contains
       call check_that(all(record%rows%passes <= 20), 'gauss, Coulomb-Orowan: the passes settle')
    end subroutine passes_settle_with_gauss
 
-   !> With friction and slope, oblique: books closed.
+   !> The energy balance closes with friction and the slope effect, for an oblique motion.
    subroutine books_close_with_friction_and_slope()
       type(record_type) :: record
 
@@ -410,7 +410,7 @@ contains
          'sliding, friction with slope: heat')
    end subroutine books_close_with_friction_and_slope
 
-   !> No energy: as without adhesion.
+   !> Adhesion without energy is the same as no adhesion.
    subroutine no_energy_is_no_adhesion()
       type(record_type) :: none, zero
       character(:), allocatable :: text, ending
@@ -427,11 +427,11 @@ contains
          call check_same_rows(none, zero, 1e-6_dp, 'no energy')
          call check_close(maxval(abs(none%pressure - zero%pressure))/maxval(none%pressure), 0.0_dp, &
             1e-4_dp, 'no energy: pressure')
-         call check_close(maxval(abs(zero%rows%energy_adhesive)), 0.0_dp, 0.0_dp, 'no energy: no energy')
+         call check_close(maxval(abs(zero%rows%energy_adhesive)), 0.0_dp, 0.0_dp, 'no energy: adhesive energy')
       end do
    end subroutine no_energy_is_no_adhesion
 
-   !> The same load again changes nothing, however often.
+   !> Repeating a load, however often, changes nothing.
    subroutine repeated_load_changes_nothing()
       type(record_type) :: record
       character(:), allocatable :: place, phases
@@ -451,7 +451,7 @@ contains
       end do
    end subroutine repeated_load_changes_nothing
 
-   !> The first load is a pull: held from mere touch.
+   !> The first load may be a pull, under which the contact starts from a mere touch.
    subroutine first_load_may_be_a_pull()
       type(record_type) :: record, pressed
       character(:), allocatable :: text
@@ -472,7 +472,7 @@ contains
       end do
    end subroutine first_load_may_be_a_pull
 
-   !> Warnings and notes, their numbers against sums over the map and the thesis's formulas.
+   !> The numbers in warnings and notes agree with sums over the map and with the formulas of the thesis.
    subroutine warnings_match_the_formulas()
       type(case_type) :: case
       type(error_type), allocatable :: error
@@ -492,7 +492,7 @@ contains
       call check_no_error(error, 'advice: height')
       call adhesion_criteria(case%surfaces(1), energy, e_star, 2e4_dp, c1, c2)
       stored = 0.25_dp*e_star*spectral_sum(height, case%grid%lx, case%grid%ly)
-      ! the spectrum of the formula is continuous, that of the map has few waves
+      ! The formula's spectrum is continuous, while the map has few waves.
       call check_close(c2*stored/energy, 1.0_dp, 0.1_dp, 'advice: energy of full contact')
       call check_order(c1, '>', 0.0_dp, 'advice: C1')
 

@@ -1,4 +1,4 @@
-!> Tests of the step loop with friction: Mindlin's contact, energy books, bounds, sums, stick and slip.
+!> Tests of the step loop with friction: Mindlin's contact, energy balances, bounds, sums, stick and slip.
 module test_simulation_friction
    use case_input, only : parse_case
    use case_settings, only : case_type
@@ -17,7 +17,7 @@ module test_simulation_friction
 
    public :: run_simulation_friction
 
-   !> A block with two arms, a mass on a periodic row of summits, driven obliquely.
+   !> A block with two arms and a mass on a periodic row of summits, driven obliquely.
    character(*), parameter :: block = &
       '&grid nx = 45, ny = 30, lx = 1.1e-3, ly = 0.8e-3 /'//nl// &
       '&surface shape = ''paraboloid'', radius = 10e-3 /'//nl
@@ -32,9 +32,9 @@ contains
 
    subroutine run_simulation_friction()
       call begin_suite('simulation_friction')
-      if (selected('mindlin_sphere_driven_to_and_fro')) call mindlin_sphere_driven_to_and_fro()
+      if (selected('mindlin_sphere_forwards_and_backwards')) call mindlin_sphere_forwards_and_backwards()
       if (selected('books_close_with_friction')) call books_close_with_friction()
-      if (selected('no_friction_is_only_the_slope')) call no_friction_is_only_the_slope()
+      if (selected('zero_coefficient_leaves_the_viscous_friction')) call zero_coefficient_leaves_the_viscous_friction()
       if (selected('traction_is_within_its_bound')) call traction_is_within_its_bound()
       if (selected('all_sticks_or_all_slips')) call all_sticks_or_all_slips()
       if (selected('same_result_on_two_threads')) call same_result_on_two_threads()
@@ -65,15 +65,15 @@ contains
          associate (row => record%rows(last(record)))
             call check_close(row%friction_viscous*load, viscous, 0.01_dp*viscous, 'cylinder: viscous part')
             call check_close(row%friction*load, totals(k), 0.002_dp*totals(k), &
-               'cylinder: all of the force, slope '//slope(k))
-            call check_close(row%stick_area, 0.0_dp, 0.0_dp, 'cylinder: all slips')
+               'cylinder: whole horizontal force, slope '//slope(k))
+            call check_close(row%stick_area, 0.0_dp, 0.0_dp, 'cylinder: no cell sticks')
          end associate
       end do
    end subroutine cylinder_of_the_thesis
 
-   !> Mindlin's sphere, nu = 0: tangential force against the motion of the road, under way, back and
-   !> there again (Mindlin and Deresiewicz 1953).
-   subroutine mindlin_sphere_driven_to_and_fro()
+   !> Mindlin's sphere with nu = 0: the tangential force as a function of the road's motion, forwards, backwards and
+   !! forwards again (Mindlin and Deresiewicz 1953).
+   subroutine mindlin_sphere_forwards_and_backwards()
       real(dp), parameter :: g = 1e6_dp, radius = 10e-3_dp, a = 1e-3_dp, mu = 0.01_dp, v = 1e-3_dp
       real(dp), parameter :: full = mu*a**2/radius     !! road's motion to full slip, m
       type(record_type) :: record
@@ -105,24 +105,24 @@ contains
          end if
          worst = max(worst, abs(record%drag(1, k)/(mu*load) - expected))
       end do
-      call check_close(worst, 0.0_dp, 2e-3_dp, 'Mindlin: force there, back and there again')
+      call check_close(worst, 0.0_dp, 2e-3_dp, 'Mindlin: force on all three ways')
       call check_close(record%drag(1, last(record)), record%drag(1, 4), 1e-3_dp*mu*load, &
          'Mindlin: the loop closes')
       call check_order(record%rows(8)%dissipated_friction, '>', record%rows(4)%dissipated_friction, &
-         'Mindlin: slip on the way back is lost too')
+         'Mindlin: slip on the way back loses energy, too')
 
    contains
 
-      !> Force over the full one for a motion x of the road over that of full slip.
+      !> Return the force relative to that of full slip for a motion x relative to that at full slip.
       pure real(dp) function loading(x)
          real(dp), intent(in) :: x
 
          loading = 1.0_dp - (1.0_dp - x)**1.5_dp
       end function loading
 
-   end subroutine mindlin_sphere_driven_to_and_fro
+   end subroutine mindlin_sphere_forwards_and_backwards
 
-   !> The books close with friction, viscoelasticity, inertia and slope, and without slope.
+   !> The energy balance closes with friction, viscoelasticity, inertia, and with and without the slope effect.
    subroutine books_close_with_friction()
       type(record_type) :: record
 
@@ -132,32 +132,32 @@ contains
       call check_order(record%rows(last(record))%dissipated_friction, '>', 0.0_dp, &
          'friction loses energy')
       call check_order(maxval(record%rows%energy_kinetic), '>', 0.0_dp, 'the mass moves')
-      ! With slope T holds -P grad H: the whole force is the sum of T.
+      ! With the slope effect T includes -P grad H, so that the whole force is the sum of T.
       call check_close(record%drag(1, last(record)), record%rows(last(record))%traction_x*0.88e-6_dp, &
-         1e-12_dp*maxval(abs(record%drag)), 'with slope: the sum of T only')
+         1e-12_dp*maxval(abs(record%drag)), 'with slope: the force is the sum of T')
       call run_case(block//rubber//'&friction law = ''coulomb'', coefficient = 0.6, '// &
          'slope_effect = .false. /'//nl//drive//'&solver tolerance = 1e-9 /', 'no slope', record)
       call check_books(record, 'no slope', 1e-8_dp)
       associate (row => record%rows(last(record)))
          call check_close(row%friction, dot_product([row%traction_x, row%traction_y], &
             [0.4_dp, -0.15_dp]/hypot(0.4_dp, 0.15_dp))/row%pressure + row%friction_viscous, 1e-12_dp, &
-            'without slope: sum of T and of -P grad H, once')
+            'without slope: the force is the sum of T and of -P grad H')
       end associate
    end subroutine books_close_with_friction
 
-   !> mu = 0 with slope: the tangential force is that of no friction.
-   subroutine no_friction_is_only_the_slope()
+   !> With mu = 0 and the slope effect the tangential force is that of a road without friction.
+   subroutine zero_coefficient_leaves_the_viscous_friction()
       type(record_type) :: record
 
       call run_case(block//rubber//'&friction law = ''coulomb'', coefficient = 0 /'//nl//drive// &
          '&solver tolerance = 1e-8 /', 'mu = 0', record)
       associate (row => record%rows(last(record)))
          call check_close(row%friction, row%friction_viscous, 1e-12_dp, 'mu = 0: viscous friction only')
-         call check_close(row%dissipated_friction, 0.0_dp, 1e-12_dp*row%work_normal, 'mu = 0: none lost')
+         call check_close(row%dissipated_friction, 0.0_dp, 1e-12_dp*row%work_normal, 'mu = 0: friction loses no energy')
       end associate
-   end subroutine no_friction_is_only_the_slope
+   end subroutine zero_coefficient_leaves_the_viscous_friction
 
-   !> Each row's traction lies within the bound of its pressure.
+   !> In each row the traction lies within the bound of that row's pressure.
    subroutine traction_is_within_its_bound()
       type(case_type) :: case
       type(simulation_type) :: sim
@@ -193,7 +193,7 @@ contains
       call sim%destroy()
    end subroutine traction_is_within_its_bound
 
-   !> All sticks under a huge coefficient, all slips after a long way: friction is then the coefficient.
+   !> With a huge coefficient all cells stick. After a long way all slip, and the friction is the coefficient.
    subroutine all_sticks_or_all_slips()
       type(record_type) :: record
 
@@ -201,9 +201,9 @@ contains
          '&friction law = ''coulomb'', coefficient = 1e3, slope_effect = .false. /'//nl//drive// &
          '&solver tolerance = 1e-7 /', 'full stick', record)
       associate (row => record%rows(last(record)))
-         call check_close(row%stick_area, row%contact_area, 1e-12_dp, 'full stick')
+         call check_close(row%stick_area, row%contact_area, 1e-12_dp, 'full stick: all cells of the contact stick')
          call check_close(row%dissipated_friction, 0.0_dp, 1e-9_dp*row%work_tangential, &
-            'full stick loses nothing')
+            'full stick: no energy is lost')
       end associate
       call run_case(block//'&material poisson = 0.4, shear_modulus = 3e6, thickness = 1e-3 /'//nl// &
          '&friction law = ''coulomb'', coefficient = 0.2, slope_effect = .false. /'//nl//drive// &
@@ -211,9 +211,9 @@ contains
       associate (row => record%rows(last(record)))
          call check_close(row%stick_area, 0.0_dp, 1e-12_dp, 'full slip: nothing sticks')
          call check_close(hypot(row%traction_x, row%traction_y), 0.2_dp*row%pressure, &
-            1e-4_dp*row%pressure, 'full slip: the coefficient')
+            1e-4_dp*row%pressure, 'full slip: the friction is the coefficient')
          call check_close(row%traction_y/row%traction_x, -0.15_dp/0.4_dp, 1e-3_dp, &
-            'full slip: along the road''s motion')
+            'full slip: the traction has the direction of the road''s motion')
       end associate
    end subroutine all_sticks_or_all_slips
 
@@ -231,10 +231,9 @@ contains
       call check_same_rows(one, two, 1e-12_dp, 'threads')
    end subroutine same_result_on_two_threads
 
-   !> A thick elastic block on a short wave in one pass a step, with the ripples that linear interpolation
-   !> leaves on the friction from cell to cell: the scheme sticks and slips in turn,
-   !> which is reported once, also by a run after a restart (python/tests/test_stops.py). A mass ends it; a smooth
-   !> case is silent.
+   !> A thick elastic block on a short wave, with one pass per step, sticks and slips in turn: linear interpolation makes
+   !! the friction vary from cell to cell. This is reported once, also by a run after a restart
+   !! (python/tests/test_stops.py). A mass prevents it, and a smooth case causes no report.
    subroutine numerical_stick_slip_is_reported()
       character(*), parameter :: report = 'numerical stick-slip'
       type(record_type) :: record
@@ -247,38 +246,38 @@ contains
          call watch_slip(watch, merge(1.2_dp, 0.8_dp, mod(k, 2) == 0), 1.0_dp, 2, 0.0_dp, message)
          if (len(message) > 0) warned = warned + 1
       end do
-      call check_that(warned == 1, 'a slip that swings from step to step causes one warning')
+      call check_that(warned == 1, 'a slip that alternates from step to step causes one warning')
       watch = stick_slip_watch_type()
       do k = 1, 100
          call watch_slip(watch, 1.0_dp + 0.9_dp*sin(0.3_dp*k), 1.0_dp, 2, 0.0_dp, message)
          if (len(message) > 0) warned = warned + 1
       end do
-      call check_that(warned == 1, 'a slip that swings over many steps causes none')
+      call check_that(warned == 1, 'a slip that oscillates over many steps causes no warning')
 
       ! The motion is chaotic. In 60 steps, one of 20 blocks that differ by 1e-6 does not alternate often enough.
       call slide('0', 1, record, steps=180)
       call check_order(index(record%warnings, report), '>', 0, 'numerical stick-slip is reported')
       call check_that(index(record%warnings, report) == index(record%warnings, report, back=.true.), &
-         'and once')
+         'numerical stick-slip is reported only once')
       call slide('30', 1, record)
-      call check_that(index(record%warnings, report) == 0, 'a mass ends numerical stick-slip')
-      ! The soft mean of a thick block: without keeping the total of what sticks, some steps of this
-      ! are never solved (run_case checks that all converge).
+      call check_that(index(record%warnings, report) == 0, 'a mass prevents numerical stick-slip')
+      ! The mean of a thick block is soft. A solver that did not keep the total of the sticking cells never solved some
+      ! steps of this case (run_case checks that all steps converge).
       call slide('0', 6, record)
       call check_order(maxval(record%rows%iterations_tangential), '<', 150, &
-         'a thick block is solved')
+         'a thick block takes few iterations')
       call run_case(block//rubber//'&friction law = ''coulomb'', coefficient = 0.6 /'//nl//drive, &
          'smooth', record)
-      call check_that(index(record%warnings, report) == 0, 'no stick-slip in a smooth case')
+      call check_that(index(record%warnings, report) == 0, 'a smooth case causes no report of stick-slip')
 
    contains
 
-      !> The block with a density, kg/m3.
+      !> Run the block with a density in kg/m3.
       subroutine slide(density, passes, record, steps)
          character(*), intent(in) :: density
          integer, intent(in) :: passes
          type(record_type), intent(out) :: record
-         integer, intent(in), optional :: steps        !! default 60
+         integer, intent(in), optional :: steps        !!! number of steps, 60 by default
          integer :: n
 
          n = 60
@@ -295,7 +294,7 @@ contains
 
    end subroutine numerical_stick_slip_is_reported
 
-   !> Where friction is on, what touches sticks until the road moves; without friction it slips.
+   !> With friction all cells in contact stick until the road moves; without friction they slip.
    subroutine contact_sticks_until_the_road_moves()
       character(*), parameter :: laws(3) = [character(60) :: &
          '&friction law = ''coulomb'', coefficient = 0.6 /', &
@@ -320,9 +319,9 @@ contains
             call check_no_error(error, 'before motion: row')
             if (.not. allocated(contact)) allocate (contact(sim%grid%nx, sim%grid%ny))
             call contact_rows(sim, 1, contact)
-            call check_order(count(sim%state%pressure > 0.0_dp), '>', 100, 'before motion: contact')
+            call check_order(count(sim%state%pressure > 0.0_dp), '>', 100, 'before motion: cells in contact')
             call check_that(all(contact == merge(state, 0, sim%state%pressure > 0.0_dp)), &
-               'before motion: states')
+               'before motion: the contact record has the expected state in each cell')
             call check_close(sim%state%row%stick_area, merge(sim%state%row%contact_area, 0.0_dp, k < 3), 0.0_dp, &
                'before motion: stick area')
             call sim%destroy()

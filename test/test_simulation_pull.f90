@@ -1,4 +1,4 @@
-!> Tests of a road that is pulled by a force: known solutions, and the same runs driven at a velocity.
+!> Tests of a road that a force pulls: known solutions, and agreement with roads that are driven at a velocity.
 module test_simulation_pull
    use case_input, only : parse_case
    use case_settings, only : case_type
@@ -20,20 +20,20 @@ contains
       call begin_suite('simulation_pull')
       if (selected('mindlin_cycle_under_a_force')) call mindlin_cycle_under_a_force()
       if (selected('sticking_block_creeps')) call sticking_block_creeps()
-      if (selected('pulled_road_goes_as_a_driven_one')) then
-         call pulled_road_goes_as_a_driven_one('.true.', 'fast')
-         call pulled_road_goes_as_a_driven_one('.false.', 'fast')
-         call pulled_road_goes_as_a_driven_one('.true.', 'thesis')
-         call pulled_road_goes_as_a_driven_one('.false.', 'thesis')
+      if (selected('pulled_road_moves_like_a_driven_one')) then
+         call pulled_road_moves_like_a_driven_one('.true.', 'fast')
+         call pulled_road_moves_like_a_driven_one('.false.', 'fast')
+         call pulled_road_moves_like_a_driven_one('.true.', 'thesis')
+         call pulled_road_moves_like_a_driven_one('.false.', 'thesis')
       end if
-      if (selected('far_way_is_reported_once')) call far_way_is_reported_once()
+      if (selected('long_travel_is_reported_once')) call long_travel_is_reported_once()
       if (selected('pull_beyond_friction_is_reported')) call pull_beyond_friction_is_reported()
       if (selected('pulled_mass_accelerates')) call pulled_mass_accelerates()
-      if (selected('what_a_pull_excludes')) call what_a_pull_excludes()
+      if (selected('pull_excludes_other_variables')) call pull_excludes_other_variables()
    end subroutine run_simulation_pull
 
-   !> Mindlin and Deresiewicz's sphere, nu = 0, under a force that goes there and back: the way of the
-   !> road, and a loop that closes.
+   !> Mindlin and Deresiewicz's sphere with nu = 0 under a force that goes forwards and backwards: the motion of the road
+   !! is known, and its loop closes.
    subroutine mindlin_cycle_under_a_force()
       type(record_type) :: record
       real(dp), parameter :: mu = 0.4_dp, modulus = 200e6_dp, radius = 50e-3_dp, load = 10.6667_dp
@@ -61,16 +61,15 @@ contains
             way = full*(2.0_dp*(1.0_dp - 0.5_dp*(part - q))**(2.0_dp/3.0_dp) &
                - (1.0_dp - part)**(2.0_dp/3.0_dp) - 1.0_dp)
          end if
-         call check_close(record%drag(1, k), q*mu*load, 1e-6_dp*mu*load, 'Mindlin: the force asked for')
-         call check_close(record%rows(k)%road_x, way, 2e-3_dp*full, 'Mindlin: the way of the road')
+         call check_close(record%drag(1, k), q*mu*load, 1e-6_dp*mu*load, 'Mindlin: the force of the input')
+         call check_close(record%rows(k)%road_x, way, 2e-3_dp*full, 'Mindlin: the travel of the road')
       end do
-      call check_close(record%rows(30)%road_x, record%rows(6)%road_x, 1e-6_dp*full, 'Mindlin: a closed loop')
-      call check_close(maxval(abs(record%rows%road_y)), 0.0_dp, 1e-12_dp*full, 'Mindlin: no way along y')
+      call check_close(record%rows(30)%road_x, record%rows(6)%road_x, 1e-6_dp*full, 'Mindlin: the loop closes')
+      call check_close(maxval(abs(record%rows%road_y)), 0.0_dp, 1e-12_dp*full, 'Mindlin: no travel along y')
       call check_books(record, 'Mindlin')
    end subroutine mindlin_cycle_under_a_force
 
-   !> A block that sticks all over creeps by the creep function of its shear, and recovers when the pull
-   !> ends.
+   !> A block that sticks everywhere creeps by the creep function of its shear, and recovers when the pull ends.
    subroutine sticking_block_creeps()
       type(record_type) :: record
       real(dp), parameter :: relaxed = 1e6_dp, glassy = 4e6_dp, thickness = 2e-3_dp, pull = 3e4_dp
@@ -89,13 +88,13 @@ contains
          expected = step*compliance(record%rows(k)%time)
          if (record%rows(k)%phase == 3) expected = expected - step*compliance(record%rows(k)%time - hold)
          call check_close(record%rows(k)%road_x, expected, 2e-4_dp*step/relaxed, 'creep of a block')
-         call check_close(record%rows(k)%stick_area, 1.0_dp, 0.0_dp, 'creep: all sticks')
+         call check_close(record%rows(k)%stick_area, 1.0_dp, 0.0_dp, 'creep: all cells stick')
       end do
       call check_books(record, 'creep')
 
    contains
 
-      !> J(t), 1/Pa.
+      !> Return J(t) in 1/Pa.
       pure real(dp) function compliance(time)
          real(dp), intent(in) :: time
 
@@ -104,11 +103,11 @@ contains
 
    end subroutine sticking_block_creeps
 
-   !> A rough road in partial slip, pulled obliquely by steps and ramps: driven by the velocities that
-   !> were found it takes the forces that were asked for.
-   subroutine pulled_road_goes_as_a_driven_one(slope_effect, method)
+   !> A rough road in partial slip is pulled obliquely by jumps and ramps. A second run, driven at the velocities of the
+   !! first one, has the same forces.
+   subroutine pulled_road_moves_like_a_driven_one(slope_effect, method)
       character(*), intent(in) :: slope_effect
-      character(*), intent(in) :: method            !! of the solvers
+      character(*), intent(in) :: method            !!! of the solvers
       type(record_type) :: driven, pulled
       character(*), parameter :: body = '&grid nx = 36, ny = 30, lx = 1e-3, ly = 0.9e-3 /'//nl// &
          '&surface shape = ''self_affine'', hurst = 0.8, rms_slope = 0.1, wavelength_long = 0.5e-3, '// &
@@ -151,11 +150,11 @@ contains
       call check_close(pulled%rows(3)%road_y - pulled%rows(2)%road_y, -1e-3_dp*dt, 1e-18_dp, &
          'pulled along x only: the road keeps its motion along y')
       call check_order(pulled%rows(4)%stick_area, '<', pulled%rows(4)%contact_area, &
-         'pulled: something slips')
-   end subroutine pulled_road_goes_as_a_driven_one
+         'pulled: some cells slip')
+   end subroutine pulled_road_moves_like_a_driven_one
 
-   !> A pull that moves the road by more than a cell in a step is warned of once, with the step that would do.
-   subroutine far_way_is_reported_once()
+   !> A pull that moves the road by more than a cell in a step is reported once, with a step that is short enough.
+   subroutine long_travel_is_reported_once()
       type(record_type) :: far, near
       character(*), parameter :: start = '&grid nx = 16, ny = 12, lx = 1e-3 /'//nl// &
          '&surface shape = ''flat'' /'//nl//'&material shear_modulus = 1e6, thickness = 4e-3 /'//nl// &
@@ -165,16 +164,17 @@ contains
       ! Under this pull the block is sheared by 0.32 mm, five cells, in two steps and in ten.
       call run_case(start//'&phase traction_x = 8e4, ramp = ''linear'', duration = 1, steps = 2 /', 'far', far)
       first = index(far%warnings, 'the pull moves the road by 2.56 cells in a step')
-      call check_that(first > 0 .and. index(far%warnings, 'dt = 0.195312') > first, 'a far way: '//far%warnings)
-      call check_that(index(far%warnings, 'the pull moves', back=.true.) == first, 'one warning of a long way')
+      call check_that(first > 0 .and. index(far%warnings, 'dt = 0.195312') > first, &
+         'the warning gives the distance and a shorter step: '//far%warnings)
+      call check_that(index(far%warnings, 'the pull moves', back=.true.) == first, 'a pull over several cells causes one warning')
       call run_case(start//'&phase traction_x = 8e4, ramp = ''linear'', duration = 1, steps = 10 /', 'near', near)
-      call check_that(index(near%warnings, 'the pull moves') == 0, 'half a cell per step is followed')
+      call check_that(index(near%warnings, 'the pull moves') == 0, 'half a cell per step causes no warning')
       call run_case(start//'&phase traction_x = 8e4, duration = 1, steps = 10 /', 'jump', far)
       call check_order(index(far%warnings, 'let the pull grow along a ramp'), '>', 0, &
-         'a jump of the pull')
-   end subroutine far_way_is_reported_once
+         'for a jump of the pull the warning recommends a ramp')
+   end subroutine long_travel_is_reported_once
 
-   !> More than the friction holds: a row that has not converged, and a reason with the limit.
+   !> A pull above what the friction holds gives a row that has not converged, and a reason that names the limit.
    subroutine pull_beyond_friction_is_reported()
       type(case_type) :: case
       type(simulation_type) :: sim
@@ -190,7 +190,7 @@ contains
       call new_simulation(sim, case, error)
       do k = 0, 3
          call sim%advance(error)
-         call check_that(sim%converged, 'beyond: still held')
+         call check_that(sim%converged, 'beyond: the rows up to the limit converge')
       end do
       call sim%advance(error)
       call check_that(.not. sim%converged, 'beyond: not converged')
@@ -200,7 +200,7 @@ contains
       call sim%destroy()
    end subroutine pull_beyond_friction_is_reported
 
-   !> A block with mass that is pulled off at once: m a = F - mu p, and the strain of its rubber at once.
+   !> A block with mass that is pulled suddenly: m a = F - mu p, and its rubber is sheared at once.
    subroutine pulled_mass_accelerates()
       type(record_type) :: record
       real(dp), parameter :: acceleration = 2e4_dp, strained = 6e-5_dp
@@ -211,7 +211,7 @@ contains
          '&friction law = ''coulomb'', coefficient = 0.5 /'//nl//'&phase pressure = 1e5 /'//nl// &
          '&phase traction_x = 6e4, duration = 1e-3, steps = 400 /'//nl// &
          '&phase traction_x = 5e4, duration = 1e-4, steps = 40 /', 'mass', record)
-      call check_close(record%rows(1)%road_x, strained, 1e-9_dp*strained, 'mass: the strain comes at once')
+      call check_close(record%rows(1)%road_x, strained, 1e-9_dp*strained, 'mass: the rubber is sheared at once')
       do k = 2, 401
          associate (row => record%rows(k))
             call check_close(row%road_x - strained, 0.5_dp*acceleration*row%time**2, &
@@ -223,8 +223,8 @@ contains
          'mass: a pull as large as the friction keeps the speed')
    end subroutine pulled_mass_accelerates
 
-   !> What a pull excludes and needs.
-   subroutine what_a_pull_excludes()
+   !> A pull excludes some variables and requires others.
+   subroutine pull_excludes_other_variables()
       character(*), parameter :: start = '&grid nx = 8, ny = 8, lx = 1e-3 /'//nl//'&surface shape = ''flat'' /'// &
          nl//'&material shear_modulus = 1e6 /'//nl
       character(*), parameter :: rubs = '&friction law = ''coulomb'', coefficient = 0.5 /'//nl
@@ -241,7 +241,7 @@ contains
 
    contains
 
-      !> The input is refused with this in the message.
+      !> Check that the input is refused with a message that contains `message`.
       subroutine fails(text, message)
          character(*), intent(in) :: text, message
          type(case_type) :: case
@@ -251,6 +251,6 @@ contains
          call check_error(error, message, message)
       end subroutine fails
 
-   end subroutine what_a_pull_excludes
+   end subroutine pull_excludes_other_variables
 
 end module test_simulation_pull

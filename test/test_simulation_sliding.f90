@@ -30,17 +30,17 @@ contains
       if (selected('outside_work_is_that_of_the_traction')) &
          call outside_work_is_that_of_the_traction()
       if (selected('resting_road_is_a_block_at_rest')) call resting_road_is_a_block_at_rest()
-      if (selected('moved_mirrored_turned_and_scaled_roads_agree')) &
-         call moved_mirrored_turned_and_scaled_roads_agree()
+      if (selected('shifted_mirrored_rotated_and_scaled_roads_agree')) &
+         call shifted_mirrored_rotated_and_scaled_roads_agree()
       if (selected('same_bits_on_two_threads')) call same_bits_on_two_threads()
       if (selected('sphere_crosses_a_free_map')) call sphere_crosses_a_free_map()
       if (selected('contact_at_the_edge_is_reported')) call contact_at_the_edge_is_reported()
       if (selected('contacts_of_few_cells')) call contacts_of_few_cells()
    end subroutine run_simulation_sliding
 
-   !> Friction of Hunter's cylinder, one cell a step, 100 cells over the contact.
-   !> The cell of `cells` cells is periodic: its images bend the rubber like a road of another
-   !> curvature, by (pi a/L)^2/6 with a the half width.
+   !> Return the friction of Hunter's cylinder, with one cell per step and 100 cells over the contact. The cell of `cells`
+   !! cells is periodic: its images deform the rubber like a road of another curvature, by a factor of about (pi a/L)^2/6,
+   !! where a is the half width.
    real(dp) function cylinder_friction(velocity, half_width, cells, scheme) result(friction)
       real(dp), intent(in) :: velocity        !! m/s
       real(dp), intent(in) :: half_width      !! m
@@ -86,19 +86,19 @@ contains
          friction = cylinder_friction(velocity(k), half_width(k), 2048, 'backward_euler')
          call check_close(friction/exact(k), 0.99_dp, 1e-3_dp, 'Hunter, backward Euler')
       end do
-      ! In this cell the solver's directions of the step before point out of the contact.
+      ! In this cell the direction from the previous step violates the constraints.
       friction = cylinder_friction(velocity(1), half_width(1), 1024, 'exponential2')
       call check_close(friction/exact(1), 1.0_dp, 5e-4_dp, 'Hunter, a smaller cell')
-      ! Fast, the contact is small beside the wake of 1 mm: the images weigh more, as 1/L^2.
+      ! At a high speed the contact is small compared to the wake of 1 mm, so that the images have more effect, as 1/L^2.
       coarse = cylinder_friction(velocity(3), half_width(3), 2048, 'exponential2')
       friction = cylinder_friction(velocity(3), half_width(3), 4096, 'exponential2')
       call check_close(friction/exact(3), 1.0_dp, 3e-3_dp, 'Hunter, fast')
       call check_close((friction + (friction - coarse)/3.0_dp)/exact(3), 1.0_dp, 1e-3_dp, &
-         'Hunter, fast, in an endless cell')
+         'Hunter, fast, extrapolated to an infinite cell')
    end subroutine hunter_cylinder_in_time
 
-   !> A sphere, a parabola: mu R/a0 -> (1 - E_relaxed/E_glassy) V tau_creep/a0 at low speed, whatever
-   !> the load; no friction at high speed.
+   !> For a sphere mu R/a0 -> (1 - E_relaxed/E_glassy) V tau_creep/a0 at low speed, whatever the load; at high speed there
+   !! is no friction.
    subroutine friction_at_low_and_high_speed()
       type(record_type) :: record
       real(dp), parameter :: radius = 10e-3_dp, creep_time = 0.01_dp, dx = 20e-6_dp
@@ -122,14 +122,14 @@ contains
       call check_close(mu(2), 0.0_dp, 1e-5_dp, 'friction at high speed')
    end subroutine friction_at_low_and_high_speed
 
-   !> The friction stress of a road in full contact, exactly, wave by wave: each arm's traction follows
-   !> p' + p/tau = g S' with S turning like exp(-i q.V t).
+   !> The exact friction stress of a road in full contact, wave by wave: each arm's traction satisfies
+   !! p' + p/tau = g S' where S varies as exp(-i q.V t).
    subroutine full_contact(record, lx, ly, g_e, g, tau, velocity, time, stress)
       type(record_type), intent(in) :: record
       real(dp), intent(in) :: lx, ly            !! m
       real(dp), intent(in) :: g_e, g(:), tau(:)
-      real(dp), intent(in) :: velocity(:, :)    !! from one time to the next, m/s [2, times]
-      real(dp), intent(in) :: time(0:)          !! s; at rest for ever before the first
+      real(dp), intent(in) :: velocity(:, :)    !!! between one time and the next, m/s [2, times]
+      real(dp), intent(in) :: time(0:)          !!! s; the road is at rest until the first one
       real(dp), allocatable, intent(out) :: stress(:, :)   !! on the rubber, Pa [2, 0:times]
       type(real_transform_type) :: transform
       type(error_type), allocatable :: error
@@ -149,7 +149,7 @@ contains
             if (i == 1 .and. (j == 1 .or. 2*(j - 1) == ny)) cycle
             q = 2.0_dp*pi*[(i - 1)/lx, (modulo(j - 1 + ny/2, ny) - ny/2)/ly]
             if (2*(j - 1) == ny) cycle
-            weight = merge(1.0_dp, 2.0_dp, i == 1)          ! a wave and its opposite
+            weight = merge(1.0_dp, 2.0_dp, i == 1)          ! waves in pairs +q, -q
             height = transform%spectrum(i, j)/(real(nx, dp)*ny)
             if (abs(height) < 1e-16_dp*maxval(abs(record%height))) cycle
             before = height*norm2(q)/0.5_dp                 ! S = U q/(1 - nu)
@@ -177,8 +177,8 @@ contains
       call destroy_real_transform(transform)
    end subroutine full_contact
 
-   !> A rough road in full contact that moves obliquely over a grid of oblong cells, with jumps of
-   !> speed, steps of all sizes and jumps of load between: both components of its drag.
+   !> A rough road in full contact moves obliquely over a grid of oblong cells, with jumps of the speed and of the load, and
+   !! steps of all sizes: both components of its drag are exact.
    subroutine rough_road_in_full_contact()
       type(record_type) :: record
       real(dp), allocatable :: stress(:, :), velocity(:, :)
@@ -192,7 +192,7 @@ contains
             '&surface shape = ''self_affine'', hurst = 0.8, wavelength_long = 0.6e-3, wavelength_short = 0.25e-3, '// &
             'rms_height = 1e-6, seed = 5 /'//nl// &
             '&material shear_modulus = 0.5e6, prony_g = 1e6, 2e6, prony_tau = 2e-3, 5e-2 /'//nl// &
-            ! 2 and -1 cells, then -1 and 0, then 0 and 2, then rest
+            ! The road moves by 2 and -1 cells per step, then -1 and 0, then 0 and 2, then it rests.
             '&phase pressure = 5e5, relaxed = .true., duration = 0.02, steps = 20, velocity_x = 30e-3, '// &
             'velocity_y = -12e-3 /'//nl// &
             '&phase duration = 0.005, steps = 10, velocity_x = -30e-3 /'//nl// &
@@ -215,16 +215,16 @@ contains
             record%rows%time, stress)
          worst = maxval(abs(record%drag/(lx*ly) - stress))/maxval(abs(stress))
          call check_close(worst, 0.0_dp, allowed(s), 'drag of waves, '//trim(schemes(s)))
-         call check_close(minval(record%rows%contact_area), 1.0_dp, 0.0_dp, 'waves in full contact')
-         call check_that(all(maxval(abs(stress), dim=2) > 200.0_dp), 'waves drag along x and y', &
+         call check_close(minval(record%rows%contact_area), 1.0_dp, 0.0_dp, 'waves: full contact')
+         call check_that(all(maxval(abs(stress), dim=2) > 200.0_dp), 'waves: the drag has both components', &
             [minval(maxval(abs(stress), dim=2))])
          call check_books(record, 'waves')
          deallocate (velocity, stress)
       end do
    end subroutine rough_road_in_full_contact
 
-   !> Steady drag of a wave of eight cells in full contact, by the defaults, one cell a step: the closed
-   !> form within 1 %. With central differences it would be 10 % low.
+   !> The steady drag of a wave of eight cells in full contact, with the defaults and one cell per step, is within 1 % of the
+   !! closed form. Central differences would make it 10 % too low.
    subroutine drag_of_a_coarse_wave()
       type(record_type) :: record
       real(dp), parameter :: amplitude = 1e-6_dp, wave = 0.1e-3_dp, speed = 0.02_dp, tau = 1e-3_dp
@@ -243,8 +243,8 @@ contains
          'coarse wave: drag')
    end subroutine drag_of_a_coarse_wave
 
-   !> A rubber without loss gives back what it takes: the drag over a way within a cell is the change
-   !> of the elastic energy at a fixed approach, by Simpson's rule over 16 steps.
+   !> An elastic rubber returns the work that it receives: the drag over a distance within one cell is the change of the
+   !! elastic energy at a fixed approach, by Simpson's rule over 16 steps.
    subroutine elastic_road_gives_back_its_work()
       type(record_type) :: record
       real(dp), parameter :: d_x = 12e-6_dp/16, d_y = -7e-6_dp/16
@@ -268,10 +268,10 @@ contains
          end do
          energy = record%rows(last(record))%energy_elastic - record%rows(first)%energy_elastic
       end associate
-      call check_close((work - energy)/work_sizes, 0.0_dp, 1.0e-3_dp, 'elastic road: the drag is its energy')
+      call check_close((work - energy)/work_sizes, 0.0_dp, 1.0e-3_dp, 'elastic road: the work of the drag is the change of energy')
    end subroutine elastic_road_gives_back_its_work
 
-   !> Orders in time of the oblique drag, the start from rest included.
+   !> Orders in time of the oblique drag, including the start from rest.
    subroutine orders_in_time_of_the_drag()
       type(record_type) :: record
       real(dp), allocatable :: stress(:, :), velocity(:, :)
@@ -307,8 +307,8 @@ contains
       end do
    end subroutine orders_in_time_of_the_drag
 
-   !> What the load and the road do from outside is the work of the traction, as steps shrink; the
-   !> difference is that of the scheme's order.
+   !> The work of the load and the road from outside approaches the work of the traction as the steps become shorter, with
+   !! the order of the scheme.
    subroutine outside_work_is_that_of_the_traction()
       type(record_type) :: record
       real(dp) :: difference(3)
@@ -326,15 +326,15 @@ contains
             difference(k) = abs(end%work_load + end%work_drive - end%work_normal) &
                /(end%work_normal - start%work_normal)
          end associate
-         call check_books(record, 'works')
+         call check_books(record, 'work from outside')
       end do
-      ! The start in parts leaves so little in coarse steps that the first two are not yet ordered.
+      ! The parts of the first step leave so small an error in coarse steps that the first two differences are not ordered.
       call check_that(maxval(difference(:2)) < 0.012_dp .and. difference(3) < 0.5_dp*difference(2) &
-         .and. difference(3) < 0.005_dp, 'works from outside: '//to_text(difference(1))//', '// &
+         .and. difference(3) < 0.005_dp, 'the works from outside and of the traction agree: '//to_text(difference(1))//', '// &
          to_text(difference(2))//', '//to_text(difference(3)), difference)
    end subroutine outside_work_is_that_of_the_traction
 
-   !> A road that does not move yet: the rows of a block at rest.
+   !> While the road does not move, the rows are those of a block at rest.
    subroutine resting_road_is_a_block_at_rest()
       type(record_type) :: moving, resting
       character(*), parameter :: body = '&grid nx = 48, ny = 40, lx = 1.2e-3, ly = 0.9e-3 /'//nl// &
@@ -355,11 +355,11 @@ contains
          call check_close(moving%rows(k)%friction, 0.0_dp, 0.0_dp, 'no speed: friction')
       end do
       call check_order(moving%rows(last(moving))%friction, '>', 0.01_dp, &
-         'friction once the road moves')
+         'there is friction once the road moves')
    end subroutine resting_road_is_a_block_at_rest
 
-   !> The same numbers for a road that is moved, mirrored, turned, scaled.
-   subroutine moved_mirrored_turned_and_scaled_roads_agree()
+   !> Roads that are shifted, mirrored, rotated or scaled give the same numbers.
+   subroutine shifted_mirrored_rotated_and_scaled_roads_agree()
       integer, parameter :: nx = 40, ny = 27
       type(record_type) :: base, other
       real(dp) :: map(nx, ny), turned(ny, nx)
@@ -399,7 +399,7 @@ contains
 
    contains
 
-      !> Slide a map by steps that are not whole cells; the moduli, and with them the load, times `factor`.
+      !> Slide over a map in steps that are not whole cells. `factor` scales the moduli and with them the load.
       subroutine slide(h, lx, ly, factor, velocity_x, velocity_y, record)
          real(dp), intent(in) :: h(:, :)
          character(*), intent(in) :: lx, ly, factor, velocity_x, velocity_y
@@ -414,9 +414,9 @@ contains
             '&solver tolerance = 1e-11, interpolation = '''//trim(methods(k))//''' /', 'invariances', record)
       end subroutine slide
 
-   end subroutine moved_mirrored_turned_and_scaled_roads_agree
+   end subroutine shifted_mirrored_rotated_and_scaled_roads_agree
 
-   !> The number of threads changes no bit.
+   !> The number of threads changes no bit of the result.
    subroutine same_bits_on_two_threads()
       type(record_type) :: one, two
       character(*), parameter :: text = '&grid nx = 96, ny = 81, lx = 1.2e-3, ly = 0.9e-3 /'//nl// &
@@ -434,7 +434,7 @@ contains
       call check_close(maxval(abs(one%pressure - two%pressure)), 0.0_dp, 0.0_dp, 'pressure of two threads')
    end subroutine same_bits_on_two_threads
 
-   !> Contacts of one to three cells, in which a step's first directions are of no use.
+   !> Contacts of one to three cells are solved, although the first directions of a step are useless in them.
    subroutine contacts_of_few_cells()
       type(record_type) :: record
 
@@ -482,7 +482,7 @@ contains
       call check_books(record, 'few cells')
    end subroutine contacts_of_few_cells
 
-   !> A sphere crosses a free map; a periodic cell far larger than the contact sees the same.
+   !> A sphere that crosses a free map agrees with one in a periodic cell far larger than the contact.
    subroutine sphere_crosses_a_free_map()
       type(record_type) :: free, periodic
       real(dp) :: difference(2)
@@ -505,10 +505,10 @@ contains
          difference(k) = maxval(abs(free%rows%friction - periodic%rows%friction))/maxval(free%rows%friction)
       end do
       call check_close(difference(2), 0.0_dp, 3e-3_dp, 'free map and large cell: friction')
-      call check_order(difference(2), '<', difference(1)/4.0_dp, 'images of a cell weigh as 1/L^3')
+      call check_order(difference(2), '<', difference(1)/4.0_dp, 'the effect of the images decreases as 1/L^3')
    end subroutine sphere_crosses_a_free_map
 
-   !> Contact at the edge of a free map, and points that enter or leave close to the contact: once each.
+   !> Contact at the edge of a free map, and points that enter or leave near the contact, are reported once each.
    subroutine contact_at_the_edge_is_reported()
       type(record_type) :: record
       character(*), parameter :: body = '&material shear_modulus = 1e6 /'//nl// &
@@ -526,25 +526,25 @@ contains
          'moved off the map', record)
       first = index(record%warnings, 'points enter or leave the free map')
       call check_that(first > 0 .and. index(record%warnings(first + 1:), 'points enter or leave') == 0, &
-         'points that come near, one warning: '//record%warnings)
+         'points that enter near the contact cause one warning: '//record%warnings)
       first = index(record%warnings, 'cells at the edge of the free map touch')
       call check_that(first > 0 .and. index(record%warnings(first + 1:), 'cells at the edge') == 0, &
-         'a sphere that leaves the map, one warning: '//record%warnings)
-      ! A long map has a large rms height: what counts is the depth of the contact.
+         'a sphere that leaves the map causes one warning: '//record%warnings)
+      ! A long map has a large rms height, which must not matter: the depth of the contact counts.
       call run_case('&material shear_modulus = 1e6 /'//nl// &
          '&grid nx = 80, ny = 30, lx = 0.8e-3, ly = 0.3e-3, boundary = ''free'' /'//nl// &
          '&surface shape = ''paraboloid'', radius = 1e-3, centre_x = 0.1e-3 /'//nl// &
          '&phase displacement = 2e-6, duration = 1, steps = 25, velocity_x = 0.5e-3 /', 'long way', record)
-      call check_that(index(record%warnings, 'free map') == 0, 'a long way on a free map: '//record%warnings)
-      ! The edge lies some ten micrometres below: within five ranges of one attraction, not of another.
+      call check_that(index(record%warnings, 'free map') == 0, 'a long travel on a free map causes no warning: '//record%warnings)
+      ! The edge is some ten micrometres lower: within five ranges of the first attraction, but not of the second.
       call run_case(body//'&phase displacement = 2e-6, duration = 1, steps = 2, velocity_x = 5e-6 /'//nl// &
          '&adhesion potential = ''exponential'', energy = 0.01, range = 3e-6 /', 'within reach', record)
       call check_order(index(record%warnings, 'points enter or leave the free map'), '>', 0, &
-         'an edge within the reach of adhesion: '//record%warnings)
+         'an edge within the range of adhesion causes a warning: '//record%warnings)
       call run_case(body//'&phase displacement = 2e-6, duration = 1, steps = 2, velocity_x = 5e-6 /'//nl// &
          '&adhesion potential = ''exponential'', energy = 0.01, range = 0.5e-6 /', 'out of reach', record)
       call check_that(index(record%warnings, 'free map') == 0, &
-         'an edge out of the reach of adhesion: '//record%warnings)
+         'an edge beyond the range of adhesion causes no warning: '//record%warnings)
    end subroutine contact_at_the_edge_is_reported
 
 end module test_simulation_sliding

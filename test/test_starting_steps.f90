@@ -1,5 +1,5 @@
-!> Tests of the first step after a kink of the load: a flat punch, whose contact never changes, so that the
-!> approach is exactly the creep of the material times an elastic constant of the mesh.
+!> Tests of the first step after a kink of the load. A flat punch has a contact that never changes, so that the approach
+!! is exactly the creep of the material times an elastic constant of the mesh.
 module test_starting_steps
    use case_settings, only : phase_settings_type
    use check, only : begin_suite, check_close, check_order, check_that, selected
@@ -25,7 +25,7 @@ contains
       if (selected('error_after_a_kink')) call error_after_a_kink()
    end subroutine run_starting_steps
 
-   !> Load, road and time of the parts lie on the straight line of the step, and end where it does.
+   !> The load, road and time of the parts are on the straight line of the step, and end where the step ends.
    subroutine parts_lie_on_the_line_of_the_step()
       type(planned_row_type) :: plan
       type(planned_row_type), allocatable :: parts(:)
@@ -38,11 +38,11 @@ contains
       plan%road_y = -4.0_dp
       plan%new_speed = .true.
       call split_start(plan, .false., .true., [0.0_dp, 0.0_dp], parts)
-      call check_that(size(parts) == 1, 'a step that is no start is not split')
+      call check_that(size(parts) == 1, 'a step without a kink is not split')
       call split_start(plan, .true., .false., [0.0_dp, 0.0_dp], parts)
-      call check_that(size(parts) == 1, 'a scheme without memory needs no parts')
+      call check_that(size(parts) == 1, 'a scheme that does not extrapolate does not split its steps')
       call split_start(plan, .true., .true., [0.0_dp, 4.0_dp], parts)
-      call check_that(size(parts) == 3, 'three parts')
+      call check_that(size(parts) == 3, 'a step after a kink has three parts')
       if (size(parts) /= 3) return
       call check_close(sum(parts%dt), 2.0_dp, 1e-15_dp, 'the parts fill the step')
       call check_close(parts(1)%time, 3.5_dp, 1e-15_dp, 'end of the first part')
@@ -50,13 +50,13 @@ contains
       call check_close(parts(1)%road_x, 1.0_dp, 1e-15_dp, 'road after the first part')
       call check_close(parts(2)%road_y, 0.0_dp, 1e-15_dp, 'road in the middle')
       call check_close(parts(3)%load, 18.0_dp, 0.0_dp, 'load at the end')
-      call check_that(parts(1)%new_speed .and. .not. any(parts(2:)%new_speed), 'only the first part begins')
+      call check_that(parts(1)%new_speed .and. .not. any(parts(2:)%new_speed), 'only the first part has a new speed')
       plan%instantaneous = .true.
       call split_start(plan, .true., .true., [0.0_dp, 0.0_dp], parts)
       call check_that(size(parts) == 1, 'a jump is not split')
    end subroutine parts_lie_on_the_line_of_the_step
 
-   !> Which steps begin with another rate of the load: none if a ramp continues over two phases.
+   !> The schedule marks the steps whose rate of the load is new; a ramp that continues over two phases has none.
    subroutine steps_that_begin_with_another_rate()
       type(phase_settings_type) :: phases(5)
       type(schedule_type) :: schedule
@@ -90,13 +90,13 @@ contains
       call check_that(finished .or. schedule%phase > 5, 'all rows are done')
    end subroutine steps_that_begin_with_another_rate
 
-   !> Up, down more slowly, and hold: 1, 3 and 5 arms. The worst row after the first kink, relative to the largest
-   !> approach, in coarse and fine steps.
+   !> The load grows, decreases more slowly, and rests, with 1, 3 and 5 arms. The error is that of the worst row after the
+   !! first kink, relative to the largest approach, in coarse and in fine steps.
    subroutine error_after_a_kink()
       integer, parameter :: arms(3) = [1, 3, 5]
       integer, parameter :: steps(3) = [8, 16, 32]
-      !> What coarse steps may miss. Going on with the curvature from before the kink misses 2.0e-3, 3.2e-3
-      !> and 3.6e-3 with 8 steps, a plain restart 3.5e-4, 2.2e-3 and 1.7e-3.
+      !> Largest errors that are allowed in coarse steps. A scheme that continued with the curvature from before the kink had
+      !! errors of 2.0e-3, 3.2e-3 and 3.6e-3 with 8 steps; a plain restart had 3.5e-4, 2.2e-3 and 1.7e-3.
       real(dp), parameter :: allowed(3) = [1.0e-4_dp, 4.0e-4_dp, 4.0e-4_dp]
       real(dp) :: errors(3)
       integer :: k, m
@@ -107,13 +107,13 @@ contains
             errors(k) = worst(arms(m), steps(k))
          end do
          call check_close(errors(1), 0.0_dp, allowed(m), to_text(arms(m))//' arms, 8 steps a ramp')
-         call check_order(errors(3), '<', errors(1)/4.0_dp, &
-            to_text(arms(m))//' arms: the error falls: '// to_text(errors(1))//', '//to_text(errors(2))//', '//to_text(errors(3)))
+         call check_order(errors(3), '<', errors(1)/4.0_dp, to_text(arms(m))//' arms: the error decreases with the step: '// &
+            to_text(errors(1))//', '//to_text(errors(2))//', '//to_text(errors(3)))
       end do
 
    contains
 
-      !> The worst error of a run with some arms and steps per ramp.
+      !> Return the worst error of a run with the given numbers of arms and of steps per ramp.
       function worst(n, steps) result(error)
          integer, intent(in) :: n, steps
          real(dp) :: error
@@ -136,7 +136,7 @@ contains
          call check_books(record, 'kinks', 1e-6_dp)
          error = 0.0_dp
          associate (rows => record%rows)
-            ! the mesh's own constant: the elastic answer of an unloaded punch is linear in the load
+            ! The constant of the mesh: the elastic approach of a punch is linear in the load.
             constant = elastic_constant()
             do i = steps + 1, last(record)
                t = rows(i)%time
@@ -146,7 +146,7 @@ contains
          end associate
       end function worst
 
-      !> A ramp to a force in one second.
+      !> Return a phase with a ramp to a force in one second.
       function phase(force, steps) result(text)
          real(dp), intent(in) :: force
          integer, intent(in) :: steps
@@ -156,7 +156,7 @@ contains
             to_text(steps)//' /'//nl
       end function phase
 
-      !> Approach of an elastic punch, times its modulus over its force.
+      !> Return the approach of an elastic punch, times its modulus over its force.
       function elastic_constant() result(constant)
          real(dp) :: constant
          type(record_type) :: record
@@ -167,8 +167,8 @@ contains
 
    end subroutine error_after_a_kink
 
-   !> The integral of J(t - s) dF(s), J the creep compliance, for a force that grows by 1/s for a second, falls by 0.7/s
-   !> for a second, and rests.
+   !> Return the integral of J(t - s) dF(s), where J is the creep compliance, for a force that grows by 1/s for a second,
+   !! decreases by 0.7/s for a second, and rests.
    function creep(g_e, g, tau, t) result(u)
       real(dp), intent(in) :: g_e, g(:), tau(:)
       real(dp), intent(in) :: t
@@ -181,7 +181,7 @@ contains
 
    contains
 
-      !> The integral of J from 0.
+      !> Return the integral of J from 0 to s.
       real(dp) function ramp(s)
          real(dp), intent(in) :: s
 
@@ -192,7 +192,7 @@ contains
 
    end function creep
 
-   !> A map with a flat disc.
+   !> Write a map with a flat disc.
    subroutine write_punch()
       real(dp) :: height(24, 24)
       integer :: i, j
@@ -205,7 +205,7 @@ contains
       call write_map(map, height)
    end subroutine write_punch
 
-   !> Grid, surface, tolerance.
+   !> Return the groups for grid, surface and tolerance.
    function punch() result(text)
       character(:), allocatable :: text
 

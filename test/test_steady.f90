@@ -1,4 +1,4 @@
-!> Tests of steady sliding: closed forms, limits of speed, invariances, balances, the way on in time.
+!> Tests of steady sliding: closed forms, limits of the speed, invariances, balances, and continuation in time.
 module test_steady
    use case_input, only : parse_case
    use case_settings, only : case_type
@@ -37,11 +37,11 @@ contains
       if (selected('hunter_cylinder_in_steady_sliding')) call hunter_cylinder_in_steady_sliding()
       if (selected('steady_state_at_rest_and_at_high_speed')) &
          call steady_state_at_rest_and_at_high_speed()
-      if (selected('turned_and_mirrored_road')) call turned_and_mirrored_road()
-      if (selected('power_in_is_power_out')) call power_in_is_power_out()
+      if (selected('rotated_and_mirrored_roads_agree')) call rotated_and_mirrored_roads_agree()
+      if (selected('losses_balance_the_power_of_the_drive')) call losses_balance_the_power_of_the_drive()
       if (selected('plane_strain_with_the_flat_law')) call plane_strain_with_the_flat_law()
-      if (selected('run_goes_on_from_the_steady_state')) call run_goes_on_from_the_steady_state()
-      if (selected('rows_of_a_curve_end_alike')) call rows_of_a_curve_end_alike()
+      if (selected('run_continues_from_the_steady_state')) call run_continues_from_the_steady_state()
+      if (selected('rows_of_a_curve_equal_single_rows')) call rows_of_a_curve_equal_single_rows()
       if (selected('same_bits_on_two_threads')) call same_bits_on_two_threads()
       if (selected('long_run_ends_in_the_steady_state')) call long_run_ends_in_the_steady_state()
       if (selected('error_against_a_run_falls_with_steps')) &
@@ -71,8 +71,8 @@ contains
          'full contact: power')
    end subroutine full_contact_with_a_wave
 
-   !> Hunter's cylinder (Hunter, 1961) at three speeds, as in test_simulation_sliding; the periodic cell
-   !> errs by 1/L^2.
+   !> Hunter's cylinder (Hunter, 1961) at three speeds, as in test_simulation_sliding. The periodic cell has an error of
+   !! order 1/L^2.
    subroutine hunter_cylinder_in_steady_sliding()
       real(dp), parameter :: velocity(3) = [5e-3_dp, 20e-3_dp, 100e-3_dp]
       real(dp), parameter :: half_width(3) = [0.73826627e-3_dp, 0.67155531e-3_dp, 0.39313100e-3_dp]
@@ -97,7 +97,8 @@ contains
       end do
    end subroutine hunter_cylinder_in_steady_sliding
 
-   !> At rest a steady state is a relaxed one, very slow and very fast it is that of G_e and of G(0).
+   !> At rest the steady state is the relaxed state; at a very low speed it is that of G_e, and at a very high one that of
+   !! G(0).
    subroutine steady_state_at_rest_and_at_high_speed()
       type(record_type) :: slow, fast, relaxed, rest, glassy
       character(*), parameter :: case = grid//road//rubber//'&solver tolerance = 1e-9 /'//nl
@@ -111,22 +112,22 @@ contains
       call run_case(line//'&phase steady = T, pressure = 2e5, velocity_x = 1e8 /', 'fast', fast)
       call check_close(maxval(abs(rest%pressure - relaxed%pressure)), 0.0_dp, 0.0_dp, 'at rest')
       call check_close(maxval(abs(slow%pressure - relaxed%pressure))/maxval(relaxed%pressure), 0.0_dp, &
-         1e-5_dp, 'slow as relaxed')
+         1e-5_dp, 'slow: pressure of the relaxed state')
       call check_close(maxval(abs(slow%gap - relaxed%gap))/maxval(relaxed%gap), 0.0_dp, 1e-5_dp, 'slow: gap')
       call check_close(slow%rows(0)%displacement/relaxed%rows(0)%displacement, 1.0_dp, 1e-7_dp, &
          'slow: approach')
       call check_close(slow%rows(0)%energy_elastic/relaxed%rows(0)%energy_elastic, 1.0_dp, 1e-6_dp, &
          'slow: stored energy')
       call check_order(abs(slow%rows(0)%friction), '<', 1e-6_dp, 'slow: no friction')
-      ! In a plane, modes across the motion stay relaxed at any speed; on a line there are none.
+      ! In a plane, waves across the motion stay relaxed at any speed; on a line there are none.
       call check_close(maxval(abs(fast%pressure - glassy%pressure))/maxval(glassy%pressure), 0.0_dp, &
-         1e-5_dp, 'fast as glassy')
+         1e-5_dp, 'fast: pressure of a jump')
       call check_order(abs(fast%rows(0)%friction), '<', 1e-6_dp, 'fast: no friction')
       call check_books(slow, 'slow')
    end subroutine steady_state_at_rest_and_at_high_speed
 
-   !> The same road turned by 90 degrees and mirrored, with friction in an oblique direction.
-   subroutine turned_and_mirrored_road()
+   !> A road that is rotated by 90 degrees or mirrored gives the rotated or mirrored fields; friction, oblique direction.
+   subroutine rotated_and_mirrored_roads_agree()
       type(record_type) :: straight, turned, mirrored
       real(dp) :: height(40, 32)
 
@@ -143,7 +144,7 @@ contains
          'mirrored: friction')
       call check_close(maxval(abs(mirrored%pressure(40:1:-1, :) - straight%pressure)) &
          /maxval(straight%pressure), 0.0_dp, 1e-6_dp, 'mirrored: pressure')
-   end subroutine turned_and_mirrored_road
+   end subroutine rotated_and_mirrored_roads_agree
 
    !> A smooth road without symmetry, m.
    function wavy(nx, ny) result(height)
@@ -162,7 +163,7 @@ contains
       end do
    end function wavy
 
-   !> A steady row with friction on the slope, over a given road of cells of 1 mm.
+   !> Return a steady row with friction on the slope, over a given road with cells of 1 mm.
    function slid(what, height, velocity_x, velocity_y, settings) result(record)
       character(*), intent(in) :: what
       real(dp), intent(in) :: height(:, :)
@@ -182,8 +183,8 @@ contains
          what, record)
    end function slid
 
-   !> Power in is power out, with the slope; without it the flat law leaves out a part.
-   subroutine power_in_is_power_out()
+   !> The power of the drive is lost in the rubber and by friction. Without the slope effect a part of it is missing.
+   subroutine losses_balance_the_power_of_the_drive()
       type(record_type) :: slope, flat
       real(dp) :: drive
 
@@ -193,7 +194,7 @@ contains
          call check_close((row%power_viscous + row%power_friction)/drive, 1.0_dp, 1e-9_dp, 'balance: slope')
          call check_that(row%power_viscous > 0.0_dp .and. row%power_friction > 0.0_dp, 'balance: losses', &
             [row%power_viscous, row%power_friction])
-         call check_close(row%stick_area, 0.0_dp, 0.0_dp, 'all slips')
+         call check_close(row%stick_area, 0.0_dp, 0.0_dp, 'no cell sticks')
          call check_close(row%sliding_speed, hypot(0.8_dp, 0.3_dp), 1e-12_dp, 'sliding speed')
          call check_close(row%residual_tangential, 0.0_dp, 1e-8_dp, 'tangential residual')
       end associate
@@ -204,10 +205,10 @@ contains
          call check_close((row%power_viscous + row%power_friction)/drive, 1.0_dp, 0.1_dp, 'balance: flat')
       end associate
       call check_books(slope, 'steady, slope')
-   end subroutine power_in_is_power_out
+   end subroutine losses_balance_the_power_of_the_drive
 
-   !> Plane strain, nu = 1/2, flat law: T = mu P and A_xx = A_zz, so that U_x = mu U_z; the road is read
-   !> at x + U_x, and stands further by the mean of U_x under the pressure.
+   !> In plane strain with nu = 1/2 and without the slope effect T = mu P and A_xx = A_zz, so that U_x = mu U_z. The road is
+   !! read at x + U_x, and has moved by the mean of U_x weighted with the pressure.
    subroutine plane_strain_with_the_flat_law()
       type(record_type) :: record
 
@@ -223,9 +224,9 @@ contains
       end associate
    end subroutine plane_strain_with_the_flat_law
 
-   !> A steady phase with a duration continues from its state: nothing changes except by the error of the
-   !> steps, while a start from rest is far away.
-   subroutine run_goes_on_from_the_steady_state()
+   !> A steady phase with a duration continues from its state: only the error of the steps changes it, while a run from
+   !! rest differs much more.
+   subroutine run_continues_from_the_steady_state()
       type(record_type) :: steady, rest
       character(*), parameter :: steps = 'velocity_x = 0.5, duration = 12e-3, steps = 6 /'
       character(*), parameter :: laws(2) = [character(80) :: '', &
@@ -248,11 +249,10 @@ contains
             'onward: stored energy')
          call check_books(steady, 'onward')
       end do
-   end subroutine run_goes_on_from_the_steady_state
+   end subroutine run_continues_from_the_steady_state
 
-   !> A long run in time, one cell a step, ends in the steady state of its own scheme: with the symbols of
-   !> exponential2 the solver finds the same fields. With those of the continuum it differs by the error
-   !> of the steps.
+   !> A long run in time, with one cell per step, ends in the steady state of its own scheme: with the symbols of
+   !! exponential2 the solver finds the same fields. With those of the continuum the difference is the error of the steps.
    subroutine long_run_ends_in_the_steady_state()
       character(*), parameter :: laws(3) = [character(80) :: '', &
          '&friction law = ''coulomb'', coefficient = 0.4, slope_effect = F /', &
@@ -287,7 +287,7 @@ contains
 
    contains
 
-      !> The fields of both.
+      !> Compare the fields of the run and of the solver.
       subroutine compare(what, tolerance)
          character(*), intent(in) :: what
          real(dp), intent(in) :: tolerance
@@ -305,8 +305,8 @@ contains
 
    end subroutine long_run_ends_in_the_steady_state
 
-   !> The state at the end of a run in time differs from that of the continuum by the error of the steps
-   !> and of the mesh, one cell a step: it falls nearly with the square of the cell.
+   !> The state at the end of a run in time, with one cell per step, differs from that of the continuum by the error of the
+   !! steps and of the mesh, which decreases nearly with the square of the cell.
    subroutine error_against_a_run_falls_with_steps()
       type(case_type) :: case
       type(simulation_type) :: sim
@@ -338,7 +338,7 @@ contains
       call check_close(order, 1.9_dp, 0.4_dp, 'order of the difference to a run in time')
    end subroutine error_against_a_run_falls_with_steps
 
-   !> A cold start, one from another speed and one from another load end in one state.
+   !> A start from rest, from another speed and from another load end in the same state.
    subroutine all_starts_end_in_one_state()
       type(record_type) :: cold, speed, load
       character(*), parameter :: case = '&grid nx = 32, ny = 24, lx = 64e-3, ly = 48e-3 /'//nl// &
@@ -360,9 +360,9 @@ contains
       call check_close(load%rows(1)%friction/cold%rows(0)%friction, 1.0_dp, 1e-6_dp, 'from another load')
    end subroutine all_starts_end_in_one_state
 
-   !> Where the road wedges, more rounds never hand out a worse state; and the reason names the slopes. With this
-   !> coefficient every face steeper than 1/4 holds any force, and the contact cannot avoid them all. (With 1.5 there
-   !> is a solution.)
+   !> On a road that wedges the rubber, more rounds never return a worse state, and the reason names the slopes. With this
+   !! coefficient every face steeper than 1/4 holds any force, and the contact cannot avoid all of them. (With a coefficient
+   !! of 1.5 there is a solution.)
    subroutine best_state_is_kept()
       type(solver_result_type) :: normal, rubbing
       real(dp) :: missed(2)
@@ -371,16 +371,16 @@ contains
       do k = 1, 2
          call slide_uphill('law = ''coulomb'', coefficient = 4', 1, merge(100, 300, k == 1), normal, rubbing)
          missed(k) = max(normal%residual, rubbing%residual)
-         call check_that(.not. (normal%converged .and. rubbing%converged), 'wedged road: no solution')
+         call check_that(.not. (normal%converged .and. rubbing%converged), 'wedged road: no solution is reported')
          call check_order(index(normal%reason, 'wedges'), '>', 0, &
             'wedged road: reason: '//trim(normal%reason))
       end do
       call check_order(missed(2), '<=', missed(1), &
-         'wedged road: a better state is lost: '// to_text(missed(2))//' after '//to_text(missed(1)))
+         'wedged road: the error does not grow with the rounds: '// to_text(missed(2))//' after '//to_text(missed(1)))
    end subroutine best_state_is_kept
 
-   !> A constant shear stress jumps at the edge of the contact, so that the rounds swing. The closed form of
-   !> the law, in which a cell may be partly sheared, is solved all the same, and within few rounds.
+   !> Constant shear jumps at the edge of the contact, so that the rounds alternate. The closed form of the law, in which a
+   !! cell may be partly sheared, is solved nevertheless, in few rounds.
    subroutine constant_shear_at_the_edge()
       type(solver_result_type) :: normal, rubbing
 
@@ -391,8 +391,8 @@ contains
       call check_that(normal%converged .and. rubbing%converged, 'edge: a stress that grows with the pressure')
    end subroutine constant_shear_at_the_edge
 
-   !> On a steep road some cells nearly stick, and the rounds come closer only slowly. All cells are then solved at
-   !> once: from near the solution before the rounds have gone far, and from afar along a path of solutions.
+   !> On a steep road some cells nearly stick, and the rounds converge slowly. All cells are then solved at once: from near
+   !! the solution before many rounds are made, or from farther away along a path of solutions.
    subroutine stalled_rounds_are_solved_at_once()
       type(solver_result_type) :: normal, rubbing
 
@@ -403,11 +403,11 @@ contains
       call check_order(rubbing%iterations, '>=', 225, 'along a path: rounds')
    end subroutine stalled_rounds_are_solved_at_once
 
-   !> Some rounds of a law of friction on a steep road.
+   !> Run a number of rounds with a friction law on a steep road.
    subroutine slide_uphill(law, seed, rounds, normal, rubbing)
-      character(*), intent(in) :: law                  !! as in the group of the input
+      character(*), intent(in) :: law                  !!! as in the group of the input
       integer, intent(in) :: seed                      !! of the road
-      integer, intent(in) :: rounds                    !! at most
+      integer, intent(in) :: rounds                    !!! largest number
       type(solver_result_type), intent(out) :: normal, rubbing
       type(case_type) :: case
       type(steady_step_type) :: steady
@@ -434,11 +434,11 @@ contains
       call steady%destroy()
    end subroutine slide_uphill
 
-   !> The steady state of a case with the road where a run in time has left it.
+   !> Find the steady state of a case, with the road where a run in time has left it.
    subroutine find_steady(case, sim, dt, steady)
       type(case_type), intent(in) :: case
       type(simulation_type), intent(in) :: sim
-      real(dp), intent(in) :: dt                       !! of the scheme, s; 0: the continuum
+      real(dp), intent(in) :: dt                       !!! time step of the scheme, s; 0 for the continuum
       type(steady_step_type), intent(out) :: steady
       type(error_type), allocatable :: error
       type(interpolation_type) :: road
@@ -457,7 +457,7 @@ contains
       plan%velocity_x = case%phases(1)%velocity_x
       place = [sim%state%row%road_x - 2.0_dp*case%grid%lx, sim%state%row%road_y]
       base = 0.0_dp
-      ! The contact's mean displacement hardly depends on the place: a few rounds bring the road there.
+      ! The mean displacement of the contact hardly depends on the place, so that a few rounds move the road there.
       do k = 1, merge(4, 1, case%friction%law /= 'none')
          call steady%begin_curve(base)
          call steady%solve(plan, road, normal, rubbing)
@@ -466,7 +466,7 @@ contains
       end do
    end subroutine find_steady
 
-   !> The number of threads changes no bit.
+   !> The number of threads changes no bit of the result.
    subroutine same_bits_on_two_threads()
       type(record_type) :: one, two
       character(*), parameter :: case = '&grid nx = 132, ny = 128, lx = 132e-3 /'//nl//road//rubber// &
@@ -486,8 +486,8 @@ contains
          abs(one%rows(0)%power_viscous - two%rows(0)%power_viscous) <= 0.0_dp, 'threads')
    end subroutine same_bits_on_two_threads
 
-   !> Rows of a curve start from those before, and end where a row of its own ends.
-   subroutine rows_of_a_curve_end_alike()
+   !> The rows of a friction curve start from the rows before them, and end in the state of a single row.
+   subroutine rows_of_a_curve_equal_single_rows()
       type(record_type) :: curve, alone
       character(*), parameter :: case = grid//road//rubber// &
          '&friction law = ''coulomb'', coefficient = 0.4, slope_effect = F / &solver tolerance = 1e-8 /'//nl
@@ -501,6 +501,6 @@ contains
       call check_close(curve%rows(3)%friction/alone%rows(0)%friction, 1.0_dp, 1e-6_dp, 'curve: friction')
       call check_order(curve%rows(3)%ffts, '<', alone%rows(0)%ffts, &
          'curve: fewer transforms, '// to_text(curve%rows(3)%ffts)//' for '//to_text(alone%rows(0)%ffts))
-   end subroutine rows_of_a_curve_end_alike
+   end subroutine rows_of_a_curve_equal_single_rows
 
 end module test_steady

@@ -86,7 +86,7 @@ contains
       call check_no_error(error, 'sphere')
       call check_close(h(5, 4), 0.0_dp, 0.0_dp, 'summit of the sphere')
       call check_close(h(6, 2), sqrt(4.0_dp - 2.0_dp) - 2.0_dp, 1.0e-15_dp, 'sphere at (1, -1)')
-      call check_close(h(1, 1), -2.0_dp, 0.0_dp, 'beyond the radius')
+      call check_close(h(1, 1), -2.0_dp, 0.0_dp, 'the height beyond the radius is that of the centre')
       term%shape = 'cylinder'
       call new_height(grid, [term], h, error)
       call check_close(h(6, 1), sqrt(3.0_dp) - 2.0_dp, 1.0e-15_dp, 'cylinder at x = 1')
@@ -94,12 +94,12 @@ contains
       term%shape = 'paraboloid'
       call new_height(grid, [term], h, error)
       call check_close(h(9, 1), -(16.0_dp + 2.25_dp)/4.0_dp, 1.0e-15_dp, 'paraboloid')
-      ! a shallow cap keeps its digits
+      ! A shallow cap keeps its significant digits.
       term%shape = 'sphere'
       term%radius = 1.0e9_dp
       call new_height(grid, [term], h, error)
       call check_close(h(6, 4), -0.5e-9_dp, 1.0e-24_dp, 'a shallow cap')
-      ! moving the centre by whole cells moves the periodic map
+      ! Moving the centre by whole cells moves the periodic map.
       grid%boundary = boundary_periodic
       term%radius = 3.0_dp
       call new_height(grid, [term], h, error)
@@ -107,8 +107,8 @@ contains
       term%centre_y = term%centre_y - 2*grid%dy
       call new_height(grid, [term], moved, error)
       call check_close(maxval(abs(moved - cshift(cshift(h, -3, 1), 2, 2))), 0.0_dp, 1.0e-14_dp, &
-         'a periodic sphere off the middle is the sphere moved')
-      ! a line contact knows no y
+         'a periodic sphere off the centre is the shifted sphere')
+      ! A line contact does not depend on y.
       grid = new_grid(8, 1, 8.0_dp, 5.0_dp, boundary_periodic)
       term = default_surface(grid)
       term%shape = 'sphere'
@@ -150,7 +150,7 @@ contains
          'the hexagonal wave repeats after lambda by lambda/sqrt(3)')
       call check_close(maxval(abs(more(25:, 29:) - h)), 0.0_dp, 1.0e-14_dp, &
          'the hexagonal wave repeats after lambda by 2 lambda/sqrt(3)')
-      ! the product of sines is a sum of three waves of the wave number 2 k, at 120 degrees
+      ! The product of sines is a sum of three waves with the wave number 2 k, at angles of 120 degrees.
       k = 2.0_dp*pi/term%wavelength
       i = 5
       j = 4
@@ -158,10 +158,10 @@ contains
       y = 3*grid%dy
       call check_close(h(i, j), 0.075_dp*(sin(2.0_dp*k*x) &
          - sin(k*(x + sqrt(3.0_dp)*y)) - sin(k*(x - sqrt(3.0_dp)*y))), 1.0e-15_dp, 'hexagonal wave')
-      call check_close(maxval(more), 0.3_dp*0.75_dp**1.5_dp, 1.0e-3_dp, 'its highest value')
+      call check_close(maxval(more), 0.3_dp*0.75_dp**1.5_dp, 1.0e-3_dp, 'highest value of the hexagonal wave')
    end subroutine sine_and_hexagonal_wave
 
-   !> Terms add up.
+   !> The terms of a surface add up.
    subroutine terms_add_up()
       type(grid_type) :: grid
       type(surface_settings_type) :: terms(3)
@@ -209,17 +209,17 @@ contains
       allocate (psd(60, 45))
       call height_psd(grid, h, psd, error)
       plateau = psd(4, 1)                       ! mode (3, 0): wavelength 1
-      call check_order(plateau, '>', 0.0_dp, 'the end of the band belongs to it')
+      call check_order(plateau, '>', 0.0_dp, 'the longest wave belongs to the band')
       call check_close(psd(1, 4)/plateau, 1.0_dp, 1.0e-12_dp, 'constant up to the roll-off')
       k = 2.0_dp*pi*hypot(10.0_dp/3.0_dp, 4.0_dp/2.0_dp)
       call check_close(psd(11, 42)/plateau, (k*0.25_dp/pi)**(-3.4_dp), 1.0e-12_dp, &
          'power law above the roll-off, mode (10, -4)')
       call check_close(psd(51, 5)/plateau, (k*0.25_dp/pi)**(-3.4_dp), 1.0e-12_dp, &
          'power law above the roll-off, mode (-10, 4)')
-      call check_order(psd(3, 1), '<', 1.0e-25_dp*plateau, 'nothing below k_l')
-      call check_order(psd(22, 1), '<', 1.0e-25_dp*plateau, 'nothing above k_s')
+      call check_order(psd(3, 1), '<', 1.0e-25_dp*plateau, 'no waves below k_l')
+      call check_order(psd(22, 1), '<', 1.0e-25_dp*plateau, 'no waves above k_s')
       call check_order(psd(21, 1), '>', 1.0e-3_dp*plateau, 'k_s itself belongs to the band')
-      call check_order(psd(1, 1), '<', 1.0e-25_dp*plateau, 'no mean')
+      call check_order(psd(1, 1), '<', 1.0e-25_dp*plateau, 'the mean is zero')
 
       grid = new_grid(135, 1, 3.0_dp, 2.0_dp, boundary_periodic)
       call new_height(grid, [term], h, error)
@@ -227,10 +227,10 @@ contains
       allocate (psd(135, 1))
       call height_psd(grid, h, psd, error)
       call check_close(psd(4, 1)/psd(7, 1), 1.0_dp, 1.0e-12_dp, 'plateau of a profile')
-      call check_close(psd(13, 1)/psd(7, 1), 2.0_dp**(-2.4_dp), 1.0e-12_dp, 'a profile: -(1 + 2 H)')
+      call check_close(psd(13, 1)/psd(7, 1), 2.0_dp**(-2.4_dp), 1.0e-12_dp, 'exponent -(1 + 2 H) of a profile')
    end subroutine spectrum_mode_by_mode
 
-   !> rms height and rms slope are exact: both generators, odd and even, not square, profiles.
+   !> rms height and rms slope are exact with both generators, for odd and even numbers of cells, and for profiles.
    subroutine rms_height_and_slope_are_exact()
       integer, parameter :: sizes(2, 4) = reshape([64, 48, 45, 33, 50, 1, 31, 32], [2, 4])
       character(16), parameter :: generators(2) = [character(16) :: 'random_phase', 'filtered_noise']
@@ -250,7 +250,7 @@ contains
             term%seed = n
             term%wavelength_long = 0.8e-3_dp
             term%wavelength_rolloff = 0.8e-3_dp
-            term%wavelength_short = 1.0e-6_dp        ! far below a cell: all modes below Nyquist
+            term%wavelength_short = 1.0e-6_dp        ! far below a cell: all waves below Nyquist
             term%rms_height = 2.0e-6_dp
             call new_height(grid, [term], h, error)
             call check_no_error(error, generators(g))
@@ -265,7 +265,7 @@ contains
       end do
    end subroutine rms_height_and_slope_are_exact
 
-   !> A finer grid holds the same surface; another seed does not.
+   !> A finer grid contains the same surface; another seed gives another one.
    subroutine finer_grid_holds_the_same_surface()
       type(grid_type) :: fine, grid
       type(surface_settings_type) :: term
@@ -286,10 +286,10 @@ contains
          'a finer grid holds the same surface')
       term%seed = 2
       call new_height(grid, [term], refined, error)
-      call check_order(maxval(abs(refined - h)), '>', 0.5_dp, 'another seed, another surface')
+      call check_order(maxval(abs(refined - h)), '>', 0.5_dp, 'another seed gives another surface')
    end subroutine finer_grid_holds_the_same_surface
 
-   !> The same surface bit for bit on any number of threads.
+   !> The surface has the same bits with any number of threads.
    subroutine same_bits_on_two_threads()
       character(16), parameter :: generators(2) = [character(16) :: 'random_phase', 'filtered_noise']
       type(grid_type) :: grid
@@ -318,7 +318,7 @@ contains
       call omp_set_num_threads(threads)
    end subroutine same_bits_on_two_threads
 
-   !> Filtered noise is Gaussian: skewness 0, kurtosis 3, within the scatter of its number of modes.
+   !> Filtered noise is Gaussian: skewness 0 and kurtosis 3, within the scatter for its number of waves.
    subroutine filtered_noise_is_gaussian()
       type(grid_type) :: grid
       type(surface_settings_type) :: term
@@ -375,7 +375,7 @@ contains
       end do
    end subroutine every_shape_can_be_checked_and_listed
 
-   !> Wrong numbers are named, all at once.
+   !> Wrong numbers are named, all of them in one message.
    subroutine wrong_numbers_are_named()
       type(grid_type) :: grid
       type(surface_settings_type) :: terms(2)
@@ -402,7 +402,7 @@ contains
       call check_error(error, 'hurst', 'hurst')
       call check_error(error, 'wavelength_long', 'order of the wavelengths')
       call check_error(error, 'at least wavelength_short', 'order of the short wavelengths')
-      call check_error(error, 'give one of them', 'two rms')
+      call check_error(error, 'give one of them', 'rms_height and rms_slope given together')
       call check_error(error, 'dice', 'generator')
       terms(2)%rms_slope = 0.0_dp
       terms(2)%hurst = 0.5_dp
@@ -414,7 +414,7 @@ contains
       call check_error(error, 'no mode', 'an empty band')
    end subroutine wrong_numbers_are_named
 
-   !> Height maps from files: values, scale, orientation, names of datasets, everything that is wrong.
+   !> Height maps from files: values, scale, orientation, names of datasets, and all kinds of faults.
    subroutine height_maps_from_files()
       character(*), parameter :: path = 'build/test_surface.h5'
       type(grid_type) :: grid
@@ -445,7 +445,7 @@ contains
       term%scale = -0.5_dp
       call new_height(grid, [term, term], h, error)
       call check_no_error(error, 'a map from ''surface''')
-      call check_close(h(4, 2), -42.0_dp, 0.0_dp, 'x runs fastest; scale; the sum of two')
+      call check_close(h(4, 2), -42.0_dp, 0.0_dp, 'x varies fastest, the map is scaled, and two maps add up')
       call check_close(h(5, 1), -51.0_dp, 0.0_dp, 'the last cell along x')
       term%dataset = 'other'
       call new_height(grid, [term], h, error)
@@ -496,7 +496,7 @@ contains
       close (unit, status='delete')
    end subroutine height_maps_from_files
 
-   !> A map that is read in several slabs, the last one smaller: the values, and the checksum of the whole.
+   !> A map that is read in several slabs, the last of which is smaller, has the right values and checksum.
    subroutine long_maps_are_read_in_slabs()
       character(*), parameter :: path = 'build/test_surface.h5'
       integer, parameter :: nx = 30000, ny = 11
@@ -532,7 +532,7 @@ contains
       close (unit, status='delete')
    end subroutine long_maps_are_read_in_slabs
 
-   !> Warnings name what is doubtful, and are silent otherwise.
+   !> Warnings name what is doubtful; roads without doubts cause none.
    subroutine warnings_name_what_is_doubtful()
       type(grid_type) :: grid
       type(surface_settings_type) :: term
@@ -545,14 +545,14 @@ contains
       term%wavelength_rolloff = 0.5_dp
       term%wavelength_short = 0.25_dp
       call find_warnings(grid, [term], warnings)
-      call check_that(size(warnings) == 0, 'eight cells a wave, four waves a side: no warning')
+      call check_that(size(warnings) == 0, 'eight cells per wave and four waves per side: no warning')
       term%wavelength_short = 0.2_dp
       term%wavelength_long = 2.0_dp
       call find_warnings(grid, [term], warnings)
       call check_that(size(warnings) == 2, 'two warnings')
       call check_order(index(warnings(1), 'wavelength_long = 2.000E+00'), '>', 0, &
          'waves as long as the side')
-      call check_order(index(warnings(2), '6.4 cells'), '>', 0, 'few cells a wave')
+      call check_order(index(warnings(2), '6.4 cells'), '>', 0, 'few cells per wave')
       term%wavelength_long = 0.5_dp
       term%wavelength_short = 0.05_dp
       call find_warnings(grid, [term], warnings)
@@ -569,20 +569,20 @@ contains
       call check_that(size(warnings) == 1 .and. index(warnings(1), '3.3333') > 0, 'a broken wave')
       grid%boundary = boundary_free
       call find_warnings(grid, [term], warnings)
-      call check_that(size(warnings) == 0, 'a free map may break a wave')
+      call check_that(size(warnings) == 0, 'a free map may contain a part of a wave')
 
       grid = new_grid(128, 74, 2.0_dp, 2.0_dp/sqrt(3.0_dp), boundary_periodic)
       term%shape = 'hexagonal_wave'
       term%wavelength = 1.0_dp
       call find_warnings(grid, [term], warnings)
-      call check_that(size(warnings) == 0, 'a hexagonal wave in its cell: no warning')
+      call check_that(size(warnings) == 0, 'a hexagonal wave in a cell of its period: no warning')
       grid = new_grid(128, 128, 2.0_dp, 2.0_dp, boundary_periodic)
       call find_warnings(grid, [term], warnings)
       call check_that(size(warnings) == 1 .and. index(warnings(1), 'ly') > 0, &
          'a hexagonal wave on a square')
    end subroutine warnings_name_what_is_doubtful
 
-   !> A map that says of itself that it is of another size, unit or boundary.
+   !> A map whose file gives another size, unit or boundary than the case causes warnings.
    subroutine map_that_contradicts_the_case()
       character(*), parameter :: path = 'build/told_map.h5'
       type(grid_type) :: grid
@@ -605,10 +605,10 @@ contains
       call file%create_group('grid', error)
       call file%write_attribute('/grid', 'ly', 0.6_dp*(1.0_dp + 1.0e-9_dp), error)
       call file%write_attribute('/grid', 'boundary', 'free', error)
-      call check_no_error(error, 'a map that tells')
+      call check_no_error(error, 'a map with attributes')
       call file%close(error)
       call find_warnings(grid, [term], warnings)
-      call check_that(size(warnings) == 3, 'size, unit and edges are doubted')
+      call check_that(size(warnings) == 3, 'there are warnings of size, unit and edges')
       call check_that(index(warnings(1), '&surface: file = ''told_map.h5'': according to the file '// &
          'the map is 2.5000E-01 m by 6.0000E-01 m, but the grid is 5.0000E-01 m by') == 1, 'another length')
       call check_order(index(warnings(2), 'the unit of the map is um'), '>', 0, 'another unit')
@@ -623,7 +623,7 @@ contains
       call check_that(size(warnings) == 0, 'a missing file is an error elsewhere')
    end subroutine map_that_contradicts_the_case
 
-   !> Very oblong cells and very steep waves are doubtful: a length may be in another unit.
+   !> Very oblong cells and very steep waves cause warnings, because a length may be in another unit.
    subroutine lengths_that_do_not_fit_together()
       type(grid_type) :: grid
       type(surface_settings_type) :: term

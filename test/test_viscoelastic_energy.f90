@@ -1,4 +1,4 @@
-!> Tests of the energy books: closure, and each term against an independent computation.
+!> Tests of the energy balance: it closes, and each term agrees with an independent computation.
 module test_viscoelastic_energy
    use check, only : begin_suite, check_close, check_order, check_that, selected
    use asperity_errors, only : error_type
@@ -32,17 +32,17 @@ contains
 
    subroutine run_viscoelastic_energy()
       call begin_suite('viscoelastic_energy')
-      if (selected('closure')) call closure()
-      if (selected('sharp')) call sharp()
-      if (selected('terms_of_a_path')) call terms_of_a_path()
+      if (selected('balance_closes')) call balance_closes()
+      if (selected('balance_can_fail')) call balance_can_fail()
+      if (selected('work_and_loss_along_a_path')) call work_and_loss_along_a_path()
       if (selected('terms_of_backward_euler')) call terms_of_backward_euler()
       if (selected('jumps_and_rest')) call jumps_and_rest()
-      if (selected('cycle_loss')) call cycle_loss()
-      if (selected('elastic')) call elastic()
-      if (selected('restarted')) call restarted()
+      if (selected('loss_of_a_steady_cycle')) call loss_of_a_steady_cycle()
+      if (selected('elastic_body_loses_nothing')) call elastic_body_loses_nothing()
+      if (selected('restored_books_continue_equally')) call restored_books_continue_equally()
    end subroutine run_viscoelastic_energy
 
-   !> Pseudo-random number in [-1, 1), the same on every machine.
+   !> Return a pseudo-random number in [-1, 1), the same on every machine.
    function random(state) result(number)
       integer, intent(inout) :: state
       real(dp) :: number
@@ -75,11 +75,11 @@ contains
       end do
    end subroutine new_body
 
-   !> End the present step at the tractions p.
+   !> End the present step with the tractions p.
    subroutine load(self, p, damage)
       type(body_type), intent(inout) :: self
       real(dp), intent(in) :: p(cells)
-      real(dp), intent(in), optional :: damage     ! a wrong displacement of one cell
+      real(dp), intent(in), optional :: damage     ! adds an error to the displacement of one cell
       type(products_type) :: products
       real(dp) :: past(cells), u(cells)
 
@@ -104,9 +104,9 @@ contains
       end do
    end function random_load
 
-   !> work = change of stored energy + loss, each step, over random histories and operators; losses
-   !> are not negative; the stored energy is that of the arms' own fields.
-   subroutine closure()
+   !> In each step, for random histories and operators, the work is the change of the stored energy plus the loss. Losses are
+   !! not negative, and the stored energy is that computed from the arms' own fields.
+   subroutine balance_closes()
       real(dp), parameter :: g(3) = [1.0_dp, 4.0_dp, 0.3_dp]
       type(body_type) :: body
       type(energy_books_type) :: before
@@ -138,27 +138,27 @@ contains
                call check_order(body%books%dissipated, '>=', before%dissipated - 1.0e-14_dp*scale, &
                   'loss of '//schemes(i))
                call check_order(body%books%numerical, '>=', before%numerical - 1.0e-14_dp*scale, &
-                  'own loss of '//schemes(i))
+                  'numerical loss of '//schemes(i))
                stored = 0.5_dp*body%material%g_e &
                   *dot_product(body%arms%s(:, 1), matmul(body%a, body%arms%s(:, 1)))
                do k = 1, 3
                   stored = stored + dot_product(body%arms%arm(:, k, 1), &
                      matmul(body%a, body%arms%arm(:, k, 1)))/(2.0_dp*g(k))
                end do
-               ! a fluid may have flowed far: U has the round-off of its size
+               ! A fluid may have flowed far: U has the round-off of its size.
                scale = max(scale, sum(abs(body%p*body%u)))
                call check_close(body%books%stored, 0.25_dp*stored, 1.0e-12_dp*scale, &
                   'stored energy')
             end do
-            call check_order(body%books%dissipated, '>', 0.0_dp, 'something is lost')
+            call check_order(body%books%dissipated, '>', 0.0_dp, 'energy is lost')
             call check_that((body%books%numerical > 0.0_dp) .eqv. i == 1, &
-               'only backward Euler loses by itself')
+               'only backward Euler has a numerical loss')
          end do
       end do
-   end subroutine closure
+   end subroutine balance_closes
 
-   !> The balance notices a displacement that does not belong to the tractions.
-   subroutine sharp()
+   !> The balance fails if the displacement does not belong to the tractions.
+   subroutine balance_can_fail()
       type(body_type) :: body
       real(dp) :: balance
       integer :: i, n, state
@@ -175,10 +175,10 @@ contains
          balance = body%books%work - body%books%stored - body%books%dissipated
          call check_order(abs(balance), '>', 1.0e-10_dp*body%books%work, 'the balance can fail')
       end do
-   end subroutine sharp
+   end subroutine balance_can_fail
 
-   !> Work and loss of one cell against Runge-Kutta along the assumed path.
-   subroutine terms_of_a_path()
+   !> Work and loss of one cell agree with a Runge-Kutta integration along the assumed path.
+   subroutine work_and_loss_along_a_path()
       real(dp), parameter :: g_e = 0.4_dp, g(2) = [1.0_dp, 3.0_dp], tau(2) = [0.3_dp, 6.0_dp]
       real(dp), parameter :: dts(0:5) = [1.0_dp, 0.2_dp, 0.3_dp, 0.5_dp, 0.15_dp, 1.4_dp]
       type(zener_type) :: material
@@ -222,7 +222,7 @@ contains
 
    contains
 
-      !> Integrate a step: m, the work of P dU and the power m^2/(g tau) of the dashpots.
+      !> Integrate a step: m, the work of P dU and the power m^2/(g tau) of the dampers.
       subroutine runge_kutta(rate, curve, dt, u0, m, work, loss)
          real(dp), intent(in) :: rate, curve, dt, u0
          real(dp), intent(inout) :: m(2)
@@ -246,7 +246,7 @@ contains
          loss = y(4)
       end subroutine runge_kutta
 
-      !> Rates of the state, at the speed of the displacement.
+      !> Return the rates of the state at the given speed of the displacement.
       pure function slope(speed, y) result(f)
          real(dp), intent(in) :: speed, y(4)
          real(dp) :: f(4)
@@ -256,10 +256,10 @@ contains
          f(4) = sum(y(1:2)**2/(g*tau))
       end function slope
 
-   end subroutine terms_of_a_path
+   end subroutine work_and_loss_along_a_path
 
-   !> Backward Euler: stored energy, dashpots and own loss in the springs and dashpots of the Zener
-   !> branches (thesis, eq. 4.1 to 4.4), one cell with A = 1.6.
+   !> Backward Euler: stored energy, loss in the dampers and numerical loss, computed in the springs and dampers of the Zener
+   !! branches (thesis, eq. 4.1 to 4.4), for one cell with A = 1.6.
    subroutine terms_of_backward_euler()
       real(dp), parameter :: g_inf = 0.2_dp, a = 1.6_dp, area = 0.5_dp
       real(dp), parameter :: g0(2) = [1.0_dp, 3.0_dp], g1(2) = [0.4_dp, 0.05_dp]
@@ -279,7 +279,7 @@ contains
       call new_books(books, material, area)
       u = 0.0_dp
       pk = 0.0_dp                                ! A P_k of the branches
-      v = 0.0_dp                                 ! displacement of their dashpots
+      v = 0.0_dp                                 ! displacement of their dampers
       do n = 1, 25
          before = books
          dt = 10.0_dp**(-2.0_dp + 0.15_dp*mod(7*n, 31))
@@ -303,14 +303,14 @@ contains
          call check_close(books%stored, stored, 1.0e-13_dp, 'stored in the springs')
          call check_close(books%numerical - before%numerical, own, 1.0e-13_dp, 'loss of the scheme')
          call check_close(books%dissipated - before%dissipated, viscous + own, 1.0e-13_dp, &
-            'loss of the dashpots')
+            'loss of the dampers')
          call check_close(books%work - before%work, p(1)*(u_new(1) - u(1))*area, 1.0e-13_dp, &
-            'work with the traction of the end')
+            'work of the final traction')
          u = u_new
       end do
    end subroutine terms_of_backward_euler
 
-   !> A jump stores what it works; rest loses nothing; what is stored comes back or is lost.
+   !> A jump stores its work, rest loses nothing, and stored energy is returned or lost.
    subroutine jumps_and_rest()
       type(body_type) :: body
       type(energy_books_type) :: before
@@ -330,7 +330,7 @@ contains
          call check_close(body%books%dissipated, 0.0_dp, 1.0e-14_dp, 'a jump loses nothing')
          call start_jump(body%material)
          call load(body, 0.0_dp*p)
-         call check_close(body%books%work, 0.0_dp, 1.0e-14_dp, 'a jump gives all back')
+         call check_close(body%books%work, 0.0_dp, 1.0e-14_dp, 'a jump back returns all energy')
 
          call start_relaxed(body%material, error)
          call load(body, p)
@@ -343,17 +343,17 @@ contains
          end do
          call check_close(body%books%work, before%work, 1.0e-13_dp, 'no work at rest')
          call check_close(body%books%dissipated, before%dissipated, 1.0e-13_dp, 'no loss at rest')
-         do n = 1, 30                               ! unload, wait for ever
+         do n = 1, 30                               ! unload, then wait for an infinite time
             call start_step(body%material, 2.0_dp**min(n, 20))
             call load(body, 0.0_dp*p)
          end do
-         call check_close(body%books%stored, 0.0_dp, 1.0e-13_dp, 'nothing is left')
-         call check_close(body%books%work, body%books%dissipated, 1.0e-13_dp, 'all is lost')
+         call check_close(body%books%stored, 0.0_dp, 1.0e-13_dp, 'no energy remains stored')
+         call check_close(body%books%work, body%books%dissipated, 1.0e-13_dp, 'all work is lost')
       end do
    end subroutine jumps_and_rest
 
-   !> The loss of a steady cycle is pi G'' U^2, with the order of the scheme.
-   subroutine cycle_loss()
+   !> The loss of a steady cycle is pi G'' U^2; its error has the order of the scheme.
+   subroutine loss_of_a_steady_cycle()
       real(dp), parameter :: g(2) = [1.0_dp, 3.0_dp], tau(2) = [0.2_dp, 0.9_dp]
       real(dp), parameter :: w = 6.283185307179586_dp
       real(dp) :: errors(2), exact
@@ -374,7 +374,7 @@ contains
 
       function loss_of_a_cycle(scheme, n) result(loss)
          character(*), intent(in) :: scheme
-         integer, intent(in) :: n                  ! steps a cycle
+         integer, intent(in) :: n                  ! steps per cycle
          real(dp) :: loss
          type(zener_type) :: material
          type(arm_state_type) :: arms
@@ -403,10 +403,10 @@ contains
          loss = books%dissipated - loss
       end function loss_of_a_cycle
 
-   end subroutine cycle_loss
+   end subroutine loss_of_a_steady_cycle
 
-   !> Without arms nothing is ever lost.
-   subroutine elastic()
+   !> Without arms no energy is ever lost.
+   subroutine elastic_body_loses_nothing()
       type(body_type) :: body
       integer :: i, n, state
 
@@ -422,10 +422,10 @@ contains
          call check_close(body%books%work, body%books%stored, 1.0e-14_dp, 'elastic work')
          call check_close(body%books%dissipated, 0.0_dp, 0.0_dp, 'elastic loss')
       end do
-   end subroutine elastic
+   end subroutine elastic_body_loses_nothing
 
-   !> Books and states of arms that are copied and restored lead to the same numbers.
-   subroutine restarted()
+   !> Copied and restored books and states of the arms lead to the same numbers.
+   subroutine restored_books_continue_equally()
       type(body_type) :: body, other
       real(dp) :: p(cells)
       integer :: n, state
@@ -456,6 +456,6 @@ contains
          call check_close(maxval(abs(body%books%arm - other%books%arm)), 0.0_dp, 0.0_dp, &
             'restarted arms')
       end do
-   end subroutine restarted
+   end subroutine restored_books_continue_equally
 
 end module test_viscoelastic_energy

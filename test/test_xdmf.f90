@@ -1,4 +1,4 @@
-!> Tests of the XDMF file: its places, extents and names, and that it appears whole.
+!> Tests of the XDMF file: its paths, extents and names, and that it is replaced as a whole.
 module test_xdmf
    use check, only : begin_suite, check_error, check_no_error, check_order, check_that, selected
    use asperity_errors, only : error_type
@@ -20,7 +20,7 @@ contains
       if (selected('snapshots_are_listed')) call snapshots_are_listed()
    end subroutine run_xdmf
 
-   !> The file names each snapshot once with its extents; a folder that is missing is an error.
+   !> The file names each snapshot once, with its extents; a missing folder is an error.
    subroutine snapshots_are_listed()
       type(error_type), allocatable :: error
       type(snapshot_type) :: snapshots(2)
@@ -35,7 +35,7 @@ contains
       snapshots(2)%time = 0.5_dp
       snapshots(2)%fields = [character(24) :: 'pressure', 'contact']
       call write_xdmf(path, 'folder/a&b.h5', grid, snapshots, error)
-      call check_no_error(error, 'written')
+      call check_no_error(error, 'the file is written')
       call check_that(.not. file_exists(path//'.new'), 'no temporary file left')
       text = content()
       call check_that(count_of(text, '<Grid') == 3 .and. count_of(text, '</Grid>') == 3, 'grids')
@@ -47,15 +47,15 @@ contains
       call check_that(count_of(text, '5.0000000000000000E-01"/>') == 1, 'time')
       call check_that(count_of(text, '2.0000000000000000E+00  5.0000000000000000E-01  2.0') == 2, &
          'spacing')
-      call check_order(index(text, '</Xdmf>'), '>', 0, 'whole')
+      call check_order(index(text, '</Xdmf>'), '>', 0, 'the file is complete')
       call write_xdmf(path, 'a.h5', grid, snapshots(:1), error)
-      call check_that(count_of(content(), '<Time') == 1, 'written again')
+      call check_that(count_of(content(), '<Time') == 1, 'the file is written again')
       call write_xdmf('no_such_folder/x.xdmf', 'a.h5', grid, snapshots, error)
       call check_error(error, 'no_such_folder/x.xdmf: cannot be written', 'missing folder')
       call remove_file(path)
    end subroutine snapshots_are_listed
 
-   !> The text of the file.
+   !> Return the text of the file.
    function content() result(text)
       character(:), allocatable :: text
       integer :: unit, length
@@ -67,7 +67,7 @@ contains
       close (unit)
    end function content
 
-   !> How often a fragment occurs.
+   !> Return the number of times that a fragment occurs.
    integer function count_of(text, fragment)
       character(*), intent(in) :: text, fragment
       integer :: first, found

@@ -1,4 +1,4 @@
-!> Tests of the time schemes and the history fields.
+!> Tests of the time schemes and of the state of the arms.
 module test_zener
    use check, only : begin_suite, check_close, check_error, check_no_error, check_order, &
       check_that, selected
@@ -19,7 +19,7 @@ module test_zener
 
    character(14), parameter :: schemes(3) = ['backward_euler', 'exponential   ', 'exponential2  ']
 
-   !> One cell with A = 1, driven by P or by U.
+   !> One cell with A = 1, for which P or U is given.
    type :: point_type
       type(zener_type) :: material
       type(arm_state_type) :: arms
@@ -31,17 +31,17 @@ contains
 
    subroutine run_zener()
       call begin_suite('zener')
-      if (selected('functions')) call functions()
-      if (selected('thesis_scheme')) call thesis_scheme()
-      if (selected('exact_paths')) call exact_paths()
-      if (selected('parabola')) call parabola()
-      if (selected('orders')) call orders()
-      if (selected('wide_spectrum')) call wide_spectrum()
-      if (selected('split_arm')) call split_arm()
-      if (selected('limits')) call limits()
-      if (selected('fields')) call fields()
-      if (selected('elastic')) call elastic()
-      if (selected('faults')) call faults()
+      if (selected('functions_of_the_schemes')) call functions_of_the_schemes()
+      if (selected('backward_euler_is_that_of_the_thesis')) call backward_euler_is_that_of_the_thesis()
+      if (selected('steps_and_ramps_are_exact')) call steps_and_ramps_are_exact()
+      if (selected('parabola_is_exact')) call parabola_is_exact()
+      if (selected('orders_in_time')) call orders_in_time()
+      if (selected('wide_spectrum_does_not_ring')) call wide_spectrum_does_not_ring()
+      if (selected('split_arm_is_the_same_arm')) call split_arm_is_the_same_arm()
+      if (selected('limits_of_steps_and_rest')) call limits_of_steps_and_rest()
+      if (selected('cells_are_independent')) call cells_are_independent()
+      if (selected('elastic_body_has_no_memory')) call elastic_body_has_no_memory()
+      if (selected('wrong_arguments_are_refused')) call wrong_arguments_are_refused()
    end subroutine run_zener
 
    !> A point at rest.
@@ -57,7 +57,7 @@ contains
       call check_no_error(error, 'a history')
    end subroutine new_point
 
-   !> End the present step at a given P, or at a given U.
+   !> End the present step with a given P or a given U.
    subroutine reach(self, p, u)
       type(point_type), intent(inout) :: self
       real(dp), intent(in), optional :: p, u
@@ -78,8 +78,8 @@ contains
       call finish_step(self%material)
    end subroutine reach
 
-   !> The functions of x against quadrature of their definitions, and at both ends.
-   subroutine functions()
+   !> The functions of x agree with quadrature of their definitions, and have the right limits at 0 and infinity.
+   subroutine functions_of_the_schemes()
       real(dp) :: x, tolerance
       integer :: i
 
@@ -104,7 +104,7 @@ contains
       call check_close(slope_response(x)*x, 0.5_dp, 1.0e-11_dp, 'chi at infinity')
       call check_close(parabola_work(x)*x, 1.0_dp/12.0_dp, 1.0e-11_dp, 'omega at infinity')
       call check_close(steady_loss(x)*x, 1.0_dp, 1.0e-11_dp, 'steady loss at infinity')
-      do i = 1, 5                                     ! where the series end
+      do i = 1, 5                                     ! where the series are used up to
          x = 0.5_dp*i
          tolerance = 4.0e-15_dp
          call check_close(mean_decay(x*(1.0_dp + 1.0e-15_dp)), mean_decay(x), tolerance, 'phi')
@@ -116,9 +116,9 @@ contains
          call check_close(steady_loss(x*(1.0_dp + 1.0e-15_dp)), steady_loss(x), &
             1.0e-15_dp, 'steady loss is continuous')
       end do
-   end subroutine functions
+   end subroutine functions_of_the_schemes
 
-   !> Five-point Gauss rule on 400 intervals.
+   !> Integrate with a five-point Gauss rule on 400 intervals.
    pure function integral(which, x) result(total)
       integer, intent(in) :: which
       real(dp), intent(in) :: x
@@ -160,8 +160,8 @@ contains
       end select
    end function integrand
 
-   !> Backward Euler equals thesis eq. 2.12 and 2.13, written out with displacement-like states.
-   subroutine thesis_scheme()
+   !> Backward Euler equals eq. 2.12 and 2.13 of the thesis, which are written here with displacement-like states.
+   subroutine backward_euler_is_that_of_the_thesis()
       real(dp), parameter :: g_inf = 0.2_dp
       real(dp), parameter :: g0(2) = [1.0_dp, 3.0_dp], g1(2) = [0.4_dp, 0.05_dp]
       real(dp), parameter :: eta(2) = [0.7_dp, 0.02_dp]
@@ -209,10 +209,10 @@ contains
          call check_close(maxval(abs(u - thesis_u)), 0.0_dp, 1.0e-13_dp*maxval(abs(u)), &
             'backward Euler of the thesis')
       end do
-   end subroutine thesis_scheme
+   end subroutine backward_euler_is_that_of_the_thesis
 
-   !> A step of U and a ramp of U are exact with the exponential schemes, whatever the steps.
-   subroutine exact_paths()
+   !> A step of U and a ramp of U are exact with the exponential schemes, for steps of any length.
+   subroutine steps_and_ramps_are_exact()
       real(dp), parameter :: g_e = 0.3_dp, g(3) = [1.0_dp, 2.0_dp, 0.4_dp]
       real(dp), parameter :: tau(3) = [0.01_dp, 1.0_dp, 50.0_dp]
       type(point_type) :: point
@@ -245,10 +245,10 @@ contains
                1.0e-13_dp*(1.0_dp + t), 'ramp with '//schemes(i))
          end do
       end do
-   end subroutine exact_paths
+   end subroutine steps_and_ramps_are_exact
 
-   !> U = t^2 is exact with exponential2 and varied steps, but for what the first step left behind.
-   subroutine parabola()
+   !> U = t^2 is exact with exponential2 and steps of varying length, except for the error of the first step.
+   subroutine parabola_is_exact()
       real(dp), parameter :: tau(1) = [0.6_dp]
       type(point_type) :: point
       real(dp) :: t, dt, first, error
@@ -267,10 +267,10 @@ contains
          if (n > 1) call check_close(error, first*exp(-t/tau(1)), 1.0e-13_dp, 'U = t^2')
       end do
       call check_order(abs(first), '>', 1.0e-4_dp, 'the first step does not know the curvature')
-   end subroutine parabola
+   end subroutine parabola_is_exact
 
-   !> Orders in time: U or P a sine, and creep after a step of P, against closed forms.
-   subroutine orders()
+   !> Orders in time against closed forms: U or P varies as a sine, and creep after a step of P.
+   subroutine orders_in_time()
       real(dp), parameter :: least(3) = [0.9_dp, 1.9_dp, 1.9_dp]
       real(dp), parameter :: most(3) = [1.1_dp, 2.1_dp, 3.5_dp]
       character(8), parameter :: names(3) = ['sine U  ', 'sine P  ', 'creep   ']
@@ -287,10 +287,10 @@ contains
          end do
       end do
       call check_order(time_error(2, schemes(3), 160), '<', 0.5_dp*time_error(2, schemes(2), 160), &
-         'exponential2 beats exponential')
-   end subroutine orders
+         'exponential2 has less than half the error of exponential')
+   end subroutine orders_in_time
 
-   !> Error after 4 s in n unequal steps (3:2 alternating).
+   !> Return the error after 4 s in n unequal steps (alternating 3:2).
    function time_error(what, scheme, n) result(error)
       integer, intent(in) :: what           ! 1: U = sin, 2: P = sin, 3: P = 1
       character(*), intent(in) :: scheme
@@ -336,8 +336,8 @@ contains
       end select
    end function time_error
 
-   !> 20 arms over 15 decades with steps longer or shorter than most times: no ringing.
-   subroutine wide_spectrum()
+   !> 20 arms over 15 decades, with steps longer or shorter than most relaxation times, cause no ringing.
+   subroutine wide_spectrum_does_not_ring()
       real(dp), parameter :: g_e = 1.0e6_dp
       real(dp) :: g(20), tau(20), old, rise, drop, dt, drift
       type(point_type) :: point
@@ -373,8 +373,8 @@ contains
                drop = max(drop, old - point%u(1))
                drift = max(drift, point%u(1) - 1.0_dp/g_e)
             end do
-            ! a two-step scheme may pass the end by a little where dt exceeds every time of
-            ! the material (measured: 8e-3 and 5e-5); the others must not
+            ! A two-step scheme may overshoot the final value by a little if dt exceeds every time of the material (measured:
+            ! 8e-3 and 5e-5); the others must not.
             if (i == 3 .and. (steps == 3 .or. steps == 4)) then
                call check_order(max(drop, drift)*g_e, '<', merge(1.0e-2_dp, 1.0e-4_dp, steps == 3), &
                   'creep hardly overshoots')
@@ -396,10 +396,10 @@ contains
          call check_order(rise, '<=', 1.0e-6_dp, 'relaxation falls: '//schemes(i))
          call check_close(point%p(1)/g_e, 1.0_dp, 1.0e-6_dp, 'relaxation ends: '//schemes(i))
       end do
-   end subroutine wide_spectrum
+   end subroutine wide_spectrum_does_not_ring
 
-   !> An arm split in two halves of the same time is the same arm.
-   subroutine split_arm()
+   !> An arm that is split into two halves with the same time is the same arm.
+   subroutine split_arm_is_the_same_arm()
       type(point_type) :: whole, halves
       integer :: i, n
 
@@ -414,10 +414,10 @@ contains
             call check_close(halves%u(1), whole%u(1), 1.0e-13_dp, 'split arm')
          end do
       end do
-   end subroutine split_arm
+   end subroutine split_arm_is_the_same_arm
 
-   !> Jumps, rest, tiny steps, and the restart of the order.
-   subroutine limits()
+   !> Limits: jumps, rest, tiny steps, and the restart of the order.
+   subroutine limits_of_steps_and_rest()
       type(point_type) :: point, other
       type(error_type), allocatable :: error
       real(dp), parameter :: g(2) = [2.0_dp, 3.0_dp], tau(2) = [0.1_dp, 10.0_dp]
@@ -436,7 +436,7 @@ contains
          call check_close(other%u(1), point%u(1), 1.0e-15_dp, 'a jump and back')
          call start_step(other%material, 1.0e-12_dp)
          call reach(other, p=1.2_dp)
-         call check_close(other%u(1), point%u(1), 1.0e-11_dp, 'a step of next to nothing')
+         call check_close(other%u(1), point%u(1), 1.0e-11_dp, 'a tiny step')
 
          call start_relaxed(point%material, error)
          call check_no_error(error, 'a solid relaxes')
@@ -445,13 +445,13 @@ contains
          do n = 1, 3
             call start_step(point%material, 0.3_dp*n)
             call reach(point, p=1.2_dp)
-            call check_close(point%u(1), 1.2_dp, 1.0e-14_dp, 'rest stays at rest')
+            call check_close(point%u(1), 1.2_dp, 1.0e-14_dp, 'a body at rest stays at rest')
          end do
       end do
 
       call new_point(point, 1.0_dp, g, tau, 'exponential2')
       call new_point(other, 1.0_dp, g, tau, 'exponential')
-      do n = 1, 4                             ! without the step before they are the same
+      do n = 1, 4                             ! without a previous step both schemes are the same
          call restart_order(point%material)
          call start_step(point%material, 0.3_dp)
          call reach(point, p=1.0_dp*n)
@@ -459,18 +459,18 @@ contains
          call reach(other, p=1.0_dp*n)
          call check_close(point%u(1), other%u(1), 1.0e-14_dp, 'restarted order')
       end do
-      call start_step(point%material, 5.0_dp)     ! a step thought better of
+      call start_step(point%material, 5.0_dp)     ! a step that is not ended
       call start_step(point%material, 0.3_dp)
-      call check_close(point%material%ratio, 1.0_dp, 0.0_dp, 'a step may be started again')
+      call check_close(point%material%ratio, 1.0_dp, 0.0_dp, 'a step that was started but not ended leaves no trace')
 
       call new_point(point, 0.0_dp, g, tau, 'exponential2')
       call start_relaxed(point%material, error)
-      call check_error(error, 'relaxed', 'a fluid never rests')
-   end subroutine limits
+      call check_error(error, 'relaxed', 'a fluid has no relaxed state')
+   end subroutine limits_of_steps_and_rest
 
-   !> Many cells: threads, components, the part carried by a mass, each cell on its own.
-   subroutine fields()
-      integer, parameter :: nx = 67, ny = 43      ! more than a block, no multiple of it
+   !> Many cells: threads, components, the part that a mass carries, and that cells do not depend on each other.
+   subroutine cells_are_independent()
+      integer, parameter :: nx = 67, ny = 43      ! more than a block of cells, and not a multiple of it
       type(zener_type) :: material
       type(arm_state_type) :: one, two, both, single
       type(products_type) :: a, b, c, d
@@ -521,13 +521,13 @@ contains
             call check_close(b%du_ds, sum((v - u)**2), 1.0e-12_dp*b%du_ds, 'sum of dU.dU')
             call check_close(maxval(abs(a%arm_du - b%arm_du)), 0.0_dp, 1.0e-10_dp, 'p_k.dU')
 
-            call past_traction(single, material, h)        ! the cell (11, 37) for itself
+            call past_traction(single, material, h)        ! the cell (11, 37) alone
             q = p(11, 1, 37)
             w_old = w
             w = (q + h)/material%q
             d = new_products(material)
             call commit_arms(single, material, q, w_old, w, d)
-            call check_close(w(1), v(11, 1, 37), 1.0e-15_dp, 'a cell knows only itself')
+            call check_close(w(1), v(11, 1, 37), 1.0e-15_dp, 'a cell does not depend on others')
             call finish_step(material)
             u = v
          end do
@@ -535,9 +535,9 @@ contains
          call commit_threads(one, material, p(:, 1, :), u(:, 1, :))
       end do
       call set_threads(threads)
-   end subroutine fields
+   end subroutine cells_are_independent
 
-   !> The same commit with one and with two threads: the same bits.
+   !> The same commit with one and with two threads gives the same bits.
    subroutine commit_threads(arms, material, p, u)
       type(arm_state_type), intent(in) :: arms
       type(zener_type), intent(inout) :: material
@@ -563,8 +563,8 @@ contains
       call check_close(maxval(abs(copies(1)%arm - copies(2)%arm)), 0.0_dp, 0.0_dp, 'p_k, threads')
    end subroutine commit_threads
 
-   !> No arms: no history, no memory, U = P/G.
-   subroutine elastic()
+   !> Without arms there are no past tractions and no memory, and U = P/G.
+   subroutine elastic_body_has_no_memory()
       type(point_type) :: point
       type(products_type) :: products
       real(dp) :: past(1)
@@ -586,10 +586,10 @@ contains
          call check_that(size(point%arms%s) + size(point%arms%arm) &
             + size(point%arms%ds) == 0, 'no memory')
       end do
-   end subroutine elastic
+   end subroutine elastic_body_has_no_memory
 
-   !> What new_zener refuses.
-   subroutine faults()
+   !> new_zener refuses wrong arguments.
+   subroutine wrong_arguments_are_refused()
       type(zener_type) :: material
       type(error_type), allocatable :: error
 
@@ -603,6 +603,6 @@ contains
       call check_error(error, 'elastic', 'no stiffness at all')
       call new_zener(material, -1.0_dp, [2.0_dp], [1.0_dp], 'exponential', error)
       call check_error(error, 'negative', 'negative modulus')
-   end subroutine faults
+   end subroutine wrong_arguments_are_refused
 
 end module test_zener
