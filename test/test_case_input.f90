@@ -32,6 +32,7 @@ contains
       if (selected('time_steps_given_and_derived')) call time_steps_given_and_derived()
       if (selected('materials_of_arms_and_branches')) call materials_of_arms_and_branches()
       if (selected('each_fault_has_its_message')) call each_fault_has_its_message()
+      if (selected('very_many_rows_are_warned_of')) call very_many_rows_are_warned_of()
       if (selected('all_faults_are_reported_at_once')) call all_faults_are_reported_at_once()
       if (selected('files_that_exist_or_not')) call files_that_exist_or_not()
       if (selected('options_that_exclude_each_other')) call options_that_exclude_each_other()
@@ -447,6 +448,24 @@ contains
       call refuse(body//'&friction coefficient = 0.3 /', '&friction: law: is missing')
       call refuse(body//'&adhesion potential = ''gauss'', energy = 0.05 /', 'range: is missing')
    end subroutine each_fault_has_its_message
+
+   !> A run of more than 100,000 rows is announced, with the phase that has most of them. The first phase adds a row
+   !> for the jump of its load.
+   subroutine very_many_rows_are_warned_of()
+      type(case_type) :: case
+      type(error_type), allocatable :: error
+      character(*), parameter :: rest = '&phase pressure=1.0, duration=1, steps=40000 /'
+      character(*), parameter :: slide = '&phase duration=1, velocity_x=1e-9, steps='
+
+      call parse_case(grid//sphere//steel//rest//slide//'59999 /', 'road.nml', case, error)
+      call check_no_error(error, '100,000 rows')
+      call check_that(case%warnings == '', '100,000 rows: no warning '//case%warnings)
+
+      call parse_case(grid//sphere//steel//rest//slide//'60000 /', 'road.nml', case, error)
+      call check_no_error(error, '100,001 rows')
+      call check_order(index(case%warnings, '&phase 2: the run has 100001 rows, of which 60000 belong to this phase '// &
+         '(time step: steps given'), '>', 0, 'a warning: '//case%warnings)
+   end subroutine very_many_rows_are_warned_of
 
    !> An input must give exactly one fault, which holds the fragment.
    subroutine refuse(text, fragment)

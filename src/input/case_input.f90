@@ -18,7 +18,7 @@ module case_input
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use shear_laws, only : law_variables
    use snapshot_fields, only : field_names, field_needs_friction
-   use scale_warnings, only : cap_warning, oblong_warning, steepness_warning
+   use scale_warnings, only : cap_warning, oblong_warning, rows_warning, steepness_warning
    use surface_warnings, only : find_warnings, warning_length
    use asperity_text_file, only : read_text_file
    use text_tools, only : to_text
@@ -100,7 +100,7 @@ contains
       if (allocated(faults%error)) call move_alloc(faults%error, error)
    end subroutine parse_case
 
-   !> Add the warnings about the grid, the surfaces and the adhesion.
+   !> Add the warnings about the grid, the surfaces, the number of rows and the adhesion.
    subroutine add_warnings(case)
       type(case_type), intent(inout) :: case
       character(warning_length), allocatable :: found(:)
@@ -115,6 +115,7 @@ contains
          call add_warning(case, length_warning('ny', case%grid%ny, case%grid%nx))
       end if
       call add_warning(case, oblong_warning(case%grid))
+      call add_warning(case, rows_warning(case%phases))
       do i = 1, size(case%surfaces)
          call add_warning(case, steepness_warning(case%surfaces(i)))
          call add_warning(case, cap_warning(case%surfaces(i), case%grid))

@@ -1,18 +1,22 @@
-!> Warnings about lengths that do not fit together, as where a value is given in another unit: very
-!> oblong cells, very steep roads, and spheres smaller than the cells.
+!> Warnings about values that do not fit together, as where one is given in another unit: very oblong cells,
+!> very steep roads, spheres smaller than the cells, and phases with very many steps.
 module scale_warnings
    use asperity_precision, only : dp, pi
+   use asperity_schedule, only : count_rows
+   use case_settings, only : phase_settings_type
    use regular_grid, only : grid_type
    use surface_settings, only : surface_settings_type
    use surface_shapes, only : find_shape, shape_type
+   use text_tools, only : to_text
    implicit none
    private
 
-   public :: cap_warning, oblong_warning, steepness_warning
+   public :: cap_warning, oblong_warning, rows_warning, steepness_warning
 
    real(dp), parameter :: largest_aspect = 100.0_dp   !! of a cell: beyond it a length is often wrong
    real(dp), parameter :: least_radius = 4.0_dp       !! of a cap, cells: below it no contact on the cap is resolved
    real(dp), parameter :: largest_slope = 3.0_dp      !! far beyond what a theory for small slopes describes
+   integer, parameter :: many_rows = 100000           !! of a run: above it a mistake is costly
 
 contains
 
@@ -78,5 +82,20 @@ contains
          'smaller cells'
       text = trim(line)
    end function cap_warning
+
+   !> A warning if a run has so many rows that the user should know before it starts. Empty if all is well.
+   pure function rows_warning(phases) result(text)
+      type(phase_settings_type), intent(in) :: phases(:)  !! resolved
+      character(:), allocatable :: text
+      integer :: longest
+
+      text = ''
+      if (count_rows(phases) <= many_rows) return
+      longest = maxloc(phases%steps, dim=1)
+      text = '&phase '//to_text(longest)//': the run has '//to_text(count_rows(phases))//' rows, of which '// &
+         to_text(phases(longest)%steps)//' belong to this phase (time step: '//trim(phases(longest)%dt_reason)// &
+         '): asperity check estimates how long that takes; check the units of velocity_x, velocity_y and duration, '// &
+         'or give a longer dt'
+   end function rows_warning
 
 end module scale_warnings
