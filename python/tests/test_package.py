@@ -31,6 +31,13 @@ def test_the_version_is_written_once(root):
     assert "## Unreleased" in changes or f"## {written}" in changes
 
 
+def test_the_licence_is_a_name_and_a_file():
+    """`pip show` prints the name; the text lies beside it."""
+    told = distribution("asperity").metadata
+    assert told["License-Expression"] == "MIT"
+    assert told["License-File"] == "LICENSE"
+
+
 def test_what_an_installation_holds(root):
     files = {str(path) for path in distribution("asperity").files or []}
     if not any(name.endswith("asperity/results/run.py") for name in files):
