@@ -35,6 +35,23 @@ def _browser():
 BROWSER = _browser()
 
 
+# Clicks on all buttons that save, and returns the files that they offer.
+SAVED = """
+const done = arguments[0];
+window.saved = [];
+URL.createObjectURL = (blob) => { saved.push(blob); return "#main"; };
+const buttons = [...document.querySelectorAll("button.save")];
+for (const button of buttons) button.click();
+const read = (blob) => new Promise((kept) => {
+  const reader = new FileReader();
+  reader.onload = () => kept([blob.type, reader.result.split(",")[1]]);
+  reader.readAsDataURL(blob);
+});
+const wait = () => saved.length < buttons.length ? setTimeout(wait, 50)
+  : Promise.all(saved.map(read)).then(done);
+wait();"""
+
+
 class Browser:
     """A browser with one window, for use in a `with` statement."""
 
@@ -131,6 +148,14 @@ class Browser:
             {"type": "pointerDown", "button": 0},
             {"type": "pointerMove", "duration": 60, "x": round(end[0]), "y": round(end[1])},
             {"type": "pointerUp", "button": 0}]})
+
+    def saved(self):
+        """Click on all buttons that save; return the texts and the pictures."""
+        self.call("POST", "/timeouts", {"script": 1000 * PATIENCE})
+        found = self.call("POST", "/execute/async", {"script": SAVED, "args": []})
+        files = {kind: [base64.b64decode(data) for each, data in found if each == kind]
+                 for kind in ("text/csv", "image/png")}
+        return [text.decode() for text in files["text/csv"]], files["image/png"]
 
     def console(self):
         """Return the messages of the console since the last call."""

@@ -241,6 +241,12 @@ def test_wrong_values_are_refused_immediately(name, value, message):
     assert str(case) == before
 
 
+@pytest.mark.parametrize("source", ["road.nml", Path("road.nml"), "&grid nx = 4 /"])
+def test_an_input_is_not_a_title(source):
+    with pytest.raises(ValueError, match=r"title = '.*Case\.read reads an input"):
+        asperity.Case(source)
+
+
 def test_quotes_in_values_stay_inside_the_text():
     case = elastic()
     case.title = "it's / &grid nx = 3 / 'x"

@@ -415,6 +415,12 @@ def test_page_in_a_browser(curve, tmp_path):
                               " document.querySelectorAll('#losses figure').length,"
                               " document.querySelectorAll('#map canvas').length]")
         assert counted == [5, len(curve.losses), 1]
+        texts, pictures = browser.saved()
+        assert len(texts) == len(pictures) == sum(counted)
+        (field,) = (text for text in texts if text.startswith("x (m),y (m),Pressure"))
+        x, y, pressure = np.loadtxt(field.splitlines(), delimiter=",", skiprows=1).T
+        assert len(x) == len(set(zip(x, y, strict=True))) > 100
+        assert pressure.min() >= 0.0 and pressure.max() > 2e5
         ribbons = browser.run("return document.querySelectorAll('.ribbon').length")
         assert ribbons >= 4
         before = browser.run("return document.querySelector('#map canvas').toDataURL()")

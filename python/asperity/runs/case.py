@@ -30,6 +30,14 @@ class _Text(str):
         return str(self)
 
 
+def _check_title(title: Any) -> None:
+    """Refuse an input in the place of a title: the case would be empty but for its title."""
+    if isinstance(title, os.PathLike) or (isinstance(title, str) and (
+            title.endswith(".nml") or title.lstrip().startswith("&"))):
+        raise ValueError(f"title = {str(title)[:60]!r}: must be a title;"
+                         " asperity.Case.read reads an input")
+
+
 class Case(CaseGroups):
     """An input of the program, which can be built, changed, checked, written and run from Python.
 
@@ -90,6 +98,7 @@ class Case(CaseGroups):
     # Type checkers know the groups by name, from CaseGroups.
     if not TYPE_CHECKING:
         def __init__(self, title: str | None = None, **groups: Any) -> None:
+            _check_title(title)
             object.__setattr__(self, "_groups", {})
             object.__setattr__(self, "path", None)
             for name in namelists.table():

@@ -47,6 +47,8 @@ def curve(values: NDArray[Any]) -> str:
     1
     >>> curve(np.array([1.0]))
     ''
+    >>> "1.0,8.0 50.0,8.0 99.0,8.0" in curve(np.array([5.0, 5.0 + 1e-12, 5.0]))
+    True
     """
     values = np.asarray(values, dtype=float)
     if len(values) > POINTS:
@@ -55,9 +57,9 @@ def curve(values: NDArray[Any]) -> str:
     if good.sum() < 2:
         return ""
     low, high = float(values[good].min()), float(values[good].max())
-    span = high - low or 1.0
+    varies = high - low > 1e-6 * max(abs(low), abs(high))  # beyond round-off
     x = np.linspace(1, 99, len(values))[good]
-    y = 15.0 - 14.0 * (values[good] - low) / span if high > low else np.full(good.sum(), 8.0)
+    y = 15.0 - 14.0 * (values[good] - low) / (high - low) if varies else np.full(good.sum(), 8.0)
     points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
     return ('<svg width="100" height="16" viewBox="0 0 100 16" aria-hidden="true">'
             f'<polyline points="{points}" fill="none" stroke="#0072B2" stroke-width="1.2"/></svg>')

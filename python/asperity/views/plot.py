@@ -269,12 +269,9 @@ def _draw_energy(run: Run, along: NDArray[Any], axes: Axes, style: dict[str, Any
                                                  "label": names[part], **style})
     axes.set_ylabel(axis_text("Energy", unit))
     missing = closure(run)
-    note = None if missing is None else f"balance closes to {missing.max(initial=0.0):.1g}"
+    if missing is not None:  # without a line of its own, so that the words stand off the data
+        axes.plot([], [], " ", label=f"balance closes to {missing.max(initial=0.0):.1g}")
     _legend_above(axes)
-    if note:
-        axes.text(0.99, 0.02, note, transform=axes.transAxes, ha="right", va="bottom",
-                  fontsize=plt.rcParams["legend.fontsize"],
-                  bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5})
 
 
 def _legend_above(axes: Axes) -> None:

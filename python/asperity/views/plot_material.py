@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
 import matplotlib.pyplot as plt
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..base.check import array_of
-from .style import COLOURS
+from .style import COLOURS, SINGLE_COLUMN, print_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["plot_dma_fit", "plot_prony"]
 
 _LEGEND_ABOVE = {
-    "loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": 4, "frameon": False,
+    "loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": 2, "frameon": False,
     "columnspacing": 1.2, "handlelength": 1.6,
 }
 
@@ -48,28 +49,33 @@ def plot_prony(material: Prony, ax: Axes | None = None, omega: ArrayLike | None 
         frequency = np.geomspace(1e-2 / ends[0], 1e2 / ends[1], 400)
     else:
         frequency = array_of("omega", omega, low=0.0, low_open=True, ndim=1)
-    if ax is None:
-        _, ax = plt.subplots(figsize=(6.4, 4.2), layout="constrained")
+    with print_style() if ax is None else nullcontext():
+        if ax is None:
+            _, ax = plt.subplots(figsize=(SINGLE_COLUMN, 2.7), layout="constrained")
+        _draw_prony(material, frequency, ax)
+    return ax
+
+
+def _draw_prony(material: Prony, frequency: NDArray[np.float64], ax: Axes) -> None:
+    """Draw the moduli, the arms and tan delta into axes."""
     modulus = material.complex_modulus(frequency)
-    lines = ax.loglog(frequency, modulus.real, color="C0", label="storage modulus $G'$")
+    lines = ax.loglog(frequency, modulus.real, color=COLOURS[0], label="storage modulus $G'$")
     if material.tau.size:
-        lines += ax.loglog(frequency, modulus.imag, color="C1", label="loss modulus $G''$")
-        lines += ax.loglog(
-            1.0 / material.tau, material.g, "k.", markersize=4, label=r"arms $(1/\tau_k, g_k)$"
-        )
+        lines += ax.loglog(frequency, modulus.imag, color=COLOURS[1], label="loss modulus $G''$")
+        lines += ax.loglog(1.0 / material.tau, material.g, "x", color=COLOURS[6], markersize=4,
+                           label=r"arms $(1/\tau_k, g_k)$")
         twin = ax.twinx()
-        lines += twin.semilogx(
-            frequency, modulus.imag / modulus.real, "C2--", label=r"$\tan\delta$"
-        )
-        twin.set_ylabel(r"loss factor $\tan\delta$ (-)")
+        lines += twin.semilogx(frequency, modulus.imag / modulus.real, "--", color=COLOURS[2],
+                               label=r"loss factor $\tan\delta$")
+        twin.set_ylabel(r"loss factor $\tan\delta$")
         twin.set_ylim(bottom=0.0)
         low = 0.3 * min(material.g[material.g > 0].min(initial=np.inf), modulus.real.min())
-        ax.set_ylim(low, 2.0 * modulus.real.max())
+        ax.set_ylim(low, 2.0 * max(modulus.real.max(), material.g.max()))
     ax.set_xlim(frequency[0], frequency[-1])
     ax.set_xlabel(r"angular frequency $\omega$ (rad/s)")
     ax.set_ylabel("shear modulus (Pa)")
+    ax.grid(alpha=0.3)
     ax.legend(lines, [str(line.get_label()) for line in lines], **_LEGEND_ABOVE)
-    return ax
 
 
 def plot_dma_fit(fit: DmaFit) -> Figure:
@@ -123,7 +129,7 @@ def plot_dma_fit(fit: DmaFit) -> Figure:
     spread = float(np.abs(np.log10(fitted[2] / data[2])).max())
     bottom.set_ylim(-max(reach, 1.2 * spread), max(reach, 1.2 * spread))
     top.set_ylabel("shear modulus (Pa)")
-    middle.set_ylabel(r"$\tan\delta$ (-)")
+    middle.set_ylabel(r"loss factor $\tan\delta$")
     bottom.set_ylabel(r"$\log_{10}$(fit/data)")
     at = "" if fit.reference is None else f" at {fit.reference:g} °C"
     bottom.set_xlabel(rf"angular frequency $\omega${at} (rad/s)")

@@ -178,12 +178,25 @@ def _tiles(run: Run) -> str:
             names.append(("friction_viscous", "of it in the rubber"))
     if has_friction(run):
         names += [("stick_area", "Stick area"), ("sliding_speed", "Sliding speed")]
-    tiles = "\n".join(f"<div><dt>{label}</dt><dd>{_number(float(history[name][-1]), units)}</dd>"
-                      "</div>" for name, label in names if name in history
-                      for units in [history.units(name)])
+    tiles = "\n".join(f"<div><dt>{label}</dt><dd>{_last(run, name)}</dd></div>"
+                      for name, label in names if name in history)
     step = f", step {history['step'][-1]}" if "step" in history else ""
     return (f'<p class="soft">The last row{step}:</p>\n<dl class="tiles">\n{tiles}\n</dl>'
             + (_mean_friction(run) if moving and history.rows > 1 else ""))
+
+
+def _last(run: Run, name: str) -> str:
+    """Return the last value of a column with its unit.
+
+    Round-off is zero. That of the gap in full contact is small beside the approach.
+    """
+    last = float(run.history[name][-1])
+    size = max(float(np.abs(run.history[column]).max())
+               for column in (name, "displacement" if name == "mean_gap" else name)
+               if column in run.history)
+    if abs(last) < 1e-9 * size:
+        last = 0.0
+    return _number(last, run.history.units(name))
 
 
 def _mean_friction(run: Run) -> str:

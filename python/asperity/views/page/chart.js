@@ -23,6 +23,12 @@ function digits(value, count = 4) {
   return text.replace("e+", "e").replace("-", "−").replace("e-", "e−");
 }
 
+/** The value at a mark of a logarithmic axis, whose logarithm is given. */
+function powerText(logarithm) {
+  return Number.isInteger(logarithm) && Math.abs(logarithm) > 3
+    ? `1e${logarithm}`.replace("-", "−") : digits(10 ** logarithm, 2);
+}
+
 /** A value with its prefixed unit. */
 function shown(value, unit) {
   if (value === null || !Number.isFinite(value)) return "–";
@@ -280,8 +286,7 @@ class Chart {
     const [fx, unitX] = options.logX ? [1, options.xUnit === "1" ? "" : options.xUnit]
       : siScale(Math.max(...this.whole().map(Math.abs)), options.xUnit);
     const marksY = options.log ? powers(y0, y1, 5) : ticks(y0 * fy, y1 * fy, 5).map((v) => v / fy);
-    const textY = marksY.map((y) => options.log
-      ? (Number.isInteger(y) ? `1e${y}`.replace("-", "−") : digits(10 ** y, 2)) : digits(y * fy));
+    const textY = marksY.map((y) => options.log ? powerText(y) : digits(y * fy));
     const left = 26 + 7 * Math.max(2, ...textY.map((text) => text.length));
     const box = {left, right: width - 10, top: 8, bottom: height - 38};
     this.box = box;
@@ -312,8 +317,7 @@ class Chart {
       : ticks(x0 * fx, x1 * fx, Math.floor(width / 90)).map((v) => v / fx);
     for (const x of marksX) {
       root.append(svg("line", {x1: px(x), x2: px(x), y1: box.top, y2: box.bottom, class: "grid"}));
-      const text = options.logX ? (Number.isInteger(x) ? `1e${x}`.replace("-", "−")
-        : digits(10 ** x, 2)) : digits(x * fx, 6);
+      const text = options.logX ? powerText(x) : digits(x * fx, 6);
       root.append(svg("text", {x: Math.min(Math.max(px(x), box.left + 4), box.right - 8),
         y: box.bottom + 15, "text-anchor": "middle"}, text));
     }

@@ -239,8 +239,8 @@ function colourBar(table, low, high, unit, open) {
   scale.dataset.colours = table.join(",");
   const numbers = html("div", {class: "numbers"});
   for (const value of [low, (low + high) / 2, high]) {
-    // The middle of a scale of both signs is zero but for round-off.
-    const round = Math.abs(value) < 1e-9 * (high - low) ? 0 : value;
+    // The middle of a scale of both signs is zero but for round-off and for peaks that miss the cells.
+    const round = Math.abs(value) < 5e-4 * (high - low) ? 0 : value;
     numbers.append(html("span", {}, digits(round * factor, 3)));
   }
   numbers.lastChild.textContent += name ? ` ${name}` : "";
