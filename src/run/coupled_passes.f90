@@ -16,34 +16,34 @@
 !> solves and the length of their steps.
 !>
 !> The traction T was found at the place z. If U_T - z moves the contact along the rubber, the strains
-!> around the contact move with it. Otherwise the road would be read as stretched beside the contact.
-!> `carry` therefore moves U_T along with the contact; at the fixed point it does nothing.
+!> around the contact move with it. Otherwise the road would seem to be stretched beside the contact.
+!> `carry` therefore moves U_T along with the contact; at the fixed point it has no effect.
 !>
-!> Where the traction of a cell would jump as it opens, passes would swing between the two states of such cells.
-!> There the shares of the strength that cells may carry are unknown as well (module `edge_shares`). Each
-!> pass moves them after its normal solve, and the acceleration takes them together with the place, as a third
-!> component. The first `deciding` passes of a row, in which the contact is only being found, set them to 0 or 1.
+!> If the traction of a cell would jump as the cell opens, the passes would alternate between the two states of such
+!> cells. The share of the strength that each cell may carry is then unknown as well (module `edge_shares`). Each
+!> pass moves the shares after its normal solve, and the acceleration treats them as a third component of the
+!> place. The first `deciding` passes of a row, which only find the contact, set them to 0 or 1.
 !>
-!> The first place comes from the rows before: the displacement moves with the road, its mean goes on
-!> as in the last step, and `place_forecast` adds what the last rows have changed in it. A jump of the
-!> load is solved by the same loop, without motion and time, and its tractions are not extrapolated.
+!> The first place is extrapolated from the rows before: the displacement moves with the road, its mean continues
+!> as in the last step, and `place_forecast` adds the changes that the last rows suggest. A jump of the load is
+!> solved by the same loop, without motion and time, and its tractions are not extrapolated.
 !>
 !> The slip that the first place implies, or that the last pass has found, has almost the direction of the slip
 !> to be found. Cells that slip far therefore start on their bounds in that direction, and a step in which all
 !> cells slip takes one or two tangential iterations. (Without it, it took eleven: each cell that
 !> came into contact began as one that sticks.)
 !>
-!> What remains is measured by the road read at U_T against the road solved on, `mismatch` below: the
-!> column `residual_coupling`.
+!> The error of a pass is the difference between the road at U_T and the road on which it was solved (`mismatch`
+!> below; the column `residual_coupling`).
 !>
 !> The loop of `solve` reads: do a pass at the place, and measure the mismatch that it leaves. If the
-!> mismatch is within the tolerance, and the solves of the pass were asked to be that accurate too, the
-!> row is solved. Otherwise `pass_control` judges the pass, which sets the accuracy of the next one and
-!> how far to go, and `choose_place` goes to the next place. When the passes run out, the row keeps
-!> what the last pass has left; the last of more than ten passes is done at the best place so far. Once in a
-!> row, passes that have stalled are left for module `joint_step`, which solves the step at once; the next
-!> pass is then done at its solution, with its shares of the bounds, and proves it. A normal solve that does
-!> not converge ends the loop. A row that is given up for a stop (module `row_stop`) is left as it is.
+!> mismatch is within the tolerance, and the solves of the pass were accurate enough, the row is solved.
+!> Otherwise `pass_control` judges the pass and sets the accuracy of the next one and the length of the step, and
+!> `choose_place` computes the next place. When the number of passes is exhausted, the row keeps the result of the
+!> last pass; if there were more than ten, the last one is done at the best place so far. If the passes have
+!> stalled, module `joint_step` solves all equations of the step at once, but only once in a row; the next pass is
+!> done at its solution, with its shares of the bounds, and verifies it. A normal solve that does not converge ends
+!> the loop. A row that is abandoned because of a stop (module `row_stop`) is left as it is.
 !>
 !> The work of a row is bounded by `most_passes`, by the iterations that a case allows to a normal and to a
 !> tangential solve (`max_iterations`), and by the evaluations that `joint_equations` allows.
@@ -95,7 +95,7 @@ module coupled_passes
       !> z, m; with shares also share times reach, m [nx, 2 or 3, rows].
       real(dp), allocatable, private :: place(:, :, :)
       real(dp), allocatable, private :: carried(:, :, :)    !! U_T of the row before, carried along, m [nx, 2, rows]
-      real(dp), allocatable, private :: residuals(:, :, :)  !! what a pass makes of the place, less the place, m
+      real(dp), allocatable, private :: residuals(:, :, :)  !! place that a pass leads to, minus the place, m
       real(dp), allocatable, private :: best_place(:, :, :) !! that of the least mismatch, m
       logical, private :: sharing = .false.             !! the shares of the cells are unknown, too
       type(edge_rule_type), private :: edge             !! how they move, in the row in hand
@@ -323,11 +323,11 @@ contains
       if (self%sharing) self%place(:, 3, :) = min(max(self%place(:, 3, :), 0.0_dp), self%edge%reach)
    end subroutine choose_place
 
-   !> What remains of the coupling: by how much the road at U_T differs from the road solved on. The
-   !> larger of two means that are weighted by the pressure: the difference of the heights over the
-   !> rms height of the map, and that of the slopes over the slopes in the contact. With constant shear a cell
-   !> with hardly any pressure carries as much as any other, and these means do not see whether it obeys the
-   !> law: there the mean error of the cells at the edge counts as well.
+   !> The difference between the road at U_T and the road on which the pass was solved. It is the larger of two
+   !> means that are weighted by the pressure: the difference of the heights over the rms height of the map, and
+   !> that of the slopes over the slopes in the contact. With constant shear a cell with hardly any pressure
+   !> carries as much traction as any other, and these means do not show whether it obeys the law. In that case the
+   !> mean error of the cells at the edge counts as well.
    function mismatch(self, contact, plan) result(residual)
       class(coupled_passes_type), intent(in) :: self
       class(contact_type), intent(inout) :: contact

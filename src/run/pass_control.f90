@@ -1,29 +1,28 @@
-!> How accurate the solves of the next pass of a coupled step must be, and how far the step to the
+!> Determines how accurate the solves of the next pass of a coupled step must be, and how much the step to the
 !> next place is damped.
 !>
-!> A pass needs its solves no better than the passes have settled: to a tenth of the mismatch that the
-!> last pass left (`share`); a pass that comes close to the tolerance is solved to the tolerance. Three
-!> things go wrong on hard roads, and each has its answer:
+!> The solves of a pass need not be more accurate than a tenth (`share`) of the mismatch of the last pass. A pass
+!> that comes close to the tolerance is solved to the tolerance. On difficult roads three problems may occur:
 !>
-!> * The solves return with nothing done, since their start is within the accuracy asked for. The
-!>   mismatch then says little, and least of all where a thick block turns a small error of the
-!>   friction into a long displacement. So where `patience` passes in turn have not brought the mismatch
-!>   below the part `falls` of the least one before, the share falls tenfold, and the accuracy may become
-!>   better than the tolerance.
-!> * An extrapolation goes astray. Where the mismatch is ten times the least so far, the
-!>   acceleration forgets what it has seen.
-!> * The passes do not come closer: the mismatch has not been halved in `stalled` passes. Either cells
-!>   that stick, slip and open in turn make differences that lead the acceleration astray; short plain
-!>   steps settle then. Or the state that the rows have followed ends (a fold: the contact will snap to
-!>   another one). The residual then keeps its direction and hardly changes from pass to pass, while each
-!>   step leads a little further to the other state. The passes go back to the best place and on without
-!>   acceleration (`plain`), with a momentum that grows as long as the residual keeps its direction and
-!>   vanishes where it turns. When the mismatch has fallen to a tenth, or after `stalled_plain` passes
-!>   without halving it, the acceleration begins again from the place reached; what was the best place
-!>   before is forgotten, since it belongs to the state that ended.
+!> * The solves return without an iteration, because their start is already within the required accuracy. The
+!>   mismatch then says little, above all if a thick block turns a small error of the friction into a large
+!>   displacement. Therefore, if `patience` successive passes have not reduced the mismatch below the part `falls`
+!>   of the least one before, the share is reduced tenfold, and the required accuracy may become better than the
+!>   tolerance.
+!> * An extrapolation diverges. If the mismatch is ten times the least so far, the acceleration discards its
+!>   differences.
+!> * The passes do not come closer: the mismatch has not been halved in `stalled` passes. There are two possible
+!>   reasons. Cells that stick, slip and open alternately may make the differences useless for the acceleration;
+!>   the passes then settle with short plain steps. Or the state that the rows have followed ceases to exist (a
+!>   fold: the contact will snap to another state). The residual then keeps its direction and hardly changes from
+!>   pass to pass, while each step leads a little further to the other state. The passes return to the best place
+!>   and continue without acceleration (`plain`), with a momentum that grows as long as the residual keeps its
+!>   direction and vanishes if it turns. When the mismatch has fallen to a tenth, or after `stalled_plain` passes
+!>   without halving it, the acceleration begins again from the present place. The best place before is discarded,
+!>   because it belongs to the state that ceased to exist.
 !>
-!> Passes that stall with plain steps may not come to an end at all. Once in a row the step should then be solved
-!> all at once (`joint_due`). Only once, because an attempt may cost as much as many passes.
+!> If the passes stall even with plain steps, they may never settle. The step should then be solved all at once
+!> (`joint_due`), but only once in a row, because an attempt may cost as much as many passes.
 module pass_control
    use asperity_precision, only : dp
    implicit none

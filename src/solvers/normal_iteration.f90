@@ -39,8 +39,8 @@ module normal_iteration
    real(dp), parameter :: useless = 0.1_dp     !! largest part of a clipped step that counts as little
    real(dp), parameter :: nothing = 1e-3_dp    !! largest part that counts as nothing
 
-   ! Steps by which the preconditioner extends the residual. More of them save iterations only where most
-   ! cells touch: the gaps between are then narrow, and the coarse level sees little of them.
+   ! Steps by which the preconditioner extends the residual. More steps save iterations only if many cells touch:
+   ! the gaps between them are then narrow, and the coarse level does not resolve them.
    integer, parameter :: few_steps = 2, more_steps = 3, most_steps = 4
    real(dp), parameter :: some_contact = 0.03_dp  !! part of the cells in contact from which the far rim pays,
    real(dp), parameter :: much_contact = 0.3_dp   !! and from which more steps pay
