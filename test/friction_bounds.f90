@@ -5,9 +5,22 @@ module friction_bounds
    implicit none
    private
 
-   public :: largest_excess, return_tractions
+   public :: largest_excess, return_to_bound, return_tractions
 
 contains
+
+   !> Return the traction of a point to the bound if it lies outside.
+   pure subroutine return_to_bound(law, p, slope, t, returned)
+      type(friction_law_type), intent(in) :: law
+      real(dp), intent(in) :: p             !! Pa
+      real(dp), intent(in) :: slope(2)
+      real(dp), intent(inout) :: t(2)       !! Pa
+      logical, intent(out) :: returned      !! it lay outside
+      real(dp) :: s
+
+      call law%place_on_bound(p, slope, 1.0_dp, t, s)
+      returned = s < 1.0_dp
+   end subroutine return_to_bound
 
    !> Return how far the tractions are outside their bounds: the largest |T - returned T|, Pa.
    function largest_excess(law, p, slope_x, slope_y, contact, tx, ty) result(excess)
@@ -31,7 +44,7 @@ contains
             if (contact(i, j) /= 0_int8) then
                if (law%slope) slope = [slope_x(i, j), slope_y(i, j)]
                t = [tx(i, j), ty(i, j)]
-               call law%return_to_bound(p(i, j), slope, t, returned)
+               call return_to_bound(law, p(i, j), slope, t, returned)
             end if
             excess = max(excess, hypot(tx(i, j) - t(1), ty(i, j) - t(2)))
          end do
@@ -66,7 +79,7 @@ contains
             else
                if (law%slope) slope = [slope_x(i, j), slope_y(i, j)]
                t = [tx(i, j), ty(i, j)]
-               call law%return_to_bound(p(i, j), slope, t, returned)
+               call return_to_bound(law, p(i, j), slope, t, returned)
                if (returned) then
                   contact(i, j) = contact_slip
                   tx(i, j) = t(1)

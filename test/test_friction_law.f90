@@ -3,7 +3,7 @@ module test_friction_law
    use check, only : begin_suite, check_close, check_order, check_that, selected
    use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type, &
       new_friction_law, unbounded
-   use friction_bounds, only : largest_excess, return_tractions
+   use friction_bounds, only : largest_excess, return_to_bound, return_tractions
    use asperity_precision, only : dp, int8
    implicit none
    private
@@ -36,30 +36,30 @@ contains
 
       law = new_friction_law('coulomb', 0.5_dp, 1.0_dp, 0.0_dp, .false., .true.)
       t = [3.0_dp, 4.0_dp]
-      call law%return_to_bound(2.0_dp, none, t, returned)
+      call return_to_bound(law, 2.0_dp, none, t, returned)
       call check_that(returned, 'a traction above mu P is returned')
       call check_close(t(1), 0.6_dp, 1e-15_dp, 'Coulomb, x')
       call check_close(t(2), 0.8_dp, 1e-15_dp, 'Coulomb, y')
       t = [0.3_dp, -0.4_dp]
-      call law%return_to_bound(2.0_dp, none, t, returned)
+      call return_to_bound(law, 2.0_dp, none, t, returned)
       call check_that(.not. returned, 'a traction below mu P is left')
       law = new_friction_law('constant_shear', 0.5_dp, 1.5_dp, 0.0_dp, .false., .true.)
       t = [3.0_dp, 4.0_dp]
-      call law%return_to_bound(2.0_dp, none, t, returned)
+      call return_to_bound(law, 2.0_dp, none, t, returned)
       call check_close(hypot(t(1), t(2)), 1.5_dp, 1e-15_dp, 'constant shear')
       law = new_friction_law('coulomb_orowan', 0.5_dp, 1.5_dp, 0.0_dp, .false., .true.)
       t = [3.0_dp, 4.0_dp]
-      call law%return_to_bound(2.0_dp, none, t, returned)
+      call return_to_bound(law, 2.0_dp, none, t, returned)
       call check_close(hypot(t(1), t(2)), 1.0_dp, 1e-15_dp, 'Coulomb-Orowan at low pressure')
       t = [3.0_dp, 4.0_dp]
-      call law%return_to_bound(8.0_dp, none, t, returned)
+      call return_to_bound(law, 8.0_dp, none, t, returned)
       call check_close(hypot(t(1), t(2)), 1.5_dp, 1e-15_dp, 'Coulomb-Orowan at high pressure')
       law = new_friction_law('coulomb', 0.5_dp, 0.0_dp, 3.0_dp, .false., .true.)
       t = [3.0_dp, 4.0_dp]
-      call law%return_to_bound(-1.0_dp, none, t, returned)
+      call return_to_bound(law, -1.0_dp, none, t, returned)
       call check_close(hypot(t(1), t(2)), 1.0_dp, 1e-15_dp, 'adhesion adds gamma_0/z_0')
       t = [3.0_dp, 4.0_dp]
-      call law%return_to_bound(-3.5_dp, none, t, returned)
+      call return_to_bound(law, -3.5_dp, none, t, returned)
       call check_close(hypot(t(1), t(2)), 0.0_dp, 0.0_dp, 'no traction below -gamma_0/z_0')
    end subroutine bounds_without_slope
 
@@ -159,18 +159,18 @@ contains
 
       law = new_friction_law('coulomb', mu, 0.0_dp, 0.0_dp, .true., .true.)
       t = [100.0_dp, 0.0_dp]
-      call law%return_to_bound(p, [-h, 0.0_dp], t, returned)
+      call return_to_bound(law, p, [-h, 0.0_dp], t, returned)
       call check_close(t(1), p*(mu + h)/(1.0_dp - mu*h), 1e-13_dp, 'leading flank')
       t = [0.0_dp, 100.0_dp]
-      call law%return_to_bound(p, [0.0_dp, h], t, returned)
+      call return_to_bound(law, p, [0.0_dp, h], t, returned)
       call check_close(t(1), 0.0_dp, 1e-13_dp, 'trailing flank, across')
       call check_close(t(2), p*(mu - h)/(1.0_dp + mu*h), 1e-13_dp, 'trailing flank')
       t = [100.0_dp, 0.0_dp]
-      call law%return_to_bound(p, [-1.5_dp, 0.0_dp], t, returned)
+      call return_to_bound(law, p, [-1.5_dp, 0.0_dp], t, returned)
       call check_that(.not. returned, 'a cone steeper than 1/mu has no bound uphill')
       law = new_friction_law('coulomb', 0.0_dp, 0.0_dp, 0.0_dp, .true., .true.)
       t = [100.0_dp, -30.0_dp]
-      call law%return_to_bound(p, [-0.3_dp, 0.2_dp], t, returned)
+      call return_to_bound(law, p, [-0.3_dp, 0.2_dp], t, returned)
       call check_close(t(1), 0.6_dp, 1e-15_dp, 'no friction: T* = -P H_x')
       call check_close(t(2), -0.4_dp, 1e-15_dp, 'no friction: T* = -P H_y')
    end subroutine friction_uphill_and_downhill

@@ -28,8 +28,6 @@ module workspace
    contains
       procedure :: lend
       procedure :: take_back
-      procedure :: lent
-      procedure :: most_lent
       procedure :: destroy
    end type workspace_type
 
@@ -77,28 +75,6 @@ contains
       end do
       nullify (field)
    end subroutine take_back
-
-   !> Number of fields that are lent.
-   pure function lent(self) result(number)
-      class(workspace_type), intent(in) :: self
-      integer :: number
-      integer :: k
-
-      number = 0
-      if (.not. allocated(self%fields)) return
-      do k = 1, size(self%fields)
-         if (self%fields(k)%name /= '') number = number + 1
-      end do
-   end function lent
-
-   !> Most fields that were ever lent at once: the memory of the workspace.
-   pure function most_lent(self) result(number)
-      class(workspace_type), intent(in) :: self
-      integer :: number
-
-      number = 0
-      if (allocated(self%fields)) number = size(self%fields)
-   end function most_lent
 
    !> Free the fields, which must not be used any more.
    subroutine destroy(self)

@@ -55,7 +55,6 @@ module friction_law
       procedure :: strength_beside
       procedure :: bare_strength
       procedure :: jumps_at_edge
-      procedure :: return_to_bound
       procedure :: place_on_bound
       procedure :: slip_along_slope
    end type friction_law_type
@@ -227,19 +226,6 @@ contains
       first = -change/reach
       second = 2.0_dp*(change/reach)**2 - ddm/reach
    end subroutine bound_variation
-
-   !> Return a traction to the bound if it lies outside.
-   pure subroutine return_to_bound(self, p, slope, t, returned)
-      class(friction_law_type), intent(in) :: self
-      real(dp), intent(in) :: p
-      real(dp), intent(in) :: slope(2)
-      real(dp), intent(inout) :: t(2)       !! Pa
-      logical, intent(out) :: returned      !! it lay outside
-      real(dp) :: s
-
-      call self%place_on_bound(p, slope, 1.0_dp, t, s)
-      returned = s < 1.0_dp
-   end subroutine return_to_bound
 
    !> Scale D so that the traction lies on the bound, if its s is below a limit.
    pure subroutine place_on_bound(self, p, slope, limit, t, s, share)
