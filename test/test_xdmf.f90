@@ -53,6 +53,9 @@ contains
       call write_xdmf('no_such_folder/x.xdmf', 'a.h5', grid, snapshots, error)
       call check_error(error, 'no_such_folder/x.xdmf: cannot be written', 'missing folder')
       call remove_file(path)
+      call write_xdmf(path, 'a.h5', grid, snapshots, error)
+      call check_that(.not. file_exists(path), 'nothing is written after an error')
+      call check_error(error, 'no_such_folder/x.xdmf: cannot be written', 'the first error stays')
    end subroutine snapshots_are_listed
 
    !> Return the text of the file.

@@ -52,11 +52,12 @@ contains
       class(file_lock_type), intent(inout) :: self
       character(*), intent(in) :: path                !! of the lock's own file
       character(*), intent(in) :: protected           !! what the lock protects, for messages
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
       character(200) :: reason, host
       character(:), allocatable :: holder
       integer :: status, try
 
+      if (allocated(error)) return
       if (is_other_than_file(path)) then
          call fail(error, error_file, path//': is needed as a lock, and is not a regular file')
          return

@@ -1,4 +1,6 @@
 !> Operations on files that Fortran lacks: rename, remove, write through to the disk, and so on.
+!>
+!> With an error, the procedures that may return one do nothing, so that a caller may call several in sequence.
 module file_system
    use, intrinsic :: iso_c_binding, only : c_char, c_int, c_int64_t, c_intptr_t, c_null_char
    use asperity_errors, only : error_file, error_type, fail
@@ -74,8 +76,9 @@ contains
    subroutine rename_file(old, new, error)
       character(*), intent(in) :: old
       character(*), intent(in) :: new
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error
 
+      if (allocated(error)) return
       if (c_rename(old//c_null_char, new//c_null_char) /= 0) then
          call fail(error, error_file, new//': cannot be written: renaming '//old//' failed')
       end if
@@ -92,9 +95,10 @@ contains
    !> Wait until everything that was written to a file is on the disk.
    subroutine sync_file(path, error)
       character(*), intent(in) :: path
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error
       integer(c_int) :: descriptor, status, closed
 
+      if (allocated(error)) return
       descriptor = c_open(path//c_null_char, open_read_write)
       status = -1
       if (descriptor >= 0) then
@@ -109,9 +113,10 @@ contains
    subroutine lengthen_file(path, length, error)
       character(*), intent(in) :: path
       integer(int64), intent(in) :: length      !! bytes
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error
       integer(int64) :: now
 
+      if (allocated(error)) return
       inquire (file=path, size=now)
       if (now >= length) return
       if (c_truncate(path//c_null_char, int(length, c_int64_t)) /= 0) then

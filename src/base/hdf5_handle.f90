@@ -238,7 +238,7 @@ contains
       ! find the file too short. Therefore the file gets its length first.
       status = h5fget_filesize(self%id, length)
       call self%checked(status, 'writing failed', '', fault)
-      if (.not. allocated(fault)) call lengthen_file(self%path, int(length, int64), fault)
+      call lengthen_file(self%path, int(length, int64), fault)
       if (.not. allocated(fault)) then
          status = h5fflush(self%id, h5f_scope_local)
          call self%checked(status, 'writing failed', '', fault)

@@ -114,9 +114,9 @@ contains
       call report(self, error)
       if (allocated(error)) return
       call self%file%close(error)
-      if (.not. allocated(error)) call write_block(self%temporary, error)
-      if (.not. allocated(error)) call sync_file(self%temporary, error)
-      if (.not. allocated(error)) call rename_file(self%temporary, self%path, error)
+      call write_block(self%temporary, error)
+      call sync_file(self%temporary, error)
+      call rename_file(self%temporary, self%path, error)
       if (allocated(error)) call give_up(self)
    end subroutine commit
 
@@ -184,10 +184,11 @@ contains
    subroutine compare(self, settings, error)
       class(checkpoint_reader_type), intent(inout) :: self
       character(*), intent(in) :: settings           !! of the case: lines 'name = value'
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
       character(:), allocatable :: stored, name, value, line
       integer :: at, equals
 
+      if (allocated(error)) return
       call self%file%read_attribute('/', 'settings', stored, error)
       if (allocated(error)) return
       if (stored == settings) return

@@ -22,10 +22,11 @@ contains
    !> Write the block of a file that is complete except for the block.
    subroutine write_block(path, error)
       character(*), intent(in) :: path
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
       character(block_length) :: block
       integer :: unit, status
 
+      if (allocated(error)) return
       call make_block(path, block, error)
       if (allocated(error)) return
       open (newunit=unit, file=path, access='stream', form='unformatted', status='old', &

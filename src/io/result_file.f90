@@ -136,7 +136,7 @@ contains
    !> does not know the other one.
    subroutine give_up(self, error)
       class(result_file_type), intent(inout) :: self
-      type(error_type), allocatable, intent(inout) :: error
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
       character(:), allocatable :: temporary
 
       call self%writer%finish(self%file)
@@ -276,8 +276,7 @@ contains
 
       call self%writer%finish(self%file)
       call self%snapshots%finish(self%file, self%grid, self%compression, error)
-      if (.not. allocated(error)) call write_xdmf(self%xdmf_path, self%path, self%grid, &
-         self%snapshots%written, error)
+      call write_xdmf(self%xdmf_path, self%path, self%grid, self%snapshots%written, error)
    end subroutine end_snapshot
 
    !> Row of the last snapshot; -1 if there is none.
@@ -332,8 +331,9 @@ contains
    subroutine finish_result(self, finished, error)
       class(result_file_type), intent(inout) :: self
       logical, intent(in) :: finished
-      type(error_type), allocatable, intent(out), optional :: error
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
 
+      if (allocated(error)) return
       call self%file%write_attribute('/', 'finished', merge(1, 0, finished))
       call self%file%flush(error)
    end subroutine finish_result
@@ -364,11 +364,9 @@ contains
       call self%read_text('id', self%id, error)
       if (.not. allocated(error) .and. self%id /= id) call fail(error, error_input, self%path// &
          ': is not the result that '//checkpoint_path(path)//' belongs to')
-      if (.not. allocated(error)) call go_back(self%file, last_step, self%grid, self%expected_rows, &
-         self%snapshots%written, error)
-      if (.not. allocated(error)) call self%finish(.false., error)
-      if (.not. allocated(error)) call write_xdmf(self%xdmf_path, self%path, self%grid, &
-         self%snapshots%written, error)
+      call go_back(self%file, last_step, self%grid, self%expected_rows, self%snapshots%written, error)
+      call self%finish(.false., error)
+      call write_xdmf(self%xdmf_path, self%path, self%grid, self%snapshots%written, error)
       self%rows = last_step + 1
       if (allocated(error)) call self%file%close()
    end subroutine reopen_result

@@ -29,11 +29,12 @@ contains
       type(grid_type), intent(inout) :: grid
       integer, intent(inout) :: expected_rows    !! of the whole run
       type(snapshot_type), allocatable, intent(inout) :: snapshots(:)   !! those that are left
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
       character(120) :: text
       integer :: rows
       logical :: shortened
 
+      if (allocated(error)) return
       rows = count_history_rows(file)
       call file%report(error)
       if (allocated(error)) return

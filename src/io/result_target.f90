@@ -83,9 +83,10 @@ contains
    !> Refuse to replace an unfinished run, a checkpoint, or a file that is not a result.
    subroutine check_replaced(path, error)
       character(*), intent(in) :: path
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
       character(:), allocatable :: checkpoint
 
+      if (allocated(error)) return
       checkpoint = checkpoint_path(path)
       if (file_start(path, 1) /= '') then
          call damage_of_result(path, error)
@@ -158,10 +159,11 @@ contains
    !> Read a result in a separate process. It is an error if that process crashes or does not end.
    subroutine damage_of_result(path, error, fields)
       character(*), intent(in) :: path
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
       logical, intent(in), optional :: fields   !! read the fields as well; default no
       type(trial_type) :: trial
 
+      if (allocated(error)) return
       call trial%start(patience)
       if (trial%is_copy) then
          call read_result(path)

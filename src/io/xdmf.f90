@@ -38,11 +38,12 @@ contains
       character(*), intent(in) :: result_path            !! the result, in the same folder
       type(grid_type), intent(in) :: grid
       type(snapshot_type), intent(in) :: snapshots(:)    !! in the order of time
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
       character(:), allocatable :: temporary, result_name
       character(200) :: reason
       integer :: unit, status, closed, i
 
+      if (allocated(error)) return
       temporary = path//'.new'
       result_name = escaped(name_of(result_path))
       open (newunit=unit, file=temporary, status='replace', action='write', iostat=status, &

@@ -76,10 +76,8 @@ contains
       logical :: exists
 
       call check_place(self%path, error)
-      if (allocated(error)) return
       ! If the name is a link, the lock is that of its target.
       call self%lock%acquire(sibling_path(real_path(self%path), '.lock'), self%path, error)
-      if (allocated(error)) return
       if (restart) then
          inquire (file=self%path, exist=exists)
          if (exists) call damage_of_result(self%path, error)
@@ -152,7 +150,7 @@ contains
       call load_state(sim, reader, error)
       if (is_first_process()) then
          call reader%close()
-         if (.not. allocated(error)) call take_up_result(self, sim, reader%result_id, error)
+         call take_up_result(self, sim, reader%result_id, error)
          if (.not. allocated(error)) last_snapshot = self%result%last_snapshot()
       end if
       call agree(error)
@@ -167,9 +165,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       call reader%open(self%path, error)
-      if (allocated(error)) return
       call reader%compare(self%identity, error)
-      if (.not. allocated(error)) call compare_map(self, sim, reader, error)
+      call compare_map(self, sim, reader, error)
       if (allocated(error)) call reader%close()
    end subroutine open_checkpoint
 
@@ -178,13 +175,14 @@ contains
       type(run_files_type), intent(inout) :: self
       type(simulation_type), intent(in) :: sim
       character(*), intent(in) :: id               !! of the result that the checkpoint belongs to
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error
 
+      if (allocated(error)) return
       call self%result%reopen(self%path, id, sim%state%row%step, &
          sim%case%output%compression, error)
       if (allocated(error)) return
       call self%result%write_text('outcome', 'running', error)
-      if (.not. allocated(error)) call take_up_warnings(self, sim, error)
+      call take_up_warnings(self, sim, error)
    end subroutine take_up_result
 
    !> Check that the height map is that of the checkpoint. For maps from files the checksums in the identity ensure
@@ -193,10 +191,11 @@ contains
       type(run_files_type), intent(in) :: self
       type(simulation_type), intent(in) :: sim
       type(checkpoint_reader_type), intent(inout) :: reader
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error
       real(dp), parameter :: rounding = 1e-9_dp
       real(dp) :: rms_height, summit, allowed
 
+      if (allocated(error)) return
       call reader%get_number('rms_height', rms_height)
       call reader%get_number('summit', summit, error)
       if (allocated(error)) return
@@ -212,10 +211,11 @@ contains
    subroutine take_up_warnings(self, sim, error)
       type(run_files_type), intent(inout) :: self
       type(simulation_type), intent(in) :: sim
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error
       character(:), allocatable :: left, line
       integer :: at, step, status
 
+      if (allocated(error)) return
       call self%result%read_text('run_warnings', left, error)
       if (allocated(error)) return
       at = 1
@@ -301,9 +301,9 @@ contains
 
       if (allocated(error)) return
       if (is_first_process()) then
-         if (len(self%warnings) > 0) &
-            call self%result%write_text('run_warnings', self%warnings, error)
-         if (.not. allocated(error)) call self%result%write_text('outcome', outcome, error)
+         if (len(self%warnings) > 0) call self%result%write_text('run_warnings', self%warnings)
+         call self%result%write_text('outcome', outcome)
+         call self%result%report(error)            ! the first fault of the two calls above
       end if
       call agree(error)
    end subroutine leave_word
@@ -324,7 +324,7 @@ contains
       end if
       call agree(error)
       call self%leave_word('finished', error)
-      if (is_first_process() .and. .not. allocated(error)) call self%result%finish(.true., error)
+      if (is_first_process()) call self%result%finish(.true., error)
       call agree(error)
    end subroutine finish
 
