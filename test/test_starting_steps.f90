@@ -34,8 +34,8 @@ contains
       plan%dt = 2.0_dp
       plan%load_before = 10.0_dp
       plan%load = 18.0_dp
-      plan%road_x = 4.0_dp
-      plan%road_y = -4.0_dp
+      plan%road(1) = 4.0_dp
+      plan%road(2) = -4.0_dp
       plan%new_speed = .true.
       call split_start(plan, .false., .true., [0.0_dp, 0.0_dp], parts)
       call check_that(size(parts) == 1, 'a step without a kink is not split')
@@ -47,8 +47,8 @@ contains
       call check_close(sum(parts%dt), 2.0_dp, 1e-15_dp, 'the parts fill the step')
       call check_close(parts(1)%time, 3.5_dp, 1e-15_dp, 'end of the first part')
       call check_close(parts(2)%load, 14.0_dp, 1e-14_dp, 'load in the middle')
-      call check_close(parts(1)%road_x, 1.0_dp, 1e-15_dp, 'road after the first part')
-      call check_close(parts(2)%road_y, 0.0_dp, 1e-15_dp, 'road in the middle')
+      call check_close(parts(1)%road(1), 1.0_dp, 1e-15_dp, 'road after the first part')
+      call check_close(parts(2)%road(2), 0.0_dp, 1e-15_dp, 'road in the middle')
       call check_close(parts(3)%load, 18.0_dp, 0.0_dp, 'load at the end')
       call check_that(parts(1)%new_speed .and. .not. any(parts(2:)%new_speed), 'only the first part has a new speed')
       plan%instantaneous = .true.

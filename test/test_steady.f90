@@ -428,7 +428,7 @@ contains
       call new_steady_step(steady, case, 1e-3_dp, error)
       call check_no_error(error, 'uphill: steady')
       plan%load = case%phases(1)%target
-      plan%velocity_x = case%phases(1)%velocity_x
+      plan%velocity(1) = case%phases(1)%velocity_x
       call steady%begin_curve([0.0_dp, 0.0_dp])
       call steady%solve(plan, road, normal, rubbing)
       call steady%destroy()
@@ -454,7 +454,7 @@ contains
       call check_no_error(error, 'long run: steady')
       steady%scheme_dt = dt
       plan%load = case%phases(1)%target
-      plan%velocity_x = case%phases(1)%velocity_x
+      plan%velocity(1) = case%phases(1)%velocity_x
       place = [sim%state%row%road_x - 2.0_dp*case%grid%lx, sim%state%row%road_y]
       base = 0.0_dp
       ! The mean displacement of the contact hardly depends on the place, so that a few rounds move the road there.

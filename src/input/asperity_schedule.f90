@@ -27,10 +27,8 @@ module asperity_schedule
       character(12) :: control = 'pressure'
       real(dp) :: load = 0.0_dp                   !! Pa, N or m
       real(dp) :: load_before = 0.0_dp            !! the same at the start of the step
-      real(dp) :: road_x = 0.0_dp                 !! displacement of the road, m
-      real(dp) :: road_y = 0.0_dp
-      real(dp) :: velocity_x = 0.0_dp             !! of the road, m/s
-      real(dp) :: velocity_y = 0.0_dp
+      real(dp) :: road(2) = 0.0_dp                !! displacement of the road, m
+      real(dp) :: velocity(2) = 0.0_dp            !! of the road, m/s
       logical :: pulled(2) = .false.              !! a force pulls the road along x, y
       real(dp) :: pull(2) = 0.0_dp                !! that force, Pa
       real(dp) :: pull_before(2) = 0.0_dp         !! the same at the start of the step, Pa
@@ -44,13 +42,11 @@ module asperity_schedule
       logical :: entered = .false.                !! the row at its start is done or not needed
       real(dp) :: start_time = 0.0_dp             !! of the phase, s
       real(dp) :: start_load = 0.0_dp             !! its load at the start, in its own control
-      real(dp) :: start_x = 0.0_dp                !! displacement of the road at the start, m
-      real(dp) :: start_y = 0.0_dp
+      real(dp) :: start_road(2) = 0.0_dp          !! displacement of the road at the start, m
       character(12) :: held_control = ''          !! control of the load so far; '' at the start
       real(dp) :: held_load = 0.0_dp
       real(dp) :: held_rate = 0.0_dp              !! rate of the load in the last step, over s
-      real(dp) :: velocity_x = 0.0_dp             !! of the road so far, m/s
-      real(dp) :: velocity_y = 0.0_dp
+      real(dp) :: velocity(2) = 0.0_dp            !! of the road so far, m/s
       logical :: held_pulled(2) = .false.         !! a force has pulled the road so far
       real(dp) :: held_pull(2) = 0.0_dp           !! that force, Pa
       real(dp) :: start_pull(2) = 0.0_dp          !! force on the road at the start of the phase, Pa
@@ -123,8 +119,7 @@ contains
          self%speed_changed = .false.
          row%phase = self%phase
          row%control = phase%control(:12)
-         row%velocity_x = phase%velocity_x
-         row%velocity_y = phase%velocity_y
+         row%velocity = [phase%velocity_x, phase%velocity_y]
          row%pulled = phase%pulled
          row%pull = phase%pull
 
@@ -141,8 +136,7 @@ contains
 
          part = real(self%step, dp)/phase%steps
          row%time = self%start_time + part*phase%duration
-         row%road_x = self%start_x + part*phase%duration*phase%velocity_x
-         row%road_y = self%start_y + part*phase%duration*phase%velocity_y
+         row%road = self%start_road + part*phase%duration*row%velocity
          self%row = self%row + 1
          if (self%step == phase%steps) call leave_phase(self, phase, row)
       end associate
@@ -156,13 +150,11 @@ contains
       real(dp), intent(in) :: present_pull(2)      !! horizontal force of the road on the rubber now, Pa
       type(planned_row_type), intent(inout) :: row
 
-      row%new_speed = abs(phase%velocity_x - self%velocity_x) > 0.0_dp .or. &
-         abs(phase%velocity_y - self%velocity_y) > 0.0_dp .or. &
+      row%new_speed = any(abs([phase%velocity_x, phase%velocity_y] - self%velocity) > 0.0_dp) .or. &
          any(phase%pulled .neqv. self%held_pulled)
       self%start_pull = merge(self%held_pull, present_pull, self%held_pulled)
       self%start_load = load_at_start(self, phase, present_load)
-      self%velocity_x = phase%velocity_x
-      self%velocity_y = phase%velocity_y
+      self%velocity = [phase%velocity_x, phase%velocity_y]
    end subroutine enter_phase
 
    !> Plan the row at the start of a phase: a jump, or the state after an infinite time.
@@ -227,8 +219,7 @@ contains
       type(planned_row_type), intent(in) :: row
 
       self%start_time = row%time
-      self%start_x = row%road_x
-      self%start_y = row%road_y
+      self%start_road = row%road
       call hold(self, phase)
       self%phase = self%phase + 1
       self%step = 0
@@ -282,15 +273,12 @@ contains
 
       if (self%phase > size(phases)) return
       if (self%entered) then
-         self%speed_changed = self%speed_changed .or. abs(velocity(1) - self%velocity_x) > 0.0_dp .or. &
-            abs(velocity(2) - self%velocity_y) > 0.0_dp
+         self%speed_changed = self%speed_changed .or. any(abs(velocity - self%velocity) > 0.0_dp)
          ! The position of the road is computed from the start of the phase. That start is moved, so that the road
          ! seems to have had the new velocity throughout the phase.
          elapsed = real(self%step, dp)/phases(self%phase)%steps*phases(self%phase)%duration
-         self%start_x = road(1) - elapsed*velocity(1)
-         self%start_y = road(2) - elapsed*velocity(2)
-         self%velocity_x = velocity(1)
-         self%velocity_y = velocity(2)
+         self%start_road = road - elapsed*velocity
+         self%velocity = velocity
       end if
       do k = self%phase, size(phases)
          phases(k)%velocity_x = velocity(1)

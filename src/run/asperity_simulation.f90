@@ -253,7 +253,7 @@ contains
       associate (state => self%state)
          state%steady%now = .false.
          road = [state%row%road_x, state%row%road_y]
-         motion = [plan%road_x, plan%road_y] - road
+         motion = plan%road - road
          if (.not. is_elastic(self%material)) call past_traction(state%arms, self%material, self%past)
          if (self%frictional) call self%tangential%begin(state%tangential, self%material, motion, &
             plan%dt, plan%pulled, plan%pull)

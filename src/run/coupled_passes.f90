@@ -227,7 +227,7 @@ contains
             contact%state%gap(:, j) = contact%state%gap(:, j) + (contact%height(:, j) + contact%state%level)
          end do
       end if
-      call displaced(contact%road, plan%road_x, plan%road_y, self%place(:, 1, :), self%place(:, 2, :), &
+      call displaced(contact%road, plan%road(1), plan%road(2), self%place(:, 1, :), self%place(:, 2, :), &
          contact%height, contact%slope_x, contact%slope_y)
       call solve_normal(contact, plan, accuracy, part, one_of_many=.true., displaced=self%gap_known)
       ! A pressure that misses the load is scaled to it at the start of the next solve.
@@ -341,7 +341,7 @@ contains
       call contact%work%lend('height at U_T', height)
       call contact%work%lend('slope along x at U_T', slope_x)
       call contact%work%lend('slope along y at U_T', slope_y)
-      call displaced(contact%road, plan%road_x, plan%road_y, contact%tangential%trial(:, 1, :), &
+      call displaced(contact%road, plan%road(1), plan%road(2), contact%tangential%trial(:, 1, :), &
          contact%tangential%trial(:, 2, :), height, slope_x, slope_y)
       allocate (rows(4, contact%grid%rows()))
       !$omp parallel do default(none) shared(contact, height, slope_x, slope_y, rows) private(j)

@@ -123,7 +123,7 @@ contains
       self%evaluations = self%evaluations + 1
       call form_pressure(self, contact, state%s)
       call contact%tangential%try(contact%state%tangential, state%t)
-      call displaced(contact%road, plan%road_x, plan%road_y, contact%tangential%trial(:, 1, :), &
+      call displaced(contact%road, plan%road(1), plan%road(2), contact%tangential%trial(:, 1, :), &
          contact%tangential%trial(:, 2, :), self%height, self%slope_x, self%slope_y)
       allocate (rows(2, contact%grid%rows()), largest(contact%grid%rows()))
       !$omp parallel do default(none) shared(self, contact, state, rows, largest) private(j) &

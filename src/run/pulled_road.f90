@@ -23,7 +23,7 @@ contains
       real(dp), intent(inout) :: direction(2)
       real(dp) :: drive(2)
 
-      drive = merge(0.0_dp, [plan%velocity_x, plan%velocity_y], plan%pulled)
+      drive = merge(0.0_dp, plan%velocity, plan%pulled)
       if (.not. any(abs(drive) > 0.0_dp)) drive = merge(plan%pull, 0.0_dp, plan%pulled)
       if (any(abs(drive) > 0.0_dp)) direction = drive/norm2(drive)
    end subroutine drive_direction
@@ -34,14 +34,10 @@ contains
       real(dp), intent(in) :: road(2)               !! displacement of the road at the last row, m
       real(dp), intent(in) :: velocity(2)           !! of the road in the last step, m/s
 
-      if (plan%pulled(1)) then
-         plan%velocity_x = merge(velocity(1), 0.0_dp, plan%dt > 0.0_dp)
-         plan%road_x = road(1) + plan%dt*plan%velocity_x
-      end if
-      if (plan%pulled(2)) then
-         plan%velocity_y = merge(velocity(2), 0.0_dp, plan%dt > 0.0_dp)
-         plan%road_y = road(2) + plan%dt*plan%velocity_y
-      end if
+      where (plan%pulled)
+         plan%velocity = merge(velocity, 0.0_dp, plan%dt > 0.0_dp)
+         plan%road = road + plan%dt*plan%velocity
+      end where
    end subroutine guess_road
 
    !> Set the position of the road to the one that was computed.
@@ -57,18 +53,12 @@ contains
       if (.not. any(plan%pulled)) return
       motion = 0.0_dp
       if (moved) call tangential%take_motion(motion)
-      if (plan%pulled(1)) then
-         plan%road_x = road(1) + motion(1)
-         schedule%start_x = plan%road_x
-         if (plan%dt > 0.0_dp) velocity(1) = motion(1)/plan%dt
-         plan%velocity_x = velocity(1)
-      end if
-      if (plan%pulled(2)) then
-         plan%road_y = road(2) + motion(2)
-         schedule%start_y = plan%road_y
-         if (plan%dt > 0.0_dp) velocity(2) = motion(2)/plan%dt
-         plan%velocity_y = velocity(2)
-      end if
+      if (plan%dt > 0.0_dp) velocity = merge(motion/plan%dt, velocity, plan%pulled)
+      where (plan%pulled)
+         plan%road = road + motion
+         schedule%start_road = plan%road
+         plan%velocity = velocity
+      end where
    end subroutine take_road
 
    !> Warn once if a pull moves the road so far in a step that the contact is not resolved in time. For a road that
@@ -84,8 +74,8 @@ contains
 
       message = ''
       if (reported .or. .not. any(plan%pulled)) return
-      cells = abs(plan%road_x - road(1))/grid%dx
-      if (grid%ny > 1) cells = max(cells, abs(plan%road_y - road(2))/grid%dy)
+      cells = abs(plan%road(1) - road(1))/grid%dx
+      if (grid%ny > 1) cells = max(cells, abs(plan%road(2) - road(2))/grid%dy)
       if (cells <= followed) return
       reported = .true.
       message = 'the pull moves the road by '//to_text(cells)//' cells in a step; the contact is well '// &

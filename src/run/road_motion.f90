@@ -31,19 +31,19 @@ contains
          ! The surface is expected to move as in the step before or, if the road has just started, with the road.
          drift = self%state%tangential%rate*plan%dt
          if (plan%new_speed .and. .not. any(abs(self%state%velocity) > 0.0_dp)) &
-            drift = [plan%velocity_x, plan%velocity_y]*plan%dt
+            drift = plan%velocity*plan%dt
       end if
-      self%state%velocity = [plan%velocity_x, plan%velocity_y]
+      self%state%velocity = plan%velocity
       self%drift = drift
       self%state%drifted = self%state%drifted + drift
-      seen = [plan%road_x, plan%road_y] - self%state%drifted
+      seen = plan%road - self%state%drifted
       cells = nint(seen/[self%grid%dx, self%grid%dy])
       if (any(cells /= self%state%moved_cells)) then
          call shift_fields(self, cells - self%state%moved_cells)
          self%state%moved_cells = cells
       end if
       ! With friction the passes read the road at the displaced surface.
-      if (.not. self%rubs()) call place_road(self, plan%road_x, plan%road_y)
+      if (.not. self%rubs()) call place_road(self, plan%road(1), plan%road(2))
    end subroutine move_road
 
    !> Shift the fields that move with the road by whole cells.

@@ -114,8 +114,8 @@ contains
       row%displacement = contact%state%level + contact%summit
       row%contact_area = sums%touching/cells
       row%mean_gap = sums%gap/cells
-      row%road_x = plan%road_x
-      row%road_y = plan%road_y
+      row%road_x = plan%road(1)
+      row%road_y = plan%road(2)
       row%friction_viscous = 0.0_dp
       if (abs(sums%pressure) > 0.0_dp) row%friction_viscous = &
          dot_product(sums%force, contact%state%direction)/(sums%pressure*contact%grid%cell_area())

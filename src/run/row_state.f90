@@ -118,15 +118,15 @@ contains
       call table%add('schedule/start_time', s%start_time, 's', 'start of the phase')
       call table%add('schedule/start_load', s%start_load, '1', &
          'load at the start of the phase, in the units of its control')
-      call table%add('schedule/start_x', s%start_x, 'm', 'road at the start of the phase')
-      call table%add('schedule/start_y', s%start_y, 'm', 'road at the start of the phase')
+      call table%add('schedule/start_x', s%start_road(1), 'm', 'road at the start of the phase')
+      call table%add('schedule/start_y', s%start_road(2), 'm', 'road at the start of the phase')
       call table%add('schedule/held_control', s%held_control, 'control of the load so far')
       call table%add('schedule/held_load', s%held_load, '1', &
          'load held so far, in the units of its control')
       call table%add('schedule/held_rate', s%held_rate, '1/s', &
          'rate of the load in the last step, in the units of its control')
-      call table%add('schedule/velocity_x', s%velocity_x, 'm/s', 'velocity of the road so far')
-      call table%add('schedule/velocity_y', s%velocity_y, 'm/s', 'velocity of the road so far')
+      call table%add('schedule/velocity_x', s%velocity(1), 'm/s', 'velocity of the road so far')
+      call table%add('schedule/velocity_y', s%velocity(2), 'm/s', 'velocity of the road so far')
       call table%add('schedule/pulled_x', s%held_pulled(1), 'a force has pulled the road along x so far')
       call table%add('schedule/pulled_y', s%held_pulled(2), 'a force has pulled the road along y so far')
       call table%add('schedule/held_pull', s%held_pull, 'Pa', 'force on the road so far, over the cell')

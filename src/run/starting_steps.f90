@@ -69,8 +69,7 @@ contains
          parts(k)%time = plan%time - rest*plan%dt
          parts(k)%load = plan%load - rest*(plan%load - plan%load_before)
          parts(k)%pull = plan%pull - rest*(plan%pull - plan%pull_before)
-         parts(k)%road_x = plan%road_x - rest*(plan%road_x - road(1))
-         parts(k)%road_y = plan%road_y - rest*(plan%road_y - road(2))
+         parts(k)%road = plan%road - rest*(plan%road - road)
       end do
    end subroutine split_start
 

@@ -52,11 +52,9 @@ contains
       type(planned_row_type), intent(inout) :: plan
 
       associate (state => contact%state)
-         state%schedule%start_x = state%schedule%start_x + (steady%place(1) - plan%road_x)
-         state%schedule%start_y = state%schedule%start_y + (steady%place(2) - plan%road_y)
-         plan%road_x = steady%place(1)
-         plan%road_y = steady%place(2)
-         state%velocity = [plan%velocity_x, plan%velocity_y]
+         state%schedule%start_road = state%schedule%start_road + (steady%place - plan%road)
+         plan%road = steady%place
+         state%velocity = plan%velocity
          state%direction = state%velocity/norm2(state%velocity)
          contact%drift = 0.0_dp
          state%moved_cells = nint((steady%place - state%drifted)/[contact%grid%dx, contact%grid%dy])

@@ -169,7 +169,7 @@ contains
       type(steady_symbols_type) :: symbols
       type(normal_problem_type) :: problem
 
-      self%medium%velocity = [plan%velocity_x, plan%velocity_y]
+      self%medium%velocity = plan%velocity
       self%medium%dt = self%scheme_dt
       call new_steady_symbols(symbols, self%medium, self%operator%first, self%operator%last, self%frictional)
       call self%operator%set_symbols(symbols)

@@ -24,8 +24,7 @@ contains
 
       message = ''
       call look_at_edge(contact%grid, merge(contact%case%adhesion%range, 0.0_dp, contact%side%adhesive), &
-         contact%rms_height, [plan%road_x - contact%state%row%road_x, &
-         plan%road_y - contact%state%row%road_y], contact%state, message)
+         contact%rms_height, plan%road - [contact%state%row%road_x, contact%state%row%road_y], contact%state, message)
       call add_warning(warnings, contact%state%schedule%row, plan%time, message)
    end subroutine watch_edge
 
@@ -54,7 +53,7 @@ contains
       real(dp) :: speed
 
       if (.not. contact%frictional) return
-      speed = hypot(plan%velocity_x, plan%velocity_y)
+      speed = hypot(plan%velocity(1), plan%velocity(2))
       ! A block that comes to rest after its road has stopped is not stick-slip.
       if (.not. plan%dt*speed > 0.0_dp) return
       call watch_slip(contact%state%watch, contact%state%row%sliding_speed, speed, &
