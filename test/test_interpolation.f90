@@ -69,7 +69,7 @@ contains
          call check_no_error(error, methods(m))
          call shifted(map, 0.0_dp, 0.0_dp, h, x_0, y_0)
          call check_close(maxval(abs(h - h_0)), 0.0_dp, 0.0_dp, methods(m)//': at rest')
-         call shifted(map, 3*grid%dx, -4*grid%dy, h)
+         call shifted(map, 3*grid%dx, -4*grid%dy, h, h_x, h_y)
          call check_close(maxval(abs(h - cshift(cshift(h_0, -3, 1), 4, 2))), 0.0_dp, 0.0_dp, &
             methods(m)//': whole cells')
          call shifted(map, (3 + 13*100000)*grid%dx, -4*grid%dy + 1.0e-13_dp, h, h_x, h_y)
@@ -79,11 +79,11 @@ contains
             methods(m)//': slopes along x of whole cells')
          call check_close(maxval(abs(h_y - cshift(cshift(y_0, -3, 1), 4, 2))), 0.0_dp, 1.0e-16_dp, &
             methods(m)//': slopes along y of whole cells')
-         call displaced(map, grid%dx, 2*grid%dy, zero, zero, h)
+         call displaced(map, grid%dx, 2*grid%dy, zero, zero, h, h_x, h_y)
          call check_close(maxval(abs(h - cshift(cshift(h_0, -1, 1), -2, 2))), 0.0_dp, 2.0e-17_dp, &
             methods(m)//': whole cells and a field of zeros')
          ! A shift of one cell past the edge, plus a very small part of a cell, causes no jump.
-         call shifted(map, -13*grid%dx - 1.0e-8_dp*grid%dx, 0.0_dp, h)
+         call shifted(map, -13*grid%dx - 1.0e-8_dp*grid%dx, 0.0_dp, h, h_x, h_y)
          call check_close(maxval(abs(h - h_0)), 0.0_dp, 1.0e-10_dp, methods(m)//': just past a wrap')
       end do
    end subroutine periodic_map_moves_by_whole_cells
@@ -101,7 +101,7 @@ contains
       allocate (h, h_x, h_y, mold=h_0)
       do m = 1, 2
          call new_interpolation(map, grid, h_0, methods(m), error)
-         call shifted(map, 3*grid%dx, -4*grid%dy, h)
+         call shifted(map, 3*grid%dx, -4*grid%dy, h, h_x, h_y)
          call check_close(maxval(abs(h(4:, :6) - h_0(:10, 5:))), 0.0_dp, 0.0_dp, &
             methods(m)//': a free map, whole cells')
          call check_close(maxval(abs(h(:3, :) - minval(h_0))) + maxval(abs(h(:, 7:) - minval(h_0))), &
@@ -111,7 +111,7 @@ contains
             0.0_dp, 0.0_dp, methods(m)//': outside it the lowest value, a part of a cell')
          call check_close(maxval(abs(h_x(:3, :))) + maxval(abs(h_y(:, 7:))), 0.0_dp, 0.0_dp, &
             methods(m)//': outside it no slope')
-         call shifted(map, 1.0e12_dp, 0.0_dp, h)
+         call shifted(map, 1.0e12_dp, 0.0_dp, h, h_x, h_y)
          call check_close(maxval(abs(h - minval(h_0))), 0.0_dp, 0.0_dp, methods(m)//': far away')
       end do
    end subroutine free_map_moves_by_whole_cells
@@ -243,8 +243,6 @@ contains
       end do
       call new_interpolation(map, grid, h_0, 'cubic', error)
       call displaced(map, 0.123_dp, -3.21_dp, s_x, s_y, h, h_x, h_y)
-      call displaced(map, 0.123_dp, -3.21_dp, s_x, s_y, g)
-      call check_close(maxval(abs(g - h)), 0.0_dp, 1.0e-15_dp, 'with and without slopes')
       error_h = 0.0_dp
       error_slope = 0.0_dp
       do j = 1, 35
@@ -263,8 +261,8 @@ contains
          call new_interpolation(map, grid, h_0, methods(m), error)
          s_x = -0.777_dp*grid%dx
          s_y = 5.111_dp*grid%dy
-         call displaced(map, 0.25_dp*grid%dx, grid%dy, s_x, s_y, h)
-         call shifted(map, 1.027_dp*grid%dx, -4.111_dp*grid%dy, g)
+         call displaced(map, 0.25_dp*grid%dx, grid%dy, s_x, s_y, h, h_x, h_y)
+         call shifted(map, 1.027_dp*grid%dx, -4.111_dp*grid%dy, g, h_x, h_y)
          call check_close(maxval(abs(h - g)), 0.0_dp, 1.0e-16_dp, &
             methods(m)//': a uniform field is a shift')
       end do
@@ -285,12 +283,12 @@ contains
       call new_interpolation(map, grid, h_0, 'cubic', error)
       d = 1.0e-4_dp
       call shifted(map, 0.3_dp, -0.9_dp, h, h_x, h_y)
-      call shifted(map, 0.3_dp - d, -0.9_dp, ahead)
-      call shifted(map, 0.3_dp + d, -0.9_dp, behind)
+      call shifted(map, 0.3_dp - d, -0.9_dp, ahead, x_ahead, y_ahead)
+      call shifted(map, 0.3_dp + d, -0.9_dp, behind, x_ahead, y_ahead)
       call check_close(maxval(abs((ahead - behind)/(2*d) - h_x)), 0.0_dp, 1.0e-10_dp, &
          'the slope along x is the derivative of the height')
-      call shifted(map, 0.3_dp, -0.9_dp - d, ahead)
-      call shifted(map, 0.3_dp, -0.9_dp + d, behind)
+      call shifted(map, 0.3_dp, -0.9_dp - d, ahead, x_ahead, y_ahead)
+      call shifted(map, 0.3_dp, -0.9_dp + d, behind, x_ahead, y_ahead)
       call check_close(maxval(abs((ahead - behind)/(2*d) - h_y)), 0.0_dp, 1.0e-10_dp, &
          'the slope along y is the derivative of the height')
       call shifted(map, 1.0e-7_dp, 1.0e-7_dp, h, h_x, h_y)
@@ -346,10 +344,10 @@ contains
                call check_close(maxval(abs(h - h_0)), 0.0_dp, 2.0e-17_dp, methods(m)//': small, at rest')
                if (grid%ny == 1) call check_close(maxval(abs(h_y)), 0.0_dp, 0.0_dp, 'no slope along y')
                if (b == boundary_free) cycle
-               call displaced(map, -2.0_dp, 0.4_dp, zero, zero, h)
+               call displaced(map, -2.0_dp, 0.4_dp, zero, zero, h, h_x, h_y)
                call check_close(maxval(abs(h - h_0)), 0.0_dp, 2.0e-17_dp, methods(m)//': small, a period')
                if (grid%ny > 1) cycle
-               call shifted(map, 0.0_dp, 0.13_dp, h)
+               call shifted(map, 0.0_dp, 0.13_dp, h, h_x, h_y)
                call check_close(maxval(abs(h - h_0)), 0.0_dp, 2.0e-17_dp, 'a profile does not depend on y')
             end do
             deallocate (h, h_x, h_y, zero)
@@ -431,13 +429,13 @@ contains
       type(grid_type) :: grid
       type(interpolation_type) :: map
       type(error_type), allocatable :: error
-      real(dp), allocatable :: h(:, :), h_0(:, :)
+      real(dp), allocatable :: h(:, :), h_x(:, :), h_y(:, :), h_0(:, :)
       real(dp) :: beside, farther
       integer :: m, n
 
       grid = new_grid(64, 1, 64.0_dp, 1.0_dp, boundary_periodic)
       allocate (h_0(64, 1))
-      allocate (h, mold=h_0)
+      allocate (h, h_x, h_y, mold=h_0)
       h_0 = 0.0_dp
       h_0(17:48, 1) = 1.0_dp
       do m = 1, 2
@@ -445,7 +443,7 @@ contains
          beside = 0.0_dp
          farther = 0.0_dp
          do n = 0, 99
-            call shifted(map, -0.01_dp*n, 0.0_dp, h)
+            call shifted(map, -0.01_dp*n, 0.0_dp, h, h_x, h_y)
             beside = max(beside, maxval(h) - 1.0_dp, -minval(h))
             farther = max(farther, maxval(abs(h(20:44, 1) - 1.0_dp)))
          end do

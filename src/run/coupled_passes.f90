@@ -71,7 +71,7 @@ module coupled_passes
 
    public :: coupled_passes_type, new_coupled_passes
 
-   integer, parameter, public :: most_passes = 400      !! if the case does not limit the number
+   integer, parameter :: most_passes = 400      !! if the case does not limit the number
 
    integer, parameter :: pairs = 6                      !! number of passes that the acceleration remembers
    real(dp), parameter :: largest_factor = 1.0e3_dp     !! of a remembered pair; a larger one is round-off

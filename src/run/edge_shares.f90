@@ -19,7 +19,7 @@ module edge_shares
    implicit none
    private
 
-   public :: edge_reach, edge_rule_type, new_edge_rule
+   public :: edge_rule_type, new_edge_rule
 
    real(dp), parameter :: least_slope = 0.05_dp        !! of a road in the reach
 
@@ -27,7 +27,7 @@ module edge_shares
    type :: edge_rule_type
       type(adhesion_potential_type) :: potential
       real(dp) :: soft = 0.0_dp                        !! displacement of a cell under its own unit traction, m/Pa
-      real(dp) :: reach = 0.0_dp                       !! m
+      real(dp) :: reach = 0.0_dp                       !! by which the whole strength moves a cell down the slopes, m
    contains
       procedure :: decide
       procedure :: move
@@ -35,16 +35,6 @@ module edge_shares
    end type edge_rule_type
 
 contains
-
-   !> The length by which the whole strength moves a cell down the slopes of a road, m.
-   pure function edge_reach(soft, strength, rms_slope) result(reach)
-      real(dp), intent(in) :: soft                     !! displacement of a cell under its own unit traction, m/Pa
-      real(dp), intent(in) :: strength                 !! Pa
-      real(dp), intent(in) :: rms_slope
-      real(dp) :: reach
-
-      reach = soft*strength*max(rms_slope, least_slope)
-   end function edge_reach
 
    !> The rule of a step.
    pure function new_edge_rule(potential, soft, strength, rms_slope) result(rule)
@@ -56,7 +46,7 @@ contains
 
       rule%potential = potential
       rule%soft = soft
-      rule%reach = max(edge_reach(soft, strength, rms_slope), tiny(1.0_dp))
+      rule%reach = max(soft*strength*max(rms_slope, least_slope), tiny(1.0_dp))
    end function new_edge_rule
 
    !> Pressure of the wall in a cell, Pa: without the attraction.

@@ -29,8 +29,8 @@
 !> Memory: the map, and for 'cubic' one field of coefficients; where processes share the rows, up to one more
 !> field.
 module asperity_interpolation
-   use bilinear_map, only : bilinear_height, bilinear_slopes
-   use cubic_spline, only : spline_coefficients, spline_height, spline_map
+   use bilinear_map, only : bilinear_slopes
+   use cubic_spline, only : spline_coefficients, spline_map
    use asperity_errors, only : error_input, error_type, fail
    use asperity_precision, only : dp
    use field_sums, only : field_minimum
@@ -55,17 +55,6 @@ module asperity_interpolation
       !> The original map H_0 of 'cubic', m [nx, rows of this process].
       real(dp), allocatable, private :: height(:, :)
    end type interpolation_type
-
-   !> The map after a uniform displacement D of the road: H, or H and both slopes.
-   interface shifted
-      module procedure :: shifted_height, shifted_map
-   end interface shifted
-
-   !> The map after a displacement D of the road and displacements s of the rubber: H, or H and both
-   !> slopes.
-   interface displaced
-      module procedure :: displaced_height, displaced_map
-   end interface displaced
 
 contains
 
@@ -115,41 +104,20 @@ contains
       end do
    end subroutine copy_field
 
-   !> H(X) = H_0(X - D).
-   subroutine shifted_height(self, shift_x, shift_y, height)
-      type(interpolation_type), intent(inout) :: self
-      real(dp), intent(in) :: shift_x, shift_y     !! D, m
-      real(dp), intent(out) :: height(:, :)        !! H, m, shape [nx, rows of this process]
-      type(shift_type) :: shift
-      integer :: i, j
-
-      shift = shift_in_cells(self%grid, [shift_x, shift_y])
-      if (shift%is_whole()) then
-         if (self%cubic) call moved_height(self, self%height, shift%whole, height)
-         if (.not. self%cubic) call moved_height(self, self%rows%values, shift%whole, height)
-         return
-      end if
-      call have_shifted_rows(self, shift)
-      !$omp parallel do default(none) shared(self, height, shift) private(i)
-      do j = 1, self%grid%rows()
-         do i = 1, self%grid%nx
-            height(i, j) = height_at(self, i - 1 - shift%whole(1), shift%first + j - 1, &
-               -shift%part(1), -shift%part(2))
-         end do
-      end do
-   end subroutine shifted_height
-
    !> The heights of the map, moved by whole cells. Outside a free map the height is its lowest one.
-   subroutine moved_height(self, map, whole, height)
+   subroutine moved_height(self, whole, height)
       type(interpolation_type), intent(in) :: self
-      real(dp), intent(in) :: map(:, :)            !! H_0, m [nx, rows of this process, or more]
       integer, intent(in) :: whole(2)
       real(dp), intent(out) :: height(:, :)        !! m, shape [nx, rows of this process]
       real(dp), allocatable :: row(:)
-      integer :: from, i, j
+      integer :: from, i, j, wanted(2)
 
-      call fetch_rows(self%grid, map(:, :self%grid%rows()), &
-         [self%grid%first_row, self%grid%last_row] - whole(2), height)
+      wanted = [self%grid%first_row, self%grid%last_row] - whole(2)
+      if (self%cubic) then
+         call fetch_rows(self%grid, self%height, wanted, height)
+      else
+         call fetch_rows(self%grid, self%rows%values(:, :self%grid%rows()), wanted, height)
+      end if
       !$omp parallel default(none) shared(self, height, whole) private(i, j, from, row)
       allocate (row(self%grid%nx))
       !$omp do
@@ -167,7 +135,7 @@ contains
    end subroutine moved_height
 
    !> H(X) = H_0(X - D) and its slopes.
-   subroutine shifted_map(self, shift_x, shift_y, height, slope_x, slope_y)
+   subroutine shifted(self, shift_x, shift_y, height, slope_x, slope_y)
       type(interpolation_type), intent(inout) :: self
       real(dp), intent(in) :: shift_x, shift_y     !! D, m
       real(dp), intent(out) :: height(:, :)        !! H, m, shape [nx, rows of this process]
@@ -179,7 +147,7 @@ contains
       shift = shift_in_cells(self%grid, [shift_x, shift_y])
       if (self%periodic .and. .not. self%cubic .and. shift%is_whole()) then
          ! For whole cells, the differences of the moved map are the moved differences of the map.
-         call shifted_height(self, shift_x, shift_y, height)
+         call moved_height(self, shift%whole, height)
          call central_slopes(self%grid, height, slope_x, slope_y)
          return
       end if
@@ -192,36 +160,11 @@ contains
          end do
       end do
       ! For whole cells take the heights themselves, because the spline gives them with round-off.
-      if (shift%is_whole()) call shifted_height(self, shift_x, shift_y, height)
-   end subroutine shifted_map
-
-   !> H(X) = H_0(X + s(X) - D).
-   subroutine displaced_height(self, shift_x, shift_y, displacement_x, displacement_y, height)
-      type(interpolation_type), intent(inout) :: self
-      real(dp), intent(in) :: shift_x, shift_y          !! D, m
-      real(dp), intent(in) :: displacement_x(:, :)      !! s along x, m, shape [nx, rows of this process]
-      real(dp), intent(in) :: displacement_y(:, :)      !! s along y, m, shape [nx, rows of this process]
-      real(dp), intent(out) :: height(:, :)             !! H, m, shape [nx, rows of this process]
-      type(shift_type) :: shift
-      integer :: i, j
-      real(dp) :: per_dx, per_dy
-
-      shift = shift_in_cells(self%grid, [shift_x, shift_y])
-      per_dx = 1.0_dp/self%grid%dx
-      per_dy = 1.0_dp/self%grid%dy
-      call have_displaced_rows(self, shift, displacement_y)
-      !$omp parallel do default(none) private(i) &
-      !$omp shared(self, height, displacement_x, displacement_y, shift, per_dx, per_dy)
-      do j = 1, self%grid%rows()
-         do i = 1, self%grid%nx
-            height(i, j) = height_at(self, i - 1 - shift%whole(1), shift%first + j - 1, &
-               displacement_x(i, j)*per_dx - shift%part(1), displacement_y(i, j)*per_dy - shift%part(2))
-         end do
-      end do
-   end subroutine displaced_height
+      if (shift%is_whole()) call moved_height(self, shift%whole, height)
+   end subroutine shifted
 
    !> H(X) = H_0(X + s(X) - D) and the slopes of H_0 there.
-   subroutine displaced_map(self, shift_x, shift_y, displacement_x, displacement_y, height, &
+   subroutine displaced(self, shift_x, shift_y, displacement_x, displacement_y, height, &
       slope_x, slope_y)
       type(interpolation_type), intent(inout) :: self
       real(dp), intent(in) :: shift_x, shift_y          !! D, m
@@ -247,7 +190,7 @@ contains
                height(i, j), slope_x(i, j), slope_y(i, j))
          end do
       end do
-   end subroutine displaced_map
+   end subroutine displaced
 
    !> Make the rows available that are needed for a uniform shift. Collective.
    subroutine have_shifted_rows(self, shift)
@@ -325,25 +268,6 @@ contains
 
       below = floor(max(-1.0e9_dp, min(1.0e9_dp, q)))
    end function whole_below
-
-   !> Height at the place (i + p, j + q), in cells from 0.
-   pure function height_at(self, i, j, p, q) result(h)
-      type(interpolation_type), intent(in) :: self
-      integer, intent(in) :: i, j
-      real(dp), intent(in) :: p, q
-      real(dp) :: h
-      integer :: cell_x, cell_y
-      real(dp) :: u, v, weight_x, weight_y
-
-      call locate(self%periodic, self%grid%nx, i, p, cell_x, u, weight_x)
-      call locate(self%periodic, self%grid%ny, j, q, cell_y, v, weight_y)
-      if (self%cubic) then
-         h = spline_height(self%rows%values, cell_x, self%rows%place(cell_y - 1:cell_y + 2), u, v)
-      else
-         h = bilinear_height(self%rows, cell_x, cell_y, u, v)
-      end if
-      if (.not. self%periodic) h = blend(h, self%lowest, weight_x*weight_y)
-   end function height_at
 
    !> Height and slopes at the place (i + p, j + q), in cells from 0.
    pure subroutine map_at(self, i, j, p, q, h, h_x, h_y)

@@ -10,24 +10,9 @@ module bilinear_map
    implicit none
    private
 
-   public :: bilinear_height, bilinear_slopes
+   public :: bilinear_slopes
 
 contains
-
-   !> Height at (i + u, j + v).
-   pure function bilinear_height(map, i, j, u, v) result(h)
-      type(road_rows_type), intent(in) :: map   !! heights, m [nx, rows]
-      integer, intent(in) :: i, j               !! cell, from 0
-      real(dp), intent(in) :: u, v              !! 0 to 1
-      real(dp) :: h
-      integer :: i1, j0, j1
-
-      i1 = next(i, map%grid%nx)
-      j0 = map%place(j)
-      j1 = map%place(next(j, map%grid%ny) - 1)
-      h = (1.0_dp - v)*((1.0_dp - u)*map%values(i + 1, j0) + u*map%values(i1, j0)) &
-         + v*((1.0_dp - u)*map%values(i + 1, j1) + u*map%values(i1, j1))
-   end function bilinear_height
 
    !> Height at (i + u, j + v), and its slopes per cell (not per metre).
    pure subroutine bilinear_slopes(map, i, j, u, v, h, h_u, h_v)

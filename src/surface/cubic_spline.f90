@@ -19,7 +19,7 @@ module cubic_spline
    implicit none
    private
 
-   public :: spline_coefficients, spline_height, spline_map
+   public :: spline_coefficients, spline_map
 
    integer, parameter :: terms = 60             !! of a geometric series in z; |z|^60 < 1e-34
 
@@ -180,25 +180,6 @@ contains
       end if
       lines(:, n + 1) = lines(:, n)
    end subroutine filter_bounded
-
-   !> Height at (i + u, j + v).
-   pure function spline_height(c, i, rows, u, v) result(h)
-      real(dp), intent(in) :: c(-1:, :)         !! coefficients, in any rows
-      integer, intent(in) :: i                  !! cell along x, from 0
-      integer, intent(in) :: rows(4)            !! of the coefficients j - 1 to j + 2
-      real(dp), intent(in) :: u, v              !! 0 to 1
-      real(dp) :: h
-      real(dp) :: a(4), b(4)
-      integer :: m
-
-      a = weights(u)
-      b = weights(v)
-      h = 0.0_dp
-      do m = 1, 4
-         h = h + b(m)*(a(1)*c(i - 1, rows(m)) + a(2)*c(i, rows(m)) &
-            + a(3)*c(i + 1, rows(m)) + a(4)*c(i + 2, rows(m)))
-      end do
-   end function spline_height
 
    !> Height at (i + u, j + v), and its slopes per cell (not per metre).
    pure subroutine spline_map(c, i, rows, u, v, h, h_u, h_v)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["curve_page", "write_curve_page"]
 
-SCRIPTS = ("save.js", "chart.js", "map.js", "curve.js")
+SCRIPTS = ("save.js", "theme.js", "chart.js", "map.js", "curve.js")
 _BUDGET = 12e6          # characters that all maps may take together
 _SIDES = (192, 128, 96, 64, 48, 32)
 

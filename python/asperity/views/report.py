@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PAGE", "SCRIPTS", "report_page", "write_report"]
 
-SCRIPTS = ("save.js", "chart.js", "map.js", "page.js")
+SCRIPTS = ("save.js", "theme.js", "chart.js", "map.js", "page.js")
 
 
 def write_report(run: Run, path: str | os.PathLike[str] | None = None) -> Path:

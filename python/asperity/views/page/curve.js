@@ -5,24 +5,6 @@ const AXES = ["pressure", "temperature", "speed"];
 const LABELS = {pressure: ["Pressure", "Pa"], temperature: ["Temperature", "°C"],
   speed: ["Speed", "m/s"], reduced: ["Reduced speed a_T v", "m/s"]};
 
-/** The switch between light and dark: as the system says, light, dark. */
-function themeSwitch() {
-  const button = document.getElementById("theme");
-  const names = {auto: "◐ as the system", light: "☀ light", dark: "☾ dark"};
-  const set = (theme) => {
-    if (theme === "auto") delete document.documentElement.dataset.theme;
-    else document.documentElement.dataset.theme = theme;
-    button.textContent = names[theme];
-    button.dataset.theme = theme;
-  };
-  set("auto");
-  button.hidden = false;
-  button.addEventListener("click", () => {
-    const order = Object.keys(names);
-    set(order[(order.indexOf(button.dataset.theme) + 1) % order.length]);
-  });
-}
-
 /** The value of a variable at a point {pressure, temperature, speed} of indices. */
 function valueAt(name, at) {
   return data.values[name][at.pressure][at.temperature][at.speed];
