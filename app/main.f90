@@ -1,7 +1,7 @@
 !> The program `asperity`: it reads the command line, carries out the command, and ends with an exit
 !> status. No other place ends the program.
 program main
-   use case_files, only : overwritten_file
+   use case_files, only : default_result, overwritten_file
    use case_input, only : read_case
    use case_run, only : run_type
    use case_report, only : case_summary, resolved_input
@@ -13,6 +13,7 @@ program main
    use asperity_parallel, only : any_process, end_processes, global_max, is_first_process, process_count, share, &
       start_processes
    use asperity_errors, only : error_file, error_input, error_memory, error_type, fail
+   use file_kind, only : is_other_than_file
    use hand_over, only : become_python
    use process_agreement, only : agree
    use reference_page, only : reference_markdown
@@ -138,7 +139,12 @@ contains
       if (allocated(error)) return
       call read_case(command%path, case, error)
       if (allocated(error)) return
-      if (allocated(command%output)) call choose_output(case, error)
+      if (allocated(command%output)) then
+         call choose_output(case, error)
+      else if (is_other_than_file(command%path) .and. case%output%file == default_result(command%path)) then
+         call fail(error, error_input, command%path//': is not a regular file, beside which a result could '// &
+            'stand: give --output FILE.h5')
+      end if
       call agree(error)
       if (allocated(error)) return
       if (command%threads > 0) case%solver%threads = command%threads

@@ -178,6 +178,22 @@ def test_devices_and_pipes_are_kept(program: str, case: Path, tmp_path: Path) ->
     assert stat.S_ISCHR(Path("/dev/null").stat().st_mode)
 
 
+def test_input_from_a_pipe_needs_an_output(program: str, case: Path, tmp_path: Path) -> None:
+    """The result of such an input would be written into /dev."""
+    def run(*words: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run([program, "run", "/dev/stdin", "--quiet", *words], cwd=tmp_path,
+                              input=case.read_text(), capture_output=True, text=True,
+                              check=False)
+
+    refused = run()
+    assert refused.returncode == 2
+    assert refused.stderr == ("/dev/stdin: is not a regular file, beside which a result could"
+                              " stand: give --output FILE.h5\n")
+    assert not Path("/dev/stdin.h5").exists()
+    assert run("--output", "piped.h5").returncode == 0
+    assert asperity.open(tmp_path / "piped.h5").finished
+
+
 @pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGXCPU])
 def test_other_signals_leave_a_checkpoint(program: str, case: Path, number: signal.Signals) -> None:
     """The signal of a closed terminal and that of a batch system stop a run as SIGTERM does."""

@@ -177,3 +177,20 @@ def test_a_run_does_not_disturb_numpy_threads():
          "f['x'] = 1; print(asperity.set_threads(1), f['x'][()])"],
         capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["1", "1"]
+
+
+@pytest.mark.parametrize("wrong", [None, b"road.nml", 3, {"grid": {"nx": 4}}])
+def test_what_is_no_case_is_named(wrong):
+    for start in (asperity.run, asperity.Simulation):
+        with pytest.raises(TypeError, match=r"case = .*: must be a path, the text of"):
+            start(wrong)
+
+
+def test_a_callback_is_checked_before_the_run():
+    with pytest.raises(TypeError, match="callback = 3: must be a function"):
+        asperity.run("nowhere.nml", callback=3)
+
+
+def test_ragged_heights_are_named():
+    with pytest.raises(ValueError, match="height: must be an array of real numbers"):
+        asperity.solve_normal([[1.0, 2.0], [3.0]], 1e-3, 1e-3, 1e6, pressure=1e4)

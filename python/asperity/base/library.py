@@ -149,9 +149,9 @@ def height_map(height: ArrayLike, name: str = "height") -> NDArray[np.float64]:
         If it is not a map of finite real numbers, or has masked points.
     """
     no_masked(name, height)
-    if np.iscomplexobj(height):
-        raise ValueError(f"{name}: must be an array of real numbers")
     try:
+        if np.iscomplexobj(height):
+            raise TypeError
         array = np.ascontiguousarray(height, dtype=np.float64)
     except (TypeError, ValueError):
         raise ValueError(f"{name}: must be an array of real numbers") from None

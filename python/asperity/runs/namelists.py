@@ -97,11 +97,18 @@ def is_text(source: object) -> bool:
     return isinstance(source, str) and ("\n" in source or source.lstrip()[:1] in tuple("&$!"))
 
 
+def require_case(case: Any) -> None:
+    """Raise TypeError for what is neither a path, nor a text, nor a case."""
+    if not (isinstance(case, str | os.PathLike) or hasattr(case, "path")):
+        raise TypeError(f"case = {shown(case)}: must be a path, the text of an input or a Case")
+
+
 def source(case: Any) -> tuple[str, str]:
     """Return the name of a case's file, and its text, which is empty if it must be read from there.
 
     A case is a path, the text of an input, or an object with a ``path`` and the text ``str(case)``.
     """
+    require_case(case)
     if is_text(case):
         return "case.nml", str(case)
     if isinstance(case, str | os.PathLike):

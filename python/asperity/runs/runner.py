@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..base import library
-from ..base.check import whole
+from ..base.check import shown, whole
 from ..base.errors import NotConverged
 from ..results import Run
 from . import namelists
@@ -108,6 +108,9 @@ def run(
     ...
     OSError: nowhere.nml: there is no such file
     """
+    namelists.require_case(case)
+    if callback is not None and not callable(callback):
+        raise TypeError(f"callback = {shown(callback)}: must be a function of a row and the run")
     if threads is not None:
         threads = whole("threads", threads)
     target = b"" if output is None else os.fsencode(output)
