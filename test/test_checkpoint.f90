@@ -191,7 +191,7 @@ contains
       call check_error(error, '&grid: nx is 5 in the checkpoint and 6 in the case', 'the first error stays')
       deallocate (error)
       call reader%compare(settings//'&grid: ny = 3'//nl, error)
-      call check_error(error, 'knows no "&grid: ny"', 'unknown setting')
+      call check_error(error, 'has no "&grid: ny"', 'unknown setting')
       deallocate (error)
       call reader%compare('&grid: nx = 5'//nl, error)
       call check_error(error, 'it has settings that the case does not have', 'missing setting')

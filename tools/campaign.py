@@ -16,9 +16,9 @@ runs      random cases end with status 0 or 4; the energy balance closes; number
 inputs    damaged inputs end with status 0, 2, 3 or 4 and a message
 flips     no damaged checkpoint is continued; damaged results and maps never crash the program
 kills     a run that is killed or stopped again and again gives the numbers of one that was not
-twins     of several runs on one result one goes on, and the others say so
-memory    whatever the limit of memory, a run ends well or with status 3 and a message; a run that
-          takes longer than a minute is sent SIGTERM and ends within half a minute
+twins     of several runs on one result, one continues and the others name it
+memory    whatever the limit of memory, a run completes or ends with status 3 and a message; a run
+          that takes longer than a minute is sent SIGTERM and ends within half a minute
 """
 
 import argparse
@@ -82,7 +82,7 @@ def call(*words, cwd, statuses=(0, 2, 3, 4), stop_after=PATIENCE, **options):
     try:
         done = run_or_stop([program(), *map(str, words)], stop_after, cwd=cwd, **options)
     except subprocess.TimeoutExpired:
-        raise Wrong(f"{' '.join(map(str, words))}: does not come to an end") from None
+        raise Wrong(f"{' '.join(map(str, words))}: does not end") from None
     done.message = done.stderr.decode(errors="replace")
     if done.returncode not in statuses:
         raise Wrong(f"{' '.join(map(str, words))}: status {done.returncode}: {done.message[-300:]}")

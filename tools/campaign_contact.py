@@ -41,7 +41,7 @@ def small_height(rng, nx, ny):
 
 
 def normal_problem(rng):
-    """Draw a small convex problem; the arguments of `asperity.solve_normal`."""
+    """Draw a small convex problem, and return the arguments of `asperity.solve_normal`."""
     most = int(rng.choice([8, 16, 64, 256]))
     cells = 0
     while not 2 <= cells <= most:

@@ -66,4 +66,4 @@ for name in lists["sources = files"]:
         else:
             faults.append(f"{name} holds an old state of {included}, now {state}")
 if faults:
-    sys.exit("\n".join([*faults, "python tools/check_sources.py --update mends it"]))
+    sys.exit("\n".join([*faults, "python tools/check_sources.py --update corrects it"]))

@@ -1,31 +1,31 @@
 """Compare steps with constant shear with dense matrices, and find those without a plain solution.
 
 The random cases are those of coupled_campaign.py; those with the law `constant_shear` are run by
-the program, and this tool solves the same steps by itself, row by row. It shares nothing with the
-solver: the kernels, the spline of the road, the arms, the mass and the law are written again, and
-Newton's method with dense matrices takes all cells together. The column "difference" has the
-largest difference from the program in any row: the mean over all cells of the differences of
-pressures and tractions, relative to the mean pressure. Each row begins with the past of the
+the program, and this tool solves the same steps independently, row by row. It shares nothing with
+the solver: the kernels, the spline of the road, the arms, the mass and the law are written again,
+and Newton's method with dense matrices solves for all cells at once. The column "difference" has
+the largest difference from the program in any row: the mean over all cells of the differences of
+pressures and tractions, relative to the mean pressure. Each row starts from the state of the
 program. "rows" counts the rows compared, and "divided" those in which cells are partly sheared.
 
 With arms, `exponential2` takes the first step after a jump in three parts, of which the result has
-no snapshots. If one of these parts has several solutions, the program and the tool may go on from
-different ones. With --scheme exponential there are no such parts, and every row begins with a past
-that is known.
+no snapshots. If one of these parts has several solutions, the program and the tool may continue
+from different ones. With --scheme exponential there are no such parts, and the state at the start
+of every row is known.
 
 The tool then examines the first step with partly sheared cells, or the last one if the program did
-not settle it. The step is solved from the state that the program left it in or, if Newton's method
-fails there, from the row before, or by way of a bound that grows with a little pressure, less and
-less. With --thorough all of these ways are tried, which takes several times as long: the column
-"partial" then has a number for each solution that differs from those before, and the trees count
-together.
+not settle it. It solves the step from the final state of the program. If Newton's method fails
+there, it starts from the row before, or solves a series of smoother laws, whose bound grows within
+an ever smaller pressure. With --thorough all of these starts are tried, which takes several times
+as long: the column "partial" then has a number for each solution that differs from those before,
+and the counts of the trees are added.
 
 The plain law allows a cell two states: in contact (no gap, a pressure P >= 0, the whole strength)
 or open (a gap >= 0, no traction). The law that is solved here allows a third one between them: no
 gap, no pressure, and a part of the strength between 0 and 1. Every solution of the plain law also
 solves this one, in which no cell is partly sheared. Where cells are partly sheared, the tool looks
 for a plain solution: it forces such a cell open or into contact, solves the rest again under the
-law with three states, and goes on with the next cell that is partly sheared, until none is left
+law with three states, and continues with the next cell that is partly sheared, until none is left
 (columns "states": ends of this tree, and "broken": those in which a forced cell overlaps with the
 road or is pulled). If the tree has too many branches, a branch also ends where a forced cell
 already breaks its condition ("cut").
@@ -129,8 +129,9 @@ def read_run(folder: Path, text: str) -> tuple[Case, dict[str, np.ndarray], list
 def left_in_rows(folder: Path, text: str) -> list[float]:
     """Return how far the state of the program is from a dense solution, for each row.
 
-    That is what it leaves in the equations, or its distance from the solution that Newton's method
-    reaches from it, if that is less: a cell between two states may be read as in the wrong one.
+    The distance is the smaller of two numbers: the residual of the equations, and the difference
+    from the solution that Newton's method reaches from the state. The residual alone is too large
+    if a cell between two states is assigned to the wrong one.
     Unlike `replay` this also judges rows with several solutions. It is meant for runs whose rows
     are not taken in parts (`time_scheme = 'exponential'`).
     """
@@ -153,7 +154,7 @@ def left_in_rows(folder: Path, text: str) -> list[float]:
 
 
 def replay(folder: Path, text: str, settled: bool = False) -> dict[str, Any]:
-    """Solve all steps of a run but the last one, and begin that; if settled, solve that, too.
+    """Solve all steps of a run except the last, which is solved only if the program settled it.
 
     The step returned is the first one with partly sheared cells, or else the last one.
     """
@@ -235,7 +236,7 @@ def look_for_plain(step: DenseStep, found: tuple, cut: bool) -> dict[str, Any]:
 
 
 def unique(step: DenseStep, found: tuple) -> float:
-    """Return the part of the mixed determinants of the partly sheared cells that is positive."""
+    """Return the fraction of positive ones among the mixed determinants of partly sheared cells."""
     if step.partial(found).size == 0:
         return 1.0
     columns = step.reduced(found)
@@ -250,7 +251,7 @@ def unique(step: DenseStep, found: tuple) -> float:
 
 def examine(seed: int, program: str, thorough: bool = False, scheme: str = "exponential2",
             cells: int = 10**9) -> str:
-    """Return the line of the table of a case; nothing if it is not one to be examined."""
+    """Return the line of the table for a case, or nothing if the case is not to be examined."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         text, status = run_case(seed, folder, program, scheme, cells)

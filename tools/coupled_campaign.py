@@ -53,7 +53,7 @@ def road(rng: np.random.Generator, nx: int, ny: int, dx: float, slope: float,
 
 
 def make_case(seed: int, folder: Path) -> tuple[str, dict[str, Any]]:
-    """Return the namelist of a random case, and what it is about in words."""
+    """Return the namelist of a random case, and a description of it in words."""
     rng = np.random.default_rng(seed)
     nx = int(rng.choice([24, 32, 40]))
     ny = int(rng.choice([nx, nx // 2, 20]))

@@ -123,7 +123,7 @@ class Kernel:
                          self.times(3, t[0]) + self.times(2, t[1])])
 
     def matrix(self, c: int, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Return a part of a coefficient's matrix."""
+        """Return a part of the matrix of a coefficient."""
         ny, nx = self.table.shape[1:]
         return self.table[c][(self.j[rows][:, None] - self.j[columns]) % ny,
                              (self.i[rows][:, None] - self.i[columns]) % nx]
@@ -159,7 +159,7 @@ class Memory:
                         np.zeros_like(self.s))
 
     def end(self, s: np.ndarray) -> None:
-        """Go on with the traction that would hold the displacement elastically."""
+        """End the step; s is the traction that would hold the displacement elastically."""
         for k in range(len(self.g)):
             self.p[k] = (self.keep[k] * self.p[k] + self.b1[k] * (s - self.s)
                          + self.b2[k] * (self.s - self.old))
@@ -167,7 +167,7 @@ class Memory:
 
 
 class Case:
-    """A case of the campaign: what it is, and its state after the steps so far."""
+    """A case of the campaign, with its state after the steps so far."""
 
     def __init__(self, text: str, height: np.ndarray) -> None:
         """Read the namelist."""
@@ -206,12 +206,12 @@ class Case:
         self.normal.end((pressure + self.normal.past) / self.q)
 
     def starts(self, dt: float) -> bool:
-        """Tell whether a step is taken in three parts."""
+        """Return whether a step is taken in three parts."""
         return (self.order == 2 and len(self.normal.g) > 0 and self.normal.dt_old == 0.0
                 and dt > 0.0)
 
     def begin(self, dt: float, motion: np.ndarray, load: float) -> None:
-        """Begin a step: what the past and the mass add to the displacements."""
+        """Begin a step: compute the displacements that the past and the mass add."""
         self.normal.begin(dt)
         self.tangential.begin(dt)
         self.dt, self.motion, self.load, self.q = dt, np.array(motion), load, self.normal.q

@@ -1,8 +1,8 @@
 """One coupled step of a case of coupled_campaign.py, solved with dense matrices.
 
-Nothing here comes from the program. Newton's method takes pressures, gaps, tractions and the level
-of all cells together. With constant shear a cell may be partly sheared: it then has no gap and no
-pressure, and a share of the strength. A number s per cell says which state it is in (in m):
+Nothing here comes from the program. Newton's method solves for the pressures, gaps, tractions and
+the level of all cells at once. With constant shear a cell may be partly sheared: it then has no gap
+and no pressure, and a share of the strength. A number s per cell, in m, determines its state:
 
     s < 0            open: the gap is -s, no pressure but that of adhesion, no traction
     0 <= s <= width  partly sheared: no gap, the share s/width of the strength
@@ -33,7 +33,7 @@ class DenseStep:
         self.forced = np.zeros(case.cells, int)
 
     def force(self, states: dict[int, str]) -> None:
-        """Hold cells open or in contact, whatever that breaks."""
+        """Hold cells open or in contact, even if they then violate a condition."""
         self.forced[:] = 0
         for cell, state in states.items():
             self.forced[cell] = -1 if state == "open" else 1
@@ -77,7 +77,7 @@ class DenseStep:
 
     def law(self, t: np.ndarray, slip: np.ndarray, p: np.ndarray, hx: np.ndarray, hy: np.ndarray,
             share: np.ndarray) -> np.ndarray:
-        """Return the traction within the bound that a traction and its slip lead to."""
+        """Return the admissible traction that follows from a traction and its slip."""
         slope = np.array([hx, hy]) * (1.0 if self.case.slope else 0.0)
         normal = -share * p * slope
         d = t - normal + self.stiff * (slip + slope * (slope * slip).sum(axis=0))
@@ -104,7 +104,7 @@ class DenseStep:
         return p, found[1], self.surface(found, p)[1]
 
     def residual(self, found: Found) -> tuple[np.ndarray, np.ndarray, float]:
-        """Return what is left of the conditions: gap, traction and load, relative."""
+        """Return the relative residuals of the conditions: gap, traction and load."""
         case = self.case
         p, _, share, _, opened = self.states(found[0])
         road, gap, slip = self.surface(found, p)
@@ -114,7 +114,7 @@ class DenseStep:
                 p.mean() / case.load - 1)
 
     def jacobian(self, found: Found, touching: np.ndarray | None = None) -> tuple:
-        """Return unknown cells of s and T, and the matrix; some partial cells as if in contact."""
+        """Return the unknown cells of s and T, and the matrix; some partial cells count as in contact."""
         case, (s, t, _) = self.case, found
         p, dp, share, dshare, _ = self.states(s)
         road, _, slip = self.surface(found, p)
@@ -201,11 +201,11 @@ class DenseStep:
         return least, kept[2]
 
     def tidy(self, found: Found) -> Found:
-        """Take the traction off open cells."""
+        """Set the traction of open cells to zero."""
         return found[0], np.where(self.modes(found[0])[0], 0.0, found[1]), found[2]
 
     def start(self, pressure: np.ndarray, traction: np.ndarray, gap: np.ndarray) -> Found:
-        """Return a state found elsewhere in these terms."""
+        """Return the unknowns that correspond to a state that was found elsewhere."""
         case = self.case
         touches = gap <= 0.0
         road, level, _ = self.surface((gap, traction, 0.0), pressure)
@@ -235,7 +235,7 @@ class DenseStep:
         return best
 
     def solve_all(self, guesses: list[tuple]) -> list[tuple[Found, float]]:
-        """Solve the step from each start in both ways, and return what differs."""
+        """Solve the step from each start in both ways, and return the solutions that differ."""
         found: list[tuple[Found, float]] = []
         for guess in guesses:
             for way in (self.newton, self.descend):
@@ -247,7 +247,7 @@ class DenseStep:
         return found
 
     def descend(self, found: Found) -> tuple[Found, float]:
-        """Solve with a pressure of partly sheared cells that goes to nothing."""
+        """Solve with a pressure in partly sheared cells that is reduced to zero."""
         rise, factor, last = 1.0, 0.1, 0.0
         for _ in range(25):
             self.rise = rise
@@ -275,7 +275,7 @@ class DenseStep:
         return state, left
 
     def reduced(self, found: Found) -> np.ndarray:
-        """Return how the gaps of the partly sheared cells follow their s in each of the states."""
+        """Return the derivatives of the gaps of partly sheared cells by their s, for each state."""
         cells = self.partial(found)
         a, _, partly = self.jacobian(found)
         touching = self.jacobian(found, cells)[2]

@@ -9,15 +9,15 @@ has no memory for its own work. The third one is `asperity.run` in a Python proc
 room beside what the process takes already. What must hold:
 
 * The program ends with status 3 and one message "not enough memory", or as without a limit.
-* Python raises MemoryError, or all goes as without a limit. After the error the same process,
-  without the limit, runs the case to the same history, to the last bit.
-* No message of the runtime library, of HDF5 or of the C++ library comes through.
+* Python raises MemoryError, or the run has the result of a run without a limit. After the error the
+  same process, without the limit, runs the case to the same history, to the last bit.
+* No message of the runtime library, of HDF5 or of the C++ library reaches the user.
 
-With --midway the program also runs without a limit until a random moment, from which it cannot
-take more than a little. This is harder than any limit that is there from the start, because the
-program checks such a limit before a run and keeps a reserve of 256 MB. FFTW and the threads end
-the program where they get no memory, and so do some arrays of the size of the grid in steps with
-friction; these trials are counted as "crash", with the messages printed, and are not failures.
+With --midway the program also runs without a limit until a random moment, after which it can take
+only a little more. This is harder than a limit from the start, because the program checks such a
+limit before a run and keeps a reserve of 256 MB. FFTW and the threads end the program if they get
+no memory, and so do some arrays of the size of the grid in steps with friction; these trials are
+counted as "crash", with the messages printed, and are not failures.
 
 A run that is not done within some seconds without a limit is left out. A trial that fails is
 printed with its seed; `--only SEED` repeats it. The exit status is 1 if any failed. The trials are
@@ -158,7 +158,7 @@ def main():
     parser.add_argument("--count", type=int, default=100)
     parser.add_argument("--seed", type=int, default=1, help="of the first trial")
     parser.add_argument("--midway", action="store_true",
-                        help="forbid it also while a run is going on to take more memory")
+                        help="also limit the memory of a run at a random moment")
     parser.add_argument("--only", type=int, help="seed of the only trial")
     options = parser.parse_args()
     seeds = range(options.seed, options.seed + options.count)

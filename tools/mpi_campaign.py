@@ -67,7 +67,7 @@ def compare(expected, found):
 
 
 def without_file(text):
-    """Return an attribute without what a run on several processes has otherwise."""
+    """Return an attribute without the parts that differ in a run on several processes."""
     lines = str(text).splitlines()
     return "\n".join(
         line for line in lines if not re.search(r"\b(file|threads|checkpoint_every) *=", line)
@@ -389,7 +389,7 @@ class Trial:
         self.judge(status, None, "again.h5", *found)
 
     def keep_checkpoints(self, command, name):
-        """Run to the end and return links to the checkpoints that there were meanwhile."""
+        """Run to the end, and return links to the checkpoints that were written meanwhile."""
         words = [*command, "run", "case.nml", "--output", name, "--quiet", "--threads", "1"]
         checkpoint = self.folder / name.replace(".h5", ".checkpoint.h5")
         kept = []

@@ -7,8 +7,8 @@ is any of those of the program, flat or on the slope. Each case is a curve of up
 loads, so that rows begin from those before them.
 
 This tool shares nothing with the solver: it sums the waves of the solid one by one, has its own
-cubic spline of the road, and states the law of friction anew, in the closed form in which a cell
-without gap and pressure may carry a share of a constant strength. For the pressure and the traction
+cubic spline of the road, and its own formulas of the friction laws, in the closed form in which a
+cell without gap and pressure may carry a share of a constant strength. For the pressure and the traction
 of every row it computes
 
 gap        how far the contact conditions are missed: sum(P gap) with the smallest gap as zero,
@@ -233,8 +233,8 @@ class Reference:
     def state(self, p: np.ndarray, t: np.ndarray, place: np.ndarray) -> dict[str, np.ndarray]:
         """Return displacements, slip and the road under a pressure [n] and a traction [2 n].
 
-        The road stands such that the mean displacement of the contact does not count: it reads
-        x + u - place - (mean of u there), as the program's rows do.
+        The road is read at x + u - place - (mean of u in the contact), as in the program's rows, so
+        that the mean displacement of the contact does not count.
         """
         n = p.shape[0]
         u, slip = self.a @ t, self.d @ t
@@ -280,7 +280,7 @@ class Reference:
                      / max(np.sqrt(np.sum(total**2)), 1e-300))
 
     def sheared(self, p: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """Whether a cell touches without pressure and carries a share of a constant strength."""
+        """Return whether a cell touches without pressure, with a share of constant strength."""
         return (p <= 0) & (np.hypot(*t.reshape(2, -1)) > 0) & (self.case["law"] == "constant_shear")
 
     def gap_error(self, s: dict[str, np.ndarray]) -> float:
@@ -294,7 +294,7 @@ class Reference:
                    float(max(0.0, -s["p"].min()) / s["p"].max()))
 
     def powers(self, s: dict[str, np.ndarray]) -> tuple[float, float, float]:
-        """Return the loss in the rubber, that by friction, and what the flat law leaves out, W."""
+        """Return the loss in the rubber, that by friction, and the part that the flat law omits, W."""
         n, nu = s["p"].size, self.case["nu"]
         area = self.case["lx"] * self.case["ly"]
         modes = self.phase.conj().T @ np.column_stack([s["p"], s["t"][:n], s["t"][n:]]) / n
@@ -426,7 +426,7 @@ def judge(case: dict[str, Any], file: h5py.File, number: int, tolerance: float) 
         found["end"] = "open"
     measures = [name for name in LIMITS if found[name] > LIMITS[name]]
     if measures:
-        # All conditions are met: Newton's method has gone to another solution.
+        # All conditions are met: Newton's method has found another solution.
         another = {*measures} <= {"error", "friction"} and max(found["gap"], found["bound"]) < 1e-2
         found["end"] = "open" if another and case["law"] != "none" else "wrong"
     return found

@@ -543,11 +543,11 @@ def test_rubber_of_several_kinds(tmp_path):
 @pytest.mark.parametrize("words, message", [
     (["self_affine:hurst=0.8", "--material", "r.nml"], "lacks wavelength_long"),
     (["self_affine:hurts=0.8", "--material", "r.nml"], "NAME one of hurst"),
-    ([ROAD, "--material", "r.nml", "--speeds", "1,1"], "speeds: 1 stands twice"),
+    ([ROAD, "--material", "r.nml", "--speeds", "1,1"], "speeds: 1 is given twice"),
     ([ROAD, "--material", "r.nml", "--pressures=-1"], "pressures"),
     ([ROAD, "--material", "r.nml", "--patches", "0"], "patches = 0"),
     ([ROAD, "--material", "r.nml", "--temperatures=-200"], "temperature = -200"),
-    ([ROAD, "--material", "r.nml", "--join", "blend"], "join: goes with patches"),
+    ([ROAD, "--material", "r.nml", "--join", "blend"], "join: is for patches"),
     ([ROAD, "--material", "r.nml", "-o", "curve.txt"], "must end in .html"),
     ([ROAD, "--material", "r.nml", "--jobs", "0"], "jobs = 0"),
 ])

@@ -170,7 +170,7 @@ def test_points_on_a_grid_with_holes(tmp_path):
     np.testing.assert_allclose(units.height, 1e-6 * plane, atol=1e-18)
     assert units.lx == pytest.approx(LX * 1e-6, rel=1e-4) and units.unit == "um"
     np.savetxt(tmp_path / "points.xyz", np.vstack([kept, kept[:2]]))
-    with pytest.raises(ValueError, match="2 points of the grid stand there more than once"):
+    with pytest.raises(ValueError, match="2 points of the grid are given more than once"):
         load(tmp_path / "points.xyz", unit="um")
     np.savetxt(tmp_path / "points.xyz", np.random.default_rng(1).random((300, 3)))
     with pytest.raises(ValueError, match="the points lie on no regular grid: interpolate"):

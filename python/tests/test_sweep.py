@@ -125,7 +125,7 @@ def test_parallel_and_linked_lists(tmp_path):
         sweep(wave(), {"grid.nx": [8, 16], "grid.lx": [1.0]}, zip=True, folder=tmp_path)
     for parameters, words in [
             ({"grid.nx": []}, "has no values"), ({"grid.nx": 8}, "list of values"),
-            ({"grid.nx": [8, 8]}, "stands twice"), ({}, "must be a dict"),
+            ({"grid.nx": [8, 8]}, "is given twice"), ({}, "must be a dict"),
             ({("grid.nx", "grid.ny"): [(1, 2, 3)]}, "must be 2 values"),
             ({"grid.nx": [8], ("grid.nx", "grid.ny"): [(1, 2)]}, "given twice")]:
         with pytest.raises(ValueError, match=words):

@@ -1,7 +1,7 @@
 !> Signals set flags, which a run checks between its steps.
 !>
 !> SIGINT, SIGTERM, SIGHUP (the terminal was closed) and SIGXCPU (the limit of the batch system is
-!> near) ask a run to stop after the present step, or within it if it takes long. SIGUSR1 asks for a
+!> near) ask a run to stop after the present step, or within it if it takes long. SIGUSR1 requests a
 !> checkpoint. SIGXFSZ (a file would exceed the size limit) is ignored, so that the write that caused it
 !> fails with an error.
 module asperity_signals
@@ -128,7 +128,7 @@ contains
       end select
    end function stop_signal_name
 
-   !> Has a checkpoint been asked for?
+   !> Was a checkpoint requested?
    function checkpoint_asked() result(yes)
       logical :: yes
 

@@ -23,7 +23,7 @@ contains
       end if
    end subroutine set_threads
 
-   !> Number of threads that the environment asks for. If a launcher binds each process to certain
+   !> Number of threads that the environment requests. If a launcher binds each process to certain
    !> processors, these count and not those of the whole machine.
    function threads_of_environment() result(n)
       integer :: n

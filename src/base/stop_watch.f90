@@ -1,4 +1,4 @@
-!> Decides whether the present computation must be abandoned because the user asked for a stop.
+!> Decides whether the present computation must be abandoned because a stop was requested.
 !>
 !> A solve may take minutes. A caller that can return to the state before the solve begins a watch, and
 !> solvers call `stop_is_due` once in each iteration; without a watch the answer is no. If a stop is due, the
@@ -17,7 +17,7 @@ module stop_watch
    public :: begin_watch, end_watch, stop_is_due, stop_question
 
    abstract interface
-      !> Has a stop been asked for? C's convention, so that Python can answer.
+      !> Was a stop requested? C's convention, so that Python can answer.
       function stop_question() bind(c) result(yes)
          import :: c_int
          integer(c_int) :: yes                 !! not 0: yes

@@ -98,7 +98,7 @@ contains
       if (self%is_copy) call c_exit_at_once(0_c_int)
    end subroutine leave
 
-   !> Wait for the copy. An error is set if it crashed or did not come to an end.
+   !> Wait for the copy. An error is set if it crashed or did not end in time.
    subroutine verdict(self, path, error)
       class(trial_type), intent(inout) :: self
       character(*), intent(in) :: path                         !! of the file that was tried
@@ -116,7 +116,7 @@ contains
       number = iand(int(status), 127)
       if (found < 0 .or. number == 0) return
       if (number == alarm_signal) then
-         call fail(error, error_file, path//': the file is damaged: reading it does not come to an end')
+         call fail(error, error_file, path//': the file is damaged: reading it does not end')
       else
          call fail(error, error_file, path//': the file is damaged: HDF5 crashes when it reads it '// &
             '(signal '//to_text(number)//')')

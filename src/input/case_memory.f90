@@ -5,7 +5,7 @@
 !> `tools/bench/memory.py` compares the estimate with the peak of runs, which differs by less than a tenth.
 !> A dense system for few cells in contact (module `steady_active`) is not counted; it takes at most 20 fields
 !> while it is solved. A step or a steady row may have to be solved all at once (modules `joint_step` and
-!> `steady_joint`). How much memory this takes depends on its course, and without this memory the passes go on;
+!> `steady_joint`). How much memory this takes depends on its course; without this memory the passes continue alone;
 !> `joint_memory` therefore returns the most that it may take separately.
 module case_memory
    use asperity_precision, only : dp

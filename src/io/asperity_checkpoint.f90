@@ -149,8 +149,8 @@ contains
       path = checkpoint_path(result_path)
       if (.not. file_exists(path)) then
          if (is_complete(result_path)) then
-            call fail(error, error_file, trim(result_path)//': the run is complete, so that '// &
-               'it cannot be continued')
+            call fail(error, error_file, trim(result_path)//': the run is complete: there is '// &
+               'nothing to continue')
          else
             call fail(error, error_file, path//': there is no such file: '//trim(result_path)// &
                ' has no checkpoint from which to continue')
@@ -200,8 +200,8 @@ contains
          name = line(:equals - 1)
          call find_setting(stored, name, value)
          if (.not. allocated(value)) then
-            call add_fault(error, error_input, self%file%path//': the checkpoint knows no "'// &
-               name//'", the case has '//line(equals + 3:))
+            call add_fault(error, error_input, self%file%path//': the checkpoint has no "'// &
+               name//'", but the case has '//line(equals + 3:))
          else if (value /= line(equals + 3:)) then
             call add_fault(error, error_input, self%file%path//': '//name//' is '//value// &
                ' in the checkpoint and '//line(equals + 3:)//' in the case')

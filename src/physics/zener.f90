@@ -178,7 +178,7 @@ contains
 
       if (self%g_e <= 0.0_dp) then
          call fail(error, error_input, 'relaxed = .true.: a material without long-term modulus '// &
-            'flows for ever under load: shear_modulus (or a Zener branch''s g1) must be positive')
+            'flows without limit under load: shear_modulus (or a Zener branch''s g1) must be positive')
          return
       end if
       call start_jump(self)

@@ -155,7 +155,7 @@ contains
       type(planned_row_type), intent(in) :: plan
       real(dp), intent(in) :: tolerance
       type(solver_result_type), intent(out) :: outcome
-      logical, intent(in), optional :: one_of_many  !! solves of a row, of which each goes on where the last ended
+      logical, intent(in), optional :: one_of_many  !! several solves of a row, each of which starts where the last ended
       logical, intent(in), optional :: displaced    !! without adhesion: `gap` holds the displacement U, m
       type(normal_task_type) :: task
 

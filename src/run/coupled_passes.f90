@@ -202,7 +202,8 @@ contains
       control%accuracy = proof*contact%case%solver%tolerance
    end subroutine solve_jointly
 
-   !> Shares of a joint solution apply to the pass that proves it only.
+   !> Discard the shares of a joint solution: if they are not unknowns of the passes, they apply only to the pass that
+   !> verifies this solution.
    subroutine drop_shares(contact)
       class(contact_type), intent(inout) :: contact
 
@@ -219,8 +220,8 @@ contains
       type(solver_result_type) :: part
       integer :: j
 
-      ! The road is about to change, but not the displacement under the pressure of the last pass, which
-      ! saves the next solve the product that it would begin with.
+      ! A pass changes the road but not U_z, the displacement under the pressure of the last pass. The field `gap`
+      ! therefore passes U_z = gap + H + level to the normal solver, which need not compute it again.
       if (self%gap_known) then
          !$omp parallel do default(none) shared(contact) private(j)
          do j = 1, contact%grid%rows()
@@ -244,7 +245,7 @@ contains
       self%residual = mismatch(self, contact, plan)
    end subroutine do_pass
 
-   !> After the normal solve of a pass: the shares that its tangential solve works with, and how they have moved.
+   !> Compute the shares for the tangential solve of a pass from the result of its normal solve, and their residual.
    subroutine take_shares(self, contact)
       class(coupled_passes_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact
@@ -301,6 +302,8 @@ contains
          self%place(:, :, :) = self%best_place
          return
       end if
+
+      ! The residual is U_T, carried along by the mean of U_T - z in the contact, minus z.
       !$omp parallel do default(none) shared(self, contact) private(j)
       do j = 1, contact%grid%rows()
          self%residuals(:, :2, j) = contact%tangential%trial(:, :, j) - self%place(:, :2, j)
@@ -313,6 +316,7 @@ contains
       do j = 1, contact%grid%rows()
          self%residuals(:, :2, j) = self%residuals(:, :2, j) - self%place(:, :2, j)
       end do
+
       if (control%plain) then
          call control%follow(self%mixing%turn(self%residuals))
          call self%mixing%glide(self%residuals, self%place, control%damping, control%momentum)

@@ -1,17 +1,17 @@
-!> The cells at the edge of the contact where the traction of a cell would jump as it opens: with a law whose
-!> strength does not vanish with the pressure (constant shear).
+!> The shares of the strength that cells at the edge of the contact carry, for laws whose strength does not vanish
+!> with the pressure (constant shear). With such a law the traction of a cell would jump as the cell opens.
 !>
 !> Such a cell has three states (see docs/theory.md): open, without traction; in contact, with a pressure
 !> and the whole strength; and between them touching, with neither gap nor pressure, and a share of the
-!> strength. A pass solves for the pressure and for the traction one after the other, so that none of the two
-!> solves can find the share. It is therefore an unknown of the passes, and moves from pass to pass:
+!> strength. A pass solves for the pressure and for the traction one after the other, so that neither of the two
+!> solves can find the share. It is therefore an unknown of the passes, and each pass changes it:
 !>
 !>     share <- share + (soft P_w - gap)/reach        cut off at 0 and 1
 !>
 !> P_w is the pressure of the wall, soft P_w the length by which it presses a cell in, and the reach the
-!> length by which a full share moves the cell down the slope of the road. The share stays where it is
-!> only if the cell is in one of the three states. Where the share decides whether the cell touches, the
-!> rule is nearly Newton's method for that cell alone, and all cells of the edge move at once.
+!> length by which a full share moves the cell down the slope of the road. The share remains constant only if
+!> the cell is in one of the three states. If the share decides whether the cell touches, the rule is nearly
+!> Newton's method for that cell alone. All cells at the edge change at once.
 module edge_shares
    use adhesion_potential, only : adhesion_potential_type, adhesive_slope
    use asperity_precision, only : dp
@@ -23,7 +23,7 @@ module edge_shares
 
    real(dp), parameter :: least_slope = 0.05_dp        !! of a road in the reach
 
-   !> What the rule needs to know of a step.
+   !> The parameters of the rule in a step.
    type :: edge_rule_type
       type(adhesion_potential_type) :: potential
       real(dp) :: soft = 0.0_dp                        !! displacement of a cell under its own unit traction, m/Pa
@@ -36,7 +36,7 @@ module edge_shares
 
 contains
 
-   !> The rule of a step.
+   !> Make the rule for a step.
    pure function new_edge_rule(potential, soft, strength, rms_slope) result(rule)
       type(adhesion_potential_type), intent(in) :: potential
       real(dp), intent(in) :: soft                     !! displacement of a cell under its own unit traction, m/Pa
@@ -59,8 +59,9 @@ contains
       wall = pressure + adhesive_slope(self%potential, max(gap, 0.0_dp))
    end function wall_pressure
 
-   !> Shares of 0 and 1 only, from pressure and gap alone. The solver of the normal contact leaves small
-   !> pressures, of round-off or of its tolerance, in cells with a gap: the larger of the two lengths decides.
+   !> Set each share to 0 or 1, from pressure and gap alone. The larger of the gap and of the length by which the
+   !> pressure presses the cell in decides, because the normal solver leaves small pressures, of round-off or of its
+   !> tolerance, in cells with a gap.
    subroutine decide(self, pressure, gap, share)
       class(edge_rule_type), intent(in) :: self
       real(dp), intent(in) :: pressure(:, :)           !! attraction included, Pa
@@ -75,7 +76,7 @@ contains
       end do
    end subroutine decide
 
-   !> Move the shares by what pressure and gap of a pass ask for.
+   !> Change the shares by the rule, with the pressure and the gap of a pass.
    subroutine move(self, pressure, gap, share)
       class(edge_rule_type), intent(in) :: self
       real(dp), intent(in) :: pressure(:, :)           !! attraction included, Pa
@@ -91,11 +92,10 @@ contains
       end do
    end subroutine move
 
-   !> By how much the cells are off their states, in sum and over the sum of the lengths by which their
-   !> pressures press them in. A cell without traction may have neither a pressure of the wall nor an overlap with
-   !> the road, a cell with traction no gap, and a cell with a part of the traction no pressure of the wall.
-   !> 0 where there is no such length: without any pressure, and on a grid of one cell. Collective where
-   !> processes share the rows.
+   !> The sum of the errors of all cells, over the sum of the lengths by which their pressures press them in. A cell
+   !> without traction must have neither a pressure of the wall nor an overlap with the road, a cell with traction no
+   !> gap, and a cell with a part of the traction no pressure of the wall. The result is 0 if there is no such
+   !> length, that is, without any pressure and on a grid of one cell. Collective if processes share the rows.
    function error(self, share, pressure, gap)
       class(edge_rule_type), intent(in) :: self
       real(dp), intent(in) :: share(:, :)
@@ -117,7 +117,7 @@ contains
       if (self%soft*sums(1) > 0.0_dp) error = sums(2)/(self%soft*sums(1))
    end function error
 
-   !> The same of a cell, m.
+   !> The error of one cell, m.
    elemental function cell_error(self, share, pressure, gap) result(error)
       class(edge_rule_type), intent(in) :: self
       real(dp), intent(in) :: share, pressure, gap

@@ -42,8 +42,8 @@ contains
       call scan_edge(grid, adhesive, [wx, wy], state, touching, least)
       if (touching > 0 .and. state%edge < edge_touches) then
          state%edge = edge_touches
-         call add_line(message, to_text(touching)//' cells at the edge of the free map touch; what touches beyond '// &
-            'the map is left out: a larger map is needed')
+         call add_line(message, to_text(touching)//' cells at the edge of the free map touch; contact beyond '// &
+            'the map is left out: use a larger map')
       else if (any(abs(move) > 0.0_dp) .and. state%edge < edge_near) then
          reach = out_of_reach*range
          if (least >= max(well_below*rms_height, reach)) return
@@ -52,8 +52,8 @@ contains
          if (least >= near) return
          state%edge = edge_near
          call add_line(message, 'points enter or leave the free map only '//to_text(least)// &
-            ' m below the rubber, which is displaced by '//to_text(depth)//' m under the load: less than '// &
-            to_text(near)//' m is near, a larger map is needed')
+            ' m below the rubber, which is displaced by '//to_text(depth)//' m under the load: if it is less than '// &
+            to_text(near)//' m, use a larger map')
       end if
    end subroutine look_at_edge
 

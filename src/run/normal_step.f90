@@ -32,7 +32,7 @@ module normal_step
       real(dp) :: load = 0.0_dp                    !! Pa, N or m
       real(dp) :: modulus = 0.0_dp                 !! Q, Pa
       logical :: first = .false.                   !! there is no state yet
-      logical :: one_of_many = .false.             !! solves of a row, of which each goes on where the last ended
+      logical :: one_of_many = .false.             !! several solves of a row, each of which starts where the last ended
       !> Without adhesion: the gap handed in is the displacement U of the pressure handed in, m.
       logical :: displaced = .false.
    end type normal_task_type

@@ -20,7 +20,7 @@ module result_summary
 
 contains
 
-   !> Read a result and summarise it. Its run may still be going on. If parts of the result are damaged, there is
+   !> Read a result and summarise it. The run may still be in progress. If parts of the result are damaged, there is
    !> both a summary and an error.
    subroutine summarise_result(path, text, error)
       character(*), intent(in) :: path
@@ -55,7 +55,7 @@ contains
 
       call find_damage(file, found)
       if (found%left_out > 0) text = text//'not read    the fields of the first '// &
-         to_text(found%left_out)//' snapshots: the others take a gigabyte already'//nl
+         to_text(found%left_out)//' snapshots, because the others already take a gigabyte'//nl
       if (found%parts == 0) return
       at = 1
       do while (at <= len(found%names))

@@ -19,7 +19,7 @@ module snapshot_writer
 
 contains
 
-   !> Write the fields that the case asks for.
+   !> Write the fields that the case requests.
    subroutine write_snapshot(result, sim, error, at_stop)
       type(result_file_type), intent(inout) :: result
       type(simulation_type), intent(in) :: sim

@@ -1,4 +1,4 @@
-!> The memory of the arms in a state of steady sliding, from which a run goes on in time.
+!> The memory of the arms in a state of steady sliding, from which a run continues in time.
 !>
 !> With S = P/G* (module zener: S is the traction that would hold the displacement elastically) arm k
 !> carries the traction p_k = g_k i omega tau_k/(1 + i omega tau_k) S, mode by mode, and so for T. One

@@ -1,4 +1,4 @@
-!> A row of steady sliding within a run: its state, and what the arms remember of it where time goes on.
+!> A row of steady sliding within a run: its state, and the memory of the arms if the run continues in time.
 module steady_row
    use asperity_parallel, only : any_process
    use asperity_precision, only : dp, int8

@@ -4,26 +4,27 @@
 !> the friction law such that the slip r = DX - A T is zero where T is inside its bound, and along D
 !> = T - T* where it is on it (thesis, eq. 3.1; modules `friction_law`, `friction_problem`).
 !>
-!> Which points stick is not known beforehand. A method (module `friction_method`) therefore guesses: the
-!> points on their bound slip along it, the others stick. Under this guess it takes a step towards r = 0
-!> on the sticking points and towards r along D on the slipping ones, puts back every T that has left its
-!> bound, so that this point slips, and releases points whose slip has turned against their traction,
-!> which makes them stick. The problem is solved when the guess holds and the residual g of all points is
-!> small; module `friction_problem` defines g.
+!> Which points stick is not known beforehand. A method (module `friction_method`) therefore starts from a guess:
+!> points on their bound slip along it, the others stick. In each iteration it moves T so that r comes closer to 0
+!> at sticking points and to the direction of D at slipping points. Then it corrects the guess: a T outside its
+!> bound is returned to the bound, and its point slips from now on; a slipping point whose slip is opposed to
+!> its traction sticks from now on. The problem is solved when the residual g is small at all points, because the
+!> guess is then right; module `friction_problem` defines g.
 !>
-!> The operator A is that of G = 1. For a scheme of time with the factor Q pass DX' = Q DX and the
-!> traction T_h of the memory: r = Q DX - A (T + T_h) is then Q times the slip, and the displacement
+!> The operator A is that of G = 1. For a time step with the modulus Q, the caller passes DX' = Q DX and the
+!> traction T_h of the past: r = Q DX - A (T + T_h) is then Q times the slip, and the displacement
 !> is U = DX - r/Q, without another product. With inertia the mean mode of the operator differs from
-!> A(0): set it by `set_mean_compliance` of the operator's symbols.
+!> A(0): the caller sets it by `set_mean_compliance` of the operator's symbols.
 !>
 !> Methods: 'fast' (module `friction_cg_fast`, which falls back on `friction_cg_gradient`), 'gradient'
-!> (the fallback alone) and 'thesis' (`friction_cg_thesis`). Converged means both the criterion of
-!> the thesis, |T' - T|/|T'| <= tolerance (eq. 3.15), and the residual of all points: the largest
-!> slip of a sticking point, part of the slip across its traction, or slip against it, over the RMS
-!> of DX or of A T in the contact, or over the least scale, whichever is largest.
+!> (the fallback alone) and 'thesis' (`friction_cg_thesis`). A solve has converged if the residual is within the
+!> tolerance and, with `settle`, also the change |T' - T|/|T'| of the last move (thesis, eq. 3.15). The residual
+!> is the largest of three lengths over all points: the slip of a sticking point, the part of a slip across its
+!> traction, and a slip against its traction. It is relative to the largest of three scales: the rms of DX in
+!> the contact, that of A T, and `least_scale`.
 !>
-!> Memory beside the caller's fields: eleven fields, the two of the operator's spectrum and the two
-!> of the preconditioner's with its symbols (3/4 of a field); four more once the fallback is needed.
+!> Memory in addition to the caller's fields: eleven fields, two for the spectrum of the operator, and two for that
+!> of the preconditioner with its symbols (3/4 of a field); four more from the first use of the fallback on.
 !>
 !> examples/friction_iterations and docs/benchmarks.md show how the iterations depend on the mesh. An iteration of
 !> 'fast' takes one and a half products of the operator if points slip, and one product of its preconditioner,
@@ -55,27 +56,28 @@ module friction_cg
    integer, parameter, public :: friction_thesis = 2
    integer, parameter, public :: friction_gradient = 3
 
-   integer, parameter :: hangings = 60           !! largest number of moves of the spring
-   integer, parameter :: idle_hangings = 3       !! moves in full slip after which more are useless
+   integer, parameter :: most_moves = 60         !! of the springs
+   integer, parameter :: idle_moves = 3          !! moves in full slip after which more are useless
    !> If the mean compliance over the length of the map exceeds this, the fast method treats the mean mode
-   !> apart. Below it, that would cost iterations; above, it saves them.
+   !> separately. Below this value, that would cost iterations; above it, it saves them.
    real(dp), parameter :: thick = 0.2_dp
-   !> A solve that starts along an expected slip goes on to this part of its tolerance, if that is far above
-   !> round-off. It would often end just below the tolerance, with an error of the friction above it.
+   !> A solve that starts along an expected slip continues to the part `aim` of its tolerance, unless that is near
+   !> the round-off `resolved`. Otherwise it would often end just below the tolerance, with an error of the friction
+   !> above it.
    real(dp), parameter :: aim = 0.3_dp, resolved = 1.0e-10_dp
 
    !> The solver for one operator, kept from solve to solve. A variable of this type must not be copied.
    type :: friction_solver_type
       real(dp) :: tolerance = 1.0e-6_dp
       integer :: max_iterations = 1000
-      !> T has to settle too, |T' - T|/|T'| <= tolerance. Without it the displacements are good to the
-      !> tolerance, T is less so.
+      !> T must have settled, too: |T' - T|/|T'| <= tolerance. Otherwise only the displacements are accurate to the
+      !> tolerance, and T is less accurate.
       logical :: settle = .true.
-      !> The displacements count as this large at least, in the units of DX': of the parts that make
-      !> them up, where these may cancel.
+      !> Least scale of the residual, in the units of DX': the size of the parts of the displacements, which may
+      !> cancel.
       real(dp) :: least_scale = 0.0_dp
       logical :: near = .false.                  !! T starts near the solution, as in a step like the last
-      type(friction_pull_type) :: pull           !! a total of T that is prescribed, and the road's place
+      type(friction_pull_type) :: pull           !! prescribed total of T, and the position of the road
       class(friction_method_type), allocatable, private :: method
       type(friction_work_type), private :: work
       logical, private :: periodic = .true.
@@ -149,6 +151,9 @@ contains
       if (10*problem%foreseen > problem%cells) &
          goal%tolerance = max(aim*self%tolerance, min(self%tolerance, resolved))
       self%method%stopped = .false.
+
+      ! This loop ends in the first round, except if the slip of the solution was computed by recurrence. Such a slip
+      ! has accumulated round-off and proves nothing: it is computed again, and the iterations continue if necessary.
       do
          if (problem%residual > goal%tolerance) &
             call self%method%iterate(problem, operator, goal, result%iterations)
@@ -158,10 +163,10 @@ contains
             call meet_pull(self, problem, operator, result%iterations, result%converged)
          if (problem%fresh .or. .not. result%converged) exit
 
-         ! A slip that was computed by recurrence has accumulated round-off, and therefore proves nothing.
          call problem%refresh_slip(operator)
          if (problem%residual <= self%tolerance) exit
       end do
+
       result%stopped = self%method%stopped
       result%residual = problem%residual
       result%load_error = self%pull%missed(problem)
@@ -171,7 +176,7 @@ contains
       result%seconds = omp_get_wtime() - result%seconds
    end subroutine solve
 
-   !> The problem from what the caller gives, with the road on its springs if it is pulled.
+   !> Make the problem from the caller's fields and settings. A road that is pulled is attached to its springs.
    subroutine set_problem(self, operator, law, fields, problem)
       class(friction_solver_type), intent(inout), target :: self
       type(convolution_type), intent(inout) :: operator
@@ -210,14 +215,15 @@ contains
       else if (.not. ieee_is_finite(problem%residual)) then
          text = 'not a number'
       else if (result%iterations >= self%max_iterations) then
-         text = 'iteration limit'
+         text = 'the limit of iterations was reached'
       else
          text = 'no direction of descent'
       end if
    end function reason
 
-   !> Move the ends of the springs until the total of T is the pull. Near full slip each move changes the
-   !> total less than the one before. Therefore a move that brought little makes the next one longer.
+   !> Move the ends of the springs until the total of T equals the pull. Near full slip each move changes the total less
+   !> than the one before. Therefore the next move is made longer (`factor`) if a move gained little. If nothing is
+   !> gained in full slip, the pull exceeds the friction, and the road returns to where the springs began.
    subroutine meet_pull(self, problem, operator, iterations, converged)
       type(friction_solver_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
@@ -233,7 +239,7 @@ contains
       first = problem%spring%end
       factor = 1.0_dp
       idle = 0
-      do k = 1, hangings
+      do k = 1, most_moves
          converged = problem%solved(self%tolerance)
          if (.not. converged) return
          if (self%pull%missed(problem) <= self%tolerance) return
@@ -244,7 +250,7 @@ contains
          gained = dot_product(before, before - self%pull%lacking(problem)) &
             /max(dot_product(before, before), tiny(1.0_dp))
          idle = merge(idle + 1, 0, problem%slipping == problem%cells .and. gained < 0.01_dp)
-         self%pull%slides_off = idle >= idle_hangings
+         self%pull%slides_off = idle >= idle_moves
          if (self%pull%slides_off) then
             call problem%move_spring_end(first - problem%spring%offset)
             return

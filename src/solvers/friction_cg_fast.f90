@@ -10,10 +10,10 @@
 !>     z = the change of T that would make g vanish, about (A + lam)^-1 g (module `friction_preconditioner`)
 !>     d = z + beta Z d                      beta Polak-Ribiere+
 !>     alpha = g.d/(d.A d + sum lam |d|^2)
-!>     T' = put back(T + alpha d)            r from A T', or by recurrence where all points stick
+!>     T' = return(T + alpha d)              r from A T', or by recurrence if all points stick
 !>
-!> beta = 0 in the first iteration, also after the fallback; where more than a tenth of the contact was
-!> released from its bound to stick; after a shortened step; and where d would not point downhill.
+!> beta is 0 in the first iteration, also after the fallback; if more than a tenth of the contact was released
+!> from its bound and sticks; after a shortened step; and if d would not be a direction of descent.
 !>
 !> In words: the preconditioner turns the slip that should vanish, g, into the change of traction z that would
 !> remove it if each point kept its state. `turn` adds a part of the last direction. `take_step` moves along d by
@@ -37,7 +37,7 @@
 !> z_old instead of the old g, which is not kept: the preconditioner is symmetric, so that both agree as
 !> long as no point changes its state.
 !>
-!> There is no proof that this converges. If it stalls, or finds no step downhill, some steps of spectral
+!> There is no proof that this converges. If it stalls, or finds no direction of descent, some steps of spectral
 !> projected gradients (module `friction_cg_gradient`) follow, and then the method continues.
 module friction_cg_fast
    use asperity_errors, only : error_type
@@ -60,8 +60,8 @@ module friction_cg_fast
 
    integer, parameter :: patience = 30      !! iterations in which the residual must fall tenfold
    integer, parameter :: trials = 2         !! of a shorter step
-   !> A move is shortened where g'.(T' - T) is below -overshoot*alpha*g.d. The first iterations of a step
-   !> that continues another one may overshoot more, because shortening costs more there than it gains.
+   !> A move is shortened if g'.(T' - T) is below -overshoot*alpha*g.d. The first iterations of a solve that starts
+   !> near its solution may overshoot more, because shortening costs more there than it gains.
    real(dp), parameter :: overshoot = 0.5_dp, overshoot_near = 2.0_dp
    integer, parameter :: near_steps = 15
    integer, parameter :: gradient_steps = 100    !! of the fallback at a time
@@ -128,7 +128,8 @@ contains
       self%ffts = self%preconditioner%ffts()
    end subroutine iterate
 
-   !> The conjugate gradients, until solved, stalled, or at the limit.
+   !> Iterate by conjugate gradients until the problem is solved, the residual stalls, there is no direction of descent,
+   !> or the limit of iterations is reached.
    subroutine iterate_gradients(self, problem, operator, goal, iterations)
       type(friction_fast_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
@@ -158,8 +159,9 @@ contains
       end do
    end subroutine iterate_gradients
 
-   !> The direction d = z + beta Z d, or d = z where that one does not descend, and its product: the
-   !> whole product where no point slips, which lets the slip follow by recurrence, else d.A d only.
+   !> Compute the direction d = z + beta Z d, or d = z if the former does not descend, and its product with A. If no
+   !> point slips, the whole product A d is needed, because the slip then follows by recurrence. Otherwise d.A d is
+   !> sufficient, which saves the inverse transform.
    subroutine find_direction(self, problem, operator, now)
       type(friction_fast_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
@@ -205,15 +207,16 @@ contains
       now%restart = now%restart .or. 10*problem%released > problem%cells
    end subroutine take_step
 
-   !> T' = T + alpha d, put back; the slip of T' from a product with T', or by recurrence from A d where
-   !> nothing was put back.
+   !> Compute T' = T + alpha d, return points to their bounds, and compute the slip of T': by recurrence from A d if no
+   !> point slips and none was returned, otherwise from a product with T'. `move` can transform the rows of T' for
+   !> this product in the same pass; `move_total` cannot, because it may move several times.
    subroutine move_to(self, problem, operator, alpha, by_product, again)
       type(friction_fast_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
       real(dp), intent(in) :: alpha
-      logical, intent(in) :: by_product            !! even if nothing is put back
-      logical, intent(in) :: again                 !! instead of the last step
+      logical, intent(in) :: by_product            !! compute the slip from a product in any case
+      logical, intent(in) :: again                 !! start again from the T before the last move
       logical :: returned, transformed
 
       transformed = .false.
@@ -232,7 +235,7 @@ contains
       end if
    end subroutine move_to
 
-   !> d = z + beta Z d with its transform, its slope g.d and the part of its curvature by the bounds.
+   !> Compute d = z + beta Z d and its transform, the slope g.d, and the curvature of the bounds along d.
    subroutine turn(self, problem, operator, beta, now)
       type(friction_fast_type), intent(inout) :: self
       type(friction_problem_type), intent(in) :: problem

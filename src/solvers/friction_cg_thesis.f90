@@ -3,7 +3,7 @@
 !>
 !>     t = d + K_1                                             (K_1, K_2: derivatives of the return)
 !>     alpha = t.g/(t.A t - K_2.r)                             (eq. 3.12)
-!>     T' = put back(T + alpha d) ; r = DX - A T'              (eq. 3.10, 3.11)
+!>     T' = return(T + alpha d) ; r = DX - A T'                (eq. 3.10, 3.11)
 !>     release the points that slip against their traction
 !>     g = r, less its part along D where it slips             (eq. 3.16)
 !>     y = g' - g ; beta = -y.g'/t.y + theta t.g' y.y/(t.y)^2   (eq. 3.14)
@@ -120,7 +120,7 @@ contains
       bend = totals(2)
    end subroutine new_direction
 
-   !> beta of eq. 3.14, with y = g' - g; the old g is in `gradient` still.
+   !> Compute beta of eq. 3.14, with y = g' - g. The field `gradient` still contains the old g.
    function next_beta(self, problem) result(beta)
       type(friction_thesis_type), intent(in) :: self
       type(friction_problem_type), intent(in) :: problem

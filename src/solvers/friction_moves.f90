@@ -24,7 +24,7 @@ contains
       real(dp), intent(in), contiguous :: direction(:, :, :)     !! [nx, 2, rows] d, Pa
       logical, intent(in) :: again                   !! start again from the T before the last move
       logical, intent(in) :: transform               !! transform the rows of T' on the way
-      logical, intent(out) :: returned               !! points were put back
+      logical, intent(out) :: returned               !! some points were returned to their bounds
       type(move_sums_type) :: sums
 
       call move_rows(problem, operator, move_type(step=step, again=again), direction, transform, sums)
@@ -42,7 +42,7 @@ contains
       real(dp), intent(in) :: step
       real(dp), intent(in), contiguous :: direction(:, :, :)     !! [nx, 2, rows] d, Pa
       logical, intent(in) :: again                   !! from the T before the last move
-      logical, intent(out) :: returned               !! points were put back
+      logical, intent(out) :: returned               !! some points were returned to their bounds
       type(move_type) :: how
       type(move_sums_type) :: sums
       real(dp) :: s(2), missed(2), allowed

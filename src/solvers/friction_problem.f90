@@ -150,10 +150,10 @@ contains
       end do
    end subroutine start_row
 
-   !> Let a point that is expected to slip far start along that slip. Its slip is long beside the displacement
+   !> Let a point that is expected to slip far start along that slip. Its slip is long compared with the displacement
    !> of a cell under its own bound, so that its direction hardly depends on the tractions that are still to be
-   !> found. What was left of the last step in such a point may be worse: a point that has just come into contact
-   !> has no traction, and would stick at first.
+   !> found. The traction of the last step may be a worse start: a point that has just come into contact has no
+   !> traction, and would stick at first.
    pure subroutine start_along_slip(self, i, j, t, limit, foreseen)
       class(friction_problem_type), intent(in) :: self
       integer, intent(in) :: i, j

@@ -47,7 +47,7 @@ contains
       type(gap_watch_type), intent(out) :: self
       logical, intent(in) :: mixed             !! the products of steps start in single precision
       real(dp), intent(in) :: tolerance        !! of the solver
-      logical, intent(in) :: one_of_many       !! solves of a step, of which each goes on where the last one ended
+      logical, intent(in) :: one_of_many       !! several solves of a step, each of which starts where the last ended
 
       self%single = mixed
       self%trusts = one_of_many .and. tolerance >= resolved .and. .not. mixed

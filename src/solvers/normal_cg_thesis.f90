@@ -193,7 +193,7 @@ contains
          end do
          load = row_total(rows)
          if (load <= 0.0_dp) then
-            outcome%reason = 'a step emptied the contact'
+            outcome%reason = 'a step left no cell in contact'
             return
          end if
          factor = problem%target*cell_count(pressure)/load

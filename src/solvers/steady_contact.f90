@@ -95,7 +95,7 @@ contains
 
       if (normal%converged .and. rubbing%converged) return
       if (law%jumps_at_edge()) then
-         normal%reason = 'cells at the edge come and go; try law = ''coulomb_orowan'''
+         normal%reason = 'cells at the edge of the contact open and close in turn; try law = ''coulomb_orowan'''
       else if (law%slope .and. law%strength_beside() < 0.0_dp) then
          if (field_count(contact%pressure > 0.0_dp .and. law%reach_coefficient()*hypot(contact%slope_x, &
             contact%slope_y) >= 1.0_dp) > 0.0_dp) &

@@ -220,7 +220,7 @@ contains
    end subroutine read_place
 
    !> Complete the present contact and compute its errors. If it has not converged, the road and T/P are what they were
-   !> before, so that the rounds go on as if nobody had looked.
+   !> before, so that the check does not affect the rounds.
    subroutine examine(self, operator, task, road, contact, normal, rubbing)
       class(steady_friction_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
@@ -252,7 +252,7 @@ contains
    end subroutine keep_best
 
    !> Solve all cells at once, from the present contact, from the best one, or from that without friction: on steep
-   !> roads the best one may be far off. If this fails, the rounds go on as if nothing had happened.
+   !> roads the best one may be far off. If this fails, the rounds continue unchanged.
    subroutine solve_at_once(self, operator, task, road, pace, contact, normal, rubbing)
       class(steady_friction_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator

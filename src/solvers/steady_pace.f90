@@ -32,7 +32,7 @@ module steady_pace
    integer, parameter :: compared = 8            !! rounds whose least change is compared with that of as many before
    integer, parameter :: patience = 25           !! rounds after an attempt from here without another one
    real(dp), parameter :: within_reach = 1.0e-3_dp   !! change from which an attempt from here usually succeeds
-   real(dp), parameter :: almost = 5.0_dp        !! tolerances from which rounds go on in any case
+   real(dp), parameter :: almost = 5.0_dp        !! error, in tolerances, below which the rounds continue in any case
    real(dp), parameter :: price = 1200.0_dp      !! transforms of such an attempt on a grid of ...
    real(dp), parameter :: priced_cells = 16384.0_dp   !! ... this number of cells; it grows like the side of the grid
 

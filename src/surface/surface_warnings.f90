@@ -182,7 +182,7 @@ contains
       else
          write (text, '(2(a, es9.3), a)') '&surface: '//name//' = ', wavelength, &
             ' m: the shortest wave is not above the Nyquist wavelength of ', 2.0_dp*cell, &
-            ' m: the grid does not hold it'
+            ' m: the grid cannot represent it'
       end if
       call append(warnings, text)
    end subroutine check_short_waves

@@ -136,7 +136,7 @@ def stored() -> dict[str, dict[str, int]]:
 
 
 def agrees(found: int, expected: int) -> bool:
-    """Say whether a count agrees with that of the table."""
+    """Return whether a count agrees with that of the table."""
     return abs(found - expected) <= 0.1 * expected + 2
 
 

@@ -10,9 +10,9 @@ half of full slip in one step with one pass, on meshes that grow: iterations and
 tangential solve. An iteration takes a product and a half of the operator (six transforms) and the
 preconditioner (four).
 
-Then the road of two scales (examples/two_scale_road), whole or its first steps of sliding: what a
-step costs, by the part of the contact that sticks. With `--result` the table is that of a run that
-is there, as examples/make.py leaves it. All figures are of one run on one machine: compare ratios,
+Then the road of two scales (examples/two_scale_road), whole or its first steps of sliding: the cost
+of a step, by the part of the contact that sticks. With `--result` the table is that of an existing
+result, such as that of examples/make.py. All figures are of one run on one machine: compare ratios,
 and on a busy machine only the counts.
 """
 
@@ -74,7 +74,7 @@ def road(folder: Path, steps: int, threads: int) -> asperity.Run:
 
 
 def print_steps(run: asperity.Run) -> None:
-    """Print what the steps of a run cost."""
+    """Print the costs of the steps of a run."""
     history = run.history
     slides = history["phase"] >= 2
     part = np.divide(history["stick_area"], history["contact_area"])

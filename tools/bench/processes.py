@@ -8,9 +8,9 @@ An elastic contact of a rough road is solved by N processes of one thread each a
 N threads, in turn. The table holds the least seconds of the solver, their ratio (above 1: the
 processes are faster), and the bytes that the processes sent to each other for each transform and
 cell. The next column is what the exchange of columns alone sends: a transform of real values has
-half as many modes as cells, of 16 bytes each, of which 1/N stays where it is. Then follow the peak
-memory of the threads, the largest of a process, and the ratio of the latter to its share, a part
-1/N of the former. `--iterations` ends every solve after some, if only the memory is wanted.
+half as many modes as cells, of 16 bytes each, of which 1/N stays where it is. The last columns are
+the peak memory of the threads, the largest of a process, and the ratio of the latter to 1/N of the
+former. `--iterations` ends every solve after a number of iterations, to measure the memory only.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ MPIRUN = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-q"]
 
 
 def solve(folder: Path, launcher: list[str], program: str, threads: int) -> dict[str, float]:
-    """Run the case once and return what its result says."""
+    """Run the case once and return the numbers of its result."""
     result = folder / "case.h5"
     command = [*launcher, sys.executable, "-c", PEAK, str(folder)]
     command += [str(ROOT / ".venv/bin" / program), "run", str(folder / "case.nml")]

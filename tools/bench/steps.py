@@ -4,9 +4,10 @@
     . tools/setup.sh && . tools/install_editable.sh
     python tools/bench/steps.py [--cells 1024] [--steps 100] [--threads 1]
 
-A rough road slides one cell a step under a rubber with ten arms (thesis, 4.3). What the arms cost
-is seen by splitting one arm into ten equal ones: the contact is the same to round-off, so the time
-that is added is that of nine more arms. All figures are of one run on one machine: compare ratios.
+A rough road slides by one cell per step under a rubber with ten arms (thesis, 4.3). To find the
+cost of the arms, one arm is split into ten equal ones: the contact is the same to round-off, so the
+additional time is that of nine more arms. All figures are of one run on one machine: compare
+ratios.
 """
 
 from __future__ import annotations

@@ -43,9 +43,9 @@ def add_plot(verbs: Any) -> None:
 def _plot(chosen: argparse.Namespace) -> int:
     """Draw the picture or film that was chosen."""
     if chosen.step is not None and not chosen.field:
-        chosen.error("--step goes with --field")
+        chosen.error("--step needs --field")
     if chosen.x is not None and not chosen.history:
-        chosen.error("--x goes with --history")
+        chosen.error("--x needs --history")
     import matplotlib
 
     if not chosen.show:

@@ -116,7 +116,7 @@ class CurvePlan:
         if self.coefficient > 0.0:
             groups["friction"] = dict(law="coulomb", coefficient=self.coefficient,
                                       slope_effect=self.slope_effect)
-        return Case(title=f"{patch.label}, {self.pressure[i]:g} Pa, {self.temperature[j]:g} C",
+        return Case(title=f"{patch.label}, {self.pressure[i]:g} Pa, {self.temperature[j]:g} °C",
                     **groups)
 
     def transforms(self, celsius: float) -> float:
@@ -256,7 +256,7 @@ def plan_curve(
         if not values.size:
             raise ValueError(f"{name}: has no values")
         if np.any(np.diff(values) == 0.0):
-            raise ValueError(f"{name}: {values[:-1][np.diff(values) == 0.0][0]:g} stands twice")
+            raise ValueError(f"{name}: {values[:-1][np.diff(values) == 0.0][0]:g} is given twice")
     wanted, notes = whole("patches", patches), []
     if road.count is not None and wanted > road.count:
         notes.append(f"the maps have room for {road.count} patches that do not overlap, not for"
@@ -293,7 +293,7 @@ def _band_note(plan: CurvePlan, celsius: float) -> list[str]:
     notes = []
     for some, where, end in ((below, "below", low), (above, "above", high)):
         if some.size:
-            at = "" if math.isnan(celsius) else f"at {celsius:g} C, "
+            at = "" if math.isnan(celsius) else f"at {celsius:g} °C, "
             notes.append(f"{at}{some.size} of {plan.speed.size} speeds ({some[0]:.3g}"
                          f" to {some[-1]:.3g} m/s) load the rubber in part {where} the measured"
                          f" frequencies: the limit is {end:.3g} m/s, beyond it the series is a"

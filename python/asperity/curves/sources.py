@@ -90,10 +90,10 @@ def road_of(
                          " for maps from the joined spectrum of all")
     if maps:
         if side is not None:
-            raise ValueError("side: goes with drawn roads: patches of maps have the maps' cells")
+            raise ValueError("side: is for drawn roads only: patches of maps have the maps' cells")
         return MeasuredRoad(maps, cells, join, short, outliers, seed)
     if join is not None:
-        raise ValueError("join: goes with patches of measured maps")
+        raise ValueError("join: is for patches of measured maps only")
     return DrawnRoad(join_spectra(spectra), cells, side, short, seed)
 
 

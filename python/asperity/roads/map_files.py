@@ -234,7 +234,7 @@ def _on_grid(path: Path, table: FloatArray, unit: str | None) -> PlainMap:
     if taken.max() > 1:
         twice = int((taken > 1).sum())
         raise ValueError(f"{path}: {twice} point{'s' if twice > 1 else ''} of the grid"
-                         f" stand{'' if twice > 1 else 's'} there more than once")
+                         f" {'are' if twice > 1 else 'is'} given more than once")
     array[at] = heights
     return PlainMap(array, "Default", tuple(sizes), unit)
 

@@ -250,9 +250,9 @@ def load(
     if periodic is not None:
         choice("periodic", periodic, WINDOWS)
     elif restore_rms:
-        raise ValueError("restore_rms: goes with periodic")
+        raise ValueError("restore_rms: needs periodic")
     if taper is not None and periodic != "tukey":
-        raise ValueError("taper: goes with periodic = 'tukey'")
+        raise ValueError("taper: needs periodic = 'tukey'")
     path = Path(path)
     height, sizes, is_periodic, unit, source = read_map(path, channel, unit, size, transpose)
     work = MapWork(height, sizes, is_periodic)

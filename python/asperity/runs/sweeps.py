@@ -269,7 +269,7 @@ def _jobs(base: Case, points: list[dict[str, Any]], folder: Path, keep: bool) ->
     for values in points:
         job = Job(values, name=_file_name(values))
         if job.name in names:
-            raise ValueError(f"parameters: {_described(values)} stands twice")
+            raise ValueError(f"parameters: {_described(values)} is given twice")
         names[job.name] = values
         job.path = folder / f"{job.name}.h5"
         work.append(job)
