@@ -8,8 +8,8 @@ loads, so that rows begin from those before them.
 
 This tool shares nothing with the solver: it sums the waves of the solid one by one, has its own
 cubic spline of the road, and its own formulas of the friction laws, in the closed form in which a
-cell without gap and pressure may carry a share of a constant strength. For the pressure and the traction
-of every row it computes
+cell without gap and pressure may carry a share of a constant strength. For the pressure and the
+traction of every row it computes
 
 gap        how far the contact conditions are missed: sum(P gap) with the smallest gap as zero,
            over the load times the rms height (the measure of the solver's tolerance), and the load;
@@ -294,7 +294,7 @@ class Reference:
                    float(max(0.0, -s["p"].min()) / s["p"].max()))
 
     def powers(self, s: dict[str, np.ndarray]) -> tuple[float, float, float]:
-        """Return the loss in the rubber, that by friction, and the part that the flat law omits, W."""
+        """Return the losses in the rubber and by friction, and the part that the flat law omits, W."""
         n, nu = s["p"].size, self.case["nu"]
         area = self.case["lx"] * self.case["ly"]
         modes = self.phase.conj().T @ np.column_stack([s["p"], s["t"][:n], s["t"][n:]]) / n
