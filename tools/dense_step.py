@@ -114,7 +114,7 @@ class DenseStep:
                 p.mean() / case.load - 1)
 
     def jacobian(self, found: Found, touching: np.ndarray | None = None) -> tuple:
-        """Return the unknown cells of s and T, and the matrix; `touching` cells count as in contact."""
+        """Return the unknown cells of s and T, and the matrix; cells `touching` are in contact."""
         case, (s, t, _) = self.case, found
         p, dp, share, dshare, _ = self.states(s)
         road, _, slip = self.surface(found, p)

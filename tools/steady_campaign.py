@@ -294,7 +294,7 @@ class Reference:
                    float(max(0.0, -s["p"].min()) / s["p"].max()))
 
     def powers(self, s: dict[str, np.ndarray]) -> tuple[float, float, float]:
-        """Return the losses in the rubber and by friction, and the part that the flat law omits, W."""
+        """Return the losses in the rubber and by friction, and the part that the flat law omits."""
         n, nu = s["p"].size, self.case["nu"]
         area = self.case["lx"] * self.case["ly"]
         modes = self.phase.conj().T @ np.column_stack([s["p"], s["t"][:n], s["t"][n:]]) / n
