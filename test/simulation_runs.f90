@@ -13,7 +13,8 @@ module simulation_runs
    implicit none
    private
 
-   public :: check_books, check_same_rows, creep_compliance, last, record_type, run_case, write_map
+   public :: check_books, check_same_rows, creep_compliance, last, record_type, run_case, &
+      start_case, write_map
 
    character, parameter, public :: nl = new_line('a')
 
@@ -31,6 +32,21 @@ module simulation_runs
 
 contains
 
+   !> Read a case given as text, and prepare its simulation. An error is a failed check.
+   subroutine start_case(text, what, case, sim, error)
+      character(*), intent(in) :: text
+      character(*), intent(in) :: what
+      type(case_type), intent(out) :: case
+      type(simulation_type), intent(out) :: sim
+      type(error_type), allocatable, intent(out) :: error
+
+      call parse_case(text, 'test.nml', case, error)
+      call check_no_error(error, what//': input')
+      if (allocated(error)) return
+      call new_simulation(sim, case, error)
+      call check_no_error(error, what//': simulation')
+   end subroutine start_case
+
    !> Run a case given as text to its end. A row that does not converge is a failed check.
    subroutine run_case(text, what, record)
       character(*), intent(in) :: text
@@ -45,11 +61,7 @@ contains
       allocate (record%rows(0:0), record%drag(2, 0:0))
       record%drag = 0.0_dp
       record%warnings = ''
-      call parse_case(text, 'test.nml', case, error)
-      call check_no_error(error, what//': input')
-      if (allocated(error)) return
-      call new_simulation(sim, case, error)
-      call check_no_error(error, what//': simulation')
+      call start_case(text, what, case, sim, error)
       if (allocated(error)) return
       record%height = sim%height
       record%cell_area = sim%grid%dx*sim%grid%dy

@@ -17,6 +17,7 @@ module test_adhesion_cg
    use asperity_precision, only : dp, pi
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use solver_result, only : solver_result_type
+   use transform_shape, only : whole_shape
    implicit none
    private
 
@@ -259,7 +260,8 @@ contains
             if (i + j > 0) symbol(i, j) = (1.0_dp - poisson)/(2.0_dp*pi*hypot(i/lx, j/ly))
          end do
       end do
-      call new_symbol_operator(operator, nx, ny, symbol, error)
+      call new_symbol_operator(operator, whole_shape(nx, ny, 1), error)
+      call operator%set_symbol(symbol)
       shifted = height
       call operator%apply(past, shifted)
       shifted = height - shifted/modulus

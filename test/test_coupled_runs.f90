@@ -10,7 +10,7 @@ module test_coupled_runs
    use case_settings, only : case_type
    use check, only : begin_suite, check_close, check_no_error, check_order, check_that, selected
    use history_table, only : column_type, history_columns, row_values
-   use simulation_runs, only : check_books, last, nl, record_type, run_case
+   use simulation_runs, only : check_books, last, nl, record_type, run_case, start_case
    use simulation_state, only : load_state, save_state
    use text_tools, only : to_text
    implicit none
@@ -90,11 +90,7 @@ contains
       integer :: rows
 
       allocate (values(size(history_columns()), 0))
-      call parse_case(text, 'test.nml', case, error)
-      call check_no_error(error, what//': input')
-      if (allocated(error)) return
-      call new_simulation(sim, case, error)
-      call check_no_error(error, what//': simulation')
+      call start_case(text, what, case, sim, error)
       if (allocated(error)) return
       rows = 0
       do while (.not. sim%finished)

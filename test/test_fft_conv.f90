@@ -8,6 +8,7 @@ module test_fft_conv
    use asperity_precision, only : dp, int64, pi
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use transform_lengths, only : good_length, length_warning
+   use transform_shape, only : whole_shape
    implicit none
    private
 
@@ -245,7 +246,8 @@ contains
       call normal%apply_inverse(u, back)
       call check_close(maxval(abs(back - p + sum(p)/84.0_dp)), 0.0_dp, 1e-13_dp + loose, 'inverse')
       ones = 1.0_dp
-      call new_symbol_operator(identity, 12, 7, ones, error, single)
+      call new_symbol_operator(identity, whole_shape(12, 7, 1), error, single)
+      call identity%set_symbol(ones)
       call identity%apply(p, back)
       call check_close(maxval(abs(back - p)), 0.0_dp, 1e-15_dp + loose, 'identity')
       call check_that(identity%ffts == 2, 'an application is two transforms')

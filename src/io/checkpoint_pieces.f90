@@ -90,9 +90,7 @@ contains
       else if (associated(piece%real_0)) then
          call share(piece%real_0)
       else if (associated(piece%real_1)) then
-         do k = 1, size(piece%real_1)
-            call share(piece%real_1(k))
-         end do
+         call share(piece%real_1)
       else if (associated(piece%whole_1)) then
          do k = 1, size(piece%whole_1)
             call share(piece%whole_1(k))

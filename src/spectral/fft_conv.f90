@@ -28,7 +28,7 @@ module fft_conv
       row_column_single_type => row_column_type
    use row_sharing, only : row_sharing_type
    use symbol_table, only : new_symbol_table, symbol_table_type
-   use transform_shape, only : shape_on_grid, transform_shape_type, whole_shape
+   use transform_shape, only : shape_on_grid, transform_shape_type
    implicit none
    private
 
@@ -39,11 +39,6 @@ module fft_conv
    integer, parameter, public :: columns_form = 3      !! only the quadratic form
 
    integer, parameter :: small = 16384                 !! cells below which one thread is faster
-
-   !> A periodic scalar operator from its symbol.
-   interface new_symbol_operator
-      module procedure :: new_whole_symbol_operator, new_shared_symbol_operator
-   end interface new_symbol_operator
 
    !> A convolution operator with its plans and its work space. A variable of this type must not be copied.
    type :: convolution_type
@@ -128,28 +123,15 @@ contains
       call self%symbols%finish()
    end subroutine new_inverse_convolution
 
-   !> A periodic scalar operator from its symbol, even in both wave numbers, for fields that every process
-   !> holds whole.
-   subroutine new_whole_symbol_operator(self, nx, ny, symbol, error, single)
-      type(convolution_type), intent(out) :: self
-      integer, intent(in) :: nx, ny
-      real(dp), intent(in) :: symbol(0:, 0:)      !! (0:nx/2, 0:ny/2)
-      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
-      logical, intent(in), optional :: single      !! work in single precision
-
-      call new_shared_symbol_operator(self, whole_shape(nx, ny, 1), error, single)
-      if (.not. allocated(error)) call self%set_symbol(symbol)
-   end subroutine new_whole_symbol_operator
-
-   !> The same for fields whose rows processes may share. The caller sets the symbols of its `modes`.
-   subroutine new_shared_symbol_operator(self, shape, error, single)
+   !> A periodic scalar operator whose symbol, even in both wave numbers, the caller sets for its `modes`.
+   subroutine new_symbol_operator(self, shape, error, single)
       type(convolution_type), intent(out) :: self
       type(transform_shape_type), intent(in) :: shape
       type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
       logical, intent(in), optional :: single      !! work in single precision
 
       call plan(self, shape, error, single)
-   end subroutine new_shared_symbol_operator
+   end subroutine new_symbol_operator
 
    !> First and last wave number along x for which this process has a symbol; none if the last is less.
    pure function modes(self)
