@@ -6,7 +6,6 @@ module test_coupled_runs
    use asperity_threads, only : set_threads
    use asperity_precision, only : dp
    use asperity_simulation, only : new_simulation, simulation_type
-   use case_input, only : parse_case
    use case_settings, only : case_type
    use check, only : begin_suite, check_close, check_no_error, check_order, check_that, selected
    use history_table, only : column_type, history_columns, row_values
