@@ -40,6 +40,13 @@ module adhesion_potential
 
    real(dp), parameter :: edge_width = 1.0_dp  !! half width of the edge in gamma_0/z_0 dx/E*
    real(dp), parameter :: far = 40.0_dp        !! exp(-far) is negligible compared with 1
+   integer, parameter :: block = 64            !! cells that are skipped together if all are far
+
+   ! The exponential of many cells (procedure `decay`): 2^(-j/parts) for j = 0 to parts - 1.
+   integer, parameter :: part_bits = 6
+   integer, parameter :: parts = 2**part_bits
+   integer :: j
+   real(dp), parameter :: part_powers(0:parts - 1) = [(2.0_dp**(-real(j, dp)/parts), j=0, parts - 1)]
 
    type :: adhesion_potential_type
       integer :: kind = potential_none
@@ -252,8 +259,7 @@ contains
       real(dp), intent(out), contiguous :: slope(:)      !! e', Pa
       real(dp), intent(out), contiguous :: curvature(:)  !! e'', Pa/m
       real(dp), intent(out), contiguous, optional :: energy(:)   !! e, J/m2
-      integer, parameter :: block = 64         !! cells that are skipped together if all are far
-      real(dp) :: value, scale
+      real(dp) :: value
       integer :: i, first, last
 
       if (self%kind /= potential_exponential) then
@@ -263,34 +269,33 @@ contains
          end do
          return
       end if
-      scale = self%energy/self%range
       do first = 1, size(gap), block
          last = min(first + block - 1, size(gap))
-         call decay(1.0_dp/self%range, gap(first:last), slope(first:last))
+         call decay(1.0_dp/self%range, self%energy/self%range, gap(first:last), slope(first:last))
       end do
-      slope(:) = scale*slope
       curvature(:) = (-1.0_dp/self%range)*slope
       if (present(energy)) energy(:) = -self%range*slope
    end subroutine adhesive_slopes
 
-   !> exp(-rate gap) of some cells, accurate to round-off; beyond `far` it is negligible. The last loop has no
-   !> call and no branch, so that the compiler can vectorise it, which the library's exponential does not
-   !> allow: exp(-x) = 2^-k exp(r) with the integer k next to x/ln 2, and |r| <= ln(2)/2 in Taylor's series. Its
-   !> odd and even terms are summed separately, so that the processor can compute both sums at the same time.
-   pure subroutine decay(rate, gap, values)
-      real(dp), intent(in) :: rate
+   !> scale exp(-rate gap) of at most `block` cells, accurate to round-off; beyond `far` it is negligible.
+   !>
+   !> The loops have no call and no branch, so that the compiler can vectorise them, which the library's exponential
+   !> does not allow. With m = `parts` and the integer k next to m x/ln 2,
+   !>     exp(-x) = 2^(-j/m) 2^-l exp(r),   k = m l + j,   r = k ln(2)/m - x.
+   !> The first factor stands in a table, the second changes the exponent of the first, and |r| <= ln(2)/(2 m) is so
+   !> small that six terms of the series of exp(r) are sufficient.
+   pure subroutine decay(rate, scale, gap, values)
+      real(dp), intent(in) :: rate, scale
       real(dp), intent(in), contiguous :: gap(:)
       real(dp), intent(out), contiguous :: values(:)
       ! Adding `rounder` rounds a number to an integer, which is then in the last bits of the sum.
       real(dp), parameter :: rounder = 1.5_dp*2.0_dp**52
-      ! ln 2 in two parts, the first with zeros at the end, so that k times it is exact.
-      real(dp), parameter :: log_high = 6.93147180369123816490e-01_dp, log_low = 1.90821492927058770002e-10_dp
-      integer(int64), parameter :: one = 1023_int64      !! exponent of the number 1
-      integer, parameter :: last = 13                    !! term of the series
-      integer :: n
-      real(dp), parameter :: c(last) = [(1.0_dp/gamma(n + 1.0_dp), n=1, last)]
-      integer(int64) :: bits
-      real(dp) :: x, k, r, square, odd, even, least
+      ! ln(2)/m in two parts, the first with zeros at the end, so that k times it is exact.
+      real(dp), parameter :: log_high = 6.93147180369123816490e-01_dp/parts, &
+         log_low = 1.90821492927058770002e-10_dp/parts
+      integer, parameter :: mantissa = 52          !! bits of a number behind its exponent
+      real(dp) :: x, k, r, least
+      integer(int64) :: steps(size(gap)), power
       integer :: i
 
       least = huge(1.0_dp)
@@ -304,14 +309,17 @@ contains
 
       do i = 1, size(gap)
          x = min(rate*gap(i), 2.0_dp*far)
-         k = x*(1.0_dp/log(2.0_dp)) + rounder
-         bits = shiftl(one - (transfer(k, bits) - transfer(rounder, bits)), 52)
+         k = x*(parts/log(2.0_dp)) + rounder
+         steps(i) = transfer(k, power) - transfer(rounder, power)
          k = k - rounder
          r = (k*log_high - x) + k*log_low
-         square = r*r
-         odd = c(3) + square*(c(5) + square*(c(7) + square*(c(9) + square*(c(11) + square*c(13)))))
-         even = c(2) + square*(c(4) + square*(c(6) + square*(c(8) + square*(c(10) + square*c(12)))))
-         values(i) = (1.0_dp + (r + square*(even + r*odd)))*transfer(bits, r)
+         values(i) = scale*(1.0_dp + r*(1.0_dp + r*(1.0_dp/2.0_dp + r*(1.0_dp/6.0_dp &
+            + r*(1.0_dp/24.0_dp + r*(1.0_dp/120.0_dp))))))
+      end do
+      do i = 1, size(gap)
+         power = transfer(part_powers(iand(steps(i), parts - 1_int64)), power) &
+            - shiftl(shiftr(steps(i), part_bits), mantissa)
+         values(i) = values(i)*transfer(power, r)
       end do
    end subroutine decay
 

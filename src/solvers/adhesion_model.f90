@@ -33,7 +33,7 @@ module adhesion_model
 
    public :: adhesion_model_type, new_adhesion_model
 
-   real(dp), parameter :: ratio = 8.0_dp          !! cells of the grid to one of the coarse grid
+   integer, parameter :: ratio = 8                !! cells of the grid to one of the coarse grid, about
    real(dp), parameter :: least_passed = 0.1_dp   !! coarse symbols make up for no more than this
    real(dp), parameter :: short_waves = 1.6_dp    !! theta times B at the Nyquist wave number
 
@@ -50,6 +50,7 @@ module adhesion_model
       real(dp), private :: theta = 0.0_dp         !! M at high wave numbers
       real(dp), private :: cells = 1.0_dp         !! cells to one coarse cell
       integer, allocatable, private :: left(:), below(:)   !! lower coarse neighbour of a cell, of the whole grid
+      integer, allocatable, private :: starts(:)           !! cells of a row where `left` changes, and nx + 1
       real(dp), allocatable, private :: wx(:), wy(:)       !! weight of the upper one
       real(dp), allocatable, private :: rows(:, :)         !! restricted along x, [mx, rows and foreign ones]
       real(dp), allocatable, private :: field(:, :)        !! on the coarse grid, [mx, rows and foreign ones]
@@ -78,7 +79,7 @@ contains
       integer, intent(in) :: modes(2)               !! the wave numbers of this process that are at hand
       real(dp), intent(in) :: nyquist               !! B at the Nyquist wave number, > 0
       type(error_type), allocatable, intent(out) :: error
-      integer :: ny
+      integer :: i, ny
 
       ny = size(fine%owner)
       self%nx = nx
@@ -86,12 +87,13 @@ contains
       self%own = fine%own
       call fit_stencil(symbols, modes, nx, ny, self%weights)
       self%theta = short_waves/nyquist
-      self%mx = max(1, nint(nx/ratio))
-      self%my = max(1, nint(ny/ratio))
+      self%mx = max(1, nint(real(nx, dp)/ratio))
+      self%my = max(1, nint(real(ny, dp)/ratio))
       self%cells = real(nx, dp)*ny/(real(self%mx, dp)*self%my)
       allocate (self%left(nx), self%wx(nx), self%below(ny), self%wy(ny))
       call neighbours(nx, self%mx, self%left, self%wx)
       call neighbours(ny, self%my, self%below, self%wy)
+      self%starts = [1, pack([(i, i=2, nx)], self%left(2:) /= self%left(:nx - 1)), nx + 1]
       call share_rows(self, fine)
       allocate (self%rows(self%mx, self%fine_halo%own + self%fine_halo%foreign), &
          self%field(self%mx, self%coarse_halo%own + self%coarse_halo%foreign))
@@ -194,28 +196,38 @@ contains
    subroutine put_row(self, j, row)
       class(adhesion_model_type), intent(inout) :: self
       integer, intent(in) :: j
-      real(dp), intent(in) :: row(:)
-      real(dp) :: lower, higher
-      integer :: i, k
+      real(dp), intent(in), contiguous :: row(:)
+      real(dp) :: sums(2)
+      integer :: i, k, next, part
 
       self%rows(:, j) = 0.0_dp
-      i = 1
-      do while (i <= self%nx)
+      do part = 1, size(self%starts) - 1
          ! The cells between two coarse ones.
+         i = self%starts(part)
+         next = self%starts(part + 1)
+         if (next - i == ratio) then
+            sums = sums_of_eight(row(i:next - 1), self%wx(i:next - 1))
+         else
+            sums = [sum(row(i:next - 1)), sum(self%wx(i:next - 1)*row(i:next - 1))]
+         end if
          k = self%left(i)
-         lower = 0.0_dp
-         higher = 0.0_dp
-         do while (self%left(i) == k)
-            lower = lower + row(i)
-            higher = higher + self%wx(i)*row(i)
-            i = i + 1
-            if (i > self%nx) exit
-         end do
-         self%rows(k, j) = self%rows(k, j) + (lower - higher)
-         k = merge(1, k + 1, k == self%mx)
-         self%rows(k, j) = self%rows(k, j) + higher
+         self%rows(k, j) = self%rows(k, j) + (sums(1) - sums(2))
+         k = upper(k, self%mx)
+         self%rows(k, j) = self%rows(k, j) + sums(2)
       end do
    end subroutine put_row
+
+   !> The sums of x and of w x over eight cells, in an order in which a processor can add several numbers at once.
+   pure function sums_of_eight(x, w) result(sums)
+      real(dp), intent(in) :: x(ratio), w(ratio)
+      real(dp) :: sums(2)
+      real(dp) :: fours(4, 2), pairs(2, 2)
+
+      fours(:, 1) = x(1:4) + x(5:8)
+      fours(:, 2) = w(1:4)*x(1:4) + w(5:8)*x(5:8)
+      pairs(:, :) = fours(1:2, :) + fours(3:4, :)
+      sums(:) = pairs(1, :) + pairs(2, :)
+   end function sums_of_eight
 
    !> Finish the restriction: weighted means on the coarse grid. Each is summed in the order of the rows.
    subroutine restrict_columns(self)
@@ -322,9 +334,9 @@ contains
    pure subroutine interpolate(self, j, values)
       type(adhesion_model_type), intent(in) :: self
       integer, intent(in) :: j
-      real(dp), intent(out) :: values(:)
-      real(dp) :: between(self%mx + 1)
-      integer :: i, below, above
+      real(dp), intent(out), contiguous :: values(:)
+      real(dp) :: between(self%mx + 1), low, rise
+      integer :: i, below, above, next, part
 
       associate (row => self%own(j))
          below = self%coarse_halo%place(self%below(row))
@@ -332,8 +344,16 @@ contains
          between(:self%mx) = self%field(:, below) + self%wy(row)*(self%field(:, above) - self%field(:, below))
       end associate
       between(self%mx + 1) = between(1)
-      do i = 1, self%nx
-         values(i) = between(self%left(i)) + self%wx(i)*(between(self%left(i) + 1) - between(self%left(i)))
+      do part = 1, size(self%starts) - 1
+         i = self%starts(part)
+         next = self%starts(part + 1)
+         low = between(self%left(i))
+         rise = between(self%left(i) + 1) - low
+         if (next - i == ratio) then
+            values(i:i + ratio - 1) = low + rise*self%wx(i:i + ratio - 1)
+         else
+            values(i:next - 1) = low + rise*self%wx(i:next - 1)
+         end if
       end do
    end subroutine interpolate
 

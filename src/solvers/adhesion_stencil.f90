@@ -98,26 +98,29 @@ contains
       real(dp), intent(in) :: weights(0:reach, 0:reach)
       real(dp), intent(in), contiguous :: below2(:), below1(:), row(:), above1(:), above2(:)
       real(dp), intent(inout), contiguous :: product(:)
-      real(dp) :: near(-1:size(row) + 2, 0:reach), w(0:reach, 0:reach)
+      real(dp) :: next(1 - reach:size(row) + reach, reach), w(0:reach, 0:reach), one, two
       integer :: i, n
 
       n = size(row)
-      near(1:n, 0) = row
-      near(1:n, 1) = below1 + above1
-      near(1:n, 2) = below2 + above2
-      do i = 1, reach
-         near(1 - i, :) = near(modulo(-i, n) + 1, :)
-         near(n + i, :) = near(modulo(i - 1, n) + 1, :)
-      end do
       ! A pair of cells at a distance shares the weight of its wave.
       w(:, :) = weights
       w(1:, :) = 0.5_dp*w(1:, :)
       w(:, 1:) = 0.5_dp*w(:, 1:)
+
+      ! Sums over each column of five cells, with the weights for its own cell and for cells one and two away.
       do i = 1, n
-         product(i) = product(i) + w(0, 0)*near(i, 0) + w(0, 1)*near(i, 1) + w(0, 2)*near(i, 2) &
-            + w(1, 0)*(near(i - 1, 0) + near(i + 1, 0)) + w(1, 1)*(near(i - 1, 1) + near(i + 1, 1)) &
-            + w(1, 2)*(near(i - 1, 2) + near(i + 1, 2)) + w(2, 0)*(near(i - 2, 0) + near(i + 2, 0)) &
-            + w(2, 1)*(near(i - 2, 1) + near(i + 2, 1)) + w(2, 2)*(near(i - 2, 2) + near(i + 2, 2))
+         one = below1(i) + above1(i)
+         two = below2(i) + above2(i)
+         product(i) = product(i) + (w(0, 0)*row(i) + w(0, 1)*one + w(0, 2)*two)
+         next(i, 1) = w(1, 0)*row(i) + w(1, 1)*one + w(1, 2)*two
+         next(i, 2) = w(2, 0)*row(i) + w(2, 1)*one + w(2, 2)*two
+      end do
+      do i = 1, reach
+         next(1 - i, :) = next(modulo(-i, n) + 1, :)
+         next(n + i, :) = next(modulo(i - 1, n) + 1, :)
+      end do
+      do i = 1, n
+         product(i) = product(i) + ((next(i - 1, 1) + next(i + 1, 1)) + (next(i - 2, 2) + next(i + 2, 2)))
       end do
    end subroutine add_stencil
 
