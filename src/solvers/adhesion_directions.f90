@@ -71,12 +71,13 @@ contains
          else
             call self%model%inverse_row(j, self%residual(:, j), z)
          end if
-         call take_z_row(self, now, level_z, j, z)
-         if (first == last_pass) then
-            call sum_z_row(self, now, j, rows(j))
-         else
-            call center_row(self, now, first, 0.0_dp, j, rows(j))
+         if (self%scaling > 0.0_dp) then
+            associate (n => self%patch%inner(j))
+               z(1:n) = z(1:n)*diagonal_scaling(now%problem, now%state(1:n, j), self%scaling)
+            end associate
          end if
+         call take_z_row(self, now, level_z, j, z, rows(j))
+         if (first == sum_pass) call center_row(self, now, first, 0.0_dp, j, rows(j))
       end do
       !$omp end do
       !$omp end parallel
@@ -93,62 +94,54 @@ contains
       end do
    end subroutine precondition
 
-   !> Compute a row of z from M r. It is 0 on the cells that are not free.
-   subroutine take_z_row(self, now, level_z, j, z)
+   !> Compute a row of z from M r, with its sums of products. It is 0 on the cells that are not free, and, if the mean
+   !> of z is free, in cells in contact that it would close.
+   subroutine take_z_row(self, now, level_z, j, z, sums)
       type(adhesion_work_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(in) :: now
       real(dp), intent(in) :: level_z                  !! m
       integer, intent(in) :: j
-      real(dp), intent(inout) :: z(:)                  !! in: M r for Q = 1
-      integer :: n
+      real(dp), intent(in), contiguous :: z(:)         !! M r for Q = 1
+      type(z_sums_type), intent(out) :: sums
+      real(dp) :: factor, least
+      integer :: i, n
 
       n = self%patch%inner(j)
-      call take_free_cells(1.0_dp/now%problem%modulus, now%state(1:n, j), self%residual(1:n, j), z(1:n))
-      z(n + 1:) = z(n + 1:)*(1.0_dp/now%problem%modulus)
-      if (self%scaling > 0.0_dp) &
-         z(1:n) = z(1:n)*diagonal_scaling(now%problem, now%state(1:n, j), self%scaling)
-      if (n < self%patch%mx) z(n + 1:) = z(n + 1:) + level_z*self%patch%psi(n + 1:, j)
-      self%exchange(:, j) = z
+      factor = 1.0_dp/now%problem%modulus
+      least = 0.0_dp
+      if (self%patch%periodic .and. now%problem%control == control_approach) least = -huge(1.0_dp)
+      call take_cells(factor, least, z(1:n), now%state(1:n, j), self%residual(1:n, j), self%old(1:n, j), &
+         self%exchange(1:n, j), sums)
+      do i = n + 1, self%patch%mx
+         self%exchange(i, j) = factor*z(i) + level_z*self%patch%psi(i, j)
+      end do
+      sums%rz = sums%rz + row_product(self%exchange(n + 1:, j), self%residual(n + 1:, j))
+      sums%old_rz = sums%old_rz + row_product(self%exchange(n + 1:, j), self%old(n + 1:, j))
    end subroutine take_z_row
 
-   !> z = z factor on the free cells, 0 on the others.
-   pure subroutine take_free_cells(factor, state, residual, z)
-      real(dp), intent(in) :: factor
-      real(dp), intent(in), contiguous :: state(:), residual(:)
-      real(dp), intent(inout), contiguous :: z(:)
+   !> z = factor M r on the free cells, at least `least` in those in contact, 0 on the others; r.z and z.(old r).
+   pure subroutine take_cells(factor, least, image, state, residual, old, z, sums)
+      real(dp), intent(in) :: factor, least
+      real(dp), intent(in), contiguous :: image(:)           !! M r
+      real(dp), intent(in), contiguous :: state(:)           !! g, m
+      real(dp), intent(in), contiguous :: residual(:), old(:)
+      real(dp), intent(out), contiguous :: z(:)
+      type(z_sums_type), intent(inout) :: sums
+      real(dp) :: rz, old_rz
       integer :: i
 
-      z(:) = factor*z
-      !$omp simd
+      rz = 0.0_dp
+      old_rz = 0.0_dp
+      !$omp simd reduction(+: rz, old_rz)
       do i = 1, size(z)
-         z(i) = merge(z(i), 0.0_dp, state(i) > 0.0_dp .or. residual(i) > 0.0_dp)
+         z(i) = merge(factor*image(i), 0.0_dp, state(i) > 0.0_dp .or. residual(i) > 0.0_dp)
+         z(i) = max(z(i), merge(-huge(1.0_dp), least, state(i) > 0.0_dp))
+         rz = rz + z(i)*residual(i)
+         old_rz = old_rz + z(i)*old(i)
       end do
-   end subroutine take_free_cells
-
-   !> Set z to 0 in cells in contact that it would close, in a row whose mean is free, and form the sums of the row.
-   subroutine sum_z_row(self, now, j, sums)
-      type(adhesion_work_type), intent(inout) :: self
-      type(adhesion_iteration_type), intent(in) :: now
-      integer, intent(in) :: j
-      type(z_sums_type), intent(out) :: sums
-
-      associate (n => self%patch%inner(j))
-         call keep_contact(now%state(1:n, j), self%exchange(1:n, j))
-      end associate
-      sums%rz = row_product(self%exchange(:, j), self%residual(:, j))
-      sums%old_rz = row_product(self%exchange(:, j), self%old(:, j))
-   end subroutine sum_z_row
-
-   !> Set z to 0 in cells in contact that it would close.
-   pure subroutine keep_contact(state, z)
-      real(dp), intent(in), contiguous :: state(:)
-      real(dp), intent(inout), contiguous :: z(:)
-      integer :: i
-
-      do i = 1, size(z)
-         z(i) = max(z(i), merge(-huge(1.0_dp), 0.0_dp, state(i) > 0.0_dp))
-      end do
-   end subroutine keep_contact
+      sums%rz = rz
+      sums%old_rz = old_rz
+   end subroutine take_cells
 
    !> Subtract the mean from a row of z, set z to 0 in cells in contact that it would close, and form the sums.
    subroutine center_row(self, now, pass, mean, j, sums)
@@ -231,40 +224,46 @@ contains
       real(dp), intent(in) :: beta
       integer, intent(in) :: j
       real(dp), intent(out) :: row(2), quickest
-      real(dp) :: bent(self%patch%inner(j)), d
+      real(dp) :: d
       integer :: i, n
 
       n = self%patch%inner(j)
-      call turn_cells(now%state(1:n, j), self%exchange(1:n, j), beta, now%units%length, self%direction(1:n, j), &
-         quickest)
-      self%change(1:n, j) = self%direction(1:n, j) + now%lift
-      do i = 1, n
-         bent(i) = self%direction(i, j)*self%curvature(i, j)
-      end do
+      call turn_cells(now%state(1:n, j), self%exchange(1:n, j), self%residual(1:n, j), self%curvature(1:n, j), &
+         beta, now%units%length, now%lift, self%direction(1:n, j), self%change(1:n, j), row, quickest)
       do i = n + 1, self%patch%mx
          d = self%exchange(i, j) + beta*self%direction(i, j)
          self%direction(i, j) = d
          self%change(i, j) = d
       end do
-      row(1) = row_product(self%residual(:, j), self%direction(:, j))
-      row(2) = row_product(self%direction(1:n, j), bent)
+      row(1) = row(1) + row_product(self%residual(n + 1:, j), self%direction(n + 1:, j))
    end subroutine turn_row
 
-   !> d = z + beta d on the cells that are free or that z opens, 0 on the others; the greatest |d|/(g + z_0).
-   pure subroutine turn_cells(state, z, beta, length, d, quickest)
+   !> d = z + beta d on the cells that are free or that z opens, 0 on the others, and the change of the displacement;
+   !> r.d and d.e'' d, and the greatest |d|/(g + z_0).
+   pure subroutine turn_cells(state, z, residual, curvature, beta, length, lift, d, change, sums, quickest)
       real(dp), intent(in), contiguous :: state(:), z(:)     !! g and z, m
+      real(dp), intent(in), contiguous :: residual(:)        !! r, Pa
+      real(dp), intent(in), contiguous :: curvature(:)       !! e'', Pa/m
       real(dp), intent(in) :: beta
-      real(dp), intent(in) :: length                         !! z_0, m
+      real(dp), intent(in) :: length, lift                   !! z_0 and d of the level, m
       real(dp), intent(inout), contiguous :: d(:)
-      real(dp), intent(out) :: quickest
+      real(dp), intent(out), contiguous :: change(:)
+      real(dp), intent(out) :: sums(2), quickest
+      real(dp) :: slope, bend
       integer :: i
 
       quickest = 0.0_dp
-      !$omp simd reduction(max: quickest)
+      slope = 0.0_dp
+      bend = 0.0_dp
+      !$omp simd reduction(max: quickest) reduction(+: slope, bend)
       do i = 1, size(d)
          d(i) = merge(z(i) + beta*d(i), 0.0_dp, state(i) > 0.0_dp .or. z(i) > 0.0_dp)
+         change(i) = d(i) + lift
          quickest = max(quickest, abs(d(i))/(state(i) + length))
+         slope = slope + residual(i)*d(i)
+         bend = bend + d(i)*curvature(i)*d(i)
       end do
+      sums(:) = [slope, bend]
    end subroutine turn_cells
 
 end module adhesion_directions
