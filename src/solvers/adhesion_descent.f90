@@ -25,6 +25,7 @@ module adhesion_descent
    use adhesion_state, only : control_approach
    use adhesion_residual, only : measure
    use adhesion_steps, only : stepped_gap, sum_shift
+   use adhesion_sweeps, only : move_cells
    use adhesion_work, only : adhesion_iteration_type, adhesion_work_type
    use asperity_parallel, only : any_process
    use asperity_precision, only : dp
@@ -185,23 +186,5 @@ contains
       clipped = any_process(any_clipped)
    end subroutine move
 
-   !> g = g + alpha d, closed where it would be negative; by how much, and the most of it.
-   pure subroutine move_cells(alpha, d, state, change, most)
-      real(dp), intent(in) :: alpha
-      real(dp), intent(in), contiguous :: d(:)               !! m
-      real(dp), intent(inout), contiguous :: state(:)        !! g, m
-      real(dp), intent(out), contiguous :: change(:)         !! m
-      real(dp), intent(out) :: most
-      real(dp) :: trial
-      integer :: i
-
-      most = 0.0_dp
-      do i = 1, size(d)
-         trial = state(i) + alpha*d(i)
-         state(i) = max(trial, 0.0_dp)
-         change(i) = state(i) - trial
-         most = max(most, change(i))
-      end do
-   end subroutine move_cells
 
 end module adhesion_descent

@@ -2,6 +2,7 @@
 !> where r is the measured residual.
 module adhesion_directions
    use adhesion_state, only : control_approach, control_pressure, diagonal_scaling
+   use adhesion_sweeps, only : take_cells, turn_cells
    use adhesion_work, only : adhesion_iteration_type, adhesion_work_type
    use asperity_precision, only : dp
    use field_sums, only : largest_of_rows, row_product
@@ -94,8 +95,8 @@ contains
       end do
    end subroutine precondition
 
-   !> Compute a row of z from M r, with its sums of products. It is 0 on the cells that are not free, and, if the mean
-   !> of z is free, in cells in contact that it would close.
+   !> Compute a row of z from M r, with its sums of products. It is 0 on the cells that are not free and, unless its
+   !> mean is prescribed, in cells in contact that it would close.
    subroutine take_z_row(self, now, level_z, j, z, sums)
       type(adhesion_work_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(in) :: now
@@ -103,15 +104,15 @@ contains
       integer, intent(in) :: j
       real(dp), intent(in), contiguous :: z(:)         !! M r for Q = 1
       type(z_sums_type), intent(out) :: sums
-      real(dp) :: factor, least
+      real(dp) :: factor
+      logical :: keeps
       integer :: i, n
 
       n = self%patch%inner(j)
       factor = 1.0_dp/now%problem%modulus
-      least = 0.0_dp
-      if (self%patch%periodic .and. now%problem%control == control_approach) least = -huge(1.0_dp)
-      call take_cells(factor, least, z(1:n), now%state(1:n, j), self%residual(1:n, j), self%old(1:n, j), &
-         self%exchange(1:n, j), sums)
+      keeps = .not. (self%patch%periodic .and. now%problem%control == control_approach)
+      call take_cells(factor, keeps, z(1:n), now%state(1:n, j), self%residual(1:n, j), self%old(1:n, j), &
+         self%exchange(1:n, j), sums%rz, sums%old_rz)
       do i = n + 1, self%patch%mx
          self%exchange(i, j) = factor*z(i) + level_z*self%patch%psi(i, j)
       end do
@@ -119,29 +120,6 @@ contains
       sums%old_rz = sums%old_rz + row_product(self%exchange(n + 1:, j), self%old(n + 1:, j))
    end subroutine take_z_row
 
-   !> z = factor M r on the free cells, at least `least` in those in contact, 0 on the others; r.z and z.(old r).
-   pure subroutine take_cells(factor, least, image, state, residual, old, z, sums)
-      real(dp), intent(in) :: factor, least
-      real(dp), intent(in), contiguous :: image(:)           !! M r
-      real(dp), intent(in), contiguous :: state(:)           !! g, m
-      real(dp), intent(in), contiguous :: residual(:), old(:)
-      real(dp), intent(out), contiguous :: z(:)
-      type(z_sums_type), intent(inout) :: sums
-      real(dp) :: rz, old_rz
-      integer :: i
-
-      rz = 0.0_dp
-      old_rz = 0.0_dp
-      !$omp simd reduction(+: rz, old_rz)
-      do i = 1, size(z)
-         z(i) = merge(factor*image(i), 0.0_dp, state(i) > 0.0_dp .or. residual(i) > 0.0_dp)
-         z(i) = max(z(i), merge(-huge(1.0_dp), least, state(i) > 0.0_dp))
-         rz = rz + z(i)*residual(i)
-         old_rz = old_rz + z(i)*old(i)
-      end do
-      sums%rz = rz
-      sums%old_rz = old_rz
-   end subroutine take_cells
 
    !> Subtract the mean from a row of z, set z to 0 in cells in contact that it would close, and form the sums.
    subroutine center_row(self, now, pass, mean, j, sums)
@@ -238,32 +216,5 @@ contains
       row(1) = row(1) + row_product(self%residual(n + 1:, j), self%direction(n + 1:, j))
    end subroutine turn_row
 
-   !> d = z + beta d on the cells that are free or that z opens, 0 on the others, and the change of the displacement;
-   !> r.d and d.e'' d, and the greatest |d|/(g + z_0).
-   pure subroutine turn_cells(state, z, residual, curvature, beta, length, lift, d, change, sums, quickest)
-      real(dp), intent(in), contiguous :: state(:), z(:)     !! g and z, m
-      real(dp), intent(in), contiguous :: residual(:)        !! r, Pa
-      real(dp), intent(in), contiguous :: curvature(:)       !! e'', Pa/m
-      real(dp), intent(in) :: beta
-      real(dp), intent(in) :: length, lift                   !! z_0 and d of the level, m
-      real(dp), intent(inout), contiguous :: d(:)
-      real(dp), intent(out), contiguous :: change(:)
-      real(dp), intent(out) :: sums(2), quickest
-      real(dp) :: slope, bend
-      integer :: i
-
-      quickest = 0.0_dp
-      slope = 0.0_dp
-      bend = 0.0_dp
-      !$omp simd reduction(max: quickest) reduction(+: slope, bend)
-      do i = 1, size(d)
-         d(i) = merge(z(i) + beta*d(i), 0.0_dp, state(i) > 0.0_dp .or. z(i) > 0.0_dp)
-         change(i) = d(i) + lift
-         quickest = max(quickest, abs(d(i))/(state(i) + length))
-         slope = slope + residual(i)*d(i)
-         bend = bend + d(i)*curvature(i)*d(i)
-      end do
-      sums(:) = [slope, bend]
-   end subroutine turn_cells
 
 end module adhesion_directions

@@ -6,6 +6,7 @@ module adhesion_residual
    use adhesion_patch, only : evaluate_gradient
    use adhesion_potential, only : adhesive_slopes
    use adhesion_state, only : control_approach, control_pressure, diagonal_scaling
+   use adhesion_sweeps, only : measure_cells
    use adhesion_work, only : adhesion_iteration_type, adhesion_work_type
    use asperity_precision, only : dp
    use field_sums, only : largest_of_rows, least_of_rows
@@ -87,15 +88,14 @@ contains
       real(dp), intent(inout) :: worst                 !! natural residual
       real(dp), intent(inout) :: least                 !! least gap, m
       real(dp), intent(out) :: padding                 !! psi.r of the padding, Pa
-      real(dp) :: slope(self%patch%inner(j)), r, per_traction
+      real(dp) :: r, per_traction
       integer :: i, n
 
       n = self%patch%inner(j)
       per_traction = 1.0_dp/now%units%traction
-      call adhesive_slopes(now%problem%potential, now%state(1:n, j), slope, self%curvature(1:n, j))
-      slope(:) = now%traction(1:n, j) + slope + now%load
-      call measure_cells(now%state(1:n, j), slope, 1.0_dp/now%units%length, per_traction, self%residual(1:n, j), &
-         worst, least)
+      call adhesive_slopes(now%problem%potential, now%state(1:n, j), self%residual(1:n, j), self%curvature(1:n, j))
+      call measure_cells(now%state(1:n, j), now%traction(1:n, j), now%load, 1.0_dp/now%units%length, per_traction, &
+         self%residual(1:n, j), worst, least)
       padding = 0.0_dp
       do i = n + 1, self%patch%mx
          r = -now%traction(i, j)
@@ -113,20 +113,5 @@ contains
       end if
    end subroutine measure_row
 
-   !> r of the cells of a row, from G.
-   pure subroutine measure_cells(gap, gradient, per_length, per_traction, residual, worst, least)
-      real(dp), intent(in), contiguous :: gap(:), gradient(:)    !! g, m, and G, Pa
-      real(dp), intent(in) :: per_length, per_traction           !! 1/m, 1/Pa
-      real(dp), intent(out), contiguous :: residual(:)           !! r, Pa
-      real(dp), intent(inout) :: worst                           !! natural residual
-      real(dp), intent(inout) :: least                           !! least gap, m
-      integer :: i
-
-      do i = 1, size(gap)
-         worst = max(worst, abs(min(gap(i)*per_length, gradient(i)*per_traction)))
-         least = min(least, gap(i))
-         residual(i) = merge(-gradient(i), 0.0_dp, max(gap(i), -gradient(i)) > 0.0_dp)
-      end do
-   end subroutine measure_cells
 
 end module adhesion_residual

@@ -1,0 +1,130 @@
+!> The innermost loops of the fast method for adhesive contact: passes over the cells of a row.
+!>
+!> They stand in a module of their own because the compiler vectorises them only as procedures whose arguments are
+!> known not to overlap. If it inlines them into the parallel loops that call them, it loses that knowledge. A loop
+!> that selects values does not compute any for the same reason: the compiler would compute them under the condition,
+!> which prevents it from vectorising the loop.
+module adhesion_sweeps
+   use asperity_precision, only : dp
+   use field_sums, only : row_product
+   implicit none
+   private
+
+   public :: measure_cells, move_cells, take_cells, turn_cells
+
+contains
+
+   !> r of the cells of a row, from the attraction: G = P + e'(g) and r = -G in the cells that are free.
+   pure subroutine measure_cells(gap, traction, load, per_length, per_traction, residual, worst, least)
+      real(dp), intent(in), contiguous :: gap(:)                 !! g, m
+      real(dp), intent(in), contiguous :: traction(:)            !! P without the load, Pa
+      real(dp), intent(in) :: load                               !! Pa
+      real(dp), intent(in) :: per_length, per_traction           !! 1/m, 1/Pa
+      real(dp), intent(inout), contiguous :: residual(:)         !! in: e'; out: r, Pa
+      real(dp), intent(inout) :: worst                           !! natural residual
+      real(dp), intent(inout) :: least                           !! least gap, m
+      real(dp) :: gradient
+      integer :: i
+
+      do i = 1, size(gap)
+         residual(i) = traction(i) + residual(i) + load
+      end do
+      do i = 1, size(gap)
+         gradient = residual(i)
+         worst = max(worst, abs(min(gap(i)*per_length, gradient*per_traction)))
+         least = min(least, gap(i))
+         residual(i) = merge(-gradient, 0.0_dp, max(gap(i), -gradient) > 0.0_dp)
+      end do
+   end subroutine measure_cells
+
+   !> z = factor M r on the free cells, 0 on the others, with r.z and z.(old r).
+   pure subroutine take_cells(factor, keeps, image, state, residual, old, z, rz, old_rz)
+      real(dp), intent(in) :: factor
+      logical, intent(in) :: keeps                           !! 0, too, in cells in contact that z would close
+      real(dp), intent(in), contiguous :: image(:)           !! M r
+      real(dp), intent(in), contiguous :: state(:)           !! g, m
+      real(dp), intent(in), contiguous :: residual(:), old(:)
+      real(dp), intent(out), contiguous :: z(:)
+      real(dp), intent(out) :: rz, old_rz
+      integer :: i
+
+      do i = 1, size(z)
+         z(i) = factor*image(i)
+      end do
+      do i = 1, size(z)
+         z(i) = merge(z(i), 0.0_dp, max(state(i), residual(i)) > 0.0_dp)
+      end do
+      if (keeps) then
+         do i = 1, size(z)
+            z(i) = max(z(i), merge(-huge(1.0_dp), 0.0_dp, state(i) > 0.0_dp))
+         end do
+      end if
+      rz = row_product(z, residual)
+      old_rz = row_product(z, old)
+   end subroutine take_cells
+
+   !> d = z + beta d on the cells that are free or that z opens, 0 on the others, and the change of the displacement;
+   !> r.d and d.e'' d, and the greatest |d|/(g + z_0).
+   pure subroutine turn_cells(state, z, residual, curvature, beta, length, lift, d, change, sums, quickest)
+      real(dp), intent(in), contiguous :: state(:), z(:)     !! g and z, m
+      real(dp), intent(in), contiguous :: residual(:)        !! r, Pa
+      real(dp), intent(in), contiguous :: curvature(:)       !! e'', Pa/m
+      real(dp), intent(in) :: beta
+      real(dp), intent(in) :: length, lift                   !! z_0 and d of the level, m
+      real(dp), intent(inout), contiguous :: d(:)
+      real(dp), intent(out), contiguous :: change(:)
+      real(dp), intent(out) :: sums(2), quickest
+      real(dp) :: turned
+      integer :: i
+
+      quickest = 0.0_dp
+      do i = 1, size(d)
+         d(i) = z(i) + beta*d(i)
+      end do
+      do i = 1, size(d)
+         turned = merge(d(i), 0.0_dp, max(state(i), z(i)) > 0.0_dp)
+         d(i) = turned
+         change(i) = turned + lift
+         quickest = max(quickest, abs(turned)/(state(i) + length))
+      end do
+      sums(:) = [row_product(residual, d), row_form(curvature, d)]
+   end subroutine turn_cells
+
+   !> d.w d, in the order of `row_product`.
+   pure function row_form(weight, d) result(total)
+      real(dp), intent(in), contiguous :: weight(:), d(:)
+      real(dp) :: total
+      real(dp) :: parts(4)
+      integer :: i, whole
+
+      whole = size(d) - modulo(size(d), 4)
+      parts(:) = 0.0_dp
+      do i = 1, whole, 4
+         parts(:) = parts + d(i:i + 3)*(weight(i:i + 3)*d(i:i + 3))
+      end do
+      total = (parts(1) + parts(3)) + (parts(2) + parts(4))
+      do i = whole + 1, size(d)
+         total = total + d(i)*(weight(i)*d(i))
+      end do
+   end function row_form
+
+   !> g = g + alpha d, closed where it would be negative; by how much, and the most of it.
+   pure subroutine move_cells(alpha, d, state, change, most)
+      real(dp), intent(in) :: alpha
+      real(dp), intent(in), contiguous :: d(:)               !! m
+      real(dp), intent(inout), contiguous :: state(:)        !! g, m
+      real(dp), intent(out), contiguous :: change(:)         !! m
+      real(dp), intent(out) :: most
+      real(dp) :: trial
+      integer :: i
+
+      most = 0.0_dp
+      do i = 1, size(d)
+         trial = state(i) + alpha*d(i)
+         state(i) = max(trial, 0.0_dp)
+         change(i) = state(i) - trial
+         most = max(most, change(i))
+      end do
+   end subroutine move_cells
+
+end module adhesion_sweeps
