@@ -199,7 +199,7 @@ contains
       end do
       call s%active%list_runs(0.0_dp, s%preconditioner%residual, direction, step)
       call s%active%list_wide_runs(s%preconditioner%search, far=.false.)
-      call s%preconditioner%set_residual(s%coarse, s%active, 1.0_dp, 0.0_dp, pressure, gap)
+      call s%preconditioner%set_residual(s%coarse, s%active, 1.0_dp, 0.0_dp, pressure, gap, step)
       call s%preconditioner%extend(s%coarse, s%active, steps, form)
       do jb = 1, s%coarse%ny
          do j = s%coarse%first_y(jb), s%coarse%first_y(jb + 1) - 1

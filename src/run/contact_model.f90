@@ -150,17 +150,15 @@ contains
    end function holds
 
    !> Solve the normal contact under the row's load.
-   subroutine solve_normal(self, plan, tolerance, outcome, one_of_many, displaced)
+   subroutine solve_normal(self, plan, tolerance, outcome, displaced)
       class(contact_type), intent(inout) :: self
       type(planned_row_type), intent(in) :: plan
       real(dp), intent(in) :: tolerance
       type(solver_result_type), intent(out) :: outcome
-      logical, intent(in), optional :: one_of_many  !! several solves of a row, each of which starts where the last ended
       logical, intent(in), optional :: displaced    !! without adhesion: `gap` holds the displacement U, m
       type(normal_task_type) :: task
 
       task = normal_task_type(plan%control, plan%load, self%material%q, self%state%first)
-      if (present(one_of_many)) task%one_of_many = one_of_many
       if (present(displaced)) task%displaced = displaced
       self%side%tolerance = tolerance
       ! Without arms `past` is not allocated, and therefore an absent argument.

@@ -230,7 +230,7 @@ contains
       end if
       call displaced(contact%road, plan%road(1), plan%road(2), self%place(:, 1, :), self%place(:, 2, :), &
          contact%height, contact%slope_x, contact%slope_y)
-      call solve_normal(contact, plan, accuracy, part, one_of_many=.true., displaced=self%gap_known)
+      call solve_normal(contact, plan, accuracy, part, displaced=self%gap_known)
       ! A pressure that misses the load is scaled to it at the start of the next solve.
       self%gap_known = .not. contact%side%adhesive .and. part%load_error <= exact_load
       normal%stopped = part%stopped

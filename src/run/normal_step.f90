@@ -32,7 +32,6 @@ module normal_step
       real(dp) :: load = 0.0_dp                    !! Pa, N or m
       real(dp) :: modulus = 0.0_dp                 !! Q, Pa
       logical :: first = .false.                   !! there is no state yet
-      logical :: one_of_many = .false.             !! several solves of a row, each of which starts where the last ended
       !> Without adhesion: the gap handed in is the displacement U of the pressure handed in, m.
       logical :: displaced = .false.
    end type normal_task_type
@@ -200,7 +199,6 @@ contains
       problem%max_iterations = self%max_iterations
       problem%rms_height = self%rms_height
       problem%warm = .not. task%first
-      problem%one_of_many = task%one_of_many
       problem%displaced = task%displaced
       call load_of(self, task, problem%control, problem%target)
       call self%normal%solve(problem, height, pressure, gap, level, outcome, past)

@@ -5,7 +5,8 @@
 !> where A is the operator for unit shear modulus, c = 1/modulus, and P_h a given traction (the memory
 !> of a viscoelastic material; nothing else changes with it). After Polonsky and Keer (1999), with
 !> * the exact projection on {P >= 0, sum P = load} instead of a rescaling;
-!> * the direction kept through changes of the contact set (Fletcher-Reeves);
+!> * the direction kept through changes of the contact set (Fletcher-Reeves, and Polak-Ribiere where that loses the
+!>   conjugacy of the directions);
 !> * a preconditioner ~ |q| that consists of a local stencil and block means, for which the residual is extended
 !>   outside the contact (module `schur_preconditioner`);
 !> * the step length predicted on the block means, so that the clipped step s is known before the
@@ -18,12 +19,13 @@
 !> direction and the step.
 !>
 !> The solve has converged if the duality gap e1 = (mean gap under the pressure - least gap)/h_rms and the
-!> error of the load, both of a new product U = A P, are below the tolerance. If the contact is small on a tall
+!> error of the load are below the tolerance. If the contact is small on a tall
 !> map, a smaller scale than h_rms is used (`narrow_scale` of module `normal_state`).
 !>
 !> In mixed precision the products A s of the steps are in single precision, because their errors are small
 !> compared with s. The pressure and the gap remain in double precision. Module `gap_watch` decides when the gap
-!> is computed again in double precision, and when single precision is no longer useful.
+!> is computed again from the pressure in double precision, which always precedes the end of a solve in mixed
+!> precision, and when single precision is no longer useful.
 !>
 !> Fields of doubles: H, P, gap and step; three fields in single precision (the direction, the residual
 !> and the search direction of the preconditioner); the operator's spectrum, in whose memory lie two more
@@ -111,7 +113,7 @@ contains
          outcome%stopped = stop_is_due()
          if (outcome%stopped) return
          outcome%iterations = outcome%iterations + 1
-         call choose_direction(self%work, task, measure, pressure, gap, now)
+         call choose_direction(self%work, task, measure, pressure, gap, self%step, now)
          call choose_step(self%work, product, task, measure%level, pressure, gap, self%step, now)
          if (now%alpha > 0.0_dp) then
             call update_state(self%work, product, task%target, now%alpha/task%modulus, now%alpha, &
@@ -133,7 +135,7 @@ contains
          self%work%offset = 0.0_dp
          cells = self%grid%cells()
          call prepare_problem(problem, self%grid, self%operator%threads, height, task, determined)
-         call new_gap_watch(watch, self%mixed, task%tolerance, task%one_of_many)
+         call new_gap_watch(watch, self%mixed, task%tolerance)
          product => self%operator
          if (watch%single) product => self%quick
          call first_pressure(task, self%grid, product, height, pressure, past)
@@ -152,12 +154,13 @@ contains
 
          if (now%phase == phase_ended) return
          measure = combine_measures(task, cells, total(self%work%state))
+         call compare_with_scale()
+         call watch%note_error(measure%error, task%tolerance*task%scale/task%rms_height)
          if (watch%is_due(measure%strict <= task%tolerance)) then
             call watch%expect(measure%error)
             call compute_gap()
+            call compare_with_scale()
          end if
-         if (watch%proves() .and. measure%error <= task%tolerance) &
-            call narrow_scale(task, height, pressure, self%operator%threads, measure)
          if (measure%strict <= task%tolerance) then
             now%phase = phase_ended
             return
@@ -173,6 +176,12 @@ contains
                far=far_rim_pays(cells, measure%contact))
          end associate
       end subroutine measure_state
+
+      !> If the state seems to be solved, compare its error with the scale that belongs to it.
+      subroutine compare_with_scale()
+         if (measure%strict <= task%tolerance) &
+            call narrow_scale(task, height, pressure, self%operator%threads, measure)
+      end subroutine compare_with_scale
 
       !> Compute the gap by a product of the whole pressure, and measure it.
       subroutine compute_gap()

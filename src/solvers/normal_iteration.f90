@@ -16,7 +16,7 @@
 module normal_iteration
    use asperity_precision, only : dp
    use fft_conv, only : columns_apply, convolution_type
-   use normal_passes, only : new_direction, normal_work_type
+   use normal_passes, only : new_direction, normal_work_type, overlap_with
    use normal_projection, only : clip_step, clip_type, find_clip, keep_block_sums, longest_multiple, try_pressure
    use normal_state, only : control_pressure, gap_measure_type, normal_problem_type, reason_iterations
    use normal_sums, only : step_sums_type, trial_sums_type
@@ -45,6 +45,8 @@ module normal_iteration
    real(dp), parameter :: some_contact = 0.03_dp  !! part of the cells in contact from which the far rim pays,
    real(dp), parameter :: much_contact = 0.3_dp   !! and from which more steps pay
    real(dp), parameter :: large = 1.5e6_dp        !! cells from which they pay
+
+   real(dp), parameter :: suspicious = 0.15_dp    !! beta from which directions may have lost their conjugacy
 
    real(dp), parameter :: most_contact = 0.5_dp   !! part of the cells in contact from which the mean needs more
 
@@ -79,11 +81,12 @@ contains
    end function far_rim_pays
 
    !> Choose the direction of an iteration according to the phase, and set the phase of the next one.
-   subroutine choose_direction(work, task, measure, pressure, gap, now)
+   subroutine choose_direction(work, task, measure, pressure, gap, before, now)
       type(normal_work_type), intent(inout) :: work
       type(normal_problem_type), intent(in) :: task
       type(gap_measure_type), intent(in) :: measure
       real(dp), contiguous, intent(in) :: pressure(:, :), gap(:, :)
+      real(dp), contiguous, intent(inout) :: before(:, :)  !! work field, for the residual before
       type(iteration_type), intent(inout) :: now
       real(dp) :: rz, beta
       integer :: steps
@@ -91,7 +94,7 @@ contains
 
       fixed_load = task%control == control_pressure
       call work%preconditioner%set_residual(work%coarse, work%active, work%scale, measure%level, &
-         pressure, gap)
+         pressure, gap, before)
       work%preconditioner%waves%fixed_load = fixed_load
       steps = few_steps
       if (measure%contact > much_contact) steps = merge(most_steps, more_steps, work%grid%cells() >= large)
@@ -99,8 +102,7 @@ contains
       if (.not. fixed_load .and. mostly_touches(work, measure%contact)) &
          call work%preconditioner%blocks%shift_mean(work%coarse, work%grid%cells()*(1.0_dp - measure%contact), rz)
       beta = 0.0_dp
-      if (now%phase == phase_conjugate .and. now%rz > 0.0_dp) &
-         beta = max(rz - work%preconditioner%overlap, 0.0_dp)/now%rz
+      if (now%phase == phase_conjugate .and. now%rz > 0.0_dp) beta = old_part(work, before, rz, now%rz)
       now%rz = rz
       now%slope = 0.0_dp
       if (now%phase /= phase_plain) then
@@ -115,6 +117,28 @@ contains
       end if
       if (now%slope <= 0.0_dp) call end_loop(now, 'no direction of descent is left')
    end subroutine choose_direction
+
+   !> Compute beta, the multiple of the old direction that the new one keeps.
+   !>
+   !> Fletcher and Reeves's beta = r.z/(r.z before) is best while the contact changes. But once such changes have spoilt
+   !> the conjugacy of the directions, it never recovers: each direction then consists mostly of the old ones, and r.z
+   !> falls by a half instead of a tenth in each iteration. What r.z contains of the residual before is therefore left
+   !> out (Polak and Ribiere's beta) where beta is so large.
+   function old_part(work, before, rz, rz_before) result(beta)
+      type(normal_work_type), intent(in) :: work
+      real(dp), contiguous, intent(in) :: before(:, :)
+      real(dp), intent(in) :: rz, rz_before
+      real(dp) :: beta
+      real(dp) :: overlap
+
+      overlap = 0.0_dp
+      if (work%preconditioner%by_waves) then
+         overlap = work%preconditioner%overlap
+      else if (rz > suspicious*rz_before) then
+         overlap = max(overlap_with(work, before), 0.0_dp)
+      end if
+      beta = max(rz - overlap, 0.0_dp)/rz_before
+   end function old_part
 
    !> Do so many cells touch that the mean pressure at a given approach depends on the few open ones? Module
    !> `wave_preconditioner` takes care of that itself.

@@ -9,15 +9,16 @@ module normal_passes
    use asperity_errors, only : error_type
    use fft_conv, only : convolution_type
    use normal_state, only : row_measure
+   use field_sums, only : row_total
    use normal_sums, only : direction_sums_type, state_sums_type, total
-   use normal_sweeps, only : direction_cells, load_cells
+   use normal_sweeps, only : direction_cells, load_cells, overlap_cells
    use asperity_precision, only : dp, sp
    use regular_grid, only : grid_type
    use schur_preconditioner, only : new_schur_preconditioner, schur_preconditioner_type
    implicit none
    private
 
-   public :: new_direction, new_normal_work, normal_work_type, survey, update_state
+   public :: new_direction, new_normal_work, normal_work_type, overlap_with, survey, update_state
 
    !> The work fields of a solver, with the active blocks, the preconditioner and the sums.
    type :: normal_work_type
@@ -77,6 +78,40 @@ contains
          call self%active%survey_row(.true., j, pressure(:, j), gap(:, j), self%state(j)%least)
       end do
    end subroutine survey
+
+   !> Product of z = M r with the residual before.
+   function overlap_with(self, before) result(overlap)
+      type(normal_work_type), intent(in), target :: self
+      real(dp), intent(in) :: before(self%grid%nx, self%grid%rows())
+      real(dp) :: overlap
+      real(dp), allocatable :: rows(:)
+      real(sp), allocatable :: correction(:)
+      real(sp), pointer, contiguous :: response(:)
+      integer :: j, k, jb
+
+      allocate (rows(self%grid%rows()), source=0.0_dp)
+      !$omp parallel default(none) shared(self, before, rows) private(j, k, jb, correction, response) &
+      !$omp num_threads(self%threads)
+      allocate (correction(self%grid%nx))
+      !$omp do schedule(dynamic)
+      do jb = self%coarse%strips(1), self%coarse%strips(2)
+         correction(:) = real(self%preconditioner%blocks%pending(self%coarse%block_x, jb), sp)
+         do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
+            ! The response is not set where the length is 0.
+            response => self%preconditioner%image(:, j)
+            if (self%preconditioner%length > 0.0_sp) response => self%preconditioner%response(:, j)
+            do k = 1, self%active%runs(j)
+               associate (a => self%active%first(k, j), b => self%active%last(k, j))
+                  rows(j) = rows(j) + overlap_cells(b - a + 1, self%preconditioner%length, &
+                     self%preconditioner%image(a:b, j), response(a:b), correction(a:b), &
+                     self%preconditioner%residual(a:b, j), before(a:b, j))
+               end associate
+            end do
+         end do
+      end do
+      !$omp end parallel
+      overlap = row_total(rows)
+   end function overlap_with
 
    !> Compute direction = z + beta direction where it acts: on S, except in cells without pressure in which z is
    !> negative. The constant that makes sum(direction) zero is kept in `offset` and not subtracted; the products and

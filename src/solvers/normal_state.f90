@@ -31,7 +31,6 @@ module normal_state
       real(dp) :: tolerance = 1e-6_dp       !! of the duality gap and of the load
       integer :: max_iterations = 1000
       logical :: warm = .false.             !! the pressure handed in is a start
-      logical :: one_of_many = .false.      !! solves of one step, see module gap_watch
       logical :: displaced = .false.        !! the gap handed in is the displacement U of that start
       real(dp) :: rms_height = 0.0_dp       !! of H about its mean, m; 0: not known yet
       real(dp) :: datum = 0.0_dp            !! highest point of H; set here, m

@@ -13,27 +13,47 @@ module normal_sweeps
    private
 
    public :: above_cells, clip_cells, direction_cells, load_cells, longest_cells, &
-      residual_cells, trial_cells
+      overlap_cells, residual_cells, trial_cells
 
 contains
 
-   !> Compute the residual scale (level - gap) on S = {P > 0 or gap < level}, and zero elsewhere.
-   pure subroutine residual_cells(n, scale, level, pressure, gap, residual, column)
+   !> Compute the residual scale (level - gap) on S = {P > 0 or gap < level}, and zero elsewhere. The residual before is
+   !> kept.
+   pure subroutine residual_cells(n, scale, level, pressure, gap, residual, before, column)
       integer, intent(in) :: n
       real(dp), intent(in) :: scale, level
       real(dp), intent(in) :: pressure(n), gap(n)
       real(sp), intent(inout) :: residual(n)
+      real(dp), intent(inout) :: before(n)
       real(sp), intent(inout) :: column(n)          !! sums over the rows of a block
       real(dp) :: g
       integer :: i
 
       !$omp simd private(g)
       do i = 1, n
+         before(i) = residual(i)
          g = level - gap(i)
          residual(i) = real(scale*g*positive(max(g, pressure(i))), sp)
          column(i) = column(i) + residual(i)
       end do
    end subroutine residual_cells
+
+   !> Product of z = M r with the residual before, on the present S.
+   pure function overlap_cells(n, length, image, response, correction, residual, before) result(overlap)
+      integer, intent(in) :: n
+      real(sp), intent(in) :: length
+      real(sp), intent(in) :: image(n), response(n), correction(n)   !! z = image + length response + ...
+      real(sp), intent(in) :: residual(n)
+      real(dp), intent(in) :: before(n)
+      real(dp) :: overlap
+      integer :: i
+
+      overlap = 0.0_dp
+      !$omp simd reduction(+:overlap)
+      do i = 1, n
+         overlap = overlap + acts(residual(i))*(image(i) + length*response(i) + correction(i))*before(i)
+      end do
+   end function overlap_cells
 
    !> Compute direction = z + beta (direction - offset) with z = M r where it acts: on S, except in cells without
    !> pressure in which z is negative.

@@ -31,6 +31,7 @@ module schur_passes
       integer :: threads = 1
       real(sp) :: weights(3) = 0.0_sp                    !! of the stencil: centre, along x, along y
       type(schur_blocks_type) :: blocks                  !! coarse parts and sums of each block
+      type(image_sums_type) :: sums                      !! of the residual and its image
       real(sp), allocatable :: residual(:, :)            !! (0:nx+1, 0:ny+1), v on S, 0 on N
       real(sp), allocatable :: search(:, :)              !! (0:nx+1, 0:ny+1), d, 0 on S
       real(sp), pointer, contiguous :: image(:, :) => null()      !! [nx, ny], b
@@ -47,21 +48,21 @@ module schur_passes
 contains
 
    !> The residual scale (level - gap) on S = {P > 0 or gap < level}, its block means, and K of it.
-   subroutine residual_pass(self, coarse, active, scale, level, pressure, gap, sums)
+   subroutine residual_pass(self, coarse, active, scale, level, pressure, gap, before)
       class(schur_fields_type), intent(inout) :: self
       type(coarse_level_type), intent(inout) :: coarse
       type(active_blocks_type), intent(in) :: active
       real(dp), intent(in) :: scale                      !! a power of two
       real(dp), intent(in) :: level                      !! m
       real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows()), gap(self%grid%nx, self%grid%rows())
-      type(image_sums_type), intent(out) :: sums
+      real(dp), intent(inout) :: before(self%grid%nx, self%grid%rows())   !! out: the residual before
       type(image_sums_type), allocatable :: rows(:)
       real(sp), allocatable :: column(:)
       real(dp) :: totals(2)
       integer :: j, k, jb
 
       allocate (rows(self%grid%rows()))
-      !$omp parallel default(none) shared(self, coarse, active, scale, level, pressure, gap, rows) &
+      !$omp parallel default(none) shared(self, coarse, active, scale, level, pressure, gap, before, rows) &
       !$omp private(j, k, jb, column) num_threads(self%threads)
       allocate (column(self%grid%nx))
       !$omp do schedule(dynamic)
@@ -71,7 +72,7 @@ contains
             do k = 1, active%runs(j)
                associate (first => active%first(k, j))
                   call residual_cells(active%last(k, j) - first + 1, scale, level, pressure(first, j), &
-                     gap(first, j), self%residual(first, j), column(first))
+                     gap(first, j), self%residual(first, j), before(first, j), column(first))
                end associate
             end do
             call close_row(self, self%residual(:, j))
@@ -96,7 +97,7 @@ contains
       call coarse%share_blocks(self%blocks%image_off)
       call coarse%share_blocks(self%blocks%cells_off)
       totals = row_totals(transpose(reshape([rows%form, rows%square], [size(rows), 2])))
-      sums = image_sums_type(totals(1), totals(2))
+      self%sums = image_sums_type(totals(1), totals(2))
    end subroutine residual_pass
 
    !> K of the residual in some rows of a block.

@@ -39,7 +39,7 @@ module schur_preconditioner
    use schur_blocks, only : new_schur_blocks
    use schur_coarse, only : om, stencil_c1
    use schur_passes, only : residual_pass, schur_fields_type, search_pass, step_type
-   use schur_sweeps, only : image_sums_type, response_sums_type
+   use schur_sweeps, only : response_sums_type
    use wave_preconditioner, only : new_wave_preconditioner, wave_preconditioner_type
    implicit none
    private
@@ -60,7 +60,6 @@ module schur_preconditioner
       real(dp) :: overlap = 0.0_dp                       !! (r before).M r, if by waves; `search` holds r before
       type(wave_preconditioner_type) :: waves
       logical, private :: owns = .false.                 !! this object frees the image and the response
-      type(image_sums_type), private :: sums
    contains
       procedure :: set_residual
       procedure :: extend
@@ -109,19 +108,21 @@ contains
       if (self%by_waves) call new_wave_preconditioner(self%waves, grid, coarse, error)
    end subroutine new_schur_preconditioner
 
-   !> The residual scale (level - gap) on S = {P > 0 or gap < level}, its block means, and K of it.
-   subroutine set_residual(self, coarse, active, scale, level, pressure, gap)
+   !> The residual scale (level - gap) on S = {P > 0 or gap < level}, its block means, and K of it. The residual before
+   !> is kept, except if M r comes from `waves`.
+   subroutine set_residual(self, coarse, active, scale, level, pressure, gap, before)
       class(schur_preconditioner_type), intent(inout) :: self
       type(coarse_level_type), intent(inout) :: coarse
       type(active_blocks_type), intent(in) :: active
       real(dp), intent(in) :: scale                      !! a power of two
       real(dp), intent(in) :: level                      !! m
       real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows()), gap(self%grid%nx, self%grid%rows())
+      real(dp), intent(inout) :: before(self%grid%nx, self%grid%rows())   !! out: the residual before
 
       if (self%by_waves) then
          call self%waves%set_residual(coarse, active, scale, level, pressure, gap, self%residual)
       else
-         call residual_pass(self, coarse, active, scale, level, pressure, gap, self%sums)
+         call residual_pass(self, coarse, active, scale, level, pressure, gap, before)
       end if
    end subroutine set_residual
 
