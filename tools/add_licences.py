@@ -27,7 +27,9 @@ publish under the version named.
 """
 
 
-BUILT = {"libhdf5": ("hdf5", "hdf5"), "libfftw3": ("fftw3", "fftw3")}  # licence, pkg-config
+GCC = ("gcc-runtime", "gcc-runtime")
+BUILT = {"libhdf5": ("hdf5", "hdf5"), "libfftw3": ("fftw3", "fftw3"), "libgfortran": GCC,
+         "libgomp": GCC, "libquadmath": GCC}  # licence, pkg-config
 
 
 def output_of(*words):

@@ -1,16 +1,13 @@
 #!/bin/sh
 # Build the source archive and, from it, a wheel that carries its shared libraries: build/dist.
-# About two minutes. On Linux only; the wheel runs where the C library is as new as here.
+# About two minutes. On Linux only; the wheel runs where the C library is as new as here
+# (tools/make_portable_wheel.sh builds one for older systems).
 # The libraries are those of the system, or of tools/build_libraries.sh PREFIX where ASPERITY_LIBRARIES=PREFIX.
 set -eu
 caller=$PWD
 cd "$(dirname "$0")/.."
 . tools/setup.sh
-if ! [ .venv/ready_wheel -nt tools/requirements_wheel.txt ] || ! [ .venv/ready_wheel -nt .venv/ready ]; then
-  echo "asperity: installing the tools that build wheels into .venv" >&2
-  python -m pip install -q --disable-pip-version-check -r tools/requirements_wheel.txt
-  touch .venv/ready_wheel
-fi
+. tools/setup_wheel.sh
 
 if [ -n "${ASPERITY_LIBRARIES:-}" ]; then
   ASPERITY_LIBRARIES=$(cd "$caller" && cd "$ASPERITY_LIBRARIES" && pwd)
@@ -23,6 +20,7 @@ rm -rf build/dist build/plain
 python -m build --no-isolation -o build/plain .
 auditwheel repair -w build/plain/repaired build/plain/*.whl
 python tools/add_licences.py build/plain/repaired/*.whl
+twine check --strict build/plain/repaired/*.whl build/plain/*.tar.gz
 mkdir -p build/dist
 mv build/plain/repaired/*.whl build/plain/*.tar.gz build/dist
 rm -rf build/plain

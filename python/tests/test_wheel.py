@@ -2,7 +2,8 @@
 
     python -m pytest -m slow python/tests/test_wheel.py
 
-The build takes minutes: `.ci/run` runs these tests, `./test.sh` does not.
+The build takes minutes: `.ci/run` runs these tests, `./test.sh` does not. They examine the wheel of
+`tools/make_wheel.sh`, or that of `tools/make_portable_wheel.sh` if ASPERITY_PORTABLE_WHEEL is set.
 """
 
 import os
@@ -19,6 +20,9 @@ from conftest import ROOT
 pytestmark = pytest.mark.slow
 
 VERSION = (ROOT / "VERSION").read_text().strip()
+PORTABLE = bool(os.environ.get("ASPERITY_PORTABLE_WHEEL"))
+FROM_OTHERS = re.compile("_?Py|inflate|deflate|compress|crc32|adler32|zlib")  # Python and zlib
+NETWORK = re.compile(r"lib(curl|krb5|gssapi|ldap|crypto|ssl|sz|aec)")
 OURS = re.compile(r"lib(fftw3f?|hdf5\w*|gfortran|gomp|quadmath|sz|aec)[-.]")
 
 
@@ -27,7 +31,10 @@ def built():
     """Build the archive and the wheel; return their folder."""
     if not (ROOT / ".git").exists():
         pytest.skip("the archive is made from a git repository")
-    subprocess.run(["sh", "tools/make_wheel.sh"], cwd=ROOT, check=True, capture_output=True)
+    script = "make_portable_wheel.sh" if PORTABLE else "make_wheel.sh"
+    done = subprocess.run(["sh", f"tools/{script}"], cwd=ROOT, capture_output=True, text=True,
+                          check=False)
+    assert done.returncode == 0, (done.stdout + done.stderr)[-5000:]
     return ROOT / "build" / "dist"
 
 
@@ -92,6 +99,36 @@ def test_the_wheel_holds_the_package_the_program_and_the_licences(built):
     assert any(re.search(r"dist-info/(licenses/)?LICENSE$", name) for name in names)
     assert not any("test" in name for name in names)
     assert "Contact of a viscoelastic solid" in metadata and "# Asperity" in metadata
+
+
+def symbols(path, which):
+    """Return the dynamic symbols of a shared object as triples of kind, name and version."""
+    lines = subprocess.run(["nm", "-D", which, str(path)], check=True, capture_output=True,
+                           text=True).stdout.splitlines()
+    words = [line.split()[-2:] for line in lines]
+    return [(kind, *re.split("@+", name + "@")[:2]) for kind, name in words]
+
+
+@pytest.mark.skipif(not PORTABLE, reason="an ordinary wheel asks for the C library of its system")
+def test_a_portable_wheel_asks_for_an_old_c_library_only(built, tmp_path):
+    """The newest symbols are those of the tag, and nothing depends on libraries for the network."""
+    (wheel,) = built.glob("*.whl")
+    assert "manylinux_2_28_x86_64" in wheel.name
+    with zipfile.ZipFile(wheel) as file:
+        file.extractall(tmp_path)
+    binaries = [path for path in tmp_path.rglob("*")
+                if path.is_file() and path.read_bytes()[:4] == b"\x7fELF"]
+    assert len(binaries) == 8  # the program, the extension and six libraries
+    assert not [path.name for path in binaries if NETWORK.match(path.name)]
+    offered = {name for path in binaries for _, name, _ in symbols(path, "--defined-only")}
+    for path in binaries:
+        needed = symbols(path, "--undefined-only")
+        versions = {tuple(map(int, version[6:].split("."))) for _, _, version in needed
+                    if re.match(r"GLIBC_\d", version)}
+        assert versions and max(versions)[:2] <= (2, 28), (path.name, max(versions))
+        # What the old C library lacks has no version. Python and zlib do not number their symbols.
+        lacking = {name for kind, name, version in needed if kind == "U" and not version}
+        assert not {name for name in lacking - offered if not FROM_OTHERS.match(name)}, path.name
 
 
 def test_libraries_come_from_inside_the_wheel(empty):

@@ -334,7 +334,14 @@ contains
       real(dp), intent(in) :: present_load(3)      !! pressure, force and displacement
       real(dp) :: load
 
-      load = present_load(findloc([character(12) :: 'pressure', 'force', 'displacement'], control, dim=1))
+      select case (control)
+      case ('pressure')
+         load = present_load(1)
+      case ('force')
+         load = present_load(2)
+      case default
+         load = present_load(3)
+      end select
    end function load_in
 
 end module asperity_schedule
