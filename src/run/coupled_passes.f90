@@ -1,56 +1,58 @@
-!> The passes of a row in which friction acts.
+!> The passes of a row in which friction acts. A row is one time step, which is one line of the history.
 !>
-!> The pressure, the traction and the place where the rubber's surface touches the road depend on each other.
-!> Let D be the displacement of the road, U_T the tangential displacement of the rubber's surface, and z
-!> (the place) the guess of U_T with which the road is read. A pass computes
+!> The pressure, the traction and the place where the rubber's surface touches the road depend on each other. Let D be
+!> the displacement of the road, U_T the tangential displacement of the rubber's surface, and z (the place) the trial
+!> value of U_T with which the road is read. A pass computes
 !>
 !>    H, grad H  from the original map at X + z - D
 !>    P          the normal contact on H
 !>    T, U_T     the tangential contact under P, on the slopes grad H
 !>
-!> and the row is solved if U_T = z, because pressure, traction, heights and slopes are then consistent. The
-!> plain iteration z <- U_T need not converge. T contains -P grad H, which contributes eigenvalues
-!> between -1 and -2 times |grad H|^2 to dU_T/dz; friction adds some of the order of mu |grad H|; and a
-!> thick block multiplies the mean of both by its compliance. The passes therefore use Anderson
-!> acceleration on the whole field z (module `anderson`). Module `pass_control` determines the accuracy of their
-!> solves and the length of their steps.
+!> and the row is solved if U_T = z, because pressure, traction, heights and slopes then belong to the same surface.
+!> The plain iteration z <- U_T need not converge. T contains -P grad H, which contributes eigenvalues from -2 to -1
+!> times |grad H|^2 to dU_T/dz; friction adds some of the order of mu |grad H|; and in a thick block the mean of both
+!> is larger, because it also shears the block. The passes therefore use Anderson acceleration on the whole field z
+!> (module `anderson`). Module `pass_control` determines the accuracy of their solves and the length of their steps.
 !>
-!> The traction T was found at the place z. If U_T - z moves the contact along the rubber, the strains
-!> around the contact move with it. Otherwise the road would seem to be stretched beside the contact.
-!> `carry` therefore moves U_T along with the contact; at the fixed point it has no effect.
+!> The traction T was found at the place z. If U_T - z moves the contact along the rubber, the strains around the
+!> contact move with it. If U_T stayed at its old points, the road would seem to be stretched beside the contact.
+!> `carry` therefore moves U_T along with the contact for the next place; at the fixed point it has no effect.
 !>
-!> If the traction of a cell would jump as the cell opens, the passes would alternate between the two states of such
-!> cells. The share of the strength that each cell may carry is then unknown as well (module `edge_shares`). Each
-!> pass moves the shares after its normal solve, and the acceleration treats them as a third component of the
-!> place. The first `deciding` passes of a row, which only find the contact, set them to 0 or 1.
+!> If the law has a strength without pressure (constant shear), the traction of a cell would jump as the cell opens,
+!> and the passes would alternate between the two states of such cells. The share of the strength that each cell may
+!> carry is then unknown as well (module `edge_shares`). Each pass moves the shares after its normal solve, and the
+!> acceleration treats them as a third component of the place. The first `deciding_passes` passes of a row set them to
+!> 0 or 1, until the contact is about known.
 !>
-!> The first place is extrapolated from the rows before: the displacement moves with the road, its mean continues
-!> as in the last step, and `place_forecast` adds the changes that the last rows suggest. A jump of the load is
-!> solved by the same loop, without motion and time, and its tractions are not extrapolated.
+!> The first place is extrapolated from the rows before: the displacement moves with the road, its mean continues as
+!> in the last step, and `place_forecast` adds the changes that the last rows suggest. A jump of the load is solved by
+!> the same loop, without motion and time, and its tractions are not extrapolated.
 !>
-!> The slip that the first place implies, or that the last pass has found, has almost the direction of the slip
-!> to be found. Cells that slip far therefore start on their bounds in that direction, and a step in which all
-!> cells slip takes one or two tangential iterations. (Without it, it took eleven: each cell that
-!> came into contact began as one that sticks.)
+!> The slip that the last pass has found (at first, the slip that the first place implies) has almost the direction of
+!> the slip to be found. Cells that slip far therefore start on their bounds in that direction, and a step in which
+!> all cells slip takes one or two tangential iterations. Without this start it took eleven, because each cell that
+!> came into contact began as one that sticks.
 !>
 !> The error of a pass is the difference between the road at U_T and the road on which it was solved (`mismatch`
 !> below; the column `residual_coupling`).
 !>
-!> The loop of `solve` reads: do a pass at the place, and measure the mismatch that it leaves. If the
-!> mismatch is within the tolerance, and the solves of the pass were accurate enough, the row is solved.
-!> Otherwise `pass_control` judges the pass and sets the accuracy of the next one and the length of the step, and
-!> `choose_place` computes the next place. When the number of passes is exhausted, the row keeps the result of the
-!> last pass; if there were more than ten, the last one is done at the best place so far. If the passes have
-!> stalled, module `joint_step` solves all equations of the step at once, but only once in a row; the next pass is
-!> done at its solution, with its shares of the bounds, and verifies it. A normal solve that does not converge ends
-!> the loop. A row that is abandoned because of a stop (module `row_stop`) is left as it is.
+!> The loop of `solve` reads: do a pass at the place, and measure the mismatch that it leaves. If the mismatch is
+!> within the tolerance, and the solves of the pass were required to meet it as well, the row is solved. (The caller
+!> rejects a row whose tangential solve has not converged.) Otherwise `pass_control` judges the pass and sets the
+!> accuracy of the next one and the length of the step, and `choose_place` computes the next place. When the number of
+!> passes is exhausted, the row keeps the result of the last pass; if there were more than ten, the last one is done
+!> at the best place so far. Passes that do not come closer continue with short plain steps (module `pass_control`).
+!> If these do not come closer either, module `joint_step` solves all equations of the step at once, at most once per
+!> row; the next pass is done at its solution, with its shares of the bounds, and verifies it. A normal solve that
+!> does not converge ends the loop. On a stop (module `row_stop`) the loop returns at once, and the caller restores
+!> the state of the row before.
 !>
-!> The work of a row is bounded by `most_passes`, by the iterations that a case allows to a normal and to a
-!> tangential solve (`max_iterations`), and by the evaluations that `joint_equations` allows.
+!> The work of a row is bounded by `most_passes`, by the iterations that a case allows to a normal and to a tangential
+!> solve (`max_iterations`), and by the evaluations that `joint_equations` allows.
 !>
-!> Fields of doubles: two components each for the place, its residual, the best place and the displacement
-!> carried along, and those of the acceleration. If the traction of a cell jumps as it opens, all of these but the
-!> displacement have a third component, and there is a field of shares. The check borrows three from the workspace of the contact.
+!> Memory, in fields of doubles: the place, its residual, the best place and the displacement carried along have two
+!> components each, and so have the fields of the acceleration. With shares all of these but the displacement have a
+!> third component, and there is a field of shares. `mismatch` borrows three fields from the workspace of the contact.
 module coupled_passes
    use anderson, only : anderson_type, new_anderson
    use carried_field, only : carry
@@ -73,13 +75,13 @@ module coupled_passes
 
    integer, parameter :: most_passes = 400      !! if the case does not limit the number
 
-   integer, parameter :: pairs = 6                      !! number of passes that the acceleration remembers
-   real(dp), parameter :: largest_factor = 1.0e3_dp     !! of a remembered pair; a larger one is round-off
+   integer, parameter :: pairs = 6                      !! differences of passes that the acceleration remembers
+   real(dp), parameter :: largest_factor = 1.0e3_dp     !! of a difference; a larger one comes from round-off
 
-   integer, parameter :: deciding = 2                   !! first passes of a row whose shares are 0 or 1
+   integer, parameter :: deciding_passes = 2            !! first passes of a row whose shares are 0 or 1
    real(dp), parameter :: weight_of_share = 2.0_dp      !! in the norm of the acceleration, times the reach
 
-   !> Accuracy of the pass that proves a joint solution, in tolerances.
+   !> Accuracy of the pass that verifies a joint solution, as a multiple of the tolerance.
    real(dp), parameter :: proof = 1.0e-3_dp
 
    real(dp), parameter :: exact_load = 1.0e-12_dp       !! relative error of a load that counts as met exactly
@@ -98,7 +100,7 @@ module coupled_passes
       real(dp), allocatable, private :: residuals(:, :, :)  !! place that a pass leads to, minus the place, m
       real(dp), allocatable, private :: best_place(:, :, :) !! that of the least mismatch, m
       logical, private :: sharing = .false.             !! the shares of the cells are unknown, too
-      type(edge_rule_type), private :: edge             !! how they move, in the row in hand
+      type(edge_rule_type), private :: edge             !! how they move, in the present row
       type(anderson_type), private :: mixing
       type(joint_step_type), private :: joint
    contains
@@ -124,7 +126,7 @@ contains
       self%mixing%largest = largest_factor
    end subroutine new_coupled_passes
 
-   !> Solve a row. The road has moved, and the tangential step has begun.
+   !> Solve a row. The caller has moved the road and begun the tangential step.
    subroutine solve(self, contact, plan, motion, normal, rubbing)
       class(coupled_passes_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact
@@ -135,19 +137,19 @@ contains
       type(pass_control_type) :: control
       real(dp) :: tolerance
       integer :: most
-      logical :: solved                                  !! the step, all at once
-      logical :: unlike                                  !! this row does not continue the motion of the last one
+      logical :: tried                                   !! the step was solved jointly, or this was tried
+      logical :: breaks_motion                           !! this row does not continue the motion of the last one
 
       tolerance = contact%case%solver%tolerance
       most = contact%case%solver%passes
       if (most == 0) most = most_passes
       call self%mixing%forget()
-      unlike = plan%instantaneous .or. plan%new_speed
-      call predict(self, contact, plan%dt, motion, goes_on=.not. unlike)
-      call control%start(tolerance, merge(1.0_dp, contact%state%first_mismatch, unlike), self%sharing)
+      breaks_motion = plan%instantaneous .or. plan%new_speed
+      call predict(self, contact, plan%dt, motion, goes_on=.not. breaks_motion)
+      call control%start(tolerance, merge(1.0_dp, contact%state%first_mismatch, breaks_motion), self%sharing)
       if (.not. plan%instantaneous) &
          call contact%tangential%extrapolate(contact%state%tangential, .not. plan%new_speed)
-      if (.not. unlike) call contact%tangential%expect(contact%state%tangential, self%place)
+      if (.not. breaks_motion) call contact%tangential%expect(contact%state%tangential, self%place)
 
       self%passes = 0
       self%gap_known = .false.
@@ -161,13 +163,18 @@ contains
          if (self%passes == 1 .and. .not. plan%instantaneous) contact%state%first_mismatch = self%residual
          if (self%passes == most .or. .not. normal%converged) exit
          if (control%accuracy <= tolerance .and. self%residual <= tolerance) exit
-         if (.not. self%sharing) call drop_shares(contact)
+         ! The shares of a joint solution apply only to the pass that verifies it, unless they are unknowns.
+         if (.not. self%sharing .and. allocated(contact%tangential%share)) deallocate (contact%tangential%share)
          contact%stop%given_up = stop_is_due()
          if (contact%stop%given_up) return
          call control%judge(self%residual)
+         if (control%best_yet) self%best_place(:, :, :) = self%place
+         if (control%forget) call self%mixing%forget()
          if (control%joint_due) then
-            call solve_jointly(self, contact, plan, control, rubbing, solved)
-            if (solved) cycle
+            ! The next pass is done at the joint solution. If there is none, the attempt has overwritten the result of
+            ! the last pass, which is therefore repeated.
+            call solve_jointly(self, contact, plan, control, rubbing, tried)
+            if (tried) cycle
          end if
          call choose_place(self, contact, control)
          ! The last of many passes is done at the best place that was found.
@@ -182,33 +189,27 @@ contains
       end associate
    end subroutine solve
 
-   !> If the passes have stalled, solve the step all at once. If that succeeds, the next pass starts from its
-   !> solution with accurate solves, and verifies that the step is solved.
-   subroutine solve_jointly(self, contact, plan, control, rubbing, solved)
+   !> The passes have stalled: solve the step all at once. If that succeeds, the next pass starts from its solution
+   !> with accurate solves, and verifies that the step is solved. Otherwise the place stays as it is.
+   subroutine solve_jointly(self, contact, plan, control, rubbing, tried)
       class(coupled_passes_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact
       type(planned_row_type), intent(in) :: plan
       type(pass_control_type), intent(inout) :: control
       type(solver_result_type), intent(inout) :: rubbing   !! all tangential solves; its transforms are added
-      logical, intent(out) :: solved
+      logical, intent(out) :: tried                        !! the trial fields have been overwritten
+      logical :: solved
       integer :: transforms
 
       call self%joint%solve(contact, plan, solved, transforms)
       self%gap_known = .false.
       rubbing%ffts = rubbing%ffts + transforms
+      tried = transforms > 0
       if (.not. solved) return
       self%place(:, :2, :) = contact%tangential%trial
       if (self%sharing) self%place(:, 3, :) = self%edge%reach*contact%tangential%share
       control%accuracy = proof*contact%case%solver%tolerance
    end subroutine solve_jointly
-
-   !> Discard the shares of a joint solution: if they are not unknowns of the passes, they apply only to the pass that
-   !> verifies this solution.
-   subroutine drop_shares(contact)
-      class(contact_type), intent(inout) :: contact
-
-      if (allocated(contact%tangential%share)) deallocate (contact%tangential%share)
-   end subroutine drop_shares
 
    !> Do one pass at the place, and compute the mismatch that it leaves.
    subroutine do_pass(self, contact, plan, accuracy, normal, rubbing)
@@ -231,7 +232,8 @@ contains
       call displaced(contact%road, plan%road(1), plan%road(2), self%place(:, 1, :), self%place(:, 2, :), &
          contact%height, contact%slope_x, contact%slope_y)
       call solve_normal(contact, plan, accuracy, part, displaced=self%gap_known)
-      ! A pressure that misses the load is scaled to it at the start of the next solve.
+      ! A pressure that misses the load is scaled to it at the start of the next solve, and U_z would no longer
+      ! belong to it.
       self%gap_known = .not. contact%side%adhesive .and. part%load_error <= exact_load
       normal%stopped = part%stopped
       if (normal%stopped) return
@@ -253,7 +255,7 @@ contains
       if (.not. allocated(contact%tangential%share)) &
          allocate (contact%tangential%share(size(self%place, 1), size(self%place, 3)))
       contact%tangential%share(:, :) = self%place(:, 3, :)/self%edge%reach
-      if (self%passes <= deciding) then
+      if (self%passes <= deciding_passes) then
          call self%edge%decide(contact%state%pressure, contact%state%gap, contact%tangential%share)
       else
          call self%edge%move(contact%state%pressure, contact%state%gap, contact%tangential%share)
@@ -296,8 +298,6 @@ contains
       real(dp) :: motion(2)
       integer :: c, j
 
-      if (control%best_yet) self%best_place(:, :, :) = self%place
-      if (control%forget) call self%mixing%forget()
       if (control%go_back) then
          self%place(:, :, :) = self%best_place
          return
@@ -328,10 +328,10 @@ contains
    end subroutine choose_place
 
    !> The difference between the road at U_T and the road on which the pass was solved. It is the larger of two
-   !> means that are weighted by the pressure: the difference of the heights over the rms height of the map, and
-   !> that of the slopes over the slopes in the contact. With constant shear a cell with hardly any pressure
+   !> means that are weighted by the pressure: the difference of the heights divided by the rms height of the map,
+   !> and that of the slopes divided by the slopes in the contact. With constant shear a cell with hardly any pressure
    !> carries as much traction as any other, and these means do not show whether it obeys the law. In that case the
-   !> mean error of the cells at the edge counts as well.
+   !> sum of the errors of all cells (module `edge_shares`) counts as well.
    function mismatch(self, contact, plan) result(residual)
       class(coupled_passes_type), intent(in) :: self
       class(contact_type), intent(inout) :: contact

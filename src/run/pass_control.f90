@@ -6,10 +6,10 @@
 !>
 !> * The solves return without an iteration, because their start is already within the required accuracy. The
 !>   mismatch then says little, above all if a thick block turns a small error of the friction into a large
-!>   displacement. Therefore, if `patience` successive passes have not reduced the mismatch below the part `falls`
-!>   of the least one before, the share is reduced tenfold, and the required accuracy may become better than the
+!>   displacement. Therefore, if `patience` successive passes have not reduced the mismatch to `falls` times
+!>   the least one before, the share is reduced tenfold, and the required accuracy may become better than the
 !>   tolerance.
-!> * An extrapolation diverges. If the mismatch is ten times the least so far, the acceleration discards its
+!> * An extrapolation diverges. If the mismatch is ten times the least one so far, the acceleration discards its
 !>   differences.
 !> * The passes do not come closer: the mismatch has not been halved in `stalled` passes. There are two possible
 !>   reasons. Cells that stick, slip and open alternately may make the differences useless for the acceleration;
@@ -17,12 +17,13 @@
 !>   fold: the contact will snap to another state). The residual then keeps its direction and hardly changes from
 !>   pass to pass, while each step leads a little further to the other state. The passes return to the best place
 !>   and continue without acceleration (`plain`), with a momentum that grows as long as the residual keeps its
-!>   direction and vanishes if it turns. When the mismatch has fallen to a tenth, or after `stalled_plain` passes
+!>   direction and vanishes if it turns. When the mismatch has fallen to a tenth of its value
+!>   at the first plain step, or after `stalled_plain` passes
 !>   without halving it, the acceleration begins again from the present place. The best place before is discarded,
 !>   because it belongs to the state that ceased to exist.
 !>
 !> If the passes stall even with plain steps, they may never settle. The step should then be solved all at once
-!> (`joint_due`), but only once in a row, because an attempt may cost as much as many passes.
+!> (`joint_due`), but at most once per row, because an attempt may cost as much as many passes.
 module pass_control
    use asperity_precision, only : dp
    implicit none
@@ -31,7 +32,7 @@ module pass_control
    public :: pass_control_type
 
    real(dp), parameter :: coarsest = 1.0e-3_dp      !! accuracy of a solve
-   real(dp), parameter :: finest = 1.0e-4_dp        !! best accuracy of a solve, in tolerances
+   real(dp), parameter :: finest = 1.0e-4_dp        !! best accuracy of a solve, as a multiple of the tolerance
    real(dp), parameter :: round_off = 1.0e-11_dp    !! accuracy that double precision can reach
    real(dp), parameter :: nearly = 3.0_dp           !! an accuracy within this factor of the tolerance nearly meets it
    real(dp), parameter :: usual_share = 0.1_dp, least_share = 1.0e-6_dp

@@ -1,35 +1,38 @@
 !> The tangential problem of one step: stick, slip and tractions on a known contact.
 !>
-!> Given the displacement DX of the road against the rubber, find the traction T within the bound of
-!> the friction law such that the slip r = DX - A T is zero where T is inside its bound, and along D
-!> = T - T* where it is on it (thesis, eq. 3.1; modules `friction_law`, `friction_problem`).
+!> Given the displacement DX of the road against the rubber, find the traction T within the bound of the friction law
+!> such that the slip r = DX - A T is zero where T is inside its bound, and has the direction of slip v of the law
+!> where it is on it (thesis, eq. 3.1). A is the tangential compliance of the solid. The bound is a circle or an
+!> ellipse about T* = -P grad H, and v is about the direction of D = T - T* (modules `friction_law`,
+!> `friction_problem`).
 !>
 !> Which points stick is not known beforehand. A method (module `friction_method`) therefore starts from a guess:
-!> points on their bound slip along it, the others stick. In each iteration it moves T so that r comes closer to 0
-!> at sticking points and to the direction of D at slipping points. Then it corrects the guess: a T outside its
-!> bound is returned to the bound, and its point slips from now on; a slipping point whose slip is opposed to
-!> its traction sticks from now on. The problem is solved when the residual g is small at all points, because the
-!> guess is then right; module `friction_problem` defines g.
+!> points whose T is on its bound slip in the direction of their traction, the others stick. In each iteration it
+!> moves T so that r comes closer to 0 at sticking points and to the direction of v at slipping points. Then it
+!> corrects the guess: a T outside its bound is returned to the bound, and its point counts as slipping in the next
+!> iteration; a slipping point whose slip is opposed to its traction counts as sticking. The problem is solved when
+!> the residual g is small at all points, because the guess is then right; module `friction_problem` defines g.
 !>
-!> The operator A is that of G = 1. For a time step with the modulus Q, the caller passes DX' = Q DX and the
-!> traction T_h of the past: r = Q DX - A (T + T_h) is then Q times the slip, and the displacement
-!> is U = DX - r/Q, without another product. With inertia the mean mode of the operator differs from
-!> A(0): the caller sets it by `set_mean_compliance` of the operator's symbols.
+!> The operator A is that of a shear modulus G = 1. For a time step with the modulus Q, the caller passes DX' = Q DX
+!> and the traction T_h of the past: r = Q DX - A (T + T_h) is then Q times the slip, and the displacement is U = DX -
+!> r/Q, without another product. With inertia the mean mode of the operator differs from that of the solid: the caller
+!> sets it by `set_mean_compliance` of the operator's symbols.
 !>
-!> Methods: 'fast' (module `friction_cg_fast`, which falls back on `friction_cg_gradient`), 'gradient'
-!> (the fallback alone) and 'thesis' (`friction_cg_thesis`). A solve has converged if the residual is within the
-!> tolerance and, with `settle`, also the change |T' - T|/|T'| of the last move (thesis, eq. 3.15). The residual
-!> is the largest of three lengths over all points: the slip of a sticking point, the part of a slip across its
-!> traction, and a slip against its traction. It is relative to the largest of three scales: the rms of DX in
-!> the contact, that of A T, and `least_scale`.
+!> Methods: 'fast' (module `friction_cg_fast`, which falls back on `friction_cg_gradient`), 'gradient' (the fallback
+!> alone) and 'thesis' (`friction_cg_thesis`). A solve has converged if the residual is within the tolerance and, with
+!> `settle`, also the change |T' - T|/|T'| of the last move (thesis, eq. 3.15). The residual is the largest of three
+!> lengths over all points: the slip of a sticking point, the component of a slip perpendicular to v, and a slip
+!> against v. It is relative to the largest of several scales: the rms of DX in the contact, that of A T, the offset
+!> of a spring that pulls the road, and `least_scale`.
 !>
-!> Memory in addition to the caller's fields: eleven fields, two for the spectrum of the operator, and two for that
-!> of the preconditioner with its symbols (3/4 of a field); four more from the first use of the fallback on.
+!> Memory in addition to the caller's fields: eleven fields, two for the spectrum of the operator, and two for that of
+!> the preconditioner with its symbols (3/4 of a field); four more from the first use of the fallback on.
 !>
-!> examples/friction_iterations and docs/benchmarks.md show how the iterations depend on the mesh. An iteration of
-!> 'fast' takes one and a half products of the operator if points slip, and one product of its preconditioner,
-!> without padding. With the slope effect there is no proof of convergence. On slopes steeper than 1/mu the
-!> traction has no bound uphill. If many points are on such slopes, a solution may not be found, or may not exist.
+!> examples/friction_iterations and docs/benchmarks.md show how the number of iterations depends on the mesh. An
+!> iteration of 'fast' takes one and a half products of the operator if points slip, one if all stick, and one product
+!> of its preconditioner on the grid without padding. With the slope effect there is no proof of convergence. On
+!> slopes steeper than 1/mu the traction has no bound uphill. If many points are on such slopes, a solution may not be
+!> found, or may not exist.
 module friction_cg
    use asperity_errors, only : error_type
    use asperity_precision, only : dp
@@ -57,13 +60,13 @@ module friction_cg
    integer, parameter, public :: friction_gradient = 3
 
    integer, parameter :: most_moves = 60         !! of the springs
-   integer, parameter :: idle_moves = 3          !! moves in full slip after which more are useless
-   !> If the mean compliance over the length of the map exceeds this, the fast method treats the mean mode
+   integer, parameter :: idle_moves = 3          !! moves in full slip with little gain: the pull is too large
+   !> If the mean compliance divided by the length of the map exceeds this, the fast method treats the mean mode
    !> separately. Below this value, that would cost iterations; above it, it saves them.
    real(dp), parameter :: thick = 0.2_dp
-   !> A solve that starts along an expected slip continues to the part `aim` of its tolerance, unless that is near
-   !> the round-off `resolved`. Otherwise it would often end just below the tolerance, with an error of the friction
-   !> above it.
+   !> A solve that starts along an expected slip continues to `aim` times its tolerance (but not below `resolved`,
+   !> which is near the round-off). Otherwise it would often end just below the tolerance, with an error of the
+   !> friction above it.
    real(dp), parameter :: aim = 0.3_dp, resolved = 1.0e-10_dp
 
    !> The solver for one operator, kept from solve to solve. A variable of this type must not be copied.
@@ -73,8 +76,7 @@ module friction_cg
       !> T must have settled, too: |T' - T|/|T'| <= tolerance. Otherwise only the displacements are accurate to the
       !> tolerance, and T is less accurate.
       logical :: settle = .true.
-      !> Least scale of the residual, in the units of DX': the size of the parts of the displacements, which may
-      !> cancel.
+      !> Least scale of the residual, in the units of DX': the size of the terms of DX', which may cancel.
       real(dp) :: least_scale = 0.0_dp
       logical :: near = .false.                  !! T starts near the solution, as in a step like the last
       type(friction_pull_type) :: pull           !! prescribed total of T, and the position of the road

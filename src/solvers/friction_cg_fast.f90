@@ -1,41 +1,39 @@
-!> The fast method for the tangential problem: conjugate gradients in the tangent space of the
-!> bounds.
+!> The fast method for the tangential problem: conjugate gradients in the tangent space of the bounds.
 !>
-!> Points on the bound move along it only (the active set), and their Hessian gains the curvature of
-!> the bound. With v the direction of slip (module `friction_law`) and Z the projection that takes the
-!> part along v from the slipping points:
+!> A traction on its bound may change only along the bound (the active set), and the bound adds to the matrix of the
+!> step there. With v the direction of slip (module `friction_law`) and Z the projection that removes the component
+!> along v at the slipping points:
 !>
 !>     g = Z r                               the residual of module `friction_problem`
-!>     lam = curvature of the bound          about r.v/|v|^2, 0 where it sticks
+!>     lam = what the bound adds to A        approximately r.v/|v|^2; 0 at sticking points
 !>     z = the change of T that would make g vanish, about (A + lam)^-1 g (module `friction_preconditioner`)
 !>     d = z + beta Z d                      beta Polak-Ribiere+
 !>     alpha = g.d/(d.A d + sum lam |d|^2)
-!>     T' = return(T + alpha d)              r from A T', or by recurrence if all points stick
+!>     T' = T + alpha d, returned to bounds  r from A T', or by recurrence if all points stick
 !>
-!> beta is 0 in the first iteration, also after the fallback; if more than a tenth of the contact was released
-!> from its bound and sticks; after a shortened step; and if d would not be a direction of descent.
+!> beta is 0 in the first iteration, also after the fallback; if more than a tenth of the contact was released from
+!> its bound and now sticks; after a shortened step; and if d would not be a direction of descent.
 !>
-!> In words: the preconditioner turns the slip that should vanish, g, into the change of traction z that would
-!> remove it if each point kept its state. `turn` adds a part of the last direction. `take_step` moves along d by
-!> the length that the quadratic model gives, and returns every point that is now outside its bound to it. This
-!> changes states: a point that was returned slips from now on, and a slipping point whose slip has turned
-!> against its traction sticks. The slip of the new traction is then computed with A, and its measure gives the
-!> g of the next iteration. The loop ends when g is small at all points, because the guess of the states is then
-!> right.
+!> In words: the preconditioner turns the slip that should vanish, g, into the change of traction z that would remove
+!> it if each point kept its state. `turn` adds a part of the last direction. `take_step` moves along d by the length
+!> that the quadratic model gives, and returns every point that is now outside its bound to it. This changes states: a
+!> point that was returned counts as slipping, and a slipping point whose slip has turned against its traction as
+!> sticking. The slip of the new traction is then computed with A, and module `friction_problem` forms g of it for the
+!> next iteration. The loop ends when g is small at all points, because the guess of the states is then right.
 !>
 !> If many points are returned to their bounds, the total traction changes, and a mean mode with a large compliance
-!> then reverses the slip. The points that stuck therefore keep their total of T + alpha d: a uniform c, which is
-!> found without a transform, is added before they are returned. Without this c the set of slipping points can
-!> alternate for ever.
+!> then reverses the slip. If the mean mode is soft, a uniform traction c is therefore added at the points that stick
+!> before they are returned, such that their total remains that of T + alpha d; finding c needs no transform. Without
+!> it the set of slipping points can alternate for ever.
 !>
-!> If a move has still overshot, that is, g'.(T' - T) < -alpha g.d/2 (from a good start -2 alpha g.d), a shorter
-!> move along the same path is taken, to the point where a secant predicts that g'.(T' - T) vanishes. This does
-!> not need an energy, which does not exist with the slope effect.
+!> If a move has still overshot, that is, g'.(T' - T) < -alpha g.d/2 (-2 alpha g.d in the first iterations from a good
+!> start), a shorter move along the same path is taken, to the point where a secant predicts that g'.(T' - T)
+!> vanishes. This does not need an energy, which does not exist with the slope effect.
 !>
-!> An iteration costs two operator products, of which the first needs no inverse transform where
-!> points slip, and one preconditioner; each shortened step costs one product more. beta is formed with
-!> z_old instead of the old g, which is not kept: the preconditioner is symmetric, so that both agree as
-!> long as no point changes its state.
+!> An iteration costs one operator product if all points stick; otherwise two, of which the first needs no inverse
+!> transform. It also costs one preconditioner; each shortened step costs one product more. beta is formed with z_old
+!> instead of the old g, which is not kept: the preconditioner is symmetric, so that both agree as long as no point
+!> changes its state.
 !>
 !> There is no proof that this converges. If it stalls, or finds no direction of descent, some steps of spectral
 !> projected gradients (module `friction_cg_gradient`) follow, and then the method continues.
