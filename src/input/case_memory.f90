@@ -4,8 +4,10 @@
 !> steps if there are many passes, and that of steady sliding. For these parts measured values are used.
 !> `tools/bench/memory.py` compares the estimate with the peak of runs, which differs by less than a tenth.
 !> A dense system for few cells in contact (module `steady_active`) is not counted; it takes at most 20 fields
-!> while it is solved. A step or a steady row may have to be solved all at once (modules `joint_step` and
-!> `steady_joint`). How much memory this takes depends on its course; without this memory the passes continue alone;
+!> while it is solved. Nor is the end of a frictionless steady row by Newton's method (module `steady_newton`), which
+!> takes 20 fields or so; without this memory the splitting goes on.
+!> A step or a steady row may have to be solved all at once (modules `joint_step` and `steady_joint`).
+!> How much memory this takes depends on its course; without this memory the passes continue alone;
 !> `joint_memory` therefore returns the most that it may take separately.
 module case_memory
    use asperity_precision, only : dp

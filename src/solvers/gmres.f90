@@ -12,7 +12,7 @@
 !>    end do
 !>    call krylov%solution(x)
 !>
-!> A vector has three numbers for each cell of a list, and one additional number. The list is ordered by the
+!> A vector has some numbers for each cell of a list, and one additional number. The list is ordered by the
 !> rows of the grid, and sums are formed by row and added up in order, so that they do not depend on the number of
 !> threads or processes. The directions are stored in single precision, which limits the accuracy of x to 1e-6.
 !> Memory is allocated for each direction when it is needed; if there is none left, the method ends.
@@ -27,13 +27,13 @@ module gmres
 
    !> A vector.
    type :: cell_vector_type
-      real(dp), allocatable :: cells(:, :)          !! [3, cells of this process]
+      real(dp), allocatable :: cells(:, :)          !! [numbers, cells of this process]
       real(dp) :: beside = 0.0_dp
    end type cell_vector_type
 
    !> A direction, of unit length.
    type :: direction_type
-      real(sp), allocatable :: cells(:, :)          !! [3, cells of this process]
+      real(sp), allocatable :: cells(:, :)          !! [numbers, cells of this process]
       real(dp) :: beside = 0.0_dp
    end type direction_type
 
@@ -96,7 +96,7 @@ contains
       integer :: status
 
       if (.not. allocated(self%basis(n)%cells)) then
-         allocate (self%basis(n)%cells(3, size(v%cells, 2)), stat=status)
+         allocate (self%basis(n)%cells(size(v%cells, 1), size(v%cells, 2)), stat=status)
          self%short_of_memory = any_process(status /= 0)
          if (self%short_of_memory) return
       end if

@@ -1,13 +1,19 @@
-!> An approximate inverse of the normal compliance K on the cells in contact, with which GMRES takes fewer directions.
+!> An approximate inverse of the normal compliance K on the cells in contact, with which GMRES takes few directions.
 !>
-!> The displacements that are wanted in the contact are continued by zero, multiplied by (K + a)^-1 in Fourier space,
-!> and the result is set to zero outside the contact. With a = 0 the short waves, which the continuation by zero
-!> excites at the edge of the contact, would be amplified too much where |K| falls faster than 1/q, as it does in
-!> a rubber with large losses; a is the smallest |K|.
+!> It is the sum of two levels: dense inverses on small tiles of the contact (module `contact_tiles`), and a
+!> coarse level of boxes (module `contact_boxes`). It takes no transforms. The number of directions then hardly depends
+!> on the number of cells, the speed or the rubber. An inverse by a symbol in Fourier space, such as (K + a)^-1,
+!> takes several times more: it continues the displacements by zero outside the contact, and at high speed |K| falls
+!> so steeply with the wave number that the jump at the edge of the contact dominates the result.
 !>
-!> Memory: two fields, and one of logicals.
+!> If processes share the rows, all of them keep the list of all cells in contact.
+!>
+!> Memory: that of the tiles, 1.5 fields, and lists of the cells in contact.
 module steady_inverse
+   use asperity_parallel, only : gather_rows
    use asperity_precision, only : dp
+   use contact_boxes, only : contact_boxes_type
+   use contact_tiles, only : contact_tiles_type
    use field_sums, only : field_mean
    use regular_grid, only : grid_type
    use steady_operator, only : steady_operator_type
@@ -19,10 +25,16 @@ module steady_inverse
    !> The inverse for a set of cells.
    type :: contact_inverse_type
       logical, allocatable :: inside(:, :)             !! the cells in contact [nx, rows]
-      real(dp), allocatable, private :: lift(:, :)     !! pressures that displace them by 1 m, Pa [nx, rows]
-      real(dp), private :: lift_mean = 0.0_dp          !! their mean over the grid, Pa
+      real(dp) :: lift_mean = 0.0_dp                   !! mean over the grid of the pressures `lift`, Pa
+      type(grid_type), private :: grid
+      integer, allocatable, private :: number(:, :)    !! of each cell of the whole grid in the list; 0: open
+      integer, allocatable, private :: cells(:, :)     !! the list, column and row of the grid [2, n]
+      real(dp), allocatable, private :: lift(:, :)     !! pressures that displace the contact by 1 m, Pa [nx, rows]
+      type(contact_tiles_type), private :: tiles
+      type(contact_boxes_type), private :: boxes
    contains
       procedure :: make_room
+      procedure :: begin
       procedure :: renew
       procedure :: solve
    end type contact_inverse_type
@@ -35,55 +47,104 @@ contains
       type(grid_type), intent(in) :: grid
       integer, intent(out) :: status                   !! not 0: there is not enough memory
 
+      self%grid = grid
       allocate (self%inside(grid%nx, grid%rows()), stat=status)
+      if (status == 0) allocate (self%number(grid%nx, grid%ny), stat=status)
       if (status == 0) allocate (self%lift(grid%nx, grid%rows()), stat=status)
    end subroutine make_room
 
-   !> Prepare for another set of cells. The scale of the operator's resolvent is changed.
-   subroutine renew(self, operator, inside)
+   !> Begin with the operator of another speed: four transforms.
+   subroutine begin(self, operator)
       class(contact_inverse_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
+
+      call self%tiles%begin(operator)
+      call self%boxes%begin(operator)
+   end subroutine begin
+
+   !> Prepare for another set of cells.
+   subroutine renew(self, inside)
+      class(contact_inverse_type), intent(inout) :: self
       logical, intent(in) :: inside(:, :)
 
-      call operator%set_scale(1.0_dp/operator%shortest)
       self%inside(:, :) = inside
+      call list_cells(self)
+      call self%tiles%renew(self%number)
+      call self%boxes%renew(self%cells)
       self%lift(:, :) = merge(1.0_dp, 0.0_dp, inside)
-      call invert(self, operator, self%lift)
+      call invert(self, self%lift)
       self%lift_mean = field_mean(self%lift)
    end subroutine renew
 
+   !> List the cells in contact of all processes in the order of the rows of the grid.
+   subroutine list_cells(self)
+      type(contact_inverse_type), intent(inout) :: self
+      real(dp), allocatable :: here(:, :)
+      integer :: i, j, n
+
+      allocate (here(2, count(self%inside)))
+      n = 0
+      do j = 1, size(self%inside, 2)
+         do i = 1, size(self%inside, 1)
+            if (.not. self%inside(i, j)) cycle
+            n = n + 1
+            here(:, n) = real([i, self%grid%first_row - 1 + j], dp)
+         end do
+      end do
+      if (self%grid%shared) then
+         self%cells = nint(gather_rows(here))
+      else
+         self%cells = nint(here)
+      end if
+      self%number(:, :) = 0
+      do n = 1, size(self%cells, 2)
+         self%number(self%cells(1, n), self%cells(2, n)) = n
+      end do
+   end subroutine list_cells
+
    !> Find the pressures that displace the cells in contact by u + level and have the given mean over the grid.
-   subroutine solve(self, operator, mean, u, level)
+   subroutine solve(self, mean, u, level)
       class(contact_inverse_type), intent(in) :: self
-      type(steady_operator_type), intent(inout) :: operator
       real(dp), intent(in) :: mean                     !! Pa
-      real(dp), intent(inout) :: u(:, :)               !! in: m, zero outside the contact; out: the pressures, Pa
+      real(dp), intent(inout) :: u(:, :)               !! in: m; out: the pressures, Pa, zero outside the contact
       real(dp), intent(out) :: level                   !! m
       integer :: j
 
-      call invert(self, operator, u)
+      call invert(self, u)
       level = 0.0_dp
-      if (.not. self%lift_mean > 0.0_dp) return
+      if (.not. abs(self%lift_mean) > 0.0_dp) return
       level = (mean - field_mean(u))/self%lift_mean
       do j = 1, size(u, 2)
          u(:, j) = u(:, j) + level*self%lift(:, j)
       end do
    end subroutine solve
 
-   !> Multiply by (K + a)^-1, and set the result to zero outside the contact. K has no mean mode: the mean is treated
-   !> as the longest wave.
-   subroutine invert(self, operator, u)
+   !> Multiply by the inverse.
+   subroutine invert(self, u)
       type(contact_inverse_type), intent(in) :: self
-      type(steady_operator_type), intent(inout) :: operator
       real(dp), intent(inout) :: u(:, :)               !! in: m; out: Pa
-      real(dp) :: mean, scale
-      integer :: j
+      real(dp), allocatable :: here(:, :), wanted(:), pressure(:)
+      integer :: i, j, n
 
-      scale = 1.0_dp/operator%shortest                 ! of the resolvent (1 + scale K)^-1
-      mean = (1.0_dp/operator%longest - scale)*field_mean(u)
-      call operator%resolve(u, u)
+      allocate (wanted(size(self%cells, 2)), pressure(size(self%cells, 2)))
+      if (self%grid%shared) then
+         here = gather_rows(reshape(pack(u, self%inside), [1, count(self%inside)]))
+         wanted = here(1, :)
+      else
+         do n = 1, size(wanted)
+            wanted(n) = u(self%cells(1, n), self%cells(2, n))
+         end do
+      end if
+
+      call self%tiles%apply(wanted, pressure)
+      call self%boxes%add(wanted, pressure)
+
       do j = 1, size(u, 2)
-         u(:, j) = merge(scale*u(:, j) + mean, 0.0_dp, self%inside(:, j))
+         do i = 1, size(u, 1)
+            n = self%number(i, self%grid%first_row - 1 + j)
+            u(i, j) = 0.0_dp
+            if (n > 0) u(i, j) = pressure(n)
+         end do
       end do
    end subroutine invert
 

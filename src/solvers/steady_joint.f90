@@ -6,7 +6,8 @@
 !> Its traction then has no jump at the edge of the contact, where the plain law often has no solution.
 !>
 !> Newton's method starts from a contact that is near the solution, or follows a path of solutions (`follow_path`).
-!> An evaluation takes eight transforms, and the approximate inverse for GMRES (module `steady_inverse`) two more.
+!> An evaluation takes eight transforms. GMRES uses an approximate inverse on the cells in contact (module
+!> `steady_inverse`).
 module steady_joint
    use asperity_interpolation, only : interpolation_type
    use asperity_parallel, only : any_process
@@ -235,6 +236,7 @@ contains
       associate (contact => system%contact, rules => system%rules)
          touching = contact%pressure > 0.0_dp
          call find_softness(system%operator, rules%soft, rules%soft_along)
+         call system%inverse%begin(system%operator)
          slope = sqrt(field_mean(contact%slope_x**2 + contact%slope_y**2))
          call system%take_units(touching, contact%pressure, slope)
          system%width(:, :) = merge(rules%width, 0.0_dp, rules%has_jump(contact%slope_x, contact%slope_y))
@@ -319,7 +321,7 @@ contains
       class(steady_system_type), intent(inout) :: self
       type(joint_state_type), intent(in) :: state
 
-      call self%inverse%renew(self%operator, state%s >= self%width)
+      call self%inverse%renew(state%s >= self%width)
    end subroutine renew
 
    !> Replace the residuals of gap and load by the changes of pressure and level that would remove them if the
@@ -338,7 +340,7 @@ contains
             if (self%inverse%inside(cell(k), j)) self%wanted(cell(k), j) = v%cells(1, k)*self%unit_length
          end do
       end do
-      call self%inverse%solve(self%operator, v%beside*self%unit_pressure/self%root, self%wanted, level)
+      call self%inverse%solve(v%beside*self%unit_pressure/self%root, self%wanted, level)
       do j = 1, size(state%s, 2)
          do k = first(j), first(j + 1) - 1
             i = cell(k)

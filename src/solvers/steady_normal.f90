@@ -10,8 +10,9 @@
 !>     z <- z + (y - P)
 !>
 !> At the fixed point z is P where there is contact, and -c gap elsewhere; that sets the scale c.
-!> Anderson acceleration makes it five to ten times faster. An active-set Newton method with GMRES was
-!> slower and failed on materials whose modulus spans three decades.
+!> Anderson acceleration makes it five to ten times faster. Near the solution, Newton's method on the cells in contact may
+!> be faster still (modules `steady_active` and `steady_newton`). From a distant start it fails on materials whose
+!> modulus spans three decades.
 !>
 !> Converged means the same as for module `normal_cg`: the duality gap e1 of a fresh U = K P, over the
 !> rms height or a smaller scale where the contact is small, and the error of the load.
@@ -28,6 +29,7 @@ module steady_normal
    use solver_result, only : solver_result_type
    use stop_watch, only : stop_is_due
    use steady_active, only : finish_on_contact, worthwhile
+   use steady_newton, only : finish_by_newton, promising
    use steady_operator, only : steady_operator_type
    implicit none
    private
@@ -160,12 +162,16 @@ contains
          self%best(:, :) = self%pressure
       end if
       if (.not. outcome%converged .and. outcome%iterations >= progress%trial) then
+         finished = .false.
          if (worthwhile(field_count(self%pressure > 0.0_dp), self%grid%cells(), &
             int(operator%ffts - progress%ffts_before))) then
             progress%trial = outcome%iterations + outcome%iterations/2
             call finish_on_contact(operator, task, height, self%pressure, gap, found, finished)
-            outcome%converged = finished
+         else if (promising(outcome%iterations, progress%measure%error, task%tolerance)) then
+            progress%trial = outcome%iterations + outcome%iterations/2
+            call finish_by_newton(operator, task, height, self%pressure, gap, found, finished)
          end if
+         outcome%converged = finished
       end if
       if (outcome%converged) outcome%reason = reason_converged
    end subroutine judge
