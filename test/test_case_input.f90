@@ -1,7 +1,7 @@
 !> Tests of `case_input`: resolved values of good inputs, and every fault of bad ones.
 module test_case_input
    use case_input, only : parse_case, read_case
-   use case_memory, only : memory_needed
+   use case_memory, only : joint_memory, memory_needed
    use case_report, only : case_summary, resolved_input
    use case_settings, only : case_type
    use case_templates, only : all_template_names, template_is_available, template_list, template_text
@@ -237,6 +237,13 @@ contains
       call check_close(fields_of(case), 8.15_dp, 1.0e-9_dp, 'memory: elastic, several rows')
       case%phases(3)%velocity_y = -1.0_dp
       call check_close(fields_of(case), 13.15_dp, 1.0e-9_dp, 'memory: sliding')
+      call check_close(joint_memory(case), 0.0_dp, 0.0_dp, 'memory: nothing more without steady rows and friction')
+      case%phases(3)%steady = .true.
+      call check_close(joint_memory(case), 88.0_dp*8*64*32, 1.0e-9_dp, 'memory: a steady row solved all at once')
+      case%friction%law = 'coulomb'
+      call check_close(joint_memory(case), 275.0_dp*8*64*32, 1.0e-9_dp, 'memory: the same with friction')
+      case%friction%law = 'none'
+      case%phases(3)%steady = .false.
       case%phases(3)%velocity_y = 0.0_dp
       case%material%prony_g = [1.0_dp, 2.0_dp]
       call check_close(fields_of(case), 13.15_dp, 1.0e-9_dp, 'memory: arms')

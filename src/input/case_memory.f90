@@ -4,11 +4,10 @@
 !> steps if there are many passes, and that of steady sliding. For these parts measured values are used.
 !> `tools/bench/memory.py` compares the estimate with the peak of runs, which differs by less than a tenth.
 !> A dense system for few cells in contact (module `steady_active`) is not counted; it takes at most 20 fields
-!> while it is solved. Nor is the end of a frictionless steady row by Newton's method (module `steady_newton`), which
-!> takes 20 fields or so; without this memory the splitting goes on.
-!> A step or a steady row may have to be solved all at once (modules `joint_step` and `steady_joint`).
-!> How much memory this takes depends on its course; without this memory the passes continue alone;
-!> `joint_memory` therefore returns the most that it may take separately.
+!> while it is solved. A step or a steady row may have to be solved all at once (modules `joint_step`,
+!> `steady_joint`, and `steady_newton` without friction). How much memory this takes depends on its course, and
+!> without this memory the run continues in another way. `joint_memory` therefore returns separately the most that
+!> it may take.
 module case_memory
    use asperity_precision, only : dp
    use asperity_schedule, only : count_rows
@@ -22,6 +21,9 @@ module case_memory
    !> Fields of a step that is solved all at once: the equations and four states; and the directions of GMRES, if
    !> all cells touch.
    real(dp), parameter :: joint_fields = 30.0_dp, joint_directions = 180.0_dp
+   !> The same of a steady row without friction.
+   real(dp), parameter :: newton_fields = 8.0_dp, newton_directions = 30.0_dp
+   real(dp), parameter :: tile_fields = 50.0_dp       !! the inverses on tiles of the contact of a steady row
    !> Further fields of a steady row: the approximate inverse, and the last two states on a path of solutions.
    real(dp), parameter :: path_fields = 15.0_dp
    real(dp), parameter :: most_kept = 64.0e6_dp       !! bytes of the copies of a row that is taken in parts
@@ -70,20 +72,21 @@ contains
       bytes = 8.0_dp*fields*cells + program_itself + merge(copies + buffers, max(copies, buffers), rubs)
    end function memory_needed
 
-   !> The most memory that a run takes beyond `memory_needed` if a step or a steady row with friction is solved all at
-   !> once, bytes. It is 0 without friction.
+   !> The most memory that a run takes beyond `memory_needed` if a step with friction or a steady row is solved all at
+   !> once, bytes. It is 0 for other runs.
    pure function joint_memory(case) result(bytes)
       type(case_type), intent(in) :: case
       real(dp) :: bytes
       real(dp) :: fields
-      logical :: in_time, steady
+      logical :: in_time, rubs, steady
 
       in_time = any(.not. case%phases%static .and. case%phases%steps > 0)
       steady = any(case%phases%steady)
-      bytes = 0.0_dp
-      if (.not. (in_time .or. steady) .or. .not. road_moves(case%phases) .or. case%friction%law == 'none') return
-      fields = joint_fields + joint_directions
-      if (steady) fields = fields + path_fields
+      rubs = road_moves(case%phases) .and. case%friction%law /= 'none'
+      fields = 0.0_dp
+      if (rubs .and. (in_time .or. steady)) fields = joint_fields + joint_directions
+      if (rubs .and. steady) fields = fields + path_fields + tile_fields
+      if (steady .and. .not. rubs) fields = newton_fields + tile_fields + newton_directions
       bytes = 8.0_dp*fields*real(case%grid%nx, dp)*real(case%grid%ny, dp)
    end function joint_memory
 
