@@ -262,7 +262,7 @@ contains
             call self%passes%solve(self, plan, motion, found%normal, found%rubbing)
             if (self%stop%given_up) return
             found%passes = self%passes%passes
-            found%mismatch = self%passes%residual
+            found%mismatch = self%passes%mismatch
          else
             call solve_normal(self, plan, self%case%solver%tolerance, found%normal)
             self%stop%given_up = found%normal%stopped

@@ -33,7 +33,7 @@
 !> all cells slip takes one or two tangential iterations. Without this start it took eleven, because each cell that
 !> came into contact began as one that sticks.
 !>
-!> The error of a pass is the difference between the road at U_T and the road on which it was solved (`mismatch`
+!> The error of a pass is the difference between the road at U_T and the road on which it was solved (`mismatch_of`
 !> below; the column `residual_coupling`).
 !>
 !> The loop of `solve` reads: do a pass at the place, and measure the mismatch that it leaves. If the mismatch is
@@ -52,7 +52,7 @@
 !>
 !> Memory, in fields of doubles: the place, its residual, the best place and the displacement carried along have two
 !> components each, and so have the fields of the acceleration. With shares all of these but the displacement have a
-!> third component, and there is a field of shares. `mismatch` borrows three fields from the workspace of the contact.
+!> third component, and there is a field of shares. `mismatch_of` borrows three fields from the workspace of the contact.
 module coupled_passes
    use anderson, only : anderson_type, new_anderson
    use carried_field, only : carry
@@ -92,12 +92,12 @@ module coupled_passes
    !> The work space of the passes and their outcome.
    type :: coupled_passes_type
       integer :: passes = 0                             !! done in the last row
-      real(dp) :: residual = 0.0_dp                     !! mismatch of the last row
+      real(dp) :: mismatch = 0.0_dp                     !! of the last pass: the column residual_coupling
       logical, private :: gap_known = .false.           !! pressure, gap and heights are those of the last pass
       !> z, m; with shares also share times reach, m [nx, 2 or 3, rows].
       real(dp), allocatable, private :: place(:, :, :)
       real(dp), allocatable, private :: carried(:, :, :)    !! U_T of the row before, carried along, m [nx, 2, rows]
-      real(dp), allocatable, private :: residuals(:, :, :)  !! place that a pass leads to, minus the place, m
+      real(dp), allocatable, private :: place_residual(:, :, :) !! of a pass: the place it leads to, minus its own, m
       real(dp), allocatable, private :: best_place(:, :, :) !! that of the least mismatch, m
       logical, private :: sharing = .false.             !! the shares of the cells are unknown, too
       type(edge_rule_type), private :: edge             !! how they move, in the present row
@@ -120,7 +120,7 @@ contains
       self%sharing = sharing
       unknowns = merge(3, 2, sharing)
       allocate (self%place(grid%nx, unknowns, grid%rows()), source=0.0_dp)
-      allocate (self%residuals, self%best_place, source=self%place)
+      allocate (self%place_residual, self%best_place, source=self%place)
       allocate (self%carried(grid%nx, 2, grid%rows()), source=0.0_dp)
       call new_anderson(self%mixing, grid%nx, unknowns, grid%rows(), pairs)
       self%mixing%largest = largest_factor
@@ -160,14 +160,14 @@ contains
          call do_pass(self, contact, plan, control%accuracy, normal, rubbing)
          contact%stop%given_up = normal%stopped .or. rubbing%stopped
          if (contact%stop%given_up) return
-         if (self%passes == 1 .and. .not. plan%instantaneous) contact%state%first_mismatch = self%residual
+         if (self%passes == 1 .and. .not. plan%instantaneous) contact%state%first_mismatch = self%mismatch
          if (self%passes == most .or. .not. normal%converged) exit
-         if (control%accuracy <= tolerance .and. self%residual <= tolerance) exit
+         if (control%accuracy <= tolerance .and. self%mismatch <= tolerance) exit
          ! The shares of a joint solution apply only to the pass that verifies it, unless they are unknowns.
          if (.not. self%sharing .and. allocated(contact%tangential%share)) deallocate (contact%tangential%share)
          contact%stop%given_up = stop_is_due()
          if (contact%stop%given_up) return
-         call control%judge(self%residual)
+         call control%judge(self%mismatch)
          if (control%best_yet) self%best_place(:, :, :) = self%place
          if (control%forget) call self%mixing%forget()
          if (control%joint_due) then
@@ -181,7 +181,7 @@ contains
          if (self%passes == most - 1 .and. most > 10) self%place(:, :, :) = self%best_place
       end do
       associate (forecast => contact%state%tangential%forecast)
-         if (self%residual <= tolerance) then
+         if (self%mismatch <= tolerance) then
             call forecast%learn(contact%tangential%trial, self%carried, contact%state%pressure)
          else
             call forecast%forget()
@@ -244,7 +244,7 @@ contains
          contact%slope_x, contact%slope_y, part)
       call add_result(rubbing, part)
       if (rubbing%stopped) return
-      self%residual = mismatch(self, contact, plan)
+      self%mismatch = mismatch_of(self, contact, plan)
    end subroutine do_pass
 
    !> Compute the shares for the tangential solve of a pass from the result of its normal solve, and their residual.
@@ -260,7 +260,7 @@ contains
       else
          call self%edge%move(contact%state%pressure, contact%state%gap, contact%tangential%share)
       end if
-      self%residuals(:, 3, :) = self%edge%reach*contact%tangential%share - self%place(:, 3, :)
+      self%place_residual(:, 3, :) = self%edge%reach*contact%tangential%share - self%place(:, 3, :)
    end subroutine take_shares
 
    !> Compute the first place of a row: the displacement of the row before, moved along with the contact, which
@@ -306,22 +306,22 @@ contains
       ! The residual is U_T, carried along by the mean of U_T - z in the contact, minus z.
       !$omp parallel do default(none) shared(self, contact) private(j)
       do j = 1, contact%grid%rows()
-         self%residuals(:, :2, j) = contact%tangential%trial(:, :, j) - self%place(:, :2, j)
+         self%place_residual(:, :2, j) = contact%tangential%trial(:, :, j) - self%place(:, :2, j)
       end do
-      motion = contact_mean(contact, self%residuals(:, :2, :))
+      motion = contact_mean(contact, self%place_residual(:, :2, :))
       do c = 1, 2
-         call carry(contact%grid, contact%tangential%trial(:, c, :), motion, self%residuals(:, c, :))
+         call carry(contact%grid, contact%tangential%trial(:, c, :), motion, self%place_residual(:, c, :))
       end do
       !$omp parallel do default(none) shared(self, contact) private(j)
       do j = 1, contact%grid%rows()
-         self%residuals(:, :2, j) = self%residuals(:, :2, j) - self%place(:, :2, j)
+         self%place_residual(:, :2, j) = self%place_residual(:, :2, j) - self%place(:, :2, j)
       end do
 
       if (control%plain) then
-         call control%follow(self%mixing%turn(self%residuals))
-         call self%mixing%glide(self%residuals, self%place, control%damping, control%momentum)
+         call control%follow(self%mixing%turn(self%place_residual))
+         call self%mixing%glide(self%place_residual, self%place, control%damping, control%momentum)
       else
-         call self%mixing%step([1.0_dp, 1.0_dp, weight_of_share], self%residuals, self%place, plain=.false., &
+         call self%mixing%step([1.0_dp, 1.0_dp, weight_of_share], self%place_residual, self%place, plain=.false., &
             damping=control%damping)
       end if
       if (self%sharing) self%place(:, 3, :) = min(max(self%place(:, 3, :), 0.0_dp), self%edge%reach)
@@ -332,11 +332,11 @@ contains
    !> and that of the slopes divided by the slopes in the contact. With constant shear a cell with hardly any pressure
    !> carries as much traction as any other, and these means do not show whether it obeys the law. In that case the
    !> sum of the errors of all cells (module `edge_shares`) counts as well.
-   function mismatch(self, contact, plan) result(residual)
+   function mismatch_of(self, contact, plan) result(mismatch)
       class(coupled_passes_type), intent(in) :: self
       class(contact_type), intent(inout) :: contact
       type(planned_row_type), intent(in) :: plan
-      real(dp) :: residual
+      real(dp) :: mismatch
       real(dp), pointer, contiguous :: height(:, :), slope_x(:, :), slope_y(:, :)     ! of the road at U_T
       real(dp), allocatable :: rows(:, :)
       real(dp) :: sums(4), edges
@@ -369,11 +369,11 @@ contains
       call contact%work%take_back(height)
       call contact%work%take_back(slope_x)
       call contact%work%take_back(slope_y)
-      residual = edges
+      mismatch = edges
       if (.not. sums(1) > 0.0_dp) return
-      residual = max(residual, sums(2)/max(contact%rms_height*sums(1), tiny(1.0_dp)), &
+      mismatch = max(mismatch, sums(2)/max(contact%rms_height*sums(1), tiny(1.0_dp)), &
          sums(3)/max(sums(4), least_slope*contact%rms_slope*sums(1), tiny(1.0_dp)))
-   end function mismatch
+   end function mismatch_of
 
    !> Add the record of a solve to that of the row: keep the last outcome, and add up the work.
    subroutine add_result(total, part)

@@ -1,13 +1,13 @@
 !> Determines how accurate the solves of the next pass of a coupled step must be, and how much the step to the
 !> next place is damped.
 !>
-!> The solves of a pass need not be more accurate than a tenth (`share`) of the mismatch of the last pass. A pass
+!> The solves of a pass need not be more accurate than a tenth (`fraction`) of the mismatch of the last pass. A pass
 !> that comes close to the tolerance is solved to the tolerance. On difficult roads three problems may occur:
 !>
 !> * The solves return without an iteration, because their start is already within the required accuracy. The
 !>   mismatch then says little, above all if a thick block turns a small error of the friction into a large
 !>   displacement. Therefore, if `patience` successive passes have not reduced the mismatch to `falls` times
-!>   the least one before, the share is reduced tenfold, and the required accuracy may become better than the
+!>   the least one before, the fraction is reduced tenfold, and the required accuracy may become better than the
 !>   tolerance.
 !> * An extrapolation diverges. If the mismatch is ten times the least one so far, the acceleration discards its
 !>   differences.
@@ -35,7 +35,7 @@ module pass_control
    real(dp), parameter :: finest = 1.0e-4_dp        !! best accuracy of a solve, as a multiple of the tolerance
    real(dp), parameter :: round_off = 1.0e-11_dp    !! accuracy that double precision can reach
    real(dp), parameter :: nearly = 3.0_dp           !! an accuracy within this factor of the tolerance nearly meets it
-   real(dp), parameter :: usual_share = 0.1_dp, least_share = 1.0e-6_dp
+   real(dp), parameter :: usual_fraction = 0.1_dp, least_fraction = 1.0e-6_dp
    real(dp), parameter :: falls = 0.3_dp            !! a mismatch below this part of the least one is a success
    real(dp), parameter :: slow = 0.5_dp             !! a mismatch above this part of the last is slow progress
    real(dp), parameter :: slow_damping = 0.5_dp, sharing_damping = 0.8_dp
@@ -59,7 +59,7 @@ module pass_control
       logical :: best_yet = .false.                 !! the last pass was the best
       logical :: joint_due = .false.                !! the step should be solved all at once
       real(dp), private :: tolerance = 0.0_dp
-      real(dp), private :: share = usual_share
+      real(dp), private :: fraction = usual_fraction
       logical, private :: may_be_joint = .true.     !! the row may still be solved all at once
       real(dp), private :: slowed = slow_damping    !! damping where the mismatch falls slowly
       real(dp), private :: length = 1.0_dp          !! of plain steps
@@ -89,7 +89,7 @@ contains
 
       if (sharing) self%slowed = sharing_damping
       self%tolerance = tolerance
-      self%accuracy = min(max(coarsest, tolerance), max(tolerance, usual_share*expected))
+      self%accuracy = min(max(coarsest, tolerance), max(tolerance, usual_fraction*expected))
       call spare_a_pass(self)
    end subroutine start
 
@@ -106,11 +106,11 @@ contains
       self%idle = self%idle + 1
       if (self%seen == 1 .or. mismatch <= falls*self%least) self%idle = 0
       if (self%idle == patience) then
-         self%share = max(0.1_dp*self%share, least_share)
+         self%fraction = max(0.1_dp*self%fraction, least_fraction)
          self%idle = 0
       end if
-      self%accuracy = max(finest*self%tolerance, round_off, self%share*mismatch)
-      if (self%share >= usual_share) self%accuracy = max(self%accuracy, self%tolerance)
+      self%accuracy = max(finest*self%tolerance, round_off, self%fraction*mismatch)
+      if (self%fraction >= usual_fraction) self%accuracy = max(self%accuracy, self%tolerance)
       self%accuracy = min(self%accuracy, max(coarsest, self%tolerance))
       call spare_a_pass(self)
 

@@ -187,19 +187,19 @@ contains
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
       type(iteration_type), intent(inout) :: now
-      real(dp) :: alpha, gain, part
+      real(dp) :: alpha, predicted, part
       integer :: trial
 
       alpha = now%slope/(now%form + now%curvature)
-      call move_to(self, problem, operator, alpha, by_product=problem%slipping > 0, again=.false.)
+      call move_to(self, problem, operator, alpha, from_product=problem%slipping > 0, again=.false.)
       now%restart = .false.
-      gain = alpha*now%slope
+      predicted = alpha*now%slope
       do trial = 1, trials
-         if (problem%sums%gain >= -now%excess*gain) exit
-         part = max(0.1_dp, gain/(gain - problem%sums%gain))
+         if (problem%sums%gain >= -now%excess*predicted) exit
+         part = max(0.1_dp, predicted/(predicted - problem%sums%gain))
          alpha = part*alpha
-         call move_to(self, problem, operator, alpha, by_product=.true., again=.true.)
-         gain = part*gain
+         call move_to(self, problem, operator, alpha, from_product=.true., again=.true.)
+         predicted = part*predicted
          now%restart = .true.
       end do
       now%restart = now%restart .or. 10*problem%released > problem%cells
@@ -208,12 +208,12 @@ contains
    !> Compute T' = T + alpha d, return points to their bounds, and compute the slip of T': by recurrence from A d if no
    !> point slips and none was returned, otherwise from a product with T'. `move` can transform the rows of T' for
    !> this product in the same pass; `move_total` cannot, because it may move several times.
-   subroutine move_to(self, problem, operator, alpha, by_product, again)
+   subroutine move_to(self, problem, operator, alpha, from_product, again)
       type(friction_fast_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
       real(dp), intent(in) :: alpha
-      logical, intent(in) :: by_product            !! compute the slip from a product in any case
+      logical, intent(in) :: from_product            !! compute the slip from a product in any case
       logical, intent(in) :: again                 !! start again from the T before the last move
       logical :: returned, transformed
 
@@ -221,10 +221,10 @@ contains
       if (any(problem%mean_compliance > 0.0_dp)) then
          call move_total(problem, operator, alpha, self%d, again, returned)
       else
-         transformed = by_product
+         transformed = from_product
          call move(problem, operator, alpha, self%d, again, transformed, returned)
       end if
-      if (.not. (by_product .or. returned)) then
+      if (.not. (from_product .or. returned)) then
          call problem%advance_slip(operator, alpha)
       else if (transformed) then
          call problem%update_slip(operator)

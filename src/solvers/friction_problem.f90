@@ -36,7 +36,7 @@ module friction_problem
 
    !> A point whose s (module `friction_law`) is below this value is on its bound.
    real(dp), parameter :: on_bound = 1.0_dp + 1.0e-9_dp
-   real(dp), parameter :: outermost = 4.0_dp              !! a slipping point whose s is above it sticks
+   real(dp), parameter :: deepest_inside = 4.0_dp         !! a slipping point whose s is above it sticks
    real(dp), parameter :: far = 10.0_dp                   !! a long slip, in units of a_0 F
    real(dp), parameter :: stiffest = 1.0e15_dp            !! curvature of a bound, in units of a_0
 
@@ -94,7 +94,7 @@ contains
       allocate (sizes(self%rows), cells(self%rows), foreseen(self%rows))
       self%constants = row_constants_type(coefficient=self%law%reach_coefficient(), &
          strength=self%law%strength_beside(), physical=self%law%slope .and. self%law%physical_slip, &
-         compliance=self%compliance, stiffest=stiffest, on_bound=on_bound, outermost=outermost)
+         compliance=self%compliance, stiffest=stiffest, on_bound=on_bound, deepest_inside=deepest_inside)
       !$omp parallel do default(none) shared(self, operator, sizes, cells, foreseen) private(j) &
       !$omp num_threads(self%threads)
       do j = 1, self%rows
@@ -138,7 +138,7 @@ contains
          if (self%contact(i, j) /= contact_open) then
             t = self%traction(i, :, j)
             ! Slipping points are returned to their bound from both sides, others only from outside.
-            limit = merge(outermost, 1.0_dp, self%contact(i, j) == contact_slip)
+            limit = merge(deepest_inside, 1.0_dp, self%contact(i, j) == contact_slip)
             if (self%slip_unit > 0.0_dp) call start_along_slip(self, i, j, t, limit, foreseen)
             call self%place_on_bound(i, j, limit, t, s)
             self%contact(i, j) = merge(contact_slip, contact_stick, s < limit .or. s <= on_bound)

@@ -73,7 +73,7 @@ module friction_rows
       real(dp) :: compliance = 0.0_dp        !! a_0
       real(dp) :: stiffest = 0.0_dp          !! largest curvature of a bound, in units of a_0
       real(dp) :: on_bound = 1.0_dp          !! a point with a smaller s is on the bound
-      real(dp) :: outermost = 1.0_dp         !! a slipping point with a smaller s is moved to the bound
+      real(dp) :: deepest_inside = 1.0_dp      !! a slipping point with a smaller s is moved to the bound
    end type row_constants_type
 
 contains
@@ -142,7 +142,7 @@ contains
          inverse = 1.0_dp/max(m, tiny(1.0_dp))
          s = ratio(site(i, 4), m - k%coefficient*nd)
          s = merge(min(s, k%strength*inverse), s, k%strength >= 0.0_dp .and. m > 0.0_dp)
-         limit = merge(k%outermost, 1.0_dp, slips(i) > 0.5_dp)
+         limit = merge(k%deepest_inside, 1.0_dp, slips(i) > 0.5_dp)
          out = s < limit .and. state(i) > 0.5_dp
          put = merge(s, 1.0_dp, out)
          ! A point that has reached its bound may still move along it.
