@@ -20,7 +20,7 @@ contains
       real(dp), intent(in), contiguous :: traction(:)            !! P without the load, Pa
       real(dp), intent(in) :: load                               !! Pa
       real(dp), intent(in) :: per_length, per_traction           !! 1/m, 1/Pa
-      real(dp), intent(inout), contiguous :: residual(:)         !! in: e'; out: r, Pa
+      real(dp), intent(inout), contiguous :: residual(:)         !! e' before the call, r after it, Pa
       real(dp), intent(inout) :: worst                           !! natural residual
       real(dp), intent(inout) :: least                           !! least gap, m
       real(dp) :: gradient

@@ -117,7 +117,7 @@ contains
       real(dp), intent(in) :: scale                      !! a power of two
       real(dp), intent(in) :: level                      !! m
       real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows()), gap(self%grid%nx, self%grid%rows())
-      real(dp), intent(inout) :: before(self%grid%nx, self%grid%rows())   !! out: the residual before
+      real(dp), intent(inout) :: before(self%grid%nx, self%grid%rows())   !! is set to the residual before
 
       if (self%by_waves) then
          call self%waves%set_residual(coarse, active, scale, level, pressure, gap, self%residual)
