@@ -142,8 +142,8 @@ contains
       if (allocated(command%output)) then
          call choose_output(case, error)
       else if (is_other_than_file(command%path) .and. case%output%file == default_result(command%path)) then
-         call fail(error, error_input, command%path//': is not a regular file, beside which a result could '// &
-            'stand: give --output FILE.h5')
+         call fail(error, error_input, command%path//': is not a regular file, so that the result needs a '// &
+            'name: give --output FILE.h5')
       end if
       call agree(error)
       if (allocated(error)) return

@@ -156,7 +156,7 @@ contains
    end subroutine check_same_rows
 
    !> Return the creep compliance J(t) of a Prony series, from the zeros and residues of its transform: s G(s) = G_e +
-   !! sum g s/(s + 1/tau) has one zero between any two neighbouring relaxation rates, and one below the lowest rate.
+   !> sum g s/(s + 1/tau) has one zero between any two neighbouring relaxation rates, and one below the lowest rate.
    pure function creep_compliance(g_e, g, tau, t) result(compliance)
       real(dp), intent(in) :: g_e            !! > 0, Pa
       real(dp), intent(in) :: g(:), tau(:)   !! Pa and s; tau ascending

@@ -1,7 +1,7 @@
 !> Tests of the adhesive potentials.
 module test_adhesion_potential
    use adhesion_potential, only : adhesion_potential_type, adhesive_curvature, adhesive_energy, &
-      adhesive_slope, adhesive_terms, has_smooth_potential, new_adhesion_potential, &
+      adhesive_slope, adhesive_slopes, adhesive_terms, has_smooth_potential, new_adhesion_potential, &
       new_tabulated_potential, stiffens
    use check, only : begin_suite, check_close, check_error, check_no_error, check_that, selected
    use asperity_errors, only : error_type
@@ -24,10 +24,55 @@ contains
          call derivatives_match_differences('maugis_dugdale', -energy/range, edge=0.4_dp*range)
          call derivatives_match_differences('maugis_dugdale', -energy/range, edge=range)
       end if
+      if (selected('rows_have_the_values_of_cells')) call rows_have_the_values_of_cells()
       if (selected('bounds_of_the_range')) call bounds_of_the_range()
       if (selected('table')) call table()
       if (selected('table_of_a_line')) call table_of_a_line()
    end subroutine run_adhesion_potential
+
+   !> A row of any length has the attraction, the curvature and the energy of its cells, to round-off: at every part of
+   !> the table of the exponential, in blocks with near and with distant cells, and in blocks of distant cells alone.
+   !> (The round-off of x = gap/range gives exp(-x) a relative error in proportion to x.)
+   subroutine rows_have_the_values_of_cells()
+      type(adhesion_potential_type) :: potential
+      type(error_type), allocatable :: error
+      character(14), parameter :: names(3) = [character(14) :: 'exponential', 'gauss', 'maugis_dugdale']
+      integer, parameter :: lengths(5) = [1, 2, 63, 64, 2001]
+      real(dp), allocatable :: gap(:), slope(:), curvature(:), energies(:), exact(:, :)
+      real(dp) :: worst
+      integer :: i, k, n, which
+
+      do which = 1, size(names)
+         call new_adhesion_potential(potential, trim(names(which)), energy, range, error)
+         call check_no_error(error, trim(names(which)))
+         worst = 0.0_dp
+         do k = 1, size(lengths)
+            n = lengths(k)
+            ! From 0 to 60 ranges in steps that meet no multiple of the table's; every third cell is distant.
+            gap = [(merge(100.0_dp, 60.0_dp*(i - 1)/n, modulo(i, 3) == 0 .and. i < n/2)*range, i=1, n)]
+            allocate (slope(n), curvature(n), energies(n), exact(n, 3))
+            call adhesive_slopes(potential, gap, slope, curvature, energies)
+            call adhesive_terms(potential, gap, exact(:, 1), exact(:, 2), exact(:, 3))
+            worst = max(worst, largest(energies, exact(:, 1), energy), largest(slope, exact(:, 2), energy/range), &
+               largest(curvature, exact(:, 3), energy/range**2))
+            deallocate (slope, curvature, energies, exact)
+         end do
+         call check_close(worst, 0.0_dp, 8e-16_dp, trim(names(which))//': rows and cells')
+      end do
+
+   contains
+
+      !> The largest relative error of the values that are not negligible, and of all values over the unit.
+      function largest(found, expected, unit) result(error)
+         real(dp), intent(in) :: found(:), expected(:)
+         real(dp), intent(in) :: unit
+         real(dp) :: error
+
+         error = max(maxval(abs(found - expected))/unit, maxval(abs(found/expected - 1.0_dp)/(1.0_dp + gap/range), &
+            mask=abs(expected) > 0.0_dp))
+      end function largest
+
+   end subroutine rows_have_the_values_of_cells
 
    !> The attraction of Maugis-Dugdale ends at the range. Wrong names and numbers are reported together.
    subroutine bounds_of_the_range()

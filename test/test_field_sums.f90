@@ -4,7 +4,8 @@ module test_field_sums
    use asperity_precision, only : dp
    use check, only : begin_suite, check_close, check_that, selected
    use field_sums, only : cell_count, field_count, field_magnitude, field_maximum, field_mean, field_minimum, &
-      field_product, field_rms, field_sum, largest_of_rows, least_of_rows, row_total, row_totals, sum_rows, vector_sum
+      field_product, field_rms, field_sum, largest_of_rows, least_of_rows, row_form, row_product, row_total, row_totals, sum_rows, &
+      vector_sum
    use projection, only : project_simplex
    use regular_grid, only : boundary_free, grid_type, new_grid
    use workspace, only : new_workspace, workspace_type
@@ -22,8 +23,22 @@ contains
       if (selected('known_fields')) call known_fields()
       if (selected('threads_do_not_matter')) call threads_do_not_matter()
       if (selected('counts_and_magnitudes')) call counts_and_magnitudes()
+      if (selected('products_of_rows')) call products_of_rows()
       if (selected('returned_fields_are_lent_again')) call returned_fields_are_lent_again()
    end subroutine run_field_sums
+
+   !> Products and quadratic forms of rows of all lengths, with whole numbers, whose sums are exact.
+   subroutine products_of_rows()
+      real(dp), allocatable :: x(:), w(:)
+      integer :: i, n
+
+      do n = 0, 9
+         x = [(real(i, dp), i=1, n)]
+         w = [(real(10 - i, dp), i=1, n)]
+         call check_close(row_product(w, x), sum(w*x), 0.0_dp, 'product of rows')
+         call check_close(row_form(w, x), sum(w*x**2), 0.0_dp, 'quadratic form of a row')
+      end do
+   end subroutine products_of_rows
 
    !> Counts of the rows add up. The magnitude of a field is that of its smallest value if this is larger.
    subroutine counts_and_magnitudes()

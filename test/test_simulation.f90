@@ -245,7 +245,7 @@ contains
    end subroutine area_never_falls_after_a_drop
 
    !> The work of the traction and that of the load agree as the steps become shorter. Only backward Euler has a
-   !! numerical loss.
+   !> numerical loss.
    subroutine work_agrees_with_that_of_the_load()
       type(record_type) :: record
       real(dp) :: difference(2), numerical(2)

@@ -76,8 +76,8 @@ contains
    end function sticky
 
    !> Control by pressure, force and displacement gives the same states, elastic and viscoelastic. The energy balance
-   !! closes to 1e-10 of the energies at a tolerance of 1e-8: to round-off in a periodic cell; on a free map the
-   !! displacement of the pressure differs from the stored one by the tolerance.
+   !> closes to 1e-10 of the energies at a tolerance of 1e-8: to round-off in a periodic cell; on a free map the
+   !> displacement of the pressure differs from the stored one by the tolerance.
    subroutine controls_go_through_the_same_states(what, place, gamma, low, high)
       character(*), intent(in) :: what, place, gamma, low, high
       type(record_type) :: led, pressed, pushed
@@ -129,7 +129,7 @@ contains
    end subroutine controls_go_through_the_same_states
 
    !> Without loss the force is the derivative of the energy, which includes that of adhesion. The error of the work
-   !! by the trapezoidal rule decreases with the square of the step.
+   !> by the trapezoidal rule decreases with the square of the step.
    subroutine force_is_derivative_of_energy()
       type(record_type) :: record
       real(dp) :: errors(2), change
@@ -153,9 +153,9 @@ contains
    end subroutine force_is_derivative_of_energy
 
    !> A Maugis-Dugdale sphere is pulled off by its displacement. The largest pull is that of theory, -1.95059 pi gamma_0 R
-   !! for lambda = 0.1 and -1.60073 for lambda = 1 (lambda = sigma_0 (9 R/(2 pi gamma_0 E*^2))^(1/3)), to 2 % with cells
-   !! of 0.13 E* range^2/energy and to 3 % with cells of twice that size. The attraction ends over a finite width, which
-   !! keeps its edge from sticking to the grid.
+   !> for lambda = 0.1 and -1.60073 for lambda = 1 (lambda = sigma_0 (9 R/(2 pi gamma_0 E*^2))^(1/3)), to 2 % with cells
+   !> of 0.13 E* range^2/energy and to 3 % with cells of twice that size. The attraction ends over a finite width, which
+   !> keeps its edge from sticking to the grid.
    subroutine pull_off_force_in_a_run()
       real(dp) :: pulls(3)
 
@@ -256,7 +256,7 @@ contains
    end subroutine wave_at_no_load_has_two_states
 
    !> A viscoelastic sphere is pressed on and pulled off at half the speed. It loses energy without adhesion, and more than
-   !! twice as much with it.
+   !> twice as much with it.
    subroutine loss_of_a_viscoelastic_pull_off()
       type(record_type) :: bare, adhesive
       character(:), allocatable :: text
@@ -364,7 +364,7 @@ contains
    end subroutine drive_is_lost_in_the_solid
 
    !> In full sliding without the slope effect the traction is mu (P - P_adh) (thesis, 4.5.1). The attraction P_adh in a
-   !! closed cell, which depends on the potential, presses the surfaces together.
+   !> closed cell, which depends on the potential, presses the surfaces together.
    subroutine friction_by_the_pressure_of_the_wall(potential, attraction)
       character(*), intent(in) :: potential
       real(dp), intent(in) :: attraction           !! at touch, Pa
@@ -386,7 +386,7 @@ contains
    end subroutine friction_by_the_pressure_of_the_wall
 
    !> The bound of the friction must not jump where a cell opens, or the passes of the step would not settle. With the
-   !! potential gauss a cell opens at zero pressure.
+   !> potential gauss a cell opens at zero pressure.
    subroutine passes_settle_with_gauss()
       type(record_type) :: record
 

@@ -72,7 +72,7 @@ contains
    end subroutine cylinder_of_the_thesis
 
    !> Mindlin's sphere with nu = 0: the tangential force as a function of the road's motion, forwards, backwards and
-   !! forwards again (Mindlin and Deresiewicz 1953).
+   !> forwards again (Mindlin and Deresiewicz 1953).
    subroutine mindlin_sphere_forwards_and_backwards()
       real(dp), parameter :: g = 1e6_dp, radius = 10e-3_dp, a = 1e-3_dp, mu = 0.01_dp, v = 1e-3_dp
       real(dp), parameter :: full = mu*a**2/radius     !! road's motion to full slip, m
@@ -232,8 +232,8 @@ contains
    end subroutine same_result_on_two_threads
 
    !> A thick elastic block on a short wave, with one pass per step, sticks and slips in turn: linear interpolation makes
-   !! the friction vary from cell to cell. This is reported once, also by a run after a restart
-   !! (python/tests/test_stops.py). A mass prevents it, and a smooth case causes no report.
+   !> the friction vary from cell to cell. This is reported once, also by a run after a restart
+   !> (python/tests/test_stops.py). A mass prevents it, and a smooth case causes no report.
    subroutine numerical_stick_slip_is_reported()
       character(*), parameter :: report = 'numerical stick-slip'
       type(record_type) :: record
@@ -277,7 +277,7 @@ contains
          character(*), intent(in) :: density
          integer, intent(in) :: passes
          type(record_type), intent(out) :: record
-         integer, intent(in), optional :: steps        !!! number of steps, 60 by default
+         integer, intent(in), optional :: steps        !! number of steps, 60 by default
          integer :: n
 
          n = 60

@@ -33,7 +33,7 @@ contains
    end subroutine run_simulation_pull
 
    !> Mindlin and Deresiewicz's sphere with nu = 0 under a force that goes forwards and backwards: the motion of the road
-   !! is known, and its loop closes.
+   !> is known, and its loop closes.
    subroutine mindlin_cycle_under_a_force()
       type(record_type) :: record
       real(dp), parameter :: mu = 0.4_dp, modulus = 200e6_dp, radius = 50e-3_dp, load = 10.6667_dp
@@ -104,10 +104,10 @@ contains
    end subroutine sticking_block_creeps
 
    !> A rough road in partial slip is pulled obliquely by jumps and ramps. A second run, driven at the velocities of the
-   !! first one, has the same forces.
+   !> first one, has the same forces.
    subroutine pulled_road_moves_like_a_driven_one(slope_effect, method)
       character(*), intent(in) :: slope_effect
-      character(*), intent(in) :: method            !!! of the solvers
+      character(*), intent(in) :: method            !! of the solvers
       type(record_type) :: driven, pulled
       character(*), parameter :: body = '&grid nx = 36, ny = 30, lx = 1e-3, ly = 0.9e-3 /'//nl// &
          '&surface shape = ''self_affine'', hurst = 0.8, rms_slope = 0.1, wavelength_long = 0.5e-3, '// &

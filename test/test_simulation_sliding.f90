@@ -39,8 +39,8 @@ contains
    end subroutine run_simulation_sliding
 
    !> Return the friction of Hunter's cylinder, with one cell per step and 100 cells over the contact. The cell of `cells`
-   !! cells is periodic: its images deform the rubber like a road of another curvature, by a factor of about (pi a/L)^2/6,
-   !! where a is the half width.
+   !> cells is periodic: its images deform the rubber like a road of another curvature, by a factor of about (pi a/L)^2/6,
+   !> where a is the half width.
    real(dp) function cylinder_friction(velocity, half_width, cells, scheme) result(friction)
       real(dp), intent(in) :: velocity        !! m/s
       real(dp), intent(in) :: half_width      !! m
@@ -98,7 +98,7 @@ contains
    end subroutine hunter_cylinder_in_time
 
    !> For a sphere mu R/a0 -> (1 - E_relaxed/E_glassy) V tau_creep/a0 at low speed, whatever the load; at high speed there
-   !! is no friction.
+   !> is no friction.
    subroutine friction_at_low_and_high_speed()
       type(record_type) :: record
       real(dp), parameter :: radius = 10e-3_dp, creep_time = 0.01_dp, dx = 20e-6_dp
@@ -123,13 +123,13 @@ contains
    end subroutine friction_at_low_and_high_speed
 
    !> The exact friction stress of a road in full contact, wave by wave: each arm's traction satisfies
-   !! p' + p/tau = g S' where S varies as exp(-i q.V t).
+   !> p' + p/tau = g S' where S varies as exp(-i q.V t).
    subroutine full_contact(record, lx, ly, g_e, g, tau, velocity, time, stress)
       type(record_type), intent(in) :: record
       real(dp), intent(in) :: lx, ly            !! m
       real(dp), intent(in) :: g_e, g(:), tau(:)
-      real(dp), intent(in) :: velocity(:, :)    !!! between one time and the next, m/s [2, times]
-      real(dp), intent(in) :: time(0:)          !!! s; the road is at rest until the first one
+      real(dp), intent(in) :: velocity(:, :)    !! between one time and the next, m/s [2, times]
+      real(dp), intent(in) :: time(0:)          !! s; the road is at rest until the first one
       real(dp), allocatable, intent(out) :: stress(:, :)   !! on the rubber, Pa [2, 0:times]
       type(real_transform_type) :: transform
       type(error_type), allocatable :: error
@@ -178,7 +178,7 @@ contains
    end subroutine full_contact
 
    !> A rough road in full contact moves obliquely over a grid of oblong cells, with jumps of the speed and of the load, and
-   !! steps of all sizes: both components of its drag are exact.
+   !> steps of all sizes: both components of its drag are exact.
    subroutine rough_road_in_full_contact()
       type(record_type) :: record
       real(dp), allocatable :: stress(:, :), velocity(:, :)
@@ -224,7 +224,7 @@ contains
    end subroutine rough_road_in_full_contact
 
    !> The steady drag of a wave of eight cells in full contact, with the defaults and one cell per step, is within 1 % of the
-   !! closed form. Central differences would make it 10 % too low.
+   !> closed form. Central differences would make it 10 % too low.
    subroutine drag_of_a_coarse_wave()
       type(record_type) :: record
       real(dp), parameter :: amplitude = 1e-6_dp, wave = 0.1e-3_dp, speed = 0.02_dp, tau = 1e-3_dp
@@ -244,7 +244,7 @@ contains
    end subroutine drag_of_a_coarse_wave
 
    !> An elastic rubber returns the work that it receives: the drag over a distance within one cell is the change of the
-   !! elastic energy at a fixed approach, by Simpson's rule over 16 steps.
+   !> elastic energy at a fixed approach, by Simpson's rule over 16 steps.
    subroutine elastic_road_gives_back_its_work()
       type(record_type) :: record
       real(dp), parameter :: d_x = 12e-6_dp/16, d_y = -7e-6_dp/16
@@ -308,7 +308,7 @@ contains
    end subroutine orders_in_time_of_the_drag
 
    !> The work of the load and the road from outside approaches the work of the traction as the steps become shorter, with
-   !! the order of the scheme.
+   !> the order of the scheme.
    subroutine outside_work_is_that_of_the_traction()
       type(record_type) :: record
       real(dp) :: difference(3)

@@ -1,5 +1,5 @@
 !> Tests of the first step after a kink of the load. A flat punch has a contact that never changes, so that the approach
-!! is exactly the creep of the material times an elastic constant of the mesh.
+!> is exactly the creep of the material times an elastic constant of the mesh.
 module test_starting_steps
    use case_settings, only : phase_settings_type
    use check, only : begin_suite, check_close, check_order, check_that, selected
@@ -91,12 +91,12 @@ contains
    end subroutine steps_that_begin_with_another_rate
 
    !> The load grows, decreases more slowly, and rests, with 1, 3 and 5 arms. The error is that of the worst row after the
-   !! first kink, relative to the largest approach, in coarse and in fine steps.
+   !> first kink, relative to the largest approach, in coarse and in fine steps.
    subroutine error_after_a_kink()
       integer, parameter :: arms(3) = [1, 3, 5]
       integer, parameter :: steps(3) = [8, 16, 32]
       !> Largest errors that are allowed in coarse steps. A scheme that continued with the curvature from before the kink had
-      !! errors of 2.0e-3, 3.2e-3 and 3.6e-3 with 8 steps; a plain restart had 3.5e-4, 2.2e-3 and 1.7e-3.
+      !> errors of 2.0e-3, 3.2e-3 and 3.6e-3 with 8 steps; a plain restart had 3.5e-4, 2.2e-3 and 1.7e-3.
       real(dp), parameter :: allowed(3) = [1.0e-4_dp, 4.0e-4_dp, 4.0e-4_dp]
       real(dp) :: errors(3)
       integer :: k, m
@@ -168,7 +168,7 @@ contains
    end subroutine error_after_a_kink
 
    !> Return the integral of J(t - s) dF(s), where J is the creep compliance, for a force that grows by 1/s for a second,
-   !! decreases by 0.7/s for a second, and rests.
+   !> decreases by 0.7/s for a second, and rests.
    function creep(g_e, g, tau, t) result(u)
       real(dp), intent(in) :: g_e, g(:), tau(:)
       real(dp), intent(in) :: t

@@ -73,7 +73,7 @@ contains
    end subroutine full_contact_with_a_wave
 
    !> Hunter's cylinder (Hunter, 1961) at three speeds, as in test_simulation_sliding. The periodic cell has an error of
-   !! order 1/L^2.
+   !> order 1/L^2.
    subroutine hunter_cylinder_in_steady_sliding()
       real(dp), parameter :: velocity(3) = [5e-3_dp, 20e-3_dp, 100e-3_dp]
       real(dp), parameter :: half_width(3) = [0.73826627e-3_dp, 0.67155531e-3_dp, 0.39313100e-3_dp]
@@ -99,7 +99,7 @@ contains
    end subroutine hunter_cylinder_in_steady_sliding
 
    !> At rest the steady state is the relaxed state; at a very low speed it is that of G_e, and at a very high one that of
-   !! G(0).
+   !> G(0).
    subroutine steady_state_at_rest_and_at_high_speed()
       type(record_type) :: slow, fast, relaxed, rest, glassy
       character(*), parameter :: case = grid//road//rubber//'&solver tolerance = 1e-9 /'//nl
@@ -209,7 +209,7 @@ contains
    end subroutine losses_balance_the_power_of_the_drive
 
    !> In plane strain with nu = 1/2 and without the slope effect T = mu P and A_xx = A_zz, so that U_x = mu U_z. The road is
-   !! read at x + U_x, and has moved by the mean of U_x weighted with the pressure.
+   !> read at x + U_x, and has moved by the mean of U_x weighted with the pressure.
    subroutine plane_strain_with_the_flat_law()
       type(record_type) :: record
 
@@ -226,7 +226,7 @@ contains
    end subroutine plane_strain_with_the_flat_law
 
    !> A steady phase with a duration continues from its state: only the error of the steps changes it, while a run from
-   !! rest differs much more.
+   !> rest differs much more.
    subroutine run_continues_from_the_steady_state()
       type(record_type) :: steady, rest
       character(*), parameter :: steps = 'velocity_x = 0.5, duration = 12e-3, steps = 6 /'
@@ -253,7 +253,7 @@ contains
    end subroutine run_continues_from_the_steady_state
 
    !> A long run in time, with one cell per step, ends in the steady state of its own scheme: with the symbols of
-   !! exponential2 the solver finds the same fields. With those of the continuum the difference is the error of the steps.
+   !> exponential2 the solver finds the same fields. With those of the continuum the difference is the error of the steps.
    subroutine long_run_ends_in_the_steady_state()
       character(*), parameter :: laws(3) = [character(80) :: '', &
          '&friction law = ''coulomb'', coefficient = 0.4, slope_effect = F /', &
@@ -307,7 +307,7 @@ contains
    end subroutine long_run_ends_in_the_steady_state
 
    !> The state at the end of a run in time, with one cell per step, differs from that of the continuum by the error of the
-   !! steps and of the mesh, which decreases nearly with the square of the cell.
+   !> steps and of the mesh, which decreases nearly with the square of the cell.
    subroutine error_against_a_run_falls_with_steps()
       type(case_type) :: case
       type(simulation_type) :: sim
@@ -362,8 +362,8 @@ contains
    end subroutine all_starts_end_in_one_state
 
    !> On a road that wedges the rubber, more rounds never return a worse state, and the reason names the slopes. With this
-   !! coefficient every face steeper than 1/4 holds any force, and the contact cannot avoid all of them. (With a coefficient
-   !! of 1.5 there is a solution.)
+   !> coefficient every face steeper than 1/4 holds any force, and the contact cannot avoid all of them. (With a coefficient
+   !> of 1.5 there is a solution.)
    subroutine best_state_is_kept()
       type(solver_result_type) :: normal, rubbing
       real(dp) :: missed(2)
@@ -381,7 +381,7 @@ contains
    end subroutine best_state_is_kept
 
    !> Constant shear jumps at the edge of the contact, so that the rounds alternate. The closed form of the law, in which a
-   !! cell may be partly sheared, is solved nevertheless, in few rounds.
+   !> cell may be partly sheared, is solved nevertheless, in few rounds.
    subroutine constant_shear_at_the_edge()
       type(solver_result_type) :: normal, rubbing
 
@@ -411,7 +411,7 @@ contains
    end subroutine slow_contact_is_finished_by_newton
 
    !> On a steep road some cells nearly stick, and the rounds converge slowly. All cells are then solved at once: from near
-   !! the solution before many rounds are made, or from farther away along a path of solutions.
+   !> the solution before many rounds are made, or from farther away along a path of solutions.
    subroutine stalled_rounds_are_solved_at_once()
       type(solver_result_type) :: normal, rubbing
 
@@ -424,9 +424,9 @@ contains
 
    !> Run a number of rounds with a friction law on a steep road.
    subroutine slide_uphill(law, seed, rounds, normal, rubbing)
-      character(*), intent(in) :: law                  !!! as in the group of the input
+      character(*), intent(in) :: law                  !! as in the group of the input
       integer, intent(in) :: seed                      !! of the road
-      integer, intent(in) :: rounds                    !!! largest number
+      integer, intent(in) :: rounds                    !! largest number
       type(solver_result_type), intent(out) :: normal, rubbing
       type(case_type) :: case
       type(steady_step_type) :: steady
@@ -457,7 +457,7 @@ contains
    subroutine find_steady(case, sim, dt, steady)
       type(case_type), intent(in) :: case
       type(simulation_type), intent(in) :: sim
-      real(dp), intent(in) :: dt                       !!! time step of the scheme, s; 0 for the continuum
+      real(dp), intent(in) :: dt                       !! time step of the scheme, s; 0 for the continuum
       type(steady_step_type), intent(out) :: steady
       type(error_type), allocatable :: error
       type(interpolation_type) :: road

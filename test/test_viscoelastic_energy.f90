@@ -105,7 +105,7 @@ contains
    end function random_load
 
    !> In each step, for random histories and operators, the work is the change of the stored energy plus the loss. Losses are
-   !! not negative, and the stored energy is that computed from the arms' own fields.
+   !> not negative, and the stored energy is that computed from the arms' own fields.
    subroutine balance_closes()
       real(dp), parameter :: g(3) = [1.0_dp, 4.0_dp, 0.3_dp]
       type(body_type) :: body
@@ -259,7 +259,7 @@ contains
    end subroutine work_and_loss_along_a_path
 
    !> Backward Euler: stored energy, loss in the dampers and numerical loss, computed in the springs and dampers of the Zener
-   !! branches (thesis, eq. 4.1 to 4.4), for one cell with A = 1.6.
+   !> branches (thesis, eq. 4.1 to 4.4), for one cell with A = 1.6.
    subroutine terms_of_backward_euler()
       real(dp), parameter :: g_inf = 0.2_dp, a = 1.6_dp, area = 0.5_dp
       real(dp), parameter :: g0(2) = [1.0_dp, 3.0_dp], g1(2) = [0.4_dp, 0.05_dp]

@@ -187,8 +187,8 @@ def test_input_from_a_pipe_needs_an_output(program: str, case: Path, tmp_path: P
 
     refused = run()
     assert refused.returncode == 2
-    assert refused.stderr == ("/dev/stdin: is not a regular file, beside which a result could"
-                              " stand: give --output FILE.h5\n")
+    assert refused.stderr == ("/dev/stdin: is not a regular file, so that the result needs a"
+                              " name: give --output FILE.h5\n")
     assert not Path("/dev/stdin.h5").exists()
     assert run("--output", "piped.h5").returncode == 0
     assert asperity.open(tmp_path / "piped.h5").finished

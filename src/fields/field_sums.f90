@@ -17,8 +17,8 @@ module field_sums
    private
 
    public :: added, cell_count, field_count, field_magnitude, field_maximum, field_mean, field_minimum, &
-      field_product, field_rms, field_sum, largest_of_rows, least_of_rows, row_product, row_total, row_totals, &
-      sum_rows, threads_for, vector_sum
+      field_product, field_rms, field_sum, largest_of_rows, least_of_rows, row_form, row_product, row_total, &
+      row_totals, sum_rows, threads_for, vector_sum
 
    integer, parameter :: small = 16384          !! cells below which one thread is faster
 
@@ -50,6 +50,24 @@ contains
          total = total + one(i)*other(i)
       end do
    end function row_product
+
+   !> The same for the quadratic form x.w x with a diagonal w.
+   pure function row_form(weight, x) result(total)
+      real(dp), intent(in), contiguous :: weight(:), x(:)
+      real(dp) :: total
+      real(dp) :: parts(4)
+      integer :: i, whole
+
+      whole = size(x) - modulo(size(x), 4)
+      parts(:) = 0.0_dp
+      do i = 1, whole, 4
+         parts(:) = parts + x(i:i + 3)*(weight(i:i + 3)*x(i:i + 3))
+      end do
+      total = (parts(1) + parts(3)) + (parts(2) + parts(4))
+      do i = whole + 1, size(x)
+         total = total + x(i)*(weight(i)*x(i))
+      end do
+   end function row_form
 
    !> Total over all rows of the grid, added in the order of the rows.
    function total_of_rows(rows) result(total)

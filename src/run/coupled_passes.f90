@@ -52,7 +52,7 @@
 !>
 !> Memory, in fields of doubles: the place, its residual, the best place and the displacement carried along have two
 !> components each, and so have the fields of the acceleration. With shares all of these but the displacement have a
-!> third component, and there is a field of shares. `mismatch_of` borrows three fields from the workspace of the contact.
+!> third component, and there is a field of shares. `mismatch_of` borrows three fields from the contact's workspace.
 module coupled_passes
    use anderson, only : anderson_type, new_anderson
    use carried_field, only : carry
@@ -138,21 +138,11 @@ contains
       real(dp) :: tolerance
       integer :: most
       logical :: tried                                   !! the step was solved jointly, or this was tried
-      logical :: breaks_motion                           !! this row does not continue the motion of the last one
 
       tolerance = contact%case%solver%tolerance
       most = contact%case%solver%passes
       if (most == 0) most = most_passes
-      call self%mixing%forget()
-      breaks_motion = plan%instantaneous .or. plan%new_speed
-      call predict(self, contact, plan%dt, motion, goes_on=.not. breaks_motion)
-      call control%start(tolerance, merge(1.0_dp, contact%state%first_mismatch, breaks_motion), self%sharing)
-      if (.not. plan%instantaneous) &
-         call contact%tangential%extrapolate(contact%state%tangential, .not. plan%new_speed)
-      if (.not. breaks_motion) call contact%tangential%expect(contact%state%tangential, self%place)
-
-      self%passes = 0
-      self%gap_known = .false.
+      call begin(self, contact, plan, motion, control)
       do
          self%passes = self%passes + 1
          ! Early passes are solved coarsely; the result that the row keeps is solved to the tolerance.
@@ -188,6 +178,27 @@ contains
          end if
       end associate
    end subroutine solve
+
+   !> Choose the first place of a row, and how its first pass is solved.
+   subroutine begin(self, contact, plan, motion, control)
+      class(coupled_passes_type), intent(inout) :: self
+      class(contact_type), intent(inout) :: contact
+      type(planned_row_type), intent(in) :: plan
+      real(dp), intent(in) :: motion(2)                  !! of the road in this row, m
+      type(pass_control_type), intent(out) :: control
+      logical :: breaks_motion                           !! this row does not continue the motion of the last one
+
+      self%passes = 0
+      self%gap_known = .false.
+      call self%mixing%forget()
+      breaks_motion = plan%instantaneous .or. plan%new_speed
+      call predict(self, contact, plan%dt, motion, goes_on=.not. breaks_motion)
+      call control%start(contact%case%solver%tolerance, merge(1.0_dp, contact%state%first_mismatch, breaks_motion), &
+         self%sharing)
+      if (.not. plan%instantaneous) &
+         call contact%tangential%extrapolate(contact%state%tangential, .not. plan%new_speed)
+      if (.not. breaks_motion) call contact%tangential%expect(contact%state%tangential, self%place)
+   end subroutine begin
 
    !> The passes have stalled: solve the step all at once. If that succeeds, the next pass starts from its solution
    !> with accurate solves, and verifies that the step is solved. Otherwise the place stays as it is.

@@ -6,7 +6,7 @@
 !> which prevents it from vectorising the loop.
 module adhesion_sweeps
    use asperity_precision, only : dp
-   use field_sums, only : row_product
+   use field_sums, only : row_form, row_product
    implicit none
    private
 
@@ -89,24 +89,6 @@ contains
       end do
       sums(:) = [row_product(residual, d), row_form(curvature, d)]
    end subroutine turn_cells
-
-   !> d.w d, in the order of `row_product`.
-   pure function row_form(weight, d) result(total)
-      real(dp), intent(in), contiguous :: weight(:), d(:)
-      real(dp) :: total
-      real(dp) :: parts(4)
-      integer :: i, whole
-
-      whole = size(d) - modulo(size(d), 4)
-      parts(:) = 0.0_dp
-      do i = 1, whole, 4
-         parts(:) = parts + d(i:i + 3)*(weight(i:i + 3)*d(i:i + 3))
-      end do
-      total = (parts(1) + parts(3)) + (parts(2) + parts(4))
-      do i = whole + 1, size(d)
-         total = total + d(i)*(weight(i)*d(i))
-      end do
-   end function row_form
 
    !> g = g + alpha d, closed where it would be negative; by how much, and the most of it.
    pure subroutine move_cells(alpha, d, state, change, most)

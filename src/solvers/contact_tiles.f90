@@ -1,7 +1,7 @@
 !> Inverses of the normal compliance K on small tiles of the contact.
 !>
-!> The grid is divided into tiles of at most 8 x 8 cells. For each tile the displacements of its cells in contact, and of
-!> those in a rim of one cell around it, are set by pressures on these cells alone. The tile keeps the pressures of its
+!> The grid is divided into tiles of at most 8 x 8 cells. For each tile the displacements of its cells in contact, and
+!> of those in a rim of one cell around it, are set by pressures on these cells alone. The tile keeps the pressures of its
 !> own cells and drops those of the rim, which belong to other tiles (restricted additive Schwarz). What distant
 !> tiles do to each other is left to the boxes of module `contact_boxes`.
 !>

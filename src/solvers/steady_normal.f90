@@ -10,9 +10,9 @@
 !>     z <- z + (y - P)
 !>
 !> At the fixed point z is P where there is contact, and -c gap elsewhere; that sets the scale c.
-!> Anderson acceleration makes it five to ten times faster. Near the solution, Newton's method on the cells in contact may
-!> be faster still (modules `steady_active` and `steady_newton`). From a distant start it fails on materials whose
-!> modulus spans three decades.
+!> Anderson acceleration makes it five to ten times faster. Near the solution, Newton's method on the cells in contact
+!> may be faster still (modules `steady_active` and `steady_newton`). From a distant start it fails on materials
+!> whose modulus spans three decades.
 !>
 !> Converged means the same as for module `normal_cg`: the duality gap e1 of a fresh U = K P, over the
 !> rms height or a smaller scale where the contact is small, and the error of the load.
