@@ -73,8 +73,8 @@ contains
          to_text(sum(case%phases%duration))//' s'//nl
       text = text//'! memory: about '//to_text(real(nint(memory*10.0_dp), dp)/10.0_dp)//unit//nl
       if (joint_memory(case) > 0.0_dp) text = text//'! A step or a steady row that must be solved all at once takes up to '// &
-         memory_text(joint_memory(case))//' more, depending on how many cells touch; if there is not so much, the run '// &
-         'continues without this solution'//nl
+         memory_text(joint_memory(case))//' more, depending on how many cells touch; if this memory is not available, '// &
+         'the run continues without this solution'//nl
       if (memory_needed(case) > limit) text = text//'! warning: the run needs more memory than '//whose// &
          ': '//memory_text(limit)//nl
       text = text//'! time: '//duration_text(seconds_needed(case))//' on this machine, to within a factor of about three'//nl
