@@ -271,3 +271,50 @@ def test_random_rows_against_dense_matrices(program: str, laws: tuple[str, ...])
     counts = {tuple(line.split()[:3]): int(line.split()[3]) for line in done.stdout.splitlines()
               if len(line.split()) == 4}
     assert sum(n for (_, _, end), n in counts.items() if end == "right") >= 20
+
+
+def flat_topped(nx: int, ny: int) -> np.ndarray:
+    """Return a random road with flat tops, which touch under hardly any displacement."""
+    rng = np.random.default_rng(7)
+    q = np.hypot(np.fft.fftfreq(nx)[None, :] * nx, np.fft.fftfreq(ny)[:, None] * ny)
+    height = np.fft.ifft2(np.where((q > 0) & (q < 8), np.maximum(q, 1.0) ** -1.5, 0.0)
+                          * np.fft.fft2(rng.standard_normal((ny, nx)))).real
+    height = np.minimum(height / height.std(), 0.3)
+    return 1e-5 * (height - height.mean())
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
+def test_the_error_is_relative_to_the_displacement_under_the_load(tmp_path, monkeypatch, tolerance):
+    # The criterion of docs/theory.md: e1 over the rms height or ten times the mean displacement
+    # under the load, whichever is smaller. Here the latter is much smaller.
+    monkeypatch.chdir(tmp_path)
+    height = flat_topped(52, 48)
+    case = asperity.Case(
+        surface=height, grid=dict(lx=1e-3),
+        material=dict(shear_modulus=1e6, prony_g=[999e6], prony_tau=[1.0]),
+        phase=[dict(steady=True, pressure=2e4, velocity_x=1e-3)], solver=dict(tolerance=tolerance),
+        output=dict(snapshot_every=1))
+    run = asperity.run(case, output="steady.h5", quiet=True)
+    shot = run.snapshots[-1]
+    pressure, gap, moved = shot["pressure"], shot["gap"], shot["displacement_z"]
+    scale = 10 * (pressure * moved).sum() / pressure.sum()
+    assert scale < 0.03 * height.std()
+    error = (pressure * (gap - gap.min())).sum() / pressure.sum()
+    assert error <= tolerance * scale * (1 + 1e-6)
+
+
+def test_full_contact_is_found_after_other_loads_and_speeds(tmp_path, monkeypatch):
+    # The start that is extrapolated from the two phases before is far from full contact, whose
+    # pressure is a closed form.
+    monkeypatch.chdir(tmp_path)
+    phases = [dict(steady=True, pressure=load, velocity_x=speed)
+              for load, speed in ((1e7, 1e-4), (2e7, 1e-5), (1e7, 1e-6))]
+    case = asperity.Case(
+        grid=dict(nx=64, ny=1, lx=1e-3),
+        surface=dict(shape="self_affine", hurst=0.8, rms_slope=0.1, wavelength_long=0.25e-3,
+                     wavelength_short=125e-6),
+        material=dict(shear_modulus=1e6, prony_g=[99e6], prony_tau=[1.0]), phase=phases,
+        solver=dict(tolerance=1e-4))
+    history = asperity.run(case, output="full.h5", quiet=True).history
+    assert history["contact_area"][-1] == 1.0
+    assert history["ffts"][-1] <= 20

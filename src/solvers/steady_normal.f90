@@ -23,7 +23,7 @@ module steady_normal
    use normal_state, only : gap_measure_type, measure_gap, narrow_scale, normal_problem_type, &
       prepare_problem, reason_converged, reason_iterations
    use asperity_precision, only : dp, int64
-   use field_sums, only : cell_count, field_count, field_mean, field_sum, least_of_rows, row_totals
+   use field_sums, only : cell_count, field_count, field_mean, field_minimum, field_sum, least_of_rows, row_totals
    use projection, only : project_simplex
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
@@ -109,6 +109,7 @@ contains
 
       progress%ffts_before = operator%ffts
       call prepare_problem(problem, self%grid, operator%threads, height, task, determined)
+      task%datum = 0.0_dp          ! here gaps are U - H, with H as it is
       mean = field_mean(height)
       call self%start(operator, task, height, pressure, gap)
       outcome%reason = reason_iterations
@@ -148,11 +149,15 @@ contains
       real(dp), intent(inout) :: gap(:, :)
       type(gap_measure_type), intent(inout) :: found
       type(solver_result_type), intent(inout) :: outcome       !! converged, and the reason
+      real(dp) :: scale
       logical :: finished
 
       if (progress%measure%error <= task%tolerance) then
          if (mod(progress%checks, 4) == 0) then
+            scale = task%scale
             call check(self, operator, task, height, gap, found)
+            ! Errors are relative to the scale, which the check may have changed.
+            progress%least = progress%least*(scale/task%scale)
             outcome%converged = found%strict <= task%tolerance
          end if
          progress%checks = progress%checks + 1
@@ -206,7 +211,7 @@ contains
       real(dp) :: level
 
       call self%memory%forget()
-      if (.not. task%warm) then
+      if (.not. task%warm .or. closes_up(self, operator, task, height, pressure)) then
          call operator%press(height, pressure)
          pressure = pressure + task%target
          call project_simplex(pressure, task%target*self%grid%cells())
@@ -230,6 +235,22 @@ contains
       pressure(:, :) = self%z
       call project_simplex(pressure, task%target*self%grid%cells())
    end subroutine start
+
+   !> Is the solution full contact? A given start, such as the state that is extrapolated from those of other loads and
+   !> speeds, may be far from it. This is asked only if most cells of the start touch, since it takes two transforms.
+   function closes_up(self, operator, task, height, pressure) result(yes)
+      class(steady_normal_type), intent(inout) :: self
+      type(steady_operator_type), intent(inout) :: operator
+      type(normal_problem_type), intent(in) :: task
+      real(dp), intent(in) :: height(:, :)
+      real(dp), intent(in) :: pressure(:, :)
+      logical :: yes
+
+      yes = field_count(pressure > 0.0_dp) > 0.5_dp*self%grid%cells()
+      if (.not. yes) return
+      call operator%press(height, self%z)
+      yes = field_minimum(self%z) + task%target >= 0.0_dp
+   end function closes_up
 
    !> The scale that fits a state: it makes a typical pressure twice as large as c times a typical gap.
    subroutine scale_of(pressure, gap, measure)
