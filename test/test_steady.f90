@@ -39,6 +39,7 @@ contains
          call steady_state_at_rest_and_at_high_speed()
       if (selected('rotated_and_mirrored_roads_agree')) call rotated_and_mirrored_roads_agree()
       if (selected('losses_balance_the_power_of_the_drive')) call losses_balance_the_power_of_the_drive()
+      if (selected('all_cells_slip_at_any_tolerance')) call all_cells_slip_at_any_tolerance()
       if (selected('plane_strain_with_the_flat_law')) call plane_strain_with_the_flat_law()
       if (selected('run_continues_from_the_steady_state')) call run_continues_from_the_steady_state()
       if (selected('rows_of_a_curve_equal_single_rows')) call rows_of_a_curve_equal_single_rows()
@@ -207,6 +208,21 @@ contains
       end associate
       call check_books(slope, 'steady, slope')
    end subroutine losses_balance_the_power_of_the_drive
+
+   !> No cell sticks in steady sliding. With a coarse tolerance the tractions lie within their bounds by as much.
+   subroutine all_cells_slip_at_any_tolerance()
+      type(record_type) :: record
+      character(*), parameter :: tolerances(3) = ['1e-3', '1e-5', '1e-7']
+      integer :: k
+
+      do k = 1, size(tolerances)
+         call run_case(grid//road//rubber//'&friction law = ''coulomb'', coefficient = 0.3 /'//nl// &
+            '&solver tolerance = '//tolerances(k)//' /'//nl// &
+            '&phase steady = T, pressure = 2e5, velocity_x = 1. /', tolerances(k), record)
+         call check_close(record%rows(0)%stick_area, 0.0_dp, 0.0_dp, 'no cell sticks: '//tolerances(k))
+         call check_that(record%rows(0)%contact_area > 0.05_dp, 'cells touch: '//tolerances(k))
+      end do
+   end subroutine all_cells_slip_at_any_tolerance
 
    !> In plane strain with nu = 1/2 and without the slope effect T = mu P and A_xx = A_zz, so that U_x = mu U_z. The road is
    !> read at x + U_x, and has moved by the mean of U_x weighted with the pressure.

@@ -5,6 +5,7 @@ module steady_row
    use asperity_schedule, only : planned_row_type
    use contact_model, only : contact_type
    use row_account, only : found_step_type
+   use steady_bound, only : largest_force
    use steady_contact, only : steady_contact_type
    use steady_step, only : steady_step_type
    use tangential_state, only : tangential_state_type
@@ -85,7 +86,7 @@ contains
       type(steady_contact_type), intent(in) :: found
       real(dp), intent(in) :: velocity(2)             !! of the road, m/s
       real(dp), parameter :: within = 1.0_dp + 1e-6_dp  !! s of the bound from which a point sticks
-      real(dp) :: slope(2), star(2), before
+      real(dp) :: slope(2), star(2), pushed(2), before
       integer :: i, j
 
       before = state%block%kinetic()
@@ -95,7 +96,7 @@ contains
       state%block%speed = -velocity
       state%block%fresh = .true.
       state%block%work = state%block%work + state%block%kinetic() - before
-      !$omp parallel do default(none) shared(tangential, state, found) private(i, j, slope, star)
+      !$omp parallel do default(none) shared(tangential, state, found) private(i, j, slope, star, pushed)
       do j = 1, tangential%grid%rows()
          do i = 1, tangential%grid%nx
             state%traction(i, :, j) = found%traction(i, :, j)
@@ -108,8 +109,10 @@ contains
             state%rubbing(i, :, j) = state%traction(i, :, j) - star
             state%contact(i, j) = 2_int8
             if (.not. found%pressure(i, j) > 0.0_dp) cycle       ! partly sheared: it slips
-            if (tangential%law%bound_ratio(found%pressure(i, j), slope, state%traction(i, :, j) - star) > within) &
-               state%contact(i, j) = 1_int8
+            ! A traction that is only known to the tolerance may lie within the bound though the cell slips. The slip
+            ! decides: added to the traction, it takes a slipping cell far out of the bound.
+            pushed = state%rubbing(i, :, j) + largest_force(tangential%law, found%pressure(i, j))*found%slip(i, :, j)
+            if (tangential%law%bound_ratio(found%pressure(i, j), slope, pushed) > within) state%contact(i, j) = 1_int8
          end do
       end do
       state%rubbed(:, :) = state%contact
