@@ -1,18 +1,21 @@
 !> Adhesive contact: one solver for periodic and free grids, with the fast method or that of the thesis.
 !>
-!> Module `adhesion_state` defines the problem, its equations and the interface of a method; `adhesion_patch`
-!> contains the differences between the grids; `adhesion_cg_fast` is the fast method, and `adhesion_cg_thesis` that
-!> of the thesis.
+!> Module `adhesion_state` defines the problem and its equations, and `adhesion_method` the interface of a method;
+!> `adhesion_patch` contains the differences between the grids; `adhesion_cg_fast` is the fast method, and
+!> `adhesion_cg_thesis` that of the thesis.
 module adhesion_cg
    use adhesion_cg_fast, only : adhesion_fast_type, new_adhesion_fast
    use adhesion_cg_thesis, only : adhesion_thesis_type, new_adhesion_thesis
-   use adhesion_state, only : adhesion_method_type, adhesion_problem_type, control_approach
+   use adhesion_method, only : adhesion_method_type
+   use adhesion_patch, only : adhesion_contact_type
+   use adhesion_state, only : adhesion_problem_type, control_approach
    use finite_fields, only : reject_overflow
    use asperity_errors, only : error_input, error_type, fail
    use asperity_threads, only : thread_count
    use field_sums, only : field_maximum
    use kernels, only : kernel_type
    use asperity_precision, only : dp
+   use omp_lib, only : omp_get_wtime
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
    implicit none
@@ -35,7 +38,7 @@ contains
    subroutine new_adhesion_solver(self, grid, kernel, error, method)
       type(adhesion_solver_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
-      type(kernel_type), intent(in) :: kernel          !! what the solid is, normal
+      type(kernel_type), intent(in) :: kernel               !! normal response of the solid
       type(error_type), allocatable, intent(out) :: error
       character(*), intent(in), optional :: method          !! 'fast' (default) or 'thesis' (periodic)
       character(16) :: name
@@ -60,10 +63,10 @@ contains
    end subroutine new_adhesion_solver
 
    !> Solve an adhesive contact problem. A solve that does not converge is an outcome with a reason; the fields then
-   !> hold the state that was reached.
+   !> hold the state that was reached, which has the lowest energy so far.
    !>
-   !> Start: in periodic mode `gap`; in free mode `pressure` with `level` (the level is the target where
-   !> that is prescribed). With problem%full_contact from there instead.
+   !> In periodic mode the solve starts from `gap`, and in free mode from `pressure` and `level` (from the target
+   !> instead of `level` if the level is prescribed). With problem%full_contact it starts from full contact.
    subroutine solve(self, problem, height, gap, pressure, level, outcome, past)
       class(adhesion_solver_type), intent(inout) :: self
       type(adhesion_problem_type), intent(in) :: problem
@@ -73,17 +76,32 @@ contains
       real(dp), intent(inout) :: level                 !! U - H where the gap is zero, m
       type(solver_result_type), intent(out) :: outcome
       real(dp), intent(in), target, optional :: past(:, :)  !! P_h, Pa
-      type(adhesion_problem_type) :: task
+      type(adhesion_contact_type) :: contact
+      real(dp) :: started
 
-      task = problem
-      task%datum = field_maximum(height)
-      if (problem%control == control_approach) task%target = problem%target + task%datum
-      level = level + task%datum
-      call self%method%solve(task, height, gap, pressure, level, outcome, past)
+      started = omp_get_wtime()
+      contact%problem = problem
+      contact%height => height
+      contact%gap => gap
+      contact%pressure => pressure
+      if (present(past)) contact%past => past
+
+      ! The methods measure heights and levels from the highest point of the road.
+      associate (task => contact%problem)
+         task%datum = field_maximum(height)
+         contact%level = level + task%datum
+         if (problem%control == control_approach) then
+            task%target = problem%target + task%datum
+            contact%level = task%target
+         end if
+      end associate
+      call self%method%solve(contact, outcome)
       if (outcome%stopped) return
+
       call reject_overflow(outcome, gap, pressure, thread_count())
-      level = level - task%datum
+      level = contact%level - contact%problem%datum
       if (problem%control == control_approach) level = problem%target
+      outcome%seconds = omp_get_wtime() - started
    end subroutine solve
 
    !> Free plans and memory.

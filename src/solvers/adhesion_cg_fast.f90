@@ -1,53 +1,53 @@
 !> The fast method for adhesive contact, on periodic and on free grids.
 !>
-!> (Modules: adhesion_state has the equations, adhesion_patch what the grids differ in, adhesion_work the fields,
-!> adhesion_residual the residual, adhesion_descent the step in the model, adhesion_directions the iterations in
-!> it, adhesion_plane what the step before adds to it, adhesion_steps how far to go; thesis, 2.3.) The gap, not
-!> the pressure, is the unknown, so that the adhesive traction is exact in every residual. An iteration does
+!> The problem is that of section 2.3 of the thesis; its equations are in module `adhesion_state`. The gap g, not the
+!> pressure P, is the unknown, so that the adhesive traction e'(g) is exact in every residual. B is the stiffness of the
+!> solid for a shear modulus of 1, and Q the modulus of the time step. An iteration consists of
 !>
-!>     measure            G = P + e'(g);  r = -G where the cell is free: where g > 0, or where G < 0 opens it
-!>     approach_minimum   the step s to about a minimum of the energy with a local model B_h in place of B
-!>     widen_step         s with the right share of the step before (module adhesion_plane)
-!>     find_part          one product B s; the part t of the step
+!>     measure            G = P + e'(g);  r = -G in the free cells: those with g > 0, and those that G < 0 opens
+!>     approach_minimum   the step s towards a minimum of the energy with a local model B_h in place of B
+!>     make_conjugate     s = s + b d, conjugate to the step d before it
+!>     find_part          the part t of the step that is taken, after one product B s
 !>     update             g = g + t s;  P = P + t Q B s
 !>
-!> * s.B s is exact, and so is the energy along s, which never rises. Two transforms an iteration, beside
-!>   those of the model on a grid of an eighth of the cells each way.
-!> * B_h is between 0.8 and 1.3 times B (square cells), so that a step leaves about a quarter of the residual.
-!> * A prescribed mean gap (periodic mode): p is the mean multiplier over g > 0, directions have no mean
-!>   there, and a shift of the stepped gaps keeps their sum.
-!> * A prescribed force in free mode: the level is an additional unknown, which moves with the mode psi. Its
-!>   residual is the `missing` force, and its part of a step is the number `lift`.
-!> * Gauss: the preconditioner in the model is scaled from both sides by (1 + max(e'', 0)/k)^(-1/2), k = 0.02
-!>   Q B at the Nyquist wave number: near contact that potential is stiffer than the solid.
+!> (modules `adhesion_residual`, `adhesion_descent`, `adhesion_plane` and `adhesion_steps`).
 !>
-!> The start is part of the problem: the energy has several minima where the attraction is strong, and
-!> the one near the start is found. Under a negative prescribed pressure there may be none: once all
-!> gaps are so wide that the attraction, which falls with the gap, no longer balances the pull anywhere,
-!> the reason is 'detached'.
+!> * The product B s is exact, and so is the energy along s. The energy never rises. An iteration takes two transforms,
+!>   and those of the model, on a grid with an eighth of the cells in each direction.
+!> * For square cells, B_h is between 0.8 and 1.3 times B. A step therefore leaves about a quarter of the residual.
+!> * If the mean gap is prescribed (periodic mode), the load p is the number for which G has no mean over the open
+!>   cells, directions have no mean there, and the gaps after a step are shifted so that their sum does not change.
+!> * If the force is prescribed in free mode, the level is an additional unknown, which moves with the mode psi (module
+!>   `adhesion_patch`). Its residual is the `missing` force, and its part of a step is the number `lift`.
+!> * Near contact the Gauss potential is stiffer than the solid. The preconditioner in the model is therefore scaled
+!>   from both sides by (1 + max(e'', 0)/k)^(-1/2), where k is 0.02 Q B at the Nyquist wave number.
 !>
-!> Fields of doubles: H, g, P, and the work fields exchange, residual, direction, old residual, change,
-!> image, the step before and its product, curvature, state and traction of the model; the spectrum of B.
-!> In free mode the work fields (but the curvature), the spectrum and three more fields (state, traction,
-!> psi) have 4 times the cells, and the transforms counted are of the doubled grid.
+!> If the attraction is strong, the energy has several minima, and the solver finds the one near the start. The start is
+!> therefore part of the problem. Under a negative prescribed pressure there may be no minimum: if all gaps are so wide
+!> that the attraction, which decreases with the gap, balances the pull nowhere, the reason is 'detached'.
+!>
+!> Memory, in fields of doubles: H, g, P, the spectrum of B, and the work fields exchange, residual, direction, old
+!> residual, change, image, the step before and its product, curvature, state and traction of the model. In free mode
+!> the spectrum and the work fields, except the curvature, have 4 times the cells. There are four more such fields: the
+!> state, the traction, psi and the spectrum of the true operator. Transforms are then counted in those of the doubled
+!> grid.
 module adhesion_cg_fast
    use adhesion_descent, only : approach_minimum
+   use adhesion_method, only : adhesion_method_type
    use adhesion_model, only : new_adhesion_model
-   use adhesion_patch, only : is_detached, new_adhesion_patch
-   use adhesion_plane, only : keep_step, stretch_step, widen_step
+   use adhesion_patch, only : adhesion_contact_type, is_detached, new_adhesion_patch
+   use adhesion_plane, only : keep_step, make_conjugate, stretch_step
    use adhesion_potential, only : stiffens
    use adhesion_residual, only : measure
    use adhesion_start, only : begin_contact
    use adhesion_symbols, only : adhesion_symbols_type
-   use adhesion_state, only : adhesion_method_type, adhesion_problem_type, control_approach, &
-      reason_closed, reason_converged, reason_detached, reason_limit, reason_stalled
+   use adhesion_state, only : reason_closed, reason_converged, reason_detached, reason_limit, reason_stalled
    use adhesion_steps, only : choose_step, form_step_row, known_of_step, step_sums_type
    use adhesion_work, only : adhesion_iteration_type, adhesion_work_type, fresh, updated
    use asperity_errors, only : error_type
    use kernels, only : kernel_type
    use asperity_precision, only : dp, int64
    use fft_conv, only : columns_apply
-   use omp_lib, only : omp_get_wtime
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
    use stop_watch, only : stop_is_due
@@ -56,16 +56,17 @@ module adhesion_cg_fast
 
    public :: adhesion_fast_type, new_adhesion_fast
 
-   integer, parameter :: most_updates = 40      !! steps between new products with B
+   integer, parameter :: most_updates = 40      !! steps after which the traction is computed by a new product with B
    integer, parameter :: most_failures = 8      !! successive directions without a step
-   real(dp), parameter :: short = 0.01_dp       !! part of a step below which the model was wrong
+   real(dp), parameter :: short = 0.01_dp       !! if a smaller part of a step is taken, the model was wrong
+   real(dp), parameter :: scaling_part = 0.02_dp   !! k over Q B at the Nyquist wave number
 
    !> The solver with its operators and work fields, kept from solve to solve. A variable of this type must not be
    !> copied.
    type, extends(adhesion_method_type) :: adhesion_fast_type
       type(adhesion_work_type), private :: work
       real(dp), allocatable, private :: state(:, :)        !! of the contact, in free mode
-      real(dp), allocatable, private :: traction(:, :)     !! the same
+      real(dp), allocatable, private :: traction(:, :)     !! likewise
    contains
       procedure :: solve
       procedure :: destroy
@@ -77,7 +78,7 @@ contains
    subroutine new_adhesion_fast(self, grid, kernel, error)
       type(adhesion_fast_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
-      type(kernel_type), intent(in) :: kernel          !! what the solid is, normal
+      type(kernel_type), intent(in) :: kernel          !! normal response of the solid
       type(error_type), allocatable, intent(out) :: error
       type(adhesion_symbols_type) :: symbols
 
@@ -93,52 +94,43 @@ contains
                work%change(mx, rows + work%model%halo%foreign), work%image(mx, rows), &
                work%last_step(mx, rows), work%last_image(mx, rows), &
                work%curvature(work%patch%nx, work%patch%rows), source=0.0_dp)
-            allocate (work%bumpy(rows + work%model%halo%foreign), source=.true.)
+            allocate (work%has_correction(rows + work%model%halo%foreign), source=.true.)
             if (.not. work%patch%periodic) &
                allocate (self%state(mx, rows), self%traction(mx, rows), source=0.0_dp)
          end associate
       end associate
    end subroutine new_adhesion_fast
 
-   !> Solve an adhesive contact problem, as `adhesion_method_type` says.
-   subroutine solve(self, problem, height, gap, pressure, level, outcome, past)
+   !> Solve an adhesive contact problem.
+   subroutine solve(self, contact, outcome)
       class(adhesion_fast_type), intent(inout), target :: self
-      type(adhesion_problem_type), intent(in) :: problem
-      real(dp), intent(in), contiguous, target :: height(:, :)
-      real(dp), intent(inout), contiguous, target :: gap(:, :)
-      real(dp), intent(inout), contiguous, target :: pressure(:, :)
-      real(dp), intent(inout) :: level
+      type(adhesion_contact_type), intent(inout) :: contact
       type(solver_result_type), intent(out) :: outcome
-      real(dp), intent(in), target, optional :: past(:, :)
       type(adhesion_iteration_type) :: now
       real(dp) :: transforms_before
 
-      outcome%seconds = omp_get_wtime()
+      if (self%work%patch%is_full_contact(contact%problem, contact%height)) then
+         outcome%reason = reason_closed
+         return
+      end if
       transforms_before = transforms(self)
-      now%problem = problem
-      now%height => height
-      if (present(past)) now%past => past
-      now%level = level
-      if (problem%control == control_approach) now%level = problem%target
+      now%adhesion_contact_type = contact
       if (self%work%patch%periodic) then
-         now%state => gap
-         now%traction => pressure
+         now%state => contact%gap
+         now%traction => contact%pressure
       else
          now%state => self%state
          now%traction => self%traction
       end if
-      if (self%work%patch%is_closed_up(problem, height)) then
-         outcome%reason = reason_closed
-         level = problem%target
-      else
-         call begin_contact(self%work%patch, now, gap, pressure)
-         call minimise(self, now, outcome)
-         if (outcome%stopped) return
-         call self%work%patch%hand_out(now, gap, pressure, level, outcome%load_error)
-      end if
-      ! A little more, so that a half is not rounded by the round-off of what was counted before.
+      call begin_contact(self%work%patch, now)
+      call minimise(self, now, outcome)
+      if (outcome%stopped) return
+
+      call self%work%patch%return_solution(now, outcome%load_error)
+      contact%level = now%level
+      ! A transform of the model counts as a fraction. The small addition keeps the round-off of earlier counts from
+      ! deciding how a half is rounded.
       outcome%ffts = nint(transforms(self) - transforms_before + 1e-6_dp, int64)
-      outcome%seconds = omp_get_wtime() - outcome%seconds
    end subroutine solve
 
    !> Minimise the energy, starting from the present state of the contact.
@@ -150,7 +142,7 @@ contains
 
       self%work%scaling = 0.0_dp
       if (stiffens(now%problem%potential)) &
-         self%work%scaling = 0.02_dp*now%problem%modulus*self%work%patch%nyquist
+         self%work%scaling = scaling_part*now%problem%modulus*self%work%patch%nyquist
       self%work%direction = 0.0_dp
       self%work%residual = 0.0_dp
       now%limit = now%problem%tolerance
@@ -162,9 +154,10 @@ contains
                call refresh(self, now)
                cycle
             end if
-            outcome%residual = proven_residual(self, now)
+            outcome%residual = verified_residual(self, now)
             if (outcome%residual <= now%problem%tolerance) outcome%reason = reason_converged
             if (outcome%reason == reason_converged) exit
+            ! The true operator of a free grid finds a larger error: continue to a smaller residual.
             now%limit = 0.3_dp*now%limit
          end if
          if (is_detached(self%work%patch, now, now%least)) outcome%reason = reason_detached
@@ -179,12 +172,12 @@ contains
          call update(self, now, part, form, stretch)
          if (now%updates == most_updates .or. now%failures == 2) call refresh(self, now)
       end do
-      if (outcome%reason /= reason_converged) call take_last_look(self, now, outcome)
+      if (outcome%reason /= reason_converged) call check_last_state(self, now, outcome)
       outcome%converged = outcome%reason == reason_converged
    end subroutine minimise
 
-   !> Measure the last state if the loop has ended without a proof. It may be a solution nevertheless.
-   subroutine take_last_look(self, now, outcome)
+   !> Measure the last state of a loop that has not converged. It may be a solution nevertheless.
+   subroutine check_last_state(self, now, outcome)
       type(adhesion_fast_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(inout) :: now
       type(solver_result_type), intent(inout) :: outcome
@@ -193,12 +186,12 @@ contains
          call refresh(self, now)
          call measure(self%work, now)
       end if
-      outcome%residual = proven_residual(self, now)
+      outcome%residual = verified_residual(self, now)
       if (outcome%reason /= reason_detached .and. outcome%residual <= now%problem%tolerance) &
          outcome%reason = reason_converged
-   end subroutine take_last_look
+   end subroutine check_last_state
 
-   !> Compute the traction by a product with B.
+   !> Compute the traction by a new product with B, which removes the round-off of the updates.
    subroutine refresh(self, now)
       type(adhesion_fast_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(inout) :: now
@@ -208,15 +201,16 @@ contains
       now%updates = 0
    end subroutine refresh
 
-   !> The residual that proves a solution, from a fresh traction.
-   function proven_residual(self, now) result(residual)
+   !> The residual that decides whether a state is a solution: that of a fresh traction, in free mode with the true
+   !> operator.
+   function verified_residual(self, now) result(residual)
       type(adhesion_fast_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(in) :: now
       real(dp) :: residual
 
       residual = now%residual
       if (.not. self%work%patch%periodic) residual = self%work%patch%true_residual(now)
-   end function proven_residual
+   end function verified_residual
 
    !> Find the part t of the step that is taken, after one product with B.
    subroutine find_part(self, now, part, form, stretch)
@@ -224,10 +218,10 @@ contains
       type(adhesion_iteration_type), intent(inout) :: now
       real(dp), intent(out) :: part              !! 0: no part of the step lowers the energy
       real(dp), intent(out) :: form              !! Q s.B s
-      real(dp), intent(out) :: stretch           !! of the step since its product was formed
+      real(dp), intent(out) :: stretch           !! factor of the step since its product was formed
       type(step_sums_type) :: known
 
-      call widen_step(self%work, now)
+      call make_conjugate(self%work, now)
       call form_step(self, now, known)
       stretch = 1.0_dp
       form = 0.0_dp
@@ -243,8 +237,8 @@ contains
       form = known%form
    end subroutine find_part
 
-   !> What is known of the step before B s; the change of the displacement with it, transformed along the
-   !> rows.
+   !> Form the sums of the step that do not need B s. In the same pass, transform the change of the displacement along
+   !> the rows, with which the product B s begins.
    subroutine form_step(self, now, known)
       type(adhesion_fast_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(in) :: now
@@ -280,7 +274,7 @@ contains
       type(adhesion_iteration_type), intent(inout) :: now
       real(dp), intent(in) :: part
       real(dp), intent(in) :: form               !! Q s.B s
-      real(dp), intent(in) :: stretch            !! of the step since its product was formed
+      real(dp), intent(in) :: stretch            !! factor of the step since its product was formed
       integer :: j, n
 
       if (.not. part > 0.0_dp) then
@@ -307,7 +301,7 @@ contains
       now%updates = now%updates + 1
    end subroutine update
 
-   !> Transforms done so far, those of the model by their share.
+   !> Transforms done so far. Those of the model count by their number of cells.
    function transforms(self) result(count)
       type(adhesion_fast_type), intent(in) :: self
       real(dp) :: count
@@ -323,7 +317,7 @@ contains
       call self%work%model%destroy()
       if (allocated(self%work%exchange)) deallocate (self%work%exchange, self%work%residual, &
          self%work%direction, self%work%old, self%work%model_state, self%work%model_traction, &
-         self%work%change, self%work%bumpy, self%work%image, self%work%last_step, &
+         self%work%change, self%work%has_correction, self%work%image, self%work%last_step, &
          self%work%last_image, self%work%curvature)
       if (allocated(self%state)) deallocate (self%state, self%traction)
    end subroutine destroy

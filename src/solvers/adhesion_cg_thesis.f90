@@ -1,6 +1,6 @@
 !> Adhesive contact by the method of the thesis (2.3.2, eq. 2.23 to 2.28), periodic mode.
 !>
-!> Conjugate gradients on the gap outside the contact, without preconditioner: the step alpha of eq. 2.26
+!> The method does conjugate gradients on the gap outside the contact, without preconditioner. The step alpha of eq. 2.26
 !> and the factor beta of eq. 2.28 take the linearised adhesive traction into account; gaps that would be
 !> negative are closed, and a point in contact is released if its pressure is below -e'(0+). Both
 !> denominators can be negative or zero, and a step can raise the energy. In these cases beta is 0, alpha is
@@ -8,22 +8,22 @@
 !> transforms, and two more for each quartered step. The method is kept for comparison; the fast method is module
 !> `adhesion_cg_fast`, which has the same problem, units and measure of error.
 !>
-!> Fields of doubles: H, g, P, and the work fields residual, direction, product B d, trial gap, trial
-!> traction; the spectrum of B.
+!> Memory, in fields of doubles: H, g, P, the spectrum of B, and the work fields residual, direction, product B d, trial
+!> gap and trial traction.
 module adhesion_cg_thesis
+   use adhesion_method, only : adhesion_method_type
    use adhesion_patch, only : adhesion_contact_type, adhesion_patch_type, evaluate_gradient, is_detached, &
       natural_residual, new_adhesion_patch
    use adhesion_potential, only : adhesive_energy, adhesive_terms
    use adhesion_start, only : begin_contact
    use adhesion_symbols, only : adhesion_symbols_type
-   use adhesion_state, only : adhesion_method_type, adhesion_problem_type, control_approach, &
-      reason_closed, reason_converged, reason_detached, reason_limit, reason_stalled
+   use adhesion_state, only : control_approach, reason_closed, reason_converged, reason_detached, reason_limit, &
+      reason_stalled
    use adhesion_steps, only : stepped_gap, sum_shift
    use asperity_errors, only : error_input, error_type, fail
    use field_sums, only : largest_of_rows, least_of_rows, row_total, row_totals
    use kernels, only : kernel_type
    use asperity_precision, only : dp, int64
-   use omp_lib, only : omp_get_wtime
    use regular_grid, only : boundary_periodic, grid_type
    use solver_result, only : solver_result_type
    use stop_watch, only : stop_is_due
@@ -54,7 +54,7 @@ contains
    subroutine new_adhesion_thesis(self, grid, kernel, error)
       type(adhesion_thesis_type), intent(out) :: self
       type(grid_type), intent(in) :: grid                  !! periodic
-      type(kernel_type), intent(in) :: kernel          !! what the solid is, normal
+      type(kernel_type), intent(in) :: kernel              !! normal response of the solid
       type(error_type), allocatable, intent(out) :: error
       type(adhesion_symbols_type) :: symbols
 
@@ -71,40 +71,30 @@ contains
       end associate
    end subroutine new_adhesion_thesis
 
-   !> Solve an adhesive contact problem, as `adhesion_method_type` says.
-   subroutine solve(self, problem, height, gap, pressure, level, outcome, past)
+   !> Solve an adhesive contact problem.
+   subroutine solve(self, contact, outcome)
       class(adhesion_thesis_type), intent(inout), target :: self
-      type(adhesion_problem_type), intent(in) :: problem
-      real(dp), intent(in), contiguous, target :: height(:, :)
-      real(dp), intent(inout), contiguous, target :: gap(:, :)
-      real(dp), intent(inout), contiguous, target :: pressure(:, :)
-      real(dp), intent(inout) :: level
+      type(adhesion_contact_type), intent(inout) :: contact
       type(solver_result_type), intent(out) :: outcome
-      real(dp), intent(in), target, optional :: past(:, :)
-      type(adhesion_contact_type) :: now, trial
+      type(adhesion_contact_type) :: trial
       integer(int64) :: before
 
-      outcome%seconds = omp_get_wtime()
-      before = self%patch%transforms()
-      now%problem = problem
-      now%height => height
-      if (present(past)) now%past => past
-      now%state => gap
-      now%traction => pressure
-      if (self%patch%is_closed_up(problem, height)) then
+      if (self%patch%is_full_contact(contact%problem, contact%height)) then
          outcome%reason = reason_closed
-         level = problem%target
-      else
-         call begin_contact(self%patch, now, gap, pressure)
-         trial = now
-         trial%state => self%trial_gap
-         trial%traction => self%trial_traction
-         call iterate(self, now, trial, outcome)
-         if (outcome%stopped) return
-         call self%patch%hand_out(now, gap, pressure, level, outcome%load_error)
+         return
       end if
+      before = self%patch%transforms()
+      contact%state => contact%gap
+      contact%traction => contact%pressure
+      call begin_contact(self%patch, contact)
+      trial = contact
+      trial%state => self%trial_gap
+      trial%traction => self%trial_traction
+      call iterate(self, contact, trial, outcome)
+      if (outcome%stopped) return
+
+      call self%patch%return_solution(contact, outcome%load_error)
       outcome%ffts = self%patch%transforms() - before
-      outcome%seconds = omp_get_wtime() - outcome%seconds
    end subroutine solve
 
    !> The loop of the method: measure, direction, step, update.
@@ -119,7 +109,7 @@ contains
 
       self%direction = 0.0_dp
       self%product = 0.0_dp
-      curvature = 0.0_dp                                       ! d.(Q B + e'') d; 0: directions start again
+      curvature = 0.0_dp                                       ! d.(Q B + e'') d; 0: the next direction is r alone
       failures = 0
       outcome%reason = reason_limit
       do
@@ -171,7 +161,8 @@ contains
       end do
    end subroutine find_step
 
-   !> r = -G outside the contact and on the points that it releases (eq. 2.25); the natural residual.
+   !> Compute r = -G outside the contact and at the points that it releases (eq. 2.25), the natural residual and the
+   !> least gap.
    subroutine measure(self, now, natural, least)
       type(adhesion_thesis_type), intent(inout) :: self
       type(adhesion_contact_type), intent(inout) :: now
@@ -238,7 +229,7 @@ contains
       end do
    end function curvatures
 
-   !> d = r + beta d outside the contact, of zero sum where the level is prescribed; r.d.
+   !> Compute d = r + beta d outside the contact, whose sum is zero if the level is prescribed, and r.d.
    subroutine new_direction(self, now, beta, rd)
       type(adhesion_thesis_type), intent(inout) :: self
       type(adhesion_contact_type), intent(in) :: now
@@ -280,7 +271,7 @@ contains
       rd = row_total(products)
    end subroutine new_direction
 
-   !> Q B d and d.Q B d.
+   !> Compute Q B d and d.Q B d.
    subroutine multiply(self, now, form)
       type(adhesion_thesis_type), intent(inout) :: self
       type(adhesion_contact_type), intent(in) :: now
@@ -296,7 +287,7 @@ contains
       end do
    end subroutine multiply
 
-   !> The gap after a step, closed where it would be negative.
+   !> Compute the gap after a step, which is set to 0 where it would be negative.
    subroutine try_step(self, now, alpha, trial)
       type(adhesion_thesis_type), intent(in) :: self
       type(adhesion_contact_type), intent(in) :: now

@@ -1,10 +1,10 @@
-!> A step of the fast method for adhesive contact: towards the minimum of a local model of the energy.
+!> A step of the fast method for adhesive contact towards the minimum of a local model of the energy.
 !>
-!> The model of the energy about the gap g has B_h (module `adhesion_model`) in place of B. Everything else is
-!> exact: the attraction, which is not linearised, and g >= 0. The model is minimised by the iteration of module
-!> `adhesion_directions` (preconditioned conjugate gradients on the free cells) without any transform of full
-!> size. An edge that advances cell by cell over a long way therefore needs few such transforms. A step ends
-!> after `most_iterations`; more would only make it more accurate for B_h, which differs from B.
+!> The model of the energy has B_h (module `adhesion_model`) in place of B. The attraction, which is not linearised, and
+!> the condition g >= 0 are exact. The model is minimised by preconditioned conjugate gradients on the free cells (module
+!> `adhesion_directions`) without any transform of full size. An edge of the contact that advances cell by cell over a
+!> long distance therefore needs few such transforms. A step ends after `most_iterations`, because more would only make
+!> it more accurate for B_h, which differs from B.
 !>
 !> Gaps that would be negative after an iteration are closed, which changes the step and thus the traction. The
 !> stencil part of the product is usually sufficient for this correction, because the closed cells are scattered
@@ -36,21 +36,21 @@ module adhesion_descent
    public :: approach_minimum
 
    integer, parameter :: most_iterations = 8          !! in the model, for a step
-   real(dp), parameter :: goal = 0.1_dp               !! share of the residual that may be left
-   real(dp), parameter :: longest = 0.7_dp            !! change of g + z_0 over g + z_0 in an iteration
-   real(dp), parameter :: boldest = 100.0_dp          !! the same where the attraction jumps
-   real(dp), parameter :: least_stiffness = 0.25_dp   !! least part of s.B_h s that the attraction leaves
+   real(dp), parameter :: goal = 0.1_dp               !! part of the residual at which a step ends
+   real(dp), parameter :: largest_change = 0.7_dp     !! of g + z_0 in an iteration, relative to g + z_0
+   real(dp), parameter :: change_at_jump = 100.0_dp   !! the same if the attraction jumps
+   real(dp), parameter :: least_stiffness = 0.25_dp   !! least part of s.B_h s that counts, whatever the attraction
 
 contains
 
-   !> Compute the step from the present, measured gap towards a minimum of the model, in work%direction and
-   !> now%lift. After steps that failed, or of which hardly anything could be taken, it is shorter, until as many
-   !> steps have succeeded.
+   !> Compute the step from the present gap towards a minimum of the model, in work%direction and now%lift. The gap has
+   !> been measured. After steps that failed, or of which hardly anything could be taken, the step is shorter, until as
+   !> many steps have succeeded.
    subroutine approach_minimum(work, now)
       type(adhesion_work_type), intent(inout) :: work
       type(adhesion_iteration_type), intent(inout) :: now
       type(adhesion_iteration_type) :: inner
-      real(dp) :: share
+      real(dp) :: largest
       integer :: j, k, most
 
       inner = now
@@ -64,44 +64,44 @@ contains
       end do
       inner%old_rz = 0.0_dp
       inner%lift = 0.0_dp
-      inner%held = .false.
+      inner%length_limited = .false.
       inner%pending = 0.0_dp
-      inner%bumped = .false.
+      inner%correction_pending = .false.
       most = max(1, most_iterations/4**min(now%caution, 10))
-      share = longest/4**min(now%caution, 10)
-      ! With small steps a jump of the attraction would stop every cell that reaches it.
-      if (.not. has_smooth_potential(now%problem%potential)) share = boldest/4**min(now%caution, 10)
+      largest = largest_change/4**min(now%caution, 10)
+      ! If steps were small, a jump of the attraction would stop every cell that arrives at it.
+      if (.not. has_smooth_potential(now%problem%potential)) largest = change_at_jump/4**min(now%caution, 10)
       do k = 1, most
          if (k > 1) call measure(work, inner)
          if (k > 1 .and. inner%residual <= goal*now%residual) exit
          call find_direction(work, inner)
          if (.not. inner%slope > 0.0_dp) exit
-         call descend(work, inner, share)
+         call descend(work, inner, largest)
       end do
       !$omp parallel do default(none) shared(work, now, inner) private(j) num_threads(work%patch%threads)
       do j = 1, work%patch%all_rows
          work%direction(:, j) = inner%state(:, j) - now%state(:, j)
       end do
       now%lift = inner%level - now%level
-      now%held = inner%held
+      now%length_limited = inner%length_limited
    end subroutine approach_minimum
 
    !> Do an iteration in the model: move along the direction by the length that its curvature predicts.
-   subroutine descend(work, inner, share)
+   subroutine descend(work, inner, largest)
       type(adhesion_work_type), intent(inout) :: work
       type(adhesion_iteration_type), intent(inout) :: inner
-      real(dp), intent(in) :: share                    !! by which g + z_0 may change
+      real(dp), intent(in) :: largest                  !! change of g + z_0, relative to g + z_0
       real(dp) :: alpha, form, shift, stiffness
       logical :: clipped, keeps_sum, whole
 
       call form_product(work, form)
       form = inner%problem%modulus*form
       stiffness = max(form + inner%bend, least_stiffness*form)
-      alpha = share*inner%farthest
+      alpha = largest*inner%farthest
       if (stiffness*alpha > inner%slope) then
          alpha = inner%slope/stiffness
       else
-         inner%held = .true.
+         inner%length_limited = .true.
       end if
       shift = 0.0_dp
       keeps_sum = work%patch%periodic .and. inner%problem%control == control_approach
@@ -111,7 +111,7 @@ contains
       call move(work, inner, alpha, shift, whole, clipped)
       inner%level = inner%level + alpha*inner%lift
       inner%pending = inner%problem%modulus*alpha
-      inner%bumped = clipped .and. .not. whole
+      inner%correction_pending = clipped .and. .not. whole
       if (.not. (clipped .or. abs(shift) > 0.0_dp)) return
       if (whole) then
          ! The shift moves all open cells, so that the traction needs a product of the actual step.
@@ -122,7 +122,8 @@ contains
       end if
    end subroutine descend
 
-   !> Compute the product of B_h with the change of the displacement, whose rows have been put, and the form.
+   !> Compute the product of B_h with the change of the displacement, whose rows have been passed to the model, and the
+   !> quadratic form.
    subroutine form_product(work, form)
       type(adhesion_work_type), intent(inout) :: work
       real(dp), intent(out) :: form
@@ -142,20 +143,20 @@ contains
       form = sums(1)
    end subroutine form_product
 
-   !> g = g + alpha d, closed where it would be negative; and the change of the displacement, the whole of it or
-   !> what it has beyond alpha times that of before.
+   !> Set g = g + alpha d, or 0 where that would be negative. Compute the whole change of the displacement, or only its
+   !> correction: the difference from alpha times the change of which the product is known.
    subroutine move(work, inner, alpha, shift, whole, clipped)
       type(adhesion_work_type), intent(inout) :: work
       type(adhesion_iteration_type), intent(inout) :: inner
       real(dp), intent(in) :: alpha, shift
-      logical, intent(in) :: whole
-      logical, intent(out) :: clipped                  !! the change is not alpha times that of before
+      logical, intent(in) :: whole                     !! compute the whole change
+      logical, intent(out) :: clipped                  !! the correction is not zero
       real(dp) :: furthest, next, old
       integer :: i, j, n
       logical :: any_clipped
 
       any_clipped = .false.
-      work%bumpy(:) = .true.
+      work%has_correction(:) = .true.
       !$omp parallel do default(none) shared(work, inner, alpha, shift, whole) private(i, j, n, next, old, furthest) &
       !$omp reduction(.or.: any_clipped) num_threads(work%patch%threads)
       do j = 1, work%patch%all_rows
@@ -175,8 +176,8 @@ contains
             call work%model%put_row(j, work%change(:, j))
          else
             call move_cells(alpha, work%direction(1:n, j), inner%state(1:n, j), work%change(1:n, j), furthest)
-            work%bumpy(j) = furthest > 0.0_dp
-            any_clipped = any_clipped .or. work%bumpy(j)
+            work%has_correction(j) = furthest > 0.0_dp
+            any_clipped = any_clipped .or. work%has_correction(j)
             do i = n + 1, work%patch%mx
                inner%state(i, j) = inner%state(i, j) + alpha*work%direction(i, j)
                work%change(i, j) = 0.0_dp
@@ -185,6 +186,5 @@ contains
       end do
       clipped = any_process(any_clipped)
    end subroutine move
-
 
 end module adhesion_descent

@@ -2,7 +2,7 @@
 !> where r is the measured residual.
 module adhesion_directions
    use adhesion_state, only : control_approach, control_pressure, diagonal_scaling
-   use adhesion_sweeps, only : take_cells, turn_cells
+   use adhesion_sweeps, only : direction_of_cells, z_of_cells
    use adhesion_work, only : adhesion_iteration_type, adhesion_work_type
    use asperity_precision, only : dp
    use field_sums, only : largest_of_rows, row_product
@@ -12,8 +12,8 @@ module adhesion_directions
 
    public :: find_direction
 
-   ! Passes over z. The first is left out if the sum of the gap is not prescribed.
-   integer, parameter :: sum_pass = 0           !! add up
+   ! Passes that make the mean of z zero, if the sum of the gap is prescribed. They are numbered from 0 to 2.
+   integer, parameter :: sum_pass = 0           !! z is only added up
    integer, parameter :: last_pass = 2          !! z is final
 
    !> Sums of a row of z.
@@ -26,7 +26,7 @@ module adhesion_directions
 
 contains
 
-   !> Compute the direction d = z + beta d, or d = z if the former does not descend.
+   !> Compute the direction d = z + beta d, or d = z if the energy does not decrease along the former.
    subroutine find_direction(self, now)
       type(adhesion_work_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(inout) :: now
@@ -43,8 +43,8 @@ contains
       beta = 0.0_dp
       if (now%old_rz > 0.0_dp) beta = max(0.0_dp, (sums%rz - sums%old_rz)/now%old_rz)
       now%old_rz = sums%rz
-      call turn(self, beta, level_z, now)
-      if (now%slope <= 0.0_dp .and. beta > 0.0_dp) call turn(self, 0.0_dp, level_z, now)
+      call form_direction(self, beta, level_z, now)
+      if (now%slope <= 0.0_dp .and. beta > 0.0_dp) call form_direction(self, 0.0_dp, level_z, now)
    end subroutine find_direction
 
    !> Compute z = M r on the free cells and in the padding, except in cells in contact that z would close. Its mean is
@@ -69,15 +69,13 @@ contains
       do j = 1, self%patch%all_rows
          if (self%scaling > 0.0_dp) then
             call self%model%inverse_row(j, self%exchange(:, j), z)
-         else
-            call self%model%inverse_row(j, self%residual(:, j), z)
-         end if
-         if (self%scaling > 0.0_dp) then
             associate (n => self%patch%inner(j))
                z(1:n) = z(1:n)*diagonal_scaling(now%problem, now%state(1:n, j), self%scaling)
             end associate
+         else
+            call self%model%inverse_row(j, self%residual(:, j), z)
          end if
-         call take_z_row(self, now, level_z, j, z, rows(j))
+         call form_z_row(self, now, level_z, j, z, rows(j))
          if (first == sum_pass) call center_row(self, now, first, 0.0_dp, j, rows(j))
       end do
       !$omp end do
@@ -97,7 +95,7 @@ contains
 
    !> Compute a row of z from M r, with its sums of products. It is 0 on the cells that are not free and, unless its
    !> mean is prescribed, in cells in contact that it would close.
-   subroutine take_z_row(self, now, level_z, j, z, sums)
+   subroutine form_z_row(self, now, level_z, j, z, sums)
       type(adhesion_work_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(in) :: now
       real(dp), intent(in) :: level_z                  !! m
@@ -105,21 +103,20 @@ contains
       real(dp), intent(in), contiguous :: z(:)         !! M r for Q = 1
       type(z_sums_type), intent(out) :: sums
       real(dp) :: factor
-      logical :: keeps
+      logical :: opens_only
       integer :: i, n
 
       n = self%patch%inner(j)
       factor = 1.0_dp/now%problem%modulus
-      keeps = .not. (self%patch%periodic .and. now%problem%control == control_approach)
-      call take_cells(factor, keeps, z(1:n), now%state(1:n, j), self%residual(1:n, j), self%old(1:n, j), &
+      opens_only = .not. (self%patch%periodic .and. now%problem%control == control_approach)
+      call z_of_cells(factor, opens_only, z(1:n), now%state(1:n, j), self%residual(1:n, j), self%old(1:n, j), &
          self%exchange(1:n, j), sums%rz, sums%old_rz)
       do i = n + 1, self%patch%mx
          self%exchange(i, j) = factor*z(i) + level_z*self%patch%psi(i, j)
       end do
       sums%rz = sums%rz + row_product(self%exchange(n + 1:, j), self%residual(n + 1:, j))
       sums%old_rz = sums%old_rz + row_product(self%exchange(n + 1:, j), self%old(n + 1:, j))
-   end subroutine take_z_row
-
+   end subroutine form_z_row
 
    !> Subtract the mean from a row of z, set z to 0 in cells in contact that it would close, and form the sums.
    subroutine center_row(self, now, pass, mean, j, sums)
@@ -171,7 +168,7 @@ contains
 
    !> Compute d = z + beta d on the free cells and in the padding, and 0 elsewhere, and likewise for the level. The
    !> change of the displacement along d is passed to the model.
-   subroutine turn(self, beta, level_z, now)
+   subroutine form_direction(self, beta, level_z, now)
       type(adhesion_work_type), intent(inout) :: self
       real(dp), intent(in) :: beta
       real(dp), intent(in) :: level_z                  !! z of the level, m
@@ -185,18 +182,18 @@ contains
       !$omp parallel do default(none) shared(self, now, beta, rows, quickest) private(j) &
       !$omp num_threads(self%patch%threads)
       do j = 1, self%patch%all_rows
-         call turn_row(self, now, beta, j, rows(:, j), quickest(j))
+         call form_direction_row(self, now, beta, j, rows(:, j), quickest(j))
          call self%model%put_row(j, self%change(:, j))
       end do
       sums = self%patch%sharing%totals(rows)
       now%slope = sums(1) + now%missing*now%lift
       now%bend = sums(2)
       now%farthest = 1.0_dp/max(largest_of_rows(quickest), tiny(1.0_dp))
-   end subroutine turn
+   end subroutine form_direction
 
-   !> Row j of d and of the change of the displacement along it, with its parts of r.d and d.e'' d, and the
+   !> Compute row j of d and of the change of the displacement along it, with its parts of r.d and d.e'' d, and the
    !> greatest |d|/(g + z_0).
-   subroutine turn_row(self, now, beta, j, row, quickest)
+   subroutine form_direction_row(self, now, beta, j, row, quickest)
       type(adhesion_work_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(in) :: now
       real(dp), intent(in) :: beta
@@ -206,15 +203,15 @@ contains
       integer :: i, n
 
       n = self%patch%inner(j)
-      call turn_cells(now%state(1:n, j), self%exchange(1:n, j), self%residual(1:n, j), self%curvature(1:n, j), &
-         beta, now%units%length, now%lift, self%direction(1:n, j), self%change(1:n, j), row, quickest)
+      call direction_of_cells(now%state(1:n, j), self%exchange(1:n, j), self%residual(1:n, j), &
+         self%curvature(1:n, j), beta, now%units%length, now%lift, self%direction(1:n, j), self%change(1:n, j), row, &
+         quickest)
       do i = n + 1, self%patch%mx
          d = self%exchange(i, j) + beta*self%direction(i, j)
          self%direction(i, j) = d
          self%change(i, j) = d
       end do
       row(1) = row(1) + row_product(self%residual(n + 1:, j), self%direction(n + 1:, j))
-   end subroutine turn_row
-
+   end subroutine form_direction_row
 
 end module adhesion_directions

@@ -4,23 +4,23 @@
 !> long waves on a coarse grid with about an eighth of the cells in each direction:
 !>     B_h s = stencil s + R^T missing R s.
 !> R is a weighted mean onto the coarse grid and R^T (up to a factor) linear interpolation back; `missing`
-!> acts below `band`, and is divided by the part of a wave that R and R^T transmit. A product costs a pass over the
-!> cells and transforms of 2/64 of the full size. For a half-space with square cells B_h is between 0.8 and 1.3
-!> times B, so that a minimum of the model's energy is near a minimum of the true energy.
+!> acts on wave numbers below `band`, and is divided by the part of a wave that R and R^T transmit. A product costs a
+!> pass over the cells and two transforms of a 64th of the full size. For a half-space with square cells B_h is between
+!> 0.8 and 1.3 times B, so that a minimum of the model's energy is near a minimum of the true energy.
 !>
-!> The inverse serves to precondition the model: M r = theta r + R^T (1/B - theta) R r with the low symbols.
-!> Both are symmetric for any numbers of cells, and M is positive.
+!> The inverse preconditions the model: M r = theta r + R^T (1/B - theta) R r, where the coarse part has the symbols of
+!> the long waves. B_h and M are symmetric for any numbers of cells, and M is positive definite.
 !>
 !> The caller passes the rows of a field by `put_row`, calls `transform_product` or `transform_inverse`, and gets
 !> the rows of the result by `product_row` or `inverse_row`, so that no additional pass over memory is needed.
 !>
-!> Processes share the rows of the coarse grid, too: each has those whose centres lie on its rows of the
-!> grid. From its neighbours a process needs restricted rows and coarse rows at the rims, and the rows next to its
-!> own for the stencil (`halo`).
+!> Processes share the rows of the coarse grid, too: each holds those whose centres lie on its rows of the
+!> grid. From its neighbours a process needs the restricted rows and coarse rows next to its own, and the rows of the
+!> grid that the stencil reads (`halo`).
 !>
-!> Memory: 1/16 of a field.
+!> Memory: one sixteenth of a field of doubles, and the operators of the coarse grid.
 module adhesion_model
-   use adhesion_stencil, only : add_stencil, band, fit_stencil, reach, stencil_symbol
+   use adhesion_stencil, only : add_stencil, band, fit_stencil, radius, stencil_symbol
    use adhesion_symbols, only : adhesion_symbols_type
    use asperity_errors, only : error_type
    use fft_conv, only : convolution_type, new_symbol_operator
@@ -33,8 +33,8 @@ module adhesion_model
 
    public :: adhesion_model_type, new_adhesion_model
 
-   integer, parameter :: ratio = 8                !! cells of the grid to one of the coarse grid, about
-   real(dp), parameter :: least_passed = 0.1_dp   !! coarse symbols make up for no more than this
+   integer, parameter :: ratio = 8                !! about the number of cells in each direction to one coarse cell
+   real(dp), parameter :: least_passed = 0.1_dp   !! least transmitted part of a wave by which a symbol is divided
    real(dp), parameter :: short_waves = 1.6_dp    !! theta times B at the Nyquist wave number
 
    !> The model of a grid. A variable of this type must not be copied.
@@ -46,12 +46,12 @@ module adhesion_model
       integer, allocatable, private :: own(:)     !! rows of the grid that this process holds
       type(row_halo_type), private :: fine_halo   !! restricted rows that coarse rows need
       type(row_halo_type), private :: coarse_halo !! coarse rows that rows of the grid need
-      real(dp), private :: weights(0:reach, 0:reach) = 0.0_dp    !! of the stencil
-      real(dp), private :: theta = 0.0_dp         !! M at high wave numbers
+      real(dp), private :: weights(0:radius, 0:radius) = 0.0_dp  !! of the stencil
+      real(dp), private :: theta = 0.0_dp         !! symbol of M at high wave numbers
       real(dp), private :: cells = 1.0_dp         !! cells to one coarse cell
       integer, allocatable, private :: left(:), below(:)   !! lower coarse neighbour of a cell, of the whole grid
       integer, allocatable, private :: starts(:)           !! cells of a row where `left` changes, and nx + 1
-      real(dp), allocatable, private :: wx(:), wy(:)       !! weight of the upper one
+      real(dp), allocatable, private :: wx(:), wy(:)       !! weight of the upper coarse neighbour
       real(dp), allocatable, private :: rows(:, :)         !! restricted along x, [mx, rows and foreign ones]
       real(dp), allocatable, private :: field(:, :)        !! on the coarse grid, [mx, rows and foreign ones]
       type(convolution_type), private :: inverse  !! the coarse part of M
@@ -74,9 +74,9 @@ contains
    subroutine new_adhesion_model(self, nx, fine, symbols, modes, nyquist, error)
       type(adhesion_model_type), intent(out) :: self
       integer, intent(in) :: nx                     !! cells of the grid along x
-      type(row_sharing_type), intent(in) :: fine    !! who holds its rows
-      type(adhesion_symbols_type), intent(inout) :: symbols   !! of B and M
-      integer, intent(in) :: modes(2)               !! the wave numbers of this process that are at hand
+      type(row_sharing_type), intent(in) :: fine    !! which process holds which rows
+      type(adhesion_symbols_type), intent(inout) :: symbols   !! of B and of its approximate inverse
+      integer, intent(in) :: modes(2)               !! first and last wave number along x whose symbols are known
       real(dp), intent(in) :: nyquist               !! B at the Nyquist wave number, > 0
       type(error_type), allocatable, intent(out) :: error
       integer :: i, ny
@@ -103,7 +103,7 @@ contains
       call set_low_symbols(self, symbols, error)
    end subroutine new_adhesion_model
 
-   !> Give the operators of the coarse grid the low symbols.
+   !> Set the symbols of the operators on the coarse grid from those of the long waves.
    subroutine set_low_symbols(self, symbols, error)
       type(adhesion_model_type), intent(inout) :: self
       type(adhesion_symbols_type), intent(inout) :: symbols
@@ -116,7 +116,8 @@ contains
       call symbols%form(modes, error)
       if (allocated(error)) return
       allocate (missing(modes(1):modes(2), 0:self%my/2), inverse(modes(1):modes(2), 0:self%my/2))
-      ! Of all wave numbers, since a vectorised sine may depend in its last bit on where a loop begins.
+      ! All wave numbers are computed, not only those of this process: the last bit of a vectorised sine may depend on
+      ! where the loop begins.
       along_x = passed([(i, i=0, self%mx/2)], self%mx)
       along_y = passed([(j, j=0, self%my/2)], self%my)
       do j = 0, self%my/2
@@ -139,7 +140,7 @@ contains
       type(adhesion_model_type), intent(inout) :: self
       type(row_sharing_type), intent(in) :: fine
       integer :: owner(self%my), above(self%ny), rows(self%ny)
-      integer :: around(self%ny, 2*reach)
+      integer :: around(self%ny, 2*radius)
       integer :: j, k
 
       do k = 1, self%my
@@ -150,12 +151,12 @@ contains
       rows = [(j, j=1, self%ny)]
       call new_row_halo(self%fine_halo, fine, [rows, rows], [owner(self%below), owner(above)])
       call new_row_halo(self%coarse_halo, self%sharing, [self%below, above], [fine%owner, fine%owner])
-      do k = 1, reach
+      do k = 1, radius
          around(:, 2*k - 1) = modulo(rows - 1 - k, self%ny) + 1
          around(:, 2*k) = modulo(rows - 1 + k, self%ny) + 1
       end do
       call new_row_halo(self%halo, fine, reshape(around, [size(around)]), &
-         reshape(spread(fine%owner, 2, 2*reach), [size(around)]))
+         reshape(spread(fine%owner, 2, 2*radius), [size(around)]))
    end subroutine share_rows
 
    !> The coarse cell that follows another one, on a periodic grid.
@@ -192,7 +193,7 @@ contains
       end do
    end subroutine neighbours
 
-   !> Add row j of a field, counted on this process, to the weighted sums on the coarse cells.
+   !> Compute the weighted sums of row j of a field over the coarse cells along x. Rows are counted on this process.
    subroutine put_row(self, j, row)
       class(adhesion_model_type), intent(inout) :: self
       integer, intent(in) :: j
@@ -296,14 +297,14 @@ contains
       call self%stencil_row(j, s, product)
    end subroutine product_row
 
-   !> Add the stencil's part of row j of B_h s, which is all at short waves.
+   !> Add the stencil's part of row j of B_h s. For short waves this is the whole product.
    subroutine stencil_row(self, j, s, product)
       class(adhesion_model_type), intent(in) :: self
       integer, intent(in) :: j
       real(dp), intent(in), contiguous :: s(:, :)   !! with the foreign rows of `halo`
       real(dp), intent(inout), contiguous :: product(:)
 
-      integer :: at(2*reach + 1)
+      integer :: at(2*radius + 1)
 
       at = self%around(j)
       call add_stencil(self%weights, s(:, at(1)), s(:, at(2)), s(:, at(3)), s(:, at(4)), s(:, at(5)), product)
@@ -313,10 +314,10 @@ contains
    pure function around(self, j) result(places)
       class(adhesion_model_type), intent(in) :: self
       integer, intent(in) :: j
-      integer :: places(2*reach + 1)
+      integer :: places(2*radius + 1)
       integer :: k
 
-      places = self%halo%place(modulo(self%own(j) - 1 + [(k, k=-reach, reach)], self%ny) + 1)
+      places = self%halo%place(modulo(self%own(j) - 1 + [(k, k=-radius, radius)], self%ny) + 1)
    end function around
 
    !> Row j of M r.
@@ -357,7 +358,7 @@ contains
       end do
    end subroutine interpolate
 
-   !> Transforms done so far, counted in those of the grid.
+   !> Transforms done so far, in units of a transform of the full grid.
    pure function transforms(self) result(count)
       class(adhesion_model_type), intent(in) :: self
       real(dp) :: count

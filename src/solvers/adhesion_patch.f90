@@ -2,14 +2,14 @@
 !>
 !> The methods work on fields of one layout, the grid of the unknowns. Its cells from (1, 1) to (nx, ny)
 !> are the patch, where the unknown is the gap g. In periodic mode the patch is the whole grid. B is the
-!> inverse of the periodic operator for G = 1. Its mean mode is zero, and the mean of the traction, the
+!> inverse of the periodic operator for a shear modulus of 1. Its mean mode is zero, and the mean of the traction, the
 !> load p, is kept as a separate number.
 !>
-!> In free mode the grid is doubled. The truncated operator of Love's coefficients has no symbol that could be
-!> inverted. On the doubled grid, however, the wrapped coefficients have a positive symbol K, and B = 1/K
-!> there. The padding has no adhesion, its surface is free, and the unknown there is the displacement u.
-!> If the energy is minimised over u, it is that of the free operator on the patch (Schur complement). With
-!> u = g + H + level on the patch,
+!> In free mode the grid of the unknowns is twice as large in each direction; the rest of it is the padding. The
+!> operator of a free grid, with Love's coefficients, has no symbol that could be inverted. On the doubled grid,
+!> however, the same coefficients repeated periodically have a positive symbol K, and B = 1/K there. The padding has no
+!> adhesion, its surface is free, and the unknown there is the displacement u. If the energy is minimised over the u of
+!> the padding, it is that of the free operator on the patch (Schur complement). With u = g + H + level on the patch,
 !>
 !>     P = Q B u - P_h on the patch, 0 in the padding
 !>
@@ -48,13 +48,17 @@ module adhesion_patch
    type :: adhesion_contact_type
       type(adhesion_problem_type) :: problem
       real(dp), pointer, contiguous :: height(:, :) => null()    !! H on the patch, m
-      real(dp), pointer :: past(:, :) => null()                  !! P_h on the patch, Pa; may be missing
+      !> P_h on the patch, Pa; may be missing. Not contiguous: gfortran 12 would pack the argument to which it points
+      !> even if that is absent.
+      real(dp), pointer :: past(:, :) => null()
+      real(dp), pointer, contiguous :: gap(:, :) => null()       !! g of the start in periodic mode; of the solution, m
+      real(dp), pointer, contiguous :: pressure(:, :) => null()  !! P of the start in free mode; of the solution, Pa
       real(dp), pointer, contiguous :: state(:, :) => null()     !! g on the patch, u in the padding, m
       real(dp), pointer, contiguous :: traction(:, :) => null()  !! P; in periodic mode P - p, Pa
-      real(dp) :: load = 0.0_dp          !! p in periodic mode, Pa; else 0
-      real(dp) :: force = 0.0_dp         !! prescribed sum of P in free mode, Pa; else 0
+      real(dp) :: load = 0.0_dp          !! p in periodic mode, Pa; 0 in free mode
+      real(dp) :: force = 0.0_dp         !! prescribed sum of P in free mode, Pa; 0 otherwise
       real(dp) :: gap_sum = 0.0_dp       !! prescribed sum of g in periodic mode at a prescribed level, m
-      real(dp) :: level = 0.0_dp         !! U - H where the gap is zero, free mode, m
+      real(dp) :: level = 0.0_dp         !! U - H where the gap is zero; 0 while a periodic contact is solved, m
       real(dp) :: mean_height = 0.0_dp   !! of the patch above the datum, m
       real(dp) :: past_mean = 0.0_dp     !! mean of P_h, which does not matter in periodic mode, Pa
       type(residual_units_type) :: units
@@ -78,21 +82,21 @@ module adhesion_patch
       type(convolution_type), private :: operator          !! the true free operator
    contains
       procedure :: inner
-      procedure :: is_closed_up
+      procedure :: is_full_contact
       procedure :: evaluate_traction
       procedure :: true_residual
-      procedure :: hand_out
+      procedure :: return_solution
       procedure :: transforms
       procedure :: destroy
    end type adhesion_patch_type
 
 contains
 
-   !> Make the patch of a grid, and its symbols for a preconditioner.
+   !> Make the patch of a grid, and its symbols, from which a caller can make a preconditioner.
    subroutine new_adhesion_patch(self, grid, kernel, symbols, error)
       type(adhesion_patch_type), intent(out) :: self
       type(grid_type), intent(in) :: grid                      !! free grids: ny > 1
-      type(kernel_type), intent(in) :: kernel          !! what the solid is, normal
+      type(kernel_type), intent(in) :: kernel                  !! normal response of the solid
       type(adhesion_symbols_type), intent(out) :: symbols
       type(error_type), allocatable, intent(out) :: error
 
@@ -120,7 +124,8 @@ contains
       if (.not. self%periodic) call make_psi(self)
    end subroutine new_adhesion_patch
 
-   !> Share the rows of the unknowns: the rows of the patch as on its grid, and those of the padding likewise.
+   !> Decide which process holds which rows of the unknowns: the rows of the patch as on its grid, and those of the
+   !> padding likewise.
    pure subroutine share_unknowns(self, grid)
       type(adhesion_patch_type), intent(inout) :: self
       type(grid_type), intent(in) :: grid
@@ -132,7 +137,7 @@ contains
       self%all_rows = size(self%sharing%own)
    end subroutine share_unknowns
 
-   !> psi: the displacement of a uniform pressure on the patch over its least value there, at most 1.
+   !> Compute psi: the displacement of a uniform pressure on the patch, divided by its least value there, at most 1.
    subroutine make_psi(self)
       type(adhesion_patch_type), intent(inout) :: self
       real(dp), allocatable :: pressure(:, :)
@@ -158,8 +163,8 @@ contains
       n = merge(self%nx, 0, j <= self%rows)
    end function inner
 
-   !> Does a prescribed level leave no gap at all? In free mode the solid can always bulge outside.
-   function is_closed_up(self, problem, height) result(closed)
+   !> Does a prescribed level leave no gap at all? In free mode the solid can always bulge outside the patch.
+   function is_full_contact(self, problem, height) result(closed)
       class(adhesion_patch_type), intent(in) :: self
       type(adhesion_problem_type), intent(in) :: problem
       real(dp), intent(in) :: height(:, :)
@@ -168,7 +173,7 @@ contains
       closed = .false.
       if (self%periodic .and. problem%control == control_approach) closed = .not. problem%target &
          + (field_mean(height) - problem%datum) < 0.0_dp
-   end function is_closed_up
+   end function is_full_contact
 
    !> Compute the traction from the state by a product with B.
    subroutine evaluate_traction(self, contact)
@@ -200,12 +205,12 @@ contains
       end associate
    end subroutine evaluate_traction
 
-   !> Compute the gradient of the energy on the patch without the load p and, in periodic mode at a prescribed
-   !> level, p itself, which is the mean multiplier over the open cells.
+   !> Compute the gradient of the energy on the patch without the load p. In periodic mode at a prescribed level, also
+   !> compute p, with which the gradient has no mean over the open cells.
    subroutine evaluate_gradient(self, contact, gradient)
       type(adhesion_patch_type), intent(in) :: self
       class(adhesion_contact_type), intent(inout) :: contact
-      real(dp), intent(inout) :: gradient(:, :)        !! out: P + e'(g) on the patch, Pa
+      real(dp), intent(inout) :: gradient(:, :)        !! out: P - p + e'(g) on the patch, Pa
       real(dp), allocatable :: rows(:, :)
       real(dp) :: sums(2)
       integer :: j
@@ -251,7 +256,7 @@ contains
       error = abs(min(gap/units%length, gradient/units%traction))
    end function natural_residual
 
-   !> The natural residual of a free patch with the displacement of its pressure by the true operator.
+   !> The natural residual of a free patch, whose gap is computed from its pressure with the true operator.
    function true_residual(self, contact) result(natural)
       class(adhesion_patch_type), intent(inout) :: self
       class(adhesion_contact_type), intent(in) :: contact
@@ -290,41 +295,36 @@ contains
       natural = max(natural, abs(load - contact%force)/max(abs(contact%force), contact%units%traction))
    end function true_residual
 
-   !> Return the gap, pressure and level of the solution, with gaps of exactly zero in cells that the wall carries,
-   !> and the error of the prescribed load or level.
-   subroutine hand_out(self, contact, gap, pressure, level, load_error)
+   !> Compute the gap, pressure and level of the solution from its state, and the error of the prescribed load or level.
+   !> The gap is exactly zero in the cells in contact. In periodic mode gap and pressure are the fields of the state and
+   !> of the traction themselves.
+   subroutine return_solution(self, contact, load_error)
       class(adhesion_patch_type), intent(in) :: self
-      class(adhesion_contact_type), intent(in) :: contact
-      real(dp), intent(inout), target :: gap(:, :)          !! in periodic mode the state itself
-      real(dp), intent(inout), target :: pressure(:, :)     !! in periodic mode the traction itself
-      real(dp), intent(inout) :: level                      !! m
+      class(adhesion_contact_type), intent(inout) :: contact
       real(dp), intent(out) :: load_error
       real(dp) :: sum_of_gap, sum_of_pressure, scale
       integer :: j
 
-      !$omp parallel do default(none) shared(self, contact, gap, pressure) private(j) &
-      !$omp num_threads(self%threads)
+      !$omp parallel do default(none) shared(self, contact) private(j) num_threads(self%threads)
       do j = 1, self%rows
-         gap(:, j) = contact%state(1:self%nx, j)
-         pressure(:, j) = contact%traction(1:self%nx, j) + contact%load
+         contact%gap(:, j) = contact%state(1:self%nx, j)
+         contact%pressure(:, j) = contact%traction(1:self%nx, j) + contact%load
       end do
       load_error = 0.0_dp
-      sum_of_pressure = field_sum(pressure)
+      sum_of_pressure = field_sum(contact%pressure)
       if (self%periodic) then
-         sum_of_gap = field_sum(gap)
-         level = -contact%mean_height - sum_of_gap/self%cells
-         scale = max(abs(contact%load), epsilon(1.0_dp)*field_magnitude(pressure), tiny(1.0_dp))
+         sum_of_gap = field_sum(contact%gap)
+         contact%level = -contact%mean_height - sum_of_gap/self%cells
+         scale = max(abs(contact%load), epsilon(1.0_dp)*field_magnitude(contact%pressure), tiny(1.0_dp))
          load_error = abs(sum_of_pressure/self%cells - contact%load)/scale
          if (contact%problem%control == control_approach) &
             load_error = abs(sum_of_gap - contact%gap_sum)/contact%gap_sum
-      else
-         level = contact%level
-         if (contact%problem%control == control_pressure) load_error = abs(sum_of_pressure - contact%force) &
-            /max(abs(contact%force), contact%units%traction)
+      else if (contact%problem%control == control_pressure) then
+         load_error = abs(sum_of_pressure - contact%force)/max(abs(contact%force), contact%units%traction)
       end if
       call close_gaps(contact%problem, contact%units%length, contact%units%traction, self%threads, &
-         gap, pressure)
-   end subroutine hand_out
+         contact%gap, contact%pressure)
+   end subroutine return_solution
 
    !> Transforms done so far.
    pure function transforms(self) result(count)

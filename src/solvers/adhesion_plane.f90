@@ -1,15 +1,15 @@
-!> Combines the step of the model with the step before, for adhesive contact.
+!> Searches for the step of an adhesive contact in the plane of the model's step and of the step before it.
 !>
 !> Near an instability of the contact one mode is soft: its stiffness is a small difference between that of the
 !> solid and that of the attraction. An error of a quarter in the local model of the energy (module
 !> `adhesion_descent`) makes its steps many times too short along that mode, or reverses their sign. The true
-!> form of a step is known, however, since every step is multiplied by B. Therefore the step s of the model is
+!> quadratic form of a step is known, however, since every step is multiplied by B. Therefore the step s of the model is
 !> made conjugate to the step d before it, with the true second derivatives H = Q B + e'':
 !>     s = s + b d,     b = -(G.d + s.H d)/(d.H d)
-!> which is the conjugate gradient method with the model as its preconditioner. Where H is not positive along
-!> d, the step continues along d. In both cases w = b d is shortened until it changes no g + z_0 by more than a
-!> share, and gaps that would be negative are closed. `stretch_step` then lengthens the step to the minimum
-!> of the energy along it.
+!> which is the conjugate gradient method with the model as its preconditioner. If d.H d is not positive, the step
+!> continues along d. In both cases b d is shortened until it changes no g + z_0 by more than `largest_change`, and
+!> gaps that would be negative are set to 0. After the product B s, `stretch_step` lengthens the step to the minimum of
+!> the energy along it.
 module adhesion_plane
    use adhesion_potential, only : adhesive_slopes, has_smooth_potential
    use adhesion_state, only : control_approach
@@ -20,25 +20,26 @@ module adhesion_plane
    implicit none
    private
 
-   public :: keep_step, stretch_step, widen_step
+   public :: keep_step, make_conjugate, stretch_step
 
-   real(dp), parameter :: share = 0.05_dp               !! by which g + z_0 may change with w
-   real(dp), parameter :: most = 4.0_dp                !! greatest b
-   real(dp), parameter :: onward = 1.0_dp              !! b where H is not positive
+   real(dp), parameter :: largest_change = 0.05_dp     !! of g + z_0 with b d, or by stretching, over g + z_0
+   real(dp), parameter :: most = 4.0_dp                !! greatest |b|
+   real(dp), parameter :: onward = 1.0_dp              !! |b| if d.H d is not positive
    real(dp), parameter :: greatest_stretch = 2.0_dp
-   real(dp), parameter :: least_stiffness = 1e-3_dp    !! H over B, below which it counts as negative
+   real(dp), parameter :: least_stiffness = 1e-3_dp    !! if d.H d/(d.Q B d) is less, it counts as negative
 
 contains
 
-   !> Combine the step of the model, in work%direction and now%lift, with the step before.
-   subroutine widen_step(work, now)
+   !> Make the step of the model, in work%direction and now%lift, conjugate to the step before. A step whose length was
+   !> limited is left as it is, because it is far from a minimum of the model.
+   subroutine make_conjugate(work, now)
       type(adhesion_work_type), intent(inout) :: work
       type(adhesion_iteration_type), intent(inout) :: now
       real(dp) :: b, shift, slope, stiffness
 
-      if (.not. now%has_last .or. now%held .or. .not. has_smooth_potential(now%problem%potential)) return
+      if (.not. now%has_last .or. now%length_limited .or. .not. has_smooth_potential(now%problem%potential)) return
       if (.not. now%last_form > 0.0_dp) return
-      call look_along(work, now, slope, stiffness)
+      call measure_along(work, now, slope, stiffness)
       b = sign(onward, -slope)
       if (stiffness > least_stiffness*now%last_form) b = min(max(-slope/stiffness, -most), most)
       b = b*allowed_part(work, now, b)
@@ -51,10 +52,10 @@ contains
             now%state, work%direction, 1.0_dp, now%gap_sum, patch%threads)
       end associate
       call close_step(work, now, shift)
-   end subroutine widen_step
+   end subroutine make_conjugate
 
-   !> Compute the slope of the energy along the step before, after the step of the model, and the stiffness along it.
-   subroutine look_along(work, now, slope, stiffness)
+   !> Compute the stiffness along the step d before, and the slope of the energy along d after the step s of the model.
+   subroutine measure_along(work, now, slope, stiffness)
       type(adhesion_work_type), intent(inout) :: work
       type(adhesion_iteration_type), intent(in) :: now
       real(dp), intent(out) :: slope               !! G.d + s.H d
@@ -66,15 +67,15 @@ contains
       allocate (rows(2, work%patch%all_rows))
       !$omp parallel do default(none) shared(work, now, rows) private(j) num_threads(work%patch%threads)
       do j = 1, work%patch%all_rows
-         call look_along_row(work, now, j, work%patch%inner(j), rows(:, j))
+         call measure_along_row(work, now, j, work%patch%inner(j), rows(:, j))
       end do
       totals = work%patch%sharing%totals(rows)
       slope = totals(1) - now%force*now%last_lift
       stiffness = now%last_form + totals(2)
-   end subroutine look_along
+   end subroutine measure_along
 
-   !> The sums of row j.
-   subroutine look_along_row(work, now, j, n, row)
+   !> Row j of both sums, the stiffness without the part of B, which is known.
+   subroutine measure_along_row(work, now, j, n, row)
       type(adhesion_work_type), intent(inout) :: work
       type(adhesion_iteration_type), intent(in) :: now
       integer, intent(in) :: j
@@ -100,14 +101,14 @@ contains
             + modulus*work%direction(i, j)*work%last_image(i, j)
       end do
       row(:) = [slope, curvature]
-   end subroutine look_along_row
+   end subroutine measure_along_row
 
-   !> The part of w = b d with which no g + z_0 of an open cell changes by more than a share.
-   function allowed_part(work, now, b) result(tau)
+   !> The part of b d with which no g + z_0 of an open cell changes by more than `largest_change`.
+   function allowed_part(work, now, b) result(part)
       type(adhesion_work_type), intent(in) :: work
       type(adhesion_iteration_type), intent(in) :: now
       real(dp), intent(in) :: b
-      real(dp) :: tau
+      real(dp) :: part
       real(dp), allocatable :: least(:)
       real(dp) :: gap, w, limit
       integer :: i, j
@@ -120,12 +121,12 @@ contains
          do i = 1, work%patch%nx
             w = abs(b*work%last_step(i, j))
             gap = now%state(i, j) + work%direction(i, j)
-            if (gap > 0.0_dp .and. limit*w > share*(gap + now%units%length)) &
-               limit = share*(gap + now%units%length)/w
+            if (gap > 0.0_dp .and. limit*w > largest_change*(gap + now%units%length)) &
+               limit = largest_change*(gap + now%units%length)/w
          end do
          least(j) = limit
       end do
-      tau = min(least_of_rows(least), 1.0_dp)
+      part = min(least_of_rows(least), 1.0_dp)
    end function allowed_part
 
    !> Set s = s + b d, except in cells that s closes.
@@ -164,12 +165,13 @@ contains
       end do
    end subroutine close_step
 
-   !> Lengthen the step, whose product is known, to the minimum that its second derivative predicts.
+   !> Lengthen the step, whose product with B is known, to the minimum that its second derivative predicts. The factor is
+   !> limited so that no gap becomes negative and no g + z_0 changes by more than `largest_change`.
    subroutine stretch_step(work, now, known, stretch)
       type(adhesion_work_type), intent(inout) :: work
       type(adhesion_iteration_type), intent(inout) :: now
       type(step_sums_type), intent(inout) :: known
-      real(dp), intent(out) :: stretch
+      real(dp), intent(out) :: stretch                 !! the factor; 1: the step is not changed
       real(dp), allocatable :: least(:)
       real(dp) :: gap, limit, s, stiffness
       integer :: i, j
@@ -188,7 +190,8 @@ contains
             s = work%direction(i, j)
             gap = max(now%state(i, j) + s, 0.0_dp)
             if (gap + limit*s < 0.0_dp) limit = -gap/s
-            if (limit*abs(s) > share*(gap + now%units%length)) limit = share*(gap + now%units%length)/abs(s)
+            if (limit*abs(s) > largest_change*(gap + now%units%length)) &
+               limit = largest_change*(gap + now%units%length)/abs(s)
          end do
          least(j) = limit
       end do
@@ -220,7 +223,7 @@ contains
       call move_alloc(spare, work%image)
       now%last_form = form
       now%last_lift = now%lift
-      now%has_last = .not. now%held
+      now%has_last = .not. now%length_limited
    end subroutine keep_step
 
 end module adhesion_plane

@@ -1,4 +1,4 @@
-!> The residual of the fast method for adhesive contact (module adhesion_cg_fast).
+!> The residual of the fast method for adhesive contact (module `adhesion_cg_fast`).
 !>
 !> `measure` computes r and the error from the present traction. In the same pass over the cells it updates the
 !> traction of the model (module `adhesion_descent`).
@@ -15,12 +15,12 @@ module adhesion_residual
 
    public :: measure
 
-   !> Errors in the padding count more: they are smooth and of one sign, and add up in energies.
+   !> Factor of errors in the padding. They count more because they are smooth and of one sign, and add up in energies.
    real(dp), parameter :: strictness = 10.0_dp
 
 contains
 
-   !> Compute the gradient G, the natural residual, and r, which is passed to the preconditioner.
+   !> Compute the natural residual, the least gap, and r, which is passed to the preconditioner.
    subroutine measure(self, now)
       type(adhesion_work_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(inout) :: now
@@ -64,23 +64,23 @@ contains
       now%residual = max(now%residual, abs(now%missing)/max(abs(now%force), now%units%traction))
    end subroutine measure
 
-   !> Add the pending terms to a row of the traction of the model: a multiple of the product, and the contribution
-   !> of cells that closed, for which the stencil is sufficient.
+   !> Add the pending terms to a row of the traction of the model: a multiple of the product, and the product of the
+   !> correction where gaps were closed, for which the stencil is sufficient (module `adhesion_descent`).
    subroutine add_product_row(self, now, j)
       type(adhesion_work_type), intent(in) :: self
       type(adhesion_iteration_type), intent(inout) :: now
       integer, intent(in) :: j
-      real(dp) :: bumps(self%patch%mx)
+      real(dp) :: correction(self%patch%mx)
 
       now%traction(:, j) = now%traction(:, j) + now%pending*self%image(:, j)
-      if (.not. now%bumped) return
-      if (.not. any(self%bumpy(self%model%around(j)))) return
-      bumps(:) = 0.0_dp
-      call self%model%stencil_row(j, self%change, bumps)
-      now%traction(:, j) = now%traction(:, j) + now%problem%modulus*bumps
+      if (.not. now%correction_pending) return
+      if (.not. any(self%has_correction(self%model%around(j)))) return
+      correction(:) = 0.0_dp
+      call self%model%stencil_row(j, self%change, correction)
+      now%traction(:, j) = now%traction(:, j) + now%problem%modulus*correction
    end subroutine add_product_row
 
-   !> Compute a row of r and of the input of M from the row of G without p.
+   !> Compute a row of r and of the input of M from the rows of the gap and of the traction.
    subroutine measure_row(self, now, j, worst, least, padding)
       type(adhesion_work_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(in) :: now
@@ -112,6 +112,5 @@ contains
          call self%model%put_row(j, self%residual(:, j))
       end if
    end subroutine measure_row
-
 
 end module adhesion_residual

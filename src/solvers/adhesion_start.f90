@@ -12,12 +12,11 @@ module adhesion_start
 
 contains
 
-   !> Set the first state of a contact from `gap` (periodic) or from `pressure` and `level` (free), or to full
+   !> Set the first state of a contact from its gap (periodic) or from its pressure and level (free), or to full
    !> contact, and choose the units of the residual.
-   subroutine begin_contact(self, contact, gap, pressure)
+   subroutine begin_contact(self, contact)
       class(adhesion_patch_type), intent(inout) :: self
-      class(adhesion_contact_type), intent(inout) :: contact    !! with its fields and the level set
-      real(dp), intent(in) :: gap(:, :), pressure(:, :)        !! of the patch; free mode only
+      class(adhesion_contact_type), intent(inout) :: contact    !! in: its fields are associated
       real(dp) :: deviation, spread, round_off, greatest
 
       contact%mean_height = field_mean(contact%height) - contact%problem%datum
@@ -30,7 +29,7 @@ contains
       else
          round_off = 20.0_dp*epsilon(1.0_dp)*(abs(contact%level) + spread)
          contact%units%length = max(contact%units%length, round_off/contact%problem%tolerance)
-         call begin_free(self, contact, gap, pressure)
+         call begin_free(self, contact)
       end if
       call self%evaluate_traction(contact)
       greatest = max(abs(contact%load), field_magnitude(contact%traction))
@@ -70,10 +69,9 @@ contains
 
    !> Set the state from the given pressure and level, or to full contact. The gap that follows from a pressure has
    !> errors. Therefore gaps within the tolerance are set to zero, so that cells in contact stay in contact.
-   subroutine begin_free(self, contact, gap, pressure)
+   subroutine begin_free(self, contact)
       type(adhesion_patch_type), intent(inout) :: self
       class(adhesion_contact_type), intent(inout) :: contact
-      real(dp), intent(in) :: gap(:, :), pressure(:, :)
       real(dp) :: g
       integer :: i, j
 
@@ -82,16 +80,15 @@ contains
          if (contact%problem%control /= control_approach) contact%level = -contact%mean_height
          do j = 1, self%all_rows
             contact%state(:, j) = (contact%level + contact%mean_height)*self%psi(:, j)
-            if (j <= self%rows) contact%state(1:self%nx, j) = max(gap(:, j), 0.0_dp)
+            if (j <= self%rows) contact%state(1:self%nx, j) = max(contact%gap(:, j), 0.0_dp)
          end do
          return
       end if
       do j = 1, self%all_rows
          contact%traction(:, j) = 0.0_dp
          if (j > self%rows) cycle
-         contact%traction(1:self%nx, j) = pressure(:, j)
-         if (associated(contact%past)) contact%traction(1:self%nx, j) = pressure(:, j) &
-            + contact%past(:, j)
+         contact%traction(1:self%nx, j) = contact%pressure(:, j)
+         if (associated(contact%past)) contact%traction(1:self%nx, j) = contact%pressure(:, j) + contact%past(:, j)
       end do
       call self%stiffness%apply_inverse(contact%traction, contact%state)
       do j = 1, self%all_rows

@@ -1,9 +1,9 @@
 !> A stencil of 5 x 5 cells that fits the stiffness B of an adhesive contact at short waves.
 !>
 !> Its symbol is sum_ab weight(a, b) cos(a kx) cos(b ky) with a, b = 0 to 2 and wave numbers per cell. The
-!> weights make the sum of (symbol/B - 1)^2/k least over the wave vectors that are longer than `band`: any
-!> solid and any shape of cells gets a stencil of its own. For a half-space with square cells the symbol is
-!> between 0.8 and 1.3 times B (0.75 and 1.6 where cells are twice as long as wide).
+!> weights minimise the sum of (symbol/B - 1)^2/k over the wave vectors with a length k above `band`. The stencil
+!> therefore fits any solid and any shape of cells. For a half-space with square cells the symbol is between 0.8 and 1.3
+!> times B (between 0.75 and 1.6 if cells are twice as long as wide).
 module adhesion_stencil
    use adhesion_symbols, only : adhesion_symbols_type
    use asperity_parallel, only : global_sum
@@ -12,22 +12,23 @@ module adhesion_stencil
    implicit none
    private
 
-   public :: add_stencil, band, fit_stencil, reach, stencil_symbol
+   public :: add_stencil, band, fit_stencil, radius, stencil_symbol
 
-   integer, parameter :: reach = 2                      !! cells on each side
-   integer, parameter :: terms = (reach + 1)**2
+   integer, parameter :: radius = 2                     !! cells of the stencil on each side of its centre
+   integer, parameter :: terms = (radius + 1)**2
    integer, parameter :: samples = 128                  !! wave numbers for the fit in each direction
    real(dp), parameter :: band = pi/16.0_dp             !! least wave number per cell that is fitted
-   real(dp), parameter :: ridge = 1e-10_dp              !! for grids with fewer waves than weights
+   !> Part of the first diagonal entry that is added to all, because a grid may have fewer waves than weights.
+   real(dp), parameter :: ridge = 1e-10_dp
 
 contains
 
-   !> The weights of the stencil for a grid of mx by my cells, from the symbols at hand. Collective.
+   !> Fit the weights of the stencil for a grid of mx by my cells to the symbols that this process has. Collective.
    subroutine fit_stencil(symbols, modes, mx, my, weights)
       type(adhesion_symbols_type), intent(in) :: symbols
       integer, intent(in) :: modes(2)                   !! wave numbers along x of this process: first, last
       integer, intent(in) :: mx, my
-      real(dp), intent(out) :: weights(0:reach, 0:reach)
+      real(dp), intent(out) :: weights(0:radius, 0:radius)
       real(dp), allocatable :: sums(:)
       real(dp) :: matrix(terms, terms), right(terms), column(terms*(terms + 1)), term(terms), kx, ky
       integer :: i, j, k, size_of_sums
@@ -60,34 +61,34 @@ contains
       end do
       call factor(matrix, 1)
       call solve_factors(matrix, right)
-      weights(:, :) = reshape(right, [reach + 1, reach + 1])
+      weights(:, :) = reshape(right, [radius + 1, radius + 1])
    end subroutine fit_stencil
 
    !> cos(a kx) cos(b ky); 0 along a side of a single cell, for a > 0 or b > 0.
    pure function waves(kx, ky, mx, my) result(values)
       real(dp), intent(in) :: kx, ky
       integer, intent(in) :: mx, my
-      real(dp) :: values(0:reach, 0:reach)
+      real(dp) :: values(0:radius, 0:radius)
       integer :: a, b
 
-      do b = 0, reach
-         do a = 0, reach
+      do b = 0, radius
+         do a = 0, radius
             values(a, b) = cos(a*kx)*cos(b*ky)
             if ((mx == 1 .and. a > 0) .or. (my == 1 .and. b > 0)) values(a, b) = 0.0_dp
          end do
       end do
    end function waves
 
-   !> Symbol of a stencil at wave numbers per cell.
+   !> The symbol of a stencil at wave numbers per cell.
    pure function stencil_symbol(weights, kx, ky) result(value)
-      real(dp), intent(in) :: weights(0:reach, 0:reach)
+      real(dp), intent(in) :: weights(0:radius, 0:radius)
       real(dp), intent(in) :: kx, ky
       real(dp) :: value
       integer :: a, b
 
       value = 0.0_dp
-      do b = 0, reach
-         do a = 0, reach
+      do b = 0, radius
+         do a = 0, radius
             value = value + weights(a, b)*cos(a*kx)*cos(b*ky)
          end do
       end do
@@ -95,14 +96,14 @@ contains
 
    !> Add to a row the stencil's product, from the rows around it on a periodic grid.
    pure subroutine add_stencil(weights, below2, below1, row, above1, above2, product)
-      real(dp), intent(in) :: weights(0:reach, 0:reach)
+      real(dp), intent(in) :: weights(0:radius, 0:radius)
       real(dp), intent(in), contiguous :: below2(:), below1(:), row(:), above1(:), above2(:)
       real(dp), intent(inout), contiguous :: product(:)
-      real(dp) :: next(1 - reach:size(row) + reach, reach), w(0:reach, 0:reach), one, two
+      real(dp) :: next(1 - radius:size(row) + radius, radius), w(0:radius, 0:radius), one, two
       integer :: i, n
 
       n = size(row)
-      ! A pair of cells at a distance shares the weight of its wave.
+      ! cos(a kx) is the mean of two cells at the distances a and -a, each of which gets half of the weight.
       w(:, :) = weights
       w(1:, :) = 0.5_dp*w(1:, :)
       w(:, 1:) = 0.5_dp*w(:, 1:)
@@ -115,7 +116,7 @@ contains
          next(i, 1) = w(1, 0)*row(i) + w(1, 1)*one + w(1, 2)*two
          next(i, 2) = w(2, 0)*row(i) + w(2, 1)*one + w(2, 2)*two
       end do
-      do i = 1, reach
+      do i = 1, radius
          next(1 - i, :) = next(modulo(-i, n) + 1, :)
          next(n + i, :) = next(modulo(i - 1, n) + 1, :)
       end do

@@ -1,7 +1,7 @@
 !> Chooses the length of a step s for adhesive contact.
 !>
-!> A step may close gaps: it satisfies g + s >= 0. With its product with B the energy along g + t s is known
-!> exactly, and `choose_step` finds the part t that is taken.
+!> A step may close gaps, so that g + s >= 0. Once its product with B is known, the energy along g + t s is known
+!> exactly, and `choose_step` finds the part t of the step that is taken.
 !>
 !> Sums are formed row by row and added in the order of the rows, so that they do not depend on the number of
 !> threads.
@@ -27,7 +27,7 @@ module adhesion_steps
       real(dp) :: curvature = 0.0_dp        !! s.e''(g) s
    end type step_sums_type
 
-   !> Two ends between which a function that rises has its root.
+   !> The ends of an interval in which an increasing function has its root, and the values there.
    type :: bracket_type
       real(dp) :: lower = 0.0_dp, low_value = 0.0_dp                   !! value < 0
       real(dp) :: upper = 1.0_dp, high_value = 0.0_dp                  !! value >= 0
@@ -64,7 +64,7 @@ contains
       root = min(max(root, self%lower + margin*width), self%upper - margin*width)
    end function chord_root
 
-   !> The gap after a step along d, closed where it would be negative, less a shift that keeps its sum.
+   !> The gap after a step along d, minus a shift that keeps the sum of the gaps. It is 0 where it would be negative.
    elemental function stepped_gap(gap, direction, alpha, shift) result(value)
       real(dp), intent(in) :: gap, direction, alpha, shift
       real(dp) :: value
@@ -77,7 +77,8 @@ contains
       end if
    end function stepped_gap
 
-   !> The shift with which the stepped gaps have the sum `total`: Newton's steps rise to it.
+   !> The shift with which the gaps after a step have the sum `total`. The sum is a convex function of the shift that
+   !> decreases, so that Newton's iteration approaches the solution from below.
    function sum_shift(gap, direction, alpha, total, threads) result(shift)
       real(dp), intent(in) :: gap(:, :), direction(:, :)
       real(dp), intent(in) :: alpha
@@ -121,7 +122,7 @@ contains
    subroutine form_step_row(problem, gap, wall, s, sums)
       type(adhesion_problem_type), intent(in) :: problem
       real(dp), intent(in), contiguous :: gap(:)       !! g, m
-      real(dp), intent(in), contiguous :: wall(:)      !! G less e', Pa
+      real(dp), intent(in), contiguous :: wall(:)      !! G - e', Pa
       real(dp), intent(in), contiguous :: s(:)         !! m
       type(step_sums_type), intent(out) :: sums
       real(dp) :: slope, adhesive, curvature, energy
@@ -186,7 +187,7 @@ contains
       bracket%low_value = known%slope
       t = 1.0_dp
       do pass = 1, merge(8, 1, smooth)
-         call look(t, slope, rise)
+         call evaluate(t, slope, rise)
          risen = rise > noise
          ! The whole step is taken even if the energy has another minimum along the straight line, because the
          ! model from which the step comes has followed the energy to this point.
@@ -198,7 +199,7 @@ contains
          t = bracket%chord_root(0.05_dp)
       end do
       do pass = 1, 20
-         call look(t, slope, rise)
+         call evaluate(t, slope, rise)
          if (rise <= noise) return
          t = 0.25_dp*t
       end do
@@ -206,8 +207,8 @@ contains
 
    contains
 
-      !> Slope of the energy at t, and its rise from t = 0.
-      subroutine look(at, gradient, change)
+      !> Compute the slope of the energy at t, and its rise from t = 0.
+      subroutine evaluate(at, gradient, change)
          real(dp), intent(in) :: at
          real(dp), intent(out) :: gradient, change
          real(dp) :: adhesive, energy
@@ -216,9 +217,9 @@ contains
          gradient = known%slope + at*known%form + adhesive - known%adhesive_slope
          change = at*(known%slope - known%adhesive_slope) + 0.5_dp*at**2*known%form &
             + energy - known%energy
-      end subroutine look
+      end subroutine evaluate
 
-      !> Sum of s e'(g + t s) and of e(g + t s).
+      !> Compute the sums of s e'(g + t s) and of e(g + t s).
       subroutine adhesive_part(at, slope_sum, energy_sum)
          real(dp), intent(in) :: at
          real(dp), intent(out) :: slope_sum, energy_sum

@@ -1,6 +1,6 @@
-!> The symbols of the stiffness B of an adhesive contact and of its approximate inverse, by wave numbers along x.
+!> The symbols of the stiffness B of an adhesive contact and of its approximate inverse.
 !>
-!> `form` computes only the symbols that a process needs, those of the columns that it transforms.
+!> `form` computes only the symbols that a process needs: those of the wave numbers along x whose columns it transforms.
 module adhesion_symbols
    use asperity_errors, only : error_input, error_type, fail
    use asperity_parallel, only : any_process
@@ -15,11 +15,11 @@ module adhesion_symbols
    !> The symbols that have been computed.
    type :: adhesion_symbols_type
       type(grid_type), private :: grid
-      type(kernel_type), private :: kernel             !! what the solid is, normal
+      type(kernel_type), private :: kernel             !! normal response of the solid
       integer, private :: mx = 0, my = 0               !! cells of the grid of the unknowns
       integer, private :: modes(2) = [0, -1]           !! first and last wave number that were computed
-      real(dp), allocatable :: stiffness(:, :)         !! B for G = 1, (first:last, 0:my/2)
-      real(dp), allocatable :: compliance(:, :)        !! about its inverse, > 0
+      real(dp), allocatable :: stiffness(:, :)         !! B for a shear modulus of 1, (first:last, 0:my/2)
+      real(dp), allocatable :: compliance(:, :)        !! its inverse or nearly, > 0, also at wave number zero
    contains
       procedure :: form
    end type adhesion_symbols_type
@@ -42,7 +42,7 @@ contains
    !> Compute the symbols of some wave numbers along x, unless they are already available. Collective.
    subroutine form(self, modes, error)
       class(adhesion_symbols_type), intent(inout) :: self
-      integer, intent(in) :: modes(2)                  !! first and last, none if the last is less
+      integer, intent(in) :: modes(2)                  !! first and last wave number; none if the last is less
       type(error_type), allocatable, intent(out) :: error
       real(dp), allocatable :: table(:, :, :)
 
