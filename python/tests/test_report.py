@@ -382,6 +382,27 @@ def test_page_in_a_browser_fits_every_width(browser, tmp_path, kind, sliding):
         assert lines >= (4 if kind in ("sliding", "line") else 2)
 
 
+@needs_browser
+def test_the_links_of_the_page_lie_beside_the_button(browser, tmp_path, sliding):
+    page = asperity.open(sliding).report(tmp_path / "page.html")
+    for width in (390, 700, 1280):
+        browser.window(width, 900)
+        browser.open(page)
+        wait_for(browser, READY)
+        # Links that do not fit are scrolled, and are not covered.
+        left, right = browser.run(
+            "return [document.getElementById('theme').getBoundingClientRect().left,"
+            " document.querySelector('.links').getBoundingClientRect().right]")
+        assert right <= left
+        (seen,) = browser.run(
+            "const link = document.querySelectorAll('nav a'), last = link[link.length - 1];"
+            "last.scrollIntoView({inline: 'end', block: 'nearest'});"
+            "const box = last.getBoundingClientRect();"
+            "const y = (box.top + box.bottom) / 2;"
+            "return [document.elementFromPoint(box.right - 3, y) === last]")
+        assert seen
+
+
 def test_round_off_is_not_shown_as_a_gap(tmp_path):
     case = asperity.Case(grid={"nx": 64, "ny": 1, "lx": 1e-3}, material={"shear_modulus": 1e6},
                          surface={"shape": "sine", "amplitude": 1e-6, "wavelength": 1e-3},

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from .steady import steady_rows
+
 if TYPE_CHECKING:
     from .history import Grid
     from .run import Run
@@ -182,12 +184,18 @@ def closure(run: Run) -> FloatArray | None:
 
 
 def road_speed(run: Run) -> FloatArray:
-    """Return the speed of the road in each row, m/s; it is 0 in a row in which no time passes."""
+    """Return the speed of the road in each row, m/s.
+
+    In a row in which no time passes it is 0, or the speed of a state of steady sliding.
+    """
     history = run.history
     passed = np.diff(history["time"])
     moved = np.hypot(np.diff(history["road_x"]), np.diff(history["road_y"]))
     speed = np.divide(moved, passed, out=np.zeros_like(moved), where=passed > 0.0)
-    return np.concatenate([[0.0], speed])
+    speed = np.concatenate([[0.0], speed])
+    if "sliding_speed" not in history:
+        return speed
+    return np.where(steady_rows(run), history["sliding_speed"], speed)
 
 
 def direction(run: Run, row: int) -> tuple[float, float] | None:

@@ -1,4 +1,4 @@
-"""Means of a column of the history over complete laps of a sliding road.
+"""Steady sliding: rows of steady phases, and means over complete laps of a sliding road.
 
 On a periodic road the rubber meets the same road again after a lap. The mean over complete laps is
 meaningful. The mean over a part of a lap depends on which part it is, and may have the wrong sign.
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .result_file import ResultFile
 
-__all__ = ["SteadyMean", "steady_mean"]
+__all__ = ["SteadyMean", "steady_mean", "steady_rows", "steady_speeds"]
 
 FloatArray = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ def steady_mean(run: ResultFile, column: str = "friction") -> SteadyMean:
     values = np.asarray(run.history[column], dtype=float)
     if not values.size:
         raise ValueError(f"{run.path}: has no rows")
-    if _is_steady(run):
+    if steady_rows(run)[-1]:
         return SteadyMean(float(values[-1]), 0.0, math.inf)
     first, travel, lap = _slide(run)
     if travel.size < 2:
@@ -94,16 +94,48 @@ def steady_mean(run: ResultFile, column: str = "friction") -> SteadyMean:
     return SteadyMean(float(laps.mean()), _error(laps), float(count), note)
 
 
-def _is_steady(run: ResultFile) -> bool:
-    """Return whether the last row is a steady phase without duration."""
-    if "phase" not in run.history or run.history.rows == 0:
-        return False
-    number = int(run.history["phase"][-1])
+def steady_rows(run: ResultFile) -> NDArray[np.bool_]:
+    """Return for each row whether it is a state of steady sliding: the first row of its phase.
+
+    Parameters
+    ----------
+    run : ResultFile
+        The result.
+
+    Returns
+    -------
+    ndarray of bool, shape (rows,)
+    """
+    if "phase" not in run.history:
+        return np.zeros(run.history.rows, dtype=bool)
     settings = str(run.attributes.get("settings", "") or run.input)
     phases = re.findall(r"(?is)&phase\b(.*?)(?:\n\s*/|/\s*(?:\n|$))", settings)
-    if number > len(phases) or not re.search(r"(?i)\bsteady\s*=\s*\.?t", phases[number - 1]):
-        return False
-    return int(np.sum(np.asarray(run.history["phase"]) == number)) == 1
+    steady = [number for number, phase in enumerate(phases, 1)
+              if re.search(r"(?i)\bsteady\s*=\s*\.?t", phase)]
+    number = np.asarray(run.history["phase"])
+    return np.isin(number, steady) & (np.diff(number, prepend=0) != 0)
+
+
+def steady_speeds(run: ResultFile) -> FloatArray | None:
+    """Return the speeds of a curve of steady states, or None if the run is not such a curve.
+
+    Parameters
+    ----------
+    run : ResultFile
+        The result.
+
+    Returns
+    -------
+    ndarray, shape (rows,), or None
+        Speed of the road, m/s; NaN in rows that rest. It is None if time passes in the run, or if
+        fewer than two speeds are found.
+    """
+    history = run.history
+    if "sliding_speed" not in history or not history.rows or np.ptp(history["time"]) > 0.0:
+        return None
+    speed = np.asarray(history["sliding_speed"], dtype=float)
+    speed = np.where(steady_rows(run) & (speed > 0.0), speed, np.nan)
+    return speed if len(np.unique(speed[np.isfinite(speed)])) > 1 else None
 
 
 def _slide(run: ResultFile) -> tuple[int, FloatArray, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 from matplotlib.patches import Patch
+from numpy.typing import NDArray
 
 from ..results.derived import has_friction
 from .plot_fields import field_style, frame_of, state_style, without_open_cells
@@ -27,15 +29,16 @@ from .style import (
 )
 
 if TYPE_CHECKING:
-    from ..results import Run
+    from ..results import Run, Snapshot
 
 __all__ = ["film"]
 
 _ENDINGS = {".gif", ".mp4"}
+SHORTEST = 5.0  # seconds of a film, unless its frames are very few
 
 
-def film(run: Run, path: Path, field: str | None = None, *, frames_per_second: float = 12.0
-         ) -> Path:
+def film(run: Run, path: Path, field: str | None = None, *,
+         frames_per_second: float | None = None) -> Path:
     """Write a film of a field: one frame per snapshot, with friction or contact area beside it.
 
     Parameters
@@ -46,8 +49,9 @@ def film(run: Run, path: Path, field: str | None = None, *, frames_per_second: f
         The film: .gif, or .mp4 if ffmpeg is installed.
     field : str, optional
         The field. The default is 'contact' with friction, and 'pressure' without.
-    frames_per_second : float
-        Number of frames per second.
+    frames_per_second : float, optional
+        Number of frames per second. The default is 12, and less for a film of few frames, which
+        would otherwise be over too soon.
 
     Returns
     -------
@@ -69,6 +73,8 @@ def film(run: Run, path: Path, field: str | None = None, *, frames_per_second: f
                          " `&output snapshot_every = 1 /` stores one for each row")
     if run.grid.ny == 1:
         raise ValueError(f"{run.path}: a film needs a map: this is a line contact, ny = 1")
+    if frames_per_second is None:
+        frames_per_second = float(np.clip(len(run.snapshots) / SHORTEST, 2.0, 12.0))
     if path.suffix.lower() == ".mp4":
         if not FFMpegWriter.isAvailable():
             raise OSError(f"{path}: ffmpeg is not installed: write a .gif")
@@ -101,12 +107,12 @@ def _animation(run: Run, field: str) -> tuple[FuncAnimation, Any]:
                                      label=name) for colour, name in names],
                       loc="outside lower center", ncols=3, frameon=False)
     else:
-        fields = [snapshot[field] for snapshot in snapshots]
-        factor, scale_unit, style = field_style(np.stack(fields), field,
+        factor, scale_unit, style = field_style(_sample(snapshots, field), field,
                                                 snapshots[0].units(field))
-        image = panel.imshow(without_open_cells(fields[0] * factor, field), origin="lower",
-                             extent=edges, **style)
-        figure.colorbar(image, ax=panel, shrink=0.9).set_label(
+        image = panel.imshow(without_open_cells(snapshots[0][field] * factor, field),
+                             origin="lower", extent=edges, **style)
+        tall = float(np.clip(grid.ly / grid.lx, 0.1, 2.5))  # the bar is as tall as the map
+        figure.colorbar(image, ax=panel, fraction=0.046 * tall, pad=0.03).set_label(
             axis_text(label_of(field, snapshots[0]), scale_unit))
     panel.set_xlabel(f"x ({unit})")
     panel.set_ylabel(f"y ({unit})")
@@ -120,7 +126,10 @@ def _animation(run: Run, field: str) -> tuple[FuncAnimation, Any]:
     curve.set_xlabel(axis_text(LABELS[along], along_unit))
     curve.set_ylabel(axis_text(LABELS[column], ""))
     curve.grid(alpha=0.3)
-    title = panel.set_title(when(snapshots[0]))
+    curve.set_box_aspect(max(ratio, 0.6))
+    if run.title:
+        figure.suptitle(run.title, parse_math=False)
+    title = panel.set_title(_moment(snapshots[0], snapshots[-1]))
     # The layout is computed once, because in every frame it would take most of the time.
     figure.canvas.draw()
     figure.set_layout_engine("none")
@@ -132,7 +141,25 @@ def _animation(run: Run, field: str) -> tuple[FuncAnimation, Any]:
                        else without_open_cells(values * factor, field))
         row = int(np.searchsorted(history["step"], snapshot.step))
         mark.set_data([history[along][row] * scale], [history[column][row]])
-        title.set_text(when(snapshot))
+        title.set_text(_moment(snapshot, snapshots[-1]))
         return image, mark, title
 
     return FuncAnimation(figure, draw, frames=len(snapshots), blit=False), figure
+
+
+def _sample(snapshots: list[Snapshot], field: str) -> NDArray[Any]:
+    """Return values that stand for a field in all snapshots, without holding all of it.
+
+    They are the quantiles of each snapshot, which include its extremes.
+    """
+    shares = np.linspace(0.0, 1.0, 1001)
+    return np.array([np.quantile(snapshot[field], shares) for snapshot in snapshots])
+
+
+def _moment(snapshot: Snapshot, last: Snapshot) -> str:
+    """Return step and time of a snapshot, with the unit and the decimals of all frames."""
+    if last.time == 0.0:
+        return when(snapshot)
+    factor, unit = si_scale(last.time, "s")
+    decimals = max(0, 2 - math.floor(math.log10(last.time * factor)))
+    return f"step {snapshot.step}, t = {snapshot.time * factor:.{decimals}f} {unit}"

@@ -26,7 +26,7 @@ from ..results.derived import (
     road_speed,
     travel,
 )
-from ..results.steady import steady_mean
+from ..results.steady import steady_mean, steady_rows, steady_speeds
 from .plot_fields import plot_field, plot_section
 from .style import (
     COLOURS,
@@ -69,8 +69,8 @@ def plot_history(run: Run, name: str = "contact_area", x: str | None = None,
     name : str
         Column to draw, or 'energy'.
     x : str, optional
-        Column along the horizontal axis. The default is time or, if no time passes, pressure or
-        step.
+        Column along the horizontal axis. The default is time. If no time passes, it is the sliding
+        speed of a curve of steady states, otherwise pressure or step.
     ax : matplotlib.axes.Axes, optional
         Axes to draw into; by default a new figure that fits one column of a journal.
     **style
@@ -89,16 +89,21 @@ def plot_history(run: Run, name: str = "contact_area", x: str | None = None,
     history = run.history
     if name != "energy" and name not in history:
         raise UnknownNameError(unknown_name("column of the history", name, [*history, "energy"]))
-    if x is None:
-        x = next((column for column in ("time", "pressure", "step")
-                  if column != name and column in history and np.ptp(history[column]) > 0.0),
-                 "step") if history.rows else "step"
-    factor, unit = si_scale(history[x], history.units(x))
-    along = history[x] * factor
+    if x is None and name != "sliding_speed" and steady_speeds(run) is not None:
+        along, label, log = _horizontal(run)
+    else:
+        if x is None:
+            x = next((column for column in ("time", "pressure", "step")
+                      if column != name and column in history and np.ptp(history[column]) > 0.0),
+                     "step") if history.rows else "step"
+        factor, unit = si_scale(history[x], history.units(x))
+        along, label, log = history[x] * factor, axis_text(label_of(x, history), unit), False
     with print_style() if ax is None else nullcontext():
         axes = ax if ax is not None else _new_axes()
         _draw(run, name, along, axes, style)
-        axes.set_xlabel(axis_text(label_of(x, history), unit))
+        axes.set_xlabel(label)
+        if log:
+            axes.set_xscale("log")
         if run.title and ax is None:
             above = axes.get_legend()
             rows = 0 if above is None else -(-len(above.get_texts()) // above._ncols)
@@ -114,8 +119,8 @@ def plot_overview(run: Run) -> Figure:
     over time, and the last maps of pressure and of stick and slip. Without friction they are the
     last maps of pressure and gap, and one of these: contact area (and viscous friction) over time;
     for a growing load, the contact area against the load, with Persson's theory if the road is
-    rough and the material elastic; for a single solve, a section through the contact. A run without
-    snapshots shows its history.
+    rough and the material elastic; for a single solve, a section through the contact. A curve of
+    steady states is drawn over the sliding speed. A run without snapshots shows its history.
 
     Parameters
     ----------
@@ -129,7 +134,8 @@ def plot_overview(run: Run) -> Figure:
     """
     with print_style():
         snapshot = run.snapshots[-1] if len(run.snapshots) else None
-        moving = run.history.rows > 1 and np.ptp(run.history["time"]) > 0.0
+        moving = run.history.rows > 1 and (np.ptp(run.history["time"]) > 0.0
+                                           or steady_speeds(run) is not None)
         if has_friction(run) and moving:
             return _frictional_overview(run)
         names = [name for name in ("pressure", "gap") if snapshot is not None and name in snapshot]
@@ -146,7 +152,7 @@ def plot_overview(run: Run) -> Figure:
         panel = panels[0, -1]
         if moving:
             _time_panel(run, panel)
-        elif run.history.rows <= 1 and len(names) == 2 and not has_rough_road(run):
+        elif run.history.rows <= 1 and len(names) == 2 and not _persson_applies(run):
             plot_section(snapshot, panel)
         else:
             _load_panel(run, panel)
@@ -169,11 +175,15 @@ def shown_once(figure: Figure) -> Figure:
 
 
 def _frictional_overview(run: Run) -> Figure:
-    """Draw friction, areas and speed over time on the left, and the last maps on the right."""
+    """Draw friction, areas and speed over time on the left, and the last maps on the right.
+
+    A curve of steady states shows friction, areas and gap over the speed.
+    """
+    curve = steady_speeds(run) is not None
     snapshot = run.snapshots[-1] if len(run.snapshots) else None
     maps = [name for name in ("pressure", "contact") if snapshot is not None and name in snapshot]
-    columns = [name for name in ("friction", "contact_area", "sliding_speed")
-               if name in run.history]
+    columns = [name for name in ("friction", "contact_area", "mean_gap" if curve else
+                                 "sliding_speed") if name in run.history]
     grid = run.grid
     ratio = 0.6 if grid.ny == 1 else float(np.clip(grid.ly / grid.lx, 0.3, 1.3))
     figure = plt.figure(figsize=(DOUBLE_COLUMN if maps else SINGLE_COLUMN,
@@ -181,9 +191,11 @@ def _frictional_overview(run: Run) -> Figure:
                         layout="constrained")
     parts = figure.subfigures(1, 2, width_ratios=(1.0, 1.0)) if maps else [figure]
     panels = parts[0].subplots(len(columns), 1, sharex=True, squeeze=False)[:, 0]
-    along, head = _time_or_travel(run)
+    along, head, log = _horizontal(run)
     for name, panel in zip(columns, panels, strict=True):
         _draw(run, name, along, panel, {})
+        if log:
+            panel.set_xscale("log")
     panels[-1].set_xlabel(head)
     if maps:
         for name, panel in zip(maps, parts[1].subplots(len(maps), 1, squeeze=False)[:, 0],
@@ -231,27 +243,30 @@ def _draw(run: Run, name: str, along: NDArray[Any], axes: Axes, style: dict[str,
             axes.plot(along[rows], outside, color=COLOURS[3], marker="s", linestyle="",
                       label="attraction outside contact", clip_on=False)
             parts = parts or [("outside", outside, "", "")]
-    if name == "friction":
-        _draw_mean(run, axes)
+    with_mean = name == "friction" and _draw_mean(run, axes)
     axes.set_ylabel(axis_text(label_of(name, history), unit))
     if not parts:
         _sane_limits(axes, values * factor)
-    else:
+    if parts or with_mean:
         _legend_above(axes)
 
 
-def _draw_mean(run: Run, axes: Axes) -> None:
-    """Draw the mean friction over complete laps; the label says if there is no complete lap."""
+def _draw_mean(run: Run, axes: Axes) -> bool:
+    """Draw the mean friction over complete laps; the label says if there is no complete lap.
+
+    Return whether there is a label.
+    """
     if run.history.rows < 2 or not np.any(run.history["friction"]):
-        return
+        return False
     found = steady_mean(run, "friction")
     if 1.0 <= found.laps < np.inf:
         laps = "last lap" if found.laps == 1.0 else f"last {found.laps:.0f} laps"
         axes.axhline(found.mean, color=COLOURS[6], linestyle=":", linewidth=0.9,
                      label=f"mean of the {laps}")
     elif 0.0 < found.laps < 1.0:
-        axes.annotate(f"{2.0 * found.laps:.2g} of a lap: no mean", (0.98, 0.03),
-                      xycoords="axes fraction", ha="right", fontsize="small", color="0.35")
+        # In the legend, where it hides no data.
+        axes.plot([], [], " ", label=f"{2.0 * found.laps:.2g} of a lap: no mean")
+    return 0.0 < found.laps < np.inf
 
 
 def _draw_energy(run: Run, along: NDArray[Any], axes: Axes, style: dict[str, Any]) -> None:
@@ -298,8 +313,26 @@ def _headline(run: Run, figure: Figure) -> None:
     words = [f"{run.title or run.path.name}"]
     if len(run.snapshots):
         words.append(when(run.snapshots[-1]))
+        words[-1] += _steady_words(run, run.snapshots[-1].step)
     figure.suptitle(": ".join(words) + ("" if run.finished else " (run not finished)"),
                     parse_math=False)
+
+
+def _steady_words(run: Run, step: int) -> str:
+    """Return the speed and the friction if a step is a state of steady sliding, or else ''."""
+    history = run.history
+    row = int(np.searchsorted(history["step"], step))
+    if not steady_rows(run)[row] or "sliding_speed" not in history:
+        return ""
+    factor, unit = si_scale(history["sliding_speed"][row], "m/s")
+    return (f", steady at {history['sliding_speed'][row] * factor:.4g} {unit}, friction"
+            f" {history['friction'][row]:.3g}")
+
+
+def _persson_applies(run: Run) -> bool:
+    """Return whether Persson's theory of elastic contact holds for the road and the material."""
+    return (has_rough_road(run) and run.grid.boundary == "periodic" and run.grid.ny > 1
+            and is_elastic(run) and not has_adhesion(run))
 
 
 def _load_panel(run: Run, axes: Axes) -> None:
@@ -307,8 +340,7 @@ def _load_panel(run: Run, axes: Axes) -> None:
     history = run.history
     pressure = history["pressure"]
     factor, unit = si_scale(pressure, "Pa")
-    if (has_rough_road(run) and run.grid.boundary == "periodic" and run.grid.ny > 1
-            and is_elastic(run) and not has_adhesion(run)):
+    if _persson_applies(run):
         modulus = 2.0 * float(run.material.shear_modulus) / (1.0 - float(run.material.poisson))
         slope = rms_slope(run.grid, run.height)
         if slope > 0.0 and pressure.max(initial=0.0) > 0.0:
@@ -330,23 +362,34 @@ def _load_panel(run: Run, axes: Axes) -> None:
     _legend_above(axes)
 
 
-def _time_or_travel(run: Run) -> tuple[np.ndarray, str]:
-    """Return the travel of the road or, if that suits better, the time, and the axis label."""
-    way = travel(run)
-    values, what, unit = ((run.history["time"], "Time", "s") if way is None
-                          else (way, "Travel of the road", "m"))
-    factor, unit = si_scale(values, unit)
-    return values * factor, axis_text(what, unit)
+def _horizontal(run: Run) -> tuple[NDArray[Any], str, bool]:
+    """Return values and label of the horizontal axis, and whether the axis is logarithmic.
+
+    It is the speed for a curve of steady states, otherwise the time or, if that suits better, the
+    travel of the road.
+    """
+    speed, way = steady_speeds(run), travel(run)
+    values, what, unit = (
+        (speed, LABELS["sliding_speed"], "m/s") if speed is not None
+        else (run.history["time"], "Time", "s") if way is None
+        else (way, "Travel of the road", "m"))
+    log = speed is not None and bool(np.nanmax(speed) >= 10.0 * np.nanmin(speed))
+    factor, unit = (1.0, unit) if log else si_scale(values, unit)
+    return values * factor, axis_text(what, unit), log
 
 
 def _time_panel(run: Run, axes: Axes) -> None:
     """Draw contact area, and friction of a moving road, against time or travel."""
     names = ["contact_area", *(["friction"] if np.any(run.history["friction"]) else [])]
-    along, head = _time_or_travel(run)
+    along, head, log = _horizontal(run)
+    marker = "o" if len(along) <= 40 else ""
     for number, (name, panel) in enumerate(zip(names, (axes, None), strict=False)):
         panel = panel or axes.twinx()
-        panel.plot(along, run.history[name], color=COLOURS[number], linestyle=("-", "--")[number])
+        panel.plot(along, run.history[name], color=COLOURS[number], linestyle=("-", "--")[number],
+                   marker=marker)
         panel.set_xlabel(head)
+        if log:
+            panel.set_xscale("log")
         panel.set_ylabel(axis_text(LABELS[name], ""))
         if len(names) == 2:
             panel.yaxis.label.set_color(COLOURS[number])

@@ -116,7 +116,9 @@ def plot_section(snapshot: Snapshot, ax: Axes | None = None) -> Axes:
     other.grid(visible=False)
     for panel, colour in ((axes, COLOURS[0]), (other, COLOURS[1])):
         panel.yaxis.label.set_color(colour)
-    if np.any(gap[row] > 0.0):
+    # Both zeros are at the same height.
+    if np.any(gap[row] > 0.0) and pressure[row].min() >= 0.0:
+        axes.set_ylim(bottom=0.0)
         other.set_ylim(bottom=0.0)
     length, unit = si_scale(max(grid.lx, grid.ly), "m")
     axes.set_title(f"Section at y = {grid.y[row] * length:.4g} {unit}")

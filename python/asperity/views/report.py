@@ -25,7 +25,7 @@ from ..results.standing import (
     time_of_row,
     way_on,
 )
-from ..results.steady import steady_mean
+from ..results.steady import steady_mean, steady_rows
 from .page_parts import PAGE, colour_scales, fill_page, page_file, page_json
 from .report_data import faulty, now, page_data, phase_names
 from .style import si_scale, typeset
@@ -169,8 +169,9 @@ def _tiles(run: Run) -> str:
     history = run.history
     if not history.rows:
         return '<p class="note">The history has no rows yet.</p>'
-    names = [("time", "Time"), ("pressure", "Mean pressure"), ("displacement", "Approach"),
-             ("contact_area", "Contact area"), ("mean_gap", "Mean gap")]
+    names = [("time", "Time")] if np.any(history["time"]) else []
+    names += [("pressure", "Mean pressure"), ("displacement", "Approach"),
+              ("contact_area", "Contact area"), ("mean_gap", "Mean gap")]
     moving = "friction" in history and np.any(history["friction"])
     if moving:
         names.append(("friction", "Friction"))
@@ -178,6 +179,8 @@ def _tiles(run: Run) -> str:
             names.append(("friction_viscous", "of it in the rubber"))
     if has_friction(run):
         names += [("stick_area", "Stick area"), ("sliding_speed", "Sliding speed")]
+    elif steady_rows(run)[-1]:
+        names.append(("sliding_speed", "Sliding speed"))
     tiles = "\n".join(f"<div><dt>{label}</dt><dd>{_last(run, name)}</dd></div>"
                       for name, label in names if name in history)
     step = f", step {history['step'][-1]}" if "step" in history else ""

@@ -16,6 +16,7 @@ from ..results.derived import (
     road_speed,
     solver_setting,
 )
+from ..results.steady import steady_speeds
 from .style import LABELS
 
 if TYPE_CHECKING:
@@ -61,7 +62,10 @@ class _Charts:
         self.columns: dict[str, FloatArray] = {name: np.asarray(history[name]) for name in (
             "step", "phase", "time", "pressure", "displacement", "contact_area", "friction")
             if name in history}
-        if history.rows >= 2 and "road_x" in history and "road_y" in history:
+        self.speeds = steady_speeds(run)
+        if self.speeds is not None:  # the road has no travel in steady states
+            self.columns["speed"] = self.speeds
+        elif history.rows >= 2 and "road_x" in history and "road_y" in history:
             moved = np.hypot(np.diff(history["road_x"]), np.diff(history["road_y"]))
             self.columns["travel"] = np.concatenate([[0.0], np.cumsum(moved)])
 
@@ -104,7 +108,7 @@ class _Charts:
         if self.rubbing:
             lines += self.series("stick_area", "sticking", 4, "6 3")
         self.chart("time", "contact_area", "Contact area", "Fraction of the grid", "1", lines)
-        if self.rubbing:
+        if self.rubbing and self.speeds is None:
             lines = self.series("sliding_speed", "mean of the interface", 0)
             if "road_x" in self.history:
                 lines += self.series("road_speed", "road against the block's top", 6, "2 3",

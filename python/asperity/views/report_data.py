@@ -96,19 +96,22 @@ def _numbers(values: NDArray[Any]) -> list[float | int | None]:
     return [float(f"{value:.10g}") if np.isfinite(value) else None for value in values.tolist()]
 
 
-def _axes(run: Run, columns: dict[str, FloatArray]) -> list[dict[str, str]]:
+def _axes(run: Run, columns: dict[str, FloatArray]) -> list[dict[str, Any]]:
     """Return the choices of the horizontal axis of the charts; the default is first."""
-    named = {"time": ("Time", "s"), "travel": ("Travel of the road", "m"),
-             "pressure": ("Mean pressure", "Pa"), "displacement": ("Approach", "m"),
-             "step": ("Step", "1")}
-    order = ["time", "travel", "pressure", "displacement", "step"]
+    named = {"speed": ("Sliding speed", "m/s"), "time": ("Time", "s"),
+             "travel": ("Travel of the road", "m"), "pressure": ("Mean pressure", "Pa"),
+             "displacement": ("Approach", "m"), "step": ("Step", "1")}
+    order = list(named)
     if travel(run) is not None:
         order.insert(0, "travel")
     found = []
     for name in dict.fromkeys(order):
-        if name in columns and run.history.rows and (
-                name == "step" or np.ptp(columns[name]) > 0.0):
-            found.append({"name": name, "label": named[name][0], "unit": named[name][1]})
+        if name not in columns or not run.history.rows:
+            continue
+        values = columns[name][np.isfinite(columns[name])]
+        if name == "step" or (values.size and np.ptp(values) > 0.0):
+            found.append({"name": name, "label": named[name][0], "unit": named[name][1],
+                          "log": name == "speed" and bool(values.max() >= 10.0 * values.min())})
     return found
 
 
@@ -147,13 +150,15 @@ def _snapshot(snapshot: Snapshot, block: int) -> dict[str, Any]:
     rows = np.flatnonzero(steps == snapshot.step)
     found: dict[str, Any] = {
         "step": snapshot.step, "time": snapshot.time, "phase": snapshot.phase,
-        "travel": None, "pressure": None, "displacement": None, "fields": {}}
+        "travel": None, "speed": None, "pressure": None, "displacement": None, "fields": {}}
     if len(rows):
         row = int(rows[0])
         for name in ("pressure", "displacement", "contact_area", "friction"):
             if name in run.history:
                 value = float(run.history[name][row])
                 found[name] = value if np.isfinite(value) else None
+        if "sliding_speed" in run.history:
+            found["speed"] = float(run.history["sliding_speed"][row]) or None
         if "road_x" in run.history and "road_y" in run.history:
             moved = np.hypot(np.diff(run.history["road_x"][:row + 1]),
                              np.diff(run.history["road_y"][:row + 1]))

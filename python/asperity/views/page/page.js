@@ -10,7 +10,7 @@ function historyCharts() {
     y: data.columns[line.column]}));
   const made = data.charts.map((chart) => [chart, new Chart(
     document.getElementById(`charts-${chart.section}`),
-    {...chart, series: series(chart), xLabel: axis.label, xUnit: axis.unit}, group)]);
+    {...chart, series: series(chart), xLabel: axis.label, xUnit: axis.unit, logX: axis.log}, group)]);
   const choice = document.getElementById("axis");
   if (data.axes.length > 1) {
     for (const each of data.axes) choice.append(html("option", {value: each.name}, each.label));
@@ -19,7 +19,7 @@ function historyCharts() {
       for (const [chart, drawn] of made) {
         drawn.range = null;
         drawn.cursor = null;
-        drawn.update(series(chart), {xLabel: axis.label, xUnit: axis.unit});
+        drawn.update(series(chart), {xLabel: axis.label, xUnit: axis.unit, logX: axis.log});
       }
       marks();
     });
@@ -195,7 +195,10 @@ function snapshots(show) {
   slider.value = slider.max;
   const set = () => {
     const snapshot = data.snapshots[Number(slider.value)];
-    const words = [`step ${snapshot.step}`, `t = ${shown(snapshot.time, "s")}`];
+    const words = [`step ${snapshot.step}`];
+    // Rows of static or steady states have no time.
+    if (snapshot.time) words.push(`t = ${shown(snapshot.time, "s")}`);
+    else if (snapshot.speed) words.push(`sliding speed ${shown(snapshot.speed, "m/s")}`);
     if (snapshot.pressure !== undefined && snapshot.pressure !== null) {
       words.push(`pressure ${shown(snapshot.pressure, "Pa")}`);
     }

@@ -1,0 +1,65 @@
+"""Films of a run."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from conftest import write_result
+from PIL import Image
+
+import asperity
+from asperity.__main__ import main
+from asperity.views.film import _animation, film
+
+
+@pytest.fixture(autouse=True)
+def close_figures():
+    yield
+    plt.close("all")
+
+
+def test_a_film_has_a_frame_for_each_snapshot(road, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["plot", str(road / "road.h5"), "--film", "-o", "road.gif"]) == 0
+    assert "wrote road.gif" in capsys.readouterr().out
+    run = asperity.open(road / "road.h5")
+    with Image.open("road.gif") as picture:
+        assert picture.n_frames == len(run.snapshots) >= 3
+        first = np.asarray(picture.convert("L"), dtype=float)
+        picture.seek(picture.n_frames - 1)
+        assert np.abs(np.asarray(picture.convert("L"), dtype=float) - first).max() > 50
+    assert main(["plot", str(road / "road.h5"), "--film", "pressure", "-o", "x.png"]) == 2
+    assert "must be .gif or .mp4" in capsys.readouterr().err
+
+
+def test_a_film_of_few_frames_is_slow_enough_to_be_seen(road, tmp_path):
+    run = asperity.open(road / "road.h5")
+    with Image.open(film(run, tmp_path / "slow.gif")) as picture:
+        assert picture.info["duration"] == 500
+    with Image.open(film(run, tmp_path / "fast.gif", frames_per_second=20.0)) as picture:
+        assert picture.info["duration"] == 50
+
+
+def test_frames_have_one_unit_of_time_and_one_scale(road):
+    run = asperity.open(road / "road.h5")
+    animation, figure = _animation(run, "gap")
+    panel, _, bar = figure.axes
+    titles, limits = [], set()
+    for number in range(len(run.snapshots)):
+        animation._func(number)
+        titles.append(panel.get_title())
+        limits.add(panel.images[0].get_clim())
+    assert titles == ["step 0, t = 0 µs", "step 32, t = 250 µs", "step 64, t = 500 µs"]
+    (ends,) = limits
+    gaps = np.stack([snapshot.gap for snapshot in run.snapshots]) * 1e6
+    np.testing.assert_allclose(ends, (gaps.min(), gaps.max()))
+    assert figure.get_suptitle() == run.title
+    assert bar.get_ylabel() == "gap (µm)"
+    animation._draw_was_started = True  # the frames were drawn by hand
+
+
+def test_the_colour_bar_is_as_tall_as_a_flat_map(tmp_path):
+    write_result(tmp_path / "flat.h5", nx=60, ny=12, lx=6e-3, ly=1.2e-3)
+    animation, figure = _animation(asperity.open(tmp_path / "flat.h5"), "gap")
+    panel, _, bar = (axes.get_window_extent().height for axes in figure.axes)
+    assert bar < 1.3 * panel
+    animation._draw_was_started = True
